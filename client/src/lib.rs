@@ -1,0 +1,2 @@
+//! Client sessions of contactd.
+#![forbid(unsafe_code)]

@@ -1,0 +1,171 @@
+//! What the search answers for a pair. Geometry does not fail: doubt is a value with its bracket.
+
+use glam::DVec3;
+
+/// What became of a pair over the step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// The surfaces meet within the step.
+    Contact,
+    /// They don't.
+    Clear,
+    /// Deeper than 2 delta at the start already.
+    Overlap,
+    /// The work limit ran out; `time_lower` is proven.
+    Undecided,
+}
+
+/// Which features meet, the less smooth one first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Kind {
+    FaceFace,
+    EdgeFace,
+    VertexFace,
+    EdgeEdge,
+    VertexEdge,
+    VertexVertex,
+}
+
+impl Kind {
+    /// From the number of active surfaces on each side: 1 face, 2 edge, 3 or more vertex.
+    pub fn of_active(a: usize, b: usize) -> Self {
+        match (a.max(b).clamp(1, 3), a.min(b).clamp(1, 3)) {
+            (1, _) => Kind::FaceFace,
+            (2, 1) => Kind::EdgeFace,
+            (2, _) => Kind::EdgeEdge,
+            (_, 1) => Kind::VertexFace,
+            (_, 2) => Kind::VertexEdge,
+            _ => Kind::VertexVertex,
+        }
+    }
+
+    /// The contract's word for it.
+    pub fn name(self) -> &'static str {
+        ["face-face", "edge-face", "vertex-face", "edge-edge", "vertex-edge", "vertex-vertex"][self as usize]
+    }
+}
+
+/// Whether the first contact is one point, a line or a patch of points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Extent {
+    Point,
+    Line,
+    Patch,
+}
+
+impl Extent {
+    /// The contract's word for it.
+    pub fn name(self) -> &'static str {
+        ["point", "line", "patch"][self as usize]
+    }
+}
+
+impl Status {
+    /// The contract's word for it.
+    pub fn name(self) -> &'static str {
+        ["contact", "clear", "overlap", "undecided"][self as usize]
+    }
+}
+
+/// Counted work of one query; sums are taken over a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Primitives of both trees before stage 1.
+    pub primitives: u64,
+    /// Primitives left after stage 1.
+    pub after_stage1: u64,
+    /// Pairs of octree nodes visited by the walk.
+    pub node_pairs: u64,
+    /// Candidate primitive pairs that stage 2 handed to stage 3.
+    pub candidates: u64,
+    /// Cells refined in stage 3.
+    pub cells: u64,
+    /// Clauses bounded.
+    pub clauses: u64,
+    /// Newton attempts.
+    pub newton: u64,
+    /// Whole-primitive closed forms used.
+    pub closed_forms: u64,
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, o: Self) {
+        self.primitives += o.primitives;
+        self.after_stage1 += o.after_stage1;
+        self.node_pairs += o.node_pairs;
+        self.candidates += o.candidates;
+        self.cells += o.cells;
+        self.clauses += o.clauses;
+        self.newton += o.newton;
+        self.closed_forms += o.closed_forms;
+    }
+}
+
+/// "No face" in `faces_a`, `faces_b`.
+pub const NO_FACE: u32 = u32::MAX;
+
+/// The answer for a pair (a, b). World frame; times are fractions of the step; normal from a to b.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// What became of the pair.
+    pub status: Status,
+    /// Before it no point is deeper than delta in both.
+    pub time_lower: f64,
+    /// Where the surfaces meet.
+    pub time: f64,
+    /// A verified witness of depth delta exists then.
+    pub time_upper: f64,
+    /// Separation at the start lies within the touching threshold.
+    pub touching: bool,
+    /// `time` could not be continued back from the witness and equals `time_upper`.
+    pub not_continued: bool,
+    /// A vertex met a vertex: the normal is the average of the adjacent normals.
+    pub averaged_normal: bool,
+    /// Contact (contact) or deepest (overlap) point. Meaningful for these two only.
+    pub point: DVec3,
+    /// Unit normal from a to b. Meaningful for contact and overlap.
+    pub normal: DVec3,
+    /// Signed separation at `time`: 0 at contact, negative depth at overlap; at the start for a touching clear pair.
+    pub separation: f64,
+    /// Approach speed along the normal at `time`, length per step, positive = approaching.
+    pub normal_speed: f64,
+    /// Which features meet.
+    pub kind: Kind,
+    /// How far the contact extends.
+    pub extent: Extent,
+    /// The resolution delta that was used.
+    pub resolution: f64,
+    /// Active faces of a, by face id within its model; `NO_FACE` fills.
+    pub faces_a: [u32; 3],
+    /// Active faces of b.
+    pub faces_b: [u32; 3],
+    /// Work done.
+    pub counters: Counters,
+}
+
+impl Outcome {
+    /// The answer "they don't meet".
+    pub fn clear(resolution: f64) -> Self {
+        Self {
+            status: Status::Clear,
+            time_lower: 1.0,
+            time: 1.0,
+            time_upper: 1.0,
+            touching: false,
+            not_continued: false,
+            averaged_normal: false,
+            point: DVec3::ZERO,
+            normal: DVec3::ZERO,
+            separation: 0.0,
+            normal_speed: 0.0,
+            kind: Kind::FaceFace,
+            extent: Extent::Point,
+            resolution,
+            faces_a: [NO_FACE; 3],
+            faces_b: [NO_FACE; 3],
+            counters: Counters::default(),
+        }
+    }
+}

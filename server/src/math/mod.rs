@@ -1,0 +1,25 @@
+//! Rigid motion's raw material: boxes, balls and the one place for numerical constants.
+//!
+//! Nothing here knows about solids. Floor 0: imports only `glam`.
+
+pub mod aabb;
+pub mod ball;
+pub mod tolerance;
+
+pub use aabb::Aabb;
+pub use ball::Ball;
+
+use glam::DVec3;
+
+/// A unit vector perpendicular to the unit vector `a`, always the same one for the same `a`.
+pub fn any_perpendicular(a: DVec3) -> DVec3 {
+    let m = a.abs();
+    let e = if m.x <= m.y && m.x <= m.z {
+        DVec3::X
+    } else if m.y <= m.z {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    (e - a * a.dot(e)).normalize()
+}

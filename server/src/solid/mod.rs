@@ -1,0 +1,16 @@
+//! Solids as they were designed: a tree of set operations over exact primitives.
+//!
+//! A primitive is an intersection of convex faces psi <= 0 (`face`), a solid is a tree of them (`tree`), and `f`
+//! (`classify`) is the tree's min/max: union = min, intersection = max, difference A - B = max(f_A, -f_B). f < 0 inside,
+//! > 0 outside, 1-Lipschitz.
+//!
+//! Floor 2: imports `math` and `proto`.
+
+pub mod classify;
+pub mod face;
+pub mod primitive;
+pub mod tree;
+
+pub use face::Face;
+pub use primitive::{Primitive, Shape};
+pub use tree::{Label, Node, NodeId, Op, Sense, Solid, SolidBuilder};

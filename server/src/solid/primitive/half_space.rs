@@ -1,0 +1,41 @@
+//! Half-space z <= 0: only as an operand that something bounded cuts down.
+
+use super::Geometry;
+use crate::math::{Aabb, Ball};
+use crate::solid::Face;
+use contactd_proto::Pose;
+use glam::DVec3;
+
+/// The half-space z <= 0 of its frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HalfSpace;
+
+impl Geometry for HalfSpace {
+    fn faces(&self) -> Vec<Face> {
+        vec![Face::Plane { normal: DVec3::Z, offset: 0.0 }]
+    }
+    fn face_name(&self, _: usize) -> String {
+        "plane".into()
+    }
+    fn aabb(&self, frame: &Pose) -> Aabb {
+        // Bounded only against an axis that the plane faces squarely.
+        let n = frame.vector(DVec3::Z);
+        let mut b = Aabb::ALL;
+        for k in 0..3 {
+            if n[k].abs() == 1.0 {
+                let at = frame.position[k];
+                if n[k] > 0.0 { b.max[k] = at } else { b.min[k] = at }
+            }
+        }
+        b
+    }
+    fn ball(&self) -> Ball {
+        Ball::ALL
+    }
+    fn smallest_dimension(&self) -> f64 {
+        f64::INFINITY
+    }
+    fn interior_point(&self) -> DVec3 {
+        -DVec3::Z
+    }
+}

@@ -1,0 +1,182 @@
+//! The CSG tree, in file order and in any arity, and its normal form without complements.
+
+use crate::math::Aabb;
+use crate::solid::{Face, Primitive, Shape};
+use contactd_proto::Pose;
+
+/// Index of a node in `Solid::nodes`; children come before their parents.
+pub type NodeId = u32;
+
+/// A set operation. Regularised: what has no volume is not part of the result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Op {
+    /// Points of any child.
+    Union,
+    /// Points of every child.
+    Intersection,
+    /// Points of the first child and of none of the others.
+    Difference,
+}
+
+/// A node of the tree.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Node {
+    /// Nothing at all (an empty group).
+    Empty,
+    /// A primitive, by its index in file order.
+    Primitive(u32),
+    /// An operation on its children, in order.
+    Op(Op, Vec<NodeId>),
+}
+
+/// How a primitive enters a solid: its volume (positive), or the complement of its volume (negative, subtracted).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sense {
+    /// The primitive's own volume.
+    Positive,
+    /// The complement of its volume.
+    Negative,
+}
+
+impl Sense {
+    /// The other one.
+    pub fn flipped(self) -> Self {
+        match self {
+            Sense::Positive => Sense::Negative,
+            Sense::Negative => Sense::Positive,
+        }
+    }
+}
+
+/// Where a primitive stands in its source.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Label {
+    /// The format's name of it: "sphere", "cylinder", "cube", "polyhedron" …
+    pub name: String,
+    /// 1-based line in the source; 0 when there is none.
+    pub line: u32,
+    /// 1-based column.
+    pub column: u32,
+}
+
+/// A solid: primitives in file order, and the tree over them. Immutable once built.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// Primitives in file order.
+    pub primitives: Vec<Primitive>,
+    /// Nodes, children before parents.
+    pub nodes: Vec<Node>,
+    /// Root node.
+    pub root: NodeId,
+    /// All faces, by id: those of primitive 0 first, in order.
+    pub faces: Vec<Face>,
+    /// The primitive that owns each face.
+    pub face_owner: Vec<u32>,
+    /// Sense of each primitive in this solid (every primitive stands at one leaf).
+    pub senses: Vec<Sense>,
+}
+
+impl Solid {
+    /// The box of the solid by the plain upward rule (no pruning); the bound floor does better.
+    pub fn aabb(&self) -> Aabb {
+        let mut boxes: Vec<Aabb> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            boxes.push(match node {
+                Node::Empty => Aabb::EMPTY,
+                Node::Primitive(p) => self.primitives[*p as usize].aabb,
+                Node::Op(op, children) => {
+                    let mut each = children.iter().map(|c| boxes[*c as usize]);
+                    match op {
+                        Op::Union => each.fold(Aabb::EMPTY, |a, b| a.union(&b)),
+                        Op::Intersection => each.fold(Aabb::ALL, |a, b| a.intersection(&b)),
+                        Op::Difference => each.next().unwrap_or(Aabb::EMPTY),
+                    }
+                }
+            });
+        }
+        boxes[self.root as usize]
+    }
+
+    /// True when nothing is left of it: the root is an empty node.
+    pub fn is_empty(&self) -> bool {
+        self.nodes[self.root as usize] == Node::Empty
+    }
+}
+
+/// Builds a solid bottom-up, primitives in file order.
+#[derive(Default, Debug)]
+pub struct SolidBuilder {
+    primitives: Vec<Primitive>,
+    nodes: Vec<Node>,
+    faces: u32,
+}
+
+impl SolidBuilder {
+    /// An empty builder.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds the next primitive in file order; returns its leaf.
+    pub fn primitive(&mut self, shape: impl Into<Shape>, frame: Pose, label: Label) -> NodeId {
+        let p = Primitive::new(shape.into(), frame, label, self.faces);
+        self.faces += p.faces.len() as u32;
+        self.primitives.push(p);
+        self.push(Node::Primitive(self.primitives.len() as u32 - 1))
+    }
+
+    /// Adds a node without points.
+    pub fn empty(&mut self) -> NodeId {
+        self.push(Node::Empty)
+    }
+
+    /// Adds an operation on existing nodes, each of which may be used once. Empty children and single operands are
+    /// folded away: ∅ ∪ A = A, ∅ ∩ A = ∅, A − ∅ = A, ∅ − A = ∅.
+    pub fn operation(&mut self, op: Op, children: &[NodeId]) -> NodeId {
+        let is_empty = |b: &Self, n: NodeId| b.nodes[n as usize] == Node::Empty;
+        let kept: Vec<NodeId> = match op {
+            Op::Union => children.iter().copied().filter(|c| !is_empty(self, *c)).collect(),
+            Op::Intersection if children.iter().any(|c| is_empty(self, *c)) => vec![],
+            Op::Intersection => children.to_vec(),
+            Op::Difference => match children.first() {
+                Some(first) if !is_empty(self, *first) => {
+                    let rest = children[1..].iter().copied().filter(|c| !is_empty(self, *c));
+                    std::iter::once(*first).chain(rest).collect()
+                }
+                _ => vec![],
+            },
+        };
+        match kept.as_slice() {
+            [] => self.empty(),
+            [one] => *one,
+            _ => self.push(Node::Op(op, kept)),
+        }
+    }
+
+    /// Finishes the solid with `root` on top.
+    pub fn finish(self, root: NodeId) -> Solid {
+        let mut senses = vec![Sense::Positive; self.primitives.len()];
+        let mut stack = vec![(root, Sense::Positive)];
+        while let Some((n, sense)) = stack.pop() {
+            match &self.nodes[n as usize] {
+                Node::Empty => {}
+                Node::Primitive(p) => senses[*p as usize] = sense,
+                Node::Op(op, children) => {
+                    for (i, c) in children.iter().enumerate() {
+                        let flip = *op == Op::Difference && i > 0;
+                        stack.push((*c, if flip { sense.flipped() } else { sense }));
+                    }
+                }
+            }
+        }
+        let faces = self.primitives.iter().flat_map(|p| p.faces.iter().copied()).collect();
+        let owners = self.primitives.iter().enumerate();
+        let face_owner = owners.flat_map(|(i, p)| std::iter::repeat_n(i as u32, p.faces.len())).collect();
+        Solid { primitives: self.primitives, nodes: self.nodes, root, faces, face_owner, senses }
+    }
+
+    fn push(&mut self, node: Node) -> NodeId {
+        self.nodes.push(node);
+        self.nodes.len() as NodeId - 1
+    }
+}
