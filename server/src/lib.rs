@@ -4,4 +4,5 @@
 pub mod contact;
 pub mod eco;
 pub mod math;
+pub mod motion;
 pub mod solid;

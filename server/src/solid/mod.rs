@@ -8,6 +8,7 @@
 
 pub mod classify;
 pub mod face;
+pub mod local;
 pub mod primitive;
 pub mod tree;
 

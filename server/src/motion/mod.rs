@@ -1,0 +1,7 @@
+//! A step's motion, seen from one body of a pair: relative positions, velocities and bounds on both.
+//!
+//! Floor 1: imports `math` and `proto`.
+
+pub mod relative;
+
+pub use relative::{Bounds, Instant, Placed, Relative};
