@@ -6,6 +6,8 @@
 
 pub mod motion;
 pub mod pose;
+pub mod rule;
 
 pub use motion::Motion;
 pub use pose::Pose;
+pub use rule::{Detect, InitialOverlap, Report, Rule};

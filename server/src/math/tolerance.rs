@@ -14,3 +14,17 @@ pub const SIMILARITY: f64 = 1e-5;
 /// A polyhedron this close to convex, relative to its size, is taken as the hull of its planes: single-precision
 /// sources leave faces non-planar by 1e-4.
 pub const CONVEXITY: f64 = 1e-4;
+
+/// Neighbouring faces of a polyhedron whose corners lie this close to one plane, relative to the polyhedron's size, are
+/// one face: six printed digits bend a triangulated face by this much.
+pub const COPLANAR: f64 = 1e-6;
+
+/// Deviations below this, relative to the size at hand, are rounding: nothing was snapped and no note is due.
+pub const ROUNDING: f64 = 1e-12;
+
+/// A frustum whose radii differ by less than this, relative to the larger one, is a cylinder: its apex would be so far
+/// away that the apex' own rounding spoils the lateral surface.
+pub const SAME_RADIUS: f64 = 1e-9;
+
+/// A quaternion whose squared length is this close to 1 is normalised; beyond that it is refused as a mistake.
+pub const QUATERNION: f64 = 1e-3;
