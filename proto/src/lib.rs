@@ -2,12 +2,28 @@
 //!
 //! Conventions: lengths in the models' unit, time within a step as a fraction 0..1, right-handed axes, `f64`
 //! everywhere, quaternions `x y z w`, rotations active (`world = pose.point(local)`).
+//!
+//! Everything that lies in shared memory is `repr(C)`, free of padding, enums and booleans, with its size asserted at
+//! compile time. Every field is written and read by its owner once; a reader copies what it branches on.
 #![forbid(unsafe_code)]
 
+pub mod contact_record;
+pub mod control;
+pub mod error;
 pub mod motion;
+pub mod names;
 pub mod pose;
+pub mod pose_record;
 pub mod rule;
+pub mod status;
+pub mod step;
+pub mod track;
 
+pub use contact_record::{ContactRecord, DetailSlot, PatchSlot};
+pub use error::ErrorCode;
 pub use motion::Motion;
 pub use pose::Pose;
+pub use pose_record::PoseRecord;
 pub use rule::{Detect, InitialOverlap, Report, Rule};
+pub use step::{StepReply, StepRequest};
+pub use track::Track;

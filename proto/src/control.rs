@@ -1,0 +1,315 @@
+//! Commands and answers of the control service. The only file that names bincode.
+//!
+//! Both sides bound what they decode by [`DECODE_LIMIT`], so a forged length cannot make them allocate.
+
+use crate::{Detect, ErrorCode, InitialOverlap, Motion, Pose, Report, Rule, Track};
+use bincode::{Decode, Encode, config};
+use glam::{DQuat, DVec3};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Most bytes that an encoded command or answer may have.
+pub const DECODE_LIMIT: usize = 80 << 20;
+
+/// A rule in bytes; its words as indices into their tables.
+#[derive(Clone, Debug, PartialEq, Encode, Decode)]
+pub struct WireRule {
+    between: [String; 2],
+    except: Vec<[String; 2]>,
+    words: [u8; 3],
+    margin: f64,
+    penetration: bool,
+    sensor: bool,
+}
+
+impl From<&Rule> for WireRule {
+    fn from(r: &Rule) -> Self {
+        Self {
+            between: r.between.clone(),
+            except: r.except.clone(),
+            words: [r.detect as u8, r.report as u8, r.initial_overlap as u8],
+            margin: r.margin,
+            penetration: r.penetration,
+            sensor: r.sensor,
+        }
+    }
+}
+
+impl WireRule {
+    /// The rule.
+    ///
+    /// # Errors
+    /// `BadRule` for a word that is not in its table.
+    pub fn checked(self) -> Result<Rule, ErrorCode> {
+        let [detect, report, overlap] = self.words.map(usize::from);
+        Ok(Rule {
+            between: self.between,
+            except: self.except,
+            detect: *Detect::ALL.get(detect).ok_or(ErrorCode::BadRule)?,
+            report: *Report::ALL.get(report).ok_or(ErrorCode::BadRule)?,
+            penetration: self.penetration,
+            margin: self.margin,
+            initial_overlap: *InitialOverlap::ALL.get(overlap).ok_or(ErrorCode::BadRule)?,
+            sensor: self.sensor,
+        })
+    }
+}
+
+/// How curved primitives of a model are taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Encode, Decode)]
+pub enum Facets {
+    /// Exact when `$fn` is 0 or at least 9, as written below that.
+    #[default]
+    Auto,
+    /// Always exact.
+    Exact,
+    /// Always the prism or polyhedron that `$fn` asks for.
+    AsWritten,
+}
+
+/// An object to be added to a session. Rotations are unit quaternions x, y, z, w.
+#[derive(Clone, Debug, PartialEq, Encode, Decode)]
+pub struct ObjectSpec {
+    /// Its id, larger than every id the session has seen.
+    pub id: u32,
+    /// Its model's id.
+    pub model: u32,
+    /// Its name, for the exceptions of rules.
+    pub name: String,
+    /// Its group, for rules.
+    pub group: String,
+    /// It never moves.
+    pub is_static: bool,
+    /// It may turn.
+    pub rotates: bool,
+    /// Largest speed of any of its points, length per second; infinite when nothing is declared.
+    pub max_speed: f64,
+    /// The model in the object's frame.
+    pub place: WirePose,
+    /// The object's pose before its first step.
+    pub pose: WirePose,
+}
+
+/// A pose in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Encode, Decode)]
+pub struct WirePose {
+    /// Position x, y, z.
+    pub position: [f64; 3],
+    /// Quaternion x, y, z, w.
+    pub rotation: [f64; 4],
+}
+
+impl From<Pose> for WirePose {
+    fn from(p: Pose) -> Self {
+        Self { position: p.position.to_array(), rotation: p.rotation.to_array() }
+    }
+}
+
+impl WirePose {
+    /// The pose, exactly these bits, if they are finite and of unit length.
+    ///
+    /// # Errors
+    /// `NotFinite`, `BadQuaternion`.
+    pub fn checked(&self) -> Result<Pose, ErrorCode> {
+        let position = DVec3::from_array(self.position);
+        if !position.is_finite() {
+            return Err(ErrorCode::NotFinite);
+        }
+        let unit = crate::pose_record::unit_quaternion(self.rotation)?;
+        let given = DQuat::from_array(self.rotation);
+        // A quaternion that a session once normalised must come back with the same bits.
+        let rotation = if (given.length_squared() - 1.0).abs() < 1e-14 { given } else { unit };
+        Ok(Pose::new(position, rotation))
+    }
+}
+
+/// An object's track in bytes, for the replay after a restart of the server.
+#[derive(Clone, Copy, Debug, PartialEq, Encode, Decode)]
+pub struct WireTrack {
+    /// Object id.
+    pub object: u32,
+    /// Pose before its last accepted step.
+    pub start: WirePose,
+    /// Displacement over that step.
+    pub velocity: [f64; 3],
+    /// Rotation vector over that step.
+    pub spin: [f64; 3],
+    /// Pose after it.
+    pub end: WirePose,
+}
+
+impl WireTrack {
+    /// Packs a track.
+    pub fn of(object: u32, track: &Track) -> Self {
+        Self {
+            object,
+            start: track.motion.start.into(),
+            velocity: track.motion.velocity.to_array(),
+            spin: track.motion.spin.to_array(),
+            end: track.end.into(),
+        }
+    }
+
+    /// Unpacks a track.
+    ///
+    /// # Errors
+    /// `NotFinite`, `BadQuaternion`.
+    pub fn checked(&self) -> Result<Track, ErrorCode> {
+        let velocity = DVec3::from_array(self.velocity);
+        let spin = DVec3::from_array(self.spin);
+        if !velocity.is_finite() || !spin.length_squared().is_finite() {
+            return Err(ErrorCode::NotFinite);
+        }
+        let motion = Motion { start: self.start.checked()?, velocity, spin };
+        Ok(Track { motion, end: self.end.checked()? })
+    }
+}
+
+/// What a client asks of the server beside steps.
+#[derive(Clone, Debug, PartialEq, Encode, Decode)]
+pub enum Command {
+    /// Opens a session.
+    Open {
+        /// Protocol version of the client.
+        version: u32,
+        /// The client's process id, and when that process started (clock ticks since boot).
+        process: (u32, u64),
+    },
+    /// Ends it.
+    Close,
+    /// Imports a model; other steps go on meanwhile.
+    LoadModel {
+        /// Its id, larger than every model id the session has seen.
+        model: u32,
+        /// Its name, for error sentences.
+        name: String,
+        /// OpenSCAD CSG text.
+        text: String,
+        /// How curved primitives are taken.
+        facets: Facets,
+    },
+    /// Adds an object.
+    AddObject(ObjectSpec),
+    /// Removes an object; its id is not used again.
+    RemoveObject(u32),
+    /// Replaces the session's rules.
+    SetRules(Vec<WireRule>),
+    /// The resolution of every pair; `None`: each pair its default.
+    SetResolution(Option<f64>),
+    /// Puts objects on the tracks they had (replay).
+    Restore(Vec<WireTrack>),
+}
+
+/// A face of a model, as the client may name it.
+#[derive(Clone, Debug, PartialEq, Eq, Encode, Decode)]
+pub struct FaceName {
+    /// Index of its primitive in file order.
+    pub primitive: u32,
+    /// The primitive's name in the format: "sphere", "cylinder" …
+    pub name: String,
+    /// The face's name: "side", "top" …
+    pub face: String,
+    /// The primitive is subtracted.
+    pub subtracted: bool,
+}
+
+/// The server's answer to a command.
+#[derive(Clone, Debug, PartialEq, Encode, Decode)]
+pub enum Answer {
+    /// A session is open.
+    Opened {
+        /// Its id.
+        session: u64,
+        /// Most records in a batch.
+        max_batch: u32,
+        /// How long its client should poll for a reply before it blocks, in nanoseconds.
+        spin_ns: u64,
+    },
+    /// A model is loaded; its faces by id, and what the import had to say.
+    Loaded {
+        /// Face id → name.
+        faces: Vec<FaceName>,
+        /// What was snapped or dropped.
+        warnings: Vec<String>,
+    },
+    /// Done.
+    Done,
+    /// Refused; nothing changed.
+    Refused {
+        /// Number of an error code.
+        code: u32,
+        /// Offending index within the command, or `u32::MAX`.
+        index: u32,
+        /// What exactly was wrong, when there is more to say than the code's sentence.
+        detail: String,
+    },
+}
+
+/// A command with its session (0 for `Open`).
+#[derive(Clone, Debug, PartialEq, Encode, Decode)]
+pub struct Envelope {
+    /// Epoch of the server that opened the session; 0 for `Open`.
+    pub epoch: u64,
+    /// The session.
+    pub session: u64,
+    /// The command.
+    pub command: Command,
+}
+
+/// Header of a control request and of its answer: the command's bytes follow as the payload.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct ControlHeader {
+    /// Protocol version.
+    pub version: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// Bytes of a command or an answer.
+///
+/// # Errors
+/// `LimitText` when they would be more than [`DECODE_LIMIT`].
+pub fn encode<T: Encode>(value: &T) -> Result<Vec<u8>, ErrorCode> {
+    let bytes = bincode::encode_to_vec(value, config::standard()).map_err(|_| ErrorCode::Internal)?;
+    if bytes.len() > DECODE_LIMIT { Err(ErrorCode::LimitText) } else { Ok(bytes) }
+}
+
+/// A command or an answer from its bytes, all of them.
+///
+/// # Errors
+/// `BadCommand` for anything that is not one.
+pub fn decode<T: Decode<()>>(bytes: &[u8]) -> Result<T, ErrorCode> {
+    let limited = config::standard().with_limit::<DECODE_LIMIT>();
+    match bincode::decode_from_slice(bytes, limited) {
+        Ok((value, used)) if used == bytes.len() => Ok(value),
+        _ => Err(ErrorCode::BadCommand),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_come_back_and_damage_is_refused() {
+        let rule = Rule { except: vec![["a".into(), "b".into()]], margin: 0.5, ..Rule::new(["x".into(), "y".into()]) };
+        assert_eq!(WireRule::from(&rule).checked(), Ok(rule.clone()));
+        let command = Envelope { epoch: 9, session: 3, command: Command::SetRules(vec![WireRule::from(&rule)]) };
+        let bytes = encode(&command).unwrap();
+        assert_eq!(decode::<Envelope>(&bytes), Ok(command));
+        for cut in 0..bytes.len() {
+            assert_eq!(decode::<Envelope>(&bytes[..cut]), Err(ErrorCode::BadCommand), "cut at {cut}");
+        }
+        let mut longer = bytes.clone();
+        longer.push(0);
+        assert_eq!(decode::<Envelope>(&longer), Err(ErrorCode::BadCommand));
+    }
+
+    #[test]
+    fn a_forged_length_does_not_allocate() {
+        // Envelope { 0, 0, LoadModel { 0, name: 2^60 bytes … } }
+        let mut bytes = vec![0, 0, 2, 0, 253];
+        bytes.extend((1u64 << 60).to_le_bytes());
+        assert_eq!(decode::<Envelope>(&bytes), Err(ErrorCode::BadCommand));
+    }
+}

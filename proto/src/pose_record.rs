@@ -1,0 +1,138 @@
+//! The 64-byte record by which a client moves one object over a step.
+//!
+//! Invariant: a record that decodes holds finite numbers and a unit quaternion. It does not promise that the object
+//! exists: that is the session's to know.
+
+use crate::{ErrorCode, Pose};
+use glam::{DQuat, DVec3};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Position and rotation are the pose at the end of the step, reached the shortest way.
+pub const END: u32 = 1;
+/// Position is where the origin ends, rotation[0..3] the rotation vector over the step (world axes, radians).
+pub const TURN: u32 = 2;
+/// The pose is set before the step starts, without motion. May stand beside an END or TURN of the same object.
+pub const START: u32 = 4;
+
+/// How far the squared norm of a quaternion may be off 1; such are normalised, others refused.
+pub const QUATERNION_TOLERANCE: f64 = 1e-3;
+
+/// One object's motion, as it lies in shared memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct PoseRecord {
+    /// Object id of the session.
+    pub object: u32,
+    /// Exactly one of [`END`], [`TURN`], [`START`].
+    pub flags: u32,
+    /// Position x, y, z of the object's origin in the world.
+    pub position: [f64; 3],
+    /// Quaternion x, y, z, w; for [`TURN`] the rotation vector and a zero.
+    pub rotation: [f64; 4],
+}
+
+const _: () = assert!(size_of::<PoseRecord>() == 64 && align_of::<PoseRecord>() == 8);
+const _: () = assert!(std::mem::offset_of!(PoseRecord, position) == 8);
+const _: () = assert!(std::mem::offset_of!(PoseRecord, rotation) == 32);
+
+/// What a valid record asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// Set the pose before the step.
+    Start(Pose),
+    /// Move to this pose the shortest way.
+    End(Pose),
+    /// Move the origin there, turning by a rotation vector.
+    Turn(DVec3, DVec3),
+}
+
+impl PoseRecord {
+    /// The object moves to `pose` the shortest way.
+    pub fn end(object: u32, pose: &Pose) -> Self {
+        Self::of_pose(object, END, pose)
+    }
+
+    /// The object is put at `pose` before the step.
+    pub fn start(object: u32, pose: &Pose) -> Self {
+        Self::of_pose(object, START, pose)
+    }
+
+    /// The object's origin moves to `position` while it turns by `rotation_vector` (world axes, radians).
+    pub fn turn(object: u32, position: DVec3, rotation_vector: DVec3) -> Self {
+        let [x, y, z] = rotation_vector.to_array();
+        Self { object, flags: TURN, position: position.to_array(), rotation: [x, y, z, 0.0] }
+    }
+
+    fn of_pose(object: u32, flags: u32, pose: &Pose) -> Self {
+        Self { object, flags, position: pose.position.to_array(), rotation: pose.rotation.to_array() }
+    }
+
+    /// Checks the numbers of a record (pass a copy when it lies in shared memory).
+    ///
+    /// # Errors
+    /// `BadCount` for flags out of the protocol, `NotFinite`, `BadQuaternion`.
+    pub fn decode(&self) -> Result<Order, ErrorCode> {
+        let position = DVec3::from_array(self.position);
+        if !position.is_finite() || self.rotation.iter().any(|c| !c.is_finite()) {
+            return Err(ErrorCode::NotFinite);
+        }
+        match self.flags {
+            TURN => {
+                let [x, y, z, _] = self.rotation;
+                let vector = DVec3::new(x, y, z);
+                if !vector.length_squared().is_finite() {
+                    return Err(ErrorCode::NotFinite);
+                }
+                Ok(Order::Turn(position, vector))
+            }
+            END => Ok(Order::End(Pose::new(position, unit_quaternion(self.rotation)?))),
+            START => Ok(Order::Start(Pose::new(position, unit_quaternion(self.rotation)?))),
+            _ => Err(ErrorCode::BadCount),
+        }
+    }
+}
+
+/// A quaternion x, y, z, w normalised, if its squared norm is within [`QUATERNION_TOLERANCE`] of 1.
+///
+/// # Errors
+/// `NotFinite`, `BadQuaternion`.
+pub fn unit_quaternion(q: [f64; 4]) -> Result<DQuat, ErrorCode> {
+    let q = DQuat::from_array(q);
+    if !q.is_finite() {
+        return Err(ErrorCode::NotFinite);
+    }
+    if (q.length_squared() - 1.0).abs() > QUATERNION_TOLERANCE {
+        return Err(ErrorCode::BadQuaternion);
+    }
+    Ok(q.normalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_numbers_are_refused_by_name() {
+        let good = PoseRecord::end(1, &Pose::at(DVec3::X));
+        assert!(good.decode().is_ok());
+        let table = [
+            (PoseRecord { position: [f64::NAN, 0.0, 0.0], ..good }, ErrorCode::NotFinite),
+            (PoseRecord { position: [0.0, f64::INFINITY, 0.0], ..good }, ErrorCode::NotFinite),
+            (PoseRecord { rotation: [f64::NAN, 0.0, 0.0, 1.0], ..good }, ErrorCode::NotFinite),
+            (PoseRecord { rotation: [0.0; 4], ..good }, ErrorCode::BadQuaternion),
+            (PoseRecord { rotation: [0.0, 0.0, 0.0, 1.001], ..good }, ErrorCode::BadQuaternion),
+            (PoseRecord { flags: 0, ..good }, ErrorCode::BadCount),
+            (PoseRecord { flags: END | START, ..good }, ErrorCode::BadCount),
+            (PoseRecord { flags: TURN, rotation: [1e200; 4], ..good }, ErrorCode::NotFinite),
+        ];
+        for (record, code) in table {
+            assert_eq!(record.decode(), Err(code), "{record:?}");
+        }
+    }
+
+    #[test]
+    fn a_rough_quaternion_is_normalised() {
+        let rough = PoseRecord { rotation: [0.0, 0.0, 0.0, 1.0004], ..PoseRecord::end(1, &Pose::IDENTITY) };
+        assert_eq!(rough.decode(), Ok(Order::End(Pose::IDENTITY)));
+    }
+}
