@@ -1,6 +1,7 @@
 //! contactd: earliest contact of moving CSG solids.
 #![forbid(unsafe_code)]
 
+pub mod bound;
 pub mod contact;
 pub mod eco;
 pub mod math;

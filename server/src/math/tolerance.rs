@@ -28,3 +28,17 @@ pub const SAME_RADIUS: f64 = 1e-9;
 
 /// A quaternion whose squared length is this close to 1 is normalised; beyond that it is refused as a mistake.
 pub const QUATERNION: f64 = 1e-3;
+
+/// Relative outward rounding of bounds: a rule on boxes or balls does a dozen operations, each off by half an ulp.
+pub const OUTWARD: f64 = 32.0 * f64::EPSILON;
+
+/// S-bounds are stable once no bound shrinks by more than this fraction in a round: what is left to gain by going on is
+/// less than that.
+pub const BOUND_PROGRESS: f64 = 1e-3;
+
+/// Depth, as a fraction of a model's bounding radius, up to which its S-bounds and octree keep f exactly: far above
+/// every sensible resolution (also that of a partner ten thousand times larger), far below every voxel.
+pub const MODEL_MARGIN: f64 = 1e-5;
+
+/// Relative rounding of a point carried through a few rotations and translations.
+pub const CARRIED: f64 = 64.0 * f64::EPSILON;

@@ -3,5 +3,7 @@
 //! Floor 1: imports `math` and `proto`.
 
 pub mod relative;
+pub mod sweep;
 
 pub use relative::{Bounds, Instant, Placed, Relative};
+pub use sweep::Sweep;

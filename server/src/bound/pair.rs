@@ -1,0 +1,240 @@
+//! Stage 1 for a pair: the collision region, by the rules of S-bounds on the tree A ∩ B over the motion of a step.
+//!
+//! The root of A ∩ B hands each of its two operands the bound of the other one, swept over the motion and seen in its own
+//! model frame; below that the downward and the upward rule run as in a single tree, until the root settles. If it comes
+//! out empty the two cannot meet; otherwise both trees are taken apart again and hold only what can take part.
+//!
+//! One descent does both rules: it hands a node the box that matters (downward), returns the box of what is left of it
+//! (upward), and an intersection's or difference's operands see what is left of the others at once. Subtrees inside the
+//! box need no rule and cost nothing. Nodes whose bound misses the box die.
+//!
+//! Invariant: at every point of `Pruned::aabb`, f with dead nodes at +infinity equals f clamped to ±margin; outside the
+//! two boxes (each in its own frame) no time of the span brings max(f_A, f_B) to the margin or below.
+//! Not promised: time within the span; a long span is best cut by the caller.
+
+use super::SBounds;
+use crate::math::{Aabb, tolerance::BOUND_PROGRESS};
+use crate::motion::{Placed, Sweep};
+use crate::solid::{Node, NodeId, Op, Solid};
+use glam::DVec3;
+
+/// Cap on how often the two sides clip each other. Each round costs two sweeps; the third rarely gains 1%.
+const MAX_ROUNDS: usize = 4;
+
+/// One side of a pair: a model's tree, its bounds, and its motion.
+#[derive(Clone, Copy, Debug)]
+pub struct Side<'a> {
+    /// The tree.
+    pub solid: &'a Solid,
+    /// Its S-bounds.
+    pub bounds: &'a SBounds,
+    /// Where the model stands and how it moves.
+    pub placed: Placed,
+}
+
+/// What of a tree can take part in a collision.
+#[derive(Clone, Debug)]
+pub struct Pruned {
+    /// Box of it, own model frame.
+    pub aabb: Aabb,
+    /// A bit per node of the tree.
+    alive: Vec<u64>,
+    /// A bit per primitive.
+    alive_primitives: Vec<u64>,
+    /// Number of primitives that are left.
+    pub primitives: usize,
+    /// Number of primitives of the whole tree.
+    pub primitives_before: usize,
+}
+
+/// The collision region of a pair.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// What of A can take part.
+    pub a: Pruned,
+    /// What of B can take part.
+    pub b: Pruned,
+}
+
+/// Locates the collision region of a pair over [t0, t1] of its step; `None` when they cannot come closer than `margin`
+/// to a common point (max(f_A, f_B) > margin everywhere). `margin` (a length) may not exceed the margin of either
+/// side's bounds, otherwise those are taken anew for it.
+pub fn locate(a: &Side, b: &Side, t0: f64, t1: f64, margin: f64) -> Option<Region> {
+    let wide = |s: &Side| (margin > s.bounds.margin()).then(|| SBounds::new(s.solid, margin));
+    let (wide_a, wide_b) = (wide(a), wide(b));
+    let bounds_a = wide_a.as_ref().unwrap_or(a.bounds);
+    let bounds_b = wide_b.as_ref().unwrap_or(b.bounds);
+    let a_from_b = Sweep::new(b.placed, a.placed);
+    let b_from_a = Sweep::new(a.placed, b.placed);
+
+    let swept = |s: &Sweep, bounds: &SBounds, aabb: &Aabb| {
+        // The ball as a whole and what is left of the box: both hold the mover, each is the better one at times.
+        s.of_box(aabb, t0, t1).intersection(&s.of_ball(&bounds.root().ball, t0, t1))
+    };
+    let mut box_a = bounds_a.root().aabb;
+    let mut box_b = bounds_b.root().aabb;
+    for _ in 0..MAX_ROUNDS {
+        let (was_a, was_b) = (box_a, box_b);
+        box_a = descend(a.solid, bounds_a, &box_a.intersection(&swept(&a_from_b, bounds_b, &box_b)), None);
+        box_b = descend(b.solid, bounds_b, &box_b.intersection(&swept(&b_from_a, bounds_a, &box_a)), None);
+        if box_a.is_empty() || box_b.is_empty() {
+            return None;
+        }
+        if !(shrank(&box_a, &was_a) || shrank(&box_b, &was_b)) {
+            break;
+        }
+    }
+    Some(Region { a: Pruned::within(a.solid, bounds_a, box_a)?, b: Pruned::within(b.solid, bounds_b, box_b)? })
+}
+
+impl Pruned {
+    /// What of a tree lies in `region` (own model frame); `None` when nothing does.
+    pub fn within(solid: &Solid, bounds: &SBounds, region: Aabb) -> Option<Self> {
+        let mut alive = Alive {
+            nodes: vec![0; solid.nodes.len().div_ceil(64)],
+            primitives: vec![0; solid.primitives.len().div_ceil(64)],
+        };
+        let aabb = descend(solid, bounds, &region, Some(&mut alive));
+        if aabb.is_empty() {
+            return None;
+        }
+        let primitives = alive.primitives.iter().map(|w| w.count_ones() as usize).sum();
+        let (alive, alive_primitives) = (alive.nodes, alive.primitives);
+        Some(Self { aabb, alive, alive_primitives, primitives, primitives_before: solid.primitives.len() })
+    }
+
+    /// Everything that the bounds leave of the tree, without a partner: stage 1 switched off.
+    pub fn whole(solid: &Solid, bounds: &SBounds) -> Option<Self> {
+        Self::within(solid, bounds, bounds.root().aabb)
+    }
+
+    /// False when the node contributes nothing in the region.
+    pub fn node_alive(&self, n: NodeId) -> bool {
+        bit(&self.alive, n)
+    }
+
+    /// False when the primitive contributes nothing in the region.
+    pub fn primitive_alive(&self, p: u32) -> bool {
+        bit(&self.alive_primitives, p)
+    }
+
+    /// f of the pruned tree at `x` (model frame): dead nodes are +infinity.
+    pub fn value(&self, solid: &Solid, x: DVec3) -> f64 {
+        self.value_of(solid, solid.root, x)
+    }
+
+    fn value_of(&self, solid: &Solid, n: NodeId, x: DVec3) -> f64 {
+        if !self.node_alive(n) {
+            return f64::INFINITY;
+        }
+        match &solid.nodes[n as usize] {
+            Node::Empty => f64::INFINITY,
+            Node::Primitive(p) => solid.primitives[*p as usize].value(x),
+            Node::Op(op, children) => {
+                let mut values = children.iter().map(|c| self.value_of(solid, *c, x));
+                match op {
+                    Op::Union => values.fold(f64::INFINITY, f64::min),
+                    Op::Intersection => values.fold(f64::NEG_INFINITY, f64::max),
+                    Op::Difference => {
+                        let first = values.next().unwrap_or(f64::INFINITY);
+                        values.fold(first, |m, v| m.max(-v))
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Marks of what is left.
+struct Alive {
+    nodes: Vec<u64>,
+    primitives: Vec<u64>,
+}
+
+fn bit(words: &[u64], i: u32) -> bool {
+    words[i as usize / 64] >> (i % 64) & 1 == 1
+}
+
+fn set(words: &mut [u64], i: u32) {
+    words[i as usize / 64] |= 1 << (i % 64);
+}
+
+fn shrank(now: &Aabb, was: &Aabb) -> bool {
+    let (e, f) = (now.max - now.min, was.max - was.min);
+    (0..3).any(|k| e[k] < f[k] * (1.0 - BOUND_PROGRESS))
+}
+
+/// The box of what is left of the tree inside `clip`, and marks for it.
+fn descend(solid: &Solid, bounds: &SBounds, clip: &Aabb, marks: Option<&mut Alive>) -> Aabb {
+    if clip.is_empty() {
+        return Aabb::EMPTY;
+    }
+    let left = left_of(solid, bounds, solid.root, clip);
+    if let (Some(marks), false) = (marks, left.is_empty()) {
+        mark(solid, bounds, solid.root, &left, marks);
+    }
+    left
+}
+
+/// What is left of node `n` inside `clip`: both rules below `n`, without marks.
+fn left_of(solid: &Solid, bounds: &SBounds, n: NodeId, clip: &Aabb) -> Aabb {
+    let bound = bounds.node(n);
+    if bound.is_empty() || bound.ball.misses(clip) {
+        return Aabb::EMPTY;
+    }
+    let b = bound.aabb.intersection(clip);
+    if b.is_empty() || b == bound.aabb {
+        return b;
+    }
+    match &solid.nodes[n as usize] {
+        Node::Empty => Aabb::EMPTY,
+        Node::Primitive(_) => b,
+        Node::Op(Op::Union, children) => {
+            let mut hull = Aabb::EMPTY;
+            for c in children {
+                if hull == b {
+                    break;
+                }
+                hull = hull.union(&left_of(solid, bounds, *c, &b));
+            }
+            hull
+        }
+        Node::Op(Op::Intersection, children) => {
+            // Each operand clips the next one; once more round when the last ones clipped the first ones.
+            let mut left = b;
+            for _ in 0..2 {
+                let before = left;
+                for c in children {
+                    left = left_of(solid, bounds, *c, &left);
+                    if left.is_empty() {
+                        return Aabb::EMPTY;
+                    }
+                }
+                if left == before {
+                    break;
+                }
+            }
+            left
+        }
+        Node::Op(Op::Difference, children) => left_of(solid, bounds, children[0], &b),
+    }
+}
+
+/// Marks what counts of node `n` inside `clip`, which holds something of it.
+fn mark(solid: &Solid, bounds: &SBounds, n: NodeId, clip: &Aabb, marks: &mut Alive) {
+    set(&mut marks.nodes, n);
+    match &solid.nodes[n as usize] {
+        Node::Empty => {}
+        Node::Primitive(p) => set(&mut marks.primitives, *p),
+        Node::Op(op, children) => {
+            for (i, c) in children.iter().enumerate() {
+                let left = left_of(solid, bounds, *c, clip);
+                if !left.is_empty() {
+                    // Operands of an intersection, and the first of a difference, count in the whole of it.
+                    let all = *op == Op::Intersection || (*op == Op::Difference && i == 0);
+                    mark(solid, bounds, *c, if all { clip } else { &left }, marks);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! One bound: a ball and a box that hold the same points, and the rules that join bounds under set operations.
+//!
+//! A bound is an upper estimate: every rule's result holds the exact result of its operation on whatever its operands
+//! hold, rounding included. Rules never make a bound larger than what box and ball rules give by themselves.
+
+use crate::math::{Aabb, Ball, tolerance::OUTWARD};
+use crate::solid::{Op, Primitive};
+use glam::DVec3;
+
+/// A ball and a box around the same points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    /// Axis-aligned box, model frame.
+    pub aabb: Aabb,
+    /// Ball, model frame.
+    pub ball: Ball,
+}
+
+impl Bound {
+    /// The bound of nothing.
+    pub const EMPTY: Self = Self { aabb: Aabb::EMPTY, ball: Ball::EMPTY };
+    /// The bound of everything.
+    pub const ALL: Self = Self { aabb: Aabb::ALL, ball: Ball::ALL };
+
+    /// The bound of a box.
+    pub fn of_box(b: Aabb) -> Self {
+        Self { aabb: b, ball: Ball::of_box(&b) }
+    }
+
+    /// The bound of {psi <= margin} for a primitive.
+    ///
+    /// psi is convex and psi(c) = −rho at an interior point c. So y with psi(y) <= margin lies on the ray from c through
+    /// a point x of the primitive with |y−c| <= (1 + margin/rho)|x−c|: scaling the primitive's own bounds about c by
+    /// 1 + margin/rho bounds the dilated set, whatever the primitive.
+    pub fn of_primitive(p: &Primitive, margin: f64) -> Self {
+        let c = p.frame.point(p.shape.geometry().interior_point());
+        let rho = -p.value(c);
+        let reach = if margin > 0.0 { margin / rho } else { 0.0 };
+        if !(rho > 0.0 && reach.is_finite()) {
+            return Self::ALL;
+        }
+        let outward = |x: DVec3, sign: f64| {
+            // x + reach·(x − c), with the rounding of the primitive's own box on top; infinite sides stay so.
+            let y = x + (x - c) * reach + (x.abs() + c.abs()) * (sign * OUTWARD);
+            DVec3::select(x.is_finite_mask(), y, x)
+        };
+        let aabb = Aabb { min: outward(p.aabb.min, -1.0), max: outward(p.aabb.max, 1.0) };
+        let center = p.ball.center + (p.ball.center - c) * reach;
+        let radius =
+            p.ball.radius * ((1.0 + reach) * (1.0 + OUTWARD)) + (p.ball.center.abs() + c.abs()).max_element() * OUTWARD;
+        Self { aabb, ball: Ball { center, radius } }.tightened()
+    }
+
+    /// True when it holds no point.
+    pub fn is_empty(&self) -> bool {
+        self.aabb.is_empty() || self.ball.is_empty()
+    }
+
+    /// True when box and ball are finite.
+    pub fn is_finite(&self) -> bool {
+        self.aabb.is_finite() && self.ball.radius.is_finite()
+    }
+
+    /// Box and ball each tightened by the other; empty when they miss each other.
+    pub fn tightened(self) -> Self {
+        if self.is_empty() || self.ball.misses(&self.aabb) {
+            return Self::EMPTY;
+        }
+        let aabb = self.aabb.intersection(&self.ball.aabb());
+        if aabb.is_empty() {
+            return Self::EMPTY;
+        }
+        let around = Ball::of_box(&aabb);
+        let ball = if around.radius < self.ball.radius { around } else { self.ball };
+        Self { aabb, ball }
+    }
+
+    /// A bound of what both hold.
+    pub fn intersection(&self, other: &Self) -> Self {
+        let aabb = self.aabb.intersection(&other.aabb);
+        Self { aabb, ball: self.ball.intersection(&other.ball) }.tightened()
+    }
+
+    /// A bound of what either holds.
+    pub fn union(&self, other: &Self) -> Self {
+        if self.is_empty() {
+            return *other;
+        }
+        if other.is_empty() {
+            return *self;
+        }
+        Self { aabb: self.aabb.union(&other.aabb), ball: self.ball.union(&other.ball) }.tightened()
+    }
+
+    /// The upward rule: a bound of an operation's result from the bounds of its operands, in order.
+    pub fn upward(op: Op, mut operands: impl Iterator<Item = Bound>) -> Self {
+        match op {
+            Op::Union => operands.fold(Self::EMPTY, |a, b| a.union(&b)),
+            Op::Intersection => operands.fold(Self::ALL, |a, b| a.intersection(&b)),
+            Op::Difference => operands.next().unwrap_or(Self::EMPTY),
+        }
+    }
+
+    /// A bound with the smaller box of the two and the smaller ball, both of which must hold the same points.
+    pub fn smaller(&self, other: &Self) -> Self {
+        let ball = if other.ball.radius < self.ball.radius { other.ball } else { self.ball };
+        Self { aabb: self.aabb.intersection(&other.aabb), ball }.tightened()
+    }
+
+    /// True when `self` is smaller than `before` by more than the fraction `progress`, or newly empty or finite.
+    pub fn shrank_from(&self, before: &Self, progress: f64) -> bool {
+        if self.is_empty() {
+            return !before.is_empty();
+        }
+        let extent = |b: &Aabb| b.max - b.min;
+        let (e, f) = (extent(&self.aabb), extent(&before.aabb));
+        let less = |now: f64, was: f64| now < was * (1.0 - progress) || (now.is_finite() && !was.is_finite());
+        less(self.ball.radius, before.ball.radius) || (0..3).any(|k| less(e[k], f[k]))
+    }
+}

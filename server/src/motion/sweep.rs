@@ -1,0 +1,119 @@
+//! Where a moving box or ball can be, seen from another moving body, over a span of time.
+//!
+//! A point fixed in the mover, at distance X or less from the mover's centre of rotation, moves against the observer with
+//! speed at most V and acceleration at most Acc (`Relative::bounds`):
+//!
+//! ```text
+//! V   = max over the span's ends of |v0 − spin_o×d| + |omega|·X
+//! Acc = (|omega|² + |omega×spin_o|)·X + |spin_o|·max over the ends of |spin_o×d − 2 v0|
+//! ```
+//!
+//! On a piece of length h the point stays within min(V·h/2, Acc·h²/8) of the chord between its places at the piece's
+//! ends; the chord lies in the box of both places. A box is the hull of its corners, so the swept box is the union over
+//! the pieces of (box at the one end ∪ box at the other), grown by that much. Two more bounds hold at once, whatever the
+//! spins (whole turns included), and are intersected: the path of the mover's centre of rotation grown by X, and the
+//! ball of radius max |d| + X around the observer's centre of rotation.
+//!
+//! Not promised: the smallest box. The number of pieces is bounded, so many whole turns of the observer leave the ball.
+
+use super::{Placed, Relative};
+use crate::math::{Aabb, Ball, tolerance::CARRIED};
+use glam::DVec3;
+
+/// A piece turns by no more than this angle (radians) unless `MAX_PIECES` says otherwise: the growth Acc·h²/8 is then
+/// below 1% of X.
+const PIECE_ANGLE: f64 = 0.25;
+
+/// Pieces at most: two whole turns at `PIECE_ANGLE`.
+const MAX_PIECES: f64 = 48.0;
+
+/// The motion of a mover's model as an observer's model frame sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep {
+    relative: Relative,
+    /// The mover's centre of rotation, mover's model frame.
+    mover_center: DVec3,
+    /// The observer's centre of rotation, observer's model frame.
+    observer_center: DVec3,
+    spin: f64,
+    observer_spin: f64,
+}
+
+impl Sweep {
+    /// The motion of `mover` in the model frame of `observer`.
+    pub fn new(mover: Placed, observer: Placed) -> Self {
+        let relative = Relative::new(mover, observer);
+        Self {
+            relative,
+            mover_center: relative.center_a(),
+            observer_center: Relative::new(observer, mover).center_a(),
+            spin: (mover.motion.spin - observer.motion.spin).length(),
+            observer_spin: observer.motion.spin.length(),
+        }
+    }
+
+    /// A box around a box of the mover's model frame over [t0, t1], in the observer's model frame.
+    pub fn of_box(&self, b: &Aabb, t0: f64, t1: f64) -> Aabb {
+        if b.is_empty() {
+            return Aabb::EMPTY;
+        }
+        if !b.is_finite() {
+            return Aabb::ALL;
+        }
+        let (c, e) = (b.center(), b.half());
+        // Farthest corner from the centre of rotation.
+        let x = ((c - self.mover_center).abs() + e).length();
+        let swept = self.pieces(x, t0, t1, |at| {
+            let m = at.b_from_a;
+            let half = m.x_axis.abs() * e.x + m.y_axis.abs() * e.y + m.z_axis.abs() * e.z;
+            Aabb::around(at.b_point(c), half)
+        });
+        let center = self.pieces(0.0, t0, t1, |at| Aabb::of_points([at.b_point(self.mover_center)])).grown(x);
+        self.finished(swept.intersection(&center), x, t0, t1)
+    }
+
+    /// A box around a ball of the mover's model frame over [t0, t1], in the observer's model frame.
+    pub fn of_ball(&self, ball: &Ball, t0: f64, t1: f64) -> Aabb {
+        if ball.is_empty() {
+            return Aabb::EMPTY;
+        }
+        if !ball.radius.is_finite() {
+            return Aabb::ALL;
+        }
+        let x = (ball.center - self.mover_center).length();
+        let path = self.pieces(x, t0, t1, |at| Aabb::of_points([at.b_point(ball.center)]));
+        let center = self.pieces(0.0, t0, t1, |at| Aabb::of_points([at.b_point(self.mover_center)])).grown(x);
+        self.finished(path.intersection(&center).grown(ball.radius), x + ball.radius, t0, t1)
+    }
+
+    /// The union over the pieces of [t0, t1] of the boxes at both ends, grown by what lies between; `x` bounds the
+    /// distance of the swept points from the mover's centre of rotation.
+    fn pieces(&self, x: f64, t0: f64, t1: f64, box_at: impl Fn(&super::Instant) -> Aabb) -> Aabb {
+        let turn = (if x > 0.0 { self.spin } else { 0.0 } + self.observer_spin) * (t1 - t0);
+        let count = (turn / PIECE_ANGLE).ceil().clamp(1.0, MAX_PIECES);
+        let h = (t1 - t0) / count;
+        let mut before = box_at(&self.relative.at(t0));
+        let mut swept = Aabb::EMPTY;
+        for i in 0..count as usize {
+            let (s, e) = (t0 + h * i as f64, if i + 1 == count as usize { t1 } else { t0 + h * (i + 1) as f64 });
+            let after = box_at(&self.relative.at(e));
+            let b = self.relative.bounds(s, e - s, x);
+            let acceleration = (b.omega * b.omega + b.cross) * x + self.observer_spin * b.swing;
+            let grow = (0.5 * b.speed * (e - s)).min(0.125 * acceleration * (e - s) * (e - s));
+            swept = swept.union(&before.union(&after).grown(grow));
+            before = after;
+        }
+        swept
+    }
+
+    /// Clipped by the ball around the observer's centre of rotation, and grown by the rounding of carried points
+    /// (angles round in proportion to themselves).
+    fn finished(&self, swept: Aabb, x: f64, t0: f64, t1: f64) -> Aabb {
+        let far = self.relative.difference(t0).length().max(self.relative.difference(t1).length());
+        let reach = far + x;
+        let scale = reach + self.mover_center.length() + self.observer_center.length();
+        let turn = 1.0 + self.spin + self.observer_spin;
+        let ball = Aabb::around(self.observer_center, DVec3::splat(reach));
+        swept.intersection(&ball).grown(scale * turn * CARRIED)
+    }
+}
