@@ -6,4 +6,5 @@ pub mod contact;
 pub mod eco;
 pub mod math;
 pub mod motion;
+pub mod picture;
 pub mod solid;

@@ -1,0 +1,10 @@
+//! Pictures that the program draws of its own data: placed solids with their contacts, trees with bounds, octree slices.
+//!
+//! `ray` traces trees exactly, `view` turns that into an image, `drawing` adds lines and text and writes SVG or PNG.
+//! Deterministic: the same scene gives the same file. Nothing here is used by the search.
+//!
+//! Floor 8, beside the reports: imports everything down to `math`; nothing below imports it.
+
+pub mod drawing;
+pub mod ray;
+pub mod view;
