@@ -3,6 +3,7 @@
 
 pub mod bound;
 pub mod contact;
+pub mod demo;
 pub mod eco;
 pub mod math;
 pub mod motion;

@@ -5,6 +5,7 @@
 //!
 //! Floor 8, beside the reports: imports everything down to `math`; nothing below imports it.
 
+pub mod contacts;
 pub mod drawing;
 pub mod ray;
 pub mod view;
