@@ -79,7 +79,8 @@ pub fn solid(r: &mut Random, depth: usize) -> Solid {
     }
 }
 
-fn node(r: &mut Random, b: &mut SolidBuilder, depth: usize, size: f64, operand: bool) -> NodeId {
+/// Adds a random tree of up to `depth` levels to a builder; an `operand` of something bounded may be a half-space.
+pub fn node(r: &mut Random, b: &mut SolidBuilder, depth: usize, size: f64, operand: bool) -> NodeId {
     if depth == 0 || r.below(8) == 0 {
         let frame = Pose::new(r.vector(0.8 * size), r.rotation());
         if operand && r.below(6) == 0 {

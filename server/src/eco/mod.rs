@@ -1,10 +1,22 @@
-//! Extended CSG octrees: where a solid is full, empty, or bounded by which primitives.
+//! Stage 2: extended CSG octrees, where a solid is full, empty, or bounded by which primitives.
 //!
-//! Floor 5: imports `bound`, `solid`, `math`.
+//! M. Zeiller 1993. `tables` holds the paper's four decision tables as data, `local` classifies a voxel, `octree` builds
+//! and refines, `walk` finds the pairs of primitives that two moving octrees hand to stage 3.
+//!
+//! Floor 5: imports `bound`, `motion`, `solid`, `math`.
+
+pub mod local;
+pub mod octree;
+pub mod span;
+pub mod tables;
+
+pub use octree::{Census, Eco, Limits, Node};
+pub use tables::{Kind, Meet, meet};
 
 use crate::bound::SBounds;
 use crate::math::tolerance::MODEL_MARGIN;
 use crate::solid::Solid;
+use crate::solid::local::{Token, Truth};
 
 /// A solid with what was preprocessed for it. Shared by all objects that use it.
 #[derive(Debug)]
@@ -13,6 +25,8 @@ pub struct Model {
     pub solid: Solid,
     /// Its S-bounds, with a margin of `MODEL_MARGIN` times the radius.
     pub bounds: SBounds,
+    /// Its extended CSG octree.
+    pub eco: Eco,
     /// Bounding radius: that of the ball around the solid. 0 for an empty solid, infinite for an unbounded one.
     pub radius: f64,
 }
@@ -20,9 +34,40 @@ pub struct Model {
 impl Model {
     /// Preprocesses a solid.
     pub fn new(solid: Solid) -> Self {
+        Self::with_limits(solid, Limits::default())
+    }
+
+    /// Preprocesses a solid; its octree is built to the given limits.
+    pub fn with_limits(solid: Solid, limits: Limits) -> Self {
         let radius = SBounds::new(&solid, 0.0).root().ball.radius.max(0.0);
         let margin = if radius.is_finite() { MODEL_MARGIN * radius } else { 0.0 };
         let bounds = SBounds::new(&solid, margin);
-        Self { solid, bounds, radius }
+        let eco = Eco::new(&solid, &bounds, limits);
+        Self { solid, bounds, eco, radius }
+    }
+
+    /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.
+    pub fn margin(&self) -> f64 {
+        self.bounds.margin()
+    }
+
+    /// Children of a grey or mixed node of this model's octree; see [`Eco::expand`].
+    pub fn expand<'n>(&self, node: &'n Node) -> Option<&'n [Node; 8]> {
+        self.eco.expand(&self.solid, &self.bounds, node)
+    }
+
+    /// Appends the literals (`solid::local`) that are open at depth `delta` over a node of this model's octree: what a
+    /// contact of that depth in its cube depends on. True for a full node, false for an empty one. `delta` is a length of
+    /// at most `margin()`.
+    pub fn literals(&self, node: &Node, delta: f64, out: &mut Vec<Token>) -> Truth {
+        debug_assert!(delta <= self.margin() || self.radius.is_infinite());
+        match node.kind() {
+            Kind::Full => Truth::True,
+            Kind::Empty => Truth::False,
+            _ if node.half.is_finite() => {
+                local::write_literals(&self.solid, node.terms(), node.center, node.half, delta, out)
+            }
+            _ => crate::solid::local::write_tree(&self.solid, out),
+        }
     }
 }

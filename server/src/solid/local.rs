@@ -15,14 +15,14 @@ use glam::DVec3;
 /// One token; see the module's head.
 pub type Token = u32;
 
-const AND: u32 = 1 << 30;
-const OR: u32 = 2 << 30;
+pub(crate) const AND: u32 = 1 << 30;
+pub(crate) const OR: u32 = 2 << 30;
 const KIND: u32 = 3 << 30;
 const NEGATED: u32 = 1 << 29;
 
 /// A face with the sense in which it takes part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LiteralId(u32);
+pub struct LiteralId(pub(crate) u32);
 
 impl LiteralId {
     /// A literal of face `face` (id within its model).
@@ -123,7 +123,7 @@ fn write_node(solid: &Solid, node: NodeId, sense: Sense, out: &mut Vec<Token>) -
 
 /// Writes an operator over operands that `each` appends one by one, folding constants, single operands and operands of
 /// the same kind.
-fn fold<I>(
+pub(crate) fn fold<I>(
     kind: u32,
     items: impl Iterator<Item = I>,
     out: &mut Vec<Token>,

@@ -1,0 +1,307 @@
+//! The tree as a voxel sees it: what is left of it there, and of which kind the voxel is.
+//!
+//! A local tree is a list of terms in prefix order, a term being a node of the solid's tree with the number of terms
+//! below it. `classify` evaluates it over a voxel — leaves by distance bounds and S-bounds, operations by tables 1 to 3 —
+//! and writes down what is left for the voxel's own children: operands that are empty or full there are gone, an
+//! operation with one operand left is that operand. So the cost of classification falls with the size of the voxel.
+//!
+//! Invariant: over the voxel, f of what is left, clamped to ±margin, is the solid's f so clamped. Full and empty are
+//! decided beyond ±margin, hence hold at every depth within it.
+
+use super::span::{face_span, primitive_span};
+use super::tables::{Kind, combine};
+use crate::bound::SBounds;
+use crate::math::Aabb;
+use crate::solid::local::{AND, LiteralId, OR, Token, Truth, fold, truth_of};
+use crate::solid::{Node, NodeId, Op, Sense, Solid};
+use glam::DVec3;
+
+/// A node of the solid's tree in a local tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Term {
+    node: u32,
+    len: u32,
+}
+
+/// Marks a primitive that is known to contain the voxel: it stands for the first operand of a difference.
+const FULL: u32 = 1 << 31;
+
+impl Term {
+    /// Node of the solid's tree.
+    pub fn node(self) -> NodeId {
+        self.node & !FULL
+    }
+    /// True when it is a primitive known to contain the voxel.
+    pub fn is_full(self) -> bool {
+        self.node & FULL != 0
+    }
+    /// Number of terms below it, directly after it.
+    pub fn len_below(self) -> usize {
+        self.len as usize
+    }
+}
+
+/// The whole tree of a solid as a local tree; empty for an empty solid.
+pub fn whole(solid: &Solid, bounds: &SBounds) -> Vec<Term> {
+    fn write(solid: &Solid, bounds: &SBounds, n: NodeId, out: &mut Vec<Term>) {
+        if bounds.node(n).is_empty() {
+            return;
+        }
+        let head = out.len();
+        out.push(Term { node: n, len: 0 });
+        if let Node::Op(_, children) = &solid.nodes[n as usize] {
+            for c in children {
+                write(solid, bounds, *c, out);
+            }
+        }
+        out[head].len = (out.len() - head - 1) as u32;
+    }
+    let mut out = vec![];
+    write(solid, bounds, solid.root, &mut out);
+    out
+}
+
+/// What `classify` knows of a local tree over a voxel.
+#[derive(Clone, Copy, Debug)]
+pub struct Local {
+    /// Kind at the lowest level: never grey.
+    pub kind: Kind,
+    /// Lower bound of f, meaningful up to the margin.
+    pub lo: f64,
+    /// Upper bound of f, meaningful down to −margin.
+    pub hi: f64,
+}
+
+/// Classifies voxels of one solid.
+pub struct Classifier<'a> {
+    /// The solid.
+    pub solid: &'a Solid,
+    /// Its S-bounds; their margin is the classifier's.
+    pub bounds: &'a SBounds,
+    /// Centre of the voxel.
+    pub center: DVec3,
+    /// Half its side.
+    pub half: f64,
+    /// Leaves evaluated so far.
+    pub work: usize,
+}
+
+const EMPTY: Local = Local { kind: Kind::Empty, lo: f64::INFINITY, hi: f64::INFINITY };
+
+impl Classifier<'_> {
+    /// Kind of the voxel for the tree at the head of `terms`. Appends to `out` what is left of it unless it is full or
+    /// empty, and to `refs` the primitives the kind refers to.
+    pub fn classify(&mut self, terms: &[Term], out: &mut Vec<Term>, refs: &mut Vec<u32>) -> Local {
+        let Some(head) = terms.first() else { return EMPTY };
+        let node = &self.solid.nodes[head.node() as usize];
+        if head.is_full() {
+            if let Node::Primitive(p) = node {
+                refs.push(*p);
+            }
+            return Local { kind: Kind::Full, lo: f64::NEG_INFINITY, hi: f64::NEG_INFINITY };
+        }
+        let e = DVec3::splat(self.half);
+        let bound = self.bounds.node(head.node());
+        let voxel = Aabb::around(self.center, e);
+        if !bound.aabb.meets(&voxel) || bound.ball.misses(&voxel) {
+            return EMPTY;
+        }
+        match node {
+            Node::Empty => EMPTY,
+            Node::Primitive(p) => {
+                self.work += 1;
+                let (lo, hi) = primitive_span(&self.solid.primitives[*p as usize], self.center, e);
+                let margin = self.bounds.margin();
+                if lo > margin {
+                    return EMPTY;
+                }
+                refs.push(*p);
+                if hi < -margin {
+                    return Local { kind: Kind::Full, lo, hi };
+                }
+                out.push(*head);
+                Local { kind: Kind::PSurface, lo, hi }
+            }
+            Node::Op(op, _) => self.operation(*op, *head, &terms[1..1 + head.len_below()], out, refs),
+        }
+    }
+
+    fn operation(&mut self, op: Op, head: Term, mut body: &[Term], out: &mut Vec<Term>, refs: &mut Vec<u32>) -> Local {
+        let (out_start, refs_start) = (out.len(), refs.len());
+        out.push(head);
+        // acc: the operands so far; an operation's neutral element is not needed, the first operand starts it.
+        let mut acc: Option<Local> = None;
+        let mut kept = 0;
+        while !body.is_empty() {
+            let (operand, rest) = body.split_at(1 + body[0].len_below());
+            body = rest;
+            let (out_mark, refs_mark) = (out.len(), refs.len());
+            let x = self.classify(operand, out, refs);
+            let Some(a) = acc else {
+                if x.kind == Kind::Empty && op == Op::Union {
+                    continue;
+                }
+                acc = Some(x);
+                kept = usize::from(out.len() > out_mark);
+                if decides(op, x.kind, true) {
+                    break;
+                }
+                if x.kind == Kind::Full && op == Op::Difference {
+                    self.stand_in(operand, refs[refs_mark], out);
+                    kept = 1;
+                }
+                continue;
+            };
+            // Mixed stands for grey at the lowest level, which is what every voxel is until it is decomposed.
+            let kind = match combine(op, a.kind, x.kind) {
+                Some(Kind::Grey) | None => Kind::Mixed,
+                Some(kind) => kind,
+            };
+            merge_refs(op, a.kind, x.kind, kind, refs, refs_start, refs_mark);
+            let (lo, hi) = match op {
+                Op::Union => (a.lo.min(x.lo), a.hi.min(x.hi)),
+                Op::Intersection => (a.lo.max(x.lo), a.hi.max(x.hi)),
+                Op::Difference => (a.lo.max(-x.hi), a.hi.max(-x.lo)),
+            };
+            kept += usize::from(out.len() > out_mark);
+            acc = Some(Local { kind, lo, hi });
+            if decides(op, x.kind, false) {
+                break;
+            }
+        }
+        let result = acc.unwrap_or(EMPTY);
+        if matches!(result.kind, Kind::Full | Kind::Empty) {
+            out.truncate(out_start);
+            if result.kind == Kind::Empty {
+                refs.truncate(refs_start);
+                return EMPTY;
+            }
+        } else if kept == 1 {
+            out.remove(out_start);
+        } else {
+            out[out_start].len = (out.len() - out_start - 1) as u32;
+        }
+        result
+    }
+
+    /// A full first operand of a difference: one primitive that contains the voxel stands for it.
+    fn stand_in(&self, operand: &[Term], primitive: u32, out: &mut Vec<Term>) {
+        let leaf = operand.iter().find(|t| self.solid.nodes[t.node() as usize] == Node::Primitive(primitive));
+        let node = leaf.map_or(operand[0].node, |t| t.node) | FULL;
+        out.push(Term { node, len: 0 });
+    }
+}
+
+/// True when an operand of this kind makes the rest irrelevant.
+fn decides(op: Op, kind: Kind, first: bool) -> bool {
+    match op {
+        Op::Union => kind == Kind::Full,
+        Op::Intersection => kind == Kind::Empty,
+        Op::Difference => kind == if first { Kind::Empty } else { Kind::Full },
+    }
+}
+
+/// References of `a op b` of kind `kind`, from those of a in `refs[start..mark]` and those of b in `refs[mark..]`.
+fn merge_refs(op: Op, a: Kind, b: Kind, kind: Kind, refs: &mut Vec<u32>, start: usize, mark: usize) {
+    match kind {
+        Kind::Empty => refs.truncate(start),
+        Kind::Full => match (a, b) {
+            (Kind::Full, Kind::Full) => {}
+            (Kind::Full, _) => refs.truncate(mark),
+            _ => drop(refs.drain(start..mark)),
+        },
+        Kind::NSurface if op == Op::Difference && b == Kind::PSurface => {
+            // Full − p: the volume of the one, the boundary of the other.
+            refs.drain(start + 1..mark);
+        }
+        Kind::PSurface if op == Op::Difference && b == Kind::NSurface => {
+            // Full − n: what the inner difference cut away from the subtracted volume comes back.
+            let boundary = refs[mark + 1];
+            refs.truncate(start);
+            refs.push(boundary);
+        }
+        Kind::PSurface | Kind::NSurface => {
+            if a == kind && b != kind {
+                refs.truncate(mark);
+            } else {
+                refs.drain(start..mark);
+            }
+        }
+        Kind::Mixed | Kind::Grey => {
+            // The primitives partly in it: a full operand has none, an n-surface only its boundary.
+            let partly = |kind: Kind, range: std::ops::Range<usize>| match kind {
+                Kind::Full | Kind::Empty => range.end..range.end,
+                Kind::NSurface => range.start + 1..range.end,
+                _ => range,
+            };
+            let (ra, rb) = (partly(a, start..mark), partly(b, mark..refs.len()));
+            refs.copy_within(rb.clone(), mark);
+            refs.truncate(mark + rb.len());
+            refs.drain(start..ra.start);
+        }
+    }
+}
+
+/// Appends to `out` the literals (`solid::local`) that are open at depth `delta` over the voxel center ± half, for the
+/// local tree at the head of `terms`. `delta` (a length) lies within the margin that the local tree was made with.
+pub fn write_literals(
+    solid: &Solid,
+    terms: &[Term],
+    center: DVec3,
+    half: f64,
+    delta: f64,
+    out: &mut Vec<Token>,
+) -> Truth {
+    let e = DVec3::splat(half);
+    write(solid, terms, Sense::Positive, out, &mut |id| {
+        truth_of(id.sense(), face_span(&solid.faces[id.face() as usize], center, e), delta)
+    })
+}
+
+fn write(
+    solid: &Solid,
+    terms: &[Term],
+    sense: Sense,
+    out: &mut Vec<Token>,
+    truth: &mut impl FnMut(LiteralId) -> Truth,
+) -> Truth {
+    let never = if sense == Sense::Positive { Truth::False } else { Truth::True };
+    let Some(head) = terms.first() else { return never };
+    if head.is_full() {
+        return if sense == Sense::Positive { Truth::True } else { Truth::False };
+    }
+    match &solid.nodes[head.node() as usize] {
+        Node::Empty => never,
+        Node::Primitive(p) => {
+            let p = &solid.primitives[*p as usize];
+            let kind = if sense == Sense::Positive { AND } else { OR };
+            fold(kind, 0..p.faces.len() as u32, out, |i, out| {
+                let id = LiteralId::new(p.first_face + i, sense);
+                let known = truth(id);
+                if known == Truth::Open {
+                    out.push(id.0);
+                }
+                known
+            })
+        }
+        Node::Op(op, _) => {
+            let kind = match (op, sense) {
+                (Op::Union, Sense::Positive) | (Op::Intersection | Op::Difference, Sense::Negative) => OR,
+                _ => AND,
+            };
+            let mut rest = &terms[1..1 + head.len_below()];
+            let mut index = 0;
+            let operands = std::iter::from_fn(move || {
+                let below = rest.first()?.len_below();
+                let (operand, tail) = rest.split_at(1 + below);
+                rest = tail;
+                index += 1;
+                Some((index - 1, operand))
+            });
+            fold(kind, operands, out, |(i, operand), out| {
+                let s = if *op == Op::Difference && i > 0 { sense.flipped() } else { sense };
+                write(solid, operand, s, out, truth)
+            })
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! The extended CSG octree of a model: cubes of its own frame, down to a limited resolution, finer where asked.
+//!
+//! M. Zeiller 1993. A node is grey (eight children), full, empty, p- or n-surface, or mixed, and refers to primitives as
+//! `Kind` says; n-surface: first the positive primitive of the volume, then the negative one of the boundary. Building is
+//! depth first to a depth that a budget of evaluated primitives sets, so that a part of thousands of primitives still
+//! loads at once; `expand` decomposes mixed leaves further, on demand and for good.
+//!
+//! Invariant: everything about a node is a function of the solid and the node's cube: it does not matter who asked for it,
+//! or when. All that is said of a node holds for every depth and distance up to the margin of the S-bounds.
+//! Not promised: the smallest octree; a voxel near an edge may count a primitive as partly in that is not.
+
+use super::local::{Classifier, Term, whole};
+use super::tables::Kind;
+use crate::bound::SBounds;
+use crate::math::Aabb;
+use crate::solid::Solid;
+use glam::DVec3;
+use std::sync::OnceLock;
+
+/// How far an octree is built at load. Counts, not times: the same model gives the same octree everywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Levels below the root.
+    pub depth: u8,
+    /// Primitives evaluated; the next level is left out when it could exceed this.
+    pub work: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { depth: 6, work: 400_000 }
+    }
+}
+
+/// Smallest voxel, as a multiple of the margin: below it nothing is told apart any more.
+const FINEST: f64 = 16.0;
+
+/// Levels below the root at most, for models without a margin.
+const DEEPEST: u8 = 24;
+
+/// A node of an octree.
+#[derive(Debug)]
+pub struct Node {
+    /// Centre of the cube, model frame.
+    pub center: DVec3,
+    /// Half its side.
+    pub half: f64,
+    /// Proven lower bound of the solid's f over the cube, as far as it tells within ±margin.
+    pub f_lo: f64,
+    /// Proven upper bound of f over the cube, as far as it tells within ±margin.
+    pub f_hi: f64,
+    kind: Kind,
+    depth: u8,
+    refs: Box<[u32]>,
+    terms: Box<[Term]>,
+    children: OnceLock<Box<[Node; 8]>>,
+}
+
+impl Node {
+    /// Kind; a mixed node stays mixed when it is expanded on demand.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+    /// Levels below the root.
+    pub fn depth(&self) -> u8 {
+        self.depth
+    }
+    /// The primitives that the kind refers to.
+    pub fn refs(&self) -> &[u32] {
+        &self.refs
+    }
+    /// What is left of the tree in the cube; empty when the node is full or empty.
+    pub fn terms(&self) -> &[Term] {
+        &self.terms
+    }
+    /// The cube.
+    pub fn aabb(&self) -> Aabb {
+        Aabb::around(self.center, DVec3::splat(self.half))
+    }
+    /// The children that exist already, from (−,−,−) to (+,+,+), x first.
+    pub fn children(&self) -> Option<&[Node; 8]> {
+        self.children.get().map(|c| &**c)
+    }
+}
+
+/// The octree of a solid.
+#[derive(Debug)]
+pub struct Eco {
+    root: Node,
+    depth: u8,
+}
+
+/// Numbers of nodes by kind and depth.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// `by_depth[d][kind]`: nodes at depth d.
+    pub by_depth: Vec<[usize; 6]>,
+}
+
+impl Census {
+    /// Nodes of a kind.
+    pub fn of(&self, kind: Kind) -> usize {
+        self.by_depth.iter().map(|d| d[kind as usize]).sum()
+    }
+    /// All nodes.
+    pub fn nodes(&self) -> usize {
+        self.by_depth.iter().flatten().sum()
+    }
+}
+
+impl Eco {
+    /// Builds the octree of a solid inside the smallest cube around its S-bounds' root box. An unbounded solid has a
+    /// single mixed node without limits, an empty one a single empty node.
+    pub fn new(solid: &Solid, bounds: &SBounds, limits: Limits) -> Self {
+        let b = bounds.root().aabb;
+        let (center, half) = match () {
+            () if b.is_empty() => (DVec3::ZERO, 0.0),
+            () if b.is_finite() => {
+                let c = b.center();
+                (c, (b.max - c).max(c - b.min).max_element())
+            }
+            () => (DVec3::ZERO, f64::INFINITY),
+        };
+        let terms = whole(solid, bounds);
+        let mut work = 0;
+        let root = if half.is_finite() {
+            classified(solid, bounds, &terms, center, half, 0, &mut work)
+        } else {
+            let refs = (0..solid.primitives.len() as u32).collect();
+            let (kind, children) = (Kind::Mixed, OnceLock::new());
+            Node { center, half, f_lo: -half, f_hi: half, kind, depth: 0, refs, terms: terms.into(), children }
+        };
+        let mut eco = Self { root, depth: 0 };
+        while eco.depth < limits.depth {
+            let next = 8 * work_below(&eco.root);
+            if next == 0 || work + next > limits.work {
+                break;
+            }
+            deepen(solid, bounds, &mut eco.root, &mut work);
+            eco.depth += 1;
+        }
+        eco
+    }
+
+    /// The root.
+    pub fn root(&self) -> &Node {
+        &self.root
+    }
+
+    /// Levels below the root that were built at load.
+    pub fn depth(&self) -> u8 {
+        self.depth
+    }
+
+    /// Children of a grey or mixed node of this octree, made now if need be; `None` for other kinds and for the smallest
+    /// voxels.
+    pub fn expand<'n>(&self, solid: &Solid, bounds: &SBounds, node: &'n Node) -> Option<&'n [Node; 8]> {
+        if let Some(children) = node.children() {
+            return Some(children);
+        }
+        can_expand(bounds, node).then(|| &**node.children.get_or_init(|| children_of(solid, bounds, node, &mut 0)))
+    }
+
+    /// The deepest node that holds `x` (model frame) among those built so far; `None` outside the root.
+    pub fn locate(&self, x: DVec3) -> Option<&Node> {
+        if !self.root.aabb().contains(x) {
+            return None;
+        }
+        let mut node = &self.root;
+        while let Some(children) = node.children() {
+            let d = x.cmpge(node.center);
+            node = &children[usize::from(d.x) + 2 * usize::from(d.y) + 4 * usize::from(d.z)];
+        }
+        Some(node)
+    }
+
+    /// Counts the nodes built so far; nodes with children count as grey.
+    pub fn census(&self) -> Census {
+        fn count(node: &Node, census: &mut Census) {
+            let d = node.depth as usize;
+            if census.by_depth.len() <= d {
+                census.by_depth.resize(d + 1, [0; 6]);
+            }
+            let kind = if node.children().is_some() { Kind::Grey } else { node.kind };
+            census.by_depth[d][kind as usize] += 1;
+            for c in node.children().into_iter().flatten() {
+                count(c, census);
+            }
+        }
+        let mut census = Census::default();
+        count(&self.root, &mut census);
+        census
+    }
+}
+
+fn can_expand(bounds: &SBounds, node: &Node) -> bool {
+    matches!(node.kind, Kind::Grey | Kind::Mixed)
+        && node.half.is_finite()
+        && node.depth < DEEPEST
+        && node.half > FINEST * bounds.margin()
+}
+
+fn classified(
+    solid: &Solid,
+    bounds: &SBounds,
+    terms: &[Term],
+    center: DVec3,
+    half: f64,
+    depth: u8,
+    work: &mut usize,
+) -> Node {
+    let (mut out, mut refs) = (vec![], vec![]);
+    let mut classifier = Classifier { solid, bounds, center, half, work: 0 };
+    let local = classifier.classify(terms, &mut out, &mut refs);
+    *work += classifier.work;
+    let margin = bounds.margin();
+    Node {
+        center,
+        half,
+        // What lies beyond the margin is known to lie there, and no more.
+        f_lo: local.lo.min(margin),
+        f_hi: local.hi.max(-margin),
+        kind: local.kind,
+        depth,
+        refs: refs.into(),
+        terms: out.into(),
+        children: OnceLock::new(),
+    }
+}
+
+fn children_of(solid: &Solid, bounds: &SBounds, node: &Node, work: &mut usize) -> Box<[Node; 8]> {
+    let h = 0.5 * node.half;
+    Box::new(std::array::from_fn(|i| {
+        let sign = |bit: usize| if i >> bit & 1 == 0 { -h } else { h };
+        let center = node.center + DVec3::new(sign(0), sign(1), sign(2));
+        classified(solid, bounds, &node.terms, center, h, node.depth + 1, work)
+    }))
+}
+
+/// Decomposes every mixed leaf once, depth first.
+fn deepen(solid: &Solid, bounds: &SBounds, node: &mut Node, work: &mut usize) {
+    if let Some(children) = node.children.get_mut() {
+        for c in children.iter_mut() {
+            deepen(solid, bounds, c, work);
+        }
+    } else if can_expand(bounds, node) {
+        node.children = OnceLock::from(children_of(solid, bounds, node, work));
+        node.kind = Kind::Grey;
+    }
+}
+
+/// Leaves of the local trees of the mixed leaves: each is evaluated eight times on the next level.
+fn work_below(node: &Node) -> usize {
+    match node.children() {
+        Some(children) => children.iter().map(work_below).sum(),
+        None if node.kind == Kind::Mixed && node.half.is_finite() => {
+            node.terms.iter().filter(|t| t.len_below() == 0).count()
+        }
+        None => 0,
+    }
+}

@@ -1,0 +1,328 @@
+//! Laws of stage 2's octree: the paper's tables, and membership in octree and tree, over random solids.
+
+use contactd::bound::SBounds;
+use contactd::eco::local::{Classifier, whole};
+use contactd::eco::tables::combine;
+use contactd::eco::{Kind, Limits, Meet, Model, Node, meet};
+use contactd::solid::local::{self, Truth};
+use contactd::solid::{Op, Sense, Solid, SolidBuilder};
+use contactd_tests::random_solids::{Random, node, perforated_plate, solid};
+use glam::DVec3;
+
+// The paper's rows, as printed: the commutative tables by their lower half.
+const UNION: &str = "
+grey  | grey
+full  | full | full
+empty | grey | full | empty
+p     | grey | full | p     | grey
+n     | grey | full | n     | grey  | grey
+mixed | -    | full | mixed | mixed | mixed | mixed";
+const INTERSECTION: &str = "
+grey  | grey
+full  | grey  | full
+empty | empty | empty | empty
+p     | grey  | p     | empty | grey
+n     | grey  | n     | empty | grey  | grey
+mixed | -     | mixed | empty | mixed | mixed | mixed";
+const DIFFERENCE: &str = "
+grey  | grey  | grey  | empty | grey  | grey  | -
+full  | empty | empty | empty | empty | empty | empty
+empty | grey  | full  | empty | p     | n     | mixed
+p     | grey  | n     | empty | grey  | grey  | mixed
+n     | grey  | p     | empty | grey  | grey  | mixed
+mixed | -     | mixed | empty | mixed | mixed | mixed";
+const COLLISION: &str = "
+grey  | branches
+full  | branches | pairs
+empty | skip     | skip  | skip
+p     | branches | pairs | skip | pairs
+n     | branches | pairs | skip | pairs | pairs
+mixed | branches | pairs | skip | pairs | pairs | pairs";
+
+fn kind(word: &str) -> Option<Kind> {
+    match word {
+        "-" => None,
+        "p" => Some(Kind::PSurface),
+        "n" => Some(Kind::NSurface),
+        w => Some(Kind::ALL.into_iter().find(|k| k.name() == w).unwrap_or_else(|| panic!("no kind {w}"))),
+    }
+}
+
+/// Calls `check(row kind, column kind, word)` for every printed cell; returns their number.
+fn cells(table: &str, mut check: impl FnMut(Kind, Kind, &str)) -> usize {
+    let mut count = 0;
+    for line in table.trim().lines() {
+        let mut words = line.split('|').map(str::trim);
+        let row = kind(words.next().unwrap()).unwrap();
+        for (column, word) in words.enumerate() {
+            check(row, Kind::ALL[column], word);
+            count += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn every_cell_of_the_four_tables_is_the_papers() {
+    let n = cells(UNION, |a, b, w| {
+        assert_eq!(combine(Op::Union, a, b), kind(w));
+        assert_eq!(combine(Op::Union, b, a), kind(w));
+    });
+    assert_eq!(n, 21);
+    let n = cells(INTERSECTION, |a, b, w| {
+        assert_eq!(combine(Op::Intersection, a, b), kind(w));
+        assert_eq!(combine(Op::Intersection, b, a), kind(w));
+    });
+    assert_eq!(n, 21);
+    let n = cells(DIFFERENCE, |row_b, column_a, w| assert_eq!(combine(Op::Difference, column_a, row_b), kind(w)));
+    assert_eq!(n, 36);
+    let n = cells(COLLISION, |a, b, w| {
+        let expected = match w {
+            "branches" => Meet::Branches,
+            "pairs" => Meet::Pairs,
+            _ => Meet::Skip,
+        };
+        assert_eq!((meet(a, b), meet(b, a)), (expected, expected));
+    });
+    assert_eq!(n, 21);
+}
+
+#[test]
+fn the_tables_treat_grey_and_mixed_alike_but_for_the_name() {
+    let mixed = |k: Kind| if k == Kind::Grey { Kind::Mixed } else { k };
+    for op in [Op::Union, Op::Intersection, Op::Difference] {
+        for a in Kind::ALL {
+            for b in Kind::ALL {
+                if let Some(r) = combine(op, a, b) {
+                    // Two surfaces give grey, at the lowest level mixed: the same thing.
+                    assert_eq!(Some(mixed(r)), combine(op, mixed(a), mixed(b)).map(mixed), "{a:?} {op:?} {b:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Asserts what a voxel's kind and references say at a point of the voxel; `slack` for points on a surface.
+fn assert_membership(s: &Solid, kind: Kind, refs: &[u32], x: DVec3, slack: f64, what: &str) {
+    let f = s.value(x);
+    let psi = |i: usize| s.primitives[refs[i] as usize].value(x);
+    let clear = |v: f64| v.abs() > slack;
+    match kind {
+        Kind::Full => {
+            assert!(f <= slack, "{what}: full, but f = {f}");
+            assert!(
+                !refs.is_empty() && (0..refs.len()).all(|i| psi(i) <= slack),
+                "{what}: full by a primitive beside it"
+            );
+        }
+        Kind::Empty => assert!(f >= -slack, "{what}: empty, but f = {f}"),
+        Kind::PSurface => {
+            assert_eq!(refs.len(), 1);
+            assert_eq!(s.senses[refs[0] as usize], Sense::Positive);
+            assert!(!clear(f) || !clear(psi(0)) || (f < 0.0) == (psi(0) < 0.0), "{what}: p, f {f}, psi {}", psi(0));
+        }
+        Kind::NSurface => {
+            assert_eq!(refs.len(), 2);
+            assert_eq!((s.senses[refs[0] as usize], s.senses[refs[1] as usize]), (Sense::Positive, Sense::Negative));
+            assert!(psi(0) <= slack, "{what}: n, the volume does not fill the voxel");
+            assert!(!clear(f) || !clear(psi(1)) || (f < 0.0) == (psi(1) > 0.0), "{what}: n, f {f}, psi {}", psi(1));
+        }
+        Kind::Mixed | Kind::Grey => assert!(kind == Kind::Grey || refs.len() > 1, "{what}: mixed by {refs:?}"),
+    }
+}
+
+#[test]
+fn combined_kinds_agree_with_dense_sampling_in_every_cell() {
+    let mut seen = [[[0usize; 6]; 6]; 3];
+    let (mut voxels, mut agree, mut sharper) = (0, 0, 0);
+    for seed in 0..900u64 {
+        let op = [Op::Union, Op::Intersection, Op::Difference][seed as usize % 3];
+        // The operands by themselves, and both in one tree: the same seeds, the same primitives.
+        let alone = |salt: u64| {
+            let mut b = SolidBuilder::new();
+            let root = node(&mut Random::new(seed * 2 + salt), &mut b, 2, 1.0, false);
+            b.finish(root)
+        };
+        let (a, b) = (alone(0), alone(1));
+        let mut builder = SolidBuilder::new();
+        let left = node(&mut Random::new(seed * 2), &mut builder, 2, 1.0, false);
+        let right = node(&mut Random::new(seed * 2 + 1), &mut builder, 2, 1.0, false);
+        let root = builder.operation(op, &[left, right]);
+        let both = builder.finish(root);
+        let mut r = Random::new(seed + 77);
+        for _ in 0..40 {
+            // Half of the voxels where both surfaces are, or the rarer kinds never meet.
+            let tries = if r.below(2) == 0 { 1 } else { 60 };
+            let near = |x: &DVec3| a.value(*x).abs().max(b.value(*x).abs());
+            let candidates = (0..tries).map(|_| r.vector(1.2)).collect::<Vec<_>>();
+            let center = candidates.into_iter().min_by(|x, y| near(x).total_cmp(&near(y))).expect("one at least");
+            let half = r.within(0.01, if tries == 1 { 0.3 } else { 0.1 });
+            let classify = |s: &Solid, bounds: &SBounds| {
+                let (mut out, mut refs) = (vec![], vec![]);
+                let terms = whole(s, bounds);
+                let mut c = Classifier { solid: s, bounds, center, half, work: 0 };
+                (c.classify(&terms, &mut out, &mut refs).kind, refs)
+            };
+            // Bounds without the downward rule's help from the whole: the operands' own.
+            let (ka, kb) = (classify(&a, &SBounds::new(&a, 0.0)).0, classify(&b, &SBounds::new(&b, 0.0)).0);
+            let (k, refs) = classify(&both, &SBounds::new(&both, 0.0));
+            let table = combine(op, ka, kb).map(|k| if k == Kind::Grey { Kind::Mixed } else { k });
+            seen[seed as usize % 3][ka as usize][kb as usize] += 1;
+            // The bounds of the whole tree clip the operands' own, so that it sees less of them: sharper as a rule.
+            agree += usize::from(Some(k) == table);
+            sharper += usize::from(Some(k) != table && k != Kind::Mixed);
+            voxels += 1;
+            for i in 0..30 {
+                let x = if i < 8 {
+                    let s = |bit: usize| if i >> bit & 1 == 0 { -half } else { half };
+                    center + DVec3::new(s(0), s(1), s(2))
+                } else {
+                    center + r.vector(half)
+                };
+                assert_membership(&both, k, &refs, x, 1e-12, &format!("seed {seed}: {ka:?} {op:?} {kb:?}"));
+            }
+        }
+    }
+    println!("{voxels} voxels: {agree} of the table's kind, {sharper} of a sharper one");
+    assert!(agree * 10 > voxels * 9 && (agree + sharper) * 1000 > voxels * 999);
+    for (op, table) in ["union", "intersection", "difference"].iter().zip(seen) {
+        let at_lowest = [1, 2, 3, 4, 5].map(|i| [1, 2, 3, 4, 5].map(|j| table[i][j]));
+        println!("{op}: voxels by kinds of operands (full empty p n mixed) {at_lowest:?}");
+        assert!(at_lowest.iter().flatten().all(|n| *n > 0), "a cell of {op} was never met");
+    }
+}
+
+/// Walks down to `x`, expanding on the way while `deeper` says so; calls `check` on every node passed.
+fn descend<'n>(m: &'n Model, x: DVec3, deeper: impl Fn(&Node) -> bool, mut check: impl FnMut(&'n Node)) {
+    let mut at = m.eco.root();
+    loop {
+        check(at);
+        let children = if deeper(at) { m.expand(at) } else { at.children() };
+        let Some(children) = children else { return };
+        at = children.iter().find(|c| c.aabb().contains(x)).expect("children cover their parent");
+    }
+}
+
+#[test]
+fn octree_membership_is_tree_membership_also_where_refined_later() {
+    let mut r = Random::new(5);
+    let (mut points, mut inside, mut by_kind, mut deepest) = (0, 0, [0usize; 6], 0);
+    for i in 0..150 {
+        let s = solid(&mut r, 1 + i % 4);
+        let m = Model::with_limits(s, Limits { depth: 1 + (i % 5) as u8, work: 40_000 });
+        let slack = m.margin().max(1e-12);
+        for k in 0..60 {
+            let mut cube = m.eco.root();
+            if k % 4 == 0 {
+                // Down into the mixed ones, where random points hardly get.
+                while let Some(children) = m.expand(cube) {
+                    let mixed: Vec<&Node> = children.iter().filter(|c| m.expand(c).is_some()).collect();
+                    if mixed.is_empty() || cube.depth() == 10 {
+                        break;
+                    }
+                    cube = mixed[r.below(mixed.len())];
+                }
+            }
+            let x = r.point_in(&cube.aabb());
+            let f = m.solid.value(x);
+            points += 1;
+            inside += usize::from(f < 0.0);
+            let (mut tokens, mut kinds) = (vec![], vec![]);
+            let limit = if k % 2 == 0 { 11 } else { 0 };
+            descend(
+                &m,
+                x,
+                |n| n.depth() < limit,
+                |n| {
+                    let kind = if n.children().is_some() { Kind::Grey } else { n.kind() };
+                    kinds.push(kind);
+                    deepest = deepest.max(n.depth());
+                    assert_membership(&m.solid, n.kind(), n.refs(), x, slack, &format!("solid {i}"));
+                    // The bounds of f, and f of what is left, as far as the margin goes.
+                    let clamped = f.clamp(-m.margin(), m.margin());
+                    assert!(
+                        n.f_lo <= clamped && clamped <= n.f_hi,
+                        "solid {i}: f {f} outside [{}, {}]",
+                        n.f_lo,
+                        n.f_hi
+                    );
+                    let delta = 0.3 * m.margin();
+                    tokens.clear();
+                    match m.literals(n, delta, &mut tokens) {
+                        Truth::True => assert!(f <= -delta),
+                        Truth::False => assert!(f > -delta),
+                        Truth::Open => {
+                            let g = local::value(&tokens, &mut |face| m.solid.faces[face as usize].value(x));
+                            assert_eq!(g <= -delta, f <= -delta, "solid {i}: f {f}, left {g}");
+                            for l in local::literals(&tokens) {
+                                let p = m.solid.face_owner[l.face() as usize];
+                                assert!(n.refs().contains(&p), "solid {i}: an open literal of a primitive not named");
+                                assert_eq!(m.solid.senses[p as usize], l.sense());
+                            }
+                        }
+                    }
+                },
+            );
+            by_kind[*kinds.last().unwrap() as usize] += 1;
+        }
+    }
+    println!(
+        "octree membership: {points} points, {:.0}% inside; leaves {:?}; down to depth {deepest}",
+        100.0 * inside as f64 / points as f64,
+        Kind::ALL.map(|k| (k.name(), by_kind[k as usize]))
+    );
+    assert!(inside * 10 > points && deepest >= 10);
+    assert!(Kind::ALL.iter().all(|k| *k == Kind::Grey || by_kind[*k as usize] > 20));
+}
+
+#[test]
+fn who_asks_first_does_not_matter() {
+    let (eager, lazy) = (Limits { depth: 5, work: usize::MAX }, Limits { depth: 2, work: usize::MAX });
+    let (a, b) = (Model::with_limits(perforated_plate(3), eager), Model::with_limits(perforated_plate(3), lazy));
+    fn compare(a: &Node, b: &Node, m: &Model, count: &mut usize) {
+        *count += 1;
+        assert_eq!((a.center, a.half, a.f_lo, a.f_hi), (b.center, b.half, b.f_lo, b.f_hi));
+        assert_eq!((a.refs(), a.terms()), (b.refs(), b.terms()));
+        assert!(a.kind() == b.kind() || (a.kind() == Kind::Grey && b.kind() == Kind::Mixed));
+        if let Some(children) = a.children() {
+            let others = m.expand(b).expect("a mixed node expands");
+            children.iter().zip(others).for_each(|(x, y)| compare(x, y, m, count));
+        }
+    }
+    let mut count = 0;
+    std::thread::scope(|s| {
+        // Two threads refine the same octree at once.
+        s.spawn(|| compare(a.eco.root(), b.eco.root(), &b, &mut 0));
+        compare(a.eco.root(), b.eco.root(), &b, &mut count);
+    });
+    assert_eq!(count, a.eco.census().nodes());
+    assert!(count > 1000);
+}
+
+#[test]
+fn the_budget_bounds_the_octree_of_a_large_part() {
+    let plate = perforated_plate(64);
+    assert_eq!(plate.primitives.len(), 8193);
+    let start = std::time::Instant::now();
+    let m = Model::new(plate);
+    let took = start.elapsed();
+    let census = m.eco.census();
+    println!("8193 primitives: depth {}, {} nodes, {took:?}", m.eco.depth(), census.nodes());
+    for (d, row) in census.by_depth.iter().enumerate() {
+        println!("  depth {d}: {:?}", Kind::ALL.map(|k| (k.name(), row[k as usize])));
+    }
+    assert!(m.eco.depth() >= 2 && census.of(Kind::Mixed) > 0);
+}
+
+#[test]
+fn an_empty_and_an_unbounded_solid_have_their_octrees_too() {
+    let mut b = SolidBuilder::new();
+    let root = b.empty();
+    let m = Model::new(b.finish(root));
+    assert_eq!((m.eco.root().kind(), m.radius), (Kind::Empty, 0.0));
+    let mut b = SolidBuilder::new();
+    let root = b.primitive(contactd::solid::primitive::HalfSpace, contactd_proto::Pose::IDENTITY, Default::default());
+    let m = Model::new(b.finish(root));
+    assert_eq!(m.eco.root().kind(), Kind::Mixed);
+    assert!(m.expand(m.eco.root()).is_none() && m.radius.is_infinite());
+}
