@@ -2,6 +2,19 @@
 //!
 //! Floor 6: imports `eco`, `bound`, `motion`, `solid`, `math`, `proto`.
 
+pub mod clause;
+mod depth;
+mod fit;
+pub mod literal;
+pub mod lp;
+pub mod newton;
 pub mod outcome;
+pub mod pair;
+pub mod roots;
+pub mod search;
+#[cfg(test)]
+mod tests;
 
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
+pub use pair::{Body, DEFAULT_CELL_LIMIT, PairQuery, default_resolution, earliest_contact};
+pub use search::Scratch;

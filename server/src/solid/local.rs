@@ -224,6 +224,43 @@ fn value_of(mut body: &[Token], mut v: f64, join: fn(f64, f64) -> f64, psi: &mut
     v
 }
 
+/// f of an expression with the literal that decides it (the first of equals).
+pub fn deciding(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> (f64, LiteralId) {
+    let (e, _) = first(tokens);
+    let (mut body, larger) = match e {
+        Expression::Literal(id) => {
+            let v = psi(id.face());
+            return (if id.sense() == Sense::Positive { v } else { -v }, id);
+        }
+        Expression::And(body) => (body, true),
+        Expression::Or(body) => (body, false),
+    };
+    let mut found: Option<(f64, LiteralId)> = None;
+    while !body.is_empty() {
+        let n = first(body).1;
+        let one = deciding(&body[..n], psi);
+        if found.is_none_or(|f| if larger { one.0 > f.0 } else { one.0 < f.0 }) {
+            found = Some(one);
+        }
+        body = &body[n..];
+    }
+    found.expect("an operator has operands")
+}
+
+/// Appends the conjunction of some open expressions.
+pub fn write_and<'a>(parts: impl IntoIterator<Item = &'a [Token]>, out: &mut Vec<Token>) {
+    let truth = fold(AND, parts.into_iter(), out, |part, out| {
+        out.extend_from_slice(part);
+        Truth::Open
+    });
+    debug_assert_eq!(truth, Truth::Open);
+}
+
+/// The token of a single literal.
+pub fn literal_token(id: LiteralId) -> Token {
+    id.0
+}
+
 /// Bounds of psi over a region: (lower, upper).
 pub type Span = (f64, f64);
 

@@ -1,6 +1,7 @@
 //! The CSG tree, in file order and in any arity, and its normal form without complements.
 
 use crate::math::Aabb;
+use crate::solid::local::{self, Token};
 use crate::solid::{Face, Primitive, Shape};
 use contactd_proto::Pose;
 
@@ -74,6 +75,8 @@ pub struct Solid {
     pub face_owner: Vec<u32>,
     /// Sense of each primitive in this solid (every primitive stands at one leaf).
     pub senses: Vec<Sense>,
+    /// The tree as and/or of literals (`local`); empty when the solid is empty.
+    pub normal_form: Vec<Token>,
 }
 
 impl Solid {
@@ -172,7 +175,19 @@ impl SolidBuilder {
         let faces = self.primitives.iter().flat_map(|p| p.faces.iter().copied()).collect();
         let owners = self.primitives.iter().enumerate();
         let face_owner = owners.flat_map(|(i, p)| std::iter::repeat_n(i as u32, p.faces.len())).collect();
-        Solid { primitives: self.primitives, nodes: self.nodes, root, faces, face_owner, senses }
+        let mut solid = Solid {
+            primitives: self.primitives,
+            nodes: self.nodes,
+            root,
+            faces,
+            face_owner,
+            senses,
+            normal_form: Vec::new(),
+        };
+        let mut normal_form = Vec::new();
+        local::write_tree(&solid, &mut normal_form);
+        solid.normal_form = normal_form;
+        solid
     }
 
     fn push(&mut self, node: Node) -> NodeId {

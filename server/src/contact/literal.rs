@@ -1,0 +1,262 @@
+//! A cell at an instant, and the linear lower bounds of its literals.
+//!
+//! The cell is a box fixed in A. For x in it, a literal is at least a + n·(x − c) − R:
+//! * +psi: psi is convex, so a tangent plane bounds it everywhere: R = 0;
+//! * −psi: concave; R is the supremum of k·(ρ(x) − ρ − u·(x−c)): k·D²/(2ρ) over |x−c| <= D across the face's axis (exact
+//!   where D <= 2ρ, an upper bound beyond), or k·T²/(2(ρ−S)) where the cell reaches S along the radial direction u and
+//!   T along the curving tangents (sqrt((ρ+s)² + τ²) − (ρ+s) falls with s). Where D > 2ρ the radial direction means
+//!   nothing over the cell: it is left out and R = k·D.
+//!
+//! A contact at depth delta needs every literal of a clause <= −delta, so `bound` carries a + delta − R and "excluded" is
+//! bound > 0 for a convex combination. Guards (the planes of an octree voxel) need <= 0 and carry no delta.
+//! B's literals move: `rate` is d(value)/dt at the centre, `s` and `q` what the concave remainder adds per unit and per
+//! half squared unit of time (D grows at most with the speed bound V).
+
+use crate::motion::{Bounds, Instant};
+use crate::solid::local::{LiteralId, Truth, truth_of};
+use crate::solid::{Face, Sense, Solid, face::FaceAt};
+use glam::DVec3;
+
+/// The body a literal belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Side {
+    /// The body that carries the cells.
+    A,
+    /// The other one.
+    B,
+}
+
+/// The faces of one body: those of its solid, then the search's guards.
+#[derive(Clone, Copy, Debug)]
+pub struct Faces<'a> {
+    /// The solid.
+    pub solid: &'a Solid,
+    /// Planes of octree voxels, in the solid's frame; id = number of the solid's faces + index.
+    pub guards: &'a [Face],
+}
+
+impl Faces<'_> {
+    /// The face of an id.
+    pub fn get(&self, id: u32) -> &Face {
+        let own = self.solid.faces.len();
+        match self.solid.faces.get(id as usize) {
+            Some(f) => f,
+            None => &self.guards[id as usize - own],
+        }
+    }
+    /// True for a voxel's plane.
+    pub fn is_guard(&self, id: u32) -> bool {
+        id as usize >= self.solid.faces.len()
+    }
+}
+
+/// A literal's linear lower bound over a cell; A's model axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Linear {
+    /// Body of the literal.
+    pub side: Side,
+    /// Which literal.
+    pub id: LiteralId,
+    /// The other literal of a same-shape fit (`fit`).
+    pub other: Option<(Side, LiteralId)>,
+    /// n, with the literal's sign.
+    pub normal: DVec3,
+    /// a + delta − R at the centre.
+    pub bound: f64,
+    /// d(value)/dt at the centre.
+    pub rate: f64,
+    /// Gradient of that rate over the cell.
+    pub turn: DVec3,
+    /// Growth of the remainder, first order.
+    pub s: f64,
+    /// Growth of the remainder, second order.
+    pub q: f64,
+    /// The normal is fixed in B: the second derivative of its motion is bounded with those of its clause.
+    pub rigid: bool,
+    /// What each half extent of the cell costs the bound.
+    pub cost: DVec3,
+}
+
+/// A box cell of A at an instant, with bounds on its motion against B over [t, t + h].
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// A's faces.
+    pub a: Faces<'a>,
+    /// B's faces.
+    pub b: Faces<'a>,
+    /// The instant.
+    pub at: &'a Instant,
+    /// Motion bounds over the span.
+    pub motion: Bounds,
+    /// Centre (A's model frame).
+    pub center: DVec3,
+    /// Half extents along A's model axes.
+    pub half: DVec3,
+    /// |half|.
+    pub radius: f64,
+    /// Centre in B's model frame.
+    pub center_b: DVec3,
+    /// v(c): velocity of the centre against B.
+    pub velocity: DVec3,
+    /// Depth of the contact that is searched.
+    pub delta: f64,
+}
+
+impl View<'_> {
+    /// The faces of a body.
+    pub fn faces(&self, side: Side) -> &Faces<'_> {
+        match side {
+            Side::A => &self.a,
+            Side::B => &self.b,
+        }
+    }
+
+    /// The face at the point `center + y`, its normal along A's axes.
+    fn face_at(&self, side: Side, face: &Face, y: DVec3) -> FaceAt {
+        match side {
+            Side::A => face.at(self.center + y),
+            Side::B => {
+                let mut f = face.at(self.center_b + self.at.b_from_a * y);
+                f.normal = self.at.a_vector(f.normal);
+                f
+            }
+        }
+    }
+
+    /// Extents of the cell at a curved face: (across the axis or all around, along the normal, along the curving
+    /// tangents), each the largest distance from the centre. `normal` is the face's there, along A's axes.
+    fn extents(&self, side: Side, face: &Face, normal: DVec3) -> (f64, f64, f64) {
+        let along = |n: DVec3| n.abs().dot(self.half);
+        match *face {
+            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+                let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
+                let t = axis.cross(normal).normalize_or_zero();
+                let u = t.cross(axis);
+                (along(u).hypot(along(t)).min(self.radius), along(u), along(t))
+            }
+            _ => {
+                let u = crate::math::any_perpendicular(normal);
+                let t = along(u).hypot(along(normal.cross(u))).min(self.radius);
+                (self.radius, along(normal), t)
+            }
+        }
+    }
+
+    /// What is known of a literal over the cell, for B over the whole span.
+    pub fn truth(&self, side: Side, id: LiteralId) -> Truth {
+        let faces = self.faces(side);
+        let face = faces.get(id.face());
+        let f = self.face_at(side, face, DVec3::ZERO);
+        let tilt = f.normal.abs().dot(self.half);
+        let r = self.radius;
+        let (mut lo, mut hi) = (f.value - tilt, f.value + tilt);
+        if f.k > 0.0 {
+            let bulge = if f.rho > 0.0 { f.k * r * r / (2.0 * f.rho) } else { f64::INFINITY };
+            hi = f.value + (tilt + bulge).min(r);
+        }
+        if side == Side::B {
+            // Lipschitz in space: no point moves further than V·h. A plane (and the tangent of a convex face) also has a
+            // rate of its own, with the second-order bound for a single normal.
+            let h = self.motion.h;
+            let way = self.motion.speed * h;
+            let rate = f.normal.dot(self.velocity) * h;
+            let slack =
+                f.normal.cross(self.at.omega).length() * r * h + 0.5 * self.motion.curvature(self.at, f.normal) * h * h;
+            lo = (lo - way).max(lo + rate.min(0.0) - slack);
+            hi = if f.k == 0.0 { (hi + way).min(hi + rate.max(0.0) + slack) } else { hi + way };
+        }
+        truth_of(id.sense(), (lo, hi), if faces.is_guard(id.face()) { 0.0 } else { self.delta })
+    }
+
+    /// The literal's linear bound, convex faces touched at `center + y`.
+    pub fn linear(&self, side: Side, id: LiteralId, y: DVec3) -> Linear {
+        let faces = self.faces(side);
+        let face = faces.get(id.face());
+        let delta = if faces.is_guard(id.face()) { 0.0 } else { self.delta };
+        if id.sense() == Sense::Positive {
+            let f = self.face_at(side, face, y);
+            let mut l = self.plane(side, id, f.normal, f.value - f.normal.dot(y) + delta);
+            l.cost = self.bulge(side, face, &f);
+            return l;
+        }
+        let f = self.face_at(side, face, DVec3::ZERO);
+        let mut normal = -f.normal;
+        let (mut remainder, mut s, mut q) = (0.0, 0.0, 0.0);
+        if f.k > 0.0 {
+            let (d, radial, tangential) = self.extents(side, face, f.normal);
+            let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
+            let closest = f.rho - radial - way;
+            // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
+            let slab = closest >= 0.5 * f.rho && tangential * tangential * f.rho < d * d * closest;
+            if slab || d <= 2.0 * f.rho {
+                let (d, rho) = if slab { (tangential, closest) } else { (d, f.rho) };
+                remainder = f.k * d * d / (2.0 * rho);
+                s = f.k * self.motion.speed * d / rho;
+                q = f.k * self.motion.speed * self.motion.speed / rho;
+            } else {
+                // −psi >= −psi(c) [+ sin α axis·(x−c) for a cone] − k·D.
+                normal = match *face {
+                    Face::Cone { axis, sin, .. } => sin * if side == Side::A { axis } else { self.at.a_vector(axis) },
+                    _ => DVec3::ZERO,
+                };
+                remainder = f.k * d;
+                s = f.k * self.motion.speed;
+            }
+        }
+        let mut l = self.plane(side, id, normal, -f.value - remainder + delta);
+        l.cost = self.bulge(side, face, &f);
+        if side == Side::A { l } else { Linear { s, q, ..l } }
+    }
+
+    /// The tangent plane of a convex face at a point of its own body's frame, wherever that is.
+    pub fn tangent(&self, side: Side, id: LiteralId, point: DVec3) -> Linear {
+        let f = self.faces(side).get(id.face()).at(point);
+        let (normal, center) = match side {
+            Side::A => (f.normal, self.center),
+            Side::B => (self.at.a_vector(f.normal), self.center_b),
+        };
+        self.plane(side, id, normal, f.value + f.normal.dot(center - point) + self.delta)
+    }
+
+    /// A bound by a plane that is fixed in its body.
+    fn plane(&self, side: Side, id: LiteralId, normal: DVec3, bound: f64) -> Linear {
+        let (rate, turn) = match side {
+            Side::A => (0.0, DVec3::ZERO),
+            Side::B => (normal.dot(self.velocity), normal.cross(self.at.omega)),
+        };
+        Linear {
+            side,
+            id,
+            other: None,
+            normal,
+            bound,
+            rate,
+            turn,
+            s: 0.0,
+            q: 0.0,
+            rigid: side == Side::B,
+            cost: DVec3::ZERO,
+        }
+    }
+
+    /// How much each half extent weighs in how far a face bends away from its tangent: k·(tangent component)²·e²/(2ρ).
+    fn bulge(&self, side: Side, face: &Face, f: &FaceAt) -> DVec3 {
+        if f.k == 0.0 {
+            return DVec3::ZERO;
+        }
+        let across = match *face {
+            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+                let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
+                let t = axis.cross(f.normal);
+                t * t
+            }
+            _ => DVec3::ONE - f.normal * f.normal,
+        };
+        across * self.half * self.half * (f.k / (2.0 * f.rho.max(self.radius)))
+    }
+
+    /// True where a tangent at another point can tighten the literal's bound.
+    pub fn is_curved_convex(&self, side: Side, id: LiteralId) -> bool {
+        id.sense() == Sense::Positive && !matches!(self.faces(side).get(id.face()), Face::Plane { .. })
+    }
+}

@@ -1,0 +1,174 @@
+//! The inner problem of every bound: the lowest point of a few planes over a box.
+//!
+//!     z* = min over |y_k| <= e_k of max_i (b_i + n_i·y)  =  max over λ >= 0, Σλ = 1 of Σ λ_i b_i − Σ_k e_k |Σ λ_i n_i|_k
+//!
+//! A linear program with four rows: the dual has the columns (n_i, 1) with profit b_i and the six slacks (∓ê_k, 0) with
+//! profit −e_k; the best single plane with its three slacks is a feasible start, so a primal simplex on a 4×4 basis inverse
+//! needs no first phase. Whatever it returns is only a proposal: callers evaluate the bound of its λ themselves, so an
+//! early stop or rounding can cost work, never correctness.
+
+use glam::DVec3;
+
+/// The multipliers and the point the program proposes.
+#[derive(Clone, Copy, Debug)]
+pub struct Solution {
+    /// Proposed minimum z*.
+    pub z: f64,
+    /// The minimising point y, relative to the box's centre.
+    pub y: DVec3,
+    /// Planes with a positive multiplier: (index, λ).
+    pub support: [(u32, f64); 4],
+    /// How many of `support` are filled.
+    pub count: usize,
+}
+
+/// Pivots after which the current basis is returned as it is.
+const MAX_PIVOTS: usize = 48;
+/// Slack columns stand behind the planes: plane count + 2k (p_k) and + 2k + 1 (q_k).
+const NONE: usize = usize::MAX;
+
+/// Solves the program for planes (n_i, b_i), i < b.len(); at least one is needed.
+pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
+    let count = b.len();
+    debug_assert!(count > 0 && normals.len() >= count);
+    let mut start = 0;
+    let mut scale: f64 = half.max_element();
+    for i in 0..count {
+        // The first basis: the plane whose own minimum over the box is highest.
+        let own = |i: usize| b[i] - normals[i].abs().dot(half);
+        if own(i) > own(start) {
+            start = i;
+        }
+        scale = scale.max(b[i].abs());
+    }
+    let tol = 1e-14 * scale;
+    // Rows of the basis inverse; `basis[r]` is the column in row r.
+    let mut inv = [[0.0f64; 4]; 4];
+    let mut basis = [NONE; 4];
+    for k in 0..3 {
+        let n = normals[start][k];
+        let (column, sign) = if n >= 0.0 { (count + 2 * k, -1.0) } else { (count + 2 * k + 1, 1.0) };
+        basis[k] = column;
+        inv[k][k] = sign;
+        inv[k][3] = -sign * n;
+    }
+    basis[3] = start;
+    inv[3][3] = 1.0;
+    let profit = |c: usize| if c < count { b[c] } else { -half[(c - count) / 2] };
+    let mut y = [0.0; 4];
+    for _ in 0..MAX_PIVOTS {
+        let p = [profit(basis[0]), profit(basis[1]), profit(basis[2]), profit(basis[3])];
+        for k in 0..4 {
+            y[k] = p[0] * inv[0][k] + p[1] * inv[1][k] + p[2] * inv[2][k] + p[3] * inv[3][k];
+        }
+        // Entering column: the largest reduced profit.
+        let (mut entering, mut gain) = (NONE, tol);
+        for i in 0..count {
+            let n = normals[i];
+            let g = b[i] - (n.x * y[0] + n.y * y[1] + n.z * y[2] + y[3]);
+            if g > gain {
+                (entering, gain) = (i, g);
+            }
+        }
+        for k in 0..3 {
+            let e = half[k];
+            if y[k] - e > gain {
+                (entering, gain) = (count + 2 * k, y[k] - e);
+            }
+            if -y[k] - e > gain {
+                (entering, gain) = (count + 2 * k + 1, -y[k] - e);
+            }
+        }
+        if entering == NONE {
+            break;
+        }
+        let mut d = [0.0; 4];
+        for r in 0..4 {
+            d[r] = if entering < count {
+                let n = normals[entering];
+                inv[r][0] * n.x + inv[r][1] * n.y + inv[r][2] * n.z + inv[r][3]
+            } else {
+                let k = (entering - count) / 2;
+                if (entering - count).is_multiple_of(2) { -inv[r][k] } else { inv[r][k] }
+            };
+        }
+        let (mut leaving, mut ratio) = (NONE, f64::INFINITY);
+        for r in 0..4 {
+            if d[r] > 1e-12 {
+                let q = inv[r][3].max(0.0) / d[r];
+                // Ties: the larger pivot, for stability.
+                if q < ratio || (q == ratio && leaving != NONE && d[r] > d[leaving]) {
+                    (leaving, ratio) = (r, q);
+                }
+            }
+        }
+        if leaving == NONE {
+            break;
+        }
+        let pivot = 1.0 / d[leaving];
+        for k in 0..4 {
+            inv[leaving][k] *= pivot;
+        }
+        for r in 0..4 {
+            if r != leaving && d[r] != 0.0 {
+                for k in 0..4 {
+                    inv[r][k] -= d[r] * inv[leaving][k];
+                }
+            }
+        }
+        basis[leaving] = entering;
+    }
+    let mut s = Solution { z: y[3], y: DVec3::new(-y[0], -y[1], -y[2]), support: [(0, 0.0); 4], count: 0 };
+    s.y = s.y.clamp(-half, half);
+    for r in 0..4 {
+        if basis[r] < count && inv[r][3] > 0.0 {
+            s.support[s.count] = (basis[r] as u32, inv[r][3]);
+            s.count += 1;
+        }
+    }
+    s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(normals: &[DVec3], b: &[f64], half: DVec3) {
+        let s = min_max(normals, b, half);
+        let top = |y: DVec3| (0..b.len()).map(|i| b[i] + normals[i].dot(y)).fold(f64::NEG_INFINITY, f64::max);
+        // Strong duality: the multipliers' bound equals the value at the point.
+        let (mut value, mut w) = (0.0, DVec3::ZERO);
+        for &(i, l) in &s.support[..s.count] {
+            value += l * b[i as usize];
+            w += l * normals[i as usize];
+        }
+        let bound = value - w.abs().dot(half);
+        assert!((bound - top(s.y)).abs() < 1e-12, "{bound} {}", top(s.y));
+        assert!((s.z - bound).abs() < 1e-12);
+    }
+
+    #[test]
+    fn primal_and_dual_agree_on_random_planes() {
+        let mut seed = 1u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+        };
+        for round in 0..20000 {
+            let count = 1 + round % 12;
+            let normals: Vec<DVec3> = (0..count)
+                .map(|_| DVec3::new(random(), random(), random()).try_normalize().unwrap_or(DVec3::X))
+                .collect();
+            let b: Vec<f64> = (0..count).map(|_| random()).collect();
+            check(&normals, &b, DVec3::new(random().abs(), random().abs(), random().abs()));
+        }
+    }
+
+    #[test]
+    fn degenerate_planes_are_solved() {
+        let n = [DVec3::X, -DVec3::X, DVec3::X, DVec3::Y, -DVec3::Y];
+        check(&n, &[0.0; 5], DVec3::splat(1.0));
+        check(&n[..2], &[1.0, 1.0], DVec3::new(1.0, 0.0, 1.0));
+        check(&n[..1], &[-0.5], DVec3::ZERO);
+    }
+}

@@ -1,0 +1,339 @@
+//! The exact contact of a few literals: Newton on the optimality conditions of "deepest common point".
+//!
+//! Unknowns x (A's model frame), t and multipliers λ; for active constraints c_i with gradients g_i
+//!
+//!     c_i(x, t) = −level,    Σ λ_i g_i = 0,    Σ λ_i = 1 (over literals)
+//!
+//! Two literals: face against face; three: edge against face; four: vertex against face or edge against edge. A cone's
+//! apex is a vertex of its own: its literal is replaced by three planes through the apex of the offset cone (moved by
+//! level/sin α along the axis), whose multipliers are free in sign.
+//! Steps are Levenberg-Marquardt with damping by the squared residual, so that degenerate sets (parallel faces,
+//! redundant planes) converge to their nearest solution (Yamashita & Fukushima 2001). Where multipliers do not settle but
+//! the surfaces do meet, minimum-norm steps on c_i = −level alone finish.
+//! Nothing here is trusted: the search accepts a solution only when both whole trees confirm it.
+
+use super::literal::{Faces, Side};
+use crate::motion::{Instant, Relative};
+use crate::solid::local::LiteralId;
+use crate::solid::{Face, Sense};
+use glam::{DMat3, DVec3};
+
+/// Most constraints a system may hold.
+pub const MAX_ACTIVE: usize = 6;
+const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
+
+/// One active constraint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Constraint {
+    /// A face of the solid, with its sense.
+    Literal(Side, LiteralId),
+    /// A plane through a cone's offset apex: direction `axis` index 0..3 (0 the axis, 1 and 2 perpendiculars) of cone face.
+    Apex(Side, LiteralId, u8),
+}
+
+/// A point of contact in space-time with its multipliers.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Point, A's model frame.
+    pub x: DVec3,
+    /// Time, fraction of the step.
+    pub t: f64,
+    /// The active constraints.
+    pub active: Vec<Constraint>,
+    /// Their multipliers.
+    pub lambda: Vec<f64>,
+    /// Largest |Σ λ g| left.
+    pub stationarity: f64,
+}
+
+/// What the equations are about.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// A's faces.
+    pub a: Faces<'a>,
+    /// B's faces.
+    pub b: Faces<'a>,
+    /// Relative motion.
+    pub relative: &'a Relative,
+    /// Length scale of the pair.
+    pub scale: f64,
+    /// Time in which the pair moves by about its scale.
+    pub time_scale: f64,
+    /// Residual of the constraints below which they count as met.
+    pub tolerance: f64,
+}
+
+/// A constraint's value, gradient, Hessian, time derivatives; A's axes.
+pub struct Row {
+    pub(crate) value: f64,
+    pub(crate) gradient: DVec3,
+    pub(crate) hessian: DMat3,
+    pub(crate) rate: f64,
+    pub(crate) gradient_rate: DVec3,
+}
+
+fn outer(u: DVec3, v: DVec3) -> DMat3 {
+    DMat3::from_cols(u * v.x, u * v.y, u * v.z)
+}
+
+/// Hessian of psi of a face at a point, given its normal there, in the face's own frame.
+fn hessian(face: &Face, x: DVec3) -> DMat3 {
+    match *face {
+        Face::Plane { .. } => DMat3::ZERO,
+        Face::Sphere { .. } => {
+            let f = face.at(x);
+            if f.rho == 0.0 { DMat3::ZERO } else { (DMat3::IDENTITY - outer(f.normal, f.normal)) * (1.0 / f.rho) }
+        }
+        Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+            let f = face.at(x);
+            if f.rho == 0.0 {
+                return DMat3::ZERO;
+            }
+            // The tangent across the axis is the same for the cone's normal and its radial direction.
+            let t = axis.cross(f.normal).normalize_or_zero();
+            outer(t, t) * (f.k / f.rho)
+        }
+    }
+}
+
+impl Problem<'_> {
+    /// The constraint at (x, instant), for a contact at depth `level`: value is c + level.
+    pub fn row(&self, c: &Constraint, x: DVec3, at: &Instant, level: f64) -> Row {
+        let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
+        let face = if side == Side::A { self.a.get(id.face()) } else { self.b.get(id.face()) };
+        let own = if side == Side::A { x } else { at.b_point(x) };
+        let (value, mut gradient, mut h) = match *c {
+            Constraint::Literal(..) => {
+                let f = face.at(own);
+                let h = hessian(face, own);
+                if id.sense() == Sense::Positive {
+                    (f.value + level, f.normal, h)
+                } else {
+                    (-f.value + level, -f.normal, h * -1.0)
+                }
+            }
+            Constraint::Apex(_, _, k) => {
+                let Face::Cone { apex, axis, sin, .. } = *face else { unreachable!("apex of a cone") };
+                let u = crate::math::any_perpendicular(axis);
+                let n = [axis, u, axis.cross(u)][k as usize];
+                let shift = if k == 0 { level / sin } else { 0.0 };
+                (n.dot(own - apex) - shift, n, DMat3::ZERO)
+            }
+        };
+        let (mut rate, mut gradient_rate) = (0.0, DVec3::ZERO);
+        if side == Side::B {
+            gradient = at.a_vector(gradient);
+            h = at.b_from_a.transpose() * h * at.b_from_a;
+            let v = at.velocity(x);
+            rate = gradient.dot(v);
+            // B's field turns with −omega against A and is passed through at v.
+            gradient_rate = h * v - at.omega.cross(gradient);
+        }
+        Row { value, gradient, hessian: h, rate, gradient_rate }
+    }
+
+    /// Solves from a starting guess. `None` when it does not converge to finite numbers.
+    pub fn solve(&self, active: &[Constraint], x: DVec3, t: f64, lambda: &[f64], level: f64) -> Option<Solution> {
+        let m = active.len();
+        debug_assert!(m <= MAX_ACTIVE && lambda.len() == m);
+        let n = m + 4;
+        let (mut x, mut t, mut lambda) = (x, t, lambda.to_vec());
+        let mut f = [0.0; MAX_UNKNOWNS];
+        let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
+        let mut best: f64 = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+        let mut damping = 1.0;
+        for _ in 0..60 {
+            if best < 1e-30 {
+                break;
+            }
+            let mu = damping * best.min(1e-2);
+            let step = damped_step(&jac, &f, n, mu.max(1e-26))?;
+            let sx = DVec3::new(step[0], step[1], step[2]) * self.scale;
+            let st = step[3] * self.time_scale;
+            if !(sx.is_finite() && st.is_finite()) {
+                return None;
+            }
+            let (nx, nt) = (x + sx, t + st);
+            let nl: Vec<f64> = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
+            let (mut nf, mut nj) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
+            if nt.abs() > 4.0 {
+                damping *= 16.0;
+                if damping > 1e12 {
+                    return None;
+                }
+                continue;
+            }
+            let next = self.fill(active, nx, nt, &nl, level, &mut nf, &mut nj);
+            if next < best {
+                let stalled = next > 0.25 * best && best < 1e-26;
+                (x, t, lambda, f, jac, best) = (nx, nt, nl, nf, nj, next);
+                damping = (damping * 0.1).max(1e-6);
+                if stalled {
+                    break;
+                }
+            } else {
+                if best < 1e-26 {
+                    break;
+                }
+                damping *= 16.0;
+                if damping > 1e14 {
+                    break;
+                }
+            }
+        }
+        (x, t) = self.meet(active, x, t, level)?;
+        let at = self.relative.at(t);
+        let sum = active.iter().zip(&lambda).map(|(c, l)| self.row(c, x, &at, level).gradient * *l).sum::<DVec3>();
+        Some(Solution { x, t, active: active.to_vec(), lambda, stationarity: sum.abs().max_element() })
+    }
+
+    /// Minimum-norm steps on the constraints alone until they are met to rounding; `None` when they can't be.
+    fn meet(&self, active: &[Constraint], mut x: DVec3, mut t: f64, level: f64) -> Option<(DVec3, f64)> {
+        let m = active.len();
+        let mut last = f64::INFINITY;
+        for _ in 0..12 {
+            let at = self.relative.at(t);
+            let (mut g, mut v, mut residual) = ([[0.0; 4]; MAX_ACTIVE], [0.0; MAX_ACTIVE], 0.0f64);
+            for (i, c) in active.iter().enumerate() {
+                let r = self.row(c, x, &at, level);
+                g[i] = [r.gradient.x, r.gradient.y, r.gradient.z, r.rate * self.time_scale / self.scale];
+                v[i] = r.value / self.scale;
+                residual = residual.max(r.value.abs());
+            }
+            if !residual.is_finite() {
+                return None;
+            }
+            if residual == 0.0 || residual >= 0.5 * last {
+                last = last.min(residual);
+                break;
+            }
+            last = residual;
+            // Gram matrix of the rows, a trace of damping for redundant ones.
+            let (mut gram, mut rhs) = ([[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS], [0.0; MAX_UNKNOWNS]);
+            for i in 0..m {
+                for j in 0..m {
+                    gram[i][j] = (0..4).map(|k| g[i][k] * g[j][k]).sum();
+                }
+                gram[i][i] *= 1.0 + 1e-13;
+                gram[i][i] += 1e-15;
+                rhs[i] = -v[i];
+            }
+            let y = cholesky_solve(&mut gram, rhs, m)?;
+            let step: [f64; 4] = std::array::from_fn(|k| (0..m).map(|i| g[i][k] * y[i]).sum());
+            x += DVec3::new(step[0], step[1], step[2]) * self.scale;
+            t += step[3] * self.time_scale;
+        }
+        (last <= self.tolerance).then_some((x, t))
+    }
+
+    /// Scaled residual and Jacobian; returns the squared residual.
+    fn fill(
+        &self,
+        active: &[Constraint],
+        x: DVec3,
+        t: f64,
+        lambda: &[f64],
+        level: f64,
+        f: &mut [f64; MAX_UNKNOWNS],
+        jac: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+    ) -> f64 {
+        let m = active.len();
+        let at = self.relative.at(t);
+        let (mut sum, mut curvature, mut sum_rate, mut total, mut literals) =
+            (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO, 0.0, false);
+        for (i, c) in active.iter().enumerate() {
+            let r = self.row(c, x, &at, level);
+            f[i] = r.value / self.scale;
+            for k in 0..3 {
+                jac[i][k] = r.gradient[k];
+                jac[m + k][4 + i] = r.gradient[k];
+            }
+            jac[i][3] = r.rate * self.time_scale / self.scale;
+            sum += r.gradient * lambda[i];
+            curvature += r.hessian * lambda[i];
+            sum_rate += r.gradient_rate * lambda[i];
+            if matches!(c, Constraint::Literal(..)) {
+                total += lambda[i];
+                jac[m + 3][4 + i] = 1.0;
+                literals = true;
+            }
+        }
+        for k in 0..3 {
+            f[m + k] = sum[k];
+            for j in 0..3 {
+                jac[m + k][j] = curvature.col(j)[k] * self.scale;
+            }
+            jac[m + k][3] = sum_rate[k] * self.time_scale;
+        }
+        if literals {
+            f[m + 3] = total - 1.0;
+        } else {
+            // Apex on apex: any scale of the multipliers will do; hold the first one.
+            f[m + 3] = lambda[0] - 1.0;
+            jac[m + 3][4] = 1.0;
+        }
+        f[..m + 4].iter().map(|v| v * v).sum()
+    }
+}
+
+/// Solves (JᵀJ + μ I) step = −Jᵀ f.
+fn damped_step(
+    jac: &[[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+    f: &[f64; MAX_UNKNOWNS],
+    n: usize,
+    mu: f64,
+) -> Option<[f64; MAX_UNKNOWNS]> {
+    let (mut a, mut b) = ([[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS], [0.0; MAX_UNKNOWNS]);
+    for i in 0..n {
+        for j in 0..=i {
+            let mut s = 0.0;
+            for r in 0..n {
+                s += jac[r][i] * jac[r][j];
+            }
+            a[i][j] = s;
+            a[j][i] = s;
+        }
+        a[i][i] += mu + 1e-15 * a[i][i];
+        for r in 0..n {
+            b[i] -= jac[r][i] * f[r];
+        }
+    }
+    cholesky_solve(&mut a, b, n)
+}
+
+/// Solves a symmetric positive definite system in place.
+fn cholesky_solve(
+    a: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+    mut b: [f64; MAX_UNKNOWNS],
+    n: usize,
+) -> Option<[f64; MAX_UNKNOWNS]> {
+    for j in 0..n {
+        for k in 0..j {
+            let l = a[j][k];
+            for i in j..n {
+                a[i][j] -= a[i][k] * l;
+            }
+        }
+        let d = a[j][j];
+        if d.is_nan() || d <= 0.0 {
+            return None;
+        }
+        let r = d.sqrt();
+        for i in j..n {
+            a[i][j] /= r;
+        }
+    }
+    for i in 0..n {
+        for k in 0..i {
+            b[i] -= a[i][k] * b[k];
+        }
+        b[i] /= a[i][i];
+    }
+    for i in (0..n).rev() {
+        for k in i + 1..n {
+            b[i] -= a[k][i] * b[k];
+        }
+        b[i] /= a[i][i];
+    }
+    Some(b)
+}

@@ -1,0 +1,224 @@
+//! Earliest contact of one pair over one step: from the question to the answer's fields.
+
+use super::literal::{Faces, Side};
+use super::newton::{Constraint, Problem, Solution};
+use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use super::roots;
+use super::search::{Ending, Found, Scratch, Search, Task};
+use crate::eco::Model;
+use crate::math::{Aabb, tolerance};
+use crate::motion::{Placed, Relative};
+use glam::{DMat3, DVec3};
+
+/// One body of a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Body<'a> {
+    /// Its model.
+    pub model: &'a Model,
+    /// Where it stands and how it moves.
+    pub placed: Placed,
+}
+
+/// A question: two bodies over one step.
+#[derive(Clone, Copy, Debug)]
+pub struct PairQuery<'a> {
+    /// The first body; normals point from it.
+    pub a: Body<'a>,
+    /// The second one.
+    pub b: Body<'a>,
+    /// Depth delta at which a contact is decided; see `default_resolution`.
+    pub resolution: f64,
+    /// Cells that may be refined before the answer is `undecided`.
+    pub cell_limit: u64,
+}
+
+/// Cells a pair may cost by default.
+pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
+
+/// 1e-9 of the larger bounding radius of the two models.
+pub fn default_resolution(a: &Model, b: &Model) -> f64 {
+    let radius = |m: &Model| m.solid.aabb().half().length();
+    tolerance::DEFAULT_RESOLUTION * radius(a).max(radius(b))
+}
+
+/// Searches a pair to its end.
+pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
+    let (a, b) = (&query.a.model.solid, &query.b.model.solid);
+    if a.is_empty() || b.is_empty() {
+        return Outcome::clear(query.resolution);
+    }
+    let relative = Relative::new(query.a.placed, query.b.placed);
+    let (box_a, box_b) = (a.aabb(), b.aabb());
+    let scale = box_a.half().length().max(box_b.half().length());
+    // Positions, matrices and faces are each right to a few units in the last place of the pair's extent.
+    let extent = box_a.center().length() + box_b.center().length() + 2.0 * scale + relative.center_a().length();
+    let task = Task {
+        a,
+        b,
+        relative: &relative,
+        delta: query.resolution,
+        rounding: 32.0 * f64::EPSILON * extent,
+        scale,
+        still: false,
+        limit: query.cell_limit,
+    };
+    let mut outcome = Outcome::clear(query.resolution);
+    for level in [1.0, 2.0] {
+        let task = Task { delta: level * query.resolution, ..task };
+        let mut search = Search::new(task, scratch);
+        start(&mut search, &task, &box_a);
+        let ending = search.run(f64::INFINITY).expect("a search without a horizon ends");
+        outcome.counters += search.counters;
+        match ending {
+            Ending::Clear => {}
+            Ending::Contact(found) => fill_contact(&mut outcome, &task, &found),
+            Ending::Limit(t) => {
+                outcome.status = Status::Undecided;
+                outcome.time_lower = t;
+            }
+            Ending::Deep(x) => {
+                outcome.touching = true;
+                if level == 1.0 {
+                    continue;
+                }
+                fill_overlap(&mut outcome, &task, x);
+            }
+        }
+        break;
+    }
+    outcome
+}
+
+fn start(search: &mut Search, task: &Task, region: &Aabb) {
+    for root in roots::alternatives(task.a, &task.a.normal_form, region, 4096) {
+        search.root(root.region.center(), root.region.half(), &root.tokens, &task.b.normal_form);
+    }
+}
+
+fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
+    let deep = &found.deep;
+    let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
+    o.status = Status::Contact;
+    o.time_upper = deep.t;
+    o.time = found.touch.as_ref().map_or(deep.t, |s| s.t.clamp(0.0, deep.t));
+    o.not_continued = found.touch.is_none();
+    o.time_lower = o.time.min(found.goal.max(0.0));
+    let at = task.relative.at(o.time);
+    let problem = Problem {
+        a: Faces { solid: task.a, guards: &[] },
+        b: Faces { solid: task.b, guards: &[] },
+        relative: task.relative,
+        scale: task.scale,
+        time_scale: 1.0,
+        tolerance: task.rounding,
+    };
+    o.point = task.relative.world_point(&at, s.x);
+    let active = Active::of(&problem, s);
+    o.kind = Kind::of_active(active.count[0], active.count[1]);
+    o.faces_a = active.faces[0];
+    o.faces_b = active.faces[1];
+    o.extent = active.extent;
+    o.averaged_normal = o.kind == Kind::VertexVertex;
+    let normal = active.normal;
+    o.normal = (at.world_from_a * normal).normalize();
+    o.normal_speed = at.velocity(s.x).dot(normal);
+    o.separation = 0.0;
+}
+
+/// What a solution's multipliers say about the contact.
+struct Active {
+    count: [usize; 2],
+    faces: [[u32; 3]; 2],
+    /// Unit, from A, along A's axes.
+    normal: DVec3,
+    extent: Extent,
+}
+
+/// A multiplier above this holds its face in the contact.
+const ACTIVE: f64 = 1e-8;
+
+impl Active {
+    fn of(problem: &Problem, s: &Solution) -> Self {
+        let at = problem.relative.at(s.t);
+        let mut count = [0; 2];
+        let mut faces = [[NO_FACE; 3]; 2];
+        let mut sums = [DVec3::ZERO; 2];
+        let mut gradients = Vec::new();
+        let mut curvature = DMat3::ZERO;
+        for (c, l) in s.active.iter().zip(&s.lambda) {
+            let row = problem.row(c, s.x, &at, 0.0);
+            let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
+            let k = side as usize;
+            sums[k] += row.gradient * *l;
+            curvature += row.hessian * *l;
+            let active = match c {
+                Constraint::Literal(..) => *l > ACTIVE,
+                Constraint::Apex(..) => true,
+            };
+            if active {
+                gradients.push(row.gradient);
+                let new = !faces[k].contains(&id.face());
+                if let Some(slot) = faces[k].iter().position(|f| *f == NO_FACE).filter(|_| new) {
+                    faces[k][slot] = id.face();
+                }
+                count[k] += 1;
+            }
+        }
+        let normal =
+            (sums[0] - sums[1]).try_normalize().unwrap_or_else(|| gradients.first().copied().unwrap_or(DVec3::X));
+        Self { count, faces, normal, extent: extent(&gradients, curvature, problem.scale) }
+    }
+}
+
+/// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
+fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
+    // Orthonormal basis of the span of the gradients (Gram-Schmidt), then of its complement.
+    let mut span: Vec<DVec3> = Vec::new();
+    for g in gradients {
+        let r = span.iter().fold(*g, |r, e| r - *e * e.dot(r));
+        if r.length() > 1e-6 && span.len() < 3 {
+            span.push(r.normalize());
+        }
+    }
+    let flat = |v: f64| v.abs() * scale < 1e-6;
+    match span.len() {
+        1 => {
+            let u = crate::math::any_perpendicular(span[0]);
+            let v = span[0].cross(u);
+            let (a, b, c) = (u.dot(curvature * u), u.dot(curvature * v), v.dot(curvature * v));
+            let (mean, spread) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
+            match (flat(mean - spread), flat(mean + spread)) {
+                (true, true) => Extent::Patch,
+                (false, false) => Extent::Point,
+                _ => Extent::Line,
+            }
+        }
+        2 => {
+            let u = span[0].cross(span[1]).normalize();
+            if flat(u.dot(curvature * u)) { Extent::Line } else { Extent::Point }
+        }
+        _ => Extent::Point,
+    }
+}
+
+/// Overlap at the start: climbs from a common point to a locally deepest one.
+fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
+    o.status = Status::Overlap;
+    (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
+    let at = task.relative.at(0.0);
+    let (deepest, normal, depth, faces) = super::depth::deepest(task, &at, x);
+    o.point = task.relative.world_point(&at, deepest);
+    o.normal = (at.world_from_a * normal).normalize();
+    o.separation = -2.0 * depth;
+    o.normal_speed = at.velocity(deepest).dot(normal);
+    for (side, id) in faces {
+        let list = if side == Side::A { &mut o.faces_a } else { &mut o.faces_b };
+        if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
+            && !list.contains(&id.face())
+        {
+            list[slot] = id.face();
+        }
+    }
+    let count = |list: &[u32; 3]| list.iter().filter(|f| **f != NO_FACE).count();
+    o.kind = Kind::of_active(count(&o.faces_a), count(&o.faces_b));
+}

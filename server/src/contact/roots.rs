@@ -1,0 +1,102 @@
+//! Where the search starts: one box per positive alternative of a body.
+//!
+//! A contact point lies in some positive primitive of A, so A's expression is split at its bounded alternatives: an *or*
+//! into its operands, an *and* along its bounded *or*. Each root carries only its own alternative, and its box is what the
+//! positive primitives of that alternative have in common.
+
+use crate::math::Aabb;
+use crate::solid::local::{self, Expression, Token};
+use crate::solid::{Sense, Solid};
+
+/// One alternative and the box that holds it (the solid's frame).
+#[derive(Clone, Debug)]
+pub struct Root {
+    /// The box; never empty.
+    pub region: Aabb,
+    /// The expression within it.
+    pub tokens: Vec<Token>,
+}
+
+/// Alternatives of an expression that is asked for within `region`. At most about `most` of them.
+pub fn alternatives(solid: &Solid, tokens: &[Token], region: &Aabb, most: usize) -> Vec<Root> {
+    let mut out = Vec::new();
+    split(solid, tokens, region, most, &mut out);
+    out
+}
+
+fn split(solid: &Solid, tokens: &[Token], region: &Aabb, most: usize, out: &mut Vec<Root>) {
+    let region = bound(solid, tokens).intersection(region);
+    if region.is_empty() {
+        return;
+    }
+    if out.len() >= most {
+        out.push(Root { region, tokens: tokens.to_vec() });
+        return;
+    }
+    match local::first(tokens).0 {
+        Expression::Or(body) => each(body, |operand| split(solid, operand, &region, most, out)),
+        Expression::And(body) => {
+            // The bounded operand with alternatives whose boxes together are smallest; the rest rides along.
+            let mut pick: Option<(usize, &[Token])> = None;
+            let mut at = 0;
+            each(body, |operand| {
+                if matches!(local::first(operand).0, Expression::Or(_))
+                    && bound(solid, operand).is_finite()
+                    && pick.is_none()
+                {
+                    pick = Some((at, operand));
+                }
+                at += operand.len();
+            });
+            let Some((at, operand)) = pick else {
+                out.push(Root { region, tokens: tokens.to_vec() });
+                return;
+            };
+            let Expression::Or(inner) = local::first(operand).0 else { unreachable!("picked an or") };
+            let mut rest: Vec<&[Token]> = Vec::new();
+            let mut here = 0;
+            each(body, |o| {
+                if here != at {
+                    rest.push(o);
+                }
+                here += o.len();
+            });
+            each(inner, |alternative| {
+                let mut joined = Vec::new();
+                local::write_and(std::iter::once(alternative).chain(rest.iter().copied()), &mut joined);
+                split(solid, &joined, &region, most, out);
+            });
+        }
+        Expression::Literal(_) => out.push(Root { region, tokens: tokens.to_vec() }),
+    }
+}
+
+/// Calls `f` with each operand of a body, operator included.
+fn each<'t>(mut body: &'t [Token], mut f: impl FnMut(&'t [Token])) {
+    while !body.is_empty() {
+        let (operand, rest) = body.split_at(local::first(body).1);
+        f(operand);
+        body = rest;
+    }
+}
+
+/// A box that holds an expression: a positive literal lies in its whole primitive, whose other faces stand beside it or
+/// hold throughout the region.
+fn bound(solid: &Solid, tokens: &[Token]) -> Aabb {
+    match local::first(tokens).0 {
+        Expression::Literal(id) if id.sense() == Sense::Positive => {
+            solid.face_owner.get(id.face() as usize).map_or(Aabb::ALL, |p| solid.primitives[*p as usize].aabb)
+        }
+        Expression::Literal(_) => Aabb::ALL,
+        Expression::And(body) => {
+            let mut b = Aabb::ALL;
+            each(body, |o| b = b.intersection(&bound(solid, o)));
+            b
+        }
+        Expression::Or(body) => {
+            let mut b = Aabb::EMPTY;
+            each(body, |o| b = b.union(&bound(solid, o)));
+            b
+        }
+    }
+}

@@ -1,0 +1,545 @@
+//! The search: one queue ordered by the earliest time at which an item could hold a contact.
+//!
+//! Items are cells: boxes fixed in the carrier A with what is left there of both trees. The earliest is popped, bounded
+//! (`clause`) and put back at the time it is proven free until, or split; where its bounds point to a contact, Newton
+//! proposes one and both whole trees confirm it (`newton`). When the earliest item lies beyond the verified contact, all
+//! that was queued is the proof that nothing came before.
+//!
+//! A cell inside one body may be dropped only at t > 0: once the start is known to be free of overlap and containment,
+//! the first contact lies on both surfaces (f_A = f_B = −delta). At t = 0 such cells are refined like any other, and a
+//! witness found there restarts the search at 2 delta, then means overlap.
+
+use super::clause::{self, Advance, Hint};
+use super::literal::{Faces, Side, View};
+use super::newton::{Constraint, Problem, Solution};
+use super::outcome::Counters;
+use crate::motion::{Instant, Relative};
+use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::{Face, Sense, Solid};
+use glam::DVec3;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// An expression in the token pool; `start == end` means true everywhere.
+type Range = (u32, u32);
+
+/// A box fixed in A with what is left there of both trees.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    /// Proven free of contact before this time.
+    t: f64,
+    /// Order of creation: ties in time are popped in this order.
+    serial: u64,
+    center: DVec3,
+    half: DVec3,
+    a: Range,
+    /// B's expression at all times.
+    b_always: Range,
+    /// B's expression until `b_until`.
+    b: Range,
+    b_until: f64,
+    /// Length of a look ahead in units of radius / speed.
+    reach: f64,
+}
+
+impl PartialEq for Cell {
+    fn eq(&self, o: &Self) -> bool {
+        self.cmp(o) == Ordering::Equal
+    }
+}
+impl Eq for Cell {}
+impl PartialOrd for Cell {
+    fn partial_cmp(&self, o: &Self) -> Option<Ordering> {
+        Some(self.cmp(o))
+    }
+}
+impl Ord for Cell {
+    // The heap's greatest is the earliest.
+    fn cmp(&self, o: &Self) -> Ordering {
+        o.t.total_cmp(&self.t).then(o.serial.cmp(&self.serial))
+    }
+}
+
+/// A confirmed contact.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The witness of depth delta.
+    pub deep: Solution,
+    /// The same contact where the surfaces meet, when it could be continued back.
+    pub touch: Option<Solution>,
+    /// Time until which everything must be proven free.
+    pub goal: f64,
+}
+
+/// How a search ended.
+#[derive(Clone, Debug)]
+pub enum Ending {
+    /// No contact within the step.
+    Clear,
+    /// The earliest contact.
+    Contact(Found),
+    /// A point of this depth exists at t = 0 (A's frame).
+    Deep(DVec3),
+    /// The work limit ran out; free before this time.
+    Limit(f64),
+}
+
+/// What to search: two solids, their motion, a depth, a limit.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// The carrier of the cells.
+    pub a: &'a Solid,
+    /// The other solid.
+    pub b: &'a Solid,
+    /// Motion of the pair.
+    pub relative: &'a Relative,
+    /// Depth at which a contact is decided.
+    pub delta: f64,
+    /// What rounding may do to one bound.
+    pub rounding: f64,
+    /// Length scale of the pair.
+    pub scale: f64,
+    /// Search only the instant t = 0.
+    pub still: bool,
+    /// Cells that may be refined.
+    pub limit: u64,
+}
+
+/// |Σ λ g| below which multipliers have settled.
+const SETTLED: f64 = 1e-6;
+
+/// Points kept at which curved faces are touched.
+const MAX_HINTS: usize = 8;
+
+/// Memory of a search, kept from one to the next.
+#[derive(Default, Debug)]
+pub struct Scratch {
+    heap: BinaryHeap<Cell>,
+    pool: Vec<Token>,
+    guards_b: Vec<Face>,
+    clause: clause::Scratch,
+    hints: Vec<Hint>,
+    tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
+}
+
+/// A search in progress.
+pub struct Search<'a, 's> {
+    task: Task<'a>,
+    scratch: &'s mut Scratch,
+    serial: u64,
+    found: Option<Found>,
+    instant: Instant,
+    /// Work done so far.
+    pub counters: Counters,
+}
+
+impl<'a, 's> Search<'a, 's> {
+    /// A search without roots; see `root`.
+    pub fn new(task: Task<'a>, scratch: &'s mut Scratch) -> Self {
+        scratch.heap.clear();
+        scratch.pool.clear();
+        scratch.guards_b.clear();
+        scratch.tried.clear();
+        scratch.hints.clear();
+        scratch.clause.clauses = 0;
+        let instant = task.relative.at(0.0);
+        Self { task, scratch, serial: 0, found: None, instant, counters: Counters::default() }
+    }
+
+    /// Adds a root: the box [center ± half] of A, in which A is `a` and B is `b`.
+    pub fn root(&mut self, center: DVec3, half: DVec3, a: &[Token], b: &[Token]) {
+        let a = self.store(a);
+        let b = self.store(b);
+        self.push(Cell { t: 0.0, serial: 0, center, half, a, b_always: b, b, b_until: f64::INFINITY, reach: 1.0 });
+    }
+
+    fn store(&mut self, tokens: &[Token]) -> Range {
+        let start = self.scratch.pool.len() as u32;
+        self.scratch.pool.extend_from_slice(tokens);
+        (start, self.scratch.pool.len() as u32)
+    }
+
+    fn push(&mut self, mut cell: Cell) {
+        cell.serial = self.serial;
+        self.serial += 1;
+        self.scratch.heap.push(cell);
+    }
+
+    /// Time before which nothing can happen in what is queued; infinite when nothing is.
+    pub fn earliest(&self) -> f64 {
+        self.scratch.heap.peek().map_or(f64::INFINITY, |c| c.t)
+    }
+
+    fn goal(&self) -> f64 {
+        self.found.as_ref().map_or(f64::INFINITY, |f| f.goal)
+    }
+
+    /// Runs to the end, or until nothing before `until` is left: then `None`.
+    pub fn run(&mut self, until: f64) -> Option<Ending> {
+        loop {
+            let Some(cell) = self.scratch.heap.peek().copied() else {
+                return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
+            };
+            if cell.t >= self.goal() {
+                return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
+            }
+            if cell.t > until {
+                return None;
+            }
+            if self.counters.cells >= self.task.limit {
+                return Some(Ending::Limit(cell.t));
+            }
+            self.scratch.heap.pop();
+            self.counters.cells += 1;
+            let deep = self.refine(cell);
+            self.counters.clauses = self.scratch.clause.clauses;
+            if let Some(x) = deep {
+                return Some(Ending::Deep(x));
+            }
+        }
+    }
+
+    /// Refines one cell; a point deeper than delta in both bodies at t = 0 ends the search.
+    fn refine(&mut self, mut cell: Cell) -> Option<DVec3> {
+        if self.instant.t != cell.t {
+            self.instant = self.task.relative.at(cell.t);
+        }
+        let at = self.instant;
+        let start = cell.t == 0.0;
+        if cell.a.0 == cell.a.1 && !start {
+            return None;
+        }
+        let radius = cell.half.length();
+        let x_max = (cell.center - at.center_a).length() + radius;
+        let end = if self.task.still { 0.0 } else { self.goal().min(1.0) - cell.t };
+        // Speed bounds need a span, the span a speed: take the whole rest first, then cut.
+        let whole = self.task.relative.bounds(cell.t, end, x_max);
+        let h = if whole.speed * end > cell.reach * radius { cell.reach * radius / whole.speed } else { end };
+        let motion = if h < end { self.task.relative.bounds(cell.t, h, x_max) } else { whole };
+
+        let scratch = &mut *self.scratch;
+        let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
+        let view = View {
+            a: Faces { solid: self.task.a, guards: &[] },
+            b: Faces { solid: self.task.b, guards: &scratch.guards_b },
+            at: &at,
+            motion,
+            center: cell.center,
+            half: cell.half,
+            radius,
+            center_b: at.b_point(cell.center),
+            velocity: at.velocity(cell.center),
+            delta: self.task.delta,
+        };
+        let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
+        let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
+        let b = match b_truth {
+            (Truth::Open, range) => {
+                cell.b = range;
+                cell.b_until = cell.t + h;
+                range
+            }
+            (Truth::True, _) => (0, 0),
+            (Truth::False, _) => {
+                self.again(cell, h, end, true);
+                return None;
+            }
+        };
+        let b_full = b.0 == b.1;
+        if b_full && !start {
+            self.again(cell, h, end, true);
+            return None;
+        }
+        let one_sided = b_full || cell.a.0 == cell.a.1;
+        let found = if b_full && cell.a.0 == cell.a.1 {
+            Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO }
+        } else {
+            let pair = clause::Pair { pool, a: cell.a, b };
+            clause::advance(&view, &pair, &scratch.hints, self.task.rounding, 0.0, clause_scratch)
+        };
+        if one_sided {
+            // At the start only: exclusion now suffices. Inside A nothing first happens later; inside B not before h.
+            if found.dt >= 0.0 {
+                if b_full && cell.a.0 != cell.a.1 {
+                    self.again(cell, h, end, true);
+                }
+                return None;
+            }
+        } else if found.dt >= h {
+            self.again(cell, h, end, true);
+            return None;
+        } else if found.dt > 0.0 {
+            // What splitting could gain is what the cell's extents cost the bound.
+            let gain = found.cost.element_sum().min(radius);
+            if found.dt * motion.speed >= 0.25 * gain || found.dt >= 0.25 * end {
+                self.again(cell, found.dt, end, false);
+                return None;
+            }
+        }
+        if start {
+            for x in [cell.center, cell.center + found.y] {
+                if self.is_deep(x, &at) {
+                    return Some(x);
+                }
+            }
+        }
+        if !one_sided && !self.task.still {
+            self.attempt(&cell, &found, &at);
+            if cell.t >= self.goal() {
+                return None;
+            }
+        }
+        self.split(cell, found.cost);
+        None
+    }
+
+    /// Puts a cell back that is free for `dt`, unless that is all the time there is.
+    fn again(&mut self, mut cell: Cell, dt: f64, end: f64, capped: bool) {
+        if dt >= end {
+            return;
+        }
+        let t = cell.t + dt;
+        if t <= cell.t {
+            // Time no longer advances in floating point: only a smaller cell can.
+            self.split(cell, DVec3::ZERO);
+            return;
+        }
+        cell.t = t;
+        cell.reach = if capped { cell.reach * 2.0 } else { (cell.reach * 0.5).max(0.5) };
+        self.push(cell);
+    }
+
+    /// Halves a cell along the axis that costs its bound most (`cost`), the longest one where none does.
+    fn split(&mut self, cell: Cell, cost: DVec3) {
+        let cost = cost + cell.half * 1e-6;
+        let k = if cost.x >= cost.y && cost.x >= cost.z {
+            0
+        } else if cost.y >= cost.z {
+            1
+        } else {
+            2
+        };
+        let mut half = cell.half;
+        half[k] *= 0.5;
+        for sign in [-1.0, 1.0] {
+            let mut child = Cell { half, ..cell };
+            child.center[k] += sign * half[k];
+            if cell.a.0 < cell.a.1 {
+                let (faces, delta) = (&self.task.a.faces, self.task.delta);
+                let mut classify = |id: LiteralId| {
+                    let span = local::face_span(&faces[id.face() as usize], child.center, half);
+                    local::truth_of(id.sense(), span, delta)
+                };
+                match prune_in_pool(&mut self.scratch.pool, cell.a, &mut classify) {
+                    (Truth::False, _) => continue,
+                    (Truth::True, _) => child.a = (0, 0),
+                    (Truth::Open, range) => child.a = range,
+                }
+            }
+            self.push(child);
+        }
+    }
+
+    /// True when x (A's frame) is deeper than delta in both whole solids at the instant.
+    fn is_deep(&self, x: DVec3, at: &Instant) -> bool {
+        self.task.a.value(x) <= -self.task.delta && self.task.b.value(at.b_point(x)) <= -self.task.delta
+    }
+
+    fn problem(&self) -> Problem<'_> {
+        let speed = self.task.relative.bounds(0.0, 1.0, self.task.scale).speed;
+        Problem {
+            a: Faces { solid: self.task.a, guards: &[] },
+            b: Faces { solid: self.task.b, guards: &[] },
+            relative: self.task.relative,
+            scale: self.task.scale,
+            time_scale: (self.task.scale / speed.max(f64::MIN_POSITIVE)).min(1.0),
+            tolerance: 2.0 * self.task.rounding,
+        }
+    }
+
+    /// Tries to find the contact that a cell's weakest clause points to.
+    fn attempt(&mut self, cell: &Cell, advance: &Advance, at: &Instant) {
+        let sides = |s: Side| advance.support.iter().filter(|l| l.0 == s).count();
+        if sides(Side::A) == 0 || sides(Side::B) == 0 {
+            return;
+        }
+        let level = advance.cost.element_sum().log2().floor() as i32;
+        let mut key: Vec<_> = advance.support.iter().map(|l| (l.0, l.1)).collect();
+        key.sort_unstable();
+        if self.scratch.tried.iter().any(|(k, l)| *l == level && *k == key) {
+            return;
+        }
+        self.scratch.tried.push((key, level));
+        let x = cell.center + advance.y;
+        let t = cell.t + advance.dt.max(0.0);
+        let active: Vec<_> = advance.support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
+        let lambda: Vec<_> = advance.support.iter().map(|l| l.2).collect();
+        if self.polish(active, x, t, lambda) {
+            return;
+        }
+        // A cone whose apex is near: the apex is a vertex of its own.
+        for (i, l) in advance.support.iter().enumerate() {
+            let solid = if l.0 == Side::A { self.task.a } else { self.task.b };
+            let Face::Cone { apex, .. } = solid.faces[l.1.face() as usize] else { continue };
+            let apex = if l.0 == Side::A { apex } else { at.a_point(apex) };
+            if l.1.sense() == Sense::Negative || (apex - cell.center).length() > 4.0 * cell.half.length() {
+                continue;
+            }
+            let mut active: Vec<_> = (0..3).map(|k| Constraint::Apex(l.0, l.1, k)).collect();
+            let mut lambda = vec![-l.2, 0.0, 0.0];
+            for (j, o) in advance.support.iter().enumerate() {
+                if j != i && (o.0 != l.0) && active.len() < super::newton::MAX_ACTIVE {
+                    active.push(Constraint::Literal(o.0, o.1));
+                    lambda.push(o.2);
+                }
+            }
+            if self.polish(active, apex, t, lambda) {
+                return;
+            }
+        }
+    }
+
+    /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled
+    /// multipliers was confirmed.
+    fn polish(&mut self, mut active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
+        let level = self.task.delta * (1.0 + 1e-6) + 4.0 * self.task.rounding;
+        for _ in 0..7 {
+            self.counters.newton += 1;
+            let Some(s) = self.problem().solve(&active, x, t, &lambda, level) else { return false };
+            if s.t < 0.0 || s.t > 1.0 || s.t >= self.goal() {
+                return false;
+            }
+            // A negative multiplier: that literal holds nothing back.
+            let worst = (0..active.len())
+                .filter(|i| matches!(active[*i], Constraint::Literal(..)))
+                .min_by(|i, j| s.lambda[*i].total_cmp(&s.lambda[*j]));
+            if let Some(i) = worst.filter(|i| s.lambda[*i] < -1e-9 && s.stationarity < SETTLED) {
+                if active.len() <= 2 {
+                    return false;
+                }
+                active.remove(i);
+                lambda.remove(i);
+                if !has_both_sides(&active) {
+                    return false;
+                }
+                continue;
+            }
+            let at = self.task.relative.at(s.t);
+            if self.is_deep(s.x, &at) {
+                return self.accept(s);
+            }
+            // Something else decides there: it enters, the smallest multiplier leaves.
+            let entering = self.deciding(s.x, &at);
+            if active.contains(&entering) {
+                return false;
+            }
+            if active.len() >= 4 {
+                let weakest = (0..active.len())
+                    .filter(|i| matches!(active[*i], Constraint::Literal(..)))
+                    .min_by(|i, j| s.lambda[*i].total_cmp(&s.lambda[*j]));
+                let Some(i) = weakest else { return false };
+                active.remove(i);
+                lambda.remove(i);
+            }
+            active.push(entering);
+            lambda.push(0.25);
+            if !has_both_sides(&active) {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// The literal that keeps x from being deep in both bodies.
+    fn deciding(&self, x: DVec3, at: &Instant) -> Constraint {
+        let mut worst: Option<(f64, Constraint)> = None;
+        for (side, solid, y) in [(Side::A, self.task.a, x), (Side::B, self.task.b, at.b_point(x))] {
+            let (v, id) = local::deciding(&solid.normal_form, &mut |f| solid.faces[f as usize].value(y));
+            if worst.as_ref().is_none_or(|w| v > w.0) {
+                worst = Some((v, Constraint::Literal(side, id)));
+            }
+        }
+        worst.expect("two bodies").1
+    }
+
+    /// Remembers where the curved convex faces of a solution are touched.
+    fn hint(&mut self, s: &Solution) {
+        let at = self.task.relative.at(s.t);
+        for c in &s.active {
+            let Constraint::Literal(side, id) = *c else { continue };
+            let (solid, point) = if side == Side::A { (self.task.a, s.x) } else { (self.task.b, at.b_point(s.x)) };
+            if id.sense() == Sense::Negative || matches!(solid.faces[id.face() as usize], Face::Plane { .. }) {
+                continue;
+            }
+            if self.scratch.hints.len() == MAX_HINTS {
+                self.scratch.hints.remove(0);
+            }
+            self.scratch.hints.push(Hint { side, id, point });
+        }
+    }
+
+    /// Keeps a confirmed witness if it is the earliest; continues it back to the touch.
+    fn accept(&mut self, deep: Solution) -> bool {
+        self.hint(&deep);
+        let settled = deep.stationarity < SETTLED;
+        if !settled {
+            // A witness, but an earlier one lies beside it: everything before it is still searched.
+            let goal = deep.t;
+            if goal < self.goal() {
+                self.found = Some(Found { deep, touch: None, goal });
+            }
+            return false;
+        }
+        let problem = self.problem();
+        let touch = problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0).filter(|s| {
+            let at = self.task.relative.at(s.t);
+            let tol = 16.0 * self.task.rounding;
+            s.t <= deep.t && self.task.a.value(s.x).abs() <= tol && self.task.b.value(at.b_point(s.x)).abs() <= tol
+        });
+        let goal = match &touch {
+            Some(s) => 0.5 * (s.t.max(0.0) + deep.t),
+            None => {
+                let at = self.task.relative.at(deep.t);
+                let mut speed = 0.0;
+                for (c, l) in deep.active.iter().zip(&deep.lambda) {
+                    speed += l * problem.row(c, deep.x, &at, 0.0).rate;
+                }
+                deep.t - (0.25 * self.task.delta / speed.abs().max(f64::MIN_POSITIVE)).clamp(1e-15, 1e-9)
+            }
+        };
+        if goal >= self.goal() {
+            return true;
+        }
+        self.found = Some(Found { deep, touch, goal });
+        true
+    }
+}
+
+fn has_both_sides(active: &[Constraint]) -> bool {
+    let side = |c: &Constraint| match c {
+        Constraint::Literal(s, _) | Constraint::Apex(s, _, _) => *s,
+    };
+    active.iter().any(|c| side(c) == Side::A) && active.iter().any(|c| side(c) == Side::B)
+}
+
+/// Prunes an expression of the pool, the result behind everything else in it.
+fn prune_in_pool(
+    pool: &mut Vec<Token>,
+    source: Range,
+    classify: &mut impl FnMut(LiteralId) -> Truth,
+) -> (Truth, Range) {
+    if source.0 == source.1 {
+        return (Truth::True, (0, 0));
+    }
+    // The source stays put while the result grows behind it: copy it out of the way of the borrow.
+    let tokens: smallvec::SmallVec<[Token; 64]> = pool[source.0 as usize..source.1 as usize].into();
+    let start = pool.len() as u32;
+    let truth = local::prune(&tokens, pool, classify);
+    let end = pool.len() as u32;
+    if truth == Truth::Open && end - start == source.1 - source.0 {
+        // Nothing folded: keep the old one.
+        pool.truncate(start as usize);
+        return (Truth::Open, source);
+    }
+    (truth, (start, end))
+}

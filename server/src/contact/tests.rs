@@ -1,0 +1,228 @@
+//! Pairs with a right answer in closed form, each through the whole search.
+
+use super::*;
+use crate::eco::Model;
+use crate::motion::Placed;
+use crate::solid::{Label, Op, Shape, SolidBuilder, primitive::*};
+use contactd_proto::motion::quat_of_rotation_vector;
+use contactd_proto::{Motion, Pose};
+use glam::DVec3;
+
+fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+fn simple(shape: impl Into<Shape>) -> Model {
+    let mut b = SolidBuilder::new();
+    let n = b.primitive(shape, Pose::IDENTITY, Label::default());
+    Model::new(b.finish(n))
+}
+
+fn minus(a: impl Into<Shape>, cuts: Vec<(Shape, Pose)>) -> Model {
+    let mut b = SolidBuilder::new();
+    let mut all = vec![b.primitive(a, Pose::IDENTITY, Label::default())];
+    for (s, p) in cuts {
+        all.push(b.primitive(s, p, Label::default()));
+    }
+    let n = b.operation(Op::Difference, &all);
+    Model::new(b.finish(n))
+}
+
+fn rest() -> Motion {
+    Motion::resting(Pose::IDENTITY)
+}
+
+fn slide(from: DVec3, way: DVec3) -> Motion {
+    Motion { start: Pose::at(from), velocity: way, spin: DVec3::ZERO }
+}
+
+fn turn(pose: Pose, way: DVec3, spin: DVec3) -> Motion {
+    Motion { start: pose, velocity: way, spin }
+}
+
+fn tilt(v: DVec3) -> glam::DQuat {
+    quat_of_rotation_vector(v)
+}
+
+fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
+    let place = Pose::IDENTITY;
+    let q = PairQuery {
+        a: Body { model: a, placed: Placed { place, motion: ma } },
+        b: Body { model: b, placed: Placed { place, motion: mb } },
+        resolution: default_resolution(a, b),
+        cell_limit: 300_000,
+    };
+    let began = std::time::Instant::now();
+    let o = earliest_contact(&q, &mut Scratch::default());
+    println!(
+        "{name:36} {:?} {:.12} [{:.1e} {:.1e}] {:?} {:?} n {:.4} cells {} clauses {} newton {} {:?}",
+        o.status,
+        o.time,
+        o.time - o.time_lower,
+        o.time_upper - o.time,
+        o.kind,
+        o.extent,
+        o.normal,
+        o.counters.cells,
+        o.counters.clauses,
+        o.counters.newton,
+        began.elapsed()
+    );
+    o
+}
+
+fn hits(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, time: f64) -> Outcome {
+    let o = ask(name, a, ma, b, mb);
+    assert_eq!(o.status, Status::Contact, "{name}");
+    assert!((o.time - time).abs() < 1e-9, "{name}: {} for {time}", o.time);
+    assert!(o.time_lower <= o.time && o.time <= o.time_upper, "{name}");
+    assert!(o.time - o.time_lower < 1e-8, "{name}");
+    o
+}
+
+fn clear(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) {
+    assert_eq!(ask(name, a, ma, b, mb).status, Status::Clear, "{name}");
+}
+
+fn plate(hole: f64) -> Model {
+    minus(Cuboid { half: v(0.5, 0.5, 0.1) }, vec![(Cylinder { radius: hole, half_height: 0.3 }.into(), Pose::IDENTITY)])
+}
+
+fn peg(r: f64) -> Model {
+    simple(Cylinder { radius: r, half_height: 0.5 })
+}
+
+#[test]
+fn spheres_and_boxes() {
+    let ball = simple(Sphere { radius: 0.5 });
+    let cube = simple(Cuboid { half: DVec3::splat(0.5) });
+    hits("sphere on box face", &ball, slide(v(0.1, 0.2, 2.0), v(0., 0., -2.)), &cube, rest(), 0.5);
+    hits("sphere on sphere", &ball, slide(v(-2.0, 0., 0.), v(2., 0., 0.)), &ball, rest(), 0.5);
+    let o = hits("faces closing parallel", &cube, slide(v(0.1, 0.2, 2.0), v(0., 0., -2.)), &cube, rest(), 0.5);
+    assert_eq!((o.kind, o.extent), (Kind::FaceFace, Extent::Patch));
+    clear("box sliding on box", &cube, slide(v(0.1, 0.2, 1.0), v(0.5, 0.1, 0.)), &cube, rest());
+    clear(
+        "box spinning at rest on box",
+        &cube,
+        turn(Pose::at(v(0.1, 0.2, 1.0)), DVec3::ZERO, v(0., 0., 2.0)),
+        &cube,
+        rest(),
+    );
+    let lying = Pose::new(v(0., 0., 2.0), tilt(v(std::f64::consts::FRAC_PI_2, 0., 0.)));
+    let o = hits(
+        "cylinder lying down on a face",
+        &peg(0.25),
+        turn(lying, v(0., 0., -2.), DVec3::ZERO),
+        &cube,
+        rest(),
+        0.625,
+    );
+    assert_eq!(o.extent, Extent::Line);
+    let o = hits(
+        "edge on edge",
+        &cube,
+        turn(Pose::new(v(0., 0., 2.0), tilt(v(std::f64::consts::FRAC_PI_4, 0., 0.))), v(0., 0., -2.), DVec3::ZERO),
+        &cube,
+        turn(Pose::new(v(0., 0., 0.), tilt(v(0., std::f64::consts::FRAC_PI_4, 0.))), DVec3::ZERO, DVec3::ZERO),
+        (2.0 - 2f64.sqrt()) / 2.0,
+    );
+    assert_eq!(o.kind, Kind::EdgeEdge);
+    let falling = turn(Pose::at(v(0., 0., 0.6)), DVec3::ZERO, v(std::f64::consts::FRAC_PI_2, 0., 0.));
+    let floor = simple(Cuboid { half: v(5., 5., 1.) });
+    let angle = (0.6 / 0.5f64.sqrt()).asin() - std::f64::consts::FRAC_PI_4;
+    hits(
+        "cube turning above a floor",
+        &cube,
+        falling,
+        &floor,
+        slide(v(0., 0., -1.), DVec3::ZERO),
+        angle / std::f64::consts::FRAC_PI_2,
+    );
+}
+
+/// A peg r .24 tilted by 3 degrees, the centre of its lower disc on the hole's axis: its side meets the upper rim (.25 from
+/// the axis, .1 up) where the rim's distance from the peg's axis is .24.
+fn tilted_peg() -> f64 {
+    let (s, c) = 3f64.to_radians().sin_cos();
+    let below = (0.25 * c - 0.24) / s;
+    (1.0 - 0.5 * c) - (0.1 - below)
+}
+
+#[test]
+fn pegs_and_holes() {
+    let down = |x, z: f64, w: f64| slide(v(x, 0., z), v(0., 0., -w));
+    clear("peg .24 straight through hole .25", &plate(0.25), rest(), &peg(0.24), down(0., 1.0, 1.0));
+    clear("peg .25 into hole .25", &plate(0.25), rest(), &peg(0.25), down(0., 1.0, 1.0));
+    clear(
+        "peg .25 spinning in hole .25",
+        &plate(0.25),
+        rest(),
+        &peg(0.25),
+        turn(Pose::IDENTITY, DVec3::ZERO, v(0., 0., 3.)),
+    );
+    hits("peg moving sideways in its hole", &plate(0.25), rest(), &peg(0.24), slide(DVec3::ZERO, v(0.1, 0., 0.)), 0.1);
+    hits("off-axis peg on the rim", &plate(0.25), rest(), &peg(0.24), down(0.05, 1.0, 1.0), 0.4);
+    let aside = -0.5 * 3f64.to_radians().sin();
+    let tilted = turn(Pose::new(v(0., aside, 1.0), tilt(v(3f64.to_radians(), 0., 0.))), v(0., 0., -1.), DVec3::ZERO);
+    hits("tilted peg into the hole", &plate(0.25), rest(), &peg(0.24), tilted, tilted_peg());
+    ask("peg tilting in its hole", &plate(0.25), rest(), &peg(0.24), turn(Pose::IDENTITY, DVec3::ZERO, v(0.5, 0., 0.)));
+}
+
+#[test]
+fn cones_and_sockets() {
+    let cone = simple(Cone { bottom: 0.5, top: 0.0, half_height: 0.5 });
+    let flipped = tilt(v(std::f64::consts::PI, 0., 0.));
+    let cube = simple(Cuboid { half: DVec3::splat(0.5) });
+    let ball = simple(Sphere { radius: 0.5 });
+    let down = |q| turn(Pose::new(v(0.1, 0.05, 2.0), q), v(0., 0., -2.), DVec3::ZERO);
+    hits("cone apex on face", &cone, down(flipped), &cube, rest(), 0.5);
+    let t = tilt(v(0.3, 0.2, 0.)) * flipped;
+    let reach = (t * v(0., 0., 0.5)).z;
+    hits("tilted cone apex on face", &cone, down(t), &cube, rest(), (1.5 + reach) / 2.0);
+    let apex_on_ball = turn(Pose::new(v(0., 0., 2.0), flipped), v(0., 0., -2.), DVec3::ZERO);
+    hits("cone apex on sphere", &cone, apex_on_ball, &ball, rest(), 0.5);
+    hits("cone apex on apex", &cone, apex_on_ball, &cone, rest(), 0.5);
+    let needle = simple(Cone { bottom: 0.01, top: 0.0, half_height: 0.5 });
+    hits("needle on face", &needle, down(flipped), &cube, rest(), 0.5);
+    let socket = minus(
+        Cuboid { half: DVec3::splat(0.7) },
+        vec![(Cone { bottom: 0.5, top: 0.0, half_height: 0.5 }.into(), Pose::new(v(0., 0., 0.2), flipped))],
+    );
+    hits(
+        "cone into an equal cone hole",
+        &socket,
+        rest(),
+        &cone,
+        turn(Pose::new(v(0., 0., 1.2), flipped), v(0., 0., -2.), DVec3::ZERO),
+        0.5,
+    );
+    let bowl =
+        minus(Cuboid { half: v(0.7, 0.7, 0.5) }, vec![(Sphere { radius: 0.5 }.into(), Pose::at(v(0., 0., 0.5)))]);
+    let drop = slide(v(0., 0., 1.4), v(0., 0., -1.0));
+    hits("ball .5 into socket .5", &bowl, rest(), &ball, drop, 0.9);
+    hits("ball .499 into socket .5", &bowl, rest(), &simple(Sphere { radius: 0.499 }), drop, 0.901);
+    let z = 0.5 + (0.501f64 * 0.501 - 0.25).sqrt();
+    hits("ball .501 on the socket's rim", &bowl, rest(), &simple(Sphere { radius: 0.501 }), drop, 1.4 - z);
+}
+
+#[test]
+fn overlaps_and_cavities() {
+    let cube = simple(Cuboid { half: DVec3::splat(0.5) });
+    let small = simple(Cuboid { half: DVec3::splat(0.1) });
+    let o = ask("small inside large", &cube, rest(), &small, rest());
+    assert_eq!(o.status, Status::Overlap);
+    let o = ask("large around small", &small, rest(), &cube, rest());
+    assert_eq!(o.status, Status::Overlap);
+    let o = ask("pressed by a tenth", &cube, rest(), &cube, slide(v(0.0, 0.0, 0.9), v(0., 0., 1.)));
+    assert_eq!(o.status, Status::Overlap);
+    assert!((o.separation + 0.1).abs() < 1e-9 && (o.normal - DVec3::Z).length() < 1e-9, "{o:?}");
+    let shell = minus(Sphere { radius: 1.1 }, vec![(Sphere { radius: 1.0 }.into(), Pose::IDENTITY)]);
+    let ball = simple(Sphere { radius: 0.2 });
+    let o = hits("ball meets the cavity's wall", &shell, rest(), &ball, slide(v(0.1, 0., 0.), v(1., 0., 0.)), 0.7);
+    assert!((o.normal + DVec3::X).length() < 1e-6, "{:?}", o.normal);
+    let rod = simple(Cylinder { radius: 0.01, half_height: 2.0 });
+    let spin = turn(Pose::new(DVec3::ZERO, tilt(v(0., std::f64::consts::FRAC_PI_2, 0.))), DVec3::ZERO, v(0., 0., 50.0));
+    let at = v(0.5f64.cos(), 0.5f64.sin(), 0.) * 1.5;
+    let o = ask("spinning rod", &rod, spin, &simple(Sphere { radius: 0.05 }), slide(at, DVec3::ZERO));
+    assert!((o.time - 0.00919978651).abs() < 1e-10, "{}", o.time);
+}
