@@ -7,7 +7,7 @@
 
 use contactd_proto::Pose;
 use contactd_proto::motion::quat_of_rotation_vector;
-use glam::{DQuat, DVec3, dvec3};
+use glam::{DVec3, dvec3};
 use std::f64::consts::{PI, TAU};
 
 /// A model of the demo: its name and its OpenSCAD tree.
@@ -163,7 +163,7 @@ fn bolts(i: usize) -> Vec<Leg> {
                 let aside = around_z(GOLDEN * i as f64, 1.0, 0.0);
                 let end = match s {
                     _ if s == BOLT_STEPS - 1 => at(8.6, DVec3::ZERO, DVec3::ZERO),
-                    _ if s % 2 == 0 || z > 33.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
+                    _ if s.is_multiple_of(2) || z > 33.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
                     _ if s % 4 == 1 => at(z - 0.4, aside * 0.9, DVec3::ZERO),
                     _ => at(z - 0.4, aside * 0.5, DVec3::Z.cross(aside) * 0.06),
                 };
@@ -194,7 +194,7 @@ fn pegs(i: usize) -> Vec<Leg> {
                     // Above the hole: now and then a trial beside it, onto the chamfer.
                     _ if z > 24.0 && s % 3 == 1 => at(22.6, aside * 0.8, DVec3::ZERO),
                     _ if z > 24.0 && s % 3 == 2 => at(22.4, aside * 0.6, aside * 0.05),
-                    _ if s % 2 == 0 || z > 24.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
+                    _ if s.is_multiple_of(2) || z > 24.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
                     _ if s % 4 == 1 => at(z - 0.2, aside * 0.12, DVec3::ZERO),
                     _ => at(z - 0.2, DVec3::ZERO, aside * 0.03),
                 };
@@ -213,7 +213,7 @@ fn bearing(i: usize) -> Vec<Leg> {
     for b in 0..BALLS {
         let home = |phase: f64| b as f64 * TAU / BALLS as f64 + phase;
         let start = turned(around_z(home(phase), 23.0, 0.0), DVec3::Z * (-2.0 * phase));
-        let thrown = i % BALLS == b && i % 2 == 0;
+        let thrown = i % BALLS == b && i.is_multiple_of(2);
         let late = i % BALLS == b && i % 4 == 1;
         let (radius, angle) =
             if thrown { (23.06, home(next)) } else { (23.0, home(if late { next + 0.012 } else { next })) };
@@ -228,7 +228,7 @@ fn gears(i: usize) -> Vec<Leg> {
     let tooth = TAU / 24.0;
     let at = |x: f64, angle: f64| turned(dvec3(x, 0.0, 2.3), DVec3::Z * angle);
     let phase = 0.37 * tooth * i as f64;
-    let drive = if i % 2 == 0 { 0.06 } else { -0.06 };
+    let drive = if i.is_multiple_of(2) { 0.06 } else { -0.06 };
     let lag = match i % 4 {
         0 | 1 => 0.0,
         _ => -drive,
@@ -248,7 +248,7 @@ fn cover(i: usize) -> Vec<Leg> {
     let aside = around_z(GOLDEN * i as f64, 1.0, 0.0);
     let end = match i {
         _ if i == COVER_STEPS - 1 => at(-0.2, DVec3::ZERO, DVec3::ZERO),
-        _ if i % 2 == 0 => at(height(i + 1), DVec3::ZERO, DVec3::ZERO),
+        _ if i.is_multiple_of(2) => at(height(i + 1), DVec3::ZERO, DVec3::ZERO),
         _ if z > 9.5 && i % 4 == 1 => at(7.0, aside * 3.0, DVec3::ZERO),
         _ if z > 9.5 => at(7.5, aside * 2.0, aside * 0.02),
         _ if i % 4 == 1 => at(z - 0.05, aside * 0.2, DVec3::ZERO),
@@ -257,15 +257,13 @@ fn cover(i: usize) -> Vec<Leg> {
     vec![Leg::rest(Pose::IDENTITY), Leg { start: at(z, DVec3::ZERO, DVec3::ZERO), end }]
 }
 
-/// Unit quaternion check for the tests.
-#[cfg(test)]
-fn is_unit(q: DQuat) -> bool {
-    (q.length_squared() - 1.0).abs() < 1e-12
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn is_unit(q: glam::DQuat) -> bool {
+        (q.length_squared() - 1.0).abs() < 1e-12
+    }
 
     #[test]
     fn the_acts_have_a_thousand_steps_of_finite_unit_poses() {

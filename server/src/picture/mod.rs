@@ -8,4 +8,6 @@
 pub mod contacts;
 pub mod drawing;
 pub mod ray;
+pub mod slice;
+pub mod tree;
 pub mod view;
