@@ -200,6 +200,25 @@ impl Drawing {
         self.items.push(Item::Text { at: [left, at[1]], text: text.into(), size, bold, color });
     }
 
+    /// Puts `other` below this drawing.
+    pub fn below(mut self, other: Drawing) -> Self {
+        let down = self.height as f64;
+        let shift = |[x, y]: [f64; 2]| [x, y + down];
+        self.width = self.width.max(other.width);
+        self.height += other.height;
+        self.items.extend(other.items.into_iter().map(|item| match item {
+            Item::Path { points, closed, fill, stroke, dash } => {
+                Item::Path { points: points.into_iter().map(shift).collect(), closed, fill, stroke, dash }
+            }
+            Item::Circle { center, radius, fill, stroke } => {
+                Item::Circle { center: shift(center), radius, fill, stroke }
+            }
+            Item::Text { at, text, size, bold, color } => Item::Text { at: shift(at), text, size, bold, color },
+            Item::Image { at, width, pixels } => Item::Image { at: shift(at), width, pixels },
+        }));
+        self
+    }
+
     /// The drawing as an SVG file.
     pub fn to_svg(&self) -> String {
         let (w, h) = (self.width, self.height);
@@ -257,6 +276,15 @@ impl Drawing {
         }
         out.push_str("</svg>\n");
         out
+    }
+
+    /// The file's bytes in the format that the ending of `path` names.
+    pub fn encode_for(&self, path: &std::path::Path) -> Result<Vec<u8>, String> {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("svg") => Ok(self.to_svg().into_bytes()),
+            Some("png") => Ok(self.to_png()),
+            _ => Err(format!("{}: a picture's name ends in .svg or .png", path.display())),
+        }
     }
 
     /// The drawing as a PNG file, one pixel a unit.

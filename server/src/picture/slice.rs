@@ -11,7 +11,7 @@ use glam::DVec3;
 /// Side of a panel, pixels.
 const PANEL: usize = 640;
 /// Cells are refined down to this size, pixels.
-const FINEST: f64 = 7.0;
+const FINEST: f64 = 4.0;
 
 /// What is drawn for each kind of leaf, in the order of the legend.
 const KINDS: [(Kind, &str, Color); 5] = [
@@ -22,7 +22,8 @@ const KINDS: [(Kind, &str, Color); 5] = [
     (Kind::Mixed, "mixed: several", Color::hex(0x8c4fb0)),
 ];
 
-/// Two slices through the middle of `model`: one upright (y constant), one level (z constant).
+/// Two slices through the middle of `model`: one upright (y constant), one level, low enough to cut
+/// what is sunk into the upper side of most parts (z constant).
 pub fn slice(name: &str, model: &Model) -> Drawing {
     let root = model.eco.root();
     let (head, foot, gap) = (56.0, 96.0, 24.0);
@@ -32,7 +33,7 @@ pub fn slice(name: &str, model: &Model) -> Drawing {
     let title = format!("{name}: octree of {} levels, {} nodes", model.eco.depth(), census.nodes());
     d.bold([gap, 30.0], &title, Size::Large, Anchor::Left, INK);
     if root.half.is_finite() && root.half > 0.0 {
-        for (i, (axis, at)) in [(1, 0.503), (2, 0.5)].into_iter().enumerate() {
+        for (i, (axis, at)) in [(1, 0.503), (2, 0.27)].into_iter().enumerate() {
             let left = gap + i as f64 * (PANEL as f64 + gap);
             panel(&mut d, model, [left, head], axis, at);
         }
@@ -75,7 +76,8 @@ fn panel(d: &mut Drawing, model: &Model, at: [f64; 2], axis: usize, fraction: f6
 
 /// The leaves that the plane cuts, refined to the picture's resolution.
 fn collect<'a>(model: &'a Model, node: &'a Node, axis: usize, level: f64, scale: f64, cells: &mut Vec<&'a Node>) {
-    if (node.center[axis] - level).abs() > node.half {
+    // Half open, so that a plane on a seam cuts one side only.
+    if level < node.center[axis] - node.half || level >= node.center[axis] + node.half {
         return;
     }
     let finer = node.half * scale >= FINEST;
