@@ -11,11 +11,11 @@ pub const ON_AXIS: f64 = 1e-9;
 /// leaves 2e-6.
 pub const SIMILARITY: f64 = 1e-5;
 
-/// A polyhedron this close to convex, relative to its size, is taken as the hull of its planes: single-precision
-/// sources leave faces non-planar by 1e-4.
+/// A polyhedron this close to convex, relative to the diagonal of its box, is taken as the hull of its planes: real
+/// sources leave faces non-planar by that much.
 pub const CONVEXITY: f64 = 1e-4;
 
-/// Neighbouring faces of a polyhedron whose corners lie this close to one plane, relative to the polyhedron's size, are
+/// Neighbouring faces of a polyhedron whose corners lie this close to one plane, relative to the diagonal of its box, are
 /// one face: six printed digits bend a triangulated face by this much.
 pub const COPLANAR: f64 = 1e-6;
 

@@ -19,7 +19,7 @@ impl Geometry for HalfSpace {
     }
     fn aabb(&self, frame: &Pose) -> Aabb {
         // Bounded only against an axis that the plane faces squarely.
-        let n = frame.vector(DVec3::Z);
+        let n = frame.vector(DVec3::Z).normalize();
         let mut b = Aabb::ALL;
         for k in 0..3 {
             if n[k].abs() == 1.0 {

@@ -18,7 +18,7 @@ pub use cone::Cone;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use half_space::HalfSpace;
-pub use polyhedron::Polyhedron;
+pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use sphere::Sphere;
 
 /// What every primitive answers about itself, in its own frame.

@@ -8,6 +8,11 @@ use crate::solid::Face;
 use contactd_proto::Pose;
 use glam::DVec3;
 
+mod clip;
+mod mesh;
+
+pub use mesh::{Fit, MeshError};
+
 /// A bounded convex polyhedron with an interior.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyhedron {

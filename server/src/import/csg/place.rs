@@ -1,0 +1,185 @@
+//! Primitives under affine transforms: which shape they become and where it stands.
+//!
+//! Similarities (rotation, mirror, uniform scale) keep every kind. A transform that scales along a primitive's own axes
+//! keeps a box a box, and a cylinder a cylinder when it scales its cross-section evenly. Any other regular transform
+//! keeps polyhedra (a sheared box becomes one) and half-spaces, and is refused by name on curved primitives.
+//!
+//! Files print six digits: a linear part within `SIMILARITY` of scale × orthogonal is replaced by that product
+//! (`snapped`), with the orthogonal polar factor from Newton's iteration Q ← (Q + Q⁻ᵀ)/2 (Higham 1986).
+
+use super::Problem;
+use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
+use crate::solid::primitive::{Cone, Cuboid, Cylinder, Fit, HalfSpace, Polyhedron, Shape, Sphere};
+use contactd_proto::Pose;
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+
+/// A shape, its frame in the model, and what had to be snapped for it.
+pub struct Placed {
+    /// The shape in its own frame.
+    pub shape: Shape,
+    /// That frame in the model.
+    pub frame: Pose,
+    /// What was snapped, as sentences.
+    pub notes: Vec<String>,
+}
+
+impl Placed {
+    fn new(shape: impl Into<Shape>, frame: Pose) -> Self {
+        Self { shape: shape.into(), frame, notes: Vec::new() }
+    }
+}
+
+/// scale × orthogonal, the latter with determinant ±1.
+struct Similarity {
+    scale: f64,
+    orthogonal: DMat3,
+    /// Largest difference from the matrix it stands for, relative to the scale.
+    off: f64,
+}
+
+/// The similarity nearest to a regular matrix.
+fn similarity(m: DMat3) -> Option<Similarity> {
+    let size = m.to_cols_array().iter().fold(0.0, |s: f64, x| s.max(x.abs()));
+    if !(size > 0.0 && size.is_finite()) {
+        return None;
+    }
+    let mut q = m * (1.0 / size);
+    if q.determinant().abs() < 1e-9 {
+        return None;
+    }
+    // Quadratic convergence; a matrix far from orthogonal needs some halvings first.
+    for _ in 0..40 {
+        let next = (q + q.inverse().transpose()) * 0.5;
+        let change = (next - q).to_cols_array().iter().fold(0.0, |s: f64, x| s.max(x.abs()));
+        q = next;
+        if change <= f64::EPSILON {
+            break;
+        }
+    }
+    let product = q.transpose() * m;
+    let scale = (product.x_axis.x + product.y_axis.y + product.z_axis.z) / 3.0;
+    let off = (m - q * scale).to_cols_array().iter().fold(0.0, |s: f64, x| s.max(x.abs())) / scale;
+    Some(Similarity { scale, orthogonal: q, off })
+}
+
+/// True when `m` cannot be inverted to any accuracy.
+pub fn is_flat(m: DMat3) -> bool {
+    let product = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
+    let volume = m.determinant().abs();
+    volume.is_nan() || volume <= ROUNDING * product
+}
+
+/// The linear part to use for `m`, and how far it was moved when that is more than rounding. A rough matrix whose scale
+/// is within `SIMILARITY` of 1 was a plain rotation.
+pub fn snapped(m: DMat3) -> (DMat3, Option<f64>) {
+    match similarity(m) {
+        Some(s) if s.off > ROUNDING && s.off <= SIMILARITY => {
+            let scale = if (s.scale - 1.0).abs() <= SIMILARITY { 1.0 } else { s.scale };
+            (s.orthogonal * scale, Some(s.off))
+        }
+        _ => (m, None),
+    }
+}
+
+/// A ball of radius `radius` around the origin.
+pub fn sphere(a: &DAffine3, radius: f64) -> Result<Placed, Problem> {
+    let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "sphere"))?;
+    Ok(Placed::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)))
+}
+
+/// A cylinder, cone or frustum around `center`, along z, with radii `bottom` (low z) and `top`.
+pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64) -> Result<Placed, Problem> {
+    let even = |l: &DVec3| (l.x - l.y).abs() <= SIMILARITY * l.x;
+    let Some((lengths, rotation)) = along_axes(a.matrix3).filter(|(l, _)| even(l)) else {
+        return Err(refusal(a.matrix3, if bottom == top { "cylinder" } else { "cone" }));
+    };
+    // Even in x and y within rounding: their mean; the half sum is exact when they are equal.
+    let across = 0.5 * (lengths.x + lengths.y);
+    let half_height = 0.5 * height * lengths.z;
+    let frame = Pose::new(a.transform_point3(center), rotation);
+    let larger = bottom.max(top);
+    if (bottom - top).abs() <= SAME_RADIUS * larger {
+        let mut placed = Placed::new(Cylinder { radius: larger * across, half_height }, frame);
+        if bottom != top {
+            placed.notes.push("radii that differ by less than 1e-9 of themselves: taken as a cylinder".into());
+        }
+        return Ok(placed);
+    }
+    Ok(Placed::new(Cone { bottom: bottom * across, top: top * across, half_height }, frame))
+}
+
+/// A box around `center` with half extents `half`.
+pub fn cuboid(a: &DAffine3, center: DVec3, half: DVec3) -> Result<Placed, Problem> {
+    if let Some((lengths, frame)) = along_axes(a.matrix3) {
+        let frame = Pose::new(a.transform_point3(center), frame);
+        return Ok(Placed::new(Cuboid { half: half * lengths }, frame));
+    }
+    // Corner i has the signs of i's bits; faces clockwise from outside.
+    let corners: Vec<DVec3> = (0..8)
+        .map(|i| {
+            let s = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
+            center + half * DVec3::new(s(1), s(2), s(4))
+        })
+        .collect();
+    let faces = [[5, 7, 3, 1], [2, 6, 4, 0], [3, 7, 6, 2], [4, 5, 1, 0], [6, 7, 5, 4], [1, 3, 2, 0]];
+    let mut placed = polyhedron(a, &corners, &faces.map(|f| f.to_vec()))?.0;
+    placed.notes.push("a sheared box: taken as a polyhedron".into());
+    Ok(placed)
+}
+
+/// The polyhedron of a mesh, faces clockwise from outside; the frame follows similarities, other transforms are applied
+/// to the points.
+pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Placed, Fit), Problem> {
+    let (points, frame): (Vec<DVec3>, Pose) = match similarity(a.matrix3) {
+        Some(s) if s.off <= SIMILARITY => {
+            let (rotation, mirrored) = proper(s.orthogonal);
+            let flip = DVec3::new(if mirrored { -s.scale } else { s.scale }, s.scale, s.scale);
+            (points.iter().map(|p| *p * flip).collect(), Pose::new(a.translation, rotation))
+        }
+        _ => (points.iter().map(|p| a.matrix3 * *p).collect(), Pose::at(a.translation)),
+    };
+    let (shape, fit) = if a.matrix3.determinant() < 0.0 {
+        let reversed: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
+        Polyhedron::from_faces(&points, &reversed)?
+    } else {
+        Polyhedron::from_faces(&points, faces)?
+    };
+    Ok((Placed::new(shape, frame), fit))
+}
+
+/// The half-space n·x <= d.
+pub fn half_space(a: &DAffine3, n: DVec3, d: f64) -> Placed {
+    let normal = (a.matrix3.inverse().transpose() * n).normalize();
+    let point = a.transform_point3(n * (d / n.length_squared()));
+    Placed::new(HalfSpace, Pose::new(point, DQuat::from_rotation_arc(DVec3::Z, normal)))
+}
+
+/// Why a curved primitive cannot follow `m`.
+fn refusal(m: DMat3, kind: &str) -> Problem {
+    let how = if columns_are_perpendicular(m) { "non-uniform scale" } else { "shear" };
+    Problem::unsupported(format!("{how} on a {kind}"))
+}
+
+fn columns_are_perpendicular(m: DMat3) -> bool {
+    let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+    let across = |a: DVec3, b: DVec3| a.dot(b).abs() <= SIMILARITY * a.length() * b.length();
+    across(x, y) && across(x, z) && across(y, z)
+}
+
+/// `m` as rotation × scaling along x, y, z (a mirror goes into x, which boxes and cylinders do not notice).
+fn along_axes(m: DMat3) -> Option<(DVec3, DQuat)> {
+    if !columns_are_perpendicular(m) {
+        return None;
+    }
+    let lengths = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
+    let s = similarity(DMat3::from_cols(m.x_axis / lengths.x, m.y_axis / lengths.y, m.z_axis / lengths.z))?;
+    Some((lengths, proper(s.orthogonal).0))
+}
+
+/// The rotation of an orthogonal matrix, after a mirror in x if it has one.
+fn proper(orthogonal: DMat3) -> (DQuat, bool) {
+    let mirrored = orthogonal.determinant() < 0.0;
+    let m =
+        if mirrored { DMat3::from_cols(-orthogonal.x_axis, orthogonal.y_axis, orthogonal.z_axis) } else { orthogonal };
+    (DQuat::from_mat3(&m).normalize(), mirrored)
+}

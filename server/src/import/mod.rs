@@ -1,0 +1,156 @@
+//! File formats: OpenSCAD's flattened models (`csg`) and scene files (`scene`).
+//!
+//! A file is read completely or refused with one sentence that names the file, the line, the column, what was expected
+//! and what stands there. Real files are rough; whatever is snapped, flipped, merged or taken in another way than
+//! OpenSCAD's facets would have it is a `Note`, so that `inspect` can tell. Nothing here panics, whatever the bytes, and
+//! `Limits` bound what a file may ask for before memory is spent on it.
+//!
+//! Floor 3: imports `solid`, `math`, `proto`.
+
+pub mod csg;
+pub mod scene;
+
+pub use csg::{Problem, import_csg, read_csg};
+pub use scene::{ModelSource, ObjectSpec, Scene, SceneError, read_scene};
+
+use crate::solid::Solid;
+
+/// A place in a text; lines and columns count from 1, columns in characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Line.
+    pub line: u32,
+    /// Column.
+    pub column: u32,
+}
+
+impl Place {
+    /// The first character.
+    pub const START: Self = Self { line: 1, column: 1 };
+
+    /// The place of byte `offset` of `text`; the last place when it is beyond the end.
+    pub fn of_offset(text: &str, offset: usize) -> Self {
+        let mut at = Self::START;
+        for (i, c) in text.char_indices() {
+            if i >= offset {
+                break;
+            }
+            at = if c == '\n' {
+                Self { line: at.line + 1, column: 1 }
+            } else {
+                Self { line: at.line, column: at.column + 1 }
+            };
+        }
+        at
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}", self.line, self.column)
+    }
+}
+
+/// A model with what was done to read it.
+#[derive(Clone, Debug)]
+pub struct Import {
+    /// The solid, primitives in file order.
+    pub solid: Solid,
+    /// What was snapped or taken in another way than it stands there, in file order.
+    pub notes: Vec<Note>,
+}
+
+/// One thing that `inspect` should tell about an import.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// Where.
+    pub at: Place,
+    /// What, as a sentence without its full stop.
+    pub text: String,
+    /// By how much, where that can be said; length, or relative for a matrix.
+    pub amount: Option<f64>,
+}
+
+impl std::fmt::Display for Note {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.at, self.text)?;
+        self.amount.map_or(Ok(()), |a| write!(f, " (by {a:.1e})"))
+    }
+}
+
+/// How curved primitives are taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Facets {
+    /// Always exact, whatever `$fn` says.
+    Exact,
+    /// Exact when `$fn` is 0 or at least 9; below that the prism or polyhedron that OpenSCAD would make.
+    #[default]
+    Auto,
+    /// Always the prism or polyhedron that OpenSCAD would make of `$fn`, `$fa` and `$fs`.
+    AsWritten,
+}
+
+impl Facets {
+    /// The words of the command line, in the order of the variants.
+    pub const NAMES: [&'static str; 3] = ["exact", "auto", "as-written"];
+
+    /// The one called `word`.
+    pub fn of_name(word: &str) -> Option<Self> {
+        let all = [Self::Exact, Self::Auto, Self::AsWritten];
+        Self::NAMES.iter().position(|n| *n == word).map(|i| all[i])
+    }
+}
+
+/// The most that a model file may ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of text.
+    pub text: usize,
+    /// Calls in a file.
+    pub nodes: usize,
+    /// Levels of nesting.
+    pub depth: usize,
+    /// Faces of all primitives together.
+    pub faces: usize,
+    /// Faces of one polyhedron, whose checks grow with their square.
+    pub polyhedron_faces: usize,
+    /// Values in one list.
+    pub values: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            text: 64 << 20,
+            nodes: 1_000_000,
+            // The deepest of several hundred real files has 23 levels. Trees are walked by recursion on higher floors.
+            depth: 1_000,
+            faces: 1_000_000,
+            polyhedron_faces: 5_000,
+            values: 1_000_000,
+        }
+    }
+}
+
+/// Why a model was not read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file cannot be read at all.
+    #[error("{file}: expected a readable file, found {reason}")]
+    Read {
+        /// The file.
+        file: String,
+        /// The system's reason.
+        reason: std::io::Error,
+    },
+    /// Something in the file.
+    #[error("{file}:{at}: {problem}")]
+    Content {
+        /// The file.
+        file: String,
+        /// Where.
+        at: Place,
+        /// What.
+        problem: Problem,
+    },
+}

@@ -1,0 +1,382 @@
+//! Scene files: models, objects with their motions over one step, rules.
+//!
+//! TOML, every key known or refused. Errors name the file, the line, the column, what was expected and what was found.
+//! Nothing is guessed: NaN and infinity are refused, a quaternion is normalised only when it nearly is one. The models'
+//! files are read by `Scene::load_models`, so that a scene can be looked at without them.
+
+use super::csg::read_csg;
+use super::{Facets, Import, ImportError, Limits, Place};
+use crate::math::tolerance::QUATERNION;
+use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule};
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// The largest scene file, bytes: far beyond a million objects' worth of poses is a mistake.
+const MAX_TEXT: u64 = 256 << 20;
+
+/// A scene: what stands in its file, checked, with names resolved.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The unit's label; may be empty.
+    pub unit: String,
+    /// Resolution for every pair, length; `None` for the default of each pair.
+    pub resolution: Option<f64>,
+    /// Models in file order.
+    pub models: Vec<ModelSource>,
+    /// Objects in file order.
+    pub objects: Vec<ObjectSpec>,
+    /// Rules in file order; none means every pair.
+    pub rules: Vec<Rule>,
+    /// What errors call the scene's file.
+    pub file: String,
+}
+
+/// A model of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelSource {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its file, relative to the scene's folder unless absolute.
+    pub path: PathBuf,
+    /// Where the scene names that file.
+    pub at: Place,
+}
+
+/// An object of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectSpec {
+    /// Its name.
+    pub name: String,
+    /// Index of its model in `Scene::models`.
+    pub model: usize,
+    /// Its group, for rules.
+    pub group: String,
+    /// Declared never to move.
+    pub is_static: bool,
+    /// The model in the object's frame.
+    pub place: Pose,
+    /// The object's frame over the step.
+    pub motion: Motion,
+    /// False when it is declared never to turn.
+    pub rotates: bool,
+    /// Declared largest speed of any of its points, length per second.
+    pub max_speed: Option<f64>,
+}
+
+/// Why a scene was not read.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file cannot be read at all.
+    #[error("{file}: expected a readable file, found {reason}")]
+    Read {
+        /// The file.
+        file: String,
+        /// The system's reason.
+        reason: std::io::Error,
+    },
+    /// Not the TOML that a scene is made of.
+    #[error("{file}:{at}: {message}")]
+    Format {
+        /// The file.
+        file: String,
+        /// Where.
+        at: Place,
+        /// The TOML reader's sentence.
+        message: String,
+    },
+    /// A value that a scene cannot have.
+    #[error("{file}:{at}: expected {expected}, found {found}")]
+    Value {
+        /// The file.
+        file: String,
+        /// Where.
+        at: Place,
+        /// What could stand there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// One of its models.
+    #[error(transparent)]
+    Model(#[from] ImportError),
+}
+
+/// Reads a scene file.
+pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
+    let file = path.display().to_string();
+    let read = |reason| SceneError::Read { file: file.clone(), reason };
+    if std::fs::metadata(path).map_err(read)?.len() > MAX_TEXT {
+        let reason = std::io::Error::other(format!("more than {MAX_TEXT} bytes"));
+        return Err(SceneError::Read { file, reason });
+    }
+    let text = std::fs::read_to_string(path).map_err(read)?;
+    Scene::parse(&file, &text, path.parent().unwrap_or(Path::new("")))
+}
+
+impl Scene {
+    /// Reads a scene from its text; `file` is what errors call it, `folder` what its models' files are relative to.
+    pub fn parse(file: &str, text: &str, folder: &Path) -> Result<Self, SceneError> {
+        let checker = Checker { file, text };
+        let raw: RawScene = toml::from_str(text).map_err(|e| {
+            let at = e.span().map_or(Place::START, |s| Place::of_offset(text, s.start));
+            let message = e.message().lines().map(str::trim).collect::<Vec<_>>().join(", ");
+            SceneError::Format { file: file.to_owned(), at, message }
+        })?;
+        let resolution = raw.resolution.map(|r| checker.positive("resolution", &r)).transpose()?;
+
+        let mut models = Vec::with_capacity(raw.model.len());
+        let mut model_of: HashMap<String, usize> = HashMap::new();
+        for m in &raw.model {
+            checker.new_name("model", &m.name, &mut model_of)?;
+            let path = folder.join(m.file.as_ref());
+            models.push(ModelSource { name: m.name.as_ref().clone(), path, at: checker.place(&m.file) });
+        }
+        let mut objects = Vec::with_capacity(raw.object.len());
+        let mut object_of: HashMap<String, usize> = HashMap::new();
+        for o in &raw.object {
+            checker.new_name("object", &o.name, &mut object_of)?;
+            let Some(&model) = model_of.get(o.model.as_ref()) else {
+                return Err(checker.wrong(&o.model, "the name of a model", &format!("\"{}\"", o.model.as_ref())));
+            };
+            objects.push(checker.object(o, model)?);
+        }
+        let mut rules = Vec::with_capacity(raw.rule.len());
+        for r in &raw.rule {
+            rules.push(checker.rule(r, &object_of)?);
+        }
+        let unit = raw.unit.unwrap_or_default();
+        Ok(Self { unit, resolution, models, objects, rules, file: file.to_owned() })
+    }
+
+    /// Reads every model of the scene, in order.
+    pub fn load_models(&self, facets: Facets, limits: &Limits) -> Result<Vec<Import>, SceneError> {
+        let each = self.models.iter().map(|m| {
+            read_csg(&m.path, facets, limits).map_err(|e| match e {
+                ImportError::Read { file, reason } => SceneError::Value {
+                    file: self.file.clone(),
+                    at: m.at,
+                    expected: "a model file".into(),
+                    found: format!("{file}: {reason}"),
+                },
+                other => other.into(),
+            })
+        });
+        each.collect()
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawScene {
+    unit: Option<String>,
+    resolution: Option<Spanned<f64>>,
+    #[serde(default)]
+    model: Vec<RawModel>,
+    #[serde(default)]
+    object: Vec<RawObject>,
+    #[serde(default)]
+    rule: Vec<RawRule>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawModel {
+    name: Spanned<String>,
+    file: Spanned<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawObject {
+    name: Spanned<String>,
+    model: Spanned<String>,
+    group: Option<String>,
+    motion: Option<Spanned<String>>,
+    #[serde(default)]
+    place: RawPose,
+    #[serde(default)]
+    start: RawPose,
+    #[serde(default)]
+    end: RawPose,
+    rotation_vector: Option<Spanned<[f64; 3]>>,
+    rotates: Option<bool>,
+    max_speed: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct RawPose {
+    position: Option<Spanned<[f64; 3]>>,
+    rotation: Option<Spanned<[f64; 4]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawRule {
+    between: [String; 2],
+    #[serde(default)]
+    except: Vec<[Spanned<String>; 2]>,
+    detect: Option<Spanned<String>>,
+    report: Option<Spanned<String>>,
+    #[serde(default)]
+    penetration: bool,
+    margin: Option<Spanned<f64>>,
+    initial_overlap: Option<Spanned<String>>,
+    #[serde(default)]
+    sensor: bool,
+}
+
+/// Turns raw values into checked ones, with places for what is wrong.
+struct Checker<'a> {
+    file: &'a str,
+    text: &'a str,
+}
+
+impl Checker<'_> {
+    fn place<T>(&self, value: &Spanned<T>) -> Place {
+        Place::of_offset(self.text, value.span().start)
+    }
+
+    fn wrong<T>(&self, value: &Spanned<T>, expected: &str, found: &str) -> SceneError {
+        let (expected, found) = (expected.to_owned(), found.to_owned());
+        SceneError::Value { file: self.file.to_owned(), at: self.place(value), expected, found }
+    }
+
+    fn new_name(
+        &self,
+        what: &str,
+        name: &Spanned<String>,
+        known: &mut HashMap<String, usize>,
+    ) -> Result<(), SceneError> {
+        let next = known.len();
+        if name.as_ref().is_empty() {
+            return Err(self.wrong(name, &format!("a name for the {what}"), "an empty one"));
+        }
+        match known.insert(name.as_ref().clone(), next) {
+            None => Ok(()),
+            Some(_) => {
+                let found = format!("a second {what} \"{}\"", name.as_ref());
+                Err(self.wrong(name, &format!("a name that no other {what} has"), &found))
+            }
+        }
+    }
+
+    fn positive(&self, name: &str, value: &Spanned<f64>) -> Result<f64, SceneError> {
+        let v = *value.as_ref();
+        if v > 0.0 && v.is_finite() {
+            return Ok(v);
+        }
+        Err(self.wrong(value, &format!("a positive finite number as {name}"), &v.to_string()))
+    }
+
+    fn vector(&self, value: &Spanned<[f64; 3]>, what: &str) -> Result<DVec3, SceneError> {
+        let v = DVec3::from_array(*value.as_ref());
+        if v.is_finite() {
+            return Ok(v);
+        }
+        Err(self.wrong(value, &format!("a finite {what}"), &format!("{:?}", value.as_ref())))
+    }
+
+    fn quaternion(&self, value: &Spanned<[f64; 4]>) -> Result<DQuat, SceneError> {
+        let q = DQuat::from_array(*value.as_ref());
+        let n = q.length_squared();
+        // Written so that NaN fails too.
+        if (n - 1.0).abs() <= QUATERNION {
+            return Ok(if n == 1.0 { q } else { q * (1.0 / n.sqrt()) });
+        }
+        let found = format!("{:?} with |q|² = {n}", value.as_ref());
+        Err(self.wrong(value, "a unit quaternion [x, y, z, w] as rotation", &found))
+    }
+
+    /// `raw` with `default` for what it leaves out.
+    fn pose(&self, raw: &RawPose, default: Pose) -> Result<Pose, SceneError> {
+        let position = raw.position.as_ref().map(|p| self.vector(p, "position")).transpose()?;
+        let rotation = raw.rotation.as_ref().map(|q| self.quaternion(q)).transpose()?;
+        Ok(Pose::new(position.unwrap_or(default.position), rotation.unwrap_or(default.rotation)))
+    }
+
+    fn object(&self, o: &RawObject, model: usize) -> Result<ObjectSpec, SceneError> {
+        let name = o.name.as_ref();
+        let is_static = match &o.motion {
+            None => false,
+            Some(word) => match word.as_ref().as_str() {
+                "static" => true,
+                "moving" => false,
+                other => return Err(self.wrong(word, "\"static\" or \"moving\"", &format!("\"{other}\""))),
+            },
+        };
+        let place = self.pose(&o.place, Pose::IDENTITY)?;
+        let start = self.pose(&o.start, Pose::IDENTITY)?;
+        let end = self.pose(&o.end, start)?;
+        let motion = match &o.rotation_vector {
+            Some(v) if o.end.rotation.is_some() => {
+                let expected = format!("either end.rotation or rotation_vector of object \"{name}\"");
+                return Err(self.wrong(v, &expected, "both"));
+            }
+            Some(v) => Motion::turning(start, end.position, self.vector(v, "rotation_vector")?),
+            None if o.end.rotation.is_some() => Motion::between(start, end),
+            None => Motion::turning(start, end.position, DVec3::ZERO),
+        };
+        if is_static && !motion.is_rest() {
+            return Err(self.wrong(&o.name, &format!("a static object \"{name}\" that rests"), "one that moves"));
+        }
+        if o.rotates == Some(false) && motion.spin != DVec3::ZERO {
+            let expected = format!("an object \"{name}\" with rotates = false that does not turn");
+            return Err(self.wrong(&o.name, &expected, "one that does"));
+        }
+        let max_speed = o.max_speed.as_ref().map(|v| self.positive("max_speed", v)).transpose()?;
+        Ok(ObjectSpec {
+            name: name.clone(),
+            model,
+            group: o.group.clone().unwrap_or_else(|| "default".into()),
+            is_static,
+            place,
+            motion,
+            rotates: o.rotates.unwrap_or(true),
+            max_speed,
+        })
+    }
+
+    fn rule(&self, r: &RawRule, objects: &HashMap<String, usize>) -> Result<Rule, SceneError> {
+        let mut rule = Rule::new(r.between.clone());
+        for pair in &r.except {
+            for name in pair {
+                if !objects.contains_key(name.as_ref()) {
+                    return Err(self.wrong(name, "the name of an object", &format!("\"{}\"", name.as_ref())));
+                }
+            }
+            rule.except.push([pair[0].as_ref().clone(), pair[1].as_ref().clone()]);
+        }
+        if let Some(word) = &r.detect {
+            let words = Detect::ALL.iter().map(|d| d.name());
+            rule.detect = Detect::of_name(word.as_ref()).ok_or_else(|| self.wrong_word(word, words))?;
+        }
+        if let Some(word) = &r.report {
+            let words = Report::ALL.iter().map(|d| d.name());
+            rule.report = Report::of_name(word.as_ref()).ok_or_else(|| self.wrong_word(word, words))?;
+        }
+        if let Some(word) = &r.initial_overlap {
+            let words = InitialOverlap::ALL.iter().map(|d| d.name());
+            rule.initial_overlap =
+                InitialOverlap::of_name(word.as_ref()).ok_or_else(|| self.wrong_word(word, words))?;
+        }
+        if let Some(margin) = &r.margin {
+            let m = *margin.as_ref();
+            if !(m >= 0.0 && m.is_finite()) {
+                return Err(self.wrong(margin, "a finite margin that is not negative", &m.to_string()));
+            }
+            rule.margin = m;
+        }
+        rule.penetration = r.penetration;
+        rule.sensor = r.sensor;
+        Ok(rule)
+    }
+
+    fn wrong_word(&self, word: &Spanned<String>, words: impl Iterator<Item = &'static str>) -> SceneError {
+        let expected = words.map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ");
+        self.wrong(word, &expected, &format!("\"{}\"", word.as_ref()))
+    }
+}

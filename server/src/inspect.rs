@@ -1,0 +1,172 @@
+//! What was imported and how, as text: kinds, bounds, notes, tree.
+
+use crate::import::{Import, Note, Scene};
+use crate::math::Aabb;
+use crate::solid::{Node, NodeId, Op, Sense, Shape, Solid};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// The tree is cut off after this many lines; the counts above it are complete.
+const TREE_LINES: usize = 400;
+
+/// All about one model; `file` is its heading.
+pub fn model(file: &str, import: &Import) -> String {
+    let Import { solid, notes } = import;
+    let mut out = String::new();
+    let mut kinds: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
+    for (p, sense) in solid.primitives.iter().zip(&solid.senses) {
+        let count = kinds.entry(kind(&p.shape)).or_default();
+        match sense {
+            Sense::Positive => count.0 += 1,
+            Sense::Negative => count.1 += 1,
+        }
+    }
+    let _ = writeln!(out, "{file}");
+    let _ = writeln!(
+        out,
+        "  {} primitives, {} faces, {} nodes, {} levels",
+        solid.primitives.len(),
+        solid.faces.len(),
+        solid.nodes.len(),
+        levels(solid)
+    );
+    for (kind, (positive, negative)) in kinds {
+        let _ = writeln!(out, "    {:>6} {kind} ({negative} subtracted)", positive + negative);
+    }
+    let _ = writeln!(out, "  bounds {}", bounds(&solid.aabb()));
+    for line in grouped(notes) {
+        let _ = writeln!(out, "  note: {line}");
+    }
+    out.push_str(&tree(solid));
+    out
+}
+
+/// A scene's objects and rules; its models follow one by one.
+pub fn scene(scene: &Scene) -> String {
+    let mut out = String::new();
+    let unit = if scene.unit.is_empty() { "no unit" } else { &scene.unit };
+    let resolution = scene.resolution.map_or_else(|| "default".into(), |r| format!("{r:e}"));
+    let _ = writeln!(out, "{}\n  unit {unit}, resolution {resolution}", scene.file);
+    for o in &scene.objects {
+        let how = match (o.is_static, o.motion.is_rest()) {
+            (true, _) => "static",
+            (false, true) => "at rest",
+            (false, false) if o.motion.spin == glam::DVec3::ZERO => "translating",
+            _ => "turning",
+        };
+        let _ = writeln!(out, "  object {}: model {}, group {}, {how}", o.name, scene.models[o.model].name, o.group);
+    }
+    for r in &scene.rules {
+        let _ = writeln!(
+            out,
+            "  rule {} - {}: detect {}, report {}, margin {}",
+            r.between[0],
+            r.between[1],
+            r.detect.name(),
+            r.report.name(),
+            r.margin
+        );
+    }
+    out
+}
+
+/// Equal notes as one line with their number, the first place and the largest amount.
+fn grouped(notes: &[Note]) -> Vec<String> {
+    let mut order: Vec<&Note> = Vec::new();
+    let mut groups: BTreeMap<&str, (usize, Option<f64>)> = BTreeMap::new();
+    for n in notes {
+        let (count, amount) = groups.entry(&n.text).or_insert_with(|| {
+            order.push(n);
+            (0, None)
+        });
+        *count += 1;
+        *amount = n.amount.map_or(*amount, |a| Some(amount.map_or(a, |b: f64| b.max(a))));
+    }
+    let line = |n: &&Note| {
+        let (count, amount) = groups[n.text.as_str()];
+        let times = if count > 1 { format!(" ({count} times, first here)") } else { String::new() };
+        format!("{}{times}", Note { amount, ..(*n).clone() })
+    };
+    order.iter().map(line).collect()
+}
+
+/// The field's word for a shape.
+pub fn kind(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Sphere(_) => "sphere",
+        Shape::Cylinder(_) => "cylinder",
+        Shape::Cone(c) if c.bottom > 0.0 && c.top > 0.0 => "frustum",
+        Shape::Cone(_) => "cone",
+        Shape::Cuboid(_) => "box",
+        Shape::Polyhedron(_) => "polyhedron",
+        Shape::HalfSpace(_) => "half-space",
+    }
+}
+
+fn bounds(b: &Aabb) -> String {
+    if b.is_empty() {
+        return "none: it is empty".into();
+    }
+    let (lo, hi, size) = (b.min, b.max, b.max - b.min);
+    format!(
+        "[{:.6}, {:.6}, {:.6}] to [{:.6}, {:.6}, {:.6}], size {:.6} x {:.6} x {:.6}",
+        lo.x, lo.y, lo.z, hi.x, hi.y, hi.z, size.x, size.y, size.z
+    )
+}
+
+fn levels(solid: &Solid) -> usize {
+    // Children come before their parents.
+    let mut height = vec![1usize; solid.nodes.len()];
+    for (i, node) in solid.nodes.iter().enumerate() {
+        if let Node::Op(_, children) = node {
+            height[i] = 1 + children.iter().map(|c| height[*c as usize]).max().unwrap_or(0);
+        }
+    }
+    height[solid.root as usize]
+}
+
+/// The tree, one node a line, indented by its depth.
+fn tree(solid: &Solid) -> String {
+    let mut out = String::from("  tree\n");
+    let mut stack: Vec<(NodeId, usize)> = vec![(solid.root, 2)];
+    let mut lines = 0;
+    while let Some((id, depth)) = stack.pop() {
+        if lines == TREE_LINES {
+            let _ = writeln!(out, "    … and more");
+            break;
+        }
+        lines += 1;
+        let indent = "  ".repeat(depth.min(40));
+        let _ = match &solid.nodes[id as usize] {
+            Node::Empty => writeln!(out, "{indent}nothing"),
+            Node::Op(op, children) => {
+                stack.extend(children.iter().rev().map(|c| (*c, depth + 1)));
+                let name = match op {
+                    Op::Union => "union",
+                    Op::Intersection => "intersection",
+                    Op::Difference => "difference",
+                };
+                writeln!(out, "{indent}{name}")
+            }
+            Node::Primitive(i) => {
+                let p = &solid.primitives[*i as usize];
+                let words = [&p.label.name, kind(&p.shape), &size(&p.shape)];
+                let mut words: Vec<&str> = words.into_iter().filter(|w| !w.is_empty()).collect();
+                words.dedup();
+                writeln!(out, "{indent}{i} {} at {}:{}", words.join(" "), p.label.line, p.label.column)
+            }
+        };
+    }
+    out
+}
+
+fn size(shape: &Shape) -> String {
+    match shape {
+        Shape::Sphere(s) => format!("r {}", s.radius),
+        Shape::Cylinder(c) => format!("r {}, h {}", c.radius, 2.0 * c.half_height),
+        Shape::Cone(c) => format!("r {} to {}, h {}", c.bottom, c.top, 2.0 * c.half_height),
+        Shape::Cuboid(c) => format!("{} x {} x {}", 2.0 * c.half.x, 2.0 * c.half.y, 2.0 * c.half.z),
+        Shape::Polyhedron(p) => format!("{} faces", p.planes.len()),
+        Shape::HalfSpace(_) => String::new(),
+    }
+}

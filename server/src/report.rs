@@ -1,0 +1,276 @@
+//! Answers as users read them: the JSON object of `check --json`, the table, the work behind each answer.
+//!
+//! Numbers in JSON are the shortest decimals that read back to the same bits; the table shows nine digits. A field
+//! without meaning for a status is null: a clear pair has no point. Features name the primitive by its index in file
+//! order and the format's name, its face, and its sense in the solid.
+
+use crate::contact::{Counters, Outcome, Status};
+use crate::solid::{Sense, Solid};
+use glam::DVec3;
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// One answer with what it takes to name its features.
+#[derive(Clone, Copy, Debug)]
+pub struct PairReport<'a> {
+    /// Names of the two objects.
+    pub names: [&'a str; 2],
+    /// Their solids.
+    pub solids: [&'a Solid; 2],
+    /// The answer.
+    pub outcome: &'a Outcome,
+}
+
+/// The object that `check --json` prints.
+#[derive(Debug, Serialize)]
+pub struct Answer {
+    /// The smallest `time_lower` of all pairs searched; 1 without pairs.
+    pub safe_time: f64,
+    /// One per pair.
+    pub pairs: Vec<PairAnswer>,
+}
+
+/// One pair of `Answer`; the fields are those of the file format, in its order.
+#[derive(Debug, Serialize)]
+#[allow(missing_docs)]
+pub struct PairAnswer {
+    pub a: String,
+    pub b: String,
+    pub status: &'static str,
+    pub time: f64,
+    pub time_lower: f64,
+    pub time_upper: f64,
+    pub touching: bool,
+    pub point: Option<[f64; 3]>,
+    pub normal: Option<[f64; 3]>,
+    pub separation: Option<f64>,
+    pub normal_speed: Option<f64>,
+    pub kind: Option<&'static str>,
+    pub extent: Option<&'static str>,
+    pub resolution: f64,
+    pub features: Option<Features>,
+    pub cells: u64,
+}
+
+/// The faces that meet, on each side.
+#[derive(Debug, Serialize)]
+pub struct Features {
+    /// Faces of a.
+    pub a: Vec<Feature>,
+    /// Faces of b.
+    pub b: Vec<Feature>,
+}
+
+/// One face of a primitive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Feature {
+    /// Index of the primitive in file order.
+    pub primitive: u32,
+    /// The file format's name of it.
+    pub name: String,
+    /// Name of the face, in the primitive's frame.
+    pub face: String,
+    /// "positive", or "negative" where the primitive is subtracted.
+    pub sense: &'static str,
+}
+
+impl Feature {
+    /// The feature behind a face id of `solid`; `None` for an id that it does not have.
+    pub fn of_face(solid: &Solid, face: u32) -> Option<Self> {
+        let primitive = *solid.face_owner.get(face as usize)?;
+        let p = &solid.primitives[primitive as usize];
+        let sense = match solid.senses[primitive as usize] {
+            Sense::Positive => "positive",
+            Sense::Negative => "negative",
+        };
+        let face = p.shape.geometry().face_name((face - p.first_face) as usize);
+        Some(Self { primitive, name: p.label.name.clone(), face, sense })
+    }
+}
+
+impl Answer {
+    /// The answer made of some pairs; `safe_time` covers exactly these.
+    pub fn of_pairs(pairs: &[PairReport<'_>]) -> Self {
+        let safe_time = pairs.iter().fold(1.0, |t: f64, p| t.min(p.outcome.time_lower));
+        Self { safe_time, pairs: pairs.iter().map(PairAnswer::of_pair).collect() }
+    }
+
+    /// One line of JSON.
+    pub fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string(self)
+    }
+
+    /// The table for people: nine digits, one line per pair, features below those that have some.
+    pub fn table(&self) -> String {
+        let header = ["a", "b", "status", "time", "separation", "normal speed", "kind", "extent", "point", "normal"];
+        let mut rows = vec![header.map(String::from)];
+        for p in &self.pairs {
+            let status = if p.touching { format!("{} (touching)", p.status) } else { p.status.into() };
+            rows.push([
+                p.a.clone(),
+                p.b.clone(),
+                status,
+                digits(p.time),
+                p.separation.map_or_else(String::new, digits),
+                p.normal_speed.map_or_else(String::new, digits),
+                p.kind.unwrap_or_default().into(),
+                p.extent.unwrap_or_default().into(),
+                p.point.map_or_else(String::new, vector),
+                p.normal.map_or_else(String::new, vector),
+            ]);
+        }
+        let mut out = aligned(&rows);
+        for p in &self.pairs {
+            if let Some(f) = &p.features {
+                let side = |f: &[Feature]| f.iter().map(Feature::to_string).collect::<Vec<_>>().join(", ");
+                let _ = writeln!(out, "{} on {}, {} on {}", side(&f.a), p.a, side(&f.b), p.b);
+            }
+        }
+        let _ = writeln!(out, "safe time {}", digits(self.safe_time));
+        out
+    }
+}
+
+impl std::fmt::Display for Feature {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let sense = if self.sense == "negative" { "subtracted " } else { "" };
+        write!(f, "{} of {sense}{} {}", self.face, self.name, self.primitive)
+    }
+}
+
+impl PairAnswer {
+    fn of_pair(pair: &PairReport<'_>) -> Self {
+        let o = pair.outcome;
+        let meets = matches!(o.status, Status::Contact | Status::Overlap);
+        let met = o.status == Status::Contact;
+        let told = meets || (o.touching && o.status == Status::Clear);
+        let features = |solid: &Solid, faces: &[u32; 3]| {
+            faces.iter().filter_map(|f| Feature::of_face(solid, *f)).collect::<Vec<_>>()
+        };
+        Self {
+            a: pair.names[0].to_owned(),
+            b: pair.names[1].to_owned(),
+            status: o.status.name(),
+            time: o.time,
+            time_lower: o.time_lower,
+            time_upper: o.time_upper,
+            touching: o.touching,
+            point: meets.then(|| o.point.to_array()),
+            normal: meets.then(|| o.normal.to_array()),
+            separation: told.then_some(o.separation),
+            normal_speed: meets.then_some(o.normal_speed),
+            kind: met.then(|| o.kind.name()),
+            extent: met.then(|| o.extent.name()),
+            resolution: o.resolution,
+            features: meets
+                .then(|| Features { a: features(pair.solids[0], &o.faces_a), b: features(pair.solids[1], &o.faces_b) }),
+            cells: o.counters.cells,
+        }
+    }
+}
+
+/// What each answer cost: primitives before and after stage 1, octree nodes, candidates, cells, attempts.
+pub fn work_table(pairs: &[PairReport<'_>]) -> String {
+    let header = ["a", "b", "primitives", "after stage 1", "node pairs", "candidates", "cells", "clauses", "newton"];
+    let mut rows = vec![header.map(String::from)];
+    for p in pairs {
+        let Counters { primitives, after_stage1, node_pairs, candidates, cells, clauses, newton, .. } =
+            p.outcome.counters;
+        let [a, b] = p.names.map(String::from);
+        let numbers = [primitives, after_stage1, node_pairs, candidates, cells, clauses, newton];
+        let [n0, n1, n2, n3, n4, n5, n6] = numbers.map(|n| n.to_string());
+        rows.push([a, b, n0, n1, n2, n3, n4, n5, n6]);
+    }
+    aligned(&rows)
+}
+
+/// Columns as wide as their widest entry.
+fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
+    let width = |k: usize| rows.iter().map(|r| r[k].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(width);
+    let mut out = String::new();
+    for row in rows {
+        let cells = row.iter().zip(widths).map(|(c, w)| format!("{c:<w$}"));
+        out.push_str(cells.collect::<Vec<_>>().join("  ").trim_end());
+        out.push('\n');
+    }
+    out
+}
+
+/// Nine significant digits where the number is near 1, scientific where it is tiny.
+fn digits(x: f64) -> String {
+    if x != 0.0 && !(1e-4..1e6).contains(&x.abs()) { format!("{x:.8e}") } else { format!("{x:.9}") }
+}
+
+fn vector(v: [f64; 3]) -> String {
+    let v = DVec3::from_array(v);
+    format!("({}, {}, {})", digits(v.x), digits(v.y), digits(v.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{Extent, Kind};
+    use crate::import::{Facets, Limits, import_csg};
+
+    fn plate() -> Solid {
+        let text =
+            "difference() { cube(size = [4, 4, 1], center = true);\n cylinder(h = 2, r1 = 1, r2 = 1, center = true); }";
+        import_csg("plate.csg", text, Facets::Auto, &Limits::default()).expect("a plate").solid
+    }
+
+    fn contact() -> Outcome {
+        Outcome {
+            status: Status::Contact,
+            time: 0.1 + 0.2,
+            time_lower: 0.1,
+            point: DVec3::new(1.0, 0.0, 0.0),
+            normal: DVec3::X,
+            kind: Kind::EdgeFace,
+            extent: Extent::Line,
+            faces_a: [6, u32::MAX, u32::MAX],
+            faces_b: [0, 4, u32::MAX],
+            ..Outcome::clear(1e-9)
+        }
+    }
+
+    #[test]
+    fn json_is_exact_and_names_features() {
+        let solid = plate();
+        let outcome = contact();
+        let pair = PairReport { names: ["a", "b"], solids: [&solid, &solid], outcome: &outcome };
+        let json = Answer::of_pairs(&[pair]).json().expect("finite numbers");
+        let expected = concat!(
+            r#"{"safe_time":0.1,"pairs":[{"a":"a","b":"b","status":"contact","time":0.30000000000000004,"#,
+            r#""time_lower":0.1,"time_upper":1.0,"touching":false,"point":[1.0,0.0,0.0],"normal":[1.0,0.0,0.0],"#,
+            r#""separation":0.0,"normal_speed":0.0,"kind":"edge-face","extent":"line","resolution":1e-9,"#,
+            r#""features":{"a":[{"primitive":1,"name":"cylinder","face":"side","sense":"negative"}],"#,
+            r#""b":[{"primitive":0,"name":"cube","face":"+x","sense":"positive"},"#,
+            r#"{"primitive":0,"name":"cube","face":"+z","sense":"positive"}]},"cells":0}]}"#
+        );
+        assert_eq!(json, expected);
+    }
+
+    #[test]
+    fn fields_without_meaning_are_null() {
+        let solid = plate();
+        let clear = Outcome::clear(1e-9);
+        let pair = PairReport { names: ["a", "b"], solids: [&solid, &solid], outcome: &clear };
+        let answer = Answer::of_pairs(&[pair]);
+        let p = &answer.pairs[0];
+        assert!(p.point.is_none() && p.normal.is_none() && p.kind.is_none() && p.extent.is_none());
+        assert!(p.separation.is_none() && p.normal_speed.is_none() && p.features.is_none());
+        assert_eq!(answer.safe_time, 1.0);
+        assert_eq!(Answer::of_pairs(&[]).json().expect("json"), r#"{"safe_time":1.0,"pairs":[]}"#);
+    }
+
+    #[test]
+    fn the_table_has_nine_digits() {
+        let solid = plate();
+        let outcome = contact();
+        let pair = PairReport { names: ["peg", "plate"], solids: [&solid, &solid], outcome: &outcome };
+        let table = Answer::of_pairs(&[pair]).table();
+        assert!(table.contains("0.300000000"), "{table}");
+        assert!(table.contains("side of subtracted cylinder 1 on peg"), "{table}");
+    }
+}
