@@ -1,4 +1,7 @@
-//! Harnesses shared by the integration tests.
+//! Independent truth and harnesses shared by the integration tests.
+#![forbid(unsafe_code)]
 
 pub mod openscad;
 pub mod random_solids;
+pub mod reference;
+pub mod scenes;

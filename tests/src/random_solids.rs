@@ -27,6 +27,17 @@ impl Random {
     pub fn within(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * ((self.bits() >> 11) as f64 / (1u64 << 53) as f64)
     }
+    /// True with probability `p`.
+    pub fn chance(&mut self, p: f64) -> bool {
+        self.within(0.0, 1.0) < p
+    }
+    /// A unit vector, uniform on the sphere.
+    pub fn direction(&mut self) -> DVec3 {
+        let z = self.within(-1.0, 1.0);
+        let (s, c) = self.within(0.0, std::f64::consts::TAU).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * c, r * s, z)
+    }
     /// A whole number below `n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize

@@ -1,0 +1,172 @@
+//! f of a solid, written a second time: literals in negation normal form.
+//!
+//! A solid becomes min and max over literals ±psi in the object's frame: complements are pushed down to the faces by
+//! De Morgan's laws, so that a subtracted primitive is the min of its −psi. Near a point most literals cannot decide f;
+//! `clauses` lists what can, as alternatives (min) of conjunctions (max).
+
+use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Solid};
+use contactd_proto::Pose;
+use glam::DVec3;
+
+/// One face with its sign: +psi of a positive primitive, −psi of a subtracted one.
+#[derive(Clone, Copy, Debug)]
+pub struct Literal {
+    /// The face, in the object's frame.
+    pub face: Face,
+    /// +1 or −1.
+    pub sign: f64,
+    /// Index of the primitive that owns the face.
+    pub owner: u32,
+}
+
+impl Literal {
+    /// Value at `x`.
+    pub fn value(&self, x: DVec3) -> f64 {
+        self.sign
+            * match self.face {
+                Face::Plane { normal, offset } => normal.dot(x) - offset,
+                Face::Sphere { center, radius } => center.distance(x) - radius,
+                Face::Cylinder { origin, axis, radius } => axis.cross(x - origin).length() - radius,
+                Face::Cone { apex, axis, sin, cos } => axis.cross(x - apex).length() * cos - axis.dot(x - apex) * sin,
+            }
+    }
+
+    /// Gradient at `x` (some one-sided one where there is none).
+    pub fn gradient(&self, x: DVec3) -> DVec3 {
+        let across = |o: DVec3, a: DVec3| (a.cross(x - o)).cross(a).normalize_or(a.any_orthonormal_vector());
+        self.sign
+            * match self.face {
+                Face::Plane { normal, .. } => normal,
+                Face::Sphere { center, .. } => (x - center).normalize_or(DVec3::Z),
+                Face::Cylinder { origin, axis, .. } => across(origin, axis),
+                Face::Cone { apex, axis, sin, cos } => across(apex, axis) * cos - axis * sin,
+            }
+    }
+
+    /// Apex and axis, for the faces that have a point without gradient on the surface.
+    pub fn apex(&self) -> Option<(DVec3, DVec3, f64)> {
+        match self.face {
+            Face::Cone { apex, axis, sin, .. } if self.sign > 0.0 => Some((apex, axis, sin)),
+            _ => None,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+enum Node {
+    Literal(u32),
+    Min(Vec<Node>),
+    Max(Vec<Node>),
+    /// f = +infinity (or −infinity for the complement of nothing).
+    Constant(f64),
+}
+
+/// A solid as a function of the point, in its object's frame.
+#[derive(Clone, Debug)]
+pub struct Field {
+    /// All literals.
+    pub literals: Vec<Literal>,
+    root: Node,
+    /// Centre of a ball that holds the solid.
+    pub center: DVec3,
+    /// Radius of that ball.
+    pub radius: f64,
+}
+
+impl Field {
+    /// The solid put into its object's frame by `place`.
+    pub fn new(solid: &Solid, place: &Pose) -> Self {
+        let mut field =
+            Self { literals: vec![], root: Node::Constant(f64::INFINITY), center: DVec3::ZERO, radius: 0.0 };
+        field.root = field.lower(solid, place, solid.root, false);
+        let bounds = solid.aabb();
+        if !solid.is_empty() && bounds.min.cmple(bounds.max).all() {
+            field.center = place.rotation * ((bounds.min + bounds.max) / 2.0) + place.position;
+            field.radius = (bounds.max - bounds.min).length() / 2.0;
+        }
+        field
+    }
+
+    fn lower(&mut self, solid: &Solid, place: &Pose, id: NodeId, negated: bool) -> Node {
+        match &solid.nodes[id as usize] {
+            TreeNode::Empty => Node::Constant(if negated { f64::NEG_INFINITY } else { f64::INFINITY }),
+            TreeNode::Primitive(p) => {
+                let leaves = solid.primitives[*p as usize].faces.iter().map(|face| {
+                    let sign = if negated { -1.0 } else { 1.0 };
+                    self.literals.push(Literal { face: moved(face, place), sign, owner: *p });
+                    Node::Literal(self.literals.len() as u32 - 1)
+                });
+                let leaves = leaves.collect();
+                if negated { Node::Min(leaves) } else { Node::Max(leaves) }
+            }
+            TreeNode::Op(op, children) => {
+                let flips = |i: usize| negated != (*op == Op::Difference && i > 0);
+                let lowered =
+                    children.iter().enumerate().map(|(i, c)| self.lower(solid, place, *c, flips(i))).collect();
+                if (*op == Op::Union) != negated { Node::Min(lowered) } else { Node::Max(lowered) }
+            }
+        }
+    }
+
+    /// f at `x`.
+    pub fn value(&self, x: DVec3) -> f64 {
+        self.value_of(&self.root, x)
+    }
+
+    fn value_of(&self, node: &Node, x: DVec3) -> f64 {
+        match node {
+            Node::Literal(i) => self.literals[*i as usize].value(x),
+            Node::Min(c) => c.iter().map(|n| self.value_of(n, x)).fold(f64::INFINITY, f64::min),
+            Node::Max(c) => c.iter().map(|n| self.value_of(n, x)).fold(f64::NEG_INFINITY, f64::max),
+            Node::Constant(v) => *v,
+        }
+    }
+
+    /// The literals that can decide f within `reach` of `x`, as alternatives of conjunctions; at most `limit`
+    /// alternatives (those beyond are dropped: smaller reaches find them).
+    pub fn clauses(&self, x: DVec3, reach: f64, limit: usize) -> Vec<Vec<u32>> {
+        self.clauses_of(&self.root, x, reach, limit)
+    }
+
+    fn clauses_of(&self, node: &Node, x: DVec3, reach: f64, limit: usize) -> Vec<Vec<u32>> {
+        match node {
+            Node::Literal(i) => vec![vec![*i]],
+            Node::Constant(_) => vec![],
+            Node::Min(children) => {
+                let v = self.value_of(node, x);
+                let near = children.iter().filter(|c| self.value_of(c, x) <= v + 2.0 * reach);
+                let mut all: Vec<Vec<u32>> = near.flat_map(|c| self.clauses_of(c, x, reach, limit)).collect();
+                all.truncate(limit);
+                all
+            }
+            Node::Max(children) => {
+                let v = self.value_of(node, x);
+                let mut product: Vec<Vec<u32>> = vec![vec![]];
+                for child in children.iter().filter(|c| self.value_of(c, x) >= v - 2.0 * reach) {
+                    let alternatives = self.clauses_of(child, x, reach, limit);
+                    product = product
+                        .iter()
+                        .flat_map(|p| alternatives.iter().map(move |a| p.iter().chain(a).copied().collect()))
+                        .take(limit)
+                        .collect();
+                }
+                product
+            }
+        }
+    }
+}
+
+/// A face seen from the parent of `place`.
+fn moved(face: &Face, place: &Pose) -> Face {
+    let point = |x: DVec3| place.rotation * x + place.position;
+    let turned = |n: DVec3| (place.rotation * n).normalize();
+    match *face {
+        Face::Plane { normal, offset } => {
+            let normal = turned(normal);
+            Face::Plane { normal, offset: offset + normal.dot(place.position) }
+        }
+        Face::Sphere { center, radius } => Face::Sphere { center: point(center), radius },
+        Face::Cylinder { origin, axis, radius } => Face::Cylinder { origin: point(origin), axis: turned(axis), radius },
+        Face::Cone { apex, axis, sin, cos } => Face::Cone { apex: point(apex), axis: turned(axis), sin, cos },
+    }
+}
