@@ -159,20 +159,23 @@ pub struct Incarnation {
     pub epoch: u64,
     /// Its process.
     pub pid: u32,
+    /// When that process started, clock ticks since boot; 0 when unknown.
+    pub start: u64,
 }
 
 impl Incarnation {
     /// The text of the file `current`.
     pub fn text(&self) -> String {
-        format!("contactd 1 epoch {:016x} pid {}\n", self.epoch, self.pid)
+        format!("contactd 1 epoch {:016x} pid {} start {}\n", self.epoch, self.pid, self.start)
     }
 
     fn parse(text: &str) -> Option<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
-        let &["contactd", _, "epoch", epoch, "pid", pid] = words.as_slice() else {
+        let &["contactd", _, "epoch", epoch, "pid", pid, "start", start] = words.as_slice() else {
             return None;
         };
-        Some(Self { epoch: u64::from_str_radix(epoch, 16).ok()?, pid: pid.parse().ok()? })
+        let epoch = u64::from_str_radix(epoch, 16).ok()?;
+        Some(Self { epoch, pid: pid.parse().ok()?, start: start.parse().ok()? })
     }
 }
 
@@ -251,9 +254,9 @@ mod tests {
 
     #[test]
     fn an_incarnation_comes_back_from_its_text() {
-        let i = Incarnation { epoch: 0x1234_5678_9abc_def0, pid: 77 };
+        let i = Incarnation { epoch: 0x1234_5678_9abc_def0, pid: 77, start: 5 };
         assert_eq!(Incarnation::parse(&i.text()), Some(i));
-        assert_eq!(Incarnation::parse("contactd 1 epoch zz pid 1"), None);
+        assert_eq!(Incarnation::parse("contactd 1 epoch zz pid 1 start 2"), None);
         assert_eq!(Incarnation::parse(""), None);
     }
 

@@ -35,8 +35,8 @@ pub struct StepRequest {
     pub cell_limit: u64,
     /// Most contact records of the reply, the earliest first; 0: no cap.
     pub max_records: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Records of the slice that count.
+    pub records: u32,
 }
 
 /// Outcome of a step's search over all its pairs: nothing met.

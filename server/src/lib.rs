@@ -12,3 +12,4 @@ pub mod motion;
 pub mod picture;
 pub mod report;
 pub mod solid;
+pub mod world;

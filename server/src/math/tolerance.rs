@@ -42,3 +42,7 @@ pub const MODEL_MARGIN: f64 = 1e-5;
 
 /// Relative rounding of a point carried through a few rotations and translations.
 pub const CARRIED: f64 = 64.0 * f64::EPSILON;
+
+/// Swept boxes grow by this times the size of their coordinates: a pose, a corner and a sum of both are each right to a
+/// few units in the last place (2e-16); a wider box only costs a comparison.
+pub const BOX_ROUNDING: f64 = 1e-14;

@@ -1,0 +1,92 @@
+//! What can go wrong, each with one sentence.
+
+use contactd_proto::ErrorCode;
+use contactd_proto::names::AddressError;
+use std::fmt;
+
+/// Why a call of a session failed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Error {
+    /// The server refused; nothing has changed there.
+    Refused {
+        /// The stable code.
+        code: ErrorCode,
+        /// Index of the offending record, rule or track.
+        index: Option<u32>,
+        /// What exactly was wrong, when there is more to say than the code's sentence.
+        detail: String,
+    },
+    /// No server of this name is running.
+    NoServer(String),
+    /// The server died or was stopped. `reconnect` finds its successor and replays the session.
+    ServerLost,
+    /// The server could not deliver its reply, since this client did not take earlier ones. The step was taken.
+    ReplyLost,
+    /// The time ran out. A step stays in flight: `finish` may be called again.
+    Timeout,
+    /// The name or the runtime folder is not usable.
+    Address(AddressError),
+    /// The server speaks other protocol versions than this client.
+    Version {
+        /// Oldest version that the server speaks.
+        min: u32,
+        /// Newest version that the server speaks.
+        max: u32,
+    },
+    /// Calls came in an order that makes no sense.
+    Misuse(&'static str),
+    /// The system or the shared memory layer failed.
+    System(String),
+}
+
+impl Error {
+    /// A refusal without index or detail.
+    pub fn refused(code: ErrorCode) -> Self {
+        Self::Refused { code, index: None, detail: String::new() }
+    }
+
+    /// The stable code of a refusal.
+    pub fn code(&self) -> Option<ErrorCode> {
+        match self {
+            Self::Refused { code, .. } => Some(*code),
+            Self::Version { .. } => Some(ErrorCode::Version),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused { code, index, detail } => {
+                if let Some(index) = index {
+                    write!(f, "index {index}: ")?;
+                }
+                write!(f, "{code}")?;
+                if detail.is_empty() { Ok(()) } else { write!(f, ": {detail}") }
+            }
+            Self::NoServer(name) => {
+                write!(f, "no server called \"{name}\" is running: start it with `contactd serve --name {name}`")
+            }
+            Self::ServerLost => f.write_str("the server is gone; reconnect to replay the session on its successor"),
+            Self::ReplyLost => f.write_str("the server could not deliver its reply"),
+            Self::Timeout => f.write_str("the server has not answered in time; the request is still in flight"),
+            Self::Address(e) => write!(f, "{e}"),
+            Self::Version { min, max } => write!(
+                f,
+                "the server speaks protocol versions {min} to {max}, this client version {}",
+                contactd_proto::names::PROTOCOL_VERSION
+            ),
+            Self::Misuse(what) => f.write_str(what),
+            Self::System(what) => f.write_str(what),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<AddressError> for Error {
+    fn from(e: AddressError) -> Self {
+        Self::Address(e)
+    }
+}

@@ -1,0 +1,365 @@
+//! The client's ports and the one request that may be under way.
+
+use super::link::{self, ControlClient, StepClient, Variant, system};
+use super::watch::ProcessWatch;
+use crate::Error;
+use crate::transport::{Opened, Transport};
+use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, encode};
+use contactd_proto::names::{self, Address, Incarnation, PROTOCOL_VERSION};
+use contactd_proto::status::StatusRecord;
+use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
+use iceoryx2::pending_response::PendingResponse;
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::*;
+use iceoryx2::request_mut::RequestMut;
+use iceoryx2::response::Response;
+use rustix::fs::{FlockOperation, flock};
+use std::fmt;
+use std::time::{Duration, Instant};
+
+type Loan = RequestMut<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
+type Pending = PendingResponse<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
+type Arrived = Response<Variant, [ContactRecord], StepReply>;
+
+/// Longest wait between two looks at whether the server lives.
+const SLICE: Duration = Duration::from_millis(50);
+
+/// The way to a server through shared memory.
+pub struct SharedMemory {
+    address: Address,
+    link: Option<Link>,
+}
+
+impl fmt::Debug for SharedMemory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SharedMemory").field("address", &self.address).finish_non_exhaustive()
+    }
+}
+
+/// Everything that belongs to one session on one incarnation. Fields are dropped in this order.
+struct Link {
+    reply: Option<Arrived>,
+    pending: Option<Pending>,
+    loan: Option<Loan>,
+    wake: Option<Listener<Variant>>,
+    server: Notifier<Variant>,
+    steps: StepClient,
+    control: ControlClient,
+    life: Life,
+    epoch: u64,
+    session: u64,
+    spin: Duration,
+    node: Node<Variant>,
+}
+
+/// How the server's life is watched.
+enum Life {
+    /// By its process.
+    Process(ProcessWatch),
+    /// By its lock: its process is not visible from here.
+    Lock(Address, u64),
+}
+
+impl Life {
+    fn is_over(&self) -> bool {
+        match self {
+            Self::Process(watch) => watch.is_dead(),
+            Self::Lock(address, epoch) => {
+                !is_locked(address) || address.current().is_none_or(|now| now.epoch != *epoch)
+            }
+        }
+    }
+}
+
+/// True when a server holds its lock.
+fn is_locked(address: &Address) -> bool {
+    let Ok(file) = std::fs::File::open(address.lock_file()) else { return false };
+    flock(&file, FlockOperation::NonBlockingLockShared).is_err()
+}
+
+impl SharedMemory {
+    /// A way to the server at `address`; nothing happens before `open`.
+    pub fn new(address: Address) -> Self {
+        Self { address, link: None }
+    }
+
+    /// What the server at `address` says of itself, whatever version it speaks.
+    ///
+    /// # Errors
+    /// `NoServer`, `Address`, `System`.
+    pub fn status(address: &Address) -> Result<StatusRecord, Error> {
+        let (incarnation, _) = find(address)?;
+        let node = link::node(&link::config(address, incarnation.epoch)?)?;
+        read_status(&node)
+    }
+
+    fn link(&mut self) -> Result<&mut Link, Error> {
+        self.link.as_mut().ok_or(Error::ServerLost)
+    }
+}
+
+/// The serving incarnation and a watch on its life.
+fn find(address: &Address) -> Result<(Incarnation, Life), Error> {
+    let none = || Error::NoServer(address.name().into());
+    if !address.folder().exists() {
+        return Err(none());
+    }
+    address.check_private()?;
+    let now = address.current().ok_or_else(none)?;
+    let life = match ProcessWatch::of(now.pid, now.start) {
+        Some(watch) => Life::Process(watch),
+        None => Life::Lock(address.clone(), now.epoch),
+    };
+    // Read again after the watch stands: what it watches is the incarnation that serves.
+    if address.current() != Some(now) || life.is_over() || !is_locked(address) {
+        return Err(none());
+    }
+    Ok((now, life))
+}
+
+fn read_status(node: &Node<Variant>) -> Result<StatusRecord, Error> {
+    let name = link::service_name(names::STATUS_SERVICE)?;
+    let service = node.service_builder(&name).blackboard_opener::<u32>().open();
+    let service = service.map_err(|e| system(names::STATUS_SERVICE, e))?;
+    let reader = service.reader_builder().create().map_err(|e| system("status reader", e))?;
+    let entry = reader.entry::<StatusRecord>(&link::STATUS_KEY).map_err(|e| system("status entry", e))?;
+    Ok(*entry.get())
+}
+
+impl Link {
+    fn new(address: &Address) -> Result<Self, Error> {
+        let (incarnation, life) = find(address)?;
+        let node = link::node(&link::config(address, incarnation.epoch)?)?;
+        match Self::on(node, life, incarnation.epoch) {
+            // What cannot be opened because its server is just going is no fault of the system.
+            Err(Error::System(_)) if !is_locked(address) || address.current() != Some(incarnation) => {
+                Err(Error::NoServer(address.name().into()))
+            }
+            other => other,
+        }
+    }
+
+    fn on(node: Node<Variant>, life: Life, epoch: u64) -> Result<Self, Error> {
+        let status = read_status(&node)?;
+        if !(status.version_min..=status.version_max).contains(&PROTOCOL_VERSION) {
+            return Err(Error::Version { min: status.version_min, max: status.version_max });
+        }
+        let steps = node
+            .service_builder(&link::service_name(names::STEP_SERVICE)?)
+            .request_response::<[PoseRecord], [ContactRecord]>()
+            .request_user_header::<StepRequest>()
+            .response_user_header::<StepReply>()
+            .open()
+            .map_err(|e| system(names::STEP_SERVICE, e))?
+            .client_builder()
+            .initial_max_slice_len(64)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|e| system("step port", e))?;
+        let control = node
+            .service_builder(&link::service_name(names::CONTROL_SERVICE)?)
+            .request_response::<[u8], [u8]>()
+            .request_user_header::<ControlHeader>()
+            .response_user_header::<ControlHeader>()
+            .open()
+            .map_err(|e| system(names::CONTROL_SERVICE, e))?
+            .client_builder()
+            .initial_max_slice_len(4096)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|e| system("control port", e))?;
+        let server = node
+            .service_builder(&link::service_name(names::WAKE_SERVICE)?)
+            .event()
+            .open()
+            .map_err(|e| system(names::WAKE_SERVICE, e))?
+            .notifier_builder()
+            .create()
+            .map_err(|e| system("wake port", e))?;
+        Ok(Self {
+            reply: None,
+            pending: None,
+            loan: None,
+            wake: None,
+            server,
+            steps,
+            control,
+            life,
+            epoch,
+            session: 0,
+            spin: Duration::ZERO,
+            node,
+        })
+    }
+
+    fn command(&mut self, command: Command, timeout: Duration) -> Result<Answer, Error> {
+        let bytes = encode(&Envelope { epoch: self.epoch, session: self.session, command }).map_err(Error::refused)?;
+        let mut request = self
+            .control
+            .loan_slice_uninit(bytes.len())
+            .map_err(|e| system("no memory for a command", e))?
+            .write_from_slice(&bytes);
+        *request.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };
+        let pending = request.send().map_err(|e| system("a command cannot be sent", e))?;
+        self.wake_server();
+        let start = Instant::now();
+        loop {
+            let connected = pending.is_connected();
+            match pending.receive() {
+                Ok(Some(answer)) => {
+                    // One copy: what is decoded can no longer change.
+                    let bytes = answer.payload().to_vec();
+                    return decode(&bytes).map_err(Error::refused);
+                }
+                Ok(None) if self.life.is_over() => return Err(Error::ServerLost),
+                Ok(None) if !connected => return Err(Error::ReplyLost),
+                Ok(None) => {}
+                Err(e) => return Err(system("an answer cannot be received", e)),
+            }
+            if start.elapsed() > timeout {
+                return Err(Error::Timeout);
+            }
+            // The waits grow with what has been waited: a load of seconds is not polled by microseconds.
+            self.wait((start.elapsed() / 4).clamp(Duration::from_micros(100), SLICE));
+        }
+    }
+
+    /// Blocks until the server calls or the time is over.
+    fn wait(&self, time: Duration) {
+        let waited = match &self.wake {
+            Some(wake) => wake.timed_wait(|_| {}, time).map_err(|_| ()),
+            None => Err(()),
+        };
+        // A wait that failed (a signal may interrupt it) must not become a busy loop.
+        if waited.is_err() {
+            std::thread::sleep(time.min(Duration::from_millis(1)));
+        }
+    }
+
+    fn wake_server(&self) {
+        // A server that cannot be woken is dead or full of wake-ups: either shows elsewhere.
+        let _ = self.server.notify();
+    }
+}
+
+impl Transport for SharedMemory {
+    const MAY_LOSE_SERVER: bool = true;
+
+    fn open(&mut self) -> Result<Opened, Error> {
+        // The old link goes first: it may hold segments of a predecessor.
+        self.link = None;
+        let mut link = Link::new(&self.address)?;
+        let pid = std::process::id();
+        let process = (pid, names::start_of_process(pid).unwrap_or(0));
+        let answer = link.command(Command::Open { version: PROTOCOL_VERSION, process }, Duration::from_secs(10))?;
+        let (session, max_batch, spin_ns) = match answer {
+            Answer::Opened { session, max_batch, spin_ns } => (session, max_batch, spin_ns),
+            Answer::Refused { code, detail, .. } => {
+                let code = ErrorCode::of_number(code).unwrap_or(ErrorCode::Internal);
+                return Err(Error::Refused { code, index: None, detail });
+            }
+            other => return Err(Error::System(format!("an unexpected answer to open: {other:?}"))),
+        };
+        let wake = link
+            .node
+            .service_builder(&link::service_name(&names::wake_service_of(session))?)
+            .event()
+            .open()
+            .map_err(|e| system("the session's wake service", e))?
+            .listener_builder()
+            .create()
+            .map_err(|e| system("the session's wake port", e))?;
+        link.wake = Some(wake);
+        link.session = session;
+        link.spin = Duration::from_nanos(spin_ns);
+        let epoch = link.epoch;
+        self.link = Some(link);
+        Ok(Opened { session, epoch, max_batch })
+    }
+
+    fn command(&mut self, command: Command, timeout: Duration) -> Result<Answer, Error> {
+        self.link()?.command(command, timeout)
+    }
+
+    fn loan(&mut self, records: usize) -> Result<&mut [PoseRecord], Error> {
+        let link = self.link()?;
+        (link.reply, link.pending, link.loan) = (None, None, None);
+        // iceoryx2 knows no empty slices: the header says how many records count.
+        let slice = link.steps.loan_slice(records.max(1)).map_err(|e| system("no memory for a batch", e))?;
+        link.loan = Some(slice);
+        match &mut link.loan {
+            Some(slice) => {
+                slice.user_header_mut().records = records as u32;
+                Ok(&mut slice.payload_mut()[..records])
+            }
+            None => Ok(&mut []),
+        }
+    }
+
+    fn loaned(&self) -> &[PoseRecord] {
+        let Some(link) = &self.link else { return &[] };
+        let (records, header) = match (&link.loan, &link.pending) {
+            (Some(loan), _) => (loan.payload(), loan.user_header()),
+            (_, Some(pending)) => (pending.payload(), pending.user_header()),
+            _ => return &[],
+        };
+        &records[..(header.records as usize).min(records.len())]
+    }
+
+    fn send(&mut self, request: StepRequest) -> Result<(), Error> {
+        let link = self.link()?;
+        if link.life.is_over() {
+            return Err(Error::ServerLost);
+        }
+        let Some(mut loan) = link.loan.take() else {
+            return Err(Error::Misuse("no step was begun"));
+        };
+        *loan.user_header_mut() = request;
+        link.pending = Some(loan.send().map_err(|e| system("a batch cannot be sent", e))?);
+        link.wake_server();
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<(), Error> {
+        let link = self.link()?;
+        let Some(pending) = &link.pending else {
+            return Err(Error::Misuse("no step is in flight"));
+        };
+        let start = Instant::now();
+        loop {
+            // Looked at before receiving: a reply that came before the end of the connection is then not missed.
+            let connected = pending.is_connected();
+            match pending.receive() {
+                Ok(Some(reply)) => {
+                    link.reply = Some(reply);
+                    return Ok(());
+                }
+                Ok(None) => {}
+                Err(e) => return Err(system("a reply cannot be received", e)),
+            }
+            let waited = start.elapsed();
+            if connected && waited < link.spin {
+                std::hint::spin_loop();
+                continue;
+            }
+            if link.life.is_over() {
+                return Err(Error::ServerLost);
+            }
+            if !connected {
+                return Err(Error::ReplyLost);
+            }
+            if waited >= timeout {
+                return Err(Error::Timeout);
+            }
+            link.wait((timeout - waited).min(SLICE));
+        }
+    }
+
+    fn reply(&self) -> Option<(&StepReply, &[ContactRecord])> {
+        let reply = self.link.as_ref()?.reply.as_ref()?;
+        Some((reply.user_header(), reply.payload()))
+    }
+}

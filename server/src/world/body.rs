@@ -1,0 +1,183 @@
+//! Bodies: a model at a place in an object's frame, the object's track, and the box it sweeps in a step.
+//!
+//! The swept box rests on two facts. A point c fixed in a frame that turns by θ over the step runs on an arc, and the arc
+//! leaves its chord by at most |c|·θ²/8 (interpolation error of a function with |f''| <= |c|·θ²). And the point never
+//! leaves the ball of radius |c| around the origin's path. The smaller of the two bounds is taken, side by side.
+
+use crate::eco::Model;
+use crate::math::{Aabb, tolerance};
+use contactd_proto::{Motion, Pose, Track};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// A model with the few numbers that a world asks for again and again. Shared by all sessions that use it.
+#[derive(Debug)]
+pub struct Part {
+    /// The model.
+    pub model: Arc<Model>,
+    /// Box of the solid in the model's frame.
+    pub aabb: Aabb,
+    /// Default resolution that the model asks for; a pair takes the larger of its two.
+    pub resolution: f64,
+    /// Smallest dimension of its primitives; infinite for a solid without any.
+    pub smallest: f64,
+}
+
+impl Part {
+    /// Measures a model.
+    pub fn new(model: Arc<Model>) -> Self {
+        let primitives = model.solid.primitives.iter();
+        let smallest = primitives.map(|p| p.shape.geometry().smallest_dimension()).fold(f64::INFINITY, f64::min);
+        let aabb = model.solid.aabb();
+        let resolution = super::search::default_resolution(&model, &model);
+        Self { model, aabb, resolution, smallest }
+    }
+}
+
+/// An object to be added.
+#[derive(Clone, Debug)]
+pub struct ObjectSpec {
+    /// Its id, larger than every id before.
+    pub id: u32,
+    /// Its name, for the exceptions of rules.
+    pub name: String,
+    /// Its group, for rules.
+    pub group: String,
+    /// Its model.
+    pub part: Arc<Part>,
+    /// It never moves.
+    pub is_static: bool,
+    /// It may turn.
+    pub rotates: bool,
+    /// Largest speed of any of its points, length per second; infinite when nothing is declared.
+    pub max_speed: f64,
+    /// The model in the object's frame.
+    pub place: Pose,
+    /// Pose before the first step.
+    pub pose: Pose,
+}
+
+/// An object of the world.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Its id.
+    pub id: u32,
+    /// Its name.
+    pub name: String,
+    /// Index of its group in the plans.
+    pub group: u32,
+    /// Its model.
+    pub part: Arc<Part>,
+    /// It never moves.
+    pub is_static: bool,
+    /// It may turn.
+    pub rotates: bool,
+    /// Largest declared speed.
+    pub max_speed: f64,
+    /// The model in the object's frame.
+    pub place: Pose,
+    /// Where it stands and how it came there.
+    pub track: Track,
+    /// Corners of the model's box in the object's frame; empty for an unbounded model.
+    corners: Vec<DVec3>,
+    /// Largest distance of a corner from the object's origin.
+    reach: f64,
+    /// Step in which a record named it with a start, and with a motion.
+    pub(super) named: [u64; 2],
+}
+
+impl Body {
+    /// A body of group `group`.
+    pub fn new(spec: ObjectSpec, group: u32) -> Self {
+        let aabb = spec.part.aabb;
+        let corners: Vec<DVec3> =
+            if aabb.is_finite() { aabb.corners().iter().map(|c| spec.place.point(*c)).collect() } else { Vec::new() };
+        let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let reach = if aabb.is_finite() || aabb.is_empty() { reach } else { f64::INFINITY };
+        Self {
+            id: spec.id,
+            name: spec.name,
+            group,
+            part: spec.part,
+            is_static: spec.is_static,
+            rotates: spec.rotates,
+            max_speed: spec.max_speed,
+            place: spec.place,
+            track: Track::resting(spec.pose),
+            corners,
+            reach,
+            named: [0; 2],
+        }
+    }
+
+    /// Largest speed of any of its points under `motion`, length per step.
+    pub fn speed(&self, motion: &Motion) -> f64 {
+        let turning = if motion.spin == DVec3::ZERO { 0.0 } else { motion.spin.length() * self.reach };
+        motion.velocity.length() + turning
+    }
+
+    /// A box that holds the body over the whole of its last motion.
+    pub fn swept(&self) -> Aabb {
+        if self.reach.is_infinite() {
+            return Aabb::ALL;
+        }
+        if self.corners.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let m = &self.track.motion;
+        let (first, last) = (m.at(0.0), m.at(1.0));
+        let theta = m.spin.length();
+        let ends = Aabb::of_points(self.corners.iter().flat_map(|c| [first.point(*c), last.point(*c)]));
+        let arcs = ends.grown(self.reach * theta * theta / 8.0);
+        let balls = Aabb::of_points([first.position, last.position]).grown(self.reach);
+        let swept = if theta == 0.0 { ends } else { arcs.intersection(&balls) };
+        let size = swept.min.abs().max(swept.max.abs()).max_element() + self.reach;
+        swept.grown(size * tolerance::BOX_ROUNDING)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solid::primitive::Cuboid;
+    use crate::solid::{Label, SolidBuilder};
+    use contactd_proto::motion::quat_of_rotation_vector;
+
+    #[test]
+    fn the_swept_box_holds_every_point_at_every_time() {
+        let mut b = SolidBuilder::new();
+        let root = b.primitive(
+            Cuboid { half: DVec3::new(1.0, 2.0, 0.5) },
+            Pose::at(DVec3::new(3.0, 0.0, 1.0)),
+            Label::default(),
+        );
+        let part = Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))));
+        let spins = [0.0, 1e-3, 0.7, 3.0, 9.0, 60.0];
+        for (i, spin) in spins.into_iter().enumerate() {
+            let spec = ObjectSpec {
+                id: 1,
+                name: String::new(),
+                group: String::new(),
+                part: part.clone(),
+                is_static: false,
+                rotates: true,
+                max_speed: f64::INFINITY,
+                place: Pose::new(DVec3::new(-1.0, 0.5, 0.0), quat_of_rotation_vector(DVec3::new(0.3, 1.0, i as f64))),
+                pose: Pose::IDENTITY,
+            };
+            let mut body = Body::new(spec, 0);
+            let start = Pose::new(DVec3::new(5.0, -2.0, 1.0), quat_of_rotation_vector(DVec3::new(1.0, 0.2, 0.0)));
+            let axis = DVec3::new(0.6, -0.8, 0.0);
+            let motion = Motion::turning(start, DVec3::new(2.0, 9.0, 1.0), axis * spin);
+            body.track = Track { motion, end: motion.at(1.0) };
+            let swept = body.swept();
+            for k in 0..=200 {
+                let pose = motion.at(k as f64 / 200.0);
+                for c in part.aabb.corners() {
+                    assert!(swept.contains(pose.point(body.place.point(c))), "spin {spin}, time {k}/200");
+                }
+            }
+            assert!(swept.half().max_element() < 20.0, "a bound that is useless: {swept:?}");
+        }
+    }
+}

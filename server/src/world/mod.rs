@@ -1,0 +1,26 @@
+//! A session's scene and one step of it: bodies, rules, broad phase, pairs in canonical order, outcomes.
+//!
+//! A step checks its whole batch first and then takes it whole: a refused batch changes nothing. Every pair that rules
+//! allow and that the broad phase lets through is searched by itself, the smaller object id first, so the answer depends
+//! neither on the order of the batch nor on the order in which pairs are searched. What two swept boxes exclude is
+//! proven clear: the broad phase is part of the certificate, not a filter by taste.
+//!
+//! Invariant: ids are never used again; pairs of two static bodies never exist; buffers are kept from step to step.
+//! It does not know files, sockets or wire layouts other than the two record types.
+//!
+//! Floor 7: imports `contact`, `eco`, `motion`, `solid`, `math`, `proto`.
+
+pub mod body;
+pub mod broad;
+pub mod plan;
+pub mod record;
+pub mod scene;
+mod search;
+pub mod step;
+#[cfg(test)]
+mod tests;
+
+pub use body::{ObjectSpec, Part};
+pub use plan::{PairPlan, Plans};
+pub use scene::{Refusal, World};
+pub use step::{PairOutcome, StepError, StepOptions, StepOutcome};

@@ -1,0 +1,148 @@
+//! Rules compiled: for two bodies, in two look-ups, the plan of their pair or none.
+//!
+//! The first rule that names a pair decides (effects of a scene); an exception passes the pair on to the rules behind. A
+//! pair that no rule names is off once there are rules; without rules every pair has the default plan.
+
+use contactd_proto::{Detect, InitialOverlap, Report, Rule};
+use std::collections::HashMap;
+
+/// What is done for a pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairPlan {
+    /// Discrete or continuous (never off: such pairs have no plan).
+    pub detect: Detect,
+    /// How much is reported.
+    pub report: Report,
+    /// Measure an overlap at the start.
+    pub penetration: bool,
+    /// Report at this separation.
+    pub margin: f64,
+    /// What becomes of an overlap at the start.
+    pub initial_overlap: InitialOverlap,
+    /// Never stops a search for the first contact.
+    pub sensor: bool,
+}
+
+impl PairPlan {
+    /// The plan of pairs in a scene without rules.
+    pub const DEFAULT: Self = Self {
+        detect: Detect::Continuous,
+        report: Report::Contact,
+        penetration: false,
+        margin: 0.0,
+        initial_overlap: InitialOverlap::Report,
+        sensor: false,
+    };
+
+    fn of(rule: &Rule) -> Self {
+        Self {
+            detect: rule.detect,
+            report: rule.report,
+            penetration: rule.penetration,
+            margin: rule.margin,
+            initial_overlap: rule.initial_overlap,
+            sensor: rule.sensor,
+        }
+    }
+}
+
+/// The rules of a scene, and which of them can name which pair of groups.
+#[derive(Clone, Debug, Default)]
+pub struct Plans {
+    rules: Vec<Rule>,
+    plans: Vec<PairPlan>,
+    groups: Vec<String>,
+    by_name: HashMap<String, u32>,
+    /// For groups (g, h) that some rule is between: the rules that can name their pairs, in order.
+    table: HashMap<(u32, u32), Vec<u32>>,
+}
+
+impl Plans {
+    /// Index of a group, new ones are appended.
+    pub fn group(&mut self, name: &str) -> u32 {
+        if let Some(g) = self.by_name.get(name) {
+            return *g;
+        }
+        let g = self.groups.len() as u32;
+        self.groups.push(name.into());
+        self.by_name.insert(name.into(), g);
+        self.compile();
+        g
+    }
+
+    /// Replaces the rules.
+    pub fn set(&mut self, rules: Vec<Rule>) {
+        self.plans = rules.iter().map(PairPlan::of).collect();
+        self.rules = rules;
+        self.compile();
+    }
+
+    /// The rules in force.
+    pub fn rules(&self) -> &[Rule] {
+        &self.rules
+    }
+
+    /// Largest margin of any rule.
+    pub fn largest_margin(&self) -> f64 {
+        self.plans.iter().map(|p| p.margin).fold(0.0, f64::max)
+    }
+
+    /// The plan of the pair of two objects by group and name; `None`: the pair is off.
+    pub fn of(&self, groups: [u32; 2], names: [&str; 2]) -> Option<&PairPlan> {
+        if self.rules.is_empty() {
+            return Some(&PairPlan::DEFAULT);
+        }
+        let [g, h] = groups;
+        for r in self.table.get(&(g, h))? {
+            let rule = &self.rules[*r as usize];
+            let both = [self.groups[g as usize].as_str(), self.groups[h as usize].as_str()];
+            if rule.except.is_empty() || rule.names(both, names) {
+                let plan = &self.plans[*r as usize];
+                return (plan.detect != Detect::Off).then_some(plan);
+            }
+        }
+        None
+    }
+
+    fn compile(&mut self) {
+        self.table.clear();
+        for (r, rule) in self.rules.iter().enumerate() {
+            let [p, q] = rule.between.each_ref().map(|name| self.by_name.get(name).copied());
+            let (Some(p), Some(q)) = (p, q) else { continue };
+            for key in [(p, q), (q, p)].into_iter().take(if p == q { 1 } else { 2 }) {
+                self.table.entry(key).or_default().push(r as u32);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rule(a: &str, b: &str) -> Rule {
+        Rule::new([a.into(), b.into()])
+    }
+
+    #[test]
+    fn the_first_rule_that_names_a_pair_decides() {
+        let mut plans = Plans::default();
+        let [robot, cell, tool] = ["robot", "cell", "tool"].map(|g| plans.group(g));
+        assert_eq!(plans.of([robot, tool], ["r", "t"]), Some(&PairPlan::DEFAULT));
+        let mut first = rule("cell", "robot");
+        first.except = vec![["gripper".into(), "part".into()], ["gripper".into(), "plate".into()]];
+        let mut second = rule("robot", "cell");
+        second.detect = Detect::Discrete;
+        second.except = vec![["plate".into(), "gripper".into()]];
+        let mut off = rule("tool", "tool");
+        off.detect = Detect::Off;
+        plans.set(vec![first, second, off, rule("tool", "tool")]);
+        let detect = |g, n| plans.of(g, n).map(|p| p.detect);
+        assert_eq!(detect([robot, cell], ["arm", "part"]), Some(Detect::Continuous));
+        assert_eq!(detect([cell, robot], ["part", "gripper"]), Some(Detect::Discrete));
+        assert_eq!(detect([robot, cell], ["gripper", "plate"]), None);
+        assert_eq!(detect([tool, tool], ["a", "b"]), None);
+        assert_eq!(detect([tool, robot], ["a", "b"]), None);
+        assert_eq!(plans.largest_margin(), 0.0);
+    }
+}

@@ -1,0 +1,234 @@
+//! The world: bodies by id, rules, resolution, and how they change between steps.
+
+use super::body::{Body, ObjectSpec};
+use super::plan::{PairPlan, Plans};
+use super::step::StepState;
+use contactd_proto::{Detect, ErrorCode, Pose, Rule, Track};
+use std::collections::HashMap;
+use std::fmt;
+
+/// Why a change of the world was refused; nothing has changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// The code.
+    pub code: ErrorCode,
+    /// Offending index within what was given, if any.
+    pub index: Option<u32>,
+    /// What exactly was wrong.
+    pub detail: String,
+}
+
+impl Refusal {
+    /// A refusal with its detail.
+    pub fn new(code: ErrorCode, detail: impl Into<String>) -> Self {
+        Self { code, index: None, detail: detail.into() }
+    }
+
+    /// The same, at an index.
+    pub fn at(mut self, index: usize) -> Self {
+        self.index = Some(index as u32);
+        self
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(index) = self.index {
+            write!(f, "at index {index}: ")?;
+        }
+        write!(f, "{}", self.code)?;
+        if self.detail.is_empty() { Ok(()) } else { write!(f, ": {}", self.detail) }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// The scene of one session.
+#[derive(Debug)]
+pub struct World {
+    /// In the order of their ids.
+    pub(super) bodies: Vec<Body>,
+    pub(super) by_id: HashMap<u32, u32>,
+    pub(super) plans: Plans,
+    pub(super) resolution: Option<f64>,
+    last_id: Option<u32>,
+    max_objects: usize,
+    /// Smallest primitive dimension and largest default resolution of any body so far.
+    smallest: f64,
+    coarsest: f64,
+    pub(super) state: StepState,
+}
+
+impl World {
+    /// An empty world that takes at most `max_objects` objects and `max_batch` records a step.
+    pub fn new(max_objects: usize, max_batch: usize) -> Self {
+        Self {
+            bodies: Vec::new(),
+            by_id: HashMap::new(),
+            plans: Plans::default(),
+            resolution: None,
+            last_id: None,
+            max_objects,
+            smallest: f64::INFINITY,
+            coarsest: 0.0,
+            state: StepState::new(max_batch),
+        }
+    }
+
+    /// The bodies in the order of their ids.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// The body of an id.
+    pub fn body(&self, id: u32) -> Option<&Body> {
+        self.by_id.get(&id).map(|i| &self.bodies[*i as usize])
+    }
+
+    /// The rules in force.
+    pub fn rules(&self) -> &[Rule] {
+        self.plans.rules()
+    }
+
+    /// The plan of a pair of objects; `None` when it is never searched (or an id is unknown).
+    pub fn plan_of(&self, a: u32, b: u32) -> Option<&PairPlan> {
+        let (a, b) = (self.body(a)?, self.body(b)?);
+        if a.id == b.id || (a.is_static && b.is_static) {
+            return None;
+        }
+        self.plans.of([a.group, b.group], [&a.name, &b.name])
+    }
+
+    /// Adds an object.
+    ///
+    /// # Errors
+    /// `LimitObjects`; `DuplicateObject` for an id that is not larger than all before; `NotFinite`; `BadNumber` for a
+    /// speed that is not positive; `Resolution` when a pair's resolution would swallow a primitive.
+    pub fn add_object(&mut self, spec: ObjectSpec) -> Result<(), Refusal> {
+        let name = format!("object \"{}\"", spec.name);
+        if self.bodies.len() >= self.max_objects {
+            return Err(Refusal::new(ErrorCode::LimitObjects, format!("the limit is {}", self.max_objects)));
+        }
+        if self.last_id.is_some_and(|last| spec.id <= last) {
+            return Err(Refusal::new(ErrorCode::DuplicateObject, format!("{name}: id {} was used before", spec.id)));
+        }
+        for (pose, which) in [(&spec.place, "place"), (&spec.pose, "pose")] {
+            check_pose(pose).map_err(|code| Refusal::new(code, format!("{name}: {which}")))?;
+        }
+        if spec.max_speed.is_nan() || spec.max_speed <= 0.0 {
+            return Err(Refusal::new(ErrorCode::BadNumber, format!("{name}: max_speed must be positive")));
+        }
+        let smallest = self.smallest.min(spec.part.smallest);
+        let coarsest = self.coarsest.max(spec.part.resolution);
+        check_resolution(self.resolution, smallest, coarsest)
+            .map_err(|e| Refusal { detail: format!("{name}: {}", e.detail), ..e })?;
+        (self.smallest, self.coarsest) = (smallest, coarsest);
+        self.last_id = Some(spec.id);
+        let group = self.plans.group(&spec.group);
+        self.by_id.insert(spec.id, self.bodies.len() as u32);
+        self.bodies.push(Body::new(spec, group));
+        Ok(())
+    }
+
+    /// Removes an object. Its id is not used again.
+    ///
+    /// # Errors
+    /// `UnknownObject`.
+    pub fn remove_object(&mut self, id: u32) -> Result<(), Refusal> {
+        let Some(index) = self.by_id.remove(&id) else {
+            return Err(Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")));
+        };
+        self.bodies.remove(index as usize);
+        for (i, body) in self.bodies.iter().enumerate().skip(index as usize) {
+            self.by_id.insert(body.id, i as u32);
+        }
+        Ok(())
+    }
+
+    /// Replaces the rules.
+    ///
+    /// # Errors
+    /// `BadRule` at the index of a rule whose margin is not a finite length >= 0.
+    pub fn set_rules(&mut self, rules: Vec<Rule>) -> Result<(), Refusal> {
+        for (i, rule) in rules.iter().enumerate() {
+            if !(rule.margin.is_finite() && rule.margin >= 0.0) {
+                let detail = format!("a margin must be a finite length >= 0, not {}", rule.margin);
+                return Err(Refusal::new(ErrorCode::BadRule, detail).at(i));
+            }
+        }
+        self.plans.set(rules);
+        Ok(())
+    }
+
+    /// Sets the resolution of every pair; `None`: each pair its default, 1e-9 of the larger bounding radius.
+    ///
+    /// # Errors
+    /// `Resolution` when it is not a positive length well below every primitive's smallest dimension.
+    pub fn set_resolution(&mut self, resolution: Option<f64>) -> Result<(), Refusal> {
+        if let Some(d) = resolution
+            && !(d.is_finite() && d > 0.0)
+        {
+            return Err(Refusal::new(ErrorCode::Resolution, format!("{d} is not a positive length")));
+        }
+        check_resolution(resolution, self.smallest, self.coarsest)?;
+        self.resolution = resolution;
+        Ok(())
+    }
+
+    /// Puts objects on the tracks that they had: the next step continues from there.
+    ///
+    /// # Errors
+    /// `UnknownObject`, `StaticObject`, `NotFinite`, `BadQuaternion`, at the index of the track.
+    pub fn restore(&mut self, tracks: &[(u32, Track)]) -> Result<(), Refusal> {
+        let mut places = Vec::with_capacity(tracks.len());
+        for (i, (id, track)) in tracks.iter().enumerate() {
+            let Some(index) = self.by_id.get(id) else {
+                return Err(Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")).at(i));
+            };
+            let refuse = |code| Refusal::new(code, format!("object id {id}")).at(i);
+            check_pose(&track.motion.start).and(check_pose(&track.end)).map_err(refuse)?;
+            if self.bodies[*index as usize].is_static && !track.is_rest() {
+                return Err(refuse(ErrorCode::StaticObject));
+            }
+            places.push(*index);
+        }
+        for (index, (_, track)) in places.into_iter().zip(tracks) {
+            self.bodies[index as usize].track = *track;
+        }
+        Ok(())
+    }
+
+    /// Which of two bodies' pairs is searched and how: `None` when rules or two static bodies rule it out.
+    pub(super) fn pair_plan(&self, i: u32, j: u32) -> Option<PairPlan> {
+        let (a, b) = (&self.bodies[i as usize], &self.bodies[j as usize]);
+        if a.is_static && b.is_static {
+            return None;
+        }
+        let plan = self.plans.of([a.group, b.group], [&a.name, &b.name]).copied();
+        debug_assert!(plan.is_none_or(|p| p.detect != Detect::Off));
+        plan
+    }
+
+    /// The resolution of a pair.
+    pub(super) fn resolution_of(&self, i: u32, j: u32) -> f64 {
+        let default = |k: u32| self.bodies[k as usize].part.resolution;
+        self.resolution.unwrap_or_else(|| default(i).max(default(j)))
+    }
+}
+
+fn check_pose(pose: &Pose) -> Result<(), ErrorCode> {
+    if !pose.position.is_finite() {
+        return Err(ErrorCode::NotFinite);
+    }
+    contactd_proto::pose_record::unit_quaternion(pose.rotation.to_array()).map(|_| ())
+}
+
+/// A resolution must stay below a quarter of the smallest dimension: deeper than that a primitive has no inside left.
+fn check_resolution(fixed: Option<f64>, smallest: f64, coarsest: f64) -> Result<(), Refusal> {
+    let resolution = fixed.unwrap_or(coarsest);
+    if resolution.is_finite() && smallest <= 4.0 * resolution {
+        let detail = format!("resolution {resolution:e} against a primitive of size {smallest:e}");
+        return Err(Refusal::new(ErrorCode::Resolution, detail));
+    }
+    Ok(())
+}

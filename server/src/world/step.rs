@@ -1,0 +1,343 @@
+//! One step of the world: check the batch, take it, sweep, search, order.
+//!
+//! The batch is checked to its last record before anything changes. Then the objects that moved in the step before are
+//! put at `advance` of it, the named ones get their new motions, everything else rests. Outcomes are ordered by (time,
+//! a, b); nothing in them depends on the order of records or of searches.
+
+use super::body::Body;
+use super::broad::BroadPhase;
+use super::plan::PairPlan;
+use super::scene::World;
+use super::search::{self, PairJob};
+use crate::contact::{Counters, Outcome, Status};
+use crate::math::Aabb;
+use contactd_proto::pose_record::Order;
+use contactd_proto::step::{EFFECT_CONTACT, EFFECT_CONTINUOUS, EFFECT_DISCRETE, EFFECT_MARGIN, EFFECT_PATCH};
+use contactd_proto::{Detect, ErrorCode, PoseRecord, Report, Track};
+use std::fmt;
+
+/// Why a batch was refused. The world is as it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StepError {
+    /// The code.
+    pub code: ErrorCode,
+    /// Index of the offending record; `None` when it is the batch or an option.
+    pub index: Option<u32>,
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.index {
+            Some(index) => write!(f, "record {index}: {}", self.code),
+            None => write!(f, "{}", self.code),
+        }
+    }
+}
+
+impl std::error::Error for StepError {}
+
+/// What is asked of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepOptions {
+    /// Fraction of the previous step that is taken before this one, 0..1.
+    pub advance: f64,
+    /// Duration in seconds, for declared speeds; 0 when unknown.
+    pub dt: f64,
+    /// Only the pairs whose bracket meets the scene's earliest contact.
+    pub first: bool,
+    /// Tell clear pairs too, those that the broad phase excluded among them.
+    pub clear: bool,
+    /// Most pairs told, the earliest first; 0: all.
+    pub max_records: u32,
+    /// Most cells that one pair's search refines; 0: the default.
+    pub cell_limit: u64,
+}
+
+impl Default for StepOptions {
+    fn default() -> Self {
+        Self { advance: 1.0, dt: 0.0, first: false, clear: false, max_records: 0, cell_limit: 0 }
+    }
+}
+
+/// The answer for one pair of a step, a < b.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairOutcome {
+    /// Smaller object id.
+    pub a: u32,
+    /// Larger object id.
+    pub b: u32,
+    /// How it was searched.
+    pub plan: PairPlan,
+    /// What was found.
+    pub outcome: Outcome,
+}
+
+/// The answer of a step. Valid until the next one.
+#[derive(Clone, Debug, Default)]
+pub struct StepOutcome {
+    /// Told pairs in the order (time, a, b).
+    pub pairs: Vec<PairOutcome>,
+    /// More pairs would have been told without `max_records`.
+    pub truncated: bool,
+    /// Smallest time_lower over all pairs, told or not.
+    pub safe_time: f64,
+    /// Some pair was left undecided before the earliest contact.
+    pub undecided: bool,
+    /// Some pair meets or overlaps.
+    pub contact: bool,
+    /// Pairs that were searched.
+    pub searched: u32,
+    /// `EFFECT_…` bits of what ran.
+    pub effects: u32,
+    /// Work of all searches.
+    pub counters: Counters,
+    /// Pairs of boxes compared.
+    pub box_tests: u64,
+    /// Discrete pairs that moved far enough to have passed through each other.
+    pub may_have_passed: u64,
+}
+
+/// Memory of the steps.
+#[derive(Debug)]
+pub struct StepState {
+    max_batch: usize,
+    serial: u64,
+    orders: Vec<(u32, Order)>,
+    staged: Vec<(u32, Track)>,
+    boxes: Vec<Aabb>,
+    broad: BroadPhase,
+    jobs: Vec<PairJob>,
+    searches: search::Memory,
+    outcome: StepOutcome,
+}
+
+impl StepState {
+    pub(super) fn new(max_batch: usize) -> Self {
+        Self {
+            max_batch,
+            serial: 0,
+            orders: Vec::new(),
+            staged: Vec::new(),
+            boxes: Vec::new(),
+            broad: BroadPhase::default(),
+            jobs: Vec::new(),
+            searches: search::Memory::default(),
+            outcome: StepOutcome::default(),
+        }
+    }
+}
+
+impl World {
+    /// One step: `records` name the objects that move (or are put somewhere), all others stay.
+    ///
+    /// # Errors
+    /// What is wrong with the batch, and the index of the record; the world has not changed.
+    pub fn step(&mut self, records: &[PoseRecord], options: &StepOptions) -> Result<&StepOutcome, StepError> {
+        self.check(records, options)?;
+        self.stage(options).inspect_err(|_| self.state.staged.clear())?;
+        self.take(options);
+        self.find_pairs(options);
+        self.search(options);
+        Ok(&self.state.outcome)
+    }
+
+    /// Decodes the records and checks each against the world.
+    fn check(&mut self, records: &[PoseRecord], options: &StepOptions) -> Result<(), StepError> {
+        let refuse = |code| Err(StepError { code, index: None });
+        if records.len() > self.state.max_batch {
+            return refuse(ErrorCode::TooMany);
+        }
+        if !(0.0..=1.0).contains(&options.advance) || !(options.dt.is_finite() && options.dt >= 0.0) {
+            return refuse(ErrorCode::BadNumber);
+        }
+        self.state.serial += 1;
+        self.state.orders.clear();
+        for (i, record) in records.iter().enumerate() {
+            // One copy: another process may write to the slot while it is read.
+            let record = *record;
+            let refuse = |code| StepError { code, index: Some(i as u32) };
+            let Some(index) = self.by_id.get(&record.object).copied() else {
+                return Err(refuse(ErrorCode::UnknownObject));
+            };
+            let order = record.decode().map_err(refuse)?;
+            let body = &mut self.bodies[index as usize];
+            if body.is_static {
+                return Err(refuse(ErrorCode::StaticObject));
+            }
+            let slot = usize::from(!matches!(order, Order::Start(_)));
+            if body.named[slot] == self.state.serial {
+                return Err(refuse(ErrorCode::DuplicateObject));
+            }
+            body.named[slot] = self.state.serial;
+            self.state.orders.push((index, order));
+        }
+        Ok(())
+    }
+
+    /// Works out the new tracks of the named objects: starts first, then motions.
+    fn stage(&mut self, options: &StepOptions) -> Result<(), StepError> {
+        let Self { bodies, state, .. } = self;
+        state.staged.clear();
+        for (index, order) in &state.orders {
+            if matches!(order, Order::Start(_)) {
+                state.staged.push((*index, Track::ordered(bodies[*index as usize].track.end, *order)));
+            }
+        }
+        let starts = state.staged.len();
+        // Where a body that was put somewhere stands: binary search over the starts.
+        state.staged.sort_unstable_by_key(|(index, _)| *index);
+        for (i, (index, order)) in state.orders.iter().enumerate() {
+            if matches!(order, Order::Start(_)) {
+                continue;
+            }
+            let body = &bodies[*index as usize];
+            let put = state.staged[..starts].binary_search_by_key(index, |(k, _)| *k);
+            let start = put.map_or_else(|_| body.track.at(options.advance), |k| state.staged[k].1.end);
+            let track = Track::ordered(start, *order);
+            check_motion(body, &track, options.dt).map_err(|code| StepError { code, index: Some(i as u32) })?;
+            state.staged.push((*index, track));
+        }
+        Ok(())
+    }
+
+    /// Takes the batch: from here on nothing is refused.
+    fn take(&mut self, options: &StepOptions) {
+        for body in self.bodies.iter_mut().filter(|body| !body.track.is_rest()) {
+            body.track = Track::resting(body.track.at(options.advance));
+        }
+        for (index, track) in self.state.staged.drain(..) {
+            self.bodies[index as usize].track = track;
+        }
+    }
+
+    /// Fills the jobs: the pairs to search, in the order of their ids.
+    fn find_pairs(&mut self, options: &StepOptions) {
+        let margin = 0.5 * self.plans.largest_margin();
+        let mut boxes = std::mem::take(&mut self.state.boxes);
+        let mut jobs = std::mem::take(&mut self.state.jobs);
+        boxes.clear();
+        boxes.extend(self.bodies.iter().map(|body| {
+            // Touching is told within twice the resolution, of which this body answers for its share.
+            let touch = 2.0 * self.resolution.unwrap_or(body.part.resolution);
+            body.swept().grown(margin + touch)
+        }));
+        jobs.clear();
+        let mut broad = std::mem::take(&mut self.state.broad);
+        let mut job = |i: u32, j: u32, near: bool| {
+            let (i, j) = (i.min(j), i.max(j));
+            if let Some(plan) = self.pair_plan(i, j) {
+                jobs.push(PairJob { a: i, b: j, plan, resolution: self.resolution_of(i, j), near });
+            }
+        };
+        broad.run(&boxes, |i| self.bodies[i].is_static, |i, j| job(i, j, true));
+        if options.clear {
+            // The caller wants a line for every pair: the excluded ones are listed too.
+            for i in 0..boxes.len() {
+                for j in i + 1..boxes.len() {
+                    if !boxes[i].meets(&boxes[j]) {
+                        job(i as u32, j as u32, false);
+                    }
+                }
+            }
+        }
+        jobs.sort_unstable_by_key(|job| (job.a, job.b));
+        self.state.boxes = boxes;
+        self.state.jobs = jobs;
+        self.state.broad = broad;
+    }
+
+    /// Searches the jobs and orders what they found.
+    fn search(&mut self, options: &StepOptions) {
+        let Self { bodies, state, .. } = self;
+        let out = &mut state.outcome;
+        search::run(bodies, &state.jobs, options, &mut state.searches);
+        *out = StepOutcome {
+            pairs: std::mem::take(&mut out.pairs),
+            safe_time: 1.0,
+            box_tests: state.broad.tests,
+            ..StepOutcome::default()
+        };
+        out.pairs.clear();
+        let mut earliest = f64::INFINITY;
+        for (job, outcome) in state.jobs.iter().zip(state.searches.outcomes()) {
+            out.counters += outcome.counters;
+            out.searched += u32::from(job.near);
+            out.effects |= effects_of(&job.plan, job.near);
+            out.safe_time = out.safe_time.min(outcome.time_lower);
+            if job.plan.detect == Detect::Discrete && passes(job, bodies) {
+                out.may_have_passed += u64::from(outcome.status == Status::Clear);
+            }
+            if matches!(outcome.status, Status::Contact | Status::Overlap) {
+                out.contact = true;
+                earliest = earliest.min(outcome.time);
+            }
+            if is_told(&job.plan, outcome, options) {
+                let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
+                out.pairs.push(PairOutcome { a, b, plan: job.plan, outcome: *outcome });
+            }
+        }
+        out.undecided = state.searches.outcomes().iter().any(|o| is_undecided_before(o, earliest));
+        if options.first {
+            keep_first(&mut out.pairs);
+        }
+        let key = |p: &PairOutcome| (p.outcome.time, p.a, p.b);
+        out.pairs.sort_unstable_by(|p, q| {
+            let (p, q) = (key(p), key(q));
+            p.0.total_cmp(&q.0).then((p.1, p.2).cmp(&(q.1, q.2)))
+        });
+        if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
+            out.pairs.truncate(options.max_records as usize);
+            out.truncated = true;
+        }
+    }
+}
+
+/// Refuses a motion that leaves the finite numbers or breaks what was declared of the body.
+fn check_motion(body: &Body, track: &Track, dt: f64) -> Result<(), ErrorCode> {
+    let m = &track.motion;
+    if !m.velocity.length_squared().is_finite() {
+        return Err(ErrorCode::NotFinite);
+    }
+    let turns = !body.rotates && m.spin != glam::DVec3::ZERO;
+    // Without a duration a speed per second says nothing: a declared one needs it.
+    let fast = body.max_speed.is_finite() && (dt == 0.0 || body.speed(m) > body.max_speed * dt);
+    if turns || fast { Err(ErrorCode::Declaration) } else { Ok(()) }
+}
+
+fn effects_of(plan: &PairPlan, near: bool) -> u32 {
+    if !near {
+        return 0;
+    }
+    let detect = if plan.detect == Detect::Discrete { EFFECT_DISCRETE } else { EFFECT_CONTINUOUS };
+    let contact = if plan.report >= Report::Contact { EFFECT_CONTACT } else { 0 };
+    let patch = if plan.report >= Report::Patch { EFFECT_PATCH } else { 0 };
+    let margin = if plan.margin > 0.0 { EFFECT_MARGIN } else { 0 };
+    detect | contact | patch | margin
+}
+
+/// True when a discrete pair moved by more than the smaller body's smallest dimension.
+fn passes(job: &PairJob, bodies: &[Body]) -> bool {
+    let (a, b) = (&bodies[job.a as usize], &bodies[job.b as usize]);
+    a.speed(&a.track.motion) + b.speed(&b.track.motion) > a.part.smallest.min(b.part.smallest)
+}
+
+fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
+    match o.status {
+        Status::Contact | Status::Overlap | Status::Undecided => true,
+        Status::Clear => options.clear || (o.touching && (plan.margin > 0.0 || plan.report >= Report::Patch)),
+    }
+}
+
+fn is_undecided_before(o: &Outcome, earliest: f64) -> bool {
+    o.status == Status::Undecided && o.time_lower < earliest
+}
+
+/// Keeps the pairs whose bracket meets that of the earliest contact; sensors stop nothing.
+fn keep_first(pairs: &mut Vec<PairOutcome>) {
+    let stops = |p: &&PairOutcome| !p.plan.sensor && matches!(p.outcome.status, Status::Contact | Status::Overlap);
+    let Some(first) = pairs.iter().filter(stops).map(|p| &p.outcome).min_by(|p, q| p.time.total_cmp(&q.time)) else {
+        return;
+    };
+    let until = first.time_upper;
+    pairs.retain(|p| p.outcome.status != Status::Clear && p.outcome.time_lower <= until);
+}
