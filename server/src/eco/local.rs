@@ -242,19 +242,12 @@ fn merge_refs(op: Op, a: Kind, b: Kind, kind: Kind, refs: &mut Vec<u32>, start: 
     }
 }
 
-/// Appends to `out` the literals (`solid::local`) that are open at depth `delta` over the voxel center ± half, for the
-/// local tree at the head of `terms`. `delta` (a length) lies within the margin that the local tree was made with.
-pub fn write_literals(
-    solid: &Solid,
-    terms: &[Term],
-    center: DVec3,
-    half: f64,
-    delta: f64,
-    out: &mut Vec<Token>,
-) -> Truth {
-    let e = DVec3::splat(half);
+/// Appends to `out` the literals (`solid::local`) that are open at depth `delta` over the box `region`, for the local tree
+/// at the head of `terms`; the box lies in the voxel of the local tree, and `delta` (a length) within its margin.
+pub fn write_literals(solid: &Solid, terms: &[Term], region: &Aabb, delta: f64, out: &mut Vec<Token>) -> Truth {
+    let (c, e) = (region.center(), region.half());
     write(solid, terms, Sense::Positive, out, &mut |id| {
-        truth_of(id.sense(), face_span(&solid.faces[id.face() as usize], center, e), delta)
+        truth_of(id.sense(), face_span(&solid.faces[id.face() as usize], c, e), delta)
     })
 }
 

@@ -35,8 +35,8 @@ impl Default for Limits {
 /// Smallest voxel, as a multiple of the margin: below it nothing is told apart any more.
 const FINEST: f64 = 16.0;
 
-/// Levels below the root at most, for models without a margin.
-const DEEPEST: u8 = 24;
+/// Levels below the root at most: a path fits 64 bits.
+const DEEPEST: u8 = 20;
 
 /// A node of an octree.
 #[derive(Debug)]
@@ -50,7 +50,7 @@ pub struct Node {
     /// Proven upper bound of f over the cube, as far as it tells within ±margin.
     pub f_hi: f64,
     kind: Kind,
-    depth: u8,
+    path: u64,
     refs: Box<[u32]>,
     terms: Box<[Term]>,
     children: OnceLock<Box<[Node; 8]>>,
@@ -63,7 +63,12 @@ impl Node {
     }
     /// Levels below the root.
     pub fn depth(&self) -> u8 {
-        self.depth
+        ((63 - self.path.leading_zeros()) / 3) as u8
+    }
+    /// Id within the octree: 1 for the root, 8 times the parent's plus the index among its children. Depends on nothing but
+    /// the cube, so it orders nodes the same way in every run.
+    pub fn path(&self) -> u64 {
+        self.path
     }
     /// The primitives that the kind refers to.
     pub fn refs(&self) -> &[u32] {
@@ -124,11 +129,11 @@ impl Eco {
         let terms = whole(solid, bounds);
         let mut work = 0;
         let root = if half.is_finite() {
-            classified(solid, bounds, &terms, center, half, 0, &mut work)
+            classified(solid, bounds, &terms, center, half, 1, &mut work)
         } else {
             let refs = (0..solid.primitives.len() as u32).collect();
             let (kind, children) = (Kind::Mixed, OnceLock::new());
-            Node { center, half, f_lo: -half, f_hi: half, kind, depth: 0, refs, terms: terms.into(), children }
+            Node { center, half, f_lo: -half, f_hi: half, kind, path: 1, refs, terms: terms.into(), children }
         };
         let mut eco = Self { root, depth: 0 };
         while eco.depth < limits.depth {
@@ -174,10 +179,20 @@ impl Eco {
         Some(node)
     }
 
+    /// The smallest node that holds all of a box (model frame) among those built so far; the root when none does.
+    pub fn around(&self, b: &Aabb) -> &Node {
+        let holds = |n: &Node| n.aabb().contains(b.min) && n.aabb().contains(b.max);
+        let mut node = &self.root;
+        while let Some(child) = node.children().and_then(|c| c.iter().find(|c| holds(c))) {
+            node = child;
+        }
+        node
+    }
+
     /// Counts the nodes built so far; nodes with children count as grey.
     pub fn census(&self) -> Census {
         fn count(node: &Node, census: &mut Census) {
-            let d = node.depth as usize;
+            let d = node.depth() as usize;
             if census.by_depth.len() <= d {
                 census.by_depth.resize(d + 1, [0; 6]);
             }
@@ -196,7 +211,7 @@ impl Eco {
 fn can_expand(bounds: &SBounds, node: &Node) -> bool {
     matches!(node.kind, Kind::Grey | Kind::Mixed)
         && node.half.is_finite()
-        && node.depth < DEEPEST
+        && node.depth() < DEEPEST
         && node.half > FINEST * bounds.margin()
 }
 
@@ -206,7 +221,7 @@ fn classified(
     terms: &[Term],
     center: DVec3,
     half: f64,
-    depth: u8,
+    path: u64,
     work: &mut usize,
 ) -> Node {
     let (mut out, mut refs) = (vec![], vec![]);
@@ -221,7 +236,7 @@ fn classified(
         f_lo: local.lo.min(margin),
         f_hi: local.hi.max(-margin),
         kind: local.kind,
-        depth,
+        path,
         refs: refs.into(),
         terms: out.into(),
         children: OnceLock::new(),
@@ -233,7 +248,7 @@ fn children_of(solid: &Solid, bounds: &SBounds, node: &Node, work: &mut usize) -
     Box::new(std::array::from_fn(|i| {
         let sign = |bit: usize| if i >> bit & 1 == 0 { -h } else { h };
         let center = node.center + DVec3::new(sign(0), sign(1), sign(2));
-        classified(solid, bounds, &node.terms, center, h, node.depth + 1, work)
+        classified(solid, bounds, &node.terms, center, h, 8 * node.path + i as u64, work)
     }))
 }
 
