@@ -248,7 +248,7 @@ fn octree_membership_is_tree_membership_also_where_refined_later() {
                     );
                     let delta = 0.3 * m.margin();
                     tokens.clear();
-                    match m.literals(n, &n.aabb(), delta, &mut tokens) {
+                    match m.literals(n, delta, &mut tokens) {
                         Truth::True => assert!(f <= -delta),
                         Truth::False => assert!(f > -delta),
                         Truth::Open => {

@@ -4,7 +4,7 @@ use contactd::bound::{Region, Side, locate};
 use contactd::eco::{Approach, Detail, Model, PairKind, Walk};
 use contactd::motion::{Placed, Relative};
 use contactd::solid::primitive::{Cuboid, Cylinder};
-use contactd::solid::{Label, Node, Op, Sense, Solid, SolidBuilder, local};
+use contactd::solid::{Label, Node, Op, Sense, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
 use contactd_tests::random_solids::{Random, perforated_plate, placed, solid};
 use glam::DVec3;
@@ -102,7 +102,7 @@ const PAIRS: usize = 240;
 fn no_pair_of_surfaces_that_meets_is_missed() {
     let mut r = Random::new(12);
     let (mut met, mut subtracted, mut overlap, mut clear) = (0, 0, 0, 0);
-    let (mut pairs_all, mut pairs_found, mut starts_all) = (0, 0, [0; 4]);
+    let (mut pairs_all, mut pairs_found) = (0, 0);
     for i in 0..PAIRS {
         let (a, b) = (Model::new(solid(&mut r, 1 + i % 4)), Model::new(solid(&mut r, 1 + i % 3)));
         // Let a point of A's surface and one of B's coincide at a time of the step; seldom when they overlap at the start.
@@ -130,22 +130,22 @@ fn no_pair_of_surfaces_that_meets_is_missed() {
         let region = region_of(&a, pa, &b, pb, margin);
         let relative = Relative::new(pa, pb);
         // Seen by sampling: overlap at the start, or somewhere in the step.
-        let (mut at_start, mut within) = (false, vec![]);
+        let (mut at_start, mut within) = (false, false);
         for k in 0..400 {
             let at = relative.at(if k % 2 == 0 { 0.0 } else { r.within(0.0, 1.0) });
             let x = if k % 4 < 2 { r.point_in(&a.solid.aabb()) } else { at.a_point(r.point_in(&b.solid.aabb())) };
             if a.solid.value(x).max(b.solid.value(at.b_point(x))) < -margin {
                 at_start |= k % 2 == 0;
-                within.push((at.t, x, at.b_point(x)));
+                within = true;
             }
         }
         let Some(region) = region else {
-            assert!(surface.is_none() && within.is_empty(), "pair {i}: stage 1 misses it");
+            assert!(surface.is_none() && !within, "pair {i}: stage 1 misses it");
             clear += 1;
             continue;
         };
         let fine = Detail { finest: 0.02 * a.radius, ..Detail::default() };
-        let detail = [Detail::default(), fine, Detail { node_pairs: 500, ..fine }, Detail::coarse()][i % 4];
+        let detail = [Detail::default(), fine, Detail { node_pairs: 500, ..fine }][i % 3];
         let walk = Walk::new((&a, pa), (&b, pb), (i % 5 > 0).then_some(&region), margin, detail);
         let found = walk.candidates();
         let mut sorted = found.pairs.clone();
@@ -166,40 +166,15 @@ fn no_pair_of_surfaces_that_meets_is_missed() {
                 a.solid.senses[p as usize] == Sense::Negative || b.solid.senses[q as usize] == Sense::Negative,
             );
         }
-        // Stage 3's starts hold every point of depth delta, with literals that say so.
-        let delta = 0.5 * margin;
-        let (starts, _) = walk.starts(delta);
-        starts_all[i % 4] += starts.len();
-        assert!(starts.is_sorted_by(|x, y| x.time <= y.time));
-        let holds = |m: &Model, tokens: &[u32], x: DVec3| {
-            tokens.is_empty() || local::value(tokens, &mut |f| m.solid.faces[f as usize].value(x)) <= -delta
-        };
-        for (t, x, y) in &within {
-            let held = starts.iter().any(|s| {
-                s.time <= *t
-                    && s.region.contains(*x)
-                    && s.reach.contains(*y)
-                    && holds(&a, &s.a, *x)
-                    && holds(&b, &s.b, *y)
-            });
-            assert!(held, "pair {i}: no start for a common point at {t}");
-        }
-        for s in &starts {
-            // And nothing that is not there.
-            let x = r.point_in(&s.region);
-            assert_eq!(holds(&a, &s.a, x), a.solid.value(x) <= -delta, "pair {i}");
-            let y = r.point_in(&s.reach);
-            assert_eq!(holds(&b, &s.b, y), b.solid.value(y) <= -delta, "pair {i}");
-        }
         pairs_all += a.solid.primitives.len() * b.solid.primitives.len();
         pairs_found += found.pairs.len();
         overlap += usize::from(at_start);
-        met += usize::from(!at_start && (surface.is_some() || !within.is_empty()));
-        clear += usize::from(!at_start && surface.is_none() && within.is_empty());
+        met += usize::from(!at_start && (surface.is_some() || within));
+        clear += usize::from(!at_start && surface.is_none() && !within);
     }
     println!(
         "walk: {PAIRS} pairs: {met} contact, {clear} clear, {overlap} overlap; {subtracted} on subtracted surfaces; \
-         primitive pairs {pairs_all} -> {pairs_found}; starts {starts_all:?} (default, fine, limited, coarse)"
+         primitive pairs {pairs_all} -> {pairs_found}"
     );
     assert!(met * 10 >= 3 * PAIRS && subtracted * 100 >= 15 * PAIRS && clear > 20 && pairs_found < pairs_all);
 }

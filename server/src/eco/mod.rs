@@ -16,10 +16,9 @@ pub mod walk;
 pub use approach::Approach;
 pub use octree::{Census, Eco, Limits, Node};
 pub use tables::{Kind, Meet, meet};
-pub use walk::{Candidates, Detail, Element, Pair, PairKind, Start, Walk};
+pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 
 use crate::bound::SBounds;
-use crate::math::Aabb;
 use crate::math::tolerance::MODEL_MARGIN;
 use crate::solid::Solid;
 use crate::solid::local::{Token, Truth};
@@ -62,15 +61,15 @@ impl Model {
         self.eco.expand(&self.solid, &self.bounds, node)
     }
 
-    /// Appends the literals (`solid::local`) that are open at depth `delta` over the box `region` inside a node of this
-    /// model's octree: what a contact of that depth there depends on. True for a full node, false for an empty one.
-    /// `delta` is a length of at most `margin()`.
-    pub fn literals(&self, node: &Node, region: &Aabb, delta: f64, out: &mut Vec<Token>) -> Truth {
+    /// Appends the literals (`solid::local`) that are open at depth `delta` over a node of this model's octree: what a
+    /// contact of that depth in its cube depends on. True for a full node, false for an empty one. `delta` is a length of
+    /// at most `margin()`.
+    pub fn literals(&self, node: &Node, delta: f64, out: &mut Vec<Token>) -> Truth {
         debug_assert!(delta <= self.margin() || self.radius.is_infinite());
         match node.kind() {
             Kind::Full => Truth::True,
             Kind::Empty => Truth::False,
-            _ if region.is_finite() => local::write_literals(&self.solid, node.terms(), region, delta, out),
+            _ if node.half.is_finite() => local::write_literals(&self.solid, node.terms(), &node.aabb(), delta, out),
             _ => crate::solid::local::write_tree(&self.solid, out),
         }
     }

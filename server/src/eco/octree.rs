@@ -179,16 +179,6 @@ impl Eco {
         Some(node)
     }
 
-    /// The smallest node that holds all of a box (model frame) among those built so far; the root when none does.
-    pub fn around(&self, b: &Aabb) -> &Node {
-        let holds = |n: &Node| n.aabb().contains(b.min) && n.aabb().contains(b.max);
-        let mut node = &self.root;
-        while let Some(child) = node.children().and_then(|c| c.iter().find(|c| holds(c))) {
-            node = child;
-        }
-        node
-    }
-
     /// Counts the nodes built so far; nodes with children count as grey.
     pub fn census(&self) -> Census {
         fn count(node: &Node, census: &mut Census) {

@@ -17,9 +17,7 @@ use super::approach::Approach;
 use super::octree::Node;
 use super::tables::{Kind, Meet, meet};
 use crate::bound::{Pruned, Region};
-use crate::math::Aabb;
-use crate::motion::{Placed, Sweep};
-use crate::solid::local::{Token, Truth};
+use crate::motion::Placed;
 use crate::solid::{Sense, Solid};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -70,23 +68,13 @@ impl Pair {
 pub struct Detail {
     /// Mixed leaves with a half side above this length are decomposed further; infinite: none is.
     pub finest: f64,
-    /// Grey and mixed nodes with no more primitives partly in them than this are not decomposed: 1 decomposes all that
-    /// can be, a few leave larger boxes to a search that cuts them where it needs to.
-    pub enough: usize,
     /// Pairs of nodes to look at before decomposing stops.
     pub node_pairs: usize,
 }
 
-impl Detail {
-    /// For a search: stop at nodes of a few primitives, a clause's worth.
-    pub fn coarse() -> Self {
-        Self { enough: 4, ..Self::default() }
-    }
-}
-
 impl Default for Detail {
     fn default() -> Self {
-        Self { finest: f64::INFINITY, enough: 1, node_pairs: 20_000 }
+        Self { finest: f64::INFINITY, node_pairs: 20_000 }
     }
 }
 
@@ -106,21 +94,6 @@ impl Candidates {
         self.pairs.iter().for_each(|p| n[p.kind() as usize] += 1);
         n
     }
-}
-
-/// Where stage 3 starts: a box of A's frame with what is left there of A, and of B wherever B can be met from it.
-#[derive(Clone, Debug)]
-pub struct Start {
-    /// No contact in the box before this time.
-    pub time: f64,
-    /// The box, A's model frame.
-    pub region: Aabb,
-    /// A's literals that are open there; empty: A is full there.
-    pub a: Vec<Token>,
-    /// What of B's frame points of the box can reach from `time` on while in voxels of B that matter.
-    pub reach: Aabb,
-    /// B's literals that are open in `reach`; empty: B is full there.
-    pub b: Vec<Token>,
 }
 
 /// A pair of nodes, and a time before which they cannot meet: what a queue of stage 2 holds.
@@ -152,11 +125,9 @@ pub enum Next<'m> {
 pub struct Walk<'m> {
     a: &'m Model,
     b: &'m Model,
-    placed: (Placed, Placed),
     approach: Approach,
     region: Option<&'m Region>,
     margin: f64,
-    end: f64,
     detail: Detail,
 }
 
@@ -171,12 +142,7 @@ impl<'m> Walk<'m> {
         detail: Detail,
     ) -> Self {
         let approach = Approach::new(pa, pb, margin);
-        Self { a, b, placed: (pa, pb), approach, region, margin, end: 1.0, detail }
-    }
-
-    /// The same walk up to the time `end` of the step only.
-    pub fn until(self, end: f64) -> Self {
-        Self { end, ..self }
+        Self { a, b, approach, region, margin, detail }
     }
 
     /// The pair of roots, if they can meet.
@@ -194,29 +160,22 @@ impl<'m> Walk<'m> {
         if self.region.is_some_and(|r| outside(&r.a, a) || outside(&r.b, b)) {
             return None;
         }
-        let time = self.approach.earliest((a.center, a.half), (b.center, b.half), pair.time, self.end)?;
+        let time = self.approach.earliest((a.center, a.half), (b.center, b.half), pair.time, 1.0)?;
         Some(NodePair { time, ..pair })
     }
 
     /// What table 4 makes of a pair of nodes: the larger one of those that can be decomposed is.
     pub fn next(&self, pair: &NodePair<'m>) -> Next<'m> {
         let (a, b) = (pair.a, pair.b);
-        let splits =
-            |n: &Node| n.refs().len() > self.detail.enough && (n.kind() == Kind::Grey || n.half > self.detail.finest);
+        let splits = |n: &Node| match n.kind() {
+            Kind::Grey => true,
+            Kind::Mixed => n.half > self.detail.finest,
+            _ => false,
+        };
         let split_a = splits(a).then(|| self.a.expand(a)).flatten();
         let split_b = splits(b).then(|| self.b.expand(b)).flatten();
-        // A mixed leaf that may be finer counts as the grey node it is about to become, and a grey node that is fine enough
-        // as the mixed one that it would be if the octree ended there.
-        let kind = |n: &Node, split: bool| match n.kind() {
-            Kind::Grey | Kind::Mixed => {
-                if split {
-                    Kind::Grey
-                } else {
-                    Kind::Mixed
-                }
-            }
-            kind => kind,
-        };
+        // A mixed leaf that may be finer counts as the grey node it is about to become.
+        let kind = |n: &Node, split: bool| if split { Kind::Grey } else { n.kind() };
         match meet(kind(a, split_a.is_some()), kind(b, split_b.is_some())) {
             Meet::Skip => Next::Skip,
             Meet::Pairs => Next::Pairs,
@@ -296,38 +255,5 @@ impl<'m> Walk<'m> {
         let element =
             |p: &u32| Element { surface: *p, complemented: solid.senses[*p as usize] == Sense::Negative, volume: None };
         node.refs().iter().filter(|p| living(p)).map(element).collect()
-    }
-
-    /// Where stage 3 starts, earliest first: one start for each node of A that takes part, with the literals of A that are
-    /// open there at depth `delta`, and those of B that are open where B is met from it. Together they hold every contact
-    /// of that depth within the step.
-    pub fn starts(&self, delta: f64) -> (Vec<Start>, usize) {
-        let (ends, node_pairs) = self.ends();
-        let mut by_node: BTreeMap<u64, (NodePair, Aabb)> = BTreeMap::new();
-        for end in ends {
-            let entry = by_node.entry(end.a.path()).or_insert((end, Aabb::EMPTY));
-            entry.0.time = entry.0.time.min(end.time);
-            entry.1 = entry.1.union(&end.b.aabb());
-        }
-        let sweep = Sweep::new(self.placed.0, self.placed.1);
-        let mut starts = vec![];
-        for (NodePair { a, time, .. }, met) in by_node.into_values() {
-            let mut start = Start { time, region: a.aabb(), a: vec![], reach: met, b: vec![] };
-            if let Some(r) = self.region {
-                start.region = start.region.intersection(&r.a.aabb);
-                start.reach = start.reach.intersection(&r.b.aabb);
-            }
-            start.reach = start.reach.intersection(&sweep.of_box(&start.region, time, self.end));
-            if start.region.is_empty() || start.reach.is_empty() {
-                continue;
-            }
-            let truth_a = self.a.literals(a, &start.region, delta, &mut start.a);
-            let truth_b = self.b.literals(self.b.eco.around(&start.reach), &start.reach, delta, &mut start.b);
-            if truth_a != Truth::False && truth_b != Truth::False {
-                starts.push(start);
-            }
-        }
-        starts.sort_by(|x, y| x.time.total_cmp(&y.time));
-        (starts, node_pairs)
     }
 }
