@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bound;
+pub mod check;
 pub mod contact;
 pub mod demo;
 pub mod eco;

@@ -2,8 +2,12 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
+use contactd::check::Check;
+use contactd::contact::Status;
 use contactd::import::{self, Facets, Limits};
 use contactd::inspect;
+use contactd::report::{self, Answer, PairReport};
+use std::error::Error;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -18,6 +22,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// One step of a scene in this process, without a server: the earliest contact of every pair.
+    Check(CheckArguments),
     /// What is in a model or scene file, and how it was imported.
     Inspect {
         /// A .csg or .toml file.
@@ -28,19 +34,43 @@ enum Command {
     },
 }
 
+#[derive(clap::Args)]
+struct CheckArguments {
+    /// The scene's .toml file.
+    scene: PathBuf,
+    /// One JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Resolution for every pair, in the models' unit.
+    #[arg(long, value_parser = length)]
+    resolution: Option<f64>,
+    /// Only the pairs that meet first.
+    #[arg(long)]
+    first: bool,
+    /// What each answer cost (beside --json: on standard error).
+    #[arg(long)]
+    explain: bool,
+    /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
+    #[arg(long, default_value = "auto", value_parser = facets)]
+    facets: Facets,
+}
+
 /// What the process ends with.
 enum Done {
     /// Everything answered.
     Well,
+    /// The work limit ran out for some pair.
+    Undecided,
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let done = match arguments.command {
+    let done = match Arguments::parse().command {
+        Command::Check(arguments) => check_scene(&arguments),
         Command::Inspect { file, facets } => inspect_file(&file, facets),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
+        Ok(Done::Undecided) => ExitCode::from(3),
         Err(sentence) => {
             eprintln!("{sentence}");
             ExitCode::from(2)
@@ -52,27 +82,66 @@ fn facets(word: &str) -> Result<Facets, String> {
     Facets::of_name(word).ok_or_else(|| format!("expected {}", Facets::NAMES.join(", ")))
 }
 
-fn inspect_file(file: &Path, facets: Facets) -> Result<Done, String> {
+fn length(word: &str) -> Result<f64, String> {
+    let positive = word.parse::<f64>().ok().filter(|x| *x > 0.0 && x.is_finite());
+    positive.ok_or_else(|| "expected a positive finite length".into())
+}
+
+fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
+    let scene = import::read_scene(&arguments.scene)?;
+    let imports = scene.load_models(arguments.facets, &Limits::default())?;
+    let mut check = Check::new(&scene, imports, arguments.resolution)?;
+    let outcome = check.step(arguments.first)?.clone();
+    let undecided = outcome.undecided || outcome.pairs.iter().any(|p| p.outcome.status == Status::Undecided);
+    let bodies = check.world.bodies();
+    let pairs: Vec<PairReport<'_>> = outcome
+        .pairs
+        .iter()
+        .map(|p| {
+            let [a, b] = [p.a, p.b].map(|id| &bodies[id as usize]);
+            PairReport {
+                names: [&a.name, &b.name],
+                solids: [&a.part.model.solid, &b.part.model.solid],
+                outcome: &p.outcome,
+            }
+        })
+        .collect();
+    // Over all pairs, also those that --first does not show.
+    let answer = Answer { safe_time: outcome.safe_time, ..Answer::of_pairs(&pairs) };
+    let mut text = if arguments.json { answer.json()? + "\n" } else { answer.table() };
+    if arguments.explain {
+        let work = report::work_table(&pairs);
+        if arguments.json {
+            eprint!("{work}");
+        } else {
+            text.push_str(&work);
+        }
+    }
+    print(&text)?;
+    Ok(if undecided { Done::Undecided } else { Done::Well })
+}
+
+fn inspect_file(file: &Path, facets: Facets) -> Result<Done, Box<dyn Error>> {
     let limits = Limits::default();
     let text = if file.extension().is_some_and(|e| e == "toml") {
-        let scene = import::read_scene(file).map_err(|e| e.to_string())?;
-        let models = scene.load_models(facets, &limits).map_err(|e| e.to_string())?;
+        let scene = import::read_scene(file)?;
+        let models = scene.load_models(facets, &limits)?;
         let mut text = inspect::scene(&scene);
         for (source, import) in scene.models.iter().zip(&models) {
             text.push_str(&inspect::model(&source.path.display().to_string(), import));
         }
         text
     } else {
-        let import = import::read_csg(file, facets, &limits).map_err(|e| e.to_string())?;
-        inspect::model(&file.display().to_string(), &import)
+        inspect::model(&file.display().to_string(), &import::read_csg(file, facets, &limits)?)
     };
-    print(&text)
+    print(&text)?;
+    Ok(Done::Well)
 }
 
 /// Writes to standard output; a reader that has gone away is no error.
-fn print(text: &str) -> Result<Done, String> {
+fn print(text: &str) -> std::io::Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(format!("expected to write, found {e}")),
-        _ => Ok(Done::Well),
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
     }
 }

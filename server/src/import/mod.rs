@@ -11,7 +11,7 @@ pub mod csg;
 pub mod scene;
 
 pub use csg::{Problem, import_csg, read_csg};
-pub use scene::{ModelSource, ObjectSpec, Scene, SceneError, read_scene};
+pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
 
 use crate::solid::Solid;
 

@@ -6,9 +6,9 @@
 
 use super::csg::read_csg;
 use super::{Facets, Import, ImportError, Limits, Place};
-use crate::math::tolerance::QUATERNION;
-use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule};
-use glam::{DQuat, DVec3};
+use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
+use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule, Track};
+use glam::DVec3;
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub struct Scene {
     /// Models in file order.
     pub models: Vec<ModelSource>,
     /// Objects in file order.
-    pub objects: Vec<ObjectSpec>,
+    pub objects: Vec<SceneObject>,
     /// Rules in file order; none means every pair.
     pub rules: Vec<Rule>,
     /// What errors call the scene's file.
@@ -47,7 +47,7 @@ pub struct ModelSource {
 
 /// An object of a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ObjectSpec {
+pub struct SceneObject {
     /// Its name.
     pub name: String,
     /// Index of its model in `Scene::models`.
@@ -60,6 +60,9 @@ pub struct ObjectSpec {
     pub place: Pose,
     /// The object's frame over the step.
     pub motion: Motion,
+    /// The same as a record of a step that begins at `motion.start`, numbers as they stand in the file; its object id is
+    /// the caller's to set. `None` for an object that rests.
+    pub record: Option<PoseRecord>,
     /// False when it is declared never to turn.
     pub rotates: bool,
     /// Declared largest speed of any of its points, length per second.
@@ -229,6 +232,14 @@ struct RawRule {
     sensor: bool,
 }
 
+/// A pose as it stands in the file, and what it means.
+#[derive(Clone, Copy)]
+struct Written {
+    position: DVec3,
+    rotation: [f64; 4],
+    pose: Pose,
+}
+
 /// Turns raw values into checked ones, with places for what is wrong.
 struct Checker<'a> {
     file: &'a str,
@@ -280,25 +291,25 @@ impl Checker<'_> {
         Err(self.wrong(value, &format!("a finite {what}"), &format!("{:?}", value.as_ref())))
     }
 
-    fn quaternion(&self, value: &Spanned<[f64; 4]>) -> Result<DQuat, SceneError> {
-        let q = DQuat::from_array(*value.as_ref());
-        let n = q.length_squared();
-        // Written so that NaN fails too.
-        if (n - 1.0).abs() <= QUATERNION {
-            return Ok(if n == 1.0 { q } else { q * (1.0 / n.sqrt()) });
+    /// The quaternion as it stands in the file; it is one once normalised.
+    fn quaternion(&self, value: &Spanned<[f64; 4]>) -> Result<[f64; 4], SceneError> {
+        let q = *value.as_ref();
+        if unit_quaternion(q).is_ok() {
+            return Ok(q);
         }
-        let found = format!("{:?} with |q|² = {n}", value.as_ref());
+        let found = format!("{q:?} with squared length {}", q.iter().map(|c| c * c).sum::<f64>());
         Err(self.wrong(value, "a unit quaternion [x, y, z, w] as rotation", &found))
     }
 
     /// `raw` with `default` for what it leaves out.
-    fn pose(&self, raw: &RawPose, default: Pose) -> Result<Pose, SceneError> {
+    fn pose(&self, raw: &RawPose, default: Written) -> Result<Written, SceneError> {
         let position = raw.position.as_ref().map(|p| self.vector(p, "position")).transpose()?;
         let rotation = raw.rotation.as_ref().map(|q| self.quaternion(q)).transpose()?;
-        Ok(Pose::new(position.unwrap_or(default.position), rotation.unwrap_or(default.rotation)))
+        let (position, rotation) = (position.unwrap_or(default.position), rotation.unwrap_or(default.rotation));
+        Ok(Written { position, rotation, pose: Pose::new(position, unit_quaternion(rotation).unwrap_or_default()) })
     }
 
-    fn object(&self, o: &RawObject, model: usize) -> Result<ObjectSpec, SceneError> {
+    fn object(&self, o: &RawObject, model: usize) -> Result<SceneObject, SceneError> {
         let name = o.name.as_ref();
         let is_static = match &o.motion {
             None => false,
@@ -308,18 +319,27 @@ impl Checker<'_> {
                 other => return Err(self.wrong(word, "\"static\" or \"moving\"", &format!("\"{other}\""))),
             },
         };
-        let place = self.pose(&o.place, Pose::IDENTITY)?;
-        let start = self.pose(&o.start, Pose::IDENTITY)?;
+        let origin = Written { position: DVec3::ZERO, rotation: [0.0, 0.0, 0.0, 1.0], pose: Pose::IDENTITY };
+        let place = self.pose(&o.place, origin)?.pose;
+        let start = self.pose(&o.start, origin)?;
         let end = self.pose(&o.end, start)?;
-        let motion = match &o.rotation_vector {
+        let record = match &o.rotation_vector {
             Some(v) if o.end.rotation.is_some() => {
                 let expected = format!("either end.rotation or rotation_vector of object \"{name}\"");
                 return Err(self.wrong(v, &expected, "both"));
             }
-            Some(v) => Motion::turning(start, end.position, self.vector(v, "rotation_vector")?),
-            None if o.end.rotation.is_some() => Motion::between(start, end),
-            None => Motion::turning(start, end.position, DVec3::ZERO),
+            Some(v) => PoseRecord::turn(0, end.position, self.vector(v, "rotation_vector")?),
+            None => PoseRecord {
+                object: 0,
+                flags: pose_record::END,
+                position: end.position.to_array(),
+                rotation: end.rotation,
+            },
         };
+        // The numbers were checked one by one: what a step would refuse has been refused.
+        let motion =
+            record.decode().map_or(Motion::resting(start.pose), |order| Track::ordered(start.pose, order).motion);
+        let record = (!motion.is_rest()).then_some(record);
         if is_static && !motion.is_rest() {
             return Err(self.wrong(&o.name, &format!("a static object \"{name}\" that rests"), "one that moves"));
         }
@@ -328,13 +348,14 @@ impl Checker<'_> {
             return Err(self.wrong(&o.name, &expected, "one that does"));
         }
         let max_speed = o.max_speed.as_ref().map(|v| self.positive("max_speed", v)).transpose()?;
-        Ok(ObjectSpec {
+        Ok(SceneObject {
             name: name.clone(),
             model,
             group: o.group.clone().unwrap_or_else(|| "default".into()),
             is_static,
             place,
             motion,
+            record,
             rotates: o.rotates.unwrap_or(true),
             max_speed,
         })

@@ -26,9 +26,6 @@ pub const ROUNDING: f64 = 1e-12;
 /// away that the apex' own rounding spoils the lateral surface.
 pub const SAME_RADIUS: f64 = 1e-9;
 
-/// A quaternion whose squared length is this close to 1 is normalised; beyond that it is refused as a mistake.
-pub const QUATERNION: f64 = 1e-3;
-
 /// Relative outward rounding of bounds: a rule on boxes or balls does a dozen operations, each off by half an ulp.
 pub const OUTWARD: f64 = 32.0 * f64::EPSILON;
 
