@@ -2,7 +2,7 @@
 
 use contactd::bound::{Pruned, SBounds, Side, locate};
 use contactd::math::{Aabb, Ball};
-use contactd::motion::{Relative, Sweep};
+use contactd::motion::{Instant, Placed, Relative, Sweep};
 use contactd::solid::{Node, Op, Solid};
 use contactd_tests::random_solids::{Random, perforated_plate, placed, solid};
 use glam::DVec3;
@@ -141,27 +141,51 @@ fn s_bounds_hold_their_solid_and_what_they_leave_out_contributes_nothing() {
 #[test]
 fn a_pair_outside_its_collision_region_never_meets_and_inside_pruning_changes_nothing() {
     let mut r = Random::new(4);
-    let (mut none, mut meeting, mut subtracted, mut before, mut after) = (0, 0, 0, 0, 0);
+    let (mut none, mut contact, mut overlap, mut subtracted, mut before, mut after) = (0, 0, 0, 0, 0, 0);
     let pairs = 300;
     for i in 0..pairs {
         let (sa, sb) = (solid(&mut r, 1 + i % 4), solid(&mut r, 1 + i % 3));
         let margin = [0.0, 1e-7, 0.01][i % 3];
         let (ba, bb) = (SBounds::new(&sa, 1e-6), SBounds::new(&sb, 1e-6));
-        let (pa, pb) = (placed(&mut r, 1.2), placed(&mut r, 1.2));
+        // The deepest common point seen at a time: of the solids' own boxes, in turn.
+        let depth = |r: &mut Random, at: &Instant, k: usize| {
+            let x = if k.is_multiple_of(2) { r.point_in(&sa.aabb()) } else { at.a_point(r.point_in(&sb.aabb())) };
+            let y = at.b_point(x);
+            (x, y, sa.value(x), sb.value(y))
+        };
+        // Two pairs in three are led together late in the step; one that overlaps at the start is placed anew.
+        let inner = |r: &mut Random, s: &Solid| {
+            let points: Vec<DVec3> = (0..50).map(|_| r.point_in(&s.aabb())).collect();
+            points.into_iter().min_by(|x, y| s.value(*x).total_cmp(&s.value(*y))).expect("fifty points")
+        };
+        let (mut pa, mut pb) = (placed(&mut r, 1.5), placed(&mut r, 1.5));
+        let mut overlaps = true;
+        for attempt in 0..8 {
+            if attempt > 0 {
+                (pa, pb) = (placed(&mut r, 1.5), placed(&mut r, 1.5));
+            }
+            if i % 3 > 0 {
+                let t = r.within(0.7, 1.0);
+                let world = |p: &Placed, x| p.motion.at(t).point(p.place.point(x));
+                pb.motion.start.position += world(&pa, inner(&mut r, &sa)) - world(&pb, inner(&mut r, &sb));
+            }
+            let at = Relative::new(pa, pb).at(0.0);
+            overlaps = (0..200).any(|k| {
+                let (_, _, fa, fb) = depth(&mut r, &at, k);
+                fa.max(fb) <= margin
+            });
+            if !overlaps {
+                break;
+            }
+        }
         let a = Side { solid: &sa, bounds: &ba, placed: pa };
         let b = Side { solid: &sb, bounds: &bb, placed: pb };
         let region = locate(&a, &b, 0.0, 1.0, margin);
         let relative = Relative::new(pa, pb);
         let (mut met, mut met_cut) = (false, false);
-        for _ in 0..600 {
+        for k in 0..800 {
             let at = relative.at(r.within(0.0, 1.0));
-            let sample = sa.aabb();
-            let mut x = r.point_in(&sample);
-            if r.below(2) == 0 && sb.aabb().is_finite() {
-                x = at.a_point(r.point_in(&sb.aabb()));
-            }
-            let y = at.b_point(x);
-            let (fa, fb) = (sa.value(x), sb.value(y));
+            let (x, y, fa, fb) = depth(&mut r, &at, k);
             if fa.max(fb) <= margin {
                 met = true;
                 met_cut |= cut_nearby(&sa, x) || cut_nearby(&sb, y);
@@ -179,17 +203,20 @@ fn a_pair_outside_its_collision_region_never_meets_and_inside_pruning_changes_no
             }
         }
         none += usize::from(region.is_none());
-        meeting += usize::from(met);
-        subtracted += usize::from(met_cut);
+        overlap += usize::from(overlaps);
+        contact += usize::from(met && !overlaps);
+        subtracted += usize::from(met_cut && !overlaps);
         if let Some(g) = &region {
             before += g.a.primitives_before + g.b.primitives_before;
             after += g.a.primitives + g.b.primitives;
         }
     }
+    let clear = pairs - contact - overlap;
     println!(
-        "collision regions: {pairs} pairs, {none} without, {meeting} meet ({subtracted} by a subtracted surface); primitives {before} -> {after}"
+        "collision regions: {pairs} pairs, {contact} contact ({subtracted} at subtracted surfaces), {clear} clear ({none} \
+         without a region), {overlap} overlap; primitives {before} -> {after}"
     );
-    assert!(meeting * 10 >= pairs * 3 && subtracted * 100 >= pairs * 15 && none * 20 > pairs && after < before);
+    assert!(contact * 10 >= pairs * 3 && subtracted * 100 >= pairs * 15 && none * 20 > pairs && after < before);
 }
 
 /// True when the surface of a subtracted primitive passes within 0.1 of `x`.
@@ -200,7 +227,6 @@ fn cut_nearby(s: &Solid, x: DVec3) -> bool {
 
 #[test]
 fn a_peg_over_one_hole_of_many_leaves_that_hole() {
-    use contactd::motion::Placed;
     use contactd::solid::primitive::Cylinder;
     use contactd::solid::{Label, SolidBuilder};
     use contactd_proto::{Motion, Pose};

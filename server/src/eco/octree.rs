@@ -24,11 +24,20 @@ pub struct Limits {
     pub depth: u8,
     /// Primitives evaluated; the next level is left out when it could exceed this.
     pub work: usize,
+    /// Nodes, of a few hundred bytes each; the next level is left out when it would exceed this.
+    pub nodes: usize,
+}
+
+impl Limits {
+    /// A depth and nothing else.
+    pub fn to_depth(depth: u8) -> Self {
+        Self { depth, work: usize::MAX, nodes: usize::MAX }
+    }
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { depth: 6, work: 400_000 }
+        Self { depth: 6, work: 400_000, nodes: 32_768 }
     }
 }
 
@@ -127,7 +136,7 @@ impl Eco {
             () => (DVec3::ZERO, f64::INFINITY),
         };
         let terms = whole(solid, bounds);
-        let mut work = 0;
+        let (mut work, mut nodes) = (0, 1);
         let root = if half.is_finite() {
             classified(solid, bounds, &terms, center, half, 1, &mut work)
         } else {
@@ -137,11 +146,14 @@ impl Eco {
         };
         let mut eco = Self { root, depth: 0 };
         while eco.depth < limits.depth {
-            let next = 8 * work_below(&eco.root);
-            if next == 0 || work + next > limits.work {
+            let mut frontier = Frontier::default();
+            frontier.add(&eco.root);
+            let (next_work, next_nodes) = (8 * frontier.leaves, 8 * frontier.mixed);
+            if next_nodes == 0 || work + next_work > limits.work || nodes + next_nodes > limits.nodes {
                 break;
             }
             deepen(solid, bounds, &mut eco.root, &mut work);
+            nodes += next_nodes;
             eco.depth += 1;
         }
         eco
@@ -254,13 +266,22 @@ fn deepen(solid: &Solid, bounds: &SBounds, node: &mut Node, work: &mut usize) {
     }
 }
 
-/// Leaves of the local trees of the mixed leaves: each is evaluated eight times on the next level.
-fn work_below(node: &Node) -> usize {
-    match node.children() {
-        Some(children) => children.iter().map(work_below).sum(),
-        None if node.kind == Kind::Mixed && node.half.is_finite() => {
-            node.terms.iter().filter(|t| t.len_below() == 0).count()
+/// What one more level would decompose.
+#[derive(Default)]
+struct Frontier {
+    /// Mixed leaves of the octree.
+    mixed: usize,
+    /// Leaves of their local trees: each is evaluated eight times on the next level.
+    leaves: usize,
+}
+
+impl Frontier {
+    fn add(&mut self, node: &Node) {
+        if let Some(children) = node.children() {
+            children.iter().for_each(|c| self.add(c));
+        } else if node.kind == Kind::Mixed && node.half.is_finite() {
+            self.mixed += 1;
+            self.leaves += node.terms.iter().filter(|t| t.len_below() == 0).count();
         }
-        None => 0,
     }
 }
