@@ -126,7 +126,7 @@ impl Run<'_, '_> {
                 self.scratch.lits.push(self.view.tangent(side, id, h.point));
             }
         }
-        let before = self.scratch.lits.len();
+        let before = if self.view.fits { self.scratch.lits.len() } else { 0 };
         self.scratch.lits.push(self.view.linear(side, id, DVec3::ZERO));
         for i in 0..before {
             let l = &self.scratch.lits[i];

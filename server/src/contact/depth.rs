@@ -39,6 +39,7 @@ pub fn deepest(task: &Task, at: &Instant, start: DVec3) -> (DVec3, DVec3, f64, V
             center_b: at.b_point(x),
             velocity: DVec3::ZERO,
             delta: -best,
+            fits: false,
         };
         let mut pool: Vec<Token> = Vec::new();
         let truth_a = local::prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));

@@ -100,6 +100,8 @@ pub struct View<'a> {
     pub velocity: DVec3,
     /// Depth of the contact that is searched.
     pub delta: f64,
+    /// Same-shape fits are used.
+    pub fits: bool,
 }
 
 impl View<'_> {

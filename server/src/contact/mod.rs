@@ -12,9 +12,10 @@ pub mod outcome;
 pub mod pair;
 pub mod roots;
 pub mod search;
+mod stage2;
 #[cfg(test)]
 mod tests;
 
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
-pub use pair::{Body, DEFAULT_CELL_LIMIT, PairQuery, default_resolution, earliest_contact};
+pub use pair::{Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, default_resolution, earliest_contact};
 pub use search::Scratch;

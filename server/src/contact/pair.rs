@@ -3,10 +3,10 @@
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::roots;
 use super::search::{Ending, Found, Scratch, Search, Task};
+use crate::bound::pair::{Side as Side1, locate};
 use crate::eco::Model;
-use crate::math::{Aabb, tolerance};
+use crate::math::tolerance;
 use crate::motion::{Placed, Relative};
 use glam::{DMat3, DVec3};
 
@@ -30,6 +30,27 @@ pub struct PairQuery<'a> {
     pub resolution: f64,
     /// Cells that may be refined before the answer is `undecided`.
     pub cell_limit: u64,
+    /// Ideas of the search that are switched on: all, unless their worth is measured.
+    pub ideas: Ideas,
+}
+
+/// The ideas of the search, each of which can be switched off. None changes what an answer promises, only the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ideas {
+    /// Stage 1: the collision region by S-bounds.
+    pub region: bool,
+    /// Stage 2: candidates from the walk of both octrees.
+    pub walk: bool,
+    /// Same-shape fits as bounds of their own.
+    pub fits: bool,
+    /// Curved faces touched where a contact was found.
+    pub hints: bool,
+}
+
+impl Default for Ideas {
+    fn default() -> Self {
+        Self { region: true, walk: true, fits: true, hints: true }
+    }
 }
 
 /// Cells a pair may cost by default.
@@ -37,24 +58,42 @@ pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
 
 /// 1e-9 of the larger bounding radius of the two models.
 pub fn default_resolution(a: &Model, b: &Model) -> f64 {
-    let radius = |m: &Model| m.solid.aabb().half().length();
-    tolerance::DEFAULT_RESOLUTION * radius(a).max(radius(b))
+    tolerance::DEFAULT_RESOLUTION * a.radius.max(b.radius)
 }
 
 /// Searches a pair to its end.
-pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
+pub fn earliest_contact<'a>(query: &PairQuery<'a>, scratch: &mut Scratch) -> Outcome {
     let (a, b) = (&query.a.model.solid, &query.b.model.solid);
     if a.is_empty() || b.is_empty() {
         return Outcome::clear(query.resolution);
     }
     let relative = Relative::new(query.a.placed, query.b.placed);
-    let (box_a, box_b) = (a.aabb(), b.aabb());
-    let scale = box_a.half().length().max(box_b.half().length());
+    let (ball_a, ball_b) = (query.a.model.bounds.root().ball, query.b.model.bounds.root().ball);
+    let scale = query.a.model.radius.max(query.b.model.radius);
     // Positions, matrices and faces are each right to a few units in the last place of the pair's extent.
-    let extent = box_a.center().length() + box_b.center().length() + 2.0 * scale + relative.center_a().length();
+    let extent = ball_a.center.length() + ball_b.center.length() + 2.0 * scale + relative.center_a().length();
+    let mut outcome = Outcome::clear(query.resolution);
+    outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
+    let region = if query.ideas.region {
+        let side = |q: &Body<'a>| Side1 { solid: &q.model.solid, bounds: &q.model.bounds, placed: q.placed };
+        match locate(&side(&query.a), &side(&query.b), 0.0, 1.0, 2.0 * query.resolution) {
+            Some(region) => {
+                outcome.counters.after_stage1 = (region.a.primitives + region.b.primitives) as u64;
+                Some(region)
+            }
+            None => return outcome,
+        }
+    } else {
+        outcome.counters.after_stage1 = outcome.counters.primitives;
+        None
+    };
     let task = Task {
         a,
         b,
+        model_a: query.a.model,
+        model_b: query.b.model,
+        region: region.as_ref(),
+        ideas: query.ideas,
         relative: &relative,
         delta: query.resolution,
         rounding: 32.0 * f64::EPSILON * extent,
@@ -62,11 +101,10 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
         still: false,
         limit: query.cell_limit,
     };
-    let mut outcome = Outcome::clear(query.resolution);
     for level in [1.0, 2.0] {
         let task = Task { delta: level * query.resolution, ..task };
         let mut search = Search::new(task, scratch);
-        start(&mut search, &task, &box_a);
+        search.start();
         let ending = search.run(f64::INFINITY).expect("a search without a horizon ends");
         outcome.counters += search.counters;
         match ending {
@@ -87,12 +125,6 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
         break;
     }
     outcome
-}
-
-fn start(search: &mut Search, task: &Task, region: &Aabb) {
-    for root in roots::alternatives(task.a, &task.a.normal_form, region, 4096) {
-        search.root(root.region.center(), root.region.half(), &root.tokens, &task.b.normal_form);
-    }
 }
 
 fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {

@@ -1,9 +1,10 @@
 //! The search: one queue ordered by the earliest time at which an item could hold a contact.
 //!
-//! Items are cells: boxes fixed in the carrier A with what is left there of both trees. The earliest is popped, bounded
-//! (`clause`) and put back at the time it is proven free until, or split; where its bounds point to a contact, Newton
-//! proposes one and both whole trees confirm it (`newton`). When the earliest item lies beyond the verified contact, all
-//! that was queued is the proof that nothing came before.
+//! Items are pairs of octree nodes (`stage2`) and cells: boxes fixed in the carrier A with what is left there of both
+//! trees. The earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a pair
+//! into smaller pairs or into cells, a cell into its halves. Where a cell's bounds point to a contact, Newton proposes one
+//! and both whole trees confirm it (`newton`). When the earliest item lies beyond the verified contact, all that was
+//! queued is the proof that nothing came before.
 //!
 //! A cell inside one body may be dropped only at t > 0: once the start is known to be free of overlap and containment,
 //! the first contact lies on both surfaces (f_A = f_B = −delta). At t = 0 such cells are refined like any other, and a
@@ -13,6 +14,10 @@ use super::clause::{self, Advance, Hint};
 use super::literal::{Faces, Side, View};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::Counters;
+use super::pair::Ideas;
+use super::stage2::Stage2;
+use crate::bound::Region;
+use crate::eco::Model;
 use crate::motion::{Instant, Relative};
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::{Face, Sense, Solid};
@@ -21,25 +26,36 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// An expression in the token pool; `start == end` means true everywhere.
-type Range = (u32, u32);
+pub(super) type Range = (u32, u32);
 
-/// A box fixed in A with what is left there of both trees.
+/// "Not a pair of octree nodes" in `Cell::pair`.
+pub(super) const NO_PAIR: u32 = u32::MAX;
+
+/// A box fixed in A with what is left there of both trees, or with the pair of octree nodes it stands for.
 #[derive(Clone, Copy, Debug)]
-struct Cell {
+pub(super) struct Cell {
     /// Proven free of contact before this time.
-    t: f64,
+    pub t: f64,
     /// Order of creation: ties in time are popped in this order.
-    serial: u64,
-    center: DVec3,
-    half: DVec3,
-    a: Range,
+    pub serial: u64,
+    pub center: DVec3,
+    pub half: DVec3,
+    pub a: Range,
     /// B's expression at all times.
-    b_always: Range,
+    pub b_always: Range,
     /// B's expression until `b_until`.
-    b: Range,
-    b_until: f64,
+    pub b: Range,
+    pub b_until: f64,
     /// Length of a look ahead in units of radius / speed.
-    reach: f64,
+    pub reach: f64,
+    /// Index of the pair of octree nodes it stands for; its expressions are then the voxels' only.
+    pub pair: u32,
+}
+
+impl Cell {
+    pub(super) fn new(t: f64, center: DVec3, half: DVec3, a: Range, b: Range, pair: u32) -> Self {
+        Self { t, serial: 0, center, half, a, b_always: b, b, b_until: f64::INFINITY, reach: 1.0, pair }
+    }
 }
 
 impl PartialEq for Cell {
@@ -91,6 +107,14 @@ pub struct Task<'a> {
     pub a: &'a Solid,
     /// The other solid.
     pub b: &'a Solid,
+    /// A's octree and bounds.
+    pub model_a: &'a Model,
+    /// B's octree and bounds.
+    pub model_b: &'a Model,
+    /// What stage 1 left of both, `None` where it is switched off.
+    pub region: Option<&'a Region>,
+    /// Ideas of the search that are switched on.
+    pub ideas: Ideas,
     /// Motion of the pair.
     pub relative: &'a Relative,
     /// Depth at which a contact is decided.
@@ -115,17 +139,18 @@ const MAX_HINTS: usize = 8;
 #[derive(Default, Debug)]
 pub struct Scratch {
     heap: BinaryHeap<Cell>,
-    pool: Vec<Token>,
-    guards_b: Vec<Face>,
-    clause: clause::Scratch,
+    pub(super) pool: Vec<Token>,
+    pub(super) guards_b: Vec<Face>,
+    pub(super) clause: clause::Scratch,
     hints: Vec<Hint>,
     tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
 }
 
 /// A search in progress.
 pub struct Search<'a, 's> {
-    task: Task<'a>,
-    scratch: &'s mut Scratch,
+    pub(super) task: Task<'a>,
+    pub(super) scratch: &'s mut Scratch,
+    pub(super) stage2: Stage2<'a>,
     serial: u64,
     found: Option<Found>,
     instant: Instant,
@@ -143,23 +168,31 @@ impl<'a, 's> Search<'a, 's> {
         scratch.hints.clear();
         scratch.clause.clauses = 0;
         let instant = task.relative.at(0.0);
-        Self { task, scratch, serial: 0, found: None, instant, counters: Counters::default() }
+        Self {
+            task,
+            scratch,
+            stage2: Stage2::default(),
+            serial: 0,
+            found: None,
+            instant,
+            counters: Counters::default(),
+        }
     }
 
     /// Adds a root: the box [center ± half] of A, in which A is `a` and B is `b`.
     pub fn root(&mut self, center: DVec3, half: DVec3, a: &[Token], b: &[Token]) {
         let a = self.store(a);
         let b = self.store(b);
-        self.push(Cell { t: 0.0, serial: 0, center, half, a, b_always: b, b, b_until: f64::INFINITY, reach: 1.0 });
+        self.push(Cell::new(0.0, center, half, a, b, NO_PAIR));
     }
 
-    fn store(&mut self, tokens: &[Token]) -> Range {
+    pub(super) fn store(&mut self, tokens: &[Token]) -> Range {
         let start = self.scratch.pool.len() as u32;
         self.scratch.pool.extend_from_slice(tokens);
         (start, self.scratch.pool.len() as u32)
     }
 
-    fn push(&mut self, mut cell: Cell) {
+    pub(super) fn push(&mut self, mut cell: Cell) {
         cell.serial = self.serial;
         self.serial += 1;
         self.scratch.heap.push(cell);
@@ -206,7 +239,11 @@ impl<'a, 's> Search<'a, 's> {
         }
         let at = self.instant;
         let start = cell.t == 0.0;
-        if cell.a.0 == cell.a.1 && !start {
+        let is_pair = cell.pair != NO_PAIR;
+        if is_pair && self.stage2.is_idle(cell.pair, start) {
+            return None;
+        }
+        if cell.a.0 == cell.a.1 && !start && !is_pair {
             return None;
         }
         let radius = cell.half.length();
@@ -219,6 +256,7 @@ impl<'a, 's> Search<'a, 's> {
 
         let scratch = &mut *self.scratch;
         let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
+        let hints: &[Hint] = if self.task.ideas.hints { &scratch.hints } else { &[] };
         let view = View {
             a: Faces { solid: self.task.a, guards: &[] },
             b: Faces { solid: self.task.b, guards: &scratch.guards_b },
@@ -230,6 +268,7 @@ impl<'a, 's> Search<'a, 's> {
             center_b: at.b_point(cell.center),
             velocity: at.velocity(cell.center),
             delta: self.task.delta,
+            fits: self.task.ideas.fits,
         };
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
         let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
@@ -246,6 +285,21 @@ impl<'a, 's> Search<'a, 's> {
             }
         };
         let b_full = b.0 == b.1;
+        if is_pair {
+            // Two voxels: free until they may meet, then opened.
+            let pair = clause::Pair { pool, a: (0, 0), b };
+            let free = if b_full {
+                0.0
+            } else {
+                clause::advance(&view, &pair, &[], self.task.rounding, 0.0, clause_scratch).dt
+            };
+            if free > 0.05 * end {
+                self.again(cell, free, end, free >= h);
+            } else {
+                self.open(&cell);
+            }
+            return None;
+        }
         if b_full && !start {
             self.again(cell, h, end, true);
             return None;
@@ -255,7 +309,7 @@ impl<'a, 's> Search<'a, 's> {
             Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO }
         } else {
             let pair = clause::Pair { pool, a: cell.a, b };
-            clause::advance(&view, &pair, &scratch.hints, self.task.rounding, 0.0, clause_scratch)
+            clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
         };
         if one_sided {
             // At the start only: exclusion now suffices. Inside A nothing first happens later; inside B not before h.
@@ -378,25 +432,49 @@ impl<'a, 's> Search<'a, 's> {
             return;
         }
         // A cone whose apex is near: the apex is a vertex of its own.
-        for (i, l) in advance.support.iter().enumerate() {
+        let apex_of = |l: &(Side, LiteralId, f64)| {
             let solid = if l.0 == Side::A { self.task.a } else { self.task.b };
-            let Face::Cone { apex, .. } = solid.faces[l.1.face() as usize] else { continue };
+            let Face::Cone { apex, .. } = solid.faces[l.1.face() as usize] else { return None };
             let apex = if l.0 == Side::A { apex } else { at.a_point(apex) };
-            if l.1.sense() == Sense::Negative || (apex - cell.center).length() > 4.0 * cell.half.length() {
-                continue;
-            }
-            let mut active: Vec<_> = (0..3).map(|k| Constraint::Apex(l.0, l.1, k)).collect();
-            let mut lambda = vec![-l.2, 0.0, 0.0];
-            for (j, o) in advance.support.iter().enumerate() {
-                if j != i && (o.0 != l.0) && active.len() < super::newton::MAX_ACTIVE {
-                    active.push(Constraint::Literal(o.0, o.1));
-                    lambda.push(o.2);
-                }
-            }
-            if self.polish(active, apex, t, lambda) {
+            let near = (apex - cell.center).length() <= 4.0 * cell.half.length();
+            (l.1.sense() == Sense::Positive && near).then_some(apex)
+        };
+        let apexes: Vec<_> = advance.support.iter().filter_map(|l| Some((*l, apex_of(l)?))).collect();
+        let vertex =
+            |l: &(Side, LiteralId, f64)| (0..3).map(|k| (Constraint::Apex(l.0, l.1, k), [-l.2, 0.0, 0.0][k as usize]));
+        for (l, apex) in &apexes {
+            let others = advance.support.iter().filter(|o| o.0 != l.0);
+            let others = others.map(|o| (Constraint::Literal(o.0, o.1), o.2));
+            let (active, lambda) = vertex(l).chain(others).take(super::newton::MAX_ACTIVE).unzip();
+            if self.polish(active, *apex, t, lambda) {
                 return;
             }
         }
+        if let [(l, apex), (m, _)] = apexes[..]
+            && l.0 != m.0
+        {
+            let (active, lambda) = vertex(&l).chain(vertex(&m)).unzip();
+            self.polish(active, apex, t, lambda);
+        }
+    }
+
+    /// True when the multiplied normals of every apex in a solution lie in its normal cone: within the right angle less
+    /// the half angle of the direction away from the cone.
+    fn holds_at_apexes(&self, s: &Solution, at: &Instant) -> bool {
+        let problem = self.problem();
+        s.active.iter().all(|c| {
+            let Constraint::Apex(side, id, 0) = *c else { return true };
+            let solid = if side == Side::A { self.task.a } else { self.task.b };
+            let Face::Cone { axis, sin, .. } = solid.faces[id.face() as usize] else { return false };
+            let axis = if side == Side::A { axis } else { at.a_vector(axis) };
+            let same = s
+                .active
+                .iter()
+                .zip(&s.lambda)
+                .filter(|(o, _)| matches!(**o, Constraint::Apex(os, oid, _) if (os, oid) == (side, id)));
+            let sum: DVec3 = same.map(|(o, l)| problem.row(o, s.x, at, 0.0).gradient * *l).sum();
+            -sum.dot(axis) >= sum.length() * (sin - 1e-6)
+        })
     }
 
     /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled
@@ -426,11 +504,12 @@ impl<'a, 's> Search<'a, 's> {
             }
             let at = self.task.relative.at(s.t);
             if self.is_deep(s.x, &at) {
-                return self.accept(s);
+                return self.holds_at_apexes(&s, &at) && self.accept(s);
             }
-            // Something else decides there: it enters, the smallest multiplier leaves.
+            // Something else decides there: it enters, the smallest multiplier leaves. A primitive that the walk has not
+            // handed over is not asked.
             let entering = self.deciding(s.x, &at);
-            if active.contains(&entering) {
+            if active.contains(&entering) || !self.stage2.knows(&self.task, &entering) {
                 return false;
             }
             if active.len() >= 4 {

@@ -51,6 +51,7 @@ fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
         b: Body { model: b, placed: Placed { place, motion: mb } },
         resolution: default_resolution(a, b),
         cell_limit: 300_000,
+        ideas: Ideas::default(),
     };
     let began = std::time::Instant::now();
     let o = earliest_contact(&q, &mut Scratch::default());

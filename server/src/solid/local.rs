@@ -92,11 +92,19 @@ pub fn literals(tokens: &[Token]) -> impl Iterator<Item = LiteralId> + '_ {
 
 /// Appends the whole tree of `solid` to `out`; `False` (and nothing appended) for an empty solid.
 pub fn write_tree(solid: &Solid, out: &mut Vec<Token>) -> Truth {
-    write_node(solid, solid.root, Sense::Positive, out)
+    write_node(solid, solid.root, Sense::Positive, &|_| true, out)
 }
 
-fn write_node(solid: &Solid, node: NodeId, sense: Sense, out: &mut Vec<Token>) -> Truth {
-    match &solid.nodes[node as usize] {
+/// Appends the tree below `node`, complemented where `sense` is negative; nodes that are not alive count as empty.
+pub fn write_node(
+    solid: &Solid,
+    node: NodeId,
+    sense: Sense,
+    alive: &impl Fn(NodeId) -> bool,
+    out: &mut Vec<Token>,
+) -> Truth {
+    let kept = if alive(node) { &solid.nodes[node as usize] } else { &Node::Empty };
+    match kept {
         Node::Empty if sense == Sense::Positive => Truth::False,
         Node::Empty => Truth::True,
         Node::Primitive(p) => {
@@ -115,7 +123,7 @@ fn write_node(solid: &Solid, node: NodeId, sense: Sense, out: &mut Vec<Token>) -
             };
             fold(kind, children.iter().enumerate(), out, |(i, child), out| {
                 let s = if *op == Op::Difference && i > 0 { sense.flipped() } else { sense };
-                write_node(solid, *child, s, out)
+                write_node(solid, *child, s, alive, out)
             })
         }
     }
