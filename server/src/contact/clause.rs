@@ -25,6 +25,8 @@ use glam::DVec3;
 const MAX_CLAUSES: u32 = 96;
 /// Rounds of looking ahead and re-touching curved faces.
 const ROUNDS: usize = 5;
+/// Weight of a concave literal's own cost in the choice of the axis to split, whether it holds the bound or not.
+const IDLE_COST: f64 = 0.25;
 /// How far beyond the end of its reach a clause is looked at, in cell radii of relative motion.
 const LOOK_BEYOND: f64 = 0.02;
 
@@ -298,6 +300,12 @@ impl Run<'_, '_> {
                     Some(same) => same.2 += lambda,
                     None => a.support.push((key.0, key.1, lambda)),
                 }
+            }
+        }
+        // A concave literal that stands aside may do so only because the cell is too large for it.
+        for l in &self.scratch.lits {
+            if l.id.sense() == Sense::Negative {
+                a.cost += l.cost * IDLE_COST;
             }
         }
         a.cost += (w.abs() + turn.abs() * dt.max(0.0)) * self.view.half;

@@ -17,6 +17,9 @@ use crate::solid::local::{LiteralId, Truth, truth_of};
 use crate::solid::{Face, Sense, Solid, face::FaceAt};
 use glam::DVec3;
 
+/// Least distance from the axis, relative to the centre's, for the slab bound: nearer, its denominator spoils it.
+const SLAB: f64 = 0.05;
+
 /// The body a literal belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
@@ -189,7 +192,7 @@ impl View<'_> {
             let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
             let closest = f.rho - radial - way;
             // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
-            let slab = closest >= 0.5 * f.rho && tangential * tangential * f.rho < d * d * closest;
+            let slab = closest >= SLAB * f.rho && tangential * tangential * f.rho < d * d * closest;
             if slab || d <= 2.0 * f.rho {
                 let (d, rho) = if slab { (tangential, closest) } else { (d, f.rho) };
                 remainder = f.k * d * d / (2.0 * rho);

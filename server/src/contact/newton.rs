@@ -20,6 +20,8 @@ use glam::{DMat3, DVec3};
 
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
+/// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
+const LEAST_DAMPING: f64 = 1e-14;
 const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
 
 /// One active constraint.
@@ -147,7 +149,7 @@ impl Problem<'_> {
                 break;
             }
             let mu = damping * best.min(1e-2);
-            let step = damped_step(&jac, &f, n, mu.max(1e-26))?;
+            let step = damped_step(&jac, &f, n, mu.max(LEAST_DAMPING))?;
             let sx = DVec3::new(step[0], step[1], step[2]) * self.scale;
             let st = step[3] * self.time_scale;
             if !(sx.is_finite() && st.is_finite()) {
@@ -214,8 +216,7 @@ impl Problem<'_> {
                 for j in 0..m {
                     gram[i][j] = (0..4).map(|k| g[i][k] * g[j][k]).sum();
                 }
-                gram[i][i] *= 1.0 + 1e-13;
-                gram[i][i] += 1e-15;
+                gram[i][i] += 1e-12;
                 rhs[i] = -v[i];
             }
             let y = cholesky_solve(&mut gram, rhs, m)?;
@@ -268,8 +269,8 @@ impl Problem<'_> {
         if literals {
             f[m + 3] = total - 1.0;
         } else {
-            // Apex on apex: any scale of the multipliers will do; hold the first one.
-            f[m + 3] = lambda[0] - 1.0;
+            // Apex on apex: any scale of the multipliers will do; hold the first one, outwards against its axis.
+            f[m + 3] = lambda[0] + 1.0;
             jac[m + 3][4] = 1.0;
         }
         f[..m + 4].iter().map(|v| v * v).sum()
@@ -293,7 +294,7 @@ fn damped_step(
             a[i][j] = s;
             a[j][i] = s;
         }
-        a[i][i] += mu + 1e-15 * a[i][i];
+        a[i][i] += mu;
         for r in 0..n {
             b[i] -= jac[r][i] * f[r];
         }

@@ -132,6 +132,9 @@ pub struct Task<'a> {
 /// |Σ λ g| below which multipliers have settled.
 const SETTLED: f64 = 1e-6;
 
+/// Witnesses this close in time are of one contact.
+const SAME_TIME: f64 = 1e-12;
+
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
 
@@ -440,8 +443,10 @@ impl<'a, 's> Search<'a, 's> {
             (l.1.sense() == Sense::Positive && near).then_some(apex)
         };
         let apexes: Vec<_> = advance.support.iter().filter_map(|l| Some((*l, apex_of(l)?))).collect();
-        let vertex =
-            |l: &(Side, LiteralId, f64)| (0..3).map(|k| (Constraint::Apex(l.0, l.1, k), [-l.2, 0.0, 0.0][k as usize]));
+        let vertex = |l: &(Side, LiteralId, f64)| {
+            let (side, id, weight) = *l;
+            (0..3).map(move |k| (Constraint::Apex(side, id, k), if k == 0 { -weight } else { 0.0 }))
+        };
         for (l, apex) in &apexes {
             let others = advance.support.iter().filter(|o| o.0 != l.0);
             let others = others.map(|o| (Constraint::Literal(o.0, o.1), o.2));
@@ -484,7 +489,10 @@ impl<'a, 's> Search<'a, 's> {
         for _ in 0..7 {
             self.counters.newton += 1;
             let Some(s) = self.problem().solve(&active, x, t, &lambda, level) else { return false };
-            if s.t < 0.0 || s.t > 1.0 || s.t >= self.goal() {
+            // Where only an unsettled witness is known, a settled one of the same time is still worth having.
+            let settled = self.found.as_ref().is_none_or(|f| f.deep.stationarity < SETTLED);
+            let latest = if settled { self.goal() } else { self.goal() + SAME_TIME };
+            if s.t < 0.0 || s.t > 1.0 || s.t >= latest {
                 return false;
             }
             // A negative multiplier: that literal holds nothing back.

@@ -61,7 +61,13 @@ fn search_pair(bodies: &[Body], job: &PairJob, options: &StepOptions, scratch: &
         contact::Body { model: &body.part.model, placed: Placed { place: body.place, motion } }
     };
     let limit = if options.cell_limit == 0 { contact::DEFAULT_CELL_LIMIT } else { options.cell_limit };
-    let query = PairQuery { a: side(job.a), b: side(job.b), resolution: job.resolution, cell_limit: limit };
+    let query = PairQuery {
+        a: side(job.a),
+        b: side(job.b),
+        resolution: job.resolution,
+        cell_limit: limit,
+        ideas: crate::contact::Ideas::default(),
+    };
     let mut outcome = contact::earliest_contact(&query, scratch);
     if discrete && outcome.status != Status::Undecided {
         (outcome.time_lower, outcome.time, outcome.time_upper) = (1.0, 1.0, 1.0);
