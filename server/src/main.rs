@@ -4,8 +4,14 @@
 use clap::{Parser, Subcommand};
 use contactd::check::Check;
 use contactd::contact::Status;
+use contactd::eco::Model;
 use contactd::import::{self, Facets, Limits};
 use contactd::inspect;
+use contactd::picture::{
+    self,
+    drawing::Drawing,
+    scene::{Actor, Meeting},
+};
 use contactd::report::{self, Answer, PairReport};
 use std::error::Error;
 use std::io::Write as _;
@@ -31,6 +37,9 @@ enum Command {
         /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
         #[arg(long, default_value = "auto", value_parser = facets)]
         facets: Facets,
+        /// Also draw it, into an .svg or .png file: a model's tree with its bounds and its octree, a scene's contacts.
+        #[arg(long, value_name = "FILE")]
+        picture: Option<PathBuf>,
     },
 }
 
@@ -66,7 +75,7 @@ enum Done {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Check(arguments) => check_scene(&arguments),
-        Command::Inspect { file, facets } => inspect_file(&file, facets),
+        Command::Inspect { file, facets, picture } => inspect_file(&file, facets, picture.as_deref()),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
@@ -121,7 +130,7 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     Ok(if undecided { Done::Undecided } else { Done::Well })
 }
 
-fn inspect_file(file: &Path, facets: Facets) -> Result<Done, Box<dyn Error>> {
+fn inspect_file(file: &Path, facets: Facets, picture: Option<&Path>) -> Result<Done, Box<dyn Error>> {
     let limits = Limits::default();
     let text = if file.extension().is_some_and(|e| e == "toml") {
         let scene = import::read_scene(file)?;
@@ -130,12 +139,49 @@ fn inspect_file(file: &Path, facets: Facets) -> Result<Done, Box<dyn Error>> {
         for (source, import) in scene.models.iter().zip(&models) {
             text.push_str(&inspect::model(&source.path.display().to_string(), import));
         }
+        if let Some(to) = picture {
+            write_picture(to, &scene_picture(&scene, models)?)?;
+        }
         text
     } else {
-        inspect::model(&file.display().to_string(), &import::read_csg(file, facets, &limits)?)
+        let import = import::read_csg(file, facets, &limits)?;
+        let text = inspect::model(&file.display().to_string(), &import);
+        if let Some(to) = picture {
+            let name = file.file_stem().unwrap_or_default().to_string_lossy();
+            write_picture(to, &picture::model(&name, &Model::new(import.solid)))?;
+        }
+        text
     };
     print(&text)?;
     Ok(Done::Well)
+}
+
+/// The scene at its contacts, solved as `check` does.
+fn scene_picture(scene: &import::Scene, models: Vec<import::Import>) -> Result<Drawing, Box<dyn Error>> {
+    let mut check = Check::new(scene, models, None)?;
+    let outcome = check.step(false)?.clone();
+    let bodies = check.world.bodies();
+    let actors: Vec<Actor<'_>> = bodies
+        .iter()
+        .zip(&scene.objects)
+        .map(|(body, object)| Actor {
+            name: &object.name,
+            solid: &body.part.model.solid,
+            model: object.model,
+            place: object.place,
+            motion: object.motion,
+        })
+        .collect();
+    let meetings: Vec<Meeting<'_>> =
+        outcome.pairs.iter().map(|p| Meeting { pair: [p.a as usize, p.b as usize], outcome: &p.outcome }).collect();
+    let note = format!("each object where it first meets another; t: fraction of the step; lengths in {}", scene.unit);
+    Ok(picture::scene::scene("", &note, &actors, &meetings, picture::scene::FINE))
+}
+
+/// Writes a drawing in the format that the file's name tells.
+fn write_picture(to: &Path, drawing: &Drawing) -> Result<(), String> {
+    let bytes = drawing.encode_for(to)?;
+    std::fs::write(to, bytes).map_err(|e| format!("{}: expected to write, found {e}", to.display()))
 }
 
 /// Writes to standard output; a reader that has gone away is no error.

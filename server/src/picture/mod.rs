@@ -8,6 +8,15 @@
 pub mod contacts;
 pub mod drawing;
 pub mod ray;
+pub mod scene;
 pub mod slice;
 pub mod tree;
 pub mod view;
+
+use crate::eco::Model;
+use drawing::Drawing;
+
+/// All about one model: its tree with S-bounds, and slices of its octree.
+pub fn model(name: &str, model: &Model) -> Drawing {
+    slice::slice(name, model).below(tree::tree(name, &model.solid, &model.bounds))
+}
