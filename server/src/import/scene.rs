@@ -401,3 +401,161 @@ impl Checker<'_> {
         self.wrong(word, &expected, &format!("\"{}\"", word.as_ref()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const MODELS: &str = "[[model]]\nname = \"m\"\nfile = \"m.csg\"\n";
+
+    fn parse(text: &str) -> Result<Scene, String> {
+        Scene::parse("s.toml", text, Path::new("parts")).map_err(|e| e.to_string())
+    }
+
+    /// A scene with one object that has `lines`.
+    fn object(lines: &str) -> Result<Scene, String> {
+        parse(&format!("{MODELS}[[object]]\nname = \"o\"\nmodel = \"m\"\n{lines}"))
+    }
+
+    #[test]
+    fn everything_a_scene_can_say_is_read() {
+        let text = r#"
+            unit = "mm"
+            resolution = 1e-6
+            [[model]]
+            name = "plate"
+            file = "plate.csg"
+            [[object]]
+            name = "plate"
+            model = "plate"
+            group = "cell"
+            motion = "static"
+            place = { position = [0, 0, -1] }
+            [[object]]
+            name = "gripper"
+            model = "plate"
+            group = "robot"
+            start = { position = [0, 0, 5], rotation = [0, 0, 0.7071, 0.7071] }
+            end = { position = [1, 0, 4] }
+            rotation_vector = [0, 0, 6.283185307179586]
+            max_speed = 3
+            [[rule]]
+            between = ["robot", "cell"]
+            except = [["gripper", "plate"]]
+            detect = "discrete"
+            report = "patch"
+            penetration = true
+            margin = 0.5
+            initial_overlap = "ignore_if_separating"
+            sensor = true
+        "#;
+        let scene = parse(text).expect("a scene");
+        assert_eq!((scene.unit.as_str(), scene.resolution), ("mm", Some(1e-6)));
+        assert_eq!(scene.models[0].path, Path::new("parts/plate.csg"));
+        let [plate, gripper] = scene.objects.as_slice() else { panic!("two objects") };
+        assert!(plate.is_static && plate.motion.is_rest() && plate.record.is_none());
+        assert_eq!(plate.place.position, DVec3::new(0.0, 0.0, -1.0));
+        assert!(gripper.motion.start.rotation.is_normalized(), "0.7071 is nearly a quarter turn's half");
+        assert_eq!(gripper.motion.spin, DVec3::new(0.0, 0.0, TAU));
+        assert_eq!(gripper.motion.velocity, DVec3::new(1.0, 0.0, -1.0));
+        assert_eq!((gripper.group.as_str(), gripper.max_speed), ("robot", Some(3.0)));
+        let rule = &scene.rules[0];
+        assert_eq!((rule.detect, rule.report, rule.margin), (Detect::Discrete, Report::Patch, 0.5));
+        assert_eq!(rule.initial_overlap, InitialOverlap::IgnoreIfSeparating);
+        assert!(rule.penetration && rule.sensor && rule.except.len() == 1);
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let scene = object("start = { rotation = [0, 0, 1, 0] }").expect("a scene");
+        let o = &scene.objects[0];
+        assert_eq!((scene.resolution, o.group.as_str(), o.rotates), (None, "default", true));
+        assert!(o.motion.is_rest() && o.record.is_none(), "end is start, each field by itself");
+        let turned = object("end = { rotation = [0, 0, 1, 0] }").expect("a scene");
+        assert_eq!(turned.objects[0].motion.spin, DVec3::new(0.0, 0.0, TAU / 2.0));
+        assert_eq!(turned.objects[0].motion.velocity, DVec3::ZERO);
+    }
+
+    #[test]
+    fn an_objects_record_is_its_motion() {
+        let scene =
+            object("start = { rotation = [0.1, 0.2, 0.3, 0.927] }\nend = { position = [1, 2, 3] }").expect("a scene");
+        let o = &scene.objects[0];
+        let order = o.record.expect("it moves").decode().expect("a good record");
+        assert_eq!(Track::ordered(o.motion.start, order).motion, o.motion);
+        assert_eq!(o.motion.spin, DVec3::ZERO);
+    }
+
+    #[test]
+    fn every_mistake_is_a_sentence_with_its_place() {
+        let o = |lines: &str| format!("{MODELS}[[object]]\nname = \"o\"\nmodel = \"m\"\n{lines}");
+        let rule = |lines: &str| o(&format!("[[rule]]\nbetween = [\"a\", \"b\"]\n{lines}"));
+        let table = [
+            (
+                "colour = 1".into(),
+                "1:1: unknown field `colour`, expected one of `unit`, `resolution`, `model`, `object`, `rule`",
+            ),
+            ("unit = ".into(), "1:8: "),
+            ("resolution = 0".into(), "1:14: expected a positive finite number as resolution, found 0"),
+            ("resolution = nan".into(), "1:14: expected a positive finite number as resolution, found NaN"),
+            (format!("{MODELS}{MODELS}"), "5:8: expected a name that no other model has, found a second model \"m\""),
+            (
+                o("[[object]]\nname = \"o\"\nmodel = \"m\""),
+                "8:8: expected a name that no other object has, found a second object \"o\"",
+            ),
+            (o("[[object]]\nname = \"p\"\nmodel = \"x\""), "9:9: expected the name of a model, found \"x\""),
+            (o("[[object]]\nname = \"\"\nmodel = \"m\""), "8:8: expected a name for the object, found an empty one"),
+            (o("motion = \"dynamic\""), "7:10: expected \"static\" or \"moving\", found \"dynamic\""),
+            (o("start = { position = [0, nan, 0] }"), "7:22: expected a finite position, found [0.0, NaN, 0.0]"),
+            (o("end = { position = [0, 0] }"), "7:20: invalid length 2, expected an array of length 3"),
+            (
+                o("start = { rotation = [0, 0, 0, 0] }"),
+                "7:22: expected a unit quaternion [x, y, z, w] as rotation, found [0.0, 0.0, 0.0, 0.0] with squared length 0",
+            ),
+            (
+                o("end = { rotation = [0, 0, 0, 1.001] }"),
+                "7:20: expected a unit quaternion [x, y, z, w] as rotation, found [0.0, 0.0, 0.0, 1.001] with squared length",
+            ),
+            (
+                o("place = { rotation = [inf, 0, 0, 1] }"),
+                "7:22: expected a unit quaternion [x, y, z, w] as rotation, found [inf, 0.0, 0.0, 1.0] with squared length inf",
+            ),
+            (o("rotation_vector = [0, 0, inf]"), "7:19: expected a finite rotation_vector, found [0.0, 0.0, inf]"),
+            (
+                o("rotation_vector = [0, 0, 1]\nend = { rotation = [0, 0, 0, 1] }"),
+                "7:19: expected either end.rotation or rotation_vector of object \"o\", found both",
+            ),
+            (
+                o("motion = \"static\"\nend = { position = [1, 0, 0] }"),
+                "5:8: expected a static object \"o\" that rests, found one that moves",
+            ),
+            (
+                o("rotates = false\nrotation_vector = [0, 0, 1]"),
+                "5:8: expected an object \"o\" with rotates = false that does not turn, found one that does",
+            ),
+            (o("max_speed = -1"), "7:13: expected a positive finite number as max_speed, found -1"),
+            (o("speed = 1"), "7:1: unknown field `speed`, expected one of `name`, `model`, `group`, `motion`"),
+            (rule("detect = \"on\""), "9:10: expected \"off\" or \"discrete\" or \"continuous\", found \"on\""),
+            (rule("report = \"all\""), "9:10: expected \"hit\" or \"time\" or \"contact\" or \"patch\", found \"all\""),
+            (rule("initial_overlap = \"\""), "9:19: expected \"report\" or \"ignore_if_separating\", found \"\""),
+            (rule("margin = -0.5"), "9:10: expected a finite margin that is not negative, found -0.5"),
+            (rule("except = [[\"o\", \"p\"]]"), "9:17: expected the name of an object, found \"p\""),
+        ];
+        for (text, sentence) in table {
+            let error = parse(&text).err().unwrap_or_else(|| panic!("{text}: was read"));
+            let expected = format!("s.toml:{sentence}");
+            assert!(error.starts_with(&expected), "{text}\n  said    {error}\n  not     {expected}");
+            assert!(!error.contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_missing_model_file_is_told_where_the_scene_names_it() {
+        let scene = parse(MODELS).expect("a scene");
+        let error = scene.load_models(Facets::Auto, &Limits::default()).expect_err("no such file").to_string();
+        assert!(error.starts_with("s.toml:3:8: expected a model file, found parts/m.csg: "), "{error}");
+        let error = read_scene(Path::new("nowhere.toml")).expect_err("no such file").to_string();
+        assert!(error.starts_with("nowhere.toml: expected a readable file, found "), "{error}");
+    }
+}

@@ -14,6 +14,8 @@ mod lexer;
 mod lower;
 mod place;
 mod syntax;
+#[cfg(test)]
+mod tests;
 
 use super::{Facets, Import, ImportError, Limits, Place};
 use crate::solid::primitive::MeshError;

@@ -1,0 +1,465 @@
+//! Constructs, refusals and properties of the importer, as tables.
+
+use crate::import::{Facets, Import, Limits, import_csg};
+use crate::solid::{Node, NodeId, Op, Sense, Shape, Solid};
+use glam::DVec3;
+use proptest::prelude::*;
+
+fn import_as(text: &str, facets: Facets) -> Result<Import, String> {
+    import_csg("m.csg", text, facets, &Limits::default()).map_err(|e| e.to_string())
+}
+
+fn import(text: &str) -> Import {
+    import_as(text, Facets::Auto).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+fn refused(text: &str) -> String {
+    import_as(text, Facets::Auto).err().unwrap_or_else(|| panic!("{text}: was read"))
+}
+
+/// A solid in short: `(A & B)`, `(A | B)`, `(A - B)`, `0` for nothing, `name#index` for primitives.
+fn short(solid: &Solid, node: NodeId) -> String {
+    match &solid.nodes[node as usize] {
+        Node::Empty => "0".into(),
+        Node::Primitive(p) => format!("{}#{p}", solid.primitives[*p as usize].label.name),
+        Node::Op(op, children) => {
+            let sign = match op {
+                Op::Union => " | ",
+                Op::Intersection => " & ",
+                Op::Difference => " - ",
+            };
+            let parts: Vec<String> = children.iter().map(|c| short(solid, *c)).collect();
+            format!("({})", parts.join(sign))
+        }
+    }
+}
+
+fn tree(text: &str) -> String {
+    let solid = import(text).solid;
+    short(&solid, solid.root)
+}
+
+#[test]
+fn trees_keep_their_shape() {
+    let s = "sphere(r = 1);";
+    let c = "cube(size = [1, 1, 1], center = false);";
+    for (text, expected) in [
+        (format!("{s}{c}"), "(sphere#0 | cube#1)"),
+        (format!("group() {{ {s} }}"), "sphere#0"),
+        (format!("difference() {{ {s} union() {{ {c} {c} }} }}"), "(sphere#0 - (cube#1 | cube#2))"),
+        (format!("intersection() {{ {s} {c} }}"), "(sphere#0 & cube#1)"),
+        (format!("color([1, 0, 0, 1]) {{ render(convexity = 2) {{ {s} {c} }} }}"), "(sphere#0 | cube#1)"),
+        (format!("// one\n/* two */ union() {{ ; {s} }} ;"), "sphere#0"),
+        (format!("difference() {{ group(); {c} }} {s}"), "sphere#0"),
+        (format!("intersection() {{ group(); {c} }}"), "0"),
+        (format!("difference() {{ {s} group(); }}"), "sphere#0"),
+        ("difference(); group(); linear_extrude(height = 100);".into(), "0"),
+        (format!("%{s} *{c} #{c}"), "cube#0"),
+        (format!("difference() {{ %{s} {c} {s} }}"), "(cube#0 - sphere#1)"),
+        (format!("{s} multmatrix([[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) {{ !{c} {s} }}"), "cube#0"),
+        (format!("%#{s} {c} * minkowski() {{ {s} }}"), "cube#0"),
+        (String::new(), "0"),
+    ] {
+        assert_eq!(tree(&text), expected, "{text}");
+    }
+    let root = import("multmatrix([[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) { !sphere(r = 1); }");
+    assert_eq!(root.solid.primitives[0].frame.position, DVec3::ZERO, "a root leaves its surroundings");
+}
+
+#[test]
+fn primitives_are_what_was_written() {
+    let one = |text: &str| import(text).solid.primitives[0].clone();
+    assert!(matches!(one("sphere(r = 2.5, $fn = 0, $fa = 12);").shape, Shape::Sphere(s) if s.radius == 2.5));
+    let p = one("cylinder($fn = 0, h = 3, r1 = 2, r2 = 2, center = false);");
+    assert!(matches!(p.shape, Shape::Cylinder(c) if c.radius == 2.0 && c.half_height == 1.5));
+    assert_eq!(p.frame.position, DVec3::new(0.0, 0.0, 1.5));
+    let p = one("cylinder(h = 4, r1 = 0, r2 = 1, center = true);");
+    assert!(matches!(p.shape, Shape::Cone(c) if (c.bottom, c.top, c.half_height) == (0.0, 1.0, 2.0)));
+    let p = one("cube(size = [1, 2, 3], center = false);");
+    assert_eq!(p.aabb.min, DVec3::ZERO);
+    assert_eq!(p.aabb.max, DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!((p.label.line, p.label.column), (1, 1));
+    let p = one("cube(2);");
+    assert_eq!(p.aabb.max, DVec3::splat(2.0));
+    let octahedron = "polyhedron(points = [[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]], faces = \
+        [[0,4,2],[0,2,5],[0,3,4],[0,5,3],[1,2,4],[1,5,2],[1,4,3],[1,3,5]], convexity = 1);";
+    assert!(matches!(&one(octahedron).shape, Shape::Polyhedron(p) if p.planes.len() == 8 && p.vertices.len() == 6));
+}
+
+#[test]
+fn low_fn_gives_openscads_own_prisms() {
+    let hexagon = "cylinder($fn = 6, $fa = 12, $fs = 2, h = 2, r1 = 1, r2 = 1, center = true);";
+    let p = &import(hexagon).solid.primitives[0];
+    // The first corner lies on +x, so the flat sides face ±y.
+    assert!((p.value(DVec3::new(0.99, 0.0, 0.0))) < 0.0);
+    assert!((p.value(DVec3::new(0.0, 0.87, 0.0))) > 0.0);
+    assert_eq!(p.faces.len(), 8);
+    let faces = |text: &str, facets| {
+        let solid = import_as(text, facets).expect("readable").solid;
+        (solid.primitives[0].faces.len(), matches!(solid.primitives[0].shape, Shape::Polyhedron(_)))
+    };
+    // Rings of a sphere: (5 + 1)/2 = 3 rings of 5, two caps.
+    let sphere = |fn_: f64| format!("sphere(r = 5, $fn = {fn_}, $fa = 12, $fs = 2);");
+    assert_eq!(faces(&sphere(5.0), Facets::Auto), (12, true));
+    assert_eq!(faces(&sphere(0.1), Facets::Auto), (5, true), "at least 3 sides");
+    assert_eq!(faces(&sphere(8.9), Facets::Auto), (8 * 3 + 2, true));
+    assert_eq!(faces(&sphere(9.0), Facets::Auto), (1, false));
+    assert_eq!(faces(&sphere(5.0), Facets::Exact), (1, false));
+    // $fn = 0: min(360/12, 2π·5/2) = 15.7 → 16 sides, 8 rings.
+    assert_eq!(faces(&sphere(0.0), Facets::AsWritten), (16 * 7 + 2, true));
+    let cone = "cylinder(h = 1, r1 = 1, r2 = 0, center = false, $fn = 4);";
+    assert_eq!(faces(cone, Facets::Auto), (5, true));
+    let exact = import("sphere(r = 1, $fn = 30);");
+    assert_eq!(exact.notes[0].to_string(), "1:1: sphere with $fn = 30: taken as exact");
+    let low = import(hexagon);
+    assert_eq!(low.notes[0].to_string(), "1:1: cylinder taken as OpenSCAD's polyhedron of 6 sides");
+}
+
+/// `inner` under a matrix given by its upper rows.
+fn under(rows: &str, inner: &str) -> String {
+    format!("multmatrix([{rows}, [0, 0, 0, 1]]) {{ {inner} }}")
+}
+
+#[test]
+fn transforms_keep_kinds_where_they_can() {
+    let kind = |text: &str| {
+        let solid = import(text).solid;
+        let p = &solid.primitives[0];
+        (crate::inspect::kind(&p.shape), p.aabb.max - p.aabb.min)
+    };
+    let scaled = |x: f64, y: f64, z: f64| format!("[{x}, 0, 0, 0], [0, {y}, 0, 0], [0, 0, {z}, 0]");
+    let cases = [
+        (scaled(3.0, 3.0, 3.0), "sphere(r = 1);", "sphere", DVec3::splat(6.0)),
+        (scaled(-2.0, 2.0, 2.0), "cylinder(h = 1, r1 = 1, r2 = 0);", "cone", DVec3::new(4.0, 4.0, 2.0)),
+        (scaled(2.0, 2.0, 5.0), "cylinder(h = 1, r1 = 1, r2 = 1);", "cylinder", DVec3::new(4.0, 4.0, 5.0)),
+        (scaled(1.0, 2.0, 3.0), "cube(size = [1, 1, 1]);", "box", DVec3::new(1.0, 2.0, 3.0)),
+        (scaled(1.0, -2.0, 3.0), "cylinder(h = 1, r1 = 1, r2 = 1, $fn = 4);", "polyhedron", DVec3::new(2.0, 4.0, 3.0)),
+        ("[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]".into(), "cube(2);", "polyhedron", DVec3::new(3.0, 2.0, 2.0)),
+    ];
+    for (rows, inner, expected, size) in cases {
+        let (kind, extent) = kind(&under(&rows, inner));
+        assert_eq!(kind, expected, "{inner} under {rows}");
+        assert!((extent - size).length() < 1e-12, "{inner} under {rows}: {extent}");
+    }
+    // A non-uniform scale that a later one undoes is none.
+    let undone = under(&scaled(2.0, 1.0, 1.0), &under(&scaled(0.5, 1.0, 1.0), "sphere(r = 1);"));
+    assert_eq!(kind(&undone).0, "sphere");
+    // A mirrored cone keeps its apex on top, a cone upside down does not.
+    let apex = |rows: String| {
+        let solid = import(&under(&rows, "cylinder(h = 1, r1 = 1, r2 = 0);")).solid;
+        let inside = |z: f64| solid.value(DVec3::new(0.9, 0.0, z)) < 0.0;
+        (inside(0.05), inside(-0.05))
+    };
+    assert_eq!(apex(scaled(-1.0, 1.0, 1.0)), (true, false));
+    assert_eq!(apex(scaled(1.0, 1.0, -1.0)), (false, true));
+}
+
+#[test]
+fn six_digit_rotations_become_exact_ones() {
+    let rows = "[0.866025, -0.5, 0, 1], [0.5, 0.866025, 0, 2], [0, 0, 1, 3]";
+    let import = import(&under(rows, "cube(2, center = true);"));
+    let p = &import.solid.primitives[0];
+    assert!(matches!(&p.shape, Shape::Cuboid(c) if c.half == DVec3::ONE), "scale 1, not 0.99999973: {:?}", p.shape);
+    assert!((p.frame.rotation.to_axis_angle().1 - std::f64::consts::FRAC_PI_6).abs() < 1e-6);
+    let note = import.notes[0].to_string();
+    assert!(note.starts_with("1:12: a rough matrix: replaced by the nearest rotation times scale (by "), "{note}");
+    let exact = super::import_csg(
+        "m.csg",
+        &under("[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]", "cube(2);"),
+        Facets::Auto,
+        &Limits::default(),
+    );
+    assert_eq!(exact.expect("a quarter turn").notes, vec![]);
+}
+
+#[test]
+fn extrusions_are_prisms_and_their_set_operations() {
+    let extrude = |arguments: &str, inner: &str| format!("linear_extrude({arguments}) {{ {inner} }}");
+    let plate = extrude("height = 2", "difference() { square(size = [4, 4], center = true); circle(r = 1); }");
+    assert_eq!(tree(&plate), "(square#0 - circle#1)");
+    let solid = import(&plate).solid;
+    assert_eq!(solid.senses, vec![Sense::Positive, Sense::Negative]);
+    // The hole goes beyond both caps: no skin is left where they would have coincided.
+    assert!(solid.value(DVec3::new(0.0, 0.0, 2.0)) > 0.9);
+    assert_eq!(solid.aabb().max, DVec3::new(2.0, 2.0, 2.0));
+
+    let inside = |text: &str, p: [f64; 3]| import(text).solid.value(DVec3::from_array(p)) < 0.0;
+    let centred = extrude("height = 2, center = true", "polygon(points = [[0, 0], [0, 2], [2, 0]], paths = undef);");
+    assert!(inside(&centred, [0.5, 0.5, -0.9]) && !inside(&centred, [1.5, 1.5, 0.0]));
+    let pyramid = extrude("height = 2, scale = 0", "square(size = [2, 2], center = true);");
+    assert!(
+        inside(&pyramid, [0.0, 0.0, 1.9]) && !inside(&pyramid, [0.6, 0.0, 1.0]) && inside(&pyramid, [0.4, 0.0, 1.0])
+    );
+    let frustum = extrude("height = 2, scale = [2, 2]", "circle(r = 1);");
+    assert!(matches!(import(&frustum).solid.primitives[0].shape, Shape::Cone(_)));
+    let leaning = extrude("height = 2, v = [1, 0, 1]", "square(size = [1, 1]);");
+    let top = 2f64.sqrt();
+    assert!(inside(&leaning, [0.5 + 0.9 * top, 0.5, 0.9 * top]) && !inside(&leaning, [0.5, 0.5, 0.9 * top]));
+    let moved = extrude(
+        "height = 1",
+        &under("[0, -2, 0, 5], [2, 0, 0, 0], [0, 0, 1, 0]", "intersection() { circle(r = 1); square(size = [1, 1]); }"),
+    );
+    assert!(inside(&moved, [3.7, 1.2, 0.5]) && !inside(&moved, [5.3, 0.5, 0.5]) && !inside(&moved, [3.2, 1.8, 0.5]));
+    let hexagon = extrude("height = 1", "circle(r = 1, $fn = 6);");
+    assert_eq!(import(&hexagon).solid.primitives[0].faces.len(), 8);
+    let path = extrude("height = 1", "polygon(points = [[0, 0], [9, 9], [2, 0], [0, 2]], paths = [[0, 2, 3]]);");
+    assert_eq!(import(&path).solid.aabb().max, DVec3::new(2.0, 2.0, 1.0));
+}
+
+#[test]
+fn infinite_primitives_are_half_spaces() {
+    let half = "cylinder(h = inf, r1 = inf, r2 = inf, center = false);";
+    let solid = import(&format!("intersection() {{ sphere(r = 1); {half} }}")).solid;
+    assert!(solid.value(DVec3::new(0.0, 0.0, 0.5)) < 0.0 && solid.value(DVec3::new(0.0, 0.0, -0.5)) > 0.0);
+    assert!(matches!(solid.primitives[1].shape, Shape::HalfSpace(_)));
+    let slab = "intersection() { sphere(r = 2); cube(size = [inf, inf, 1], center = true); }";
+    assert_eq!(tree(slab), "(sphere#0 & (cube#1 & cube#2))");
+    let cut = import(&format!(
+        "difference() {{ cube(4, center = true); {} }}",
+        under("[1, 0, 0, 1], [0, 0, 1, 0], [0, -1, 0, 0]", half)
+    ));
+    assert!(cut.solid.value(DVec3::new(0.0, -1.0, 0.0)) < 0.0 && cut.solid.value(DVec3::new(0.0, 1.0, 0.0)) > 0.0);
+    assert_eq!(
+        refused(&format!("union() {{ sphere(r = 1); {half} }}")),
+        "m.csg:1:26: expected something bounded that this infinite primitive is cut down by, found a solid that reaches to infinity"
+    );
+    assert_eq!(
+        refused("cube(size = inf, center = true);"),
+        "m.csg:1:1: expected a primitive with at least one face, found all of space"
+    );
+}
+
+#[test]
+fn every_refusal_is_a_sentence_with_its_place() {
+    let cube_faces = "[[2,6,4,0],[5,7,3,1],[4,5,1,0],[3,7,6,2],[1,3,2,0],[6,7,5,4]]";
+    let cube_points = "[[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1,1]]";
+    let dented = cube_points.replace("[1,1,1]", "[0.2,0.2,0.2]");
+    let triangles = "[[2,6,4],[2,4,0],[5,7,3],[5,3,1],[4,5,1],[4,1,0],[3,7,6],[3,6,2],[1,3,2],[1,2,0],[6,7,5],[6,5,4]]";
+    let table: Vec<(String, &str)> = vec![
+        (
+            "union() {\n  hull() { }\n}".into(),
+            "2:3: expected a supported construct, found hull, which is not supported",
+        ),
+        (
+            "translate([1, 2, 3]) { }".into(),
+            "1:1: expected a supported construct, found translate, which is not supported (flatten the file first: \
+             openscad -o model.csg model.scad)",
+        ),
+        ("sphere(r = 0);".into(), "1:12: expected a positive number as r of sphere, found 0"),
+        ("sphere(r = nan);".into(), "1:12: expected a positive number as r of sphere, found nan"),
+        ("sphere(r = -inf);".into(), "1:12: expected a positive number as r of sphere, found -inf"),
+        ("sphere(r = inf);".into(), "1:12: expected a finite number as r of sphere, found inf"),
+        ("sphere();".into(), "1:1: expected a positive number as r of sphere, found none"),
+        ("sphere(r = undef);".into(), "1:1: expected a positive number as r of sphere, found undef"),
+        ("sphere(d = 1);".into(), "1:8: expected the argument r of sphere, found \"d\""),
+        ("sphere(1, r = 2);".into(), "1:11: expected each argument of sphere once, found a second r"),
+        ("sphere(1, 2);".into(), "1:11: expected at most 1 unnamed arguments of sphere, found another"),
+        ("cylinder(h = 1, r1 = 0, r2 = 0);".into(), "1:1: expected a positive r1 or r2 of cylinder, found 0 for both"),
+        (
+            "cylinder(h = 1, r1 = -1, r2 = 0);".into(),
+            "1:22: expected a number that is not negative as r1 of cylinder, found -1",
+        ),
+        (
+            "cylinder(h = inf, r1 = 1, r2 = 1);".into(),
+            "1:1: expected a finite cylinder, or one with r1 and r2 infinite, found h = inf, r1 = 1, r2 = 1",
+        ),
+        ("cube(size = [1, 2]);".into(), "1:13: expected three positive numbers as size of cube, found a list of 2"),
+        ("cube(size = [0, 1, 1]);".into(), "1:14: expected a positive number as size of cube, found 0"),
+        (
+            "cube(1, center = 7.5);cube(1, center = \"a\");".into(),
+            "1:40: expected true or false as center of cube, found the string \"a\"",
+        ),
+        ("cube(1) { sphere(1); }".into(), "1:1: expected nothing inside of cube, found calls"),
+        ("cube(1)".into(), "1:8: expected \";\" or \"{\", found the end of the file"),
+        ("cube(1;".into(), "1:7: expected \",\" or \")\", found \";\""),
+        ("cube(size 1);".into(), "1:11: expected \"=\" after size, found the number 1"),
+        ("cube(size = );".into(), "1:13: expected a value, found \")\""),
+        ("cube(size = [1 2]);".into(), "1:16: expected \",\" or \"]\", found the number 2"),
+        ("cube(size = -x);".into(), "1:14: expected a number, found \"x\""),
+        ("x = 3;".into(), "1:3: expected \"(\", found \"=\""),
+        ("}".into(), "1:1: expected a call such as union() or cube(…), found \"}\""),
+        ("%".into(), "1:2: expected a call such as union() or cube(…), found the end of the file"),
+        ("union() {\n\nsphere(1);".into(), "3:11: expected \"}\" closing line 1, found the end of the file"),
+        ("circle(r = 1);".into(), "1:1: expected a solid, found the 2D shape circle outside of linear_extrude"),
+        (
+            "linear_extrude(height = 1) { cube(1); }".into(),
+            "1:30: expected a 2D shape inside of linear_extrude, found cube",
+        ),
+        (
+            "linear_extrude(height = 1, twist = 5) { circle(1); }".into(),
+            "1:1: expected a supported construct, found twist of linear_extrude, which is not supported",
+        ),
+        (
+            "linear_extrude(height = 0) { circle(1); }".into(),
+            "1:25: expected a positive number as height of linear_extrude, found 0",
+        ),
+        (
+            "linear_extrude(height = 1, scale = [1, 2]) { circle(1); }".into(),
+            "1:46: expected a supported construct, found non-uniform scale of linear_extrude on a circle, which is not supported",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[0.2,0.2],[0,2]]); }".into(),
+            "1:30: expected a supported construct, found a polygon that is not convex, which is not supported",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[0,2]], paths = [[0,1,2],[0,2,1]]); }".into(),
+            "1:76: expected a supported construct, found a polygon of several paths, which is not supported",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[1,0]]); }".into(),
+            "1:30: expected a polygon with an area, found none",
+        ),
+        (
+            under("[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]", "sphere(1);"),
+            "1:72: expected a supported construct, found non-uniform scale on a sphere, which is not supported",
+        ),
+        (
+            under("[1, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]", "cylinder(1, 1, 1);"),
+            "1:74: expected a supported construct, found shear on a cylinder, which is not supported",
+        ),
+        (
+            under("[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]", "sphere(1);"),
+            "1:12: expected a matrix that keeps volumes, found one that flattens them",
+        ),
+        (under("[1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:13: expected a row of 4 numbers, found a list of 3"),
+        (under("[1, 0, 0, nan], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:23: expected a finite number, found nan"),
+        ("multmatrix() { }".into(), "1:1: expected a 4×4 matrix as m of multmatrix, found none"),
+        (
+            "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,1,0,1]]) { }".into(),
+            "1:43: expected the row [0, 0, 0, 1], found a list of 4",
+        ),
+        (
+            format!("polyhedron(points = {cube_points}, faces = {});", cube_faces.replace("[3,7,6,2]", "[2,6,7,3]")),
+            "1:1: expected a closed convex polyhedron, found mixed orientation: two faces run along the edge from point 2 \
+             to point 6 in the same direction",
+        ),
+        (
+            format!("polyhedron(points = {cube_points}, faces = {});", cube_faces.replace("[3,7,6,2],", "")),
+            "1:1: expected a closed convex polyhedron, found an open mesh: the edge between points 2 and 6 belongs to one \
+             face only",
+        ),
+        (
+            format!("polyhedron(points = {dented}, faces = {triangles});"),
+            "1:1: expected a closed convex polyhedron, found a non-convex polyhedron: point 2 lies 4.685e-1 outside of face 2",
+        ),
+        (
+            "polyhedron(points = [[0, 0, 0]], faces = [[0, 1, 2]]);".into(),
+            "1:47: expected an index below 1 as faces of polyhedron, found 1",
+        ),
+        (
+            "polyhedron(points = [], faces = []);".into(),
+            "1:1: expected a closed convex polyhedron, found a polyhedron without volume",
+        ),
+        ("cube(1e300);sphere(1e999);".into(), "1:20: expected a number that a double can hold, found \"1e999\""),
+    ];
+    for (text, sentence) in table {
+        let error = refused(&text);
+        let expected = format!("m.csg:{sentence}");
+        assert!(error.starts_with(&expected), "{text}\n  said    {error}\n  not     {expected}");
+        assert!(!error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn limits_are_named() {
+    let limits = Limits { text: 1000, nodes: 5, depth: 3, faces: 20, polyhedron_faces: 6, values: 8 };
+    let table = [
+        (" ".repeat(1001), "m.csg:1:1: expected at most 1000 bytes of text, found more"),
+        ("group();".repeat(6), "m.csg:1:41: expected at most 5 nodes, found more"),
+        ("group() {".repeat(4), "m.csg:1:36: expected at most 3 levels of nesting, found more"),
+        ("cube(1);".repeat(4), "m.csg:1:25: expected at most 20 faces, found more"),
+        ("sphere(1, $fn = 7);".into(), "m.csg:1:1: expected at most 6 faces of a primitive, found more"),
+        ("cube([1,2,3,4,5,6,7,8,9]);".into(), "m.csg:1:6: expected at most 8 values in a list, found more"),
+        (
+            "cube([[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]);".into(),
+            "m.csg:1:22: expected at most 16 nested brackets, found more",
+        ),
+    ];
+    for (text, sentence) in table {
+        let facets = if text.contains("$fn") { Facets::AsWritten } else { Facets::Auto };
+        match import_csg("m.csg", &text, facets, &limits) {
+            Err(e) => assert_eq!(e.to_string(), sentence),
+            Ok(_) => panic!("{text} was read"),
+        }
+    }
+}
+
+#[test]
+fn depth_costs_no_stack() {
+    let deep = 200_000;
+    let text = format!("{}sphere(1);{}", "union() {".repeat(deep), "}".repeat(deep));
+    let limits = Limits { depth: deep, ..Limits::default() };
+    let small_stack = std::thread::Builder::new().stack_size(256 << 10);
+    let thread =
+        small_stack.spawn(move || import_csg("m.csg", &text, Facets::Auto, &limits).map(|i| i.solid.nodes.len()));
+    let nodes = thread.expect("a thread").join().expect("no overflow").expect("readable");
+    assert_eq!(nodes, 1);
+}
+
+/// Texts to mutate: all constructs.
+const SEEDS: [&str; 4] = [
+    "difference() { cube(size = [1, 2, 3], center = true); multmatrix([[0, -1, 0, 1e-5], [1, 0, 0, 2], [0, 0, 1, 3], \
+     [0, 0, 0, 1]]) { cylinder($fn = 6, $fa = 12, $fs = 2, h = 3, r1 = 1, r2 = 0.5, center = false); } }",
+    "intersection() { sphere(r = 2, $fn = 5); cube(size = [inf, inf, 1], center = true); %group(); #sphere(1); }",
+    "linear_extrude(height = 3, center = true, scale = [2, 2]) { difference() { polygon(points = [[0, 0], [2, 0], [0, 2]], \
+     paths = [[0, 1, 2]]); circle(r = 0.2, $fn = 4); } }",
+    "color([1, 0, 0, 1]) { polyhedron(points = [[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]], faces = \
+     [[0,4,2],[0,2,5],[0,3,4],[0,5,3],[1,2,4],[1,5,2],[1,4,3],[1,3,5]], convexity = 1); } // end",
+];
+
+/// Reads a text in every way; what loads must be a solid that can be asked.
+fn survives(text: &str) -> bool {
+    let limits = Limits { polyhedron_faces: 500, ..Limits::default() };
+    let mut loaded = false;
+    for facets in [Facets::Exact, Facets::Auto, Facets::AsWritten] {
+        if let Ok(import) = import_csg("m.csg", text, facets, &limits) {
+            assert!(!import.solid.value(DVec3::new(0.1, 0.2, 0.3)).is_nan(), "{text}");
+            let leaves = import.solid.nodes.iter().filter(|n| matches!(n, Node::Primitive(_))).count();
+            assert_eq!(leaves, import.solid.primitives.len(), "every primitive stands at one leaf: {text}");
+            loaded = true;
+        }
+    }
+    loaded
+}
+
+#[test]
+fn seeds_load() {
+    assert!(SEEDS.iter().all(|s| survives(s)));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_text_is_read_or_refused(text in "\\PC{0,200}") {
+        survives(&text);
+    }
+
+    #[test]
+    fn any_tokens_are_read_or_refused(tokens in prop::collection::vec(0usize..24, 0..60)) {
+        const TOKENS: [&str; 24] = [
+            "union", "(", ")", "{", "}", ";", "[", "]", ",", "=", "-", "1", "0.5", "inf", "nan", "undef", "true", "sphere",
+            "cube", "!", "%", "linear_extrude", "height", "\"",
+        ];
+        survives(&tokens.iter().map(|t| TOKENS[*t]).collect::<Vec<_>>().join(" "));
+    }
+
+    #[test]
+    fn mutated_files_are_read_or_refused(
+        seed in 0..SEEDS.len(),
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0usize..5, 0usize..16), 1..6),
+    ) {
+        const INSERTS: [&str; 16] =
+            ["0", "9", "-", "e", ".", "[", "]", "(", ")", "{", "}", ",", ";", "1e308", "inf", "nan"];
+        let mut text = SEEDS[seed].to_owned();
+        for (place, edit, insert) in edits {
+            let at = place.index(text.len() + 1);
+            match edit {
+                0 if at < text.len() => { text.remove(at); }
+                1 => text.truncate(at),
+                _ => text.insert_str(at, INSERTS[insert]),
+            }
+        }
+        survives(&text);
+    }
+}

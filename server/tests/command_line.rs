@@ -1,0 +1,129 @@
+//! The binary as users call it: output, sentences, exit status.
+#![allow(missing_docs)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const BALL: &str = "sphere($fn = 0, $fa = 12, $fs = 2, r = 1);\n";
+
+/// Two unit balls four apart; b moves by `travel` towards a.
+fn scene(travel: f64) -> String {
+    format!(
+        "[[model]]\nname = \"ball\"\nfile = \"ball.csg\"\n[[object]]\nname = \"a\"\nmodel = \"ball\"\nmotion = \"static\"\n\
+         [[object]]\nname = \"b\"\nmodel = \"ball\"\nstart = {{ position = [4, 0, 0] }}\nend = {{ position = [{}, 0, 0] }}\n",
+        4.0 - travel
+    )
+}
+
+fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    folder
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_contactd")).current_dir(folder).args(arguments).output().expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("UTF-8")
+}
+
+#[test]
+fn check_answers_in_json_and_in_a_table() {
+    let folder = folder(&[("ball.csg", BALL), ("s.toml", &scene(4.0))]);
+    let out = run(folder.path(), &["check", "s.toml", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    assert_eq!(text(&out.stdout).lines().count(), 1);
+    let answer: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    let pair = &answer["pairs"][0];
+    assert_eq!(answer["pairs"].as_array().map(Vec::len), Some(1));
+    assert_eq!((&pair["a"], &pair["b"], &pair["status"]), (&"a".into(), &"b".into(), &"contact".into()));
+    assert!((pair["time"].as_f64().expect("a time") - 0.5).abs() < 1e-12);
+    assert_eq!(pair["features"]["a"][0]["name"], "sphere");
+    assert_eq!(answer["safe_time"], pair["time_lower"]);
+    let out = run(folder.path(), &["check", "s.toml", "--explain"]);
+    assert_eq!(out.status.code(), Some(0));
+    for word in ["0.500000000", "contact", "surface of sphere 0 on a", "safe time", "cells"] {
+        assert!(text(&out.stdout).contains(word), "{word} in {}", text(&out.stdout));
+    }
+}
+
+#[test]
+fn a_clear_pair_has_nulls_and_first_leaves_it_out_beside_a_contact() {
+    let apart = scene(1.0);
+    let three = format!(
+        "{}[[object]]\nname = \"c\"\nmodel = \"ball\"\nstart = {{ position = [0, 9, 0] }}\nend = {{ position = [0, 8, 0] }}\n",
+        scene(4.0)
+    );
+    let folder = folder(&[("ball.csg", BALL), ("apart.toml", &apart), ("three.toml", &three)]);
+    let answer = |arguments: &[&str]| -> serde_json::Value {
+        serde_json::from_slice(&run(folder.path(), arguments).stdout).expect("JSON")
+    };
+    let clear = &answer(&["check", "apart.toml", "--json"])["pairs"][0];
+    assert_eq!(clear["status"], "clear");
+    for field in ["point", "normal", "separation", "normal_speed", "kind", "extent", "features"] {
+        assert!(clear[field].is_null(), "{field}");
+    }
+    assert_eq!(answer(&["check", "three.toml", "--json"])["pairs"].as_array().map(Vec::len), Some(3));
+    let first = answer(&["check", "three.toml", "--json", "--first"]);
+    assert_eq!(first["pairs"].as_array().map(Vec::len), Some(1));
+    assert_eq!(first["pairs"][0]["b"], "b");
+}
+
+#[test]
+fn bad_input_is_one_line_and_status_2() {
+    let unknown = scene(4.0).replace("model = \"ball\"\nmotion", "model = \"bat\"\nmotion");
+    let folder = folder(&[
+        ("ball.csg", BALL),
+        ("good.toml", &scene(4.0)),
+        ("unknown.toml", &unknown),
+        ("hull.csg", "union() {\n  hull();\n}\n"),
+        ("hull.toml", &scene(4.0).replace("ball.csg", "hull.csg")),
+        ("lost.toml", &scene(4.0).replace("ball.csg", "lost.csg")),
+    ]);
+    std::fs::write(folder.path().join("bytes.csg"), b"cube(\xff1);").expect("a file");
+    let table: [(&[&str], &str); 7] = [
+        (&["check", "unknown.toml"], "unknown.toml:6:9: expected the name of a model, found \"bat\""),
+        (&["check", "hull.toml"], "hull.csg:2:3: expected a supported construct, found hull, which is not supported"),
+        (&["inspect", "hull.csg"], "hull.csg:2:3: expected a supported construct, found hull, which is not supported"),
+        (&["inspect", "bytes.csg"], "bytes.csg:1:6: expected text in UTF-8, found the byte 0xff"),
+        (&["check", "lost.toml"], "lost.toml:3:8: expected a model file, found lost.csg: "),
+        (&["check", "none.toml"], "none.toml: expected a readable file, found "),
+        (&["check", "good.toml", "--resolution", "0.6"], "good.toml: the resolution is not a positive length"),
+    ];
+    for (arguments, sentence) in table {
+        let out = run(folder.path(), arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&out.stderr).starts_with(sentence), "{arguments:?}: {}", text(&out.stderr));
+        assert_eq!(text(&out.stderr).lines().count(), 1, "{}", text(&out.stderr));
+        assert!(out.stdout.is_empty());
+    }
+    assert_eq!(run(folder.path(), &["check", "good.toml", "--resolution", "-1"]).status.code(), Some(2));
+    assert_eq!(run(folder.path(), &["inspect", "ball.csg", "--facets", "some"]).status.code(), Some(2));
+}
+
+#[test]
+fn inspect_tells_what_was_imported_and_how() {
+    let model = "difference() {\n  cube(size = [4, 4, 1], center = true);\n  cylinder($fn = 6, h = 2, r1 = 1, r2 = 1, center = true);\n}\n";
+    let folder = folder(&[("m.csg", model), ("ball.csg", BALL), ("s.toml", &scene(4.0))]);
+    let out = run(folder.path(), &["inspect", "m.csg"]);
+    assert_eq!(out.status.code(), Some(0));
+    for line in [
+        "m.csg",
+        "  2 primitives, 14 faces, 3 nodes, 2 levels",
+        "         1 polyhedron (1 subtracted)",
+        "  note: 3:3: cylinder taken as OpenSCAD's polyhedron of 6 sides",
+        "    difference",
+        "      0 cube box 4 x 4 x 1 at 2:3",
+        "      1 cylinder polyhedron 8 faces at 3:3",
+    ] {
+        assert!(text(&out.stdout).lines().any(|l| l == line), "{line:?} in\n{}", text(&out.stdout));
+    }
+    let exact = run(folder.path(), &["inspect", "m.csg", "--facets", "exact"]);
+    assert!(text(&exact.stdout).contains("1 cylinder r 1, h 2 at 3:3"), "{}", text(&exact.stdout));
+    let scene = run(folder.path(), &["inspect", "s.toml"]);
+    assert!(text(&scene.stdout).contains("  object b: model ball, group default, translating"));
+}
