@@ -11,7 +11,7 @@ use super::place::{self, Placed};
 use super::syntax::{Call, CallId, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
 use crate::import::Note;
-use crate::math::{Aabb, tolerance::SIMILARITY};
+use crate::math::tolerance::SIMILARITY;
 use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -415,8 +415,8 @@ impl<'a> Lowering<'a> {
         if self.faces > self.limits.faces {
             return Err((call.at, Problem::Limit { what: "faces", limit: self.limits.faces }));
         }
-        let aabb = geometry.aabb(&frame);
-        if !frame.position.is_finite() || (aabb.is_empty() && aabb != Aabb::ALL) {
+        let bounded = matches!(shape, Shape::HalfSpace(_)) || geometry.aabb(&frame).is_finite();
+        if !(bounded && frame.position.is_finite()) {
             return Err((call.at, Problem::syntax("coordinates that a double can hold", "an overflow")));
         }
         for text in notes {

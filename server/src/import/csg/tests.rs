@@ -115,6 +115,17 @@ fn low_fn_gives_openscads_own_prisms() {
     assert_eq!(low.notes[0].to_string(), "1:1: cylinder taken as OpenSCAD's polyhedron of 6 sides");
 }
 
+fn kind_of(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Sphere(_) => "sphere",
+        Shape::Cylinder(_) => "cylinder",
+        Shape::Cone(_) => "cone",
+        Shape::Cuboid(_) => "box",
+        Shape::Polyhedron(_) => "polyhedron",
+        Shape::HalfSpace(_) => "half-space",
+    }
+}
+
 /// `inner` under a matrix given by its upper rows.
 fn under(rows: &str, inner: &str) -> String {
     format!("multmatrix([{rows}, [0, 0, 0, 1]]) {{ {inner} }}")
@@ -125,7 +136,7 @@ fn transforms_keep_kinds_where_they_can() {
     let kind = |text: &str| {
         let solid = import(text).solid;
         let p = &solid.primitives[0];
-        (crate::inspect::kind(&p.shape), p.aabb.max - p.aabb.min)
+        (kind_of(&p.shape), p.aabb.max - p.aabb.min)
     };
     let scaled = |x: f64, y: f64, z: f64| format!("[{x}, 0, 0, 0], [0, {y}, 0, 0], [0, 0, {z}, 0]");
     let cases = [
@@ -349,6 +360,10 @@ fn every_refusal_is_a_sentence_with_its_place() {
         (
             "polyhedron(points = [], faces = []);".into(),
             "1:1: expected a closed convex polyhedron, found a polyhedron without volume",
+        ),
+        (
+            under("[1e99, 0, 0, 0], [0, 1e99, 0, 0], [0, 0, 1e99, 0]", "cube(1e250);"),
+            "1:81: expected coordinates that a double can hold, found an overflow",
         ),
         ("cube(1e300);sphere(1e999);".into(), "1:20: expected a number that a double can hold, found \"1e999\""),
     ];
