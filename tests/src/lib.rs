@@ -1,6 +1,8 @@
 //! Independent truth and harnesses shared by the integration tests.
 #![forbid(unsafe_code)]
 
+pub mod engine;
+pub mod judge;
 pub mod openscad;
 pub mod random_solids;
 pub mod reference;
