@@ -146,7 +146,7 @@ fn no_pair_of_surfaces_that_meets_is_missed() {
         };
         let fine = Detail { finest: 0.02 * a.radius, ..Detail::default() };
         let detail = [Detail::default(), fine, Detail { node_pairs: 500, ..fine }][i % 3];
-        let walk = Walk::new((&a, pa), (&b, pb), (i % 5 > 0).then_some(&region), margin, detail);
+        let walk = Walk::new((&a, pa), (&b, pb), (i % 5 > 0).then(|| region.clone().into()), margin, detail);
         let found = walk.candidates();
         let mut sorted = found.pairs.clone();
         sorted.dedup();
@@ -197,8 +197,13 @@ fn a_peg_in_its_hole_is_an_n_pair_that_names_the_plate_too() {
     let region = region_of(&plate, still(), &peg, down, 1e-9).expect("they are close");
     let all = plate.solid.primitives.len() * peg.solid.primitives.len();
     for (finest, most) in [(f64::INFINITY, 3), (0.02, 3)] {
-        let walk =
-            Walk::new((&plate, still()), (&peg, down), Some(&region), 1e-9, Detail { finest, ..Detail::default() });
+        let walk = Walk::new(
+            (&plate, still()),
+            (&peg, down),
+            Some(region.clone().into()),
+            1e-9,
+            Detail { finest, ..Detail::default() },
+        );
         let found = walk.candidates();
         println!("peg: {all} pairs, p/n/nn {:?} after {} node pairs", found.count(), found.node_pairs);
         assert!(found.pairs.len() <= most);

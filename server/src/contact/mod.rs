@@ -17,5 +17,5 @@ mod stage2;
 mod tests;
 
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
-pub use pair::{Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, default_resolution, earliest_contact};
+pub use pair::{Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact};
 pub use search::Scratch;

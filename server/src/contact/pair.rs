@@ -4,7 +4,6 @@ use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
 use super::search::{Ending, Found, Scratch, Search, Task};
-use crate::bound::pair::{Side as Side1, locate};
 use crate::eco::Model;
 use crate::math::tolerance;
 use crate::motion::{Placed, Relative};
@@ -62,69 +61,98 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 }
 
 /// Searches a pair to its end.
-pub fn earliest_contact<'a>(query: &PairQuery<'a>, scratch: &mut Scratch) -> Outcome {
-    let (a, b) = (&query.a.model.solid, &query.b.model.solid);
-    if a.is_empty() || b.is_empty() {
-        return Outcome::clear(query.resolution);
-    }
-    let relative = Relative::new(query.a.placed, query.b.placed);
-    let (ball_a, ball_b) = (query.a.model.bounds.root().ball, query.b.model.bounds.root().ball);
-    let scale = query.a.model.radius.max(query.b.model.radius);
-    // Positions, matrices and faces are each right to a few units in the last place of the pair's extent.
-    let extent = ball_a.center.length() + ball_b.center.length() + 2.0 * scale + relative.center_a().length();
-    let mut outcome = Outcome::clear(query.resolution);
-    outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
-    let region = if query.ideas.region {
-        let side = |q: &Body<'a>| Side1 { solid: &q.model.solid, bounds: &q.model.bounds, placed: q.placed };
-        match locate(&side(&query.a), &side(&query.b), 0.0, 1.0, 2.0 * query.resolution) {
-            Some(region) => {
-                outcome.counters.after_stage1 = (region.a.primitives + region.b.primitives) as u64;
-                Some(region)
-            }
-            None => return outcome,
-        }
-    } else {
-        outcome.counters.after_stage1 = outcome.counters.primitives;
-        None
-    };
-    let task = Task {
-        a,
-        b,
-        model_a: query.a.model,
-        model_b: query.b.model,
-        region: region.as_ref(),
-        ideas: query.ideas,
-        relative: &relative,
-        delta: query.resolution,
-        rounding: 32.0 * f64::EPSILON * extent,
-        scale,
-        still: false,
-        limit: query.cell_limit,
-    };
-    for level in [1.0, 2.0] {
-        let task = Task { delta: level * query.resolution, ..task };
-        let mut search = Search::new(task, scratch);
-        search.start();
-        let ending = search.run(f64::INFINITY).expect("a search without a horizon ends");
-        outcome.counters += search.counters;
-        match ending {
-            Ending::Clear => {}
-            Ending::Contact(found) => fill_contact(&mut outcome, &task, &found),
-            Ending::Limit(t) => {
-                outcome.status = Status::Undecided;
-                outcome.time_lower = t;
-            }
-            Ending::Deep(x) => {
-                outcome.touching = true;
-                if level == 1.0 {
-                    continue;
-                }
-                fill_overlap(&mut outcome, &task, x);
-            }
-        }
-        break;
-    }
+pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
+    let mut search = PairSearch::new(query, std::mem::take(scratch));
+    let outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
+    *scratch = search.into_scratch();
     outcome
+}
+
+/// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
+/// further than the earliest contact known.
+pub struct PairSearch<'a> {
+    task: Task<'a>,
+    /// 1 or 2: the depth that is searched, in resolutions.
+    level: f64,
+    search: Option<Search<'a>>,
+    outcome: Outcome,
+    resolution: f64,
+}
+
+impl<'a> PairSearch<'a> {
+    /// Prepares the search of a pair.
+    pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
+        let (model_a, model_b) = (query.a.model, query.b.model);
+        let (a, b) = (&model_a.solid, &model_b.solid);
+        let relative = Relative::new(query.a.placed, query.b.placed);
+        let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
+        let scale = model_a.radius.max(model_b.radius);
+        // Positions, matrices and faces are each right to a few units in the last place of the pair's extent.
+        let extent = ball_a.center.length() + ball_b.center.length() + 2.0 * scale + relative.center_a().length();
+        let task = Task {
+            a,
+            b,
+            model_a,
+            model_b,
+            ideas: query.ideas,
+            relative,
+            delta: query.resolution,
+            rounding: 32.0 * f64::EPSILON * extent,
+            scale,
+            still: false,
+            limit: query.cell_limit,
+        };
+        let mut outcome = Outcome::clear(query.resolution);
+        outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
+        let mut search = Search::new(task, scratch);
+        if !a.is_empty() && !b.is_empty() {
+            search.start();
+        }
+        Self { task, level: 1.0, search: Some(search), outcome, resolution: query.resolution }
+    }
+
+    /// No contact of this pair is earlier; infinite when nothing is left to search.
+    pub fn earliest(&self) -> f64 {
+        self.search.as_ref().map_or(f64::INFINITY, Search::earliest)
+    }
+
+    /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
+    pub fn run(&mut self, until: f64) -> Option<Outcome> {
+        loop {
+            let search = self.search.as_mut()?;
+            let ending = search.run(until)?;
+            self.outcome.counters += search.counters;
+            search.counters = Default::default();
+            match ending {
+                Ending::Clear => {}
+                Ending::Contact(found) => fill_contact(&mut self.outcome, &self.task, &found),
+                Ending::Limit(t) => {
+                    self.outcome.status = Status::Undecided;
+                    self.outcome.time_lower = t;
+                }
+                Ending::Deep(x) => {
+                    self.outcome.touching = true;
+                    if self.level == 1.0 {
+                        // A body that was stopped at its contact starts at depth 0 ± rounding: search at twice the depth.
+                        self.level = 2.0;
+                        self.task.delta = 2.0 * self.resolution;
+                        let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
+                        let mut search = Search::new(self.task, scratch);
+                        search.start();
+                        self.search = Some(search);
+                        continue;
+                    }
+                    fill_overlap(&mut self.outcome, &self.task, x);
+                }
+            }
+            return Some(self.outcome);
+        }
+    }
+
+    /// Ends the search and gives its memory back.
+    pub fn into_scratch(self) -> Scratch {
+        self.search.map(Search::into_scratch).unwrap_or_default()
+    }
 }
 
 fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
@@ -139,7 +167,7 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let problem = Problem {
         a: Faces { solid: task.a, guards: &[] },
         b: Faces { solid: task.b, guards: &[] },
-        relative: task.relative,
+        relative: &task.relative,
         scale: task.scale,
         time_scale: 1.0,
         tolerance: task.rounding,

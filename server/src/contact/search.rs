@@ -16,8 +16,8 @@ use super::newton::{Constraint, Problem, Solution};
 use super::outcome::Counters;
 use super::pair::Ideas;
 use super::stage2::Stage2;
-use crate::bound::Region;
 use crate::eco::Model;
+use crate::math::Aabb;
 use crate::motion::{Instant, Relative};
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::{Face, Sense, Solid};
@@ -28,14 +28,24 @@ use std::collections::BinaryHeap;
 /// An expression in the token pool; `start == end` means true everywhere.
 pub(super) type Range = (u32, u32);
 
-/// "Not a pair of octree nodes" in `Cell::pair`.
-pub(super) const NO_PAIR: u32 = u32::MAX;
+/// What an item of the queue is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A cell of stage 3.
+    Cell,
+    /// A slice of time for stage 1.
+    Slice,
+    /// A pair of octree nodes for stage 2, by its index.
+    Pair(u32),
+}
 
-/// A box fixed in A with what is left there of both trees, or with the pair of octree nodes it stands for.
+/// An item: a box fixed in A with what is left there of both trees, or what such boxes come from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     /// Proven free of contact before this time.
     pub t: f64,
+    /// End of the slice of time that it stands for.
+    pub until: f64,
     /// Order of creation: ties in time are popped in this order.
     pub serial: u64,
     pub center: DVec3,
@@ -48,13 +58,29 @@ pub(super) struct Cell {
     pub b_until: f64,
     /// Length of a look ahead in units of radius / speed.
     pub reach: f64,
-    /// Index of the pair of octree nodes it stands for; its expressions are then the voxels' only.
-    pub pair: u32,
+    /// What it is; only cells have a box and expressions.
+    pub source: Source,
 }
 
 impl Cell {
-    pub(super) fn new(t: f64, center: DVec3, half: DVec3, a: Range, b: Range, pair: u32) -> Self {
-        Self { t, serial: 0, center, half, a, b_always: b, b, b_until: f64::INFINITY, reach: 1.0, pair }
+    pub(super) fn new((t, until): (f64, f64), region: &Aabb, a: Range, b: Range) -> Self {
+        Self {
+            t,
+            until,
+            serial: 0,
+            center: region.center(),
+            half: region.half(),
+            a,
+            b_always: b,
+            b,
+            b_until: f64::INFINITY,
+            reach: 1.0,
+            source: Source::Cell,
+        }
+    }
+
+    pub(super) fn source(t: f64, until: f64, source: Source) -> Self {
+        Self { source, ..Self::new((t, until), &Aabb::around(DVec3::ZERO, DVec3::ZERO), (0, 0), (0, 0)) }
     }
 }
 
@@ -111,12 +137,10 @@ pub struct Task<'a> {
     pub model_a: &'a Model,
     /// B's octree and bounds.
     pub model_b: &'a Model,
-    /// What stage 1 left of both, `None` where it is switched off.
-    pub region: Option<&'a Region>,
     /// Ideas of the search that are switched on.
     pub ideas: Ideas,
     /// Motion of the pair.
-    pub relative: &'a Relative,
+    pub relative: Relative,
     /// Depth at which a contact is decided.
     pub delta: f64,
     /// What rounding may do to one bound.
@@ -150,9 +174,9 @@ pub struct Scratch {
 }
 
 /// A search in progress.
-pub struct Search<'a, 's> {
+pub struct Search<'a> {
     pub(super) task: Task<'a>,
-    pub(super) scratch: &'s mut Scratch,
+    pub(super) scratch: Scratch,
     pub(super) stage2: Stage2<'a>,
     serial: u64,
     found: Option<Found>,
@@ -161,9 +185,9 @@ pub struct Search<'a, 's> {
     pub counters: Counters,
 }
 
-impl<'a, 's> Search<'a, 's> {
-    /// A search without roots; see `root`.
-    pub fn new(task: Task<'a>, scratch: &'s mut Scratch) -> Self {
+impl<'a> Search<'a> {
+    /// A search with an empty queue; see `start`.
+    pub fn new(task: Task<'a>, mut scratch: Scratch) -> Self {
         scratch.heap.clear();
         scratch.pool.clear();
         scratch.guards_b.clear();
@@ -182,11 +206,9 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Adds a root: the box [center ± half] of A, in which A is `a` and B is `b`.
-    pub fn root(&mut self, center: DVec3, half: DVec3, a: &[Token], b: &[Token]) {
-        let a = self.store(a);
-        let b = self.store(b);
-        self.push(Cell::new(0.0, center, half, a, b, NO_PAIR));
+    /// Ends the search and gives its memory back.
+    pub fn into_scratch(self) -> Scratch {
+        self.scratch
     }
 
     pub(super) fn store(&mut self, tokens: &[Token]) -> Range {
@@ -242,22 +264,29 @@ impl<'a, 's> Search<'a, 's> {
         }
         let at = self.instant;
         let start = cell.t == 0.0;
-        let is_pair = cell.pair != NO_PAIR;
-        if is_pair && self.stage2.is_idle(cell.pair, start) {
-            return None;
+        match cell.source {
+            Source::Cell => {}
+            Source::Slice => {
+                self.locate(&cell);
+                return None;
+            }
+            Source::Pair(index) => {
+                self.open(&cell, index);
+                return None;
+            }
         }
-        if cell.a.0 == cell.a.1 && !start && !is_pair {
+        if cell.a.0 == cell.a.1 && !start {
             return None;
         }
         let radius = cell.half.length();
         let x_max = (cell.center - at.center_a).length() + radius;
-        let end = if self.task.still { 0.0 } else { self.goal().min(1.0) - cell.t };
+        let end = if self.task.still { 0.0 } else { self.goal().min(cell.until) - cell.t };
         // Speed bounds need a span, the span a speed: take the whole rest first, then cut.
         let whole = self.task.relative.bounds(cell.t, end, x_max);
         let h = if whole.speed * end > cell.reach * radius { cell.reach * radius / whole.speed } else { end };
         let motion = if h < end { self.task.relative.bounds(cell.t, h, x_max) } else { whole };
 
-        let scratch = &mut *self.scratch;
+        let scratch = &mut self.scratch;
         let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
         let hints: &[Hint] = if self.task.ideas.hints { &scratch.hints } else { &[] };
         let view = View {
@@ -288,21 +317,6 @@ impl<'a, 's> Search<'a, 's> {
             }
         };
         let b_full = b.0 == b.1;
-        if is_pair {
-            // Two voxels: free until they may meet, then opened.
-            let pair = clause::Pair { pool, a: (0, 0), b };
-            let free = if b_full {
-                0.0
-            } else {
-                clause::advance(&view, &pair, &[], self.task.rounding, 0.0, clause_scratch).dt
-            };
-            if free > 0.05 * end {
-                self.again(cell, free, end, free >= h);
-            } else {
-                self.open(&cell);
-            }
-            return None;
-        }
         if b_full && !start {
             self.again(cell, h, end, true);
             return None;
@@ -407,7 +421,7 @@ impl<'a, 's> Search<'a, 's> {
         Problem {
             a: Faces { solid: self.task.a, guards: &[] },
             b: Faces { solid: self.task.b, guards: &[] },
-            relative: self.task.relative,
+            relative: &self.task.relative,
             scale: self.task.scale,
             time_scale: (self.task.scale / speed.max(f64::MIN_POSITIVE)).min(1.0),
             tolerance: 2.0 * self.task.rounding,

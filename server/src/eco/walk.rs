@@ -20,6 +20,7 @@ use crate::bound::{Pruned, Region};
 use crate::motion::Placed;
 use crate::solid::{Sense, Solid};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 
 /// A surface that takes part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -121,12 +122,12 @@ pub enum Next<'m> {
 }
 
 /// A walk of two models' octrees over a step.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Walk<'m> {
     a: &'m Model,
     b: &'m Model,
     approach: Approach,
-    region: Option<&'m Region>,
+    region: Option<Arc<Region>>,
     margin: f64,
     detail: Detail,
 }
@@ -137,7 +138,7 @@ impl<'m> Walk<'m> {
     pub fn new(
         (a, pa): (&'m Model, Placed),
         (b, pb): (&'m Model, Placed),
-        region: Option<&'m Region>,
+        region: Option<Arc<Region>>,
         margin: f64,
         detail: Detail,
     ) -> Self {
@@ -145,22 +146,22 @@ impl<'m> Walk<'m> {
         Self { a, b, approach, region, margin, detail }
     }
 
-    /// The pair of roots, if they can meet.
-    pub fn root(&self) -> Option<NodePair<'m>> {
-        self.timed(NodePair { a: self.a.eco.root(), b: self.b.eco.root(), time: 0.0 })
+    /// The pair of roots, if they can meet in [start, end].
+    pub fn root(&self, start: f64, end: f64) -> Option<NodePair<'m>> {
+        self.timed(NodePair { a: self.a.eco.root(), b: self.b.eco.root(), time: start }, end)
     }
 
-    /// The pair with its time moved up to the earliest at which the two can meet; `None` when they cannot.
-    pub fn timed(&self, pair: NodePair<'m>) -> Option<NodePair<'m>> {
+    /// The pair with its time moved up to the earliest at which the two can meet; `None` when they cannot until `end`.
+    pub fn timed(&self, pair: NodePair<'m>, end: f64) -> Option<NodePair<'m>> {
         let (a, b) = (pair.a, pair.b);
         let outside = |p: &Pruned, n: &Node| !p.aabb.meets(&n.aabb().grown(self.margin));
         if a.kind() == Kind::Empty || b.kind() == Kind::Empty {
             return None;
         }
-        if self.region.is_some_and(|r| outside(&r.a, a) || outside(&r.b, b)) {
+        if self.region.as_ref().is_some_and(|r| outside(&r.a, a) || outside(&r.b, b)) {
             return None;
         }
-        let time = self.approach.earliest((a.center, a.half), (b.center, b.half), pair.time, 1.0)?;
+        let time = self.approach.earliest((a.center, a.half), (b.center, b.half), pair.time, end)?;
         Some(NodePair { time, ..pair })
     }
 
@@ -198,7 +199,7 @@ impl<'m> Walk<'m> {
     /// that the limit on pairs cuts all branches at about the same depth.
     pub fn ends(&self) -> (Vec<NodePair<'m>>, usize) {
         let mut ends = vec![];
-        let mut queue: VecDeque<NodePair> = self.root().into_iter().collect();
+        let mut queue: VecDeque<NodePair> = self.root(0.0, 1.0).into_iter().collect();
         let mut count = 1;
         while let Some(pair) = queue.pop_front() {
             // Beyond the limit nothing is decomposed any more.
@@ -208,11 +209,11 @@ impl<'m> Walk<'m> {
                 Next::Pairs => ends.push(pair),
                 Next::SplitA(children) => {
                     count += children.len();
-                    queue.extend(children.iter().filter_map(|a| self.timed(NodePair { a, ..pair })));
+                    queue.extend(children.iter().filter_map(|a| self.timed(NodePair { a, ..pair }, 1.0)));
                 }
                 Next::SplitB(children) => {
                     count += children.len();
-                    queue.extend(children.iter().filter_map(|b| self.timed(NodePair { b, ..pair })));
+                    queue.extend(children.iter().filter_map(|b| self.timed(NodePair { b, ..pair }, 1.0)));
                 }
             }
         }
@@ -224,8 +225,8 @@ impl<'m> Walk<'m> {
         let (ends, node_pairs) = self.ends();
         let mut found: BTreeSet<Pair> = BTreeSet::new();
         for end in &ends {
-            for a in self.elements(&self.a.solid, end.a, self.region.map(|r| &r.a)) {
-                for b in self.elements(&self.b.solid, end.b, self.region.map(|r| &r.b)) {
+            for a in self.elements(&self.a.solid, end.a, self.region.as_ref().map(|r| &r.a)) {
+                for b in self.elements(&self.b.solid, end.b, self.region.as_ref().map(|r| &r.b)) {
                     found.insert(Pair { a, b });
                 }
             }

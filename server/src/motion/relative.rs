@@ -75,6 +75,11 @@ impl Relative {
         }
     }
 
+    /// The two placed models.
+    pub fn placed(&self) -> (Placed, Placed) {
+        (self.a, self.b)
+    }
+
     /// p_A − p_B at `t`, world axes.
     pub fn difference(&self, t: f64) -> DVec3 {
         self.d0 + self.v0 * t
