@@ -7,8 +7,8 @@ use contactd::motion::Placed;
 use contactd::solid::Solid;
 use contactd_proto::Pose;
 
-/// A fifth of the default limit: a test that needs more cells than this should be told so.
-pub const CELL_LIMIT: u64 = 200_000;
+/// Cells that a test may spend on a pair, far below the default: what needs more should be told so.
+pub const CELL_LIMIT: u64 = 30_000;
 
 /// Asks about two placed solids; `None` is the default resolution.
 pub fn ask_solids(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>) -> Outcome {

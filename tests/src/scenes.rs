@@ -165,6 +165,12 @@ impl Scene {
         reference::earliest_contact(moving(&a, self.motion_a), moving(&b, self.motion_b), self.delta(), effort)
     }
 
+    /// What the reference says, with more effort where its quick proof leaves a hundredth of the step or more open.
+    pub fn truth_with_care(&self) -> Truth {
+        let quick = self.truth(Effort::QUICK);
+        if quick.time - quick.lower < 0.01 { quick } else { self.truth(Effort::THOROUGH) }
+    }
+
     /// Fastest speed of any point of b relative to a, per step (a bound).
     pub fn speed(&self) -> f64 {
         let radius = |r: &Recipe| {
