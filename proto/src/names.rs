@@ -1,9 +1,10 @@
 //! Where a server and its clients find each other: service names, prefixes and folders.
 //!
-//! A server called S keeps its files under `RUNTIME/contactd/S`, RUNTIME being the user's own runtime folder. Each start
-//! of the server is an *incarnation* with a number, its epoch; its shared memory and its folder carry the epoch in their
-//! names, so nothing that a killed predecessor left half-made can stand in its way, and a client of the predecessor
-//! that still tidies up cannot touch it. The file `current` in the server's folder names the incarnation that serves.
+//! A server called S keeps its lock in `RUNTIME/contactd/S`, RUNTIME being the user's own runtime folder, and what
+//! iceoryx2 makes in a folder beside it that has a short name, since paths of sockets are short. Each start of the server
+//! is an *incarnation* with a number, its epoch; whatever it makes carries the epoch in its name, so nothing that a killed
+//! predecessor left half-made can stand in its way, and a client of the predecessor that still tidies up cannot touch
+//! it. The file `current` in the server's folder names the incarnation that serves.
 //!
 //! Invariant: every name that contactd makes in a shared place begins with [`Address::prefix`], which belongs to one
 //! user, one runtime folder and one server name, and is a prefix of no other server's.
@@ -58,6 +59,8 @@ pub struct Address {
     name: String,
     uid: u32,
     base: PathBuf,
+    /// Seven characters that stand for user, base and name where room is short.
+    code: String,
 }
 
 impl Address {
@@ -91,10 +94,13 @@ impl Address {
         if !base.is_absolute() {
             return Err(AddressError::Folder(base.into(), "the runtime folder must be an absolute path"));
         }
-        if base.as_os_str().len() > 128 {
-            return Err(AddressError::Folder(base.into(), "the runtime folder's path is longer than 128 bytes"));
+        if base.as_os_str().len() > LONGEST_BASE {
+            return Err(AddressError::Folder(base.into(), "longer than the 39 bytes that sockets' paths leave for it"));
         }
-        Ok(Self { name: name.into(), uid: own_uid(), base: base.into() })
+        let uid = own_uid();
+        let words = [&uid.to_le_bytes(), base.as_os_str().as_encoded_bytes(), name.as_bytes()];
+        let code = base32(fnv1a(&words.join(&0)) >> 29, 7);
+        Ok(Self { name: name.into(), uid, base: base.into(), code })
     }
 
     /// The server's name.
@@ -122,19 +128,19 @@ impl Address {
         self.folder().join("current")
     }
 
+    /// The folder in which iceoryx2 keeps the files and sockets of this server.
+    pub fn shared_folder(&self) -> PathBuf {
+        self.base.join(format!(".{}", self.code))
+    }
+
     /// What every shared memory name of this server begins with.
     pub fn prefix(&self) -> String {
-        format!("contactd_{}_{}_{:016x}_", self.uid, self.name, fnv1a(self.base.as_os_str().as_encoded_bytes()))
+        format!("ctd{}", self.code)
     }
 
-    /// Prefix of one incarnation's shared memory.
+    /// Prefix of one incarnation: 30 bits of its epoch, which repeat after 13 days.
     pub fn prefix_of(&self, epoch: u64) -> String {
-        format!("{}{epoch:016x}_", self.prefix())
-    }
-
-    /// Folder of one incarnation.
-    pub fn folder_of(&self, epoch: u64) -> PathBuf {
-        self.folder().join(format!("{epoch:016x}"))
+        format!("{}{}_", self.prefix(), base32(epoch >> 20, 6))
     }
 
     /// Checks that the base and the server's folder belong to this user alone (mode 0700, no link).
@@ -150,6 +156,15 @@ impl Address {
     pub fn current(&self) -> Option<Incarnation> {
         Incarnation::parse(&std::fs::read_to_string(self.current_file()).ok()?)
     }
+}
+
+/// A socket's path has 107 bytes: base, "/.code", "/", prefix, 39 digits of a port, ".e".
+const LONGEST_BASE: usize = 107 - 9 - 1 - 17 - 39 - 2;
+
+/// The lowest `digits` digits of `n` to the base 32.
+fn base32(n: u64, digits: u32) -> String {
+    let digit = |i| b"0123456789abcdefghijklmnopqrstuv"[(n >> (5 * i) & 31) as usize] as char;
+    (0..digits).rev().map(digit).collect()
 }
 
 /// One start of a server.
@@ -250,6 +265,16 @@ mod tests {
         }
         let elsewhere = Address::under(Path::new("/run/user/8/contactd"), "a").unwrap();
         assert_ne!(elsewhere.prefix(), all[0]);
+        assert_ne!(elsewhere.prefix_of(1 << 40), elsewhere.prefix_of((1 << 40) + (1 << 20)));
+    }
+
+    #[test]
+    fn the_longest_socket_fits() {
+        let base = PathBuf::from(format!("/{}", "x".repeat(38)));
+        let address = Address::under(&base, &"n".repeat(32)).unwrap();
+        let path = address.shared_folder().join(format!("{}{}.e", address.prefix_of(u64::MAX), u128::MAX));
+        assert_eq!(path.as_os_str().len(), 107);
+        assert!(Address::under(&base.join("y"), "n").is_err());
     }
 
     #[test]

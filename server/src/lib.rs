@@ -8,9 +8,12 @@ pub mod demo;
 pub mod eco;
 pub mod import;
 pub mod inspect;
+pub mod ipc;
 pub mod math;
 pub mod motion;
 pub mod picture;
 pub mod report;
 pub mod solid;
 pub mod world;
+
+pub use ipc::embedded;

@@ -7,12 +7,14 @@ use contactd::contact::Status;
 use contactd::eco::Model;
 use contactd::import::{self, Facets, Limits};
 use contactd::inspect;
+use contactd::ipc::ServerConfig;
 use contactd::picture::{
     self,
     drawing::Drawing,
     scene::{Actor, Meeting},
 };
 use contactd::report::{self, Answer, PairReport};
+use contactd_proto::names::Address;
 use std::error::Error;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -30,6 +32,15 @@ struct Arguments {
 enum Command {
     /// One step of a scene in this process, without a server: the earliest contact of every pair.
     Check(CheckArguments),
+    /// The server, until SIGINT or SIGTERM; prints one line when ready.
+    Serve {
+        /// Its name: clients connect to it by this.
+        #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
+        name: String,
+        /// A TOML file of limits and waiting times.
+        #[arg(long)]
+        config: Option<PathBuf>,
+    },
     /// What is in a model or scene file, and how it was imported.
     Inspect {
         /// A .csg or .toml file.
@@ -76,6 +87,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Check(arguments) => check_scene(&arguments),
         Command::Inspect { file, facets, picture } => inspect_file(&file, facets, picture.as_deref()),
+        Command::Serve { name, config } => serve(&name, config.as_deref()),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
@@ -85,6 +97,17 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+fn serve(name: &str, config: Option<&Path>) -> Result<Done, Box<dyn Error>> {
+    let config = config.map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
+    let ready = || {
+        let pid = std::process::id();
+        // A reader that has gone away does not stop a server.
+        let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol 1, process {pid})\n"));
+    };
+    contactd::ipc::serve(&Address::of(name)?, config, ready)?;
+    Ok(Done::Well)
 }
 
 fn facets(word: &str) -> Result<Facets, String> {

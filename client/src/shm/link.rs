@@ -34,11 +34,13 @@ pub const STATUS_KEY: u32 = 0;
 /// `System` when a path is too long for iceoryx2.
 pub fn config(address: &Address, epoch: u64) -> Result<Config, Error> {
     let mut config = Config::default();
-    let root = address.folder_of(epoch);
+    let root = address.shared_folder();
     let root = Path::new(root.as_os_str().as_encoded_bytes());
     config.global.set_root_path(&root.map_err(|_| Error::System("the runtime folder's path is too long".into()))?);
     let prefix = FileName::new(address.prefix_of(epoch).as_bytes());
     config.global.prefix = prefix.map_err(|_| Error::System("the server's name is too long".into()))?;
+    // Sockets' paths are short.
+    config.global.service.event_connection_suffix = FileName::new(b".e").map_err(|e| system("a suffix", e))?;
     // The server looks for dead nodes, when a process has died; a client that comes or goes has no time for it.
     config.global.node.cleanup_dead_nodes_on_creation = false;
     config.global.node.cleanup_dead_nodes_on_destruction = false;

@@ -29,7 +29,9 @@ impl Part {
         let primitives = model.solid.primitives.iter();
         let smallest = primitives.map(|p| p.shape.geometry().smallest_dimension()).fold(f64::INFINITY, f64::min);
         let aabb = model.solid.aabb();
-        let resolution = super::search::default_resolution(&model, &model);
+        // An unbounded or empty solid has no size of its own: its partner's decides.
+        let resolution =
+            Some(super::search::default_resolution(&model, &model)).filter(|r| r.is_finite()).unwrap_or(0.0);
         Self { model, aabb, resolution, smallest }
     }
 }

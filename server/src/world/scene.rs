@@ -3,6 +3,7 @@
 use super::body::{Body, ObjectSpec};
 use super::plan::{PairPlan, Plans};
 use super::step::StepState;
+use crate::math::tolerance;
 use contactd_proto::{Detect, ErrorCode, Pose, Rule, Track};
 use std::collections::HashMap;
 use std::fmt;
@@ -212,7 +213,8 @@ impl World {
     /// The resolution of a pair.
     pub(super) fn resolution_of(&self, i: u32, j: u32) -> f64 {
         let default = |k: u32| self.bodies[k as usize].part.resolution;
-        self.resolution.unwrap_or_else(|| default(i).max(default(j)))
+        let own = default(i).max(default(j));
+        self.resolution.unwrap_or(if own > 0.0 { own } else { tolerance::DEFAULT_RESOLUTION })
     }
 }
 

@@ -141,13 +141,19 @@ impl World {
         Ok(&self.state.outcome)
     }
 
+    /// The answer of the last accepted step.
+    pub fn outcome(&self) -> &StepOutcome {
+        &self.state.outcome
+    }
+
     /// Decodes the records and checks each against the world.
     fn check(&mut self, records: &[PoseRecord], options: &StepOptions) -> Result<(), StepError> {
         let refuse = |code| Err(StepError { code, index: None });
         if records.len() > self.state.max_batch {
             return refuse(ErrorCode::TooMany);
         }
-        if !(0.0..=1.0).contains(&options.advance) || !(options.dt.is_finite() && options.dt >= 0.0) {
+        let fits = (0.0..=1.0).contains(&options.advance) && options.dt.is_finite() && options.dt >= 0.0;
+        if !fits {
             return refuse(ErrorCode::BadNumber);
         }
         self.state.serial += 1;

@@ -1,0 +1,22 @@
+//! The server's two doors: shared memory for other processes, and an embedded session for the caller's own.
+//!
+//! Both lead to the same `scene`: commands and steps on one session's world. The loop (`serve`) takes steps as they come
+//! and waits by spinning first and blocking then; imports run beside it on a thread of their own. `root` makes sure that
+//! one server of a name runs, that a killed predecessor is no obstacle, and that nothing stays behind.
+//!
+//! Invariant: what lies in shared memory is copied before it is branched on. It is no security boundary between
+//! processes of one user: any of them can write to the segments.
+//!
+//! Floor 8: imports `world`, `import` and everything below.
+
+pub mod config;
+mod embedded;
+mod models;
+mod root;
+mod scene;
+mod serve;
+mod services;
+
+pub use config::ServerConfig;
+pub use embedded::{Embedded, embedded};
+pub use serve::{ServeError, Server, serve};

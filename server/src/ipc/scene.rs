@@ -1,0 +1,203 @@
+//! One session's side of the protocol: commands and steps on its world, wherever they came from.
+
+use super::config::ServerConfig;
+use super::models::Loaded;
+use crate::world::{ObjectSpec, Refusal, StepOptions, World, record};
+use contactd_proto::control::{Answer, Command, Facets, ObjectSpec as WireObject};
+use contactd_proto::names::PROTOCOL_VERSION;
+use contactd_proto::step::{ASK_ALL, ASK_CLEAR, ASK_DETAILS, ASK_FIRST, NO_INDEX, STEP_REFUSED};
+use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+/// A session's world and models.
+#[derive(Debug)]
+pub struct Scene {
+    world: World,
+    models: HashMap<u32, Arc<Loaded>>,
+    last_model: u32,
+    max_records: usize,
+    /// Set for good when the engine failed within a step: its world can no longer be trusted.
+    broken: bool,
+}
+
+/// What becomes of a command.
+#[derive(Debug)]
+pub enum Outcome {
+    /// It is answered.
+    Answered(Answer),
+    /// A model has to be imported first; `Scene::loaded` makes the answer.
+    Import(Import),
+}
+
+/// A model to be imported.
+#[derive(Debug)]
+pub struct Import {
+    /// Its id.
+    pub model: u32,
+    /// Its name.
+    pub name: String,
+    /// Its text.
+    pub text: String,
+    /// How curved primitives are taken.
+    pub facets: Facets,
+}
+
+impl Scene {
+    /// An empty one.
+    pub fn new(config: &ServerConfig) -> Self {
+        Self {
+            world: World::new(config.objects, config.batch),
+            models: HashMap::new(),
+            last_model: 0,
+            max_records: config.records,
+            broken: false,
+        }
+    }
+
+    /// Obeys a command other than open and close.
+    pub fn command(&mut self, command: Command) -> Outcome {
+        Outcome::Answered(match self.obey(command) {
+            Ok(None) => Answer::Done,
+            Ok(Some(import)) => return Outcome::Import(import),
+            Err(refusal) => refused(refusal),
+        })
+    }
+
+    /// Takes an imported model.
+    pub fn loaded(&mut self, model: u32, loaded: Result<Arc<Loaded>, Refusal>) -> Answer {
+        match loaded {
+            Ok(loaded) => {
+                let answer = Answer::Loaded { faces: loaded.faces.clone(), warnings: loaded.warnings.clone() };
+                self.last_model = self.last_model.max(model);
+                self.models.insert(model, loaded);
+                answer
+            }
+            Err(refusal) => refused(refusal),
+        }
+    }
+
+    fn obey(&mut self, command: Command) -> Result<Option<Import>, Refusal> {
+        match command {
+            Command::Open { .. } | Command::Close => {
+                return Err(Refusal::new(ErrorCode::BadCommand, "open and close are the server's own"));
+            }
+            Command::LoadModel { model, name, text, facets } => {
+                if model <= self.last_model {
+                    let detail = format!("model id {model} was used before");
+                    return Err(Refusal::new(ErrorCode::BadCommand, detail));
+                }
+                return Ok(Some(Import { model, name, text, facets }));
+            }
+            Command::AddObject(spec) => {
+                let spec = self.object(spec)?;
+                self.world.add_object(spec)?;
+            }
+            Command::RemoveObject(id) => self.world.remove_object(id)?,
+            Command::SetRules(rules) => {
+                let each = rules.into_iter().enumerate();
+                let rules = each.map(|(i, r)| r.checked().map_err(|code| Refusal::new(code, "").at(i)));
+                self.world.set_rules(rules.collect::<Result<_, _>>()?)?;
+            }
+            Command::SetResolution(resolution) => self.world.set_resolution(resolution)?,
+            Command::Restore(tracks) => {
+                let each = tracks.iter().enumerate();
+                let tracks =
+                    each.map(|(i, t)| Ok((t.object, t.checked().map_err(|code| Refusal::new(code, "").at(i))?)));
+                self.world.restore(&tracks.collect::<Result<Vec<_>, Refusal>>()?)?;
+            }
+        }
+        Ok(None)
+    }
+
+    fn object(&self, spec: WireObject) -> Result<ObjectSpec, Refusal> {
+        let Some(loaded) = self.models.get(&spec.model) else {
+            return Err(Refusal::new(
+                ErrorCode::UnknownModel,
+                format!("object \"{}\": model id {}", spec.name, spec.model),
+            ));
+        };
+        let bad = |which: &str, code| Refusal::new(code, format!("object \"{}\": {which}", spec.name));
+        Ok(ObjectSpec {
+            id: spec.id,
+            part: loaded.part.clone(),
+            is_static: spec.is_static,
+            rotates: spec.rotates,
+            max_speed: spec.max_speed,
+            place: spec.place.checked().map_err(|code| bad("place", code))?,
+            pose: spec.pose.checked().map_err(|code| bad("pose", code))?,
+            name: spec.name,
+            group: spec.group,
+        })
+    }
+
+    /// One step. `request` is a copy of the header; `write` is called once with the number of slots (0 for a refusal),
+    /// the header of the reply and the slots by index, and passes them on.
+    pub fn step<R>(
+        &mut self,
+        request: &StepRequest,
+        records: &[PoseRecord],
+        write: impl FnOnce(usize, StepReply, &dyn Fn(usize) -> ContactRecord) -> R,
+    ) -> R {
+        let refuse = |code: ErrorCode, index: Option<u32>| refusal(request, code, index);
+        let none = |_| ContactRecord::default();
+        let n = request.records as usize;
+        if self.broken {
+            return write(0, refuse(ErrorCode::Internal, None), &none);
+        }
+        if request.version != PROTOCOL_VERSION {
+            return write(0, refuse(ErrorCode::Version, None), &none);
+        }
+        if request.asked & !ASK_ALL != 0 {
+            return write(0, refuse(ErrorCode::BadNumber, None), &none);
+        }
+        if n > records.len() {
+            return write(0, refuse(ErrorCode::BadCount, None), &none);
+        }
+        let details = request.asked & ASK_DETAILS != 0;
+        // Room for the records and, where asked for, a detail slot each.
+        let room = self.max_records / if details { 2 } else { 1 };
+        let cap = if request.max_records == 0 { room } else { room.min(request.max_records as usize) };
+        let options = StepOptions {
+            advance: request.advance,
+            dt: request.dt,
+            first: request.asked & ASK_FIRST != 0,
+            clear: request.asked & ASK_CLEAR != 0,
+            max_records: cap.max(1) as u32,
+            cell_limit: request.cell_limit,
+        };
+        let world = &mut self.world;
+        let stepped = catch_unwind(AssertUnwindSafe(|| world.step(&records[..n], &options).map(|_| ())));
+        match stepped {
+            Err(_) => {
+                self.broken = true;
+                write(0, refuse(ErrorCode::Internal, None), &none)
+            }
+            Ok(Err(e)) => write(0, refuse(e.code, e.index), &none),
+            Ok(Ok(())) => {
+                let out = self.world.outcome();
+                let reply = StepReply { step: request.step, epoch: request.epoch, ..record::reply(out, details) };
+                let slot = |i| record::slot(&self.world, out, details, i);
+                write(record::slots_of(out, details), reply, &slot)
+            }
+        }
+    }
+}
+
+/// The reply to a step that was refused.
+pub fn refusal(request: &StepRequest, code: ErrorCode, index: Option<u32>) -> StepReply {
+    StepReply {
+        step: request.step,
+        epoch: request.epoch,
+        status: STEP_REFUSED,
+        error: code.number(),
+        index: index.unwrap_or(NO_INDEX),
+        ..StepReply::default()
+    }
+}
+
+/// The answer to a command that was refused.
+pub fn refused(refusal: Refusal) -> Answer {
+    Answer::Refused { code: refusal.code.number(), index: refusal.index.unwrap_or(NO_INDEX), detail: refusal.detail }
+}

@@ -1,0 +1,352 @@
+//! The server's loop: steps first, then commands, then finished imports; spin, then block.
+//!
+//! One thread answers all sessions in the order in which their requests are found. Imports run on a thread of their own,
+//! so that a large model delays only its own session. Clients that died are noticed by their pidfd and lose their
+//! sessions; what they held in shared memory is freed.
+
+use super::config::ServerConfig;
+use super::models::{Loaded, Models};
+use super::root::{Root, RootError};
+use super::scene::{Import, Outcome, Scene, refusal, refused};
+use super::services::Services;
+use crate::world::Refusal;
+use contactd_client::Error;
+use contactd_client::shm::link::Variant;
+use contactd_client::shm::watch::ProcessWatch;
+use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, encode};
+use contactd_proto::names::{Address, PROTOCOL_VERSION};
+use contactd_proto::status::StatusRecord;
+use contactd_proto::step::ASK_POLLING;
+use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
+use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::port::notifier::Notifier;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+type StepCall = ActiveRequest<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
+type ControlCall = ActiveRequest<Variant, [u8], ControlHeader, [u8], ControlHeader>;
+
+/// Time between two looks at the clients' lives, and the longest wait.
+const BEAT: Duration = Duration::from_millis(50);
+/// The longest wait while an import runs: its end wakes nobody.
+const IMPORT_BEAT: Duration = Duration::from_millis(1);
+
+/// Why a server does not run.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// It has no place.
+    #[error(transparent)]
+    Root(#[from] RootError),
+    /// Shared memory failed.
+    #[error("{0}")]
+    System(Error),
+}
+
+impl From<Error> for ServeError {
+    fn from(e: Error) -> Self {
+        Self::System(e)
+    }
+}
+
+/// One client's session.
+struct Session {
+    scene: Scene,
+    wake: Notifier<Variant>,
+    /// `None`: the client's process is not visible from here.
+    life: Option<ProcessWatch>,
+    last_request: Instant,
+    importing: bool,
+}
+
+/// A server that holds its place and has created its services. Dropped in the order of its fields, the place last.
+pub struct Server {
+    pending: Vec<(u64, ControlCall)>,
+    sessions: BTreeMap<u64, Session>,
+    services: Services,
+    imports: Sender<(u64, Import)>,
+    imported: Receiver<(u64, u32, Result<Arc<Loaded>, Refusal>)>,
+    config: ServerConfig,
+    last_session: u64,
+    steps: u64,
+    beats: u64,
+    cores: usize,
+    root: Root,
+}
+
+impl Server {
+    /// Takes the place, creates the services, and tells clients.
+    ///
+    /// # Errors
+    /// Another server of the name runs; folders are not private; shared memory fails.
+    pub fn start(address: &Address, config: ServerConfig) -> Result<Self, ServeError> {
+        let root = Root::take(address)?;
+        let services = Services::create(address, root.epoch(), &config, status(&root, &config, 0, 0))?;
+        let (imports, work) = channel::<(u64, Import)>();
+        let (finished, imported) = channel();
+        let models = Models::new(config.import_limits());
+        // Ends when the server drops its sender.
+        std::thread::spawn(move || {
+            for (session, import) in work {
+                let loaded = models.load(&import.name, &import.text, import.facets);
+                if finished.send((session, import.model, loaded)).is_err() {
+                    break;
+                }
+            }
+        });
+        root.publish()?;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Ok(Self {
+            pending: Vec::new(),
+            sessions: BTreeMap::new(),
+            services,
+            imports,
+            imported,
+            config,
+            last_session: 0,
+            steps: 0,
+            beats: 0,
+            cores,
+            root,
+        })
+    }
+
+    /// Serves until `stop` is set.
+    pub fn run(&mut self, stop: &AtomicBool) {
+        let mut last_work = Instant::now();
+        let mut last_beat = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            let mut worked = false;
+            // A failed receive concerns one client's connection; the others go on.
+            while let Ok(Some(call)) = self.services.steps.receive() {
+                self.step(call);
+                worked = true;
+            }
+            while let Ok(Some(call)) = self.services.control.receive() {
+                self.command(call);
+                worked = true;
+            }
+            while let Ok((session, model, loaded)) = self.imported.try_recv() {
+                self.imported(session, model, loaded);
+                worked = true;
+            }
+            if last_beat.elapsed() >= BEAT {
+                self.beat();
+                last_beat = Instant::now();
+            }
+            if worked {
+                last_work = Instant::now();
+            } else if last_work.elapsed() < self.spin() {
+                std::hint::spin_loop();
+            } else {
+                let wait = if self.pending.is_empty() { BEAT } else { IMPORT_BEAT };
+                // An interrupted wait ends early, a failing one must not become a busy loop.
+                if self.services.wake.timed_wait(|_| {}, wait).is_err() {
+                    std::thread::sleep(IMPORT_BEAT);
+                }
+            }
+        }
+    }
+
+    /// How long to poll before blocking: not at all when the clients that poll need the cores.
+    fn spin(&self) -> Duration {
+        let spinners = 1 + self.sessions.len();
+        Duration::from_micros(if spinners <= self.cores { self.config.spin_us } else { 0 })
+    }
+
+    fn step(&mut self, call: StepCall) {
+        // One copy: the client could write to it while it is read.
+        let request = *call.user_header();
+        let session = if request.epoch == self.root.epoch() { self.sessions.get_mut(&request.session) } else { None };
+        let Some(session) = session else {
+            let code = if request.version == PROTOCOL_VERSION { ErrorCode::SessionGone } else { ErrorCode::Version };
+            send_step(&call, 0, refusal(&request, code, None), &|_| ContactRecord::default());
+            return;
+        };
+        session.last_request = Instant::now();
+        self.steps += 1;
+        if session.importing {
+            send_step(&call, 0, refusal(&request, ErrorCode::Busy, None), &|_| ContactRecord::default());
+        } else {
+            session.scene.step(&request, call.payload(), |n, reply, slot| send_step(&call, n, reply, slot));
+        }
+        // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
+        drop(call);
+        if request.asked & ASK_POLLING == 0 {
+            let _ = session.wake.notify();
+        }
+    }
+
+    fn command(&mut self, call: ControlCall) {
+        let version = call.user_header().version;
+        if version != PROTOCOL_VERSION {
+            return answer(&call, &refused(Refusal::new(ErrorCode::Version, format!("the client speaks {version}"))));
+        }
+        if call.payload().len() > self.config.text + (1 << 20) {
+            return answer(&call, &refused(Refusal::new(ErrorCode::LimitText, "")));
+        }
+        // One copy, then decoding: what is decoded can no longer change.
+        let bytes = call.payload().to_vec();
+        let envelope: Envelope = match decode(&bytes) {
+            Ok(envelope) => envelope,
+            Err(code) => return answer(&call, &refused(Refusal::new(code, ""))),
+        };
+        if let Command::Open { version, process } = envelope.command {
+            let opened = self.open(version, process).unwrap_or_else(refused);
+            return answer(&call, &opened);
+        }
+        let id = envelope.session;
+        let session = if envelope.epoch == self.root.epoch() { self.sessions.get_mut(&id) } else { None };
+        let Some(session) = session else {
+            return answer(&call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
+        };
+        session.last_request = Instant::now();
+        if session.importing {
+            return answer(&call, &refused(Refusal::new(ErrorCode::Busy, "a model is being imported")));
+        }
+        let answered = match envelope.command {
+            Command::Close => {
+                self.sessions.remove(&id);
+                self.show();
+                return answer(&call, &Answer::Done);
+            }
+            command => session.scene.command(command),
+        };
+        match answered {
+            Outcome::Answered(a) => {
+                answer(&call, &a);
+                drop(call);
+                let _ = session.wake.notify();
+            }
+            Outcome::Import(import) => {
+                session.importing = true;
+                if self.imports.send((id, import)).is_ok() {
+                    self.pending.push((id, call));
+                } else {
+                    session.importing = false;
+                    answer(&call, &refused(Refusal::new(ErrorCode::Internal, "imports have stopped")));
+                }
+            }
+        }
+    }
+
+    fn open(&mut self, version: u32, process: (u32, u64)) -> Result<Answer, Refusal> {
+        if version != PROTOCOL_VERSION {
+            return Err(Refusal::new(ErrorCode::Version, format!("the client speaks {version}")));
+        }
+        if self.sessions.len() >= self.config.sessions {
+            let detail = format!("the limit is {}", self.config.sessions);
+            return Err(Refusal::new(ErrorCode::LimitSessions, detail));
+        }
+        let id = self.last_session + 1;
+        let wake = self.services.wake_of(id).map_err(|e| Refusal::new(ErrorCode::Internal, e.to_string()))?;
+        self.last_session = id;
+        let session = Session {
+            scene: Scene::new(&self.config),
+            wake,
+            life: ProcessWatch::of(process.0, process.1),
+            last_request: Instant::now(),
+            importing: false,
+        };
+        self.sessions.insert(id, session);
+        self.show();
+        // The client polls beside the server: only where both have a core.
+        let spin = if self.cores > 1 { self.config.spin_us } else { 0 };
+        Ok(Answer::Opened { session: id, max_batch: self.config.batch as u32, spin_ns: spin * 1000 })
+    }
+
+    /// A model has been imported, or refused.
+    fn imported(&mut self, id: u64, model: u32, loaded: Result<Arc<Loaded>, Refusal>) {
+        let Some(at) = self.pending.iter().position(|(session, _)| *session == id) else { return };
+        let (_, call) = self.pending.swap_remove(at);
+        // A session that ended meanwhile has nobody to answer.
+        let Some(session) = self.sessions.get_mut(&id) else { return };
+        session.importing = false;
+        answer(&call, &session.scene.loaded(model, loaded));
+        drop(call);
+        let _ = session.wake.notify();
+    }
+
+    /// Ends the sessions of clients that died.
+    fn beat(&mut self) {
+        let idle = Duration::from_secs(self.config.idle_s);
+        let before = self.sessions.len();
+        self.sessions.retain(|_, session| match &session.life {
+            Some(life) => !life.is_dead(),
+            None => session.last_request.elapsed() < idle,
+        });
+        self.beats += 1;
+        // A client may also die before it has a session: rarely looked for, since the look costs milliseconds.
+        if self.sessions.len() < before || self.beats.is_multiple_of(200) {
+            self.services.sweep_dead();
+        }
+        self.show();
+    }
+
+    fn show(&mut self) {
+        self.services.show(status(&self.root, &self.config, self.sessions.len(), self.steps));
+    }
+}
+
+fn status(root: &Root, config: &ServerConfig, sessions: usize, steps: u64) -> StatusRecord {
+    StatusRecord {
+        version_min: PROTOCOL_VERSION,
+        version_max: PROTOCOL_VERSION,
+        iceoryx2: [0, 10, 0],
+        pid: std::process::id(),
+        epoch: root.epoch(),
+        sessions: sessions as u64,
+        steps,
+        limit_text: config.text as u64,
+        limit_batch: config.batch as u64,
+        limit_objects: config.objects as u64,
+        limit_sessions: config.sessions as u64,
+        ..StatusRecord::default()
+    }
+}
+
+/// Writes a reply once into slots of shared memory and sends it.
+fn send_step(call: &StepCall, n: usize, reply: StepReply, slot: &dyn Fn(usize) -> ContactRecord) {
+    // iceoryx2 knows no empty slices: the header says how many slots count.
+    let (loan, reply) = match call.loan_slice_uninit(n.max(1)) {
+        Ok(loan) => (loan, reply),
+        Err(_) => match call.loan_slice_uninit(1) {
+            // The step was taken, its records cannot be told: the client learns that they are cut off.
+            Ok(loan) => (loan, StepReply { records: 0, slots: 0, truncated: 1, ..reply }),
+            // Without a reply the end of the call says that it was lost.
+            Err(_) => return,
+        },
+    };
+    let told = (reply.records + reply.slots) as usize;
+    let mut response = loan.write_from_fn(|i| if i < told { slot(i) } else { ContactRecord::default() });
+    *response.user_header_mut() = reply;
+    // A reply that cannot be delivered is dropped; the end of the call tells the client.
+    let _ = response.send();
+}
+
+/// Sends the answer to a command.
+fn answer(call: &ControlCall, answer: &Answer) {
+    let Ok(bytes) = encode(answer) else { return };
+    let Ok(loan) = call.loan_slice_uninit(bytes.len()) else { return };
+    let mut response = loan.write_from_slice(&bytes);
+    *response.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };
+    let _ = response.send();
+}
+
+/// Serves until SIGINT or SIGTERM; calls `ready` once clients can connect.
+///
+/// # Errors
+/// As `Server::start`.
+pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce()) -> Result<(), ServeError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, stop.clone())
+            .map_err(|e| ServeError::System(Error::System(format!("signal handler: {e}"))))?;
+    }
+    let mut server = Server::start(address, config)?;
+    ready();
+    server.run(&stop);
+    Ok(())
+}

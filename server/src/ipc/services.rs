@@ -1,0 +1,145 @@
+//! The services of an incarnation, all created here: clients only open them, so a client that is killed while it comes
+//! can leave none half-made.
+//!
+//! Limits are set at creation, by the creator. Overflow is off everywhere: a request that does not fit is refused to its
+//! sender, a reply that cannot be delivered is dropped and its client told so, and nobody waits for anybody.
+
+use super::config::ServerConfig;
+use contactd_client::Error;
+use contactd_client::shm::link::{self, ControlServer, StepServer, Variant, system};
+use contactd_proto::control::ControlHeader;
+use contactd_proto::names::{self, Address};
+use contactd_proto::status::StatusRecord;
+use contactd_proto::{ContactRecord, PoseRecord, StepReply, StepRequest};
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::writer::{EntryHandleMut, Writer};
+use iceoryx2::prelude::*;
+
+/// The server's ports. Dropped in this order.
+pub struct Services {
+    /// Steps.
+    pub steps: StepServer,
+    /// Commands.
+    pub control: ControlServer,
+    /// Woken by clients.
+    pub wake: Listener<Variant>,
+    status: EntryHandleMut<Variant, u32, StatusRecord>,
+    _writer: Writer<Variant, u32>,
+    node: Node<Variant>,
+}
+
+impl Services {
+    /// Creates them.
+    ///
+    /// # Errors
+    /// `System`.
+    pub fn create(address: &Address, epoch: u64, config: &ServerConfig, status: StatusRecord) -> Result<Self, Error> {
+        let node = link::node(&link::config(address, epoch)?)?;
+        // A few more than sessions: clients that are just coming or going, and those that only look at the status.
+        let clients = config.sessions + 8;
+        let steps = node
+            .service_builder(&link::service_name(names::STEP_SERVICE)?)
+            .request_response::<[PoseRecord], [ContactRecord]>()
+            .request_user_header::<StepRequest>()
+            .response_user_header::<StepReply>()
+            .max_clients(clients)
+            .max_nodes(clients + 1)
+            .max_servers(1)
+            .max_active_requests_per_client(2)
+            .max_loaned_requests(2)
+            .max_response_buffer_size(2)
+            .max_borrowed_responses_per_pending_response(2)
+            .enable_safe_overflow_for_requests(false)
+            .enable_safe_overflow_for_responses(false)
+            .enable_fire_and_forget_requests(false)
+            .create()
+            .map_err(|e| system(names::STEP_SERVICE, e))?
+            .server_builder()
+            .initial_max_slice_len(64)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .max_loaned_responses_per_request(1)
+            // Each client holds one reply and may be getting the next: the worst case of every buffer full cannot occur.
+            .override_response_preallocation(move |n| n.min(3 * clients))
+            .create()
+            .map_err(|e| system("step port", e))?;
+        let control = node
+            .service_builder(&link::service_name(names::CONTROL_SERVICE)?)
+            .request_response::<[u8], [u8]>()
+            .request_user_header::<ControlHeader>()
+            .response_user_header::<ControlHeader>()
+            .max_clients(clients)
+            .max_nodes(clients + 1)
+            .max_servers(1)
+            .max_active_requests_per_client(2)
+            .max_loaned_requests(2)
+            .max_response_buffer_size(2)
+            .max_borrowed_responses_per_pending_response(2)
+            .enable_safe_overflow_for_requests(false)
+            .enable_safe_overflow_for_responses(false)
+            .enable_fire_and_forget_requests(false)
+            .create()
+            .map_err(|e| system(names::CONTROL_SERVICE, e))?
+            .server_builder()
+            .initial_max_slice_len(4096)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .max_loaned_responses_per_request(1)
+            .override_response_preallocation(move |n| n.min(3 * clients))
+            .create()
+            .map_err(|e| system("control port", e))?;
+        let wake = node
+            .service_builder(&link::service_name(names::WAKE_SERVICE)?)
+            .event()
+            .max_notifiers(clients)
+            .max_listeners(1)
+            .max_nodes(clients + 1)
+            .create()
+            .map_err(|e| system(names::WAKE_SERVICE, e))?
+            .listener_builder()
+            .create()
+            .map_err(|e| system("wake port", e))?;
+        let writer = node
+            .service_builder(&link::service_name(names::STATUS_SERVICE)?)
+            .blackboard_creator::<u32>()
+            .max_readers(clients)
+            .max_nodes(clients + 1)
+            .add::<StatusRecord>(link::STATUS_KEY, status)
+            .create()
+            .map_err(|e| system(names::STATUS_SERVICE, e))?
+            .writer_builder()
+            .create()
+            .map_err(|e| system("status writer", e))?;
+        let status = writer.entry::<StatusRecord>(&link::STATUS_KEY).map_err(|e| system("status entry", e))?;
+        Ok(Self { steps, control, wake, status, _writer: writer, node })
+    }
+
+    /// Shows the server's state.
+    pub fn show(&mut self, status: StatusRecord) {
+        self.status.update_with_copy(status);
+    }
+
+    /// The port that wakes the client of a session; its service is created here.
+    ///
+    /// # Errors
+    /// `System`.
+    pub fn wake_of(&self, session: u64) -> Result<Notifier<Variant>, Error> {
+        self.node
+            .service_builder(&link::service_name(&names::wake_service_of(session))?)
+            .event()
+            .max_notifiers(1)
+            .max_listeners(1)
+            .max_nodes(2)
+            .create()
+            .map_err(|e| system("a session's wake service", e))?
+            .notifier_builder()
+            .create()
+            .map_err(|e| system("a session's wake port", e))
+    }
+
+    /// Frees what processes that have died still hold.
+    pub fn sweep_dead(&self) {
+        self.node.try_cleanup_dead_nodes();
+    }
+}

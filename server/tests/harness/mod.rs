@@ -1,0 +1,107 @@
+//! A server process with a runtime folder of its own; whatever becomes of the test, nothing of it stays.
+
+pub mod scene;
+
+use contactd_client::proto::names::Address;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Far beyond what anything here takes: a limit against hanging, not a measure.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A running server.
+pub struct ServerProcess {
+    pub address: Address,
+    runtime: TempDir,
+    config: String,
+    child: Child,
+}
+
+impl ServerProcess {
+    /// Starts one and waits until it is ready.
+    pub fn start(name: &str, config: &str) -> Self {
+        let runtime = tempfile::tempdir().expect("a temporary folder");
+        let address = Address::under(&runtime.path().join("contactd"), name).expect("an address");
+        let child = spawn(runtime.path(), name, config);
+        Self { address, runtime, config: config.into(), child }
+    }
+
+    /// The runtime folder.
+    pub fn runtime(&self) -> &Path {
+        self.runtime.path()
+    }
+
+    /// The server's process id.
+    pub fn pid(&self) -> rustix::process::Pid {
+        rustix::process::Pid::from_child(&self.child)
+    }
+
+    /// SIGKILL: nothing is cleaned up.
+    pub fn kill(&mut self) {
+        self.child.kill().expect("a running server");
+        self.child.wait().expect("a killed server");
+    }
+
+    /// Starts it again, after `kill`.
+    pub fn restart(&mut self) {
+        self.child = spawn(self.runtime.path(), self.address.name(), &self.config);
+    }
+
+    /// SIGTERM, and the end.
+    pub fn stop(&mut self) -> ExitStatus {
+        let _ = rustix::process::kill_process(self.pid(), rustix::process::Signal::TERM);
+        let until = Instant::now() + PATIENCE;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("a child") {
+                return status;
+            }
+            assert!(Instant::now() < until, "the server does not stop");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// What is left of it in shared memory and under its folder.
+    pub fn remains(&self) -> Vec<String> {
+        let mut left = shared_memory_of(&self.address);
+        let folder = std::fs::read_dir(self.address.base()).into_iter().flatten().flatten();
+        left.extend(folder.map(|e| e.path().display().to_string()));
+        left
+    }
+}
+
+impl Drop for ServerProcess {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        for name in shared_memory_of(&self.address) {
+            let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
+        }
+    }
+}
+
+fn shared_memory_of(address: &Address) -> Vec<String> {
+    let names = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let names = names.map(|e| e.file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.starts_with(&address.prefix())).collect()
+}
+
+/// `contactd serve` in a runtime folder.
+pub fn serve_command(runtime: &Path, name: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_contactd"));
+    command.args(["serve", "--name", name]).env("XDG_RUNTIME_DIR", runtime).stdin(Stdio::null());
+    command
+}
+
+fn spawn(runtime: &Path, name: &str, config: &str) -> Child {
+    let file = runtime.join("server.toml");
+    std::fs::write(&file, config).expect("a settings file");
+    let mut command = serve_command(runtime, name);
+    let mut child = command.arg("--config").arg(file).stdout(Stdio::piped()).spawn().expect("the server's program");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("its output");
+    assert!(line.contains("ready"), "the server says: {line:?}");
+    child
+}

@@ -1,0 +1,254 @@
+//! A server and its clients as processes of their own: the same bits as embedded, death on either side, bad input.
+
+mod harness;
+
+use contactd::ipc::ServerConfig;
+use contactd_client::proto::control::{Answer, Command};
+use contactd_client::proto::names::Address;
+use contactd_client::proto::status::StatusRecord;
+use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
+use contactd_client::proto::{ErrorCode, Pose, PoseRecord, StepRequest};
+use contactd_client::{Error, Object, Session, SharedMemory, Transport};
+use glam::DVec3;
+use harness::scene::{Bits, bits, build, fill, set_options};
+use harness::{PATIENCE, ServerProcess, serve_command};
+use std::process::{Child, Command as Process, Stdio};
+use std::time::{Duration, Instant};
+
+const PEGS: u32 = 3;
+
+/// One step of the scene.
+fn step<T: Transport>(session: &mut Session<T>, ids: &[u32], k: u64, seed: u64) -> Result<Bits, Error> {
+    set_options(session, k);
+    fill(session.begin_step(ids.len())?, ids, k, seed);
+    session.finish(PATIENCE).map(|reply| bits(&reply))
+}
+
+/// Runs this very program as a client process: only the test called `a_client_process`, with its arguments in variables.
+fn client(server: &ServerProcess, steps: u64, seed: u64) -> Child {
+    Process::new(std::env::current_exe().unwrap())
+        .args(["--exact", "a_client_process", "--nocapture", "--test-threads=1"])
+        .env("CONTACTD_TEST_CLIENT", format!("{} {steps} {seed}", server.address.name()))
+        .env("XDG_RUNTIME_DIR", server.runtime())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// The body of a client process; without its variable it is a test that an absent server is told as such.
+#[test]
+fn a_client_process() {
+    let Ok(arguments) = std::env::var("CONTACTD_TEST_CLIENT") else {
+        let dir = tempfile::tempdir().unwrap();
+        let error = Session::connect_to(Address::under(dir.path(), "nobody").unwrap()).unwrap_err();
+        assert_eq!(error, Error::NoServer("nobody".into()));
+        assert!(error.to_string().contains("contactd serve --name nobody"), "{error}");
+        return;
+    };
+    let words: Vec<&str> = arguments.split(' ').collect();
+    let (steps, seed): (u64, u64) = (words[1].parse().unwrap(), words[2].parse().unwrap());
+    let mut session = Session::connect(words[0]).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let (ids, own_ids) = (build(&mut session, PEGS), build(&mut own, PEGS));
+    assert_eq!(ids, own_ids);
+    let (mut contacts, mut records) = (0, 0);
+    for k in 0..steps {
+        let answer = step(&mut session, &ids, k, seed).unwrap();
+        assert_eq!(answer, step(&mut own, &ids, k, seed).unwrap(), "step {k}");
+        contacts += u64::from(answer.0 == 2);
+        records += u64::from(answer.1);
+    }
+    session.close().unwrap();
+    println!("client done: {steps} steps, {contacts} with contact, {records} records");
+}
+
+fn output(child: Child) -> String {
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{text}");
+    text
+}
+
+#[test]
+fn two_clients_get_the_embedded_bits_for_a_thousand_steps_and_nothing_is_left() {
+    let mut server = ServerProcess::start("twins", "");
+    let clients = [client(&server, 1000, 1), client(&server, 1000, 2)];
+    for text in clients.map(output) {
+        let (_, line) = text.split_once("client done: ").expect("a client that is done");
+        let contacts: u64 = line.split(' ').nth(2).unwrap().parse().unwrap();
+        assert!(line.contains("1000 steps") && contacts > 200, "{line}");
+    }
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+#[test]
+fn a_killed_server_is_noticed_and_its_successor_continues_bit_for_bit() {
+    let mut server = ServerProcess::start("phoenix", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ids = build(&mut session, PEGS);
+    build(&mut own, PEGS);
+    let mut fastest = Duration::MAX;
+    for k in 0..90 {
+        if k % 30 == 19 {
+            // Stopped first, so that the step is in flight when it dies.
+            rustix::process::kill_process(server.pid(), rustix::process::Signal::STOP).unwrap();
+            set_options(&mut session, k);
+            fill(session.begin_step(ids.len()).unwrap(), &ids, k, 7);
+            session.send().unwrap();
+            let killed = Instant::now();
+            server.kill();
+            assert_eq!(session.finish(PATIENCE).map(|r| bits(&r)), Err(Error::ServerLost));
+            fastest = fastest.min(killed.elapsed());
+            assert_eq!(session.begin_step(1).map(|_| ()), Err(Error::ServerLost));
+            assert!(matches!(session.reconnect(Duration::ZERO), Err(Error::NoServer(_))));
+            server.restart();
+            session.reconnect(PATIENCE).unwrap();
+            session.resend().unwrap();
+            let answer = session.finish(PATIENCE).map(|r| bits(&r)).unwrap();
+            assert_eq!(answer, step(&mut own, &ids, k, 7).unwrap(), "the step in flight, sent again");
+            continue;
+        }
+        assert_eq!(step(&mut session, &ids, k, 7).unwrap(), step(&mut own, &ids, k, 7).unwrap(), "step {k}");
+    }
+    // The contract's second, by the fastest of three: the machine may be busy with other things.
+    assert!(fastest < Duration::from_secs(1), "noticed after {fastest:?}");
+    drop(session);
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+#[test]
+fn a_killed_client_loses_its_session_and_a_stopped_server_is_told() {
+    let mut server = ServerProcess::start("widow", "");
+    let mut survivor = Session::connect_to(server.address.clone()).unwrap();
+    let ids = build(&mut survivor, 1);
+    let mut victim = client(&server, 1_000_000, 3);
+    // What the server shows of itself follows its beat.
+    let shows = |what: &dyn Fn(&StatusRecord) -> bool| {
+        let until = Instant::now() + PATIENCE;
+        while !what(&SharedMemory::status(&server.address).unwrap()) {
+            assert!(Instant::now() < until, "the status never came to what it should be");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let sessions = |n: u64| shows(&|s| s.sessions == n);
+    sessions(2);
+    victim.kill().unwrap();
+    victim.wait().unwrap();
+    sessions(1);
+    step(&mut survivor, &ids, 1, 1).unwrap();
+    let status = SharedMemory::status(&server.address).unwrap();
+    assert_eq!((status.version_min, status.version_max, status.iceoryx2), (1, 1, [0, 10, 0]));
+    shows(&|s| s.steps > 0);
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new(), "a client that still lives holds nothing by name");
+    assert_eq!(step(&mut survivor, &ids, 2, 1), Err(Error::ServerLost));
+}
+
+#[test]
+fn a_second_server_of_the_name_is_refused_with_a_sentence() {
+    let server = ServerProcess::start("only", "");
+    let second = serve_command(server.runtime(), "only").output().unwrap();
+    assert_eq!(second.status.code(), Some(2));
+    let sentence = String::from_utf8_lossy(&second.stderr);
+    assert!(sentence.contains("\"only\" is running already"), "{sentence}");
+    let bad = serve_command(server.runtime(), "No Name").output().unwrap();
+    assert_eq!(bad.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&bad.stderr).contains("a-z, 0-9"));
+}
+
+/// The error that bad input meets, with its sentence.
+fn refused<T>(result: Result<T, Error>, code: ErrorCode, words: &[&str]) {
+    let Err(error) = result else { panic!("{code:?} was expected, but it was taken") };
+    assert_eq!(error.code(), Some(code), "{error}");
+    let sentence = error.to_string();
+    assert!(sentence.contains(code.sentence()), "{sentence}");
+    for word in words {
+        assert!(sentence.contains(word), "\"{word}\" is missing: {sentence}");
+    }
+}
+
+#[test]
+fn bad_input_is_refused_each_with_its_sentence() {
+    let mut server = ServerProcess::start("strict", "batch = 8\nobjects = 3\nsessions = 2\ntext = 5000\n");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let ids = build(&mut session, 2);
+    let good = step(&mut session, &ids, 1, 5).unwrap();
+    let end = PoseRecord::end(ids[0], &Pose::at(DVec3::new(8.0, 0.0, 20.0)));
+    let nan = PoseRecord { position: [f64::NAN, 0.0, 0.0], ..end };
+    let infinite = PoseRecord { rotation: [0.0, f64::INFINITY, 0.0, 1.0], ..end };
+    let zero = PoseRecord { rotation: [0.0; 4], ..end };
+    let unknown = PoseRecord { object: 77, ..end };
+    let fixed = PoseRecord { object: 1, ..end };
+    let table: [(&[PoseRecord], ErrorCode, &[&str]); 7] = [
+        (&[nan], ErrorCode::NotFinite, &["index 0", "object id 2"]),
+        (&[infinite], ErrorCode::NotFinite, &["index 0", "object id 2"]),
+        (&[zero], ErrorCode::BadQuaternion, &["index 0", "object id 2", "0.001"]),
+        (&[end, unknown], ErrorCode::UnknownObject, &["index 1", "object id 77"]),
+        (&[fixed], ErrorCode::StaticObject, &["index 0", "object id 1"]),
+        (&[end, end], ErrorCode::DuplicateObject, &["index 1", "object id 2"]),
+        (&[PoseRecord { flags: 0, ..end }], ErrorCode::BadCount, &["index 0"]),
+    ];
+    for (batch, code, words) in table {
+        session.options = Default::default();
+        session.begin_step(batch.len()).unwrap().copy_from_slice(batch);
+        refused(session.finish(PATIENCE), code, words);
+    }
+    refused(session.begin_step(9).map(|_| ()), ErrorCode::TooMany, &["9 records", "8"]);
+    session.begin_step(0).unwrap();
+    session.options.advance = 2.0;
+    refused(session.finish(PATIENCE), ErrorCode::BadNumber, &[]);
+    session.options = Default::default();
+
+    // Past the client's own checks, as a peer that has none would send it.
+    let opened = session.opened();
+    let plain =
+        StepRequest { version: 1, session: opened.session, epoch: opened.epoch, advance: 1.0, ..Default::default() };
+    for (request, code) in [
+        (StepRequest { version: 2, ..plain }, ErrorCode::Version),
+        (StepRequest { records: 9, ..plain }, ErrorCode::TooMany),
+        (StepRequest { records: 10, ..plain }, ErrorCode::BadCount),
+        (StepRequest { asked: ASK_ALL + 1, ..plain }, ErrorCode::BadNumber),
+        (StepRequest { session: opened.session + 5, ..plain }, ErrorCode::SessionGone),
+        (StepRequest { epoch: opened.epoch + 1, ..plain }, ErrorCode::SessionGone),
+    ] {
+        let raw = session.transport_mut();
+        raw.loan(9).unwrap().fill(end);
+        raw.send(request).unwrap();
+        raw.receive(PATIENCE).unwrap();
+        let (reply, _) = raw.reply().unwrap();
+        assert_eq!((reply.status, reply.error), (STEP_REFUSED, code.number()), "{code:?}");
+    }
+    let raw = session.transport_mut();
+    let answer = raw.command(Command::Open { version: 9, process: (1, 1) }, PATIENCE).unwrap();
+    assert!(matches!(answer, Answer::Refused { code, .. } if code == ErrorCode::Version.number()), "{answer:?}");
+
+    refused(session.load_model("broken.csg", "cube(size = [1, 1, 1);"), ErrorCode::Model, &["broken.csg:1:"]);
+    refused(session.load_model("text.csg", "text(\"x\");"), ErrorCode::Model, &["text.csg:1:1", "text"]);
+    let long = format!("cube(size = 1);{}", " ".repeat(6000));
+    refused(session.load_model("long.csg", &long), ErrorCode::LimitText, &["long.csg"]);
+    refused(session.add_object(Object::new("ghost", 99)), ErrorCode::UnknownModel, &["ghost", "99"]);
+    refused(session.add_object(Object::new("fourth", 1)), ErrorCode::LimitObjects, &["3"]);
+    refused(session.remove_object(99), ErrorCode::UnknownObject, &["99"]);
+    refused(session.set_resolution(Some(-1.0)), ErrorCode::Resolution, &["-1"]);
+
+    let second = Session::connect_to(server.address.clone()).unwrap();
+    refused(Session::connect_to(server.address.clone()).map(|_| ()), ErrorCode::LimitSessions, &["2"]);
+    second.close().unwrap();
+
+    // None of it has changed a bit of the scene.
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    build(&mut own, 2);
+    assert_eq!(step(&mut own, &ids, 1, 5).unwrap(), good);
+    assert_eq!(step(&mut session, &ids, 2, 5).unwrap(), step(&mut own, &ids, 2, 5).unwrap());
+
+    // A session that is gone: the batch is refused, and a reconnect brings it back.
+    session.transport_mut().command(Command::Close, PATIENCE).unwrap();
+    session.begin_step(0).unwrap();
+    refused(session.finish(PATIENCE), ErrorCode::SessionGone, &[]);
+    session.reconnect(PATIENCE).unwrap();
+    assert_eq!(step(&mut session, &ids, 3, 5).unwrap(), step(&mut own, &ids, 3, 5).unwrap());
+    assert!(server.stop().success());
+}
