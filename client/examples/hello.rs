@@ -5,7 +5,8 @@ use contactd_client::{Object, Session};
 use glam::DVec3;
 use std::time::Duration;
 
-const PLATE: &str = "difference() { cube(size = [40, 40, 4], center = true); cylinder(h = 9, r = 3, center = true); }";
+const PLATE: &str =
+    "difference() { cube(size = [40, 40, 4], center = true); cylinder(h = 9, r1 = 3, r2 = 3, center = true); }";
 const BALL: &str = "sphere(r = 5);";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

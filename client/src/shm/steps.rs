@@ -7,6 +7,7 @@ use crate::transport::{Opened, Transport};
 use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, encode};
 use contactd_proto::names::{self, Address, Incarnation, PROTOCOL_VERSION};
 use contactd_proto::status::StatusRecord;
+use contactd_proto::step::ASK_POLLING;
 use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
 use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::listener::Listener;
@@ -24,6 +25,8 @@ type Arrived = Response<Variant, [ContactRecord], StepReply>;
 
 /// Longest wait between two looks at whether the server lives.
 const SLICE: Duration = Duration::from_millis(50);
+/// The same for a client that polls.
+const POLLED: Duration = Duration::from_millis(1);
 
 /// The way to a server through shared memory.
 pub struct SharedMemory {
@@ -50,6 +53,8 @@ struct Link {
     epoch: u64,
     session: u64,
     spin: Duration,
+    /// The request under way asked the server not to wake this client.
+    polling: bool,
     node: Node<Variant>,
 }
 
@@ -191,6 +196,7 @@ impl Link {
             epoch,
             session: 0,
             spin: Duration::ZERO,
+            polling: false,
             node,
         })
     }
@@ -318,6 +324,7 @@ impl Transport for SharedMemory {
             return Err(Error::Misuse("no step was begun"));
         };
         *loan.user_header_mut() = request;
+        link.polling = request.asked & ASK_POLLING != 0;
         link.pending = Some(loan.send().map_err(|e| system("a batch cannot be sent", e))?);
         link.wake_server();
         Ok(())
@@ -329,6 +336,7 @@ impl Transport for SharedMemory {
             return Err(Error::Misuse("no step is in flight"));
         };
         let start = Instant::now();
+        let mut looked = start;
         loop {
             // Looked at before receiving: a reply that came before the end of the connection is then not missed.
             let connected = pending.is_connected();
@@ -341,10 +349,12 @@ impl Transport for SharedMemory {
                 Err(e) => return Err(system("a reply cannot be received", e)),
             }
             let waited = start.elapsed();
-            if connected && waited < link.spin {
+            let spins = waited < link.spin || (link.polling && looked.elapsed() < POLLED && waited < timeout);
+            if connected && spins {
                 std::hint::spin_loop();
                 continue;
             }
+            looked = Instant::now();
             if link.life.is_over() {
                 return Err(Error::ServerLost);
             }
@@ -354,7 +364,9 @@ impl Transport for SharedMemory {
             if waited >= timeout {
                 return Err(Error::Timeout);
             }
-            link.wait((timeout - waited).min(SLICE));
+            if !link.polling {
+                link.wait((timeout - waited).min(SLICE));
+            }
         }
     }
 

@@ -149,6 +149,13 @@ impl<'a> PairSearch<'a> {
         }
     }
 
+    /// Work done so far.
+    pub fn counters(&self) -> super::Counters {
+        let mut counters = self.outcome.counters;
+        counters += self.search.as_ref().map_or_else(super::Counters::default, |search| search.counters);
+        counters
+    }
+
     /// Ends the search and gives its memory back.
     pub fn into_scratch(self) -> Scratch {
         self.search.map(Search::into_scratch).unwrap_or_default()

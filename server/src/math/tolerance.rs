@@ -43,3 +43,7 @@ pub const CARRIED: f64 = 64.0 * f64::EPSILON;
 /// Swept boxes grow by this times the size of their coordinates: a pose, a corner and a sum of both are each right to a
 /// few units in the last place (2e-16); a wider box only costs a comparison.
 pub const BOX_ROUNDING: f64 = 1e-14;
+
+/// How far past the end of the earliest bracket (fraction of the step) other pairs are searched for a scene's first
+/// contact: their own brackets may begin before the time at which the resolution's depth is reached.
+pub const FIRST_SLACK: f64 = 1e-6;

@@ -117,7 +117,7 @@ mod tests {
                 .collect();
             boxes[3] = Aabb::ALL;
             boxes[5] = Aabb::EMPTY;
-            let is_static = |i: usize| i % 3 == 0;
+            let is_static = |i: usize| i.is_multiple_of(3);
             let mut found = Vec::new();
             BroadPhase::default().run(&boxes, is_static, |i, j| found.push((i.min(j) as usize, i.max(j) as usize)));
             found.sort_unstable();

@@ -5,9 +5,12 @@
 use super::body::Body;
 use super::plan::PairPlan;
 use super::step::StepOptions;
-use crate::contact::{self, Outcome, PairQuery, Scratch, Status};
+use crate::contact::{self, Outcome, PairQuery, PairSearch, Scratch, Status};
+use crate::math::tolerance;
 use crate::motion::Placed;
 use contactd_proto::{Detect, Motion};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 pub(super) use crate::contact::default_resolution;
 
@@ -40,12 +43,16 @@ impl Memory {
     }
 }
 
-/// Searches every job.
+/// Searches every job to its end; when only the first contact is asked for, none further than that needs.
 pub fn run(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mut Memory) {
     memory.outcomes.clear();
+    if options.first && !options.clear {
+        return run_first(bodies, jobs, options, memory);
+    }
     for job in jobs {
         let outcome = if job.near {
-            search_pair(bodies, job, options, &mut memory.scratch)
+            let outcome = contact::earliest_contact(&query(bodies, job, options), &mut memory.scratch);
+            finished(job, outcome)
         } else {
             Outcome::clear(job.resolution)
         };
@@ -53,23 +60,57 @@ pub fn run(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mu
     }
 }
 
-fn search_pair(bodies: &[Body], job: &PairJob, options: &StepOptions, scratch: &mut Scratch) -> Outcome {
-    let discrete = job.plan.detect == Detect::Discrete;
+/// One queue over all pairs, ordered by the time before which a pair cannot meet. The pair in front is searched until
+/// another is in front; the first contact found bounds how far any other needs to be searched. A pair that is left
+/// unfinished is clear until later than that, which is all that is said of it.
+fn run_first(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mut Memory) {
+    let searches = jobs.iter().map(|job| PairSearch::new(&query(bodies, job, options), Scratch::default()));
+    let mut searches: Vec<PairSearch> = searches.collect();
+    memory.outcomes.extend(jobs.iter().map(|job| Outcome::clear(job.resolution)));
+    // All times are >= 0, so their bits order as they do; ties go to the smaller pair.
+    let mut queue: BinaryHeap<Reverse<(u64, usize)>> = (0..jobs.len()).map(|i| Reverse((0, i))).collect();
+    let mut horizon = f64::INFINITY;
+    while let Some(Reverse((key, i))) = queue.pop() {
+        let time = f64::from_bits(key);
+        let search = &mut searches[i];
+        if time > horizon {
+            memory.outcomes[i].time_lower = time.min(1.0);
+            memory.outcomes[i].counters = search.counters();
+            continue;
+        }
+        let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
+        match search.run(next.max(time).min(horizon)) {
+            None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
+            Some(outcome) => {
+                let outcome = finished(&jobs[i], outcome);
+                if !jobs[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
+                    horizon = horizon.min(outcome.time_upper + tolerance::FIRST_SLACK);
+                }
+                memory.outcomes[i] = outcome;
+            }
+        }
+    }
+}
+
+fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions) -> PairQuery<'a> {
     let side = |index: u32| {
         let body = &bodies[index as usize];
+        let discrete = job.plan.detect == Detect::Discrete;
         let motion = if discrete { Motion::resting(body.track.end) } else { body.track.motion };
         contact::Body { model: &body.part.model, placed: Placed { place: body.place, motion } }
     };
-    let limit = if options.cell_limit == 0 { contact::DEFAULT_CELL_LIMIT } else { options.cell_limit };
-    let query = PairQuery {
+    PairQuery {
         a: side(job.a),
         b: side(job.b),
         resolution: job.resolution,
-        cell_limit: limit,
-        ideas: crate::contact::Ideas::default(),
-    };
-    let mut outcome = contact::earliest_contact(&query, scratch);
-    if discrete && outcome.status != Status::Undecided {
+        cell_limit: if options.cell_limit == 0 { contact::DEFAULT_CELL_LIMIT } else { options.cell_limit },
+        ideas: contact::Ideas::default(),
+    }
+}
+
+/// A discrete pair's answer is about the end of the step.
+fn finished(job: &PairJob, mut outcome: Outcome) -> Outcome {
+    if job.plan.detect == Detect::Discrete && outcome.status != Status::Undecided {
         (outcome.time_lower, outcome.time, outcome.time_upper) = (1.0, 1.0, 1.0);
     }
     outcome

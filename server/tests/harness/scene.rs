@@ -37,9 +37,9 @@ pub fn fill(records: &mut [PoseRecord], ids: &[u32], k: u64, seed: u64) {
         let mut n = numbers(seed ^ (k << 8) ^ i as u64);
         let [x, y, z] = [n() * 2.0 - 1.0, n() * 2.0 - 1.0, n()];
         let home = DVec3::new(8.0 - 12.0 * i as f64, 0.0, 7.0 + 6.0 * z);
-        let position = home + DVec3::new(3.0 * x, 3.0 * y, if k % 3 == 0 { -6.0 } else { 0.0 });
+        let position = home + DVec3::new(3.0 * x, 3.0 * y, if k.is_multiple_of(3) { -6.0 } else { 0.0 });
         let tilt = DVec3::new(x, y, 0.0) * 0.4;
-        *record = if (k + i as u64) % 2 == 0 {
+        *record = if (k + i as u64).is_multiple_of(2) {
             PoseRecord::end(ids[i], &Pose::new(position, quat_of_rotation_vector(tilt)))
         } else {
             PoseRecord::turn(ids[i], position, tilt)
@@ -50,10 +50,10 @@ pub fn fill(records: &mut [PoseRecord], ids: &[u32], k: u64, seed: u64) {
 /// The options of step `k`, which exercise what a header can say.
 pub fn set_options<T: Transport>(session: &mut Session<T>, k: u64) {
     session.options.advance = if k % 5 == 4 { 0.25 } else { 1.0 };
-    session.options.details = k % 2 == 0;
-    session.options.clear = k % 7 == 0;
-    session.options.first = k % 11 == 0;
-    session.options.polling = k % 13 == 0;
+    session.options.details = k.is_multiple_of(2);
+    session.options.clear = k.is_multiple_of(7);
+    session.options.first = k.is_multiple_of(11);
+    session.options.polling = k.is_multiple_of(13);
     // Hard poses may end undecided: that is an answer too, and must agree like any other.
     session.options.cell_limit = 100_000;
 }
