@@ -252,3 +252,59 @@ fn bad_input_is_refused_each_with_its_sentence() {
     assert_eq!(step(&mut session, &ids, 3, 5).unwrap(), step(&mut own, &ids, 3, 5).unwrap());
     assert!(server.stop().success());
 }
+
+#[test]
+fn batches_and_replies_grow_far_beyond_their_first_size() {
+    let mut server = ServerProcess::start("growth", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ids = build(&mut session, 60);
+    build(&mut own, 60);
+    // 61 objects, all pairs told with their details: 3,660 slots, from a first size of 64.
+    let mut all = |k: u64| {
+        let mut answers = Vec::new();
+        session.options = contactd_client::StepOptions { clear: true, details: true, ..Default::default() };
+        own.options = session.options;
+        fill(session.begin_step(60).unwrap(), &ids, k, 9);
+        fill(own.begin_step(60).unwrap(), &ids, k, 9);
+        answers.push(session.finish(PATIENCE).map(|r| (r.records().len(), r.slots().len(), bits(&r))).unwrap());
+        answers.push(own.finish(PATIENCE).map(|r| (r.records().len(), r.slots().len(), bits(&r))).unwrap());
+        assert_eq!(answers[0], answers[1]);
+        answers[0].1
+    };
+    assert_eq!(all(1), 2 * (61 * 60 / 2));
+    for n in [1, 100, 5_000, 100_000] {
+        // Records of no object: what is tried is their way.
+        session.begin_step(n).unwrap()[n - 1].object = 777;
+        refused(session.finish(PATIENCE), ErrorCode::UnknownObject, &["index 0"]);
+    }
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+#[test]
+fn a_large_model_delays_only_the_session_that_loads_it() {
+    let server = ServerProcess::start("beside", "");
+    let address = server.address.clone();
+    let mut session = Session::connect_to(address.clone()).unwrap();
+    let ids = build(&mut session, 1);
+    let loading = std::thread::spawn(move || {
+        let sphere = |i: u32| {
+            format!(
+                "multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n",
+                i % 150,
+                i / 150
+            )
+        };
+        let text = format!("union() {{ {} }}", (0..15_000).map(sphere).collect::<String>());
+        let mut other = Session::connect_to(address).unwrap();
+        other.load_model("large.csg", &text).map(|m| m.faces.len())
+    });
+    let mut steps = 0;
+    while !loading.is_finished() {
+        step(&mut session, &ids, steps, 2).unwrap();
+        steps += 1;
+    }
+    assert_eq!(loading.join().unwrap(), Ok(15_000));
+    assert!(steps > 3, "only {steps} steps while a model was loaded");
+}
