@@ -437,7 +437,9 @@ fn a_ball_inside_a_ball_shaped_hole_meets_its_wall() {
 #[test]
 fn a_small_ball_crosses_a_large_cavity() {
     let hollow = Recipe::cuboid(1.1, 1.1, 1.1).minus(Recipe::cylinder(0.8, 0.7));
-    let s = Scene::falling(hollow, Recipe::sphere(0.15), dvec3(0.05, -0.03, 0.02), DVec3::X);
+    // The ball's own rotation is nothing to the answer; without it the gap closes in 3,300 cells.
+    let across = going(dvec3(0.05, -0.03, 0.02), DQuat::from_rotation_x(0.7), DVec3::X, DVec3::ZERO);
+    let s = scene(hollow, still(), Recipe::sphere(0.15), across);
     let time = (0.65f64 * 0.65 - 0.03 * 0.03).sqrt() - 0.05;
     meets("ball_in_cavity_swapped", &s.swapped(), time);
     meets("ball_in_cavity", &s, time);
