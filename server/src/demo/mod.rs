@@ -1,5 +1,3 @@
-//! `contactd demo`: a server process and a client process on real parts.
-//!
-//! Floor 9, beside main: may import everything.
-
+//! What `contactd demo` plays.
+pub mod scene;
 pub mod script;

@@ -99,16 +99,13 @@ pub fn acts() -> Vec<Act> {
         },
         Act {
             title: "balls in the bearing",
-            bodies: with(
-                vec![fixed("outer_ring", OUTER_RING), fixed("inner_ring", INNER_RING), moving("cage", CAGE)],
-                several("ball", BALLS, BALL),
-            ),
+            bodies: with(vec![fixed("outer_ring", OUTER_RING), fixed("cage", CAGE)], several("ball", BALLS, BALL)),
             steps: BEARING_STEPS,
             legs: bearing,
         },
         Act {
             title: "gears in mesh",
-            bodies: vec![fixed("base", BASE), moving("gear_1", GEAR), moving("gear_2", GEAR)],
+            bodies: vec![moving("gear_1", GEAR), moving("gear_2", GEAR)],
             steps: GEAR_STEPS,
             legs: gears,
         },
@@ -122,13 +119,13 @@ pub fn acts() -> Vec<Act> {
 }
 
 const BOLTS: usize = 8;
-const BOLT_STEPS: usize = 32;
+const BOLT_STEPS: usize = 24;
 const PEGS: usize = 4;
-const PEG_STEPS: usize = 56;
-const BALLS: usize = 9;
-const BEARING_STEPS: usize = 180;
-const GEAR_STEPS: usize = 192;
-const COVER_STEPS: usize = 172;
+const PEG_STEPS: usize = 40;
+const BALLS: usize = 3;
+const BEARING_STEPS: usize = 192;
+const GEAR_STEPS: usize = 288;
+const COVER_STEPS: usize = 200;
 
 /// Golden angle: directions that never repeat and fill the circle evenly.
 const GOLDEN: f64 = 2.399_963_229_728_653;
@@ -148,23 +145,28 @@ fn bolts(i: usize) -> Vec<Leg> {
     let mut legs = vec![Leg::rest(Pose::IDENTITY)];
     for b in 0..BOLTS {
         let hole = around_z(b as f64 * TAU / BOLTS as f64, 52.0, 0.0);
-        let spin = 0.35 * b as f64;
+        let upright = quat_of_rotation_vector(DVec3::Z * (0.35 * b as f64));
+        // No hand holds a screw exactly in line: each has a lean and an offset of its own.
+        let lean = around_z(1.7 * b as f64, 0.004, 0.0);
+        let off = around_z(2.9 * b as f64 + 0.4, 0.2, 0.0);
         let at = |z: f64, aside: DVec3, tilt: DVec3| {
-            let upright = quat_of_rotation_vector(DVec3::Z * spin);
-            Pose::new(hole + aside + DVec3::Z * z, (quat_of_rotation_vector(tilt) * upright).normalize())
+            let rotation = (quat_of_rotation_vector(tilt + lean) * upright).normalize();
+            Pose::new(hole + off + aside + DVec3::Z * z, rotation)
         };
         legs.push(match b.cmp(&now) {
-            std::cmp::Ordering::Less => Leg::rest(at(9.05, DVec3::ZERO, DVec3::ZERO)),
+            std::cmp::Ordering::Less => Leg::rest(at(9.2, DVec3::ZERO, DVec3::ZERO)),
             std::cmp::Ordering::Greater => Leg::rest(at(48.0, DVec3::ZERO, DVec3::ZERO)),
             std::cmp::Ordering::Equal => {
-                let height = |s: usize| 48.0 - 38.5 * s as f64 / (BOLT_STEPS - 1) as f64;
+                let height = |s: usize| 48.0 - 38.4 * s as f64 / (BOLT_STEPS - 1) as f64;
                 let z = height(s);
                 let start = at(z, DVec3::ZERO, DVec3::ZERO);
                 let aside = around_z(GOLDEN * i as f64, 1.0, 0.0);
                 let end = match s {
                     _ if s == BOLT_STEPS - 1 => at(8.6, DVec3::ZERO, DVec3::ZERO),
-                    _ if s.is_multiple_of(2) || z > 33.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
-                    _ if s % 4 == 1 => at(z - 0.4, aside * 0.9, DVec3::ZERO),
+                    _ if s % 3 != 1 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
+                    // Above the hole: too far out, onto the rims of hole and counterbore.
+                    _ if z > 33.0 => at(25.0, aside * 2.0, DVec3::ZERO),
+                    _ if s.is_multiple_of(2) => at(z - 0.4, aside * 0.9, DVec3::ZERO),
                     _ => at(z - 0.4, aside * 0.5, DVec3::Z.cross(aside) * 0.06),
                 };
                 Leg { start, end }
@@ -182,7 +184,7 @@ fn pegs(i: usize) -> Vec<Leg> {
         let hole = dvec3(-50.0 + 40.0 * p as f64, [-20.0, 20.0, 0.0, 40.0][p], 0.0);
         let at = |z: f64, aside: DVec3, tilt: DVec3| turned(hole + aside + DVec3::Z * z, tilt);
         legs.push(match p.cmp(&now) {
-            std::cmp::Ordering::Less => Leg::rest(at(0.05, DVec3::ZERO, DVec3::ZERO)),
+            std::cmp::Ordering::Less => Leg::rest(at(0.2, DVec3::ZERO, DVec3::ZERO)),
             std::cmp::Ordering::Greater => Leg::rest(at(40.0, DVec3::ZERO, DVec3::ZERO)),
             std::cmp::Ordering::Equal => {
                 let height = |s: usize| 40.0 - 39.6 * s as f64 / (PEG_STEPS - 1) as f64;
@@ -194,8 +196,8 @@ fn pegs(i: usize) -> Vec<Leg> {
                     // Above the hole: now and then a trial beside it, onto the chamfer.
                     _ if z > 24.0 && s % 3 == 1 => at(22.6, aside * 0.8, DVec3::ZERO),
                     _ if z > 24.0 && s % 3 == 2 => at(22.4, aside * 0.6, aside * 0.05),
-                    _ if s.is_multiple_of(2) || z > 24.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
-                    _ if s % 4 == 1 => at(z - 0.2, aside * 0.12, DVec3::ZERO),
+                    _ if s % 3 != 1 || z > 24.0 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
+                    _ if s.is_multiple_of(2) => at(z - 0.2, aside * 0.12, DVec3::ZERO),
                     _ => at(z - 0.2, DVec3::ZERO, aside * 0.03),
                 };
                 Leg { start, end }
@@ -205,36 +207,37 @@ fn pegs(i: usize) -> Vec<Leg> {
     legs
 }
 
-/// The cage turns with its balls; each ball in turn is thrown outwards into the raceway's two cones, or against its pocket.
+/// Three balls roll in their pockets; one after the other is thrown outwards, into the raceway's two cones, or lags
+/// behind and meets the wall of its pocket.
 fn bearing(i: usize) -> Vec<Leg> {
-    let (phase, next) = (i as f64 * 0.02, (i + 1) as f64 * 0.02);
+    let roll = |i: usize| 0.002 * ((i % 8) as f64 - 4.0);
     let mut legs = vec![Leg::rest(Pose::IDENTITY); 2];
-    legs.push(Leg { start: turned(DVec3::ZERO, DVec3::Z * phase), end: turned(DVec3::ZERO, DVec3::Z * next) });
     for b in 0..BALLS {
-        let home = |phase: f64| b as f64 * TAU / BALLS as f64 + phase;
-        let start = turned(around_z(home(phase), 23.0, 0.0), DVec3::Z * (-2.0 * phase));
-        let thrown = i % BALLS == b && i.is_multiple_of(2);
-        let late = i % BALLS == b && i % 4 == 1;
-        let (radius, angle) =
-            if thrown { (23.06, home(next)) } else { (23.0, home(if late { next + 0.012 } else { next })) };
-        let end = turned(around_z(angle, radius, 0.0), DVec3::Z * (-2.0 * next));
+        let home = b as f64 * TAU / BALLS as f64;
+        let at = |radius: f64, angle: f64, i: usize| {
+            turned(around_z(home + angle, radius, 0.0), DVec3::Z * (-0.3 * i as f64))
+        };
+        let start = at(22.92, 0.0, i);
+        let end = match i % (2 * BALLS) {
+            k if k == 2 * b && i.is_multiple_of(4) => at(23.2, roll(i), i + 1),
+            k if k == 2 * b => at(23.05, roll(i), i + 1),
+            k if k == 2 * b + 1 && i % 4 == 1 => at(22.95, 0.012, i + 1),
+            _ => at(22.92, 0.0, i),
+        };
         legs.push(Leg { start, end });
     }
     legs
 }
 
-/// Two gears 60.2 apart turn against each other; every other step the second one lags and its flank is met.
+/// Two gears on fixed axes turn against each other, tooth by tooth: the first one drives, now this way, now that, until
+/// its flank meets the other's; on half of the steps the second one runs away as fast, and nothing meets.
 fn gears(i: usize) -> Vec<Leg> {
     let tooth = TAU / 24.0;
     let at = |x: f64, angle: f64| turned(dvec3(x, 0.0, 2.3), DVec3::Z * angle);
     let phase = 0.37 * tooth * i as f64;
     let drive = if i.is_multiple_of(2) { 0.06 } else { -0.06 };
-    let lag = match i % 4 {
-        0 | 1 => 0.0,
-        _ => -drive,
-    };
+    let lag = if i % 4 < 2 { 0.0 } else { -drive };
     vec![
-        Leg::rest(Pose::IDENTITY),
         Leg { start: at(-30.0, phase), end: at(-30.0, phase + drive) },
         Leg { start: at(30.0, PI + 0.5 * tooth - phase), end: at(30.0, PI + 0.5 * tooth - phase + lag) },
     ]

@@ -44,8 +44,8 @@ pub fn tree(name: &str, solid: &Solid, bounds: &SBounds) -> Drawing {
     let text = |r: &Row| label(solid, r.node);
     let indent = |r: &Row| 40.0 + 16.0 * r.depth as f64;
     let widest = rows.iter().map(|r| indent(r) + text_width(&text(r), Size::Small)).fold(300.0, f64::max);
-    let bars = widest + 40.0;
-    let width = (bars + 3.0 * (BAR + 16.0) + 150.0).max(1000.0);
+    let bars = widest + 80.0;
+    let width = (bars + 3.0 * (BAR + 16.0) + 150.0).max(1352.0);
     let (view_height, head) = (520.0, 56.0);
     let top = head + view_height + 60.0;
     let height = top + ROW * (rows.len() as f64 + 1.0) + if hidden > 0 { 60.0 } else { 40.0 };
