@@ -41,6 +41,21 @@ enum Command {
         #[arg(long)]
         config: Option<PathBuf>,
     },
+    /// A server process and a client process on real parts: steps, earliest contacts, latencies.
+    Demo {
+        /// The engine in this process instead of a server.
+        #[arg(long)]
+        embedded: bool,
+        /// Also write every contact, numbers exact, into a file.
+        #[arg(long, value_name = "FILE")]
+        csv: Option<PathBuf>,
+        /// Write the scene of one step instead, for `contactd check`.
+        #[arg(long, value_name = "STEP")]
+        scene_of: Option<usize>,
+        /// Where that scene and its models go.
+        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        into: PathBuf,
+    },
     /// What is in a model or scene file, and how it was imported.
     Inspect {
         /// A .csg or .toml file.
@@ -86,6 +101,8 @@ enum Done {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Check(arguments) => check_scene(&arguments),
+        Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
+        Command::Demo { embedded, csv, .. } => run_demo(embedded, csv.as_deref()),
         Command::Inspect { file, facets, picture } => inspect_file(&file, facets, picture.as_deref()),
         Command::Serve { name, config } => serve(&name, config.as_deref()),
     };
@@ -107,6 +124,18 @@ fn serve(name: &str, config: Option<&Path>) -> Result<Done, Box<dyn Error>> {
         let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol 1, process {pid})\n"));
     };
     contactd::ipc::serve(&Address::of(name)?, config, ready)?;
+    Ok(Done::Well)
+}
+
+fn run_demo(embedded: bool, csv: Option<&Path>) -> Result<Done, Box<dyn Error>> {
+    let (text, run) = contactd::demo::run(embedded, csv)?;
+    print(&text)?;
+    Ok(if run.undecided > 0 { Done::Undecided } else { Done::Well })
+}
+
+fn demo_scene(step: usize, into: &Path) -> Result<Done, Box<dyn Error>> {
+    let path = contactd::demo::scene::write(step, into)?;
+    print(&format!("{}\n", path.display()))?;
     Ok(Done::Well)
 }
 

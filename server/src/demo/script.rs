@@ -145,14 +145,10 @@ fn bolts(i: usize) -> Vec<Leg> {
     let mut legs = vec![Leg::rest(Pose::IDENTITY)];
     for b in 0..BOLTS {
         let hole = around_z(b as f64 * TAU / BOLTS as f64, 52.0, 0.0);
-        let upright = quat_of_rotation_vector(DVec3::Z * (0.35 * b as f64));
         // No hand holds a screw exactly in line: each has a lean and an offset of its own.
         let lean = around_z(1.7 * b as f64, 0.004, 0.0);
         let off = around_z(2.9 * b as f64 + 0.4, 0.2, 0.0);
-        let at = |z: f64, aside: DVec3, tilt: DVec3| {
-            let rotation = (quat_of_rotation_vector(tilt + lean) * upright).normalize();
-            Pose::new(hole + off + aside + DVec3::Z * z, rotation)
-        };
+        let at = |z: f64, aside: DVec3, tilt: DVec3| turned(hole + off + aside + DVec3::Z * z, tilt + lean);
         legs.push(match b.cmp(&now) {
             std::cmp::Ordering::Less => Leg::rest(at(9.2, DVec3::ZERO, DVec3::ZERO)),
             std::cmp::Ordering::Greater => Leg::rest(at(48.0, DVec3::ZERO, DVec3::ZERO)),
@@ -163,10 +159,10 @@ fn bolts(i: usize) -> Vec<Leg> {
                 let aside = around_z(GOLDEN * i as f64, 1.0, 0.0);
                 let end = match s {
                     _ if s == BOLT_STEPS - 1 => at(8.6, DVec3::ZERO, DVec3::ZERO),
-                    _ if s % 3 != 1 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
+                    _ if s % 3 != 1 || s == 16 => at(height(s + 1), DVec3::ZERO, DVec3::ZERO),
                     // Above the hole: too far out, onto the rims of hole and counterbore.
                     _ if z > 33.0 => at(25.0, aside * 2.0, DVec3::ZERO),
-                    _ if s.is_multiple_of(2) => at(z - 0.4, aside * 0.9, DVec3::ZERO),
+                    _ if s.is_multiple_of(2) => at(z - 0.4, aside * 0.9, DVec3::Z.cross(aside) * 0.03),
                     _ => at(z - 0.4, aside * 0.5, DVec3::Z.cross(aside) * 0.06),
                 };
                 Leg { start, end }
@@ -210,7 +206,9 @@ fn pegs(i: usize) -> Vec<Leg> {
 /// Three balls roll in their pockets; one after the other is thrown outwards, into the raceway's two cones, or lags
 /// behind and meets the wall of its pocket.
 fn bearing(i: usize) -> Vec<Leg> {
-    let roll = |i: usize| 0.002 * ((i % 8) as f64 - 4.0);
+    // How far a ball rolls on while it is thrown: another way each time.
+    let roll = |i: usize| 0.004 * libm::sin(GOLDEN * i as f64);
+    let throw = |i: usize| 0.2 + 0.1 * libm::cos(1.7 * i as f64);
     let mut legs = vec![Leg::rest(Pose::IDENTITY); 2];
     for b in 0..BALLS {
         let home = b as f64 * TAU / BALLS as f64;
@@ -219,8 +217,8 @@ fn bearing(i: usize) -> Vec<Leg> {
         };
         let start = at(22.92, 0.0, i);
         let end = match i % (2 * BALLS) {
-            k if k == 2 * b && i.is_multiple_of(4) => at(23.2, roll(i), i + 1),
-            k if k == 2 * b => at(23.05, roll(i), i + 1),
+            k if k == 2 * b && i.is_multiple_of(4) => at(23.0 + throw(i), roll(i), i + 1),
+            k if k == 2 * b => at(22.9 + throw(i), roll(i), i + 1),
             k if k == 2 * b + 1 && i % 4 == 1 => at(22.95, 0.012, i + 1),
             _ => at(22.92, 0.0, i),
         };

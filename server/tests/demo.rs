@@ -1,0 +1,74 @@
+//! The demo as a user runs it: two processes, a thousand steps, and every row of its table solved again by `check`.
+
+use contactd::check::Check;
+use contactd::contact::Outcome;
+use contactd::demo::{chosen, play, scene};
+use contactd::import::{Facets, Limits, read_scene};
+use contactd::ipc::{ServerConfig, embedded};
+use std::collections::HashMap;
+use std::path::Path;
+use std::process::Command;
+
+/// The answer of `check` for a pair of a scene file.
+fn checked(scene_file: &Path, a: &str, b: &str) -> Outcome {
+    let scene = read_scene(scene_file).unwrap_or_else(|e| panic!("{e}"));
+    let models = scene.load_models(Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+    let mut check = Check::new(&scene, models, None).unwrap_or_else(|e| panic!("{e}"));
+    let outcome = check.step(false).unwrap_or_else(|e| panic!("{e}")).clone();
+    let id = |name: &str| scene.objects.iter().position(|o| o.name == name).expect("an object of the scene") as u32;
+    let pair = outcome.pairs.iter().find(|p| (p.a, p.b) == (id(a), id(b))).expect("the pair was searched");
+    pair.outcome
+}
+
+#[test]
+fn every_row_of_the_table_is_what_check_says_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let csv = folder.path().join("demo.csv");
+    let runtime = folder.path().join("run");
+    std::fs::create_dir(&runtime).expect("a runtime folder");
+    let output = Command::new(env!("CARGO_BIN_EXE_contactd"))
+        .args(["demo", "--csv"])
+        .arg(&csv)
+        .env("XDG_RUNTIME_DIR", &runtime)
+        .output()
+        .expect("the demo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("p99.9"), "{text}");
+
+    // The records as they came through shared memory, exact.
+    let file = std::fs::read_to_string(&csv).expect("the contacts");
+    let mut sent: HashMap<(String, String, String), Vec<String>> = HashMap::new();
+    for line in file.lines().skip(1) {
+        let f: Vec<String> = line.split(',').map(String::from).collect();
+        sent.insert((f[0].clone(), f[1].clone(), f[2].clone()), f);
+    }
+    // The same script in this process: the same contacts, and the rows of the table.
+    let mut session = embedded(&ServerConfig::default()).expect("an embedded session");
+    let run = play(&mut session, |_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    assert!(
+        run.steps >= 1000 && 3 * run.steps_with_contact >= run.steps,
+        "{} of {}",
+        run.steps_with_contact,
+        run.steps
+    );
+    let subtracted = run.rows.iter().filter(|r| r.subtracted).count();
+    assert!(2 * subtracted >= run.rows.len(), "{subtracted} of {} on subtracted surfaces", run.rows.len());
+    assert_eq!(run.undecided, 0);
+    assert_eq!(contactd::demo::csv(&run), file, "shared memory and the embedded session differ");
+
+    let rows = chosen(&run);
+    assert!(rows.len() >= 20);
+    for row in rows {
+        let [a, b] = &row.names;
+        let line = &sent[&(row.step.to_string(), a.clone(), b.clone())];
+        assert!(text.contains(&format!("{:.9}", row.record.time)), "step {} is not in the table", row.step);
+        let path = scene::write(row.step, folder.path()).unwrap_or_else(|e| panic!("{e}"));
+        let o = checked(&path, a, b);
+        let bits = |x: f64| format!("{x:?}");
+        assert_eq!(line[4..6], [bits(o.time), bits(o.time_lower)], "step {}", row.step);
+        assert_eq!(line[6..8], [o.kind.name(), o.extent.name()], "step {}", row.step);
+        let vectors: Vec<String> = o.point.to_array().into_iter().chain(o.normal.to_array()).map(bits).collect();
+        assert_eq!(line[9..15], vectors[..], "step {}", row.step);
+    }
+}
