@@ -215,12 +215,14 @@ impl View<'_> {
 
     /// The tangent plane of a convex face at a point of its own body's frame, wherever that is.
     pub fn tangent(&self, side: Side, id: LiteralId, point: DVec3) -> Linear {
-        let f = self.faces(side).get(id.face()).at(point);
-        let (normal, center) = match side {
-            Side::A => (f.normal, self.center),
-            Side::B => (self.at.a_vector(f.normal), self.center_b),
-        };
-        self.plane(side, id, normal, f.value + f.normal.dot(center - point) + self.delta)
+        let face = self.faces(side).get(id.face());
+        let mut f = face.at(point);
+        let center = if side == Side::A { self.center } else { self.center_b };
+        let value = f.value + f.normal.dot(center - point);
+        if side == Side::B {
+            f.normal = self.at.a_vector(f.normal);
+        }
+        Linear { cost: self.bulge(side, face, &f), ..self.plane(side, id, f.normal, value + self.delta) }
     }
 
     /// A bound by a plane that is fixed in its body.

@@ -7,6 +7,7 @@ use super::search::{Ending, Found, Scratch, Search, Task};
 use crate::eco::Model;
 use crate::math::tolerance;
 use crate::motion::{Placed, Relative};
+use crate::solid::Sense;
 use glam::{DMat3, DVec3};
 
 /// One body of a pair.
@@ -52,6 +53,9 @@ impl Default for Ideas {
     }
 }
 
+/// A hollow body counts as this much larger when the carrier of the cells is chosen.
+const HOLLOW: f64 = 2.0;
+
 /// Cells a pair may cost by default.
 pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
 
@@ -72,6 +76,8 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
 /// further than the earliest contact known.
 pub struct PairSearch<'a> {
     task: Task<'a>,
+    /// The query's b carries the cells.
+    swapped: bool,
     /// 1 or 2: the depth that is searched, in resolutions.
     level: f64,
     search: Option<Search<'a>>,
@@ -82,9 +88,13 @@ pub struct PairSearch<'a> {
 impl<'a> PairSearch<'a> {
     /// Prepares the search of a pair.
     pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
-        let (model_a, model_b) = (query.a.model, query.b.model);
+        // The body that carries the cells: small and without cavities is cheap to cover.
+        let weight = |m: &Model| m.radius * if m.solid.senses.contains(&Sense::Negative) { HOLLOW } else { 1.0 };
+        let swapped = weight(query.b.model) < weight(query.a.model);
+        let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+        let (model_a, model_b) = (carrier.model, other.model);
         let (a, b) = (&model_a.solid, &model_b.solid);
-        let relative = Relative::new(query.a.placed, query.b.placed);
+        let relative = Relative::new(carrier.placed, other.placed);
         let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
         let scale = model_a.radius.max(model_b.radius);
         // Positions, matrices and faces are each right to a few units in the last place of the pair's extent.
@@ -108,7 +118,7 @@ impl<'a> PairSearch<'a> {
         if !a.is_empty() && !b.is_empty() {
             search.start();
         }
-        Self { task, level: 1.0, search: Some(search), outcome, resolution: query.resolution }
+        Self { task, swapped, level: 1.0, search: Some(search), outcome, resolution: query.resolution }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
@@ -144,6 +154,11 @@ impl<'a> PairSearch<'a> {
                     }
                     fill_overlap(&mut self.outcome, &self.task, x);
                 }
+            }
+            if self.swapped {
+                let o = &mut self.outcome;
+                o.normal = -o.normal;
+                std::mem::swap(&mut o.faces_a, &mut o.faces_b);
             }
             return Some(self.outcome);
         }

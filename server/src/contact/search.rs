@@ -1,8 +1,8 @@
 //! The search: one queue ordered by the earliest time at which an item could hold a contact.
 //!
-//! Items are pairs of octree nodes (`stage2`) and cells: boxes fixed in the carrier A with what is left there of both
-//! trees. The earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a pair
-//! into smaller pairs or into cells, a cell into its halves. Where a cell's bounds point to a contact, Newton proposes one
+//! Items are slices of time (`stage2`) and cells: boxes fixed in the carrier A with what is left there of both trees. The
+//! earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a slice into
+//! smaller ones or into cells, a cell into its halves. Where a cell's bounds point to a contact, Newton proposes one
 //! and both whole trees confirm it (`newton`). When the earliest item lies beyond the verified contact, all that was
 //! queued is the proof that nothing came before.
 //!
@@ -33,10 +33,8 @@ pub(super) type Range = (u32, u32);
 pub(super) enum Source {
     /// A cell of stage 3.
     Cell,
-    /// A slice of time for stage 1.
+    /// A slice of time for stages 1 and 2.
     Slice,
-    /// A pair of octree nodes for stage 2, by its index.
-    Pair(u32),
 }
 
 /// An item: a box fixed in A with what is left there of both trees, or what such boxes come from.
@@ -177,7 +175,7 @@ pub struct Scratch {
 pub struct Search<'a> {
     pub(super) task: Task<'a>,
     pub(super) scratch: Scratch,
-    pub(super) stage2: Stage2<'a>,
+    pub(super) stage2: Stage2,
     serial: u64,
     found: Option<Found>,
     instant: Instant,
@@ -248,7 +246,6 @@ impl<'a> Search<'a> {
                 return Some(Ending::Limit(cell.t));
             }
             self.scratch.heap.pop();
-            self.counters.cells += 1;
             let deep = self.refine(cell);
             self.counters.clauses = self.scratch.clause.clauses;
             if let Some(x) = deep {
@@ -265,13 +262,9 @@ impl<'a> Search<'a> {
         let at = self.instant;
         let start = cell.t == 0.0;
         match cell.source {
-            Source::Cell => {}
+            Source::Cell => self.counters.cells += 1,
             Source::Slice => {
                 self.locate(&cell);
-                return None;
-            }
-            Source::Pair(index) => {
-                self.open(&cell, index);
                 return None;
             }
         }
