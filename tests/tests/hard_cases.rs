@@ -25,8 +25,7 @@ fn scene(a: Recipe, motion_a: Motion, b: Recipe, motion_b: Motion) -> Scene {
 }
 
 /// What the engine cannot decide yet: one that it can must leave this list.
-const KNOWN_GAPS: &[&str] =
-    &["own_axis_gap", "own_axis_touching", "ball_same_size", "two_bullets"];
+const KNOWN_GAPS: &[&str] = &["own_axis_gap", "own_axis_touching", "ball_same_size", "two_bullets"];
 
 fn ceiling(name: &str) -> u64 {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("cell_ceilings.toml");
@@ -211,8 +210,8 @@ fn vertex_meets_vertex() {
         let b = going(DVec3::Z * 1.25, DQuat::from_rotation_z(angle), DOWN, DVec3::ZERO);
         scene(Recipe::platonic(8, 0.5), still(), Recipe::platonic(8, 0.25), b)
     };
-    // Known gap: two edges are told where two vertices meet; the right answer is vertex-vertex.
-    assert_eq!(meets("vertex_vertex", &turned(0.3), 0.5).kind.name(), "edge-edge");
+    let o = meets("vertex_vertex", &turned(0.3), 0.5);
+    assert!(o.kind.name() == "vertex-vertex" && o.averaged_normal && o.normal.distance(DVec3::Z) < 1e-9, "{o:?}");
     // With faces of both in one plane face-face is as true.
     let aligned = meets("vertex_vertex_aligned", &turned(0.0), 0.5);
     assert!(["vertex-vertex", "face-face"].contains(&aligned.kind.name()), "{aligned:?}");

@@ -6,8 +6,9 @@ use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
 use super::search::{Ending, Found, Scratch, Search, Task};
 use crate::eco::Model;
 use crate::math::tolerance;
-use crate::motion::{Placed, Relative};
-use crate::solid::Sense;
+use crate::motion::{Instant, Placed, Relative};
+use crate::solid::local::{self, LiteralId};
+use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 
 /// One body of a pair.
@@ -195,13 +196,16 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
         tolerance: task.rounding,
     };
     o.point = task.relative.world_point(&at, s.x);
-    let active = Active::of(&problem, s);
+    let mut active = Active::of(&problem, s);
+    if active.extent == Extent::Point && found.touch.as_ref().is_some_and(|touch| touch.t >= 0.0) {
+        active.add_incident(task, s.x, &at);
+    }
     o.kind = Kind::of_active(active.count[0], active.count[1]);
     o.faces_a = active.faces[0];
     o.faces_b = active.faces[1];
     o.extent = active.extent;
     o.averaged_normal = o.kind == Kind::VertexVertex;
-    let normal = active.normal;
+    let normal = if o.averaged_normal { active.average.unwrap_or(active.normal) } else { active.normal };
     o.normal = (at.world_from_a * normal).normalize();
     o.normal_speed = at.velocity(s.x).dot(normal);
     o.separation = 0.0;
@@ -213,6 +217,8 @@ struct Active {
     faces: [[u32; 3]; 2],
     /// Unit, from A, along A's axes.
     normal: DVec3,
+    /// Average of the adjacent normals of both sides, where known.
+    average: Option<DVec3>,
     extent: Extent,
 }
 
@@ -248,9 +254,53 @@ impl Active {
         }
         let normal =
             (sums[0] - sums[1]).try_normalize().unwrap_or_else(|| gradients.first().copied().unwrap_or(DVec3::X));
-        Self { count, faces, normal, extent: extent(&gradients, curvature, problem.scale) }
+        Self { count, faces, normal, average: None, extent: extent(&gradients, curvature, problem.scale) }
     }
 }
+
+impl Active {
+    /// Counts the faces that pass through a point of contact without being needed to hold it there: where a vertex meets
+    /// a vertex, two edges already do. The adjacent normals are averaged as the paper does.
+    fn add_incident(&mut self, task: &Task, x: DVec3, at: &Instant) {
+        let mut sum = DVec3::ZERO;
+        for (side, solid, y, sign) in [(Side::A, task.a, x, 1.0), (Side::B, task.b, at.b_point(x), -1.0)] {
+            let tol = INCIDENT * task.rounding;
+            let mut open = Vec::new();
+            let mut normals = DVec3::ZERO;
+            local::prune(&solid.normal_form, &mut open, &mut |id| {
+                let v = solid.faces[id.face() as usize].value(y);
+                local::truth_of(id.sense(), (v - tol, v + tol), 0.0)
+            });
+            let mut ids: Vec<LiteralId> = local::literals(&open).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            for id in &ids {
+                let face = &solid.faces[id.face() as usize];
+                let n = match *face {
+                    Face::Cone { apex, axis, .. } if (y - apex).length() <= tol => -axis,
+                    _ => face.at(y).normal,
+                };
+                normals += if id.sense() == Sense::Positive { n } else { -n };
+            }
+            let k = side as usize;
+            let list = &mut self.faces[k];
+            for id in &ids {
+                if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
+                    && !list.contains(&id.face())
+                {
+                    list[slot] = id.face();
+                }
+            }
+            self.count[k] = self.count[k].max(ids.len());
+            let normals = if side == Side::A { normals } else { at.a_vector(normals) };
+            sum += normals.normalize_or_zero() * sign;
+        }
+        self.average = sum.try_normalize();
+    }
+}
+
+/// A face within this many roundings of a contact point passes through it.
+const INCIDENT: f64 = 16.0;
 
 /// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
 fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
