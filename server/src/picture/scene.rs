@@ -47,7 +47,7 @@ pub struct Quality {
 }
 
 /// For files: a few seconds.
-pub const FINE: Quality = Quality { size: (1280, 800), samples: 4 };
+pub const FINE: Quality = Quality { size: (1280, 720), samples: 4 };
 
 const COLORS: [Rgb; 8] = [
     [0.40, 0.44, 0.49],
@@ -101,6 +101,7 @@ pub fn scene(title: &str, note: &str, actors: &[Actor], meetings: &[Meeting], qu
         let c = boxes[i].center();
         view.things[i].cut = Some(vec![(DVec3::X, c.x), (-DVec3::Y, -c.y)]);
     }
+    view.zoom_to_things();
     annotated(&view, title, &marks, note)
 }
 

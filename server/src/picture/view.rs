@@ -47,6 +47,8 @@ pub struct Camera {
     frame: [DVec3; 3],
     /// Pixels per unit of (lateral / forward).
     focal: f64,
+    /// (lateral / forward) at the image's middle.
+    middle: DVec2,
     /// Image size in pixels.
     pub size: (usize, usize),
 }
@@ -61,8 +63,13 @@ impl Camera {
         let whole = Aabb::of_points(corners.iter().copied());
         let radius = whole.half().length().max(1e-12);
         // Far enough for a calm perspective; then the smallest field that holds every corner, centred on it.
-        let mut camera =
-            Self { eye: whole.center() - forward * (5.0 * radius), frame: [right, up, forward], focal: 1.0, size };
+        let mut camera = Self {
+            eye: whole.center() - forward * (5.0 * radius),
+            frame: [right, up, forward],
+            focal: 1.0,
+            middle: DVec2::ZERO,
+            size,
+        };
         for _ in 0..4 {
             let at: Vec<DVec2> = corners.iter().map(|c| camera.plane(*c)).collect();
             let low = at.iter().copied().reduce(DVec2::min).unwrap_or_default();
@@ -82,15 +89,26 @@ impl Camera {
 
     /// The pixel (from the upper left) where a world point is seen.
     pub fn pixel(&self, x: DVec3) -> DVec2 {
-        let p = self.plane(x) * self.focal;
+        let p = (self.plane(x) - self.middle) * self.focal;
         DVec2::new(0.5 * self.size.0 as f64 + p.x, 0.5 * self.size.1 as f64 - p.y)
     }
 
     /// The ray through a pixel position.
     pub fn ray(&self, x: f64, y: f64) -> Ray {
         let (u, v) = ((x - 0.5 * self.size.0 as f64) / self.focal, (0.5 * self.size.1 as f64 - y) / self.focal);
+        let (u, v) = (u + self.middle.x, v + self.middle.y);
         let direction = (self.frame[2] + self.frame[0] * u + self.frame[1] * v).normalize();
         Ray { origin: self.eye, direction }
+    }
+
+    /// The same view, zoomed until the pixels from `low` to `high` fill the image.
+    pub fn zoomed(mut self, low: DVec2, high: DVec2) -> Self {
+        let size = DVec2::new(self.size.0 as f64, self.size.1 as f64);
+        let off = 0.5 * (low + high) - 0.5 * size;
+        self.middle += DVec2::new(off.x, -off.y) / self.focal;
+        let fill = size / (high - low).max(DVec2::ONE);
+        self.focal *= 0.92 * fill.x.min(fill.y);
+        self
     }
 
     /// World length that one pixel spans at `x`.
@@ -176,6 +194,25 @@ impl View<'_> {
         let ray = Ray { origin: self.camera.eye, direction: away.normalize() };
         let slack = 2.0 * self.camera.pixel_length(x);
         self.first_hit(&ray, &boxes).is_none_or(|h| h.at > away.length() - slack)
+    }
+
+    /// Zooms until what is seen of the things fills the image: boxes are larger than what they hold.
+    pub fn zoom_to_things(&mut self) {
+        let boxes: Vec<Aabb> = self.things.iter().map(Thing::aabb).collect();
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let step = (self.camera.size.0 / 200).max(1);
+        for y in (0..self.camera.size.1).step_by(step) {
+            for x in (0..self.camera.size.0).step_by(step) {
+                let at = DVec2::new(x as f64, y as f64);
+                if self.first_hit(&self.camera.ray(at.x, at.y), &boxes).is_some_and(|h| h.object != GROUND) {
+                    low = low.min(at - step as f64);
+                    high = high.max(at + step as f64);
+                }
+            }
+        }
+        if low.x < high.x {
+            self.camera = self.camera.zoomed(low, high);
+        }
     }
 
     fn first_hit(&self, ray: &Ray, boxes: &[Aabb]) -> Option<Hit> {
