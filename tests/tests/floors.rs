@@ -13,11 +13,11 @@ fn floors() -> BTreeMap<String, u32> {
     let mut table = BTreeMap::new();
     for line in text.lines() {
         let cells: Vec<&str> = line.split('|').map(str::trim).collect();
-        if let [_, floor, modules, ..] = cells.as_slice() {
-            if let Ok(floor) = floor.parse() {
-                for module in modules.split(',') {
-                    table.insert(module.trim().trim_matches('`').to_owned(), floor);
-                }
+        if let [_, floor, modules, ..] = cells.as_slice()
+            && let Ok(floor) = floor.parse()
+        {
+            for module in modules.split(',') {
+                table.insert(module.trim().trim_matches('`').to_owned(), floor);
             }
         }
     }
