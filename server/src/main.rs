@@ -40,6 +40,9 @@ enum Command {
         /// A TOML file of limits and waiting times.
         #[arg(long)]
         config: Option<PathBuf>,
+        /// Where preprocessed models are kept between runs: off (this version keeps none).
+        #[arg(long, default_value = "off", value_parser = ["off"])]
+        cache: String,
     },
     /// A server process and a client process on real parts: steps, earliest contacts, latencies.
     Demo {
@@ -104,7 +107,7 @@ fn main() -> ExitCode {
         Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
         Command::Demo { embedded, csv, .. } => run_demo(embedded, csv.as_deref()),
         Command::Inspect { file, facets, picture } => inspect_file(&file, facets, picture.as_deref()),
-        Command::Serve { name, config } => serve(&name, config.as_deref()),
+        Command::Serve { name, config, .. } => serve(&name, config.as_deref()),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
