@@ -186,13 +186,26 @@ impl View<'_> {
         }
         let f = self.face_at(side, face, DVec3::ZERO);
         let mut normal = -f.normal;
-        let (mut remainder, mut s, mut q) = (0.0, 0.0, 0.0);
+        let (mut remainder, mut s, mut q, mut cost) = (0.0, 0.0, 0.0, DVec3::ZERO);
         if f.k > 0.0 {
             let (d, radial, tangential) = self.extents(side, face, f.normal);
             let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
             let closest = f.rho - radial - way;
             // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
             let slab = closest >= SLAB * f.rho && tangential * tangential * f.rho < d * d * closest;
+            let round = match *face {
+                Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+                    let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
+                    DVec3::ONE - axis * axis
+                }
+                _ => DVec3::ONE,
+            };
+            cost = if slab {
+                let steepness = f.k * (tangential / closest) * (tangential / closest) * 0.5;
+                self.bulge(side, face, &f) * (f.rho.max(self.radius) / closest) + f.normal.abs() * self.half * steepness
+            } else {
+                round * self.half * self.half * (f.k / (2.0 * f.rho.max(0.5 * d)))
+            };
             if slab || d <= 2.0 * f.rho {
                 let (d, rho) = if slab { (tangential, closest) } else { (d, f.rho) };
                 remainder = f.k * d * d / (2.0 * rho);
@@ -209,7 +222,7 @@ impl View<'_> {
             }
         }
         let mut l = self.plane(side, id, normal, -f.value - remainder + delta);
-        l.cost = self.bulge(side, face, &f);
+        l.cost = cost;
         if side == Side::A { l } else { Linear { s, q, ..l } }
     }
 

@@ -266,7 +266,7 @@ impl Active {
         for (side, solid, y, sign) in [(Side::A, task.a, x, 1.0), (Side::B, task.b, at.b_point(x), -1.0)] {
             let tol = INCIDENT * task.rounding;
             let mut open = Vec::new();
-            let mut normals = DVec3::ZERO;
+            let (mut normals, mut each, mut is_apex) = (DVec3::ZERO, Vec::new(), false);
             local::prune(&solid.normal_form, &mut open, &mut |id| {
                 let v = solid.faces[id.face() as usize].value(y);
                 local::truth_of(id.sense(), (v - tol, v + tol), 0.0)
@@ -277,9 +277,13 @@ impl Active {
             for id in &ids {
                 let face = &solid.faces[id.face() as usize];
                 let n = match *face {
-                    Face::Cone { apex, axis, .. } if (y - apex).length() <= tol => -axis,
+                    Face::Cone { apex, axis, .. } if (y - apex).length() <= tol => {
+                        is_apex = true;
+                        -axis
+                    }
                     _ => face.at(y).normal,
                 };
+                each.push(n);
                 normals += if id.sense() == Sense::Positive { n } else { -n };
             }
             let k = side as usize;
@@ -291,7 +295,9 @@ impl Active {
                     list[slot] = id.face();
                 }
             }
-            self.count[k] = self.count[k].max(ids.len());
+            // Faces that share one edge make an edge, however many they are.
+            let rank = if is_apex { 3 } else { span_of(&each).len() };
+            self.count[k] = self.count[k].max(rank);
             let normals = if side == Side::A { normals } else { at.a_vector(normals) };
             sum += normals.normalize_or_zero() * sign;
         }
@@ -302,16 +308,21 @@ impl Active {
 /// A face within this many roundings of a contact point passes through it.
 const INCIDENT: f64 = 16.0;
 
-/// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
-fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
-    // Orthonormal basis of the span of the gradients (Gram-Schmidt), then of its complement.
+/// Orthonormal basis of the span of some unit vectors (Gram-Schmidt).
+fn span_of(vectors: &[DVec3]) -> Vec<DVec3> {
     let mut span: Vec<DVec3> = Vec::new();
-    for g in gradients {
+    for g in vectors {
         let r = span.iter().fold(*g, |r, e| r - *e * e.dot(r));
         if r.length() > 1e-6 && span.len() < 3 {
             span.push(r.normalize());
         }
     }
+    span
+}
+
+/// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
+fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
+    let span = span_of(gradients);
     let flat = |v: f64| v.abs() * scale < 1e-6;
     match span.len() {
         1 => {
