@@ -1,7 +1,7 @@
 //! The library's own answer to a scene, all stages on.
 
 use crate::scenes::Scene;
-use contactd::contact::{Body, Outcome, PairQuery, Scratch, default_resolution, earliest_contact};
+use contactd::contact::{Body, Ideas, Outcome, PairQuery, Scratch, default_resolution, earliest_contact};
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd::solid::Solid;
@@ -17,12 +17,17 @@ pub fn ask_solids(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64
 
 /// Asks about two placed models.
 pub fn ask_models(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64>) -> Outcome {
+    ask_with(a, b, resolution, Ideas::default())
+}
+
+/// Asks about two placed models with some ideas of the search switched off.
+pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64>, ideas: Ideas) -> Outcome {
     let query = PairQuery {
         a: Body { model: a.0, placed: a.1 },
         b: Body { model: b.0, placed: b.1 },
         resolution: resolution.unwrap_or_else(|| default_resolution(a.0, b.0)),
         cell_limit: CELL_LIMIT,
-        ideas: Default::default(),
+        ideas,
     };
     earliest_contact(&query, &mut Scratch::default())
 }

@@ -18,7 +18,7 @@ use super::pair::Ideas;
 use super::stage2::Stage2;
 use crate::eco::Model;
 use crate::math::Aabb;
-use crate::motion::{Instant, Relative};
+use crate::motion::{Bounds, Instant, Relative};
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::{Face, Sense, Solid};
 use glam::DVec3;
@@ -72,7 +72,7 @@ impl Cell {
             b_always: b,
             b,
             b_until: f64::INFINITY,
-            reach: 1.0,
+            reach: 2.0,
             source: Source::Cell,
         }
     }
@@ -159,6 +159,28 @@ const SAME_TIME: f64 = 1e-12;
 
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
+
+impl<'a> Task<'a> {
+    /// A cell at an instant of its own time.
+    fn view<'v>(&self, cell: &Cell, at: &'v Instant, motion: Bounds, guards_b: &'v [Face]) -> View<'v>
+    where
+        'a: 'v,
+    {
+        View {
+            a: Faces { solid: self.a, guards: &[] },
+            b: Faces { solid: self.b, guards: guards_b },
+            at,
+            motion,
+            center: cell.center,
+            half: cell.half,
+            radius: cell.half.length(),
+            center_b: at.b_point(cell.center),
+            velocity: at.velocity(cell.center),
+            delta: self.delta,
+            fits: self.ideas.fits,
+        }
+    }
+}
 
 /// Memory of a search, kept from one to the next.
 #[derive(Default, Debug)]
@@ -282,19 +304,7 @@ impl<'a> Search<'a> {
         let scratch = &mut self.scratch;
         let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
         let hints: &[Hint] = if self.task.ideas.hints { &scratch.hints } else { &[] };
-        let view = View {
-            a: Faces { solid: self.task.a, guards: &[] },
-            b: Faces { solid: self.task.b, guards: &scratch.guards_b },
-            at: &at,
-            motion,
-            center: cell.center,
-            half: cell.half,
-            radius,
-            center_b: at.b_point(cell.center),
-            velocity: at.velocity(cell.center),
-            delta: self.task.delta,
-            fits: self.task.ideas.fits,
-        };
+        let view = self.task.view(&cell, &at, motion, &scratch.guards_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
         let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
         let b = match b_truth {
@@ -355,6 +365,16 @@ impl<'a> Search<'a> {
         }
         self.split(cell, found.cost);
         None
+    }
+
+    /// True unless B is proven out of a cell's reach for the whole of its slice.
+    pub(super) fn may_meet(&self, cell: &Cell) -> bool {
+        let at = self.task.relative.at(cell.t);
+        let x_max = (cell.center - at.center_a).length() + cell.half.length();
+        let motion = self.task.relative.bounds(cell.t, cell.until - cell.t, x_max);
+        let view = self.task.view(cell, &at, motion, &self.scratch.guards_b);
+        let tokens = &self.scratch.pool[cell.b.0 as usize..cell.b.1 as usize];
+        tokens.is_empty() || local::prune(tokens, &mut Vec::new(), &mut |id| view.truth(Side::B, id)) != Truth::False
     }
 
     /// Puts a cell back that is free for `dt`, unless that is all the time there is.

@@ -89,17 +89,16 @@ impl<'a> Search<'a> {
         }
         let box_a = region.as_ref().map_or(Aabb::ALL, |r| r.a.aabb).intersection(&model_a.bounds.root().aabb);
         let box_b = region.as_ref().map_or(Aabb::ALL, |r| r.b.aabb).intersection(&model_b.bounds.root().aabb);
-        let roots = roots::alternatives(self.task.a, &a, &box_a, MOST_ALTERNATIVES);
         // Octree and bounds keep f only up to their margin; a coarser resolution works on whole trees.
         let delta = self.task.delta;
         let fine = delta <= model_a.margin() && delta <= model_b.margin();
         let finite = model_a.eco.root().half.is_finite() && model_b.eco.root().half.is_finite();
         if !(self.task.ideas.walk && fine && finite) {
-            for root in roots {
-                self.hand_over((t0, t1), &root.region, &box_b, &root.tokens, &b);
-            }
+            // Without stage 2 the region as a whole is all that stage 3 knows.
+            self.hand_over((t0, t1), &box_a, &box_b, &a, &b);
             return;
         }
+        let roots = roots::alternatives(self.task.a, &a, &box_a, MOST_ALTERNATIVES);
         let detail = Detail { finest: f64::INFINITY, ..Detail::default() };
         let walk = Walk::new((model_a, placed_a), (model_b, placed_b), region, delta, detail);
         let ends = self.ends(&walk, t0, t1);
@@ -182,11 +181,14 @@ impl<'a> Search<'a> {
         if t > 0.0 && (truth_a == Truth::True || truth_b == Truth::True) {
             return;
         }
-        self.note(&of_a, &of_b);
         let guards = self.guards(in_b);
         let range_a = self.store_and(&of_a, &[]);
         let range_b = self.store_and(&of_b, &guards);
-        self.push(Cell::new((t, until), in_a, range_a, range_b));
+        let cell = Cell::new((t, until), in_a, range_a, range_b);
+        if self.may_meet(&cell) {
+            self.note(&of_a, &of_b);
+            self.push(cell);
+        }
     }
 
     /// The planes that keep B's points to a box of its frame.

@@ -1,0 +1,51 @@
+//! What stages 1 and 2 save stage 3, on the 94 cases with a known answer.
+//! `cargo test -p contactd-tests --test stages -- --nocapture` prints the table.
+#![allow(missing_docs)]
+
+use contactd::contact::{Counters, Ideas, Status};
+use contactd::eco::Model;
+use contactd_tests::engine::ask_with;
+use contactd_tests::judge::{Case, cases};
+
+fn work(case: &Case, ideas: Ideas) -> Counters {
+    let (a, b) = (Model::new(case.a.0.clone()), Model::new(case.b.0.clone()));
+    let o = ask_with((&a, case.a.1), (&b, case.b.1), case.resolution, ideas);
+    assert_ne!(o.status, Status::Undecided, "{}", case.name);
+    assert!(case.known.judge(&o, 1e-8).is_ok(), "{}: {o:?}", case.name);
+    o.counters
+}
+
+fn median(mut v: Vec<f64>) -> f64 {
+    v.sort_by(f64::total_cmp);
+    0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2])
+}
+
+#[test]
+fn every_case_by_stage() {
+    println!("case                          tree  stage 1  pairs  cells");
+    for case in cases() {
+        let c = work(&case, Ideas::default());
+        println!("{:28} {:5} {:8} {:6} {:6}", case.name, c.primitives, c.after_stage1, c.candidates, c.cells);
+        assert!(c.after_stage1 <= c.primitives);
+        // Stage 3 works on what stage 2 handed over: cells without a candidate pair would have another source.
+        assert!(c.candidates > 0 || c.cells == 0, "{}: {c:?}", case.name);
+    }
+}
+
+#[test]
+fn without_stage_1_or_stage_2_the_cells_of_a_part_of_forty_and_forty_double() {
+    let all = Ideas::default();
+    let (mut without_1, mut without_2) = (vec![], vec![]);
+    println!("case      all  no stage 1  no stage 2");
+    for case in cases().iter().filter(|c| c.name.starts_with("part_")) {
+        let cells = work(case, all).cells;
+        let no_1 = work(case, Ideas { region: false, ..all }).cells;
+        let no_2 = work(case, Ideas { walk: false, ..all }).cells;
+        println!("{:8} {cells:5} {no_1:11} {no_2:11}", case.name);
+        without_1.push(no_1 as f64 / cells as f64);
+        without_2.push(no_2 as f64 / cells as f64);
+    }
+    let (one, two) = (median(without_1), median(without_2));
+    println!("median ratio: without stage 1 {one:.1}, without stage 2 {two:.1}");
+    assert!(one >= 2.0 && two >= 2.0, "{one} {two}");
+}
