@@ -14,9 +14,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let plate = session.load_model("plate.csg", PLATE)?;
     let ball = session.load_model("ball.csg", BALL)?;
     let plate = session.add_object(Object::new("plate", plate.id).fixed())?;
-    let ball = session.add_object(Object::new("ball", ball.id).at(Pose::at(DVec3::Z * 20.0)))?;
+    let ball = session.add_object(Object::new("ball", ball.id).at(Pose::at(DVec3::new(1.0, 0.0, 20.0))))?;
 
-    session.begin_step(1)?[0] = PoseRecord::end(ball, &Pose::at(DVec3::ZERO));
+    session.begin_step(1)?[0] = PoseRecord::end(ball, &Pose::at(DVec3::X));
     let reply = session.finish(Duration::from_secs(5))?;
     for c in reply.records() {
         println!("{plate}-{ball}: contact at t = {:.9}, point {:?}, normal {:?}", c.time, c.point, c.normal);

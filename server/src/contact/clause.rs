@@ -2,9 +2,11 @@
 //!
 //! For multipliers λ >= 0 over the linear bounds of a clause, with w = Σ λ n, w_B its part from B,
 //!
-//!     LB = Σ λ b − Σ_k e_k |w|_k > 0            excludes the whole cell now, and
-//!     LB − s·dt − ½·q·dt² >= 0                  keeps it excluded until t + dt,
-//!     s = −w_B·v(c) + Σ_k e_k |w_B × omega|_k + Σ λ s_i,   q = curvature(w_B) + Σ λ q_i.
+//! ```text
+//! LB = Σ λ b − Σ_k e_k |w|_k > 0            excludes the whole cell now, and
+//! LB − s·dt − ½·q·dt² >= 0                  keeps it excluded until t + dt,
+//! s = −w_B·v(c) + Σ_k e_k |w_B × omega|_k + Σ λ s_i,   q = curvature(w_B) + Σ λ q_i.
+//! ```
 //!
 //! λ is chosen for the longest dt, not for the largest LB: the linear program is solved with the literals' bounds looked
 //! ahead to h, then to the best dt found so far, where the bound gives out. Curved convex literals are re-touched at the

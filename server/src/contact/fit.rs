@@ -3,7 +3,9 @@
 //! A contact of +psi_p against −psi_q needs |u_p| <= R_p − delta and |u_q| >= R_q + delta, with u = P(x − o), P = I for a
 //! sphere and I − aaᵀ for a cylinder, hence, with 2R̄ = R_p + R_q,
 //!
-//!     G = [ |u_p|² − |u_q|² + (R_q + delta)² − (R_p − delta)² ] / (4R̄) <= 0.
+//! ```text
+//! G = [ |u_p|² − |u_q|² + (R_q + delta)² − (R_p − delta)² ] / (4R̄) <= 0.
+//! ```
 //!
 //! The curvatures cancel in it: ∇G = (u_p − u_q)/(2R̄); what is left of second order in y = x − c is, over 4R̄, nothing or
 //! more for a sphere in a sphere or cylinder, −(y·a_p)² for a cylinder in a sphere, (y·a_q)² − (y·a_p)² for cylinders,
@@ -13,8 +15,10 @@
 //! In time only the face on B moves (σ = +1 if that is p). Seen from A, with o the point of its axis nearest to the
 //! cell's centre, s = x − o, w the velocity of A against B at o, b = omega×a, z = s·a (0 at the centre):
 //!
-//!     d/dt ½|u|² = u·w + z u·b,
-//!     d²/dt² ½|u|² = |Pw + zb|² + 2(w·a)(u·b) − (u·b)² + u·s̈ − z u·ä,
+//! ```text
+//! d/dt ½|u|² = u·w + z u·b,
+//! d²/dt² ½|u|² = |Pw + zb|² + 2(w·a)(u·b) − (u·b)² + u·s̈ − z u·ä,
+//! ```
 //!
 //! with |s̈| <= C + |spin_A×w|, C = |spin_A×v0| + |omega||spin_B×(o − p_B)|, |w| growing at most C per unit time, and
 //! |ä| <= |omega||b| + |spin_A×spin_B|. A spin about the face's own axis enters none of these.
@@ -99,7 +103,9 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
 
 /// The bound of a cone in a cone hole of (nearly) the same angle and direction. With common axis a and angle α,
 ///
-///     ½(psi_p − psi_q) + delta >= ½[ sin α Δ·a − cos α |PΔ| ] + delta,   Δ = o_p − o_q,
+/// ```text
+/// ½(psi_p − psi_q) + delta >= ½[ sin α Δ·a − cos α |PΔ| ] + delta,   Δ = o_p − o_q,
+/// ```
 ///
 /// at every point; another axis or angle on one of them costs at most |x − o|·(|a' − a|(sin α + cos α) + |α' − α|).
 /// a is the axis of A's cone, which stands still; Δ moves with B's apex.

@@ -1,6 +1,8 @@
 //! The inner problem of every bound: the lowest point of a few planes over a box.
 //!
-//!     z* = min over |y_k| <= e_k of max_i (b_i + n_i·y)  =  max over λ >= 0, Σλ = 1 of Σ λ_i b_i − Σ_k e_k |Σ λ_i n_i|_k
+//! ```text
+//! z* = min over |y_k| <= e_k of max_i (b_i + n_i·y)  =  max over λ >= 0, Σλ = 1 of Σ λ_i b_i − Σ_k e_k |Σ λ_i n_i|_k
+//! ```
 //!
 //! A linear program with four rows: the dual has the columns (n_i, 1) with profit b_i and the six slacks (∓ê_k, 0) with
 //! profit −e_k; the best single plane with its three slacks is a feasible start, so a primal simplex on a 4×4 basis inverse

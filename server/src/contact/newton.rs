@@ -2,7 +2,9 @@
 //!
 //! Unknowns x (A's model frame), t and multipliers λ; for active constraints c_i with gradients g_i
 //!
-//!     c_i(x, t) = −level,    Σ λ_i g_i = 0,    Σ λ_i = 1 (over literals)
+//! ```text
+//! c_i(x, t) = −level,    Σ λ_i g_i = 0,    Σ λ_i = 1 (over literals)
+//! ```
 //!
 //! Two literals: face against face; three: edge against face; four: vertex against face or edge against edge. A cone's
 //! apex is a vertex of its own: its literal is replaced by three planes through the apex of the offset cone (moved by

@@ -54,7 +54,8 @@ impl ServerConfig {
     /// # Errors
     /// One sentence with file, line and column.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| format!("{}: expected a readable file, found {e}", path.display()))?;
         Self::parse(&path.display().to_string(), &text)
     }
 
