@@ -25,7 +25,7 @@ fn scene(a: Recipe, motion_a: Motion, b: Recipe, motion_b: Motion) -> Scene {
 }
 
 /// What the engine cannot decide yet: one that it can must leave this list.
-const KNOWN_GAPS: &[&str] = &["own_axis_gap", "own_axis_touching", "ball_same_size", "two_bullets"];
+const KNOWN_GAPS: &[&str] = &["ball_same_size"];
 
 fn ceiling(name: &str) -> u64 {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("cell_ceilings.toml");

@@ -27,7 +27,8 @@ pub struct PairQuery<'a> {
     pub a: Body<'a>,
     /// The second one.
     pub b: Body<'a>,
-    /// Depth delta at which a contact is decided; see `default_resolution`.
+    /// Depth delta at which a contact is decided; see `default_resolution`. Raised to `LEAST_RESOLUTION` of the pair's
+    /// extent over the step; the outcome tells what was used.
     pub resolution: f64,
     /// Cells that may be refined before the answer is `undecided`.
     pub cell_limit: u64,
@@ -73,6 +74,22 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
     outcome
 }
 
+/// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
+fn without_own_spin(body: &Body) -> Placed {
+    let mut placed = body.placed;
+    let spin = placed.motion.spin;
+    if spin != DVec3::ZERO {
+        let model_from_world = (placed.motion.start.compose(&placed.place)).rotation.conjugate();
+        let along = model_from_world * spin;
+        let center = placed.place.inverse().position;
+        let axis = body.model.solid.axis_of_revolution(along, body.model.radius);
+        if axis.is_some_and(|a| a.is_along(along) && a.passes(center, body.model.radius)) {
+            placed.motion.spin = DVec3::ZERO;
+        }
+    }
+    placed
+}
+
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
 /// further than the earliest contact known.
 pub struct PairSearch<'a> {
@@ -95,11 +112,18 @@ impl<'a> PairSearch<'a> {
         let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
         let (model_a, model_b) = (carrier.model, other.model);
         let (a, b) = (&model_a.solid, &model_b.solid);
-        let relative = Relative::new(carrier.placed, other.placed);
+        let relative = Relative::new(without_own_spin(&carrier), without_own_spin(&other));
         let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
         let scale = model_a.radius.max(model_b.radius);
-        // Positions, matrices and faces are each right to a few units in the last place of the pair's extent.
-        let extent = ball_a.center.length() + ball_b.center.length() + 2.0 * scale + relative.center_a().length();
+        // Positions, matrices and faces are each right to a few units in the last place of the pair's extent over the
+        // step; an angle is right to a few units of its own last place.
+        let extent = ball_a.center.length()
+            + ball_b.center.length()
+            + 2.0 * scale
+            + relative.center_a().length()
+            + relative.difference(0.0).length().max(relative.difference(1.0).length());
+        let turns = 1.0 + 0.125 * (query.a.placed.motion.spin.length() + query.b.placed.motion.spin.length());
+        let resolution = query.resolution.max(tolerance::LEAST_RESOLUTION * extent);
         let task = Task {
             a,
             b,
@@ -107,19 +131,19 @@ impl<'a> PairSearch<'a> {
             model_b,
             ideas: query.ideas,
             relative,
-            delta: query.resolution,
-            rounding: 32.0 * f64::EPSILON * extent,
+            delta: resolution,
+            rounding: tolerance::BOUND_ROUNDING * extent * turns,
             scale,
             still: false,
             limit: query.cell_limit,
         };
-        let mut outcome = Outcome::clear(query.resolution);
+        let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
         let mut search = Search::new(task, scratch);
         if !a.is_empty() && !b.is_empty() {
             search.start();
         }
-        Self { task, swapped, level: 1.0, search: Some(search), outcome, resolution: query.resolution }
+        Self { task, swapped, level: 1.0, search: Some(search), outcome, resolution }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.

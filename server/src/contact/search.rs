@@ -157,6 +157,9 @@ const SETTLED: f64 = 1e-6;
 /// Witnesses this close in time are of one contact.
 const SAME_TIME: f64 = 1e-12;
 
+/// Time, fraction of the step, below which an advance is no progress: at a contact a bound runs out in ever smaller ones.
+const LEAST_ADVANCE: f64 = 1e-15;
+
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
 
@@ -342,7 +345,7 @@ impl<'a> Search<'a> {
         } else if found.dt >= h {
             self.again(cell, h, end, true);
             return None;
-        } else if found.dt > 0.0 {
+        } else if found.dt > LEAST_ADVANCE {
             // What splitting could gain is what the cell's extents cost the bound.
             let gain = found.cost.element_sum().min(radius);
             if found.dt * motion.speed >= 0.25 * gain || found.dt >= 0.25 * end {

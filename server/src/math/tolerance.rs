@@ -47,3 +47,10 @@ pub const BOX_ROUNDING: f64 = 1e-14;
 /// How far past the end of the earliest bracket (fraction of the step) other pairs are searched for a scene's first
 /// contact: their own brackets may begin before the time at which the resolution's depth is reached.
 pub const FIRST_SLACK: f64 = 1e-6;
+
+/// What rounding may do to one bound, relative to the pair's extent over the step: some thirty operations on numbers of
+/// that size stand between the poses and a literal's value.
+pub const BOUND_ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+/// Smallest resolution relative to the pair's extent over the step: thirty times what rounding may do to a bound.
+pub const LEAST_RESOLUTION: f64 = 1e3 * f64::EPSILON;

@@ -10,6 +10,7 @@ pub mod classify;
 pub mod face;
 pub mod local;
 pub mod primitive;
+pub mod revolution;
 pub mod tree;
 
 pub use face::Face;
