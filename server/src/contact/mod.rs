@@ -3,6 +3,7 @@
 //! Floor 6: imports `eco`, `bound`, `motion`, `solid`, `math`, `proto`.
 
 pub mod clause;
+pub mod closed;
 mod depth;
 mod fit;
 pub mod literal;

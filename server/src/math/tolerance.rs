@@ -54,3 +54,13 @@ pub const BOUND_ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// Smallest resolution relative to the pair's extent over the step: thirty times what rounding may do to a bound.
 pub const LEAST_RESOLUTION: f64 = 1e3 * f64::EPSILON;
+
+/// Sine of an angle that a double cannot tell from 0: axes within it are one direction.
+pub const PARALLEL: f64 = 1e-15;
+
+/// Slack in the test whether a direction is a normal of an edge: a superfluous candidate does no harm, a missing one does.
+pub const NORMAL_SLACK: f64 = 1e-9;
+
+/// Separations of round bodies below this fraction of their heights are asked again by projection: Newton's climb may
+/// have stopped short of the summit.
+pub const NEARLY_TOUCHING: f64 = 1e-9;
