@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod engine;
+pub mod fuzz;
 pub mod judge;
 pub mod openscad;
 pub mod random_solids;

@@ -7,7 +7,8 @@ use contactd::eco::tables::combine;
 use contactd::eco::{Kind, Limits, Meet, Model, Node, meet};
 use contactd::solid::local::{self, Truth};
 use contactd::solid::primitive::{Cuboid, Primitive, Sphere};
-use contactd::solid::{Op, Sense, Solid, SolidBuilder};
+use contactd::solid::{Label, Op, Sense, Solid, SolidBuilder};
+use contactd_proto::Pose;
 use contactd_tests::random_solids::{Random, node, perforated_plate, shape, solid};
 use glam::DVec3;
 
@@ -381,4 +382,24 @@ fn an_empty_and_an_unbounded_solid_have_their_octrees_too() {
     let m = Model::new(b.finish(root));
     assert_eq!(m.eco.root().kind(), Kind::Mixed);
     assert!(m.expand(m.eco.root()).is_none() && m.radius.is_infinite());
+}
+
+#[test]
+fn a_voxel_that_a_surface_reaches_within_the_margin_is_neither_full_nor_empty() {
+    let mut builder = SolidBuilder::new();
+    let root = builder.primitive(Cuboid { half: DVec3::ONE }, Pose::IDENTITY, Label::default());
+    let solid = builder.finish(root);
+    let (margin, half) = (1e-3, 0.125);
+    let bounds = SBounds::new(&solid, margin);
+    for (distance, kind) in [
+        (2.0 * margin, Kind::Empty),
+        (0.5 * margin, Kind::PSurface),
+        (-2.0 * half - 0.5 * margin, Kind::PSurface),
+        (-2.0 * half - 2.0 * margin, Kind::Full),
+    ] {
+        let center = DVec3::X * (1.0 + half + distance);
+        let mut classifier = Classifier { solid: &solid, bounds: &bounds, center, half, work: 0 };
+        let found = classifier.classify(&whole(&solid, &bounds), &mut Vec::new(), &mut Vec::new());
+        assert_eq!(found.kind, kind, "at a distance of {distance}");
+    }
 }

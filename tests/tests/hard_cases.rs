@@ -4,7 +4,9 @@
 //! `cell_ceilings.toml` holds twice the cells each cost when it was recorded: `CONTACTD_RECORD=1` prints new lines for it.
 #![allow(missing_docs)]
 
-use contactd::contact::{Extent, Outcome, Status};
+use contactd::contact::{Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact};
+use contactd::eco::Model;
+use contactd::motion::Placed;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::ask;
 use contactd_tests::scenes::{Recipe, Scene};
@@ -449,5 +451,62 @@ fn sizes_from_a_millionth_to_a_million_answer_alike() {
     for (name, k) in [("size_1e-6", 1e-6), ("size_1e-3", 1e-3), ("size_1e3", 1e3), ("size_1e6", 1e6)] {
         let s = Scene::falling(plate(0.25).scaled(k), peg(0.24).scaled(k), DVec3::ZERO, DVec3::X * 0.1 * k);
         meets_along(name, &s, 0.1, -DVec3::X);
+    }
+}
+
+#[test]
+fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
+    // Both turn alike, so nothing turns against the other; beyond a right angle the blade's face recedes from the ball.
+    for i in 0..24 {
+        let angle = 1.0 + 0.09 * f64::from(i);
+        let spin = DVec3::Z * (angle + 1.0);
+        let ball = going(DVec3::X, DQuat::IDENTITY, DVec3::ZERO, spin);
+        let blade = going(DVec3::ZERO, DQuat::from_rotation_z(-angle), DVec3::ZERO, spin);
+        let arm = Recipe::cuboid(0.75, 0.05, 0.5).at(0.75, 0.0, 0.0);
+        // Without the first two stages, which would start the search shortly before the contact.
+        let models = [Recipe::sphere(0.1), arm].map(|r| Model::new(r.build()));
+        let bodies = [ball, blade].map(|motion| Placed { place: Pose::IDENTITY, motion });
+        let query = PairQuery {
+            a: Body { model: &models[0], placed: bodies[0] },
+            b: Body { model: &models[1], placed: bodies[1] },
+            resolution: 1e-9,
+            cell_limit: contactd_tests::engine::CELL_LIMIT,
+            ideas: Ideas { region: false, walk: false, ..Ideas::default() },
+        };
+        let o = earliest_contact(&query, &mut Scratch::default());
+        let time = (angle - 0.15f64.asin()) / spin.z;
+        assert_eq!(o.status, Status::Contact, "from {angle}: {o:?}");
+        assert!((o.time - time).abs() < 1e-9, "from {angle}: {} and not {time}", o.time);
+    }
+}
+
+#[test]
+fn what_lies_wholly_inside_overlaps_also_as_the_smaller_part_of_a_larger_body() {
+    let inside = Recipe::sphere(0.01).at(0.1, 0.05, -0.1).union(Recipe::sphere(2.0).at(9.0, 0.0, 0.0));
+    let o = ask(&scene(Recipe::cuboid(0.5, 0.5, 0.5), still(), inside, still()));
+    assert_eq!((o.status, o.time), (Status::Overlap, 0.0), "{o:?}");
+}
+
+#[test]
+fn a_cone_moved_sideways_in_its_hole_meets_the_wall() {
+    // Lifted by 0.1 out of a hole that widens by one half of its height, it has 0.05 to either side.
+    let cone = || tip_down(0.5, 1.0);
+    let plate = Recipe::cuboid(1.0, 1.0, 0.5).at(0.0, 0.0, 0.5).minus(cone());
+    for direction in [dvec3(1.0, 0.0, 0.0), dvec3(0.6, 0.8, 0.0)] {
+        let motion = going(dvec3(0.0, 0.0, 0.1), DQuat::IDENTITY, 0.2 * direction, DVec3::ZERO);
+        let o = ask(&scene(plate.clone(), still(), cone(), motion));
+        assert_eq!(o.status, Status::Contact, "{direction}: {o:?}");
+        assert!((o.time - 0.25).abs() < 1e-8, "{direction}: {} and not 0.25", o.time);
+    }
+}
+
+#[test]
+fn a_body_stopped_a_little_inside_its_contact_touches_and_does_not_overlap() {
+    let ball = || Recipe::sphere(1.0);
+    let resolution = ask(&scene(ball(), still(), ball(), still())).resolution;
+    for (depth, status) in [(3.0, Status::Clear), (5.0, Status::Overlap)] {
+        let start = dvec3(2.0 - depth * resolution, 0.0, 0.0);
+        let o = ask(&scene(ball(), still(), ball(), going(start, DQuat::IDENTITY, DVec3::X, DVec3::ZERO)));
+        assert_eq!((o.status, o.touching), (status, true), "{depth} resolutions deep: {o:?}");
     }
 }

@@ -240,4 +240,16 @@ mod tests {
             assert!(second.abs() <= b.curvature(&r.at(t), r.at(t).a_vector(normal)) + 1e-4, "{second}");
         }
     }
+
+    #[test]
+    fn a_pure_turn_pulls_inwards_by_radius_times_speed_of_turning_squared() {
+        let turning = Motion::turning(Pose::IDENTITY, DVec3::ZERO, DVec3::Z * 3.0);
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let r = Relative::new(placed(turning), placed(Motion::resting(Pose::IDENTITY)));
+        let (x, at) = (DVec3::X * 5.0, r.at(0.25));
+        let bound = r.bounds(0.25, 0.1, 5.0).curvature(&at, DVec3::X);
+        let along = |t: f64| at.b_from_a.x_axis.dot(r.at(t).b_point(x));
+        let pull = (along(0.25 + 1e-4) - 2.0 * along(0.25) + along(0.25 - 1e-4)) / 1e-8;
+        assert!((pull + 45.0).abs() < 1e-3 && bound >= 45.0 * (1.0 - 1e-12), "pulled by {pull}, bound {bound}");
+    }
 }

@@ -1,0 +1,109 @@
+//! The decoder of control messages: any bytes are a message that encodes to itself again, or `BadCommand`.
+
+use super::Target;
+use contactd_proto::control::{Answer, Command, Envelope, Facets, ObjectSpec, WireRule, WireTrack, decode, encode};
+use contactd_proto::{ErrorCode, Motion, Pose, Rule, Track};
+use glam::DVec3;
+
+pub(super) const TARGET: Target =
+    Target { name: "control", run, seeds, words: &WORDS, longest: 600, thorough_every: u64::MAX };
+
+const WORDS: [&str; 4] = ["\0\0\0\0\0\0\0\0", "\0\0\0\0\0\0", "\u{7f}", "name"];
+
+fn seeds() -> Vec<Vec<u8>> {
+    let rule = Rule { except: vec![["a".into(), "b".into()]], margin: 0.5, ..Rule::new(["x".into(), "y".into()]) };
+    let track = Track::resting(Pose::at(DVec3::new(1.0, -2.0, 0.25)));
+    let object = ObjectSpec {
+        id: 7,
+        model: 1,
+        name: "part".into(),
+        group: "default".into(),
+        is_static: false,
+        rotates: true,
+        max_speed: f64::INFINITY,
+        place: Pose::IDENTITY.into(),
+        pose: Pose::at(DVec3::X).into(),
+    };
+    let text = "sphere(r = 1);".into();
+    let commands = [
+        Command::Open { version: 1, process: (300, 70_000) },
+        Command::Close,
+        Command::LoadModel { model: 1, name: "ball".into(), text, facets: Facets::Exact },
+        Command::AddObject(object),
+        Command::RemoveObject(7),
+        Command::SetRules(vec![WireRule::from(&rule)]),
+        Command::SetResolution(Some(1e-9)),
+        Command::Restore(vec![WireTrack::of(7, &track), WireTrack::of(8, &track)]),
+    ];
+    let envelope = |command| encode(&Envelope { epoch: 9, session: 3, command });
+    let refused = Answer::Refused { code: 3, index: u32::MAX, detail: "why".into() };
+    let answers = [Answer::Done, refused, Answer::Loaded { faces: vec![], warnings: vec!["snapped".into()] }];
+    let answers = answers.iter().map(encode);
+    commands.into_iter().map(envelope).chain(answers).map(|bytes| bytes.expect("a small message")).collect()
+}
+
+fn run(bytes: &[u8], _: bool) -> Result<String, String> {
+    let answer = match decode::<Answer>(bytes) {
+        Ok(answer) => {
+            let again = encode(&answer).map_err(|e| format!("an answer that does not encode: {e}"))?;
+            let back = decode::<Answer>(&again).map_err(|e| format!("an answer that does not come back: {e}"))?;
+            if encode(&back) != Ok(again) {
+                return Err(format!("another answer came back: {back:?}"));
+            }
+            std::mem::discriminant(&answer) == std::mem::discriminant(&Answer::Done)
+        }
+        Err(ErrorCode::BadCommand) => false,
+        Err(other) => return Err(format!("answer refused as {other}")),
+    };
+    let envelope = match decode::<Envelope>(bytes) {
+        Ok(envelope) => envelope,
+        Err(ErrorCode::BadCommand) => return Ok(format!("refused {answer}")),
+        Err(other) => return Err(format!("command refused as {other}")),
+    };
+    let again = encode(&envelope).map_err(|e| format!("a command that does not encode: {e}"))?;
+    let back = decode::<Envelope>(&again).map_err(|e| format!("a command that does not come back: {e}"))?;
+    if encode(&back) != Ok(again) {
+        return Err(format!("another command came back: {back:?}"));
+    }
+    Ok(format!("{answer} {}", taken(envelope.command)?))
+}
+
+/// What the server makes of a command's numbers.
+fn taken(command: Command) -> Result<String, String> {
+    Ok(match command {
+        Command::AddObject(o) => {
+            let poses = [o.place, o.pose].map(|p| p.checked());
+            for pose in poses.iter().flatten() {
+                unit(pose)?;
+            }
+            format!("object {:?}", poses.map(|p| p.err()))
+        }
+        Command::SetRules(rules) => {
+            let count = rules.len().min(3);
+            let refused: Vec<_> = rules.into_iter().take(3).map(|r| r.checked().err()).collect();
+            format!("{count} rules {refused:?}")
+        }
+        Command::Restore(tracks) => {
+            let checked: Vec<_> = tracks.iter().take(3).map(WireTrack::checked).collect();
+            for track in checked.iter().flatten() {
+                unit(&track.end)?;
+                let Motion { start, velocity, spin } = track.motion;
+                unit(&start)?;
+                if !(velocity.is_finite() && spin.is_finite()) {
+                    return Err(format!("a track that is not finite: {track:?}"));
+                }
+            }
+            format!("restore {:?}", checked.iter().map(|t| t.as_ref().err()).collect::<Vec<_>>())
+        }
+        Command::Open { .. } => "open".into(),
+        Command::Close => "close".into(),
+        Command::LoadModel { facets, .. } => format!("load {facets:?}"),
+        Command::RemoveObject(_) => "remove".into(),
+        Command::SetResolution(r) => format!("resolution {:?}", r.map(|r| r.is_finite())),
+    })
+}
+
+fn unit(pose: &Pose) -> Result<(), String> {
+    let fits = pose.position.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-12;
+    if fits { Ok(()) } else { Err(format!("taken for a pose: {pose:?}")) }
+}

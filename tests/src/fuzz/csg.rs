@@ -1,0 +1,128 @@
+//! The parser of `.csg` models: any text is a solid that can be asked, or one sentence with its place.
+
+use super::Target;
+use contactd::eco::Model;
+use contactd::import::{Facets, Limits, import_csg};
+use contactd::solid::{Node, Solid};
+use glam::DVec3;
+
+pub(super) const TARGET: Target = Target { name: "csg", run, seeds, words: &WORDS, longest: 2000, thorough_every: 64 };
+
+const WORDS: [&str; 48] = [
+    "union() {",
+    "difference() {",
+    "intersection() {",
+    "group();",
+    "}",
+    "{",
+    "(",
+    ")",
+    "[",
+    "]",
+    ",",
+    ";",
+    "=",
+    "-",
+    "!",
+    "%",
+    "*",
+    "#",
+    "sphere(r = 1);",
+    "cube(size = [1, 2, 3], center = true);",
+    "cylinder(h = 3, r1 = 1, r2 = 0.5, center = false);",
+    "multmatrix([[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) {",
+    "linear_extrude(height = 3, center = true) {",
+    "circle(r = 1);",
+    "square(size = [1, 1], center = false);",
+    "polygon(points = [[0, 0], [2, 0], [0, 2]], paths = undef);",
+    "color([1, 0, 0, 1]) {",
+    "render() {",
+    "$fn = 5",
+    "$fa = 12",
+    "0",
+    "1",
+    "-1",
+    "0.5",
+    "1e-9",
+    "1e308",
+    "1e-320",
+    "inf",
+    "nan",
+    "undef",
+    "true",
+    "false",
+    "\"",
+    "//",
+    "/*",
+    "*/",
+    "\n",
+    "\u{e9}",
+];
+
+fn seeds() -> Vec<Vec<u8>> {
+    [
+        "difference() { cube(size = [1, 2, 3], center = true); multmatrix([[0, -1, 0, 1e-5], [1, 0, 0, 2], [0, 0, 1, 3], \
+         [0, 0, 0, 1]]) { cylinder($fn = 6, $fa = 12, $fs = 2, h = 3, r1 = 1, r2 = 0.5, center = false); } }",
+        "intersection() { sphere(r = 2, $fn = 5); cube(size = [inf, inf, 1], center = true); %group(); #sphere(1); }",
+        "linear_extrude(height = 3, center = true, scale = [1, 1]) { difference() { polygon(points = [[0, 0], [2, 0], \
+         [0, 2]], paths = [[0, 1, 2]]); circle(r = 0.2, $fn = 4); } }",
+        "color([1, 0, 0, 1]) { polyhedron(points = [[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]], faces = \
+         [[0,4,2],[0,2,5],[0,3,4],[0,5,3],[1,2,4],[1,5,2],[1,4,3],[1,3,5]], convexity = 1); } // end",
+    ]
+    .map(|text| text.as_bytes().to_vec())
+    .into()
+}
+
+fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
+    let text = String::from_utf8_lossy(bytes);
+    let limits = Limits { polyhedron_faces: 100, nodes: 500, faces: 2000, ..Limits::default() };
+    let mut word = String::new();
+    for facets in [Facets::Auto, Facets::Exact, Facets::AsWritten] {
+        word += &match import_csg("m.csg", &text, facets, &limits) {
+            Ok(import) => {
+                asked(&import.solid, thorough)?;
+                let kinds: Vec<_> = import.notes.iter().map(|n| family(&n.text)).collect();
+                format!("loaded {} {kinds:?} ", import.solid.primitives.len().min(4))
+            }
+            Err(e) => {
+                let sentence = e.to_string();
+                if !sentence.starts_with("m.csg:") || sentence.lines().count() != 1 {
+                    return Err(format!("not one sentence with its place: {sentence:?}"));
+                }
+                format!("{} ", family(sentence.trim_start_matches("m.csg")))
+            }
+        };
+    }
+    Ok(word)
+}
+
+/// What a solid that was loaded must be able to answer.
+fn asked(solid: &Solid, thorough: bool) -> Result<(), String> {
+    for x in [DVec3::ZERO, DVec3::new(0.1, 0.2, 0.3), DVec3::new(-1e3, 7.0, 1e-9)] {
+        if solid.value(x).is_nan() {
+            return Err(format!("f is NaN at {x}"));
+        }
+    }
+    let leaves = solid.nodes.iter().filter(|n| matches!(n, Node::Primitive(_))).count();
+    if leaves != solid.primitives.len() {
+        return Err(format!("{} primitives at {leaves} leaves", solid.primitives.len()));
+    }
+    let aabb = solid.aabb();
+    if aabb.min.is_nan() || aabb.max.is_nan() {
+        return Err(format!("a box of {aabb:?}"));
+    }
+    if thorough {
+        let model = Model::new(solid.clone());
+        if model.radius.is_nan() || model.margin().is_nan() {
+            return Err(format!("radius {}, margin {}", model.radius, model.margin()));
+        }
+    }
+    Ok(())
+}
+
+/// A sentence without its numbers and quotations: its kind.
+fn family(sentence: &str) -> String {
+    let head = sentence.split(", found").next().unwrap_or(sentence);
+    let head: String = head.chars().filter(|c| c.is_ascii_alphabetic() || *c == ' ').collect();
+    head.split_whitespace().take(12).collect::<Vec<_>>().join(" ")
+}
