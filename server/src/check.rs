@@ -3,10 +3,12 @@
 //! Object ids are the objects' indices in the file. Every pair that the rules allow is told, clear ones too, in the order
 //! (time, a, b); with `first` only those whose bracket meets the earliest contact's.
 
+use crate::contact::{Body, Ideas, PairQuery, certificate};
 use crate::eco::Model;
 use crate::import::{Import, Scene};
+use crate::motion::Placed;
 use crate::world::{ObjectSpec, Part, Refusal, StepError, StepOptions, StepOutcome, World};
-use contactd_proto::PoseRecord;
+use contactd_proto::{Detect, PoseRecord};
 use std::sync::Arc;
 
 /// Why a scene that was read cannot be stepped.
@@ -94,4 +96,36 @@ impl Check {
             CheckError::Step { file: file.clone(), object, error }
         })
     }
+
+    /// The certificates of the answers of the step just taken (docs/certificate.md), and how many pairs have none.
+    pub fn certificates(&self, outcome: &StepOutcome) -> (String, usize) {
+        let (mut text, mut without) = (format!("{}\n", certificate::HEADER), 0);
+        for p in &outcome.pairs {
+            let [a, b] = [p.a, p.b].map(|id| {
+                let body = self.world.body(id)?;
+                Some(Body { model: &body.part.model, placed: Placed { place: body.place, motion: body.track.motion } })
+            });
+            let made = match (a, b) {
+                (Some(a), Some(b)) if p.plan.detect != Detect::Discrete => {
+                    let query = PairQuery {
+                        a,
+                        b,
+                        resolution: p.outcome.resolution,
+                        cell_limit: CERTIFICATE_CELLS,
+                        ideas: Ideas::default(),
+                    };
+                    certificate::certify(&query, &p.outcome)
+                }
+                _ => None,
+            };
+            match made {
+                Some(made) => made.write((p.a as usize, p.b as usize), &mut text),
+                None => without += 1,
+            }
+        }
+        (text, without)
+    }
 }
+
+/// Cells that one certificate may have: a hundred megabytes of text.
+const CERTIFICATE_CELLS: u64 = 200_000;

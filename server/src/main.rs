@@ -85,6 +85,9 @@ struct CheckArguments {
     /// Only the pairs that meet first.
     #[arg(long)]
     first: bool,
+    /// Also write the proof of every answer, for another program to check (docs/certificate.md).
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<PathBuf>,
     /// What each answer cost (beside --json: on standard error).
     #[arg(long)]
     explain: bool,
@@ -156,6 +159,13 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     let imports = scene.load_models(arguments.facets, &Limits::default())?;
     let mut check = Check::new(&scene, imports, arguments.resolution)?;
     let outcome = check.step(arguments.first)?.clone();
+    if let Some(to) = &arguments.certificate {
+        let (text, without) = check.certificates(&outcome);
+        std::fs::write(to, text).map_err(|e| format!("{}: {e}", to.display()))?;
+        if without > 0 {
+            eprintln!("{}: {without} pairs have no certificate", to.display());
+        }
+    }
     let undecided = outcome.undecided || outcome.pairs.iter().any(|p| p.outcome.status == Status::Undecided);
     let bodies = check.world.bodies();
     let pairs: Vec<PairReport<'_>> = outcome

@@ -8,3 +8,4 @@ pub mod openscad;
 pub mod random_solids;
 pub mod reference;
 pub mod scenes;
+pub mod verifier;

@@ -65,6 +65,37 @@ pub struct Scratch {
     ors: Vec<(Side, u32, u32)>,
     /// Clauses bounded so far, over the whole query.
     pub clauses: u64,
+    /// When present, every combination of literals that excluded something is written here.
+    pub record: Option<Vec<Proof>>,
+}
+
+impl Scratch {
+    /// Memory that keeps a record.
+    pub fn recording() -> Self {
+        Self { record: Some(Vec::new()), ..Self::default() }
+    }
+}
+
+/// A combination of literals that cannot hold together anywhere in the cell for a while.
+#[derive(Clone, Debug)]
+pub struct Proof {
+    /// For how long.
+    pub dt: f64,
+    /// The literals with their multipliers.
+    pub terms: Vec<Term>,
+}
+
+/// One literal of a `Proof`, or the fit of two.
+#[derive(Clone, Copy, Debug)]
+pub struct Term {
+    /// The literal; the positive one of a fit.
+    pub literal: (Side, LiteralId),
+    /// The negative literal of a fit.
+    pub other: Option<(Side, LiteralId)>,
+    /// Its multiplier.
+    pub lambda: f64,
+    /// Where a convex face is touched, in the frame of its body.
+    pub point: DVec3,
 }
 
 /// The expressions of both bodies over a cell, as ranges of one token pool.
@@ -195,6 +226,7 @@ impl Run<'_, '_> {
         let mut best = (f64::NEG_INFINITY, self.solve(h));
         best.0 = self.reach(&best.1);
         if best.0 >= h {
+            self.note(best);
             return self.result(best);
         }
         // Where the bound gives out is where it must get better: look ahead to just that time, and a little beyond it
@@ -212,6 +244,7 @@ impl Run<'_, '_> {
                 if reach > best.0 {
                     best = (reach, lowest);
                     if reach >= h {
+                        self.note(best);
                         return self.result(best);
                     }
                 }
@@ -221,7 +254,21 @@ impl Run<'_, '_> {
                 break;
             }
         }
+        self.note(best);
         self.result((best.0, lowest))
+    }
+
+    /// Writes down what excluded something, where that is asked for.
+    fn note(&mut self, (dt, s): (f64, Solution)) {
+        let Some(record) = &mut self.scratch.record else { return };
+        if dt < 0.0 {
+            return;
+        }
+        let term = |&(i, lambda): &(u32, f64)| {
+            let l = &self.scratch.lits[i as usize];
+            Term { literal: (l.side, l.id), other: l.other, lambda, point: l.point }
+        };
+        record.push(Proof { dt, terms: s.support[..s.count].iter().map(term).collect() });
     }
 
     /// Adds tangents of the curved convex faces that rise above a solution's lowest point there; false when none does.

@@ -62,6 +62,8 @@ pub struct Linear {
     pub id: LiteralId,
     /// The other literal of a same-shape fit (`fit`).
     pub other: Option<(Side, LiteralId)>,
+    /// Where a convex face is touched, in the frame of its body.
+    pub point: DVec3,
     /// n, with the literal's sign.
     pub normal: DVec3,
     /// a + delta − R at the centre.
@@ -182,6 +184,10 @@ impl View<'_> {
             let f = self.face_at(side, face, y);
             let mut l = self.plane(side, id, f.normal, f.value - f.normal.dot(y) + delta);
             l.cost = self.bulge(side, face, &f);
+            l.point = match side {
+                Side::A => self.center + y,
+                Side::B => self.center_b + self.at.b_from_a * y,
+            };
             return l;
         }
         let f = self.face_at(side, face, DVec3::ZERO);
@@ -235,7 +241,7 @@ impl View<'_> {
         if side == Side::B {
             f.normal = self.at.a_vector(f.normal);
         }
-        Linear { cost: self.bulge(side, face, &f), ..self.plane(side, id, f.normal, value + self.delta) }
+        Linear { point, cost: self.bulge(side, face, &f), ..self.plane(side, id, f.normal, value + self.delta) }
     }
 
     /// A bound by a plane that is fixed in its body.
@@ -248,6 +254,7 @@ impl View<'_> {
             side,
             id,
             other: None,
+            point: DVec3::ZERO,
             normal,
             bound,
             rate,

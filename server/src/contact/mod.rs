@@ -2,6 +2,7 @@
 //!
 //! Floor 6: imports `eco`, `bound`, `motion`, `solid`, `math`, `proto`.
 
+pub mod certificate;
 pub mod clause;
 pub mod closed;
 mod depth;

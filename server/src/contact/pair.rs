@@ -104,8 +104,8 @@ pub struct PairSearch<'a> {
 }
 
 impl<'a> PairSearch<'a> {
-    /// Prepares the search of a pair.
-    pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
+    /// What is searched for a question, and whether its second body carries the cells.
+    pub(super) fn task(query: &PairQuery<'a>) -> (Task<'a>, bool) {
         // The body that carries the cells: small and without cavities is cheap to cover.
         let weight = |m: &Model| m.radius * if m.solid.senses.contains(&Sense::Negative) { HOLLOW } else { 1.0 };
         let swapped = weight(query.b.model) < weight(query.a.model);
@@ -137,6 +137,14 @@ impl<'a> PairSearch<'a> {
             still: false,
             limit: query.cell_limit,
         };
+        (task, swapped)
+    }
+
+    /// Prepares the search of a pair.
+    pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
+        let (task, swapped) = Self::task(query);
+        let (a, b) = (task.a, task.b);
+        let resolution = task.delta;
         let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
         let mut search = Search::new(task, scratch);

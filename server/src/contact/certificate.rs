@@ -1,0 +1,485 @@
+//! A certificate: the proof that a pair stays free of contact until `time_lower`, to be checked by another program.
+//!
+//! It is made after the answer is known, by a second, simpler pass: no slices of time, no octrees, no candidates, one tree
+//! of cells that starts with the carrier's whole box. A cell is proven free for spans of time, one after the other; where
+//! its bounds do not advance it is split into halves, which go on from there. Each span lists the combinations of
+//! literals that cannot hold together; the cell's expression is closed when no clause is left. Source: the bounds of
+//! `clause`, taken over a slightly larger cell, for a little less time and depth, so that a checker with bounds of its own
+//! has room for its rounding.
+//!
+//! Invariant: cells stand in preorder, spans meet end to end. It does not promise to be the shortest proof, and it proves
+//! the answer rather than the steps by which the search found it. Format: docs/certificate.md.
+
+use super::clause::{self, Hint, Proof, Term};
+use super::literal::{Faces, Side, View};
+use super::outcome::{NO_FACE, Outcome, Status};
+use super::pair::{PairQuery, PairSearch};
+use super::search::Task;
+use crate::math::Aabb;
+use crate::solid::Sense;
+use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
+use glam::DVec3;
+use std::fmt::Write as _;
+
+/// A literal with the body it belongs to; A is the carrier of the cells.
+type Key = (Side, LiteralId);
+
+/// Room left for a checker: depth proven, relative to the depth claimed.
+const DEPTH: f64 = 0.75;
+/// Room left for a checker: the cell is bounded as if this much larger.
+const SWELL: f64 = 1.02;
+/// Room left for a checker: share of the proven time that is used.
+const HASTE: f64 = 0.85;
+/// Combinations of a span above which they are not thinned out.
+const MAX_THINNED: usize = 40;
+
+/// The proof of one pair.
+#[derive(Clone, Debug)]
+pub struct Certificate {
+    /// The second body of the query carries the cells.
+    pub swapped: bool,
+    /// Depth below which nothing counts: the resolution, or twice that when the bodies touch at the start.
+    pub depth: f64,
+    /// Free of contact until then.
+    pub until: f64,
+    /// The box that is covered, in the carrier's frame.
+    pub root: Aabb,
+    /// Cells in preorder.
+    pub cells: Vec<CellProof>,
+}
+
+/// The proof of one cell, from the time at which its parent was split.
+#[derive(Clone, Debug, Default)]
+pub struct CellProof {
+    /// Literals that hold nowhere in the cell, from its beginning to the end of the proof; point of contact of a tangent.
+    pub never: Vec<(Key, DVec3)>,
+    /// Spans of time, each from the end of the one before.
+    pub spans: Vec<Span>,
+    /// What becomes of the rest of the time.
+    pub rest: Rest,
+}
+
+/// An exclusion: no contact in the cell until then.
+#[derive(Clone, Debug)]
+pub struct Span {
+    /// End of the span.
+    pub until: f64,
+    /// Combinations that close the cell's expression; empty when the cell lies inside B (after the start only).
+    pub close: Vec<Vec<Term>>,
+}
+
+/// How a cell ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Rest {
+    /// Its spans reach the end of the proof, or its expression is false.
+    #[default]
+    Done,
+    /// It lies inside the carrier: the first contact would be on both surfaces.
+    Inside,
+    /// Two halves follow: axis and coordinate.
+    Split(usize, f64),
+}
+
+/// Proves what an answer says; `None` when it says nothing about any time (overlap), or the limit of cells is reached.
+pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
+    if outcome.status == Status::Overlap {
+        return None;
+    }
+    let (mut task, swapped) = PairSearch::task(query);
+    let depth = outcome.resolution * if outcome.touching { 2.0 } else { 1.0 };
+    // In the frames of the bodies as they move: the search may leave out a spin that moves nothing.
+    let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+    task.relative = crate::motion::Relative::new(carrier.placed, other.placed);
+    task.delta = DEPTH * depth;
+    let hull = task.a.aabb();
+    // Coordinates of the box and of what it holds are right to a few units in the last place.
+    let slack = hull.half() * 1e-9 + DVec3::splat(depth);
+    let root = Aabb::new(hull.min - slack, hull.max + slack);
+    let mut made = Certificate { swapped, depth, until: outcome.time_lower.min(1.0), root, cells: Vec::new() };
+    if task.a.is_empty() || task.b.is_empty() {
+        return Some(made);
+    }
+    if !root.is_finite() {
+        return None;
+    }
+    let mut scratch = clause::Scratch::recording();
+    let hints = hints(&task, swapped, outcome);
+    let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
+    let mut stack = vec![Open { region: root, t: 0.0, started: false, a, b, reach: 1.0 }];
+    while let Some(open) = stack.pop() {
+        if made.cells.len() as u64 >= query.cell_limit {
+            return None;
+        }
+        let mut maker = Maker { task: &task, end: made.until, hints: &hints, scratch: &mut scratch };
+        let (proof, children) = maker.cell(open);
+        made.cells.push(proof);
+        stack.extend(children.into_iter().flatten().rev());
+    }
+    Some(made)
+}
+
+/// Where the contact touches curved faces is where they are worth touching all along.
+fn hints(task: &Task, swapped: bool, o: &Outcome) -> Vec<Hint> {
+    if o.status != Status::Contact {
+        return Vec::new();
+    }
+    let at = task.relative.at(o.time);
+    let x = at.world_from_a.transpose() * (o.point - task.relative.world_point(&at, DVec3::ZERO));
+    let (faces_a, faces_b) = if swapped { (&o.faces_b, &o.faces_a) } else { (&o.faces_a, &o.faces_b) };
+    let mut hints = Vec::new();
+    for (side, solid, faces, point) in [(Side::A, task.a, faces_a, x), (Side::B, task.b, faces_b, at.b_point(x))] {
+        for face in faces.iter().filter(|f| **f != NO_FACE && (**f as usize) < solid.faces.len()) {
+            if solid.senses[solid.face_owner[*face as usize] as usize] == Sense::Positive {
+                hints.push(Hint { side, id: LiteralId::new(*face, Sense::Positive), point });
+            }
+        }
+    }
+    hints
+}
+
+/// A cell yet to be proven.
+struct Open {
+    region: Aabb,
+    t: f64,
+    /// The instant t = 0 is excluded already.
+    started: bool,
+    a: Vec<Token>,
+    b: Vec<Token>,
+    reach: f64,
+}
+
+struct Maker<'a> {
+    task: &'a Task<'a>,
+    end: f64,
+    hints: &'a [Hint],
+    scratch: &'a mut clause::Scratch,
+}
+
+impl<'a> Maker<'a> {
+    fn cell(&mut self, mut open: Open) -> (CellProof, [Option<Open>; 2]) {
+        let mut proof = CellProof::default();
+        let (center, half) = (open.region.center(), open.region.half() * SWELL);
+        // What is settled for the rest of the time: A's literals stand still, B's sweep over all of it.
+        let mut kept = [Vec::new(), Vec::new()];
+        for (side, tokens, out) in [(Side::A, &open.a, 0), (Side::B, &open.b, 1)] {
+            if tokens.is_empty() {
+                continue;
+            }
+            let (mut used, view) = (Vec::new(), self.at(open.t, self.end - open.t, center, half));
+            let view = view.view();
+            let truth = falsify(tokens, &mut kept[out], &mut used, &mut |id| view.truth(side, id));
+            // B's points of tangency are those at the beginning.
+            let point = if side == Side::A { center } else { view.center_b };
+            if truth == Truth::False {
+                proof.never = used.into_iter().map(|id| ((side, id), point)).collect();
+                return (proof, [None, None]);
+            }
+            if truth == Truth::True && side == Side::B {
+                // Only known over the span: asked again there.
+                kept[out] = tokens.clone();
+                continue;
+            }
+            proof.never.extend(used.into_iter().map(|id| ((side, id), point)));
+        }
+        [open.a, open.b] = kept;
+        let mut cost;
+        loop {
+            let t = open.t;
+            if open.a.is_empty() && (t > 0.0 || open.started) {
+                proof.rest = Rest::Inside;
+                return (proof, [None, None]);
+            }
+            let left = self.end - t;
+            let instant = t == 0.0 && !open.started && open.a.is_empty();
+            let (h, close, dt);
+            (h, close, dt, cost) = self.span(&open, if instant { 0.0 } else { left }, center, half);
+            let Some(close) = close else { break };
+            let until = if dt >= left { self.end } else { t + dt };
+            if until <= t && !(instant || left == 0.0 || (t == 0.0 && !open.started && dt == 0.0)) {
+                break;
+            }
+            proof.spans.push(Span { until, close });
+            open.started = true;
+            open.reach = if dt >= h { open.reach * 2.0 } else { (open.reach * 0.5).max(0.5) };
+            open.t = until;
+            if until >= self.end {
+                return (proof, [None, None]);
+            }
+        }
+        // Halves along the axis that costs most.
+        let cost: DVec3 = cost + half * 1e-6;
+        let k = if cost.x >= cost.y && cost.x >= cost.z {
+            0
+        } else if cost.y >= cost.z {
+            1
+        } else {
+            2
+        };
+        proof.rest = Rest::Split(k, center[k]);
+        let child = |low: bool| {
+            let mut region = open.region;
+            if low {
+                region.max[k] = center[k]
+            } else {
+                region.min[k] = center[k]
+            }
+            let (a, b) = (open.a.clone(), open.b.clone());
+            Some(Open { region, t: open.t, started: open.started, a, b, reach: open.reach })
+        };
+        let children = [child(true), child(false)];
+        (proof, children)
+    }
+
+    /// How far the cell is free from `open.t`, at most for `end`: (length looked at, what closes it, time, costs).
+    fn span(&mut self, open: &Open, end: f64, center: DVec3, half: DVec3) -> (f64, Option<Vec<Vec<Term>>>, f64, DVec3) {
+        let placed = self.at(open.t, end, center, half);
+        let radius = half.length();
+        let whole = placed.motion.speed * end;
+        let h = if whole > open.reach * radius { open.reach * radius / placed.motion.speed } else { end };
+        let placed = self.at(open.t, h, center, half);
+        let view = placed.view();
+        let started = open.t > 0.0 || open.started;
+        let (mut b, mut used) = (Vec::new(), Vec::new());
+        let truth = falsify(&open.b, &mut b, &mut used, &mut |id| view.truth(Side::B, id));
+        let singles: Vec<Vec<Term>> = used
+            .iter()
+            .map(|id| vec![Term { literal: (Side::B, *id), other: None, lambda: 1.0, point: view.center_b }])
+            .collect();
+        match truth {
+            Truth::False => return (h, Some(thinned(singles, &open.a, &open.b)), h, DVec3::ZERO),
+            Truth::True if started => return (h, Some(Vec::new()), h, DVec3::ZERO),
+            _ => {}
+        }
+        if open.a.is_empty() && b.is_empty() {
+            return (h, None, 0.0, DVec3::ZERO);
+        }
+        let mut pool = open.a.clone();
+        let split = pool.len() as u32;
+        pool.extend_from_slice(&b);
+        let pair = clause::Pair { pool: &pool, a: (0, split), b: (split, pool.len() as u32) };
+        if let Some(record) = &mut self.scratch.record {
+            record.clear();
+        }
+        let found = clause::advance(&view, &pair, self.hints, self.task.rounding, 0.0, self.scratch);
+        if found.dt < 0.0 {
+            return (h, None, 0.0, found.cost);
+        }
+        let gain = found.cost.element_sum().min(radius);
+        let enough = found.dt >= h || found.dt * placed.motion.speed >= 0.25 * gain || found.dt >= 0.25 * end;
+        if !enough {
+            return (h, None, 0.0, found.cost);
+        }
+        let dt = if found.dt >= h { h } else { found.dt * HASTE };
+        let proofs: &[Proof] = self.scratch.record.as_deref().unwrap_or_default();
+        let mut close = singles;
+        close.extend(proofs.iter().filter(|p| p.dt >= dt).map(|p| p.terms.clone()));
+        (h, Some(thinned(close, &open.a, &open.b)), dt, found.cost)
+    }
+
+    fn at(&self, t: f64, h: f64, center: DVec3, half: DVec3) -> Placed<'a> {
+        let at = self.task.relative.at(t);
+        let x_max = (center - at.center_a).length() + half.length();
+        Placed { task: self.task, at, motion: self.task.relative.bounds(t, h, x_max), center, half }
+    }
+}
+
+/// What a view is made of.
+struct Placed<'a> {
+    task: &'a Task<'a>,
+    at: crate::motion::Instant,
+    motion: crate::motion::Bounds,
+    center: DVec3,
+    half: DVec3,
+}
+
+impl Placed<'_> {
+    fn view(&self) -> View<'_> {
+        View {
+            a: Faces { solid: self.task.a, guards: &[] },
+            b: Faces { solid: self.task.b, guards: &[] },
+            at: &self.at,
+            motion: self.motion,
+            center: self.center,
+            half: self.half,
+            radius: self.half.length(),
+            center_b: self.at.b_point(self.center),
+            velocity: self.at.velocity(self.center),
+            delta: self.task.delta,
+            fits: self.task.ideas.fits,
+        }
+    }
+}
+
+/// `local::prune` that also tells which false literals it took: of a false *and* only one operand's.
+fn falsify(
+    tokens: &[Token],
+    out: &mut Vec<Token>,
+    used: &mut Vec<LiteralId>,
+    classify: &mut dyn FnMut(LiteralId) -> Truth,
+) -> Truth {
+    let (kind, body) = match local::first(tokens).0 {
+        Expression::Literal(id) => {
+            let truth = classify(id);
+            match truth {
+                Truth::Open => out.push(local::literal_token(id)),
+                Truth::False => used.push(id),
+                Truth::True => {}
+            }
+            return truth;
+        }
+        Expression::And(body) => (AND, body),
+        Expression::Or(body) => (OR, body),
+    };
+    let mark = used.len();
+    local::fold(kind, items(body), out, |item, out| {
+        let before = used.len();
+        let truth = falsify(item, out, used, classify);
+        match truth {
+            Truth::False if kind == AND => drop(used.drain(mark..before)),
+            Truth::True if kind == OR => used.truncate(mark),
+            Truth::True => used.truncate(before),
+            _ => {}
+        }
+        truth
+    })
+}
+
+/// The operands in the body of an operator, heads included.
+fn items(mut body: &[Token]) -> impl Iterator<Item = &[Token]> {
+    std::iter::from_fn(move || {
+        let (item, rest) = (!body.is_empty()).then(|| body.split_at(local::first(body).1))?;
+        body = rest;
+        Some(item)
+    })
+}
+
+/// Leaves out combinations without which the expressions are still closed.
+fn thinned(mut close: Vec<Vec<Term>>, a: &[Token], b: &[Token]) -> Vec<Vec<Term>> {
+    if close.len() > MAX_THINNED {
+        return close;
+    }
+    let mut i = close.len();
+    while i > 0 && close.len() > 1 {
+        i -= 1;
+        let one = close.remove(i);
+        if !closed(&close, a, b) {
+            close.insert(i, one);
+        }
+    }
+    close
+}
+
+/// True when every clause of the expressions holds all literals of some combination.
+fn closed(close: &[Vec<Term>], a: &[Token], b: &[Token]) -> bool {
+    let groups: Vec<Vec<Key>> =
+        close.iter().map(|g| g.iter().flat_map(|t| [Some(t.literal), t.other]).flatten().collect()).collect();
+    let mut state = Closing { groups: &groups, literals: Vec::new(), ors: Vec::new(), left: 10_000 };
+    state.take(Side::A, a);
+    state.take(Side::B, b);
+    state.run()
+}
+
+struct Closing<'a> {
+    groups: &'a [Vec<Key>],
+    literals: Vec<Key>,
+    ors: Vec<(Side, &'a [Token])>,
+    left: u32,
+}
+
+impl<'a> Closing<'a> {
+    fn take(&mut self, side: Side, tokens: &'a [Token]) {
+        for item in items(tokens) {
+            match local::first(item).0 {
+                Expression::Literal(id) => self.literals.push((side, id)),
+                Expression::And(body) => self.take(side, body),
+                Expression::Or(body) => self.ors.push((side, body)),
+            }
+        }
+    }
+
+    fn run(&mut self) -> bool {
+        if self.groups.iter().any(|g| g.iter().all(|k| self.literals.contains(k))) {
+            return true;
+        }
+        if self.left == 0 {
+            return false;
+        }
+        self.left -= 1;
+        let known = |side: Side, item: &[Token]| {
+            local::literals(item).any(|id| self.groups.iter().any(|g| g.contains(&(side, id))))
+        };
+        let useful = |(side, body): &(Side, &[Token])| items(body).all(|item| known(*side, item));
+        let Some(pick) =
+            (0..self.ors.len()).filter(|i| useful(&self.ors[*i])).min_by_key(|i| items(self.ors[*i].1).count())
+        else {
+            return false;
+        };
+        let (side, body) = self.ors.swap_remove(pick);
+        let (literals, ors) = (self.literals.len(), self.ors.clone());
+        let all = items(body).all(|item| {
+            self.take(side, item);
+            let done = self.run();
+            self.literals.truncate(literals);
+            self.ors.clone_from(&ors);
+            done
+        });
+        self.ors.push((side, body));
+        all
+    }
+}
+
+impl Certificate {
+    /// The certificate as text; `a` and `b` are the indices of the query's objects in the scene. Format:
+    /// docs/certificate.md.
+    pub fn write(&self, (a, b): (usize, usize), out: &mut String) {
+        let (r, carrier) = (&self.root, if self.swapped { b } else { a });
+        let _ = writeln!(
+            out,
+            "pair {a} {b} carrier {carrier} depth {:e} until {:e} cells {} box {}",
+            self.depth,
+            self.until,
+            self.cells.len(),
+            numbers(&[r.min, r.max])
+        );
+        for cell in &self.cells {
+            for (key, point) in &cell.never {
+                let _ = writeln!(out, "never {} {}", name(key), numbers(&[*point]));
+            }
+            for span in &cell.spans {
+                let _ = write!(out, "until {:e}", span.until);
+                for group in &span.close {
+                    let _ = write!(out, " |");
+                    for term in group {
+                        let _ = match &term.other {
+                            Some(other) => {
+                                write!(out, " fit {} {} {:e}", name(&term.literal), name(other), term.lambda)
+                            }
+                            None => {
+                                write!(out, " {} {:e} {}", name(&term.literal), term.lambda, numbers(&[term.point]))
+                            }
+                        };
+                    }
+                }
+                out.push('\n');
+            }
+            let _ = match cell.rest {
+                Rest::Done => writeln!(out, "done"),
+                Rest::Inside => writeln!(out, "inside"),
+                Rest::Split(k, at) => writeln!(out, "split {} {at:e}", ["x", "y", "z"][k]),
+            };
+        }
+    }
+}
+
+fn name((side, id): &Key) -> String {
+    let sign = if id.sense() == Sense::Positive { '+' } else { '-' };
+    format!("{}{sign}{}", if *side == Side::A { 'a' } else { 'b' }, id.face())
+}
+
+fn numbers(points: &[DVec3]) -> String {
+    let all: Vec<String> = points.iter().flat_map(|p| p.to_array()).map(|v| format!("{v:e}")).collect();
+    all.join(" ")
+}
+
+/// The first line of every certificate.
+pub const HEADER: &str = "contactd-certificate 1";

@@ -1,0 +1,297 @@
+//! Is Σ λ_i ℓ_i positive over a box and a span of time? ℓ_i = ±psi_i + delta, which a contact needs to be <= 0.
+//!
+//! A convex literal is replaced by its tangent plane at the recorded point, which lies below it whatever the point is; a
+//! concave one is taken as it is. The sum is bounded by its mean-value form of second order (value and gradient at the
+//! middle, Hessian over the box) and by its gradient over the box; where that does not suffice the box or the span is
+//! halved, up to a budget. A budget that runs out is a refusal.
+
+use super::interval::{Interval, Jet, Vector, ZERO, dot, minus, place, point, times, unit, vector};
+use super::motion::{Motions, in_a};
+use contactd::solid::{Face, Solid};
+use glam::DVec3;
+
+/// A face of a body with its sense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Literal {
+    /// Of the body that does not carry the cells.
+    pub on_b: bool,
+    /// Face id in its solid.
+    pub face: u32,
+    /// −psi.
+    pub negative: bool,
+}
+
+/// A literal with its multiplier, or the fit of two.
+#[derive(Clone, Copy, Debug)]
+pub struct Term {
+    /// The literal; the positive one of a fit.
+    pub literal: Literal,
+    /// The negative one of a fit.
+    pub other: Option<Literal>,
+    /// Multiplier.
+    pub lambda: f64,
+    /// Point of contact of the tangent, frame of the literal's body.
+    pub point: DVec3,
+}
+
+/// What is bounded.
+pub struct Bounder<'a> {
+    /// The carrier.
+    pub a: &'a Solid,
+    /// The other body.
+    pub b: &'a Solid,
+    /// How they move.
+    pub motions: Motions,
+    /// Depth.
+    pub depth: f64,
+    /// Evaluations so far.
+    pub evaluations: u64,
+}
+
+/// A box of A and a span of time.
+#[derive(Clone, Copy, Debug)]
+pub struct Region(pub [(f64, f64); 4]);
+
+/// Evaluations that one combination may cost.
+const BUDGET: u64 = 40_000;
+
+impl Bounder<'_> {
+    fn face(&self, l: &Literal) -> Option<&Face> {
+        (if l.on_b { self.b } else { self.a }).faces.get(l.face as usize)
+    }
+
+    /// True when it is certain that the literals of `terms` never hold together in the region.
+    pub fn excludes(&mut self, terms: &[Term], region: Region) -> bool {
+        let known = |l: &Literal| self.face(l).is_some();
+        let fine = terms.iter().all(|t| {
+            t.lambda >= 0.0 && t.lambda.is_finite() && known(&t.literal) && t.other.as_ref().is_none_or(known)
+        });
+        fine && terms.iter().any(|t| t.lambda > 0.0) && self.positive(region, &|s: &Self, x, t| s.sum(terms, x, t))
+    }
+
+    /// True when it is certain that the literal holds with room everywhere in the region.
+    pub fn holds(&mut self, l: &Literal, region: Region) -> bool {
+        self.face(l).is_some()
+            && self.positive(region, &|s: &Self, x, t| {
+                let jet = s.psi(s.face(l)?, &s.coordinates(l.on_b, x, t));
+                // −(±psi) − depth > 0.
+                Some(jet.scaled(point(if l.negative { 1.0 } else { -1.0 })).plus(point(-s.depth)))
+            })
+    }
+
+    fn positive(&mut self, region: Region, f: &dyn Fn(&Self, Vector, Interval) -> Option<Jet>) -> bool {
+        let mut stack = vec![region];
+        let mut left = BUDGET;
+        while let Some(r) = stack.pop() {
+            if left == 0 {
+                return false;
+            }
+            left -= 1;
+            self.evaluations += 1;
+            let of = |k: usize| Interval::new(r.0[k].0, r.0[k].1);
+            let mid: [f64; 4] = std::array::from_fn(|k| {
+                let m = 0.5 * (r.0[k].0 + r.0[k].1);
+                m.clamp(r.0[k].0, r.0[k].1)
+            });
+            let Some(center) = f(self, vector([mid[0], mid[1], mid[2]]), point(mid[3])) else { return false };
+            if center.v.hi <= 0.0 || center.v.lo.is_nan() {
+                return false;
+            }
+            let Some(whole) = f(self, [of(0), of(1), of(2)], of(3)) else { return false };
+            let y: [Interval; 4] = std::array::from_fn(|k| of(k) - point(mid[k]));
+            let (mut second, mut first) = (center.v, center.v);
+            let mut cost = [0.0; 4];
+            for k in 0..4 {
+                second = second + center.g[k] * y[k];
+                first = first + whole.g[k] * y[k];
+                for j in k..4 {
+                    let h = whole.h[place(k, j)];
+                    let q = if j == k { point(0.5) * h * y[k].square() } else { h * (y[k] * y[j]) };
+                    second = second + q;
+                    let c = if q.lo.is_finite() { -q.lo } else { y[k].mag() * y[j].mag() };
+                    cost[k] += c.max(0.0);
+                    cost[j] += c.max(0.0);
+                }
+                cost[k] += (whole.g[k].hi - whole.g[k].lo).min(1e3) * y[k].mag() * 1e-3;
+            }
+            let best = [whole.v.lo, second.lo, first.lo].into_iter().fold(f64::NEG_INFINITY, f64::max);
+            if best > 0.0 {
+                continue;
+            }
+            let k = (0..4).max_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
+            let k = if r.0[k].0 < mid[k] && mid[k] < r.0[k].1 {
+                k
+            } else {
+                let Some(k) = (0..4).find(|k| r.0[*k].0 < mid[*k] && mid[*k] < r.0[*k].1) else { return false };
+                k
+            };
+            for half in [(mid[k], r.0[k].1), (r.0[k].0, mid[k])] {
+                let mut part = r;
+                part.0[k] = half;
+                stack.push(part);
+            }
+        }
+        true
+    }
+
+    fn coordinates(&self, on_b: bool, x: Vector, t: Interval) -> [Jet; 3] {
+        if on_b { self.motions.in_b(x, t) } else { in_a(x) }
+    }
+
+    fn sum(&self, terms: &[Term], x: Vector, t: Interval) -> Option<Jet> {
+        let (a, b) = (in_a(x), self.motions.in_b(x, t));
+        let mut sum = Jet::constant(ZERO);
+        for term in terms {
+            let y = if term.literal.on_b { &b } else { &a };
+            let face = self.face(&term.literal)?;
+            let jet = if let Some(other) = &term.other {
+                self.fit((&term.literal, face), (other, self.face(other)?), (&a, &b), (x, t))?
+            } else if term.literal.negative {
+                self.psi(face, y).scaled(point(-1.0)).plus(point(self.depth))
+            } else {
+                tangent(face, term.point, y).plus(point(self.depth))
+            };
+            sum = sum + jet.scaled(point(term.lambda));
+        }
+        Some(sum)
+    }
+
+    fn psi(&self, face: &Face, y: &[Jet; 3]) -> Jet {
+        match *face {
+            Face::Plane { normal, offset } => linear(vector(normal.to_array()), y).plus(point(-offset)),
+            Face::Sphere { center, radius } => square_length(&offsets(y, center)).sqrt().plus(point(-radius)),
+            Face::Cylinder { origin, axis, radius } => {
+                square_length(&across(&offsets(y, origin), unit(vector(axis.to_array())))).sqrt().plus(point(-radius))
+            }
+            Face::Cone { apex, axis, sin, cos } => {
+                let (o, axis) = (offsets(y, apex), unit(vector(axis.to_array())));
+                let rho = square_length(&across(&o, axis)).sqrt();
+                rho.scaled(point(cos)) - linear(axis, &o).scaled(point(sin))
+            }
+        }
+    }
+
+    /// ½(psi_p − psi_q) + delta for two cones, from below: with one axis a and one angle it is at least
+    /// ½[sin α Δ·a − cos α |Δ − (Δ·a)a|] + delta, Δ = o_p − o_q, at every x. Giving B's cone the axis and angle of A's
+    /// changes its psi at x by at most |x − o|(|a' − a|(sin α + cos α) + |α' − α|). Only the value's lower end is known,
+    /// which the jet says by unbounded derivatives.
+    fn cones(&self, p: (&Literal, &Face), q: (&Literal, &Face), x: Vector, t: Interval) -> Option<Jet> {
+        let (on_a, on_b) = if p.0.on_b { (q.1, p.1) } else { (p.1, q.1) };
+        let (Face::Cone { apex: o_a, axis: a, sin, cos }, Face::Cone { apex: o_b, axis: a_b, sin: sin_b, cos: cos_b }) =
+            (*on_a, *on_b)
+        else {
+            return None;
+        };
+        let a = unit(vector(a.to_array()));
+        let a_b = self.motions.b_direction(unit(vector(a_b.to_array())), t);
+        let o_b = self.motions.b_point(vector(o_b.to_array()), t);
+        let (sin, cos) = (point(sin), point(cos));
+        // |α' − α| <= π/2·|sin(α' − α)|, both between 0 and π/2.
+        let angle = (sin * point(cos_b) - cos * point(sin_b)).mag() * 1.58;
+        let lean = length(minus(a_b, a));
+        let far = length(minus(x, o_b));
+        let delta = minus(o_b, vector(o_a.to_array()));
+        let delta = if p.0.on_b { delta } else { times(point(-1.0), delta) };
+        let along = dot(delta, a);
+        let across = length(minus(delta, times(along, a)));
+        let least = sin * along - cos * across - far * (lean * (sin + cos) + point(angle));
+        let any = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+        let value = point(0.5) * least + point(self.depth);
+        Some(Jet { v: Interval::new(value.lo, f64::INFINITY), g: [any; 4], h: [any; 10] })
+    }
+
+    /// With |u_p| <= R_p − delta and |u_q| >= R_q + delta at a contact:
+    /// [ |u_p|² − |u_q|² + (R_q + delta)² − (R_p − delta)² ] / (2(R_p + R_q)) <= 0, for spheres and cylinders.
+    fn fit(
+        &self,
+        p: (&Literal, &Face),
+        q: (&Literal, &Face),
+        (a, b): (&[Jet; 3], &[Jet; 3]),
+        (x, t): (Vector, Interval),
+    ) -> Option<Jet> {
+        if p.0.on_b == q.0.on_b || p.0.negative || !q.0.negative {
+            return None;
+        }
+        if let (Face::Cone { .. }, Face::Cone { .. }) = (p.1, q.1) {
+            return self.cones(p, q, x, t);
+        }
+        let round = |face: &Face| match *face {
+            Face::Sphere { center, radius } => Some((center, None, radius)),
+            Face::Cylinder { origin, axis, radius } => Some((origin, Some(unit(vector(axis.to_array()))), radius)),
+            _ => None,
+        };
+        let square = |l: &Literal, face: &Face| {
+            let (o, axis, r) = round(face)?;
+            let y = offsets(if l.on_b { b } else { a }, o);
+            let mut s = square_length(&axis.map_or(y, |axis| across(&y, axis)));
+            // A rotation keeps lengths: along A's axes the spatial Hessian is 2(I − aaᵀ), a the axis as A sees it.
+            let axis = axis.map(|axis| if l.on_b { self.motions.b_direction(axis, t) } else { axis });
+            for i in 0..3 {
+                for j in i..3 {
+                    let own = point(if i == j { 2.0 } else { 0.0 });
+                    s.h[place(i, j)] =
+                        axis.map_or(own, |a| own - point(2.0) * if i == j { a[i].square() } else { a[i] * a[j] });
+                }
+            }
+            Some((s, r))
+        };
+        let ((p, r_p), (q, r_q)) = (square(p.0, p.1)?, square(q.0, q.1)?);
+        if r_p <= self.depth {
+            return None;
+        }
+        let (r_p, r_q, depth) = (point(r_p), point(r_q), point(self.depth));
+        let room = (r_q + depth).square() - (r_p - depth).square();
+        Some((p - q).plus(room).scaled((point(2.0) * (r_p + r_q)).recip()))
+    }
+}
+
+/// The length of a vector.
+fn length(v: Vector) -> Interval {
+    (v[0].square() + v[1].square() + v[2].square()).sqrt()
+}
+
+fn offsets(y: &[Jet; 3], o: DVec3) -> [Jet; 3] {
+    std::array::from_fn(|i| y[i].plus(point(-o[i])))
+}
+
+fn linear(n: Vector, y: &[Jet; 3]) -> Jet {
+    y[0].scaled(n[0]) + y[1].scaled(n[1]) + y[2].scaled(n[2])
+}
+
+fn across(y: &[Jet; 3], axis: Vector) -> [Jet; 3] {
+    let along = linear(axis, y);
+    std::array::from_fn(|i| y[i] - along.scaled(axis[i]))
+}
+
+fn square_length(y: &[Jet; 3]) -> Jet {
+    y[0].square() + y[1].square() + y[2].square()
+}
+
+/// A unit vector made a little shorter than 1 for certain.
+fn short(v: DVec3) -> Vector {
+    times(point(1.0 - 1e-15), vector(v.normalize_or_zero().to_array()))
+}
+
+/// A plane below a convex psi: |v| >= n·v for every |n| <= 1.
+fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
+    let perpendicular = |axis: DVec3, o: DVec3| {
+        let a = unit(vector(axis.to_array()));
+        let m = short({
+            let o = at - o;
+            o - axis * o.dot(axis)
+        });
+        minus(m, times(dot(m, a), a))
+    };
+    match *face {
+        Face::Plane { normal, offset } => linear(vector(normal.to_array()), y).plus(point(-offset)),
+        Face::Sphere { center, radius } => linear(short(at - center), &offsets(y, center)).plus(point(-radius)),
+        Face::Cylinder { origin, axis, radius } => {
+            linear(perpendicular(axis, origin), &offsets(y, origin)).plus(point(-radius))
+        }
+        Face::Cone { apex, axis, sin, cos } => {
+            let a = unit(vector(axis.to_array()));
+            let m = perpendicular(axis, apex);
+            linear(minus(times(point(cos), m), times(point(sin), a)), &offsets(y, apex))
+        }
+    }
+}

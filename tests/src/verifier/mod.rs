@@ -1,0 +1,413 @@
+//! Checks a certificate (docs/certificate.md) without any of the server's bounds: the text, the solids and their motion
+//! in, an error or what was checked out.
+//!
+//! What is proven when it accepts: the box holds every point of the carrier at the certificate's depth; over it and
+//! [0, until] no point is at that depth in both bodies at t = 0, and none is at exactly that depth in both afterwards.
+//! The first contact would be on both surfaces (a point strictly inside one body that just reaches the depth in the
+//! other reached it before, carried along by the other), so none is there. Each combination of literals is bounded by
+//! interval arithmetic (`bound`), and each cell's expression, taken from the tree by code of its own, has no clause left.
+//! sqrt and the four operations are the hardware's; sin and cos are series of their own. Boxes of placed primitives are
+//! not taken from the server either.
+
+pub mod bound;
+pub mod interval;
+pub mod motion;
+
+use bound::{Bounder, Literal, Region, Term};
+use contactd::motion::Placed;
+use contactd::solid::{Node, NodeId, Op, Shape, Solid};
+use glam::DVec3;
+use interval::{Interval, point};
+use motion::Motions;
+
+/// What was checked.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Checked {
+    /// No contact before this time.
+    pub until: f64,
+    /// Depth of the contacts that are excluded.
+    pub depth: f64,
+    /// Cells.
+    pub cells: u64,
+    /// Spans of time.
+    pub spans: u64,
+    /// Combinations of literals.
+    pub combinations: u64,
+    /// Interval evaluations.
+    pub evaluations: u64,
+}
+
+/// An and/or-tree of literals.
+#[derive(Clone, Debug)]
+enum Expr {
+    One(Literal),
+    And(Vec<Expr>),
+    Or(Vec<Expr>),
+}
+
+fn expression(solid: &Solid, node: NodeId, negative: bool, on_b: bool) -> Expr {
+    match &solid.nodes[node as usize] {
+        Node::Empty if negative => Expr::And(vec![]),
+        Node::Empty => Expr::Or(vec![]),
+        Node::Primitive(p) => {
+            let p = &solid.primitives[*p as usize];
+            let faces = p.first_face..p.first_face + p.faces.len() as u32;
+            let all = faces.map(|face| Expr::One(Literal { on_b, face, negative })).collect();
+            if negative { Expr::Or(all) } else { Expr::And(all) }
+        }
+        Node::Op(op, children) => {
+            let flips = |i: usize| *op == Op::Difference && i > 0;
+            let all =
+                children.iter().enumerate().map(|(i, c)| expression(solid, *c, negative != flips(i), on_b)).collect();
+            if (*op == Op::Union) != negative { Expr::Or(all) } else { Expr::And(all) }
+        }
+    }
+}
+
+/// What is left when some literals never hold; `None` when nothing can.
+fn without(e: &Expr, never: &[Literal]) -> Option<Expr> {
+    match e {
+        Expr::One(l) => (!never.contains(l)).then(|| e.clone()),
+        Expr::And(all) => {
+            let left: Option<Vec<Expr>> = all.iter().map(|e| without(e, never)).collect();
+            left.map(Expr::And)
+        }
+        Expr::Or(all) => {
+            let left: Vec<Expr> = all.iter().filter_map(|e| without(e, never)).collect();
+            (!left.is_empty()).then_some(Expr::Or(left))
+        }
+    }
+}
+
+fn any_literal(e: &Expr, f: &dyn Fn(&Literal) -> bool) -> bool {
+    match e {
+        Expr::One(l) => f(l),
+        Expr::And(all) | Expr::Or(all) => all.iter().any(|e| any_literal(e, f)),
+    }
+}
+
+/// True when every clause holds all literals of some group.
+struct Closing<'a> {
+    groups: &'a [Vec<Literal>],
+    literals: Vec<Literal>,
+    ors: Vec<&'a [Expr]>,
+    left: u32,
+}
+
+impl<'a> Closing<'a> {
+    fn take(&mut self, e: &'a Expr) {
+        match e {
+            Expr::One(l) => self.literals.push(*l),
+            Expr::And(all) => all.iter().for_each(|e| self.take(e)),
+            Expr::Or(all) => self.ors.push(all),
+        }
+    }
+
+    fn closed(&mut self) -> bool {
+        if self.groups.iter().any(|g| g.iter().all(|l| self.literals.contains(l))) {
+            return true;
+        }
+        if self.left == 0 {
+            return false;
+        }
+        self.left -= 1;
+        // Alternatives without a literal of any group cannot be closed by taking them.
+        let known = |e: &Expr| any_literal(e, &|l| self.groups.iter().any(|g| g.contains(l)));
+        let useful = (0..self.ors.len()).filter(|i| self.ors[*i].iter().all(known));
+        let Some(pick) = useful.min_by_key(|i| self.ors[*i].len()) else { return false };
+        let alternatives = self.ors.swap_remove(pick);
+        let (literals, ors) = (self.literals.len(), self.ors.clone());
+        alternatives.iter().all(|e| {
+            self.take(e);
+            let done = self.closed();
+            self.literals.truncate(literals);
+            self.ors.clone_from(&ors);
+            done
+        })
+    }
+}
+
+/// A cell to be checked next.
+struct Cell {
+    region: [(f64, f64); 3],
+    t: f64,
+    started: bool,
+    a: Option<Expr>,
+    b: Option<Expr>,
+}
+
+/// Checks the certificate of the pair (first, second) of a scene, indices `names`. The text is one pair's part: the line
+/// that begins with "pair" and all lines up to the next such line.
+///
+/// # Errors
+/// The first thing that is not certain, by line.
+pub fn check(
+    text: &str,
+    names: (usize, usize),
+    first: (&Solid, &Placed),
+    second: (&Solid, &Placed),
+) -> Result<Checked, String> {
+    let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>()));
+    let (_, head) = lines.next().ok_or("empty certificate")?;
+    let [_, a, b, _, carrier, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
+        return Err("line 1: not the head of a pair".into());
+    };
+    let index = |s: &str| s.parse::<usize>().map_err(|_| format!("line 1: {s:?} is no index"));
+    if (index(a)?, index(b)?) != names {
+        return Err("line 1: another pair".into());
+    }
+    let swapped = match index(carrier)? {
+        c if c == names.0 => false,
+        c if c == names.1 => true,
+        _ => return Err("line 1: the carrier is none of the pair".into()),
+    };
+    let (carrier, other) = if swapped { (second, first) } else { (first, second) };
+    let (depth, until, count) = (number(depth)?, number(until)?, index(cells)?);
+    if !(depth > 0.0 && (0.0..=1.0).contains(&until)) {
+        return Err("line 1: depth or time out of range".into());
+    }
+    let mut checked = Checked { until, depth, ..Checked::default() };
+    if carrier.0.is_empty() || other.0.is_empty() {
+        return Ok(checked);
+    }
+    let corners: Vec<f64> = corners.iter().map(|s| number(s)).collect::<Result<_, _>>()?;
+    let [x0, y0, z0, x1, y1, z1] = corners.as_slice() else { return Err("line 1: a box has six numbers".into()) };
+    let root = [(*x0, *x1), (*y0, *y1), (*z0, *z1)];
+    if !holds_solid(&root, carrier.0) {
+        return Err("line 1: the box does not hold the carrier".into());
+    }
+    let motions = Motions::new(carrier.1, other.1);
+    let mut bounder = Bounder { a: carrier.0, b: other.0, motions, depth, evaluations: 0 };
+    let a = expression(carrier.0, carrier.0.root, false, false);
+    let b = expression(other.0, other.0.root, false, true);
+    let mut stack = vec![Cell { region: root, t: 0.0, started: false, a: Some(a), b: Some(b) }];
+    while let Some(mut cell) = stack.pop() {
+        let end = format!("the certificate ends with cells missing (of {count})");
+        checked.cells += 1;
+        let mut never: Vec<Literal> = Vec::new();
+        let place = cell.region;
+        loop {
+            let (line, words) = lines.next().ok_or(end.clone())?;
+            let wrong = |what: &str| Err(format!("line {line}: {what}"));
+            let region = |from: f64, to: f64| {
+                let [x, y, z] = place;
+                Region([x, y, z, (from, to)])
+            };
+            match words[0] {
+                "never" => {
+                    let [_, name, x, y, z] = words.as_slice() else { return wrong("never: literal and point") };
+                    let term = Term {
+                        literal: literal(name)?,
+                        other: None,
+                        lambda: 1.0,
+                        point: DVec3::new(number(x)?, number(y)?, number(z)?),
+                    };
+                    checked.combinations += 1;
+                    if !bounder.excludes(&[term], region(cell.t, until)) {
+                        return wrong("the literal may hold");
+                    }
+                    never.push(term.literal);
+                    continue;
+                }
+                "until" => {
+                    settle(&mut cell, &mut never);
+                    checked.spans += 1;
+                    let to = number(words.get(1).unwrap_or(&""))?;
+                    if !(to >= cell.t && to <= until && (to > cell.t || !cell.started)) {
+                        return wrong("the span is out of order");
+                    }
+                    let groups = combinations(&words[2..])?;
+                    let span = region(cell.t, to);
+                    if groups.is_empty() {
+                        let inside = cell.b.as_ref().is_some_and(|b| certain(&mut bounder, b, span));
+                        if !(cell.started || cell.t > 0.0) || !inside {
+                            return wrong("the cell may not lie inside the other body");
+                        }
+                    } else {
+                        for group in &groups {
+                            checked.combinations += 1;
+                            if !bounder.excludes(group, span) {
+                                return wrong(&format!("a combination may hold: {group:?} over {span:?}"));
+                            }
+                        }
+                        let keys: Vec<Vec<Literal>> = groups
+                            .iter()
+                            .map(|g| g.iter().flat_map(|t| [Some(t.literal), t.other]).flatten().collect())
+                            .collect();
+                        if let (Some(a), Some(b)) = (&cell.a, &cell.b) {
+                            let mut closing = Closing { groups: &keys, literals: vec![], ors: vec![], left: 20_000 };
+                            closing.take(a);
+                            closing.take(b);
+                            if !closing.closed() {
+                                return wrong("a clause is left open");
+                            }
+                        }
+                    }
+                    (cell.t, cell.started) = (to, true);
+                    continue;
+                }
+                _ => {}
+            }
+            settle(&mut cell, &mut never);
+            let absent = cell.a.is_none() || cell.b.is_none();
+            match words.as_slice() {
+                ["done"] if absent || (cell.started && cell.t == until) => {}
+                ["done"] => return wrong("the cell is not done: time or clauses are left"),
+                ["inside"] => {
+                    let inside = cell.a.as_ref().is_some_and(|a| certain(&mut bounder, a, region(0.0, 0.0)));
+                    if !(cell.started || cell.t > 0.0) || !inside {
+                        return wrong("the cell may not lie inside the carrier");
+                    }
+                }
+                ["split", axis, at] => {
+                    let k = ["x", "y", "z"].iter().position(|n| n == axis).ok_or(format!("line {line}: axis"))?;
+                    let at = number(at)?;
+                    let (lo, hi) = cell.region[k];
+                    if !(lo < at && at < hi) {
+                        return wrong("the split is outside the cell");
+                    }
+                    for half in [(at, hi), (lo, at)] {
+                        let mut part = cell.region;
+                        part[k] = half;
+                        let (a, b) = (cell.a.clone(), cell.b.clone());
+                        stack.push(Cell { region: part, t: cell.t, started: cell.started, a, b });
+                    }
+                }
+                _ => return wrong("unknown line"),
+            }
+            break;
+        }
+    }
+    if lines.next().is_some() || checked.cells != count as u64 {
+        return Err("cells are left over or missing".into());
+    }
+    checked.evaluations = bounder.evaluations;
+    Ok(checked)
+}
+
+/// Takes what never holds out of a cell's expressions.
+fn settle(cell: &mut Cell, never: &mut Vec<Literal>) {
+    if !never.is_empty() {
+        cell.a = cell.a.as_ref().and_then(|e| without(e, never));
+        cell.b = cell.b.as_ref().and_then(|e| without(e, never));
+        never.clear();
+    }
+}
+
+/// True when the expression holds with room all over the region, for certain.
+fn certain(bounder: &mut Bounder, e: &Expr, region: Region) -> bool {
+    match e {
+        Expr::One(l) => bounder.holds(l, region),
+        Expr::And(all) => all.iter().all(|e| certain(bounder, e, region)),
+        Expr::Or(all) => all.iter().any(|e| certain(bounder, e, region)),
+    }
+}
+
+fn combinations(words: &[&str]) -> Result<Vec<Vec<Term>>, String> {
+    let mut groups = Vec::new();
+    for part in words.split(|w| *w == "|").skip(1) {
+        let (mut group, mut rest) = (Vec::new(), part);
+        while !rest.is_empty() {
+            rest = match rest {
+                ["fit", p, q, lambda, rest @ ..] => {
+                    let lambda = number(lambda)?;
+                    group.push(Term { literal: literal(p)?, other: Some(literal(q)?), lambda, point: DVec3::ZERO });
+                    rest
+                }
+                [name, lambda, x, y, z, rest @ ..] => {
+                    let point = DVec3::new(number(x)?, number(y)?, number(z)?);
+                    group.push(Term { literal: literal(name)?, other: None, lambda: number(lambda)?, point });
+                    rest
+                }
+                _ => return Err("a combination ends early".into()),
+            };
+        }
+        groups.push(group);
+    }
+    Ok(groups)
+}
+
+fn number(s: &str) -> Result<f64, String> {
+    s.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| format!("{s:?} is no number"))
+}
+
+fn literal(s: &str) -> Result<Literal, String> {
+    let bad = || format!("{s:?} is no literal");
+    let on_b = match s.get(..1) {
+        Some("a") => false,
+        Some("b") => true,
+        _ => return Err(bad()),
+    };
+    let negative = match s.get(1..2) {
+        Some("+") => false,
+        Some("-") => true,
+        _ => return Err(bad()),
+    };
+    Ok(Literal { on_b, negative, face: s[2..].parse().map_err(|_| bad())? })
+}
+
+/// True when the box holds every positive primitive of the solid that takes part in its extent.
+fn holds_solid(root: &[(f64, f64); 3], solid: &Solid) -> bool {
+    fn extent(solid: &Solid, node: NodeId) -> Option<[Interval; 3]> {
+        match &solid.nodes[node as usize] {
+            Node::Empty => None,
+            Node::Primitive(p) => Some(primitive_box(solid, *p)),
+            Node::Op(Op::Difference, children) => extent(solid, children[0]),
+            Node::Op(Op::Union, children) => {
+                let each = children.iter().filter_map(|c| extent(solid, *c));
+                each.reduce(|a, b| std::array::from_fn(|k| a[k].hull(b[k])))
+            }
+            Node::Op(Op::Intersection, children) => {
+                let mut left = extent(solid, children[0])?;
+                for c in &children[1..] {
+                    let o = extent(solid, *c)?;
+                    for k in 0..3 {
+                        left[k] = Interval::new(left[k].lo.max(o[k].lo), left[k].hi.min(o[k].hi));
+                        if left[k].lo > left[k].hi {
+                            return None;
+                        }
+                    }
+                }
+                Some(left)
+            }
+        }
+    }
+    let Some(all) = extent(solid, solid.root) else { return true };
+    (0..3).all(|k| root[k].0 <= all[k].lo && all[k].hi <= root[k].1)
+}
+
+fn primitive_box(solid: &Solid, p: u32) -> [Interval; 3] {
+    let p = &solid.primitives[p as usize];
+    let m = p.frame.matrix();
+    // Placing a corner and the matrix itself are right to a few units in the last place.
+    let reach = p.frame.position.abs().max_element();
+    let around = |points: &[DVec3], radius: &dyn Fn(usize) -> f64| -> [Interval; 3] {
+        std::array::from_fn(|k| {
+            let mut all = Interval::new(f64::INFINITY, f64::NEG_INFINITY);
+            for x in points {
+                let slack = 1e-14 * (reach + x.length() + radius(k));
+                let at = m.row(k).dot(*x) + p.frame.position[k];
+                all = all.hull(Interval::new(at - radius(k) - slack, at + radius(k) + slack));
+            }
+            all
+        })
+    };
+    let axis = m.z_axis;
+    let disc = |r: f64| move |k: usize| r * (1.0 - axis[k] * axis[k]).max(0.0).sqrt() + r * 1e-12;
+    match &p.shape {
+        Shape::Sphere(s) => around(&[DVec3::ZERO], &|_| s.radius),
+        Shape::Cylinder(c) => around(&[DVec3::Z * c.half_height, -DVec3::Z * c.half_height], &disc(c.radius)),
+        Shape::Cone(c) => {
+            let top = around(&[DVec3::Z * c.half_height], &disc(c.top));
+            let bottom = around(&[-DVec3::Z * c.half_height], &disc(c.bottom));
+            std::array::from_fn(|k| top[k].hull(bottom[k]))
+        }
+        Shape::Cuboid(c) => {
+            let sign = |i: u32, bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            let corners: Vec<DVec3> = (0..8).map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)) * c.half).collect();
+            around(&corners, &|_| 0.0)
+        }
+        Shape::Polyhedron(p) => around(&p.vertices, &|_| 0.0),
+        Shape::HalfSpace(_) => [point(0.0); 3].map(|_| Interval::new(f64::NEG_INFINITY, f64::INFINITY)),
+    }
+}
