@@ -16,7 +16,7 @@
 //! literals that all clauses of a subtree share bound all of them, so a subtree is left as soon as they suffice, and
 //! running out of the enumeration's allowance only weakens the bound.
 
-use super::fit::fit;
+use super::fit::{self, fit};
 use super::literal::{Linear, Side, View};
 use super::lp::{self, Solution};
 use crate::solid::Sense;
@@ -277,8 +277,20 @@ impl Run<'_, '_> {
         let mut added = false;
         for i in 0..self.scratch.lits.len() {
             let l = self.scratch.lits[i];
-            let again = self.scratch.lits[..i].iter().any(|o| (o.side, o.id) == (l.side, l.id) && o.other.is_none());
-            if again || l.other.is_some() || !v.is_curved_convex(l.side, l.id) {
+            let again = self.scratch.lits[..i].iter().any(|o| (o.side, o.id, o.other) == (l.side, l.id, l.other));
+            if again {
+                continue;
+            }
+            if l.other.is_some() {
+                if let Some(t) = fit::touch(v, &l, s.y)
+                    && t.bound + look * (t.rate - t.s) - 0.5 * look * look * t.q + t.normal.dot(s.y) > s.z + 1e-3 * v.delta
+                {
+                    self.scratch.lits.push(t);
+                    added = true;
+                }
+                continue;
+            }
+            if !v.is_curved_convex(l.side, l.id) {
                 continue;
             }
             let point = match l.side {

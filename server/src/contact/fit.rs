@@ -50,7 +50,7 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
     let (o_p, a_p, r_p) = round(view.faces(side_p).get(p.face()))?;
     let (o_q, a_q, r_q) = round(view.faces(side_q).get(q.face()))?;
     let twice_mean = r_p + r_q;
-    if (r_p - r_q).abs() > 0.5 * SIMILAR * twice_mean {
+    if a_p.is_some() && (r_p - r_q).abs() > 0.5 * SIMILAR * twice_mean {
         return None;
     }
     // Along A's axes: offset of the centre from the face's centre or axis, and the axis.
@@ -100,6 +100,17 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
         rigid: false,
         cost,
     })
+}
+
+/// The bound of a sphere in a cylinder, its convex part (y·a_q)²/(4R̄) touched at another point `y` of the cell.
+pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
+    let (side_q, q) = fit.other?;
+    let (p, q) = (view.faces(fit.side).get(fit.id.face()), view.faces(side_q).get(q.face()));
+    let (Face::Sphere { radius: r_p, .. }, Face::Cylinder { axis, radius: r_q, .. }) = (*p, *q) else { return None };
+    let axis = if side_q == Side::A { axis } else { view.at.a_vector(axis) };
+    let (twice_mean, z) = (r_p + r_q, y.dot(axis));
+    let normal = fit.normal + axis * (z / twice_mean);
+    Some(Linear { normal, bound: fit.bound - z * z / (2.0 * twice_mean), ..*fit })
 }
 
 /// The bound of a cone in a cone hole of (nearly) the same angle and direction. With common axis a and angle α,
