@@ -66,6 +66,11 @@ pub fn scene(scene: &Scene) -> String {
             r.report.name(),
             r.margin
         );
+        for group in &r.between {
+            if !scene.objects.iter().any(|o| o.group == *group) {
+                let _ = writeln!(out, "    warning: no object is of group {group}");
+            }
+        }
     }
     out
 }

@@ -283,7 +283,8 @@ impl Run<'_, '_> {
             }
             if l.other.is_some() {
                 if let Some(t) = fit::touch(v, &l, s.y)
-                    && t.bound + look * (t.rate - t.s) - 0.5 * look * look * t.q + t.normal.dot(s.y) > s.z + 1e-3 * v.delta
+                    && t.bound + look * (t.rate - t.s) - 0.5 * look * look * t.q + t.normal.dot(s.y)
+                        > s.z + 1e-3 * v.delta
                 {
                     self.scratch.lits.push(t);
                     added = true;

@@ -10,7 +10,7 @@ use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule, Track};
 use glam::DVec3;
 use serde::Deserialize;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -146,10 +146,9 @@ impl Scene {
             };
             objects.push(checker.object(o, model)?);
         }
-        let groups: HashSet<&str> = objects.iter().map(|o: &SceneObject| o.group.as_str()).collect();
         let mut rules = Vec::with_capacity(raw.rule.len());
         for r in &raw.rule {
-            rules.push(checker.rule(r, &object_of, &groups)?);
+            rules.push(checker.rule(r, &object_of)?);
         }
         let unit = raw.unit.unwrap_or_default();
         Ok(Self { unit, resolution, models, objects, rules, file: file.to_owned() })
@@ -220,7 +219,7 @@ struct RawPose {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawRule {
-    between: [Spanned<String>; 2],
+    between: [String; 2],
     #[serde(default)]
     except: Vec<[Spanned<String>; 2]>,
     detect: Option<Spanned<String>>,
@@ -362,13 +361,8 @@ impl Checker<'_> {
         })
     }
 
-    fn rule(&self, r: &RawRule, objects: &HashMap<String, usize>, groups: &HashSet<&str>) -> Result<Rule, SceneError> {
-        for group in &r.between {
-            if !groups.contains(group.as_ref().as_str()) {
-                return Err(self.wrong(group, "the group of an object", &format!("\"{}\"", group.as_ref())));
-            }
-        }
-        let mut rule = Rule::new(r.between.each_ref().map(|group| group.as_ref().clone()));
+    fn rule(&self, r: &RawRule, objects: &HashMap<String, usize>) -> Result<Rule, SceneError> {
+        let mut rule = Rule::new(r.between.clone());
         for pair in &r.except {
             for name in pair {
                 if !objects.contains_key(name.as_ref()) {
@@ -496,7 +490,7 @@ mod tests {
     #[test]
     fn every_mistake_is_a_sentence_with_its_place() {
         let o = |lines: &str| format!("{MODELS}[[object]]\nname = \"o\"\nmodel = \"m\"\n{lines}");
-        let rule = |lines: &str| o(&format!("[[rule]]\nbetween = [\"default\", \"default\"]\n{lines}"));
+        let rule = |lines: &str| o(&format!("[[rule]]\nbetween = [\"a\", \"b\"]\n{lines}"));
         let table = [
             (
                 "colour = 1".into(),
@@ -542,7 +536,6 @@ mod tests {
             ),
             (o("max_speed = -1"), "7:13: expected a positive finite number as max_speed, found -1"),
             (o("speed = 1"), "7:1: unknown field `speed`, expected one of `name`, `model`, `group`, `motion`"),
-            (o("[[rule]]\nbetween = [\"default\", \"b\"]"), "8:23: expected the group of an object, found \"b\""),
             (rule("detect = \"on\""), "9:10: expected \"off\" or \"discrete\" or \"continuous\", found \"on\""),
             (rule("report = \"all\""), "9:10: expected \"hit\" or \"time\" or \"contact\" or \"patch\", found \"all\""),
             (rule("initial_overlap = \"\""), "9:19: expected \"report\" or \"ignore_if_separating\", found \"\""),
