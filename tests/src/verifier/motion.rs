@@ -3,8 +3,10 @@
 //! With u = R_A x' the point from A's centre of rotation, d = p_A − p_B and Ω = spin_A − spin_B (world axes), a point of A
 //! has in B's object frame the coordinates y' = R_Bᵀ(d + u), hence
 //!
-//!     ẏ' = R_Bᵀ(v0 − spin_B×d + Ω×u),
-//!     ÿ' = R_Bᵀ(Ω×(Ω×u) + (Ω×spin_B)×u + spin_B×(spin_B×d) − 2 spin_B×v0),
+//! ```text
+//! ẏ' = R_Bᵀ(v0 − spin_B×d + Ω×u),
+//! ÿ' = R_Bᵀ(Ω×(Ω×u) + (Ω×spin_B)×u + spin_B×(spin_B×d) − 2 spin_B×v0),
+//! ```
 //!
 //! by differentiating once more and Jacobi's identity. Rotations are Rodrigues' formula with the alternating series of
 //! sin and cos for angles up to 1; larger ones are squared.
