@@ -517,6 +517,10 @@ impl<'a> Search<'a> {
     fn polish(&mut self, mut active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
         let level = self.task.delta * (1.0 + 1e-6) + 4.0 * self.task.rounding;
         for _ in 0..7 {
+            debug_assert!(
+                active.iter().all(|c| self.stage2.knows(&self.task, c)),
+                "stage 3 asks for a primitive that stage 2 has not handed over: {active:?}"
+            );
             self.counters.newton += 1;
             let Some(s) = self.problem().solve(&active, x, t, &lambda, level) else { return false };
             // Where only an unsettled witness is known, a settled one of the same time is still worth having.

@@ -163,6 +163,7 @@ fn pegs_and_holes() {
     );
     hits("peg moving sideways in its hole", &plate(0.25), rest(), &peg(0.24), slide(DVec3::ZERO, v(0.1, 0., 0.)), 0.1);
     hits("off-axis peg on the rim", &plate(0.25), rest(), &peg(0.24), down(0.05, 1.0, 1.0), 0.4);
+    hits("peg .26 on hole .25", &plate(0.25), rest(), &peg(0.26), down(0., 1.0, 1.0), 0.4);
     let aside = -0.5 * 3f64.to_radians().sin();
     let tilted = turn(Pose::new(v(0., aside, 1.0), tilt(v(3f64.to_radians(), 0., 0.))), v(0., 0., -1.), DVec3::ZERO);
     hits("tilted peg into the hole", &plate(0.25), rest(), &peg(0.24), tilted, tilted_peg());
