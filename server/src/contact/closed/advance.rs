@@ -9,7 +9,8 @@
 //! Invariant: before `lower` the bodies are disjoint (rounding aside); at `upper` they share a point inside both.
 //! Does not promise: `upper` for a touch that never goes deeper.
 
-use super::{Convex, Separation, Stand, separation, separation_only};
+use super::miller::{Side, critical_generators};
+use super::{Convex, Separation, Stand, clearance, separation, separation_only};
 use crate::motion::{Instant, Relative};
 use crate::solid::Primitive;
 use glam::DVec3;
@@ -56,6 +57,53 @@ pub fn time_of_contact(a: &Primitive, b: &Primitive, motion: &Relative) -> Optio
     let body_a = Convex::of(&a.shape)?.placed(&stand(a));
     let body_b = Convex::of(&b.shape)?.placed(&stand(b));
     Some(Advance::new(body_a, body_b, motion).run(a, b))
+}
+
+/// Rounds of advancement in a cavity: each uses up the clearance at the largest speed of any point, so a body that slides
+/// along the wall takes as many as its speed is larger than the part of it towards the wall.
+const ROUNDS_INSIDE: usize = 200_000;
+
+/// When A, inside the cavity B at the start, first touches its wall. `None` if one of them is no bounded convex
+/// primitive; `Overlap` if A sticks out of B at the start.
+///
+/// The clearance is the smallest distance of A's points from the wall, so it falls no faster than the fastest of them
+/// moves against B: conservative advancement (Mirtich 1996), and one Newton step from where only rounding is left.
+pub fn time_of_leaving(a: &Primitive, b: &Primitive, motion: &Relative) -> Option<Meeting> {
+    let stand = |p: &Primitive| Stand { origin: p.frame.position, axes: p.frame.matrix() };
+    let body_a = Convex::of(&a.shape)?.placed(&stand(a));
+    let body_b = Convex::of(&b.shape)?.placed(&stand(b));
+    let advance = Advance::new(body_a, body_b, motion);
+    let noise = 4.0 * f64::EPSILON * (advance.b.ball().1 + advance.x_max);
+    let mut t = 0.0;
+    for _ in 0..ROUNDS_INSIDE {
+        let at = motion.at(t);
+        let c = clearance(&advance.a, &advance.b_at(&at));
+        if t == 0.0 && c.value <= noise {
+            return Some(Meeting::Overlap(-c.value));
+        }
+        let speed = motion.bounds(t, 1.0 - t, advance.x_max).speed;
+        let step = c.value.max(0.0) / speed;
+        if c.value > noise && t + step > t {
+            t += step;
+            if t >= 1.0 {
+                return Some(Meeting::Clear);
+            }
+            continue;
+        }
+        let speed = c.normal.dot(at.velocity(c.point));
+        let time = if speed > 0.0 { (t + c.value / speed).clamp(t, 1.0) } else { t };
+        // The first later moment at which A certainly sticks out.
+        let mut ahead = (noise / speed.abs().max(noise)).max(f64::EPSILON);
+        let mut upper = f64::INFINITY;
+        while upper.is_infinite() && time + ahead <= 1.0 {
+            if clearance(&advance.a, &advance.b_at(&motion.at(time + ahead))).value < -noise {
+                upper = time + ahead;
+            }
+            ahead *= 2.0;
+        }
+        return Some(Meeting::Contact(Bracket { lower: t, time, upper, normal: c.normal, point: c.point, speed }));
+    }
+    Some(Meeting::Undecided(t))
 }
 
 struct Advance<'m> {
@@ -167,7 +215,15 @@ impl<'m> Advance<'m> {
         const PULLS: [f64; 5] = [0.0, 0.25, 0.5, 1.0, 2.0];
         let middles = [self.a.ball().0, self.b_at(at).ball().0];
         let [p, q] = s.points;
-        [0.5 * (p + q), p, q].into_iter().any(|x| {
+        // Where the sides of two cones cross, what one cuts out of the other's generators lies inside it.
+        let chords: Vec<DVec3> = match (&self.a, &self.b_at(at)) {
+            (Convex::Cone(p), Convex::Cone(q)) => Side::of(p)
+                .zip(Side::of(q))
+                .map(|(p, q)| critical_generators(&p, &q).iter().map(|g| g.point).collect())
+                .unwrap_or_default(),
+            _ => Vec::new(),
+        };
+        [0.5 * (p + q), p, q].into_iter().chain(chords).any(|x| {
             let [to_a, to_b] = middles.map(|m| (m - x).normalize_or_zero() * s.value.abs());
             PULLS.iter().any(|f| {
                 PULLS.iter().any(|g| {

@@ -29,6 +29,7 @@ pub(super) fn parallel(a: &Round, b: &Round) -> Option<DVec3> {
     let p = o - a.axis * z;
     let rho = p.length();
     let u = if rho > 0.0 { p / rho } else { any_perpendicular(a.axis) };
+    let u = (u - a.axis * u.dot(a.axis)).try_normalize().unwrap_or_else(|| any_perpendicular(a.axis));
     let g = rho - a.radii[0] - b.radii[0];
     let h = z.abs() - a.half() - b.half();
     let up = a.axis * z.signum();

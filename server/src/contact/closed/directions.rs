@@ -54,6 +54,16 @@ pub struct Rim {
     pub radius: f64,
 }
 
+impl Rim {
+    /// The point of the rim that lies farthest along n; any where all do.
+    pub fn farthest(&self, n: DVec3) -> DVec3 {
+        let u = (n - self.axis * n.dot(self.axis)).try_normalize().unwrap_or_else(|| any_perpendicular(self.axis));
+        // A short n across the axis is rounding mostly: made square to it once more.
+        let u = (u - self.axis * u.dot(self.axis)).normalize();
+        self.center + u * self.radius
+    }
+}
+
 /// Normals that two circles of directions have in common: none, or two; the perpendicular of the lines' difference
 /// where the axes are parallel. `b` as seen by `Ruled::far`.
 pub fn ruled_ruled(a: &Ruled, b: &Ruled, out: &mut Vec<DVec3>) {

@@ -3,7 +3,8 @@
 //! Idea: at an instant two convex primitives have a signed separation
 //! max over unit n of (min over B of n·y − max over A of n·x); which features attain it is a matter of a few
 //! configurations per pair, one file and one row each. `directions` holds the common normals of two features.
-//! On top of it `time_of_contact` advances by the separation and ends at its root.
+//! On top of it `time_of_contact` advances by the separation and ends at its root; `time_of_leaving` does the same for a
+//! body in a cavity by its clearance.
 //! Source: Zeiller 1993, stage 3 (quadrics by reasoning on centres, axes and radii; polyhedra by clipping; quadric and
 //! polyhedron by vertices, edges, faces); the separations are our own derivation from support functions.
 //! Invariant: `value` never exceeds the true signed separation (it is attained by a slab), and for disjoint bodies
@@ -17,6 +18,8 @@ mod cone_cone;
 mod cylinder_cone;
 mod cylinder_cylinder;
 mod directions;
+mod meridian;
+pub mod miller;
 mod polyhedron_polyhedron;
 mod quadric_polyhedron;
 mod round_round;
@@ -26,8 +29,9 @@ mod sphere_polyhedron;
 mod sphere_sphere;
 #[cfg(test)]
 mod tests;
+mod trig;
 
-pub use advance::{Bracket, Meeting, time_of_contact};
+pub use advance::{Bracket, Meeting, time_of_contact, time_of_leaving};
 pub use body::{Ball, Convex, Edge, Feature, Poly, Round, Stand};
 pub use cavity::{Clearance, clearance, tangency_of_cavities};
 

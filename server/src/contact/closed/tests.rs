@@ -46,6 +46,26 @@ impl Dice {
 
 const KINDS: usize = 9;
 
+impl Convex {
+    /// Scaled about its middle by `k`.
+    fn shrink(&mut self, k: f64) {
+        let middle = self.ball().0;
+        let to = |p: &mut DVec3| *p = middle + (*p - middle) * k;
+        match self {
+            Convex::Ball(b) => b.radius *= k,
+            Convex::Cylinder(r) | Convex::Cone(r) => {
+                r.centers.iter_mut().for_each(to);
+                r.radii = r.radii.map(|x| x * k);
+            }
+            Convex::Poly(p) => {
+                p.vertices.iter_mut().for_each(to);
+                p.edges.iter_mut().flat_map(|e| &mut e.ends).for_each(to);
+                p.planes.iter_mut().for_each(|(n, d)| *d = n.dot(middle) + (*d - n.dot(middle)) * k);
+            }
+        }
+    }
+}
+
 fn named(x: &Convex) -> &'static str {
     match x {
         Convex::Ball(_) => "Ball",
@@ -157,40 +177,144 @@ fn parallel_cylinders_agree_with_the_general_configurations() {
 }
 
 #[test]
+fn parallel_cones_agree_with_the_general_configurations() {
+    let mut dice = Dice(6);
+    let mut apart = 0;
+    for i in 0..600 {
+        let s = dice.stand(0.5);
+        let (ka, kb) = ([1, 2, 3][i % 3], [2, 3][i / 3 % 2]);
+        let (a, b) = (dice.shape(ka), dice.shape(kb));
+        let offset = if i % 5 == 0 { DVec3::Z * dice.range(-3.0, 3.0) } else { dice.vector(2.5) };
+        let place = |c: &Shape, o: DVec3| {
+            let stand = Stand { origin: s.origin + s.axes * o, axes: s.axes };
+            Convex::of(c).expect("bounded").placed(&stand)
+        };
+        let (a, b) = (place(&a, DVec3::ZERO), place(&b, offset));
+        let (Convex::Cylinder(p) | Convex::Cone(p), Convex::Cone(q)) = (&a, &b) else { unreachable!() };
+        let (mut planar, mut general) = (Best::new(&a, &b, None), Best::new(&a, &b, None));
+        assert!(meridian::parallel(p, q, &mut planar), "axes in one direction");
+        if planar.value > 0.0 {
+            apart += 1;
+            round_round::general(p, q, &mut general);
+            assert!((general.value - planar.value).abs() < 1e-12, "{} {}", general.value, planar.value);
+        }
+    }
+    assert!(apart > 200, "{apart}");
+}
+
+#[test]
+fn the_curve_of_two_cones_is_there_when_their_sides_cross_and_shrinks_to_the_touching_point() {
+    let mut dice = Dice(7);
+    let (mut crossing, mut touching, mut apart) = (0, 0, 0);
+    let mut worst = [0.0f64; 2];
+    for i in 0..4000 {
+        let (ka, kb) = (2 + i % 2, 2 + i / 2 % 2);
+        let (a, b) = (dice.body(ka, 1.2), dice.body(kb, 1.2));
+        let (Convex::Cone(p), Convex::Cone(q)) = (&a, &b) else { unreachable!() };
+        let sides = |q: &Round| (miller::Side::of(p).expect("a cone"), miller::Side::of(q).expect("a cone"));
+        let (sa, sb) = sides(q);
+        let points = miller::curve(&sa, &sb);
+        // Every critical point lies on both bodies' surfaces.
+        for x in &points {
+            let off = a.distance(*x).0.abs().max(b.distance(*x).0.abs());
+            // A generator's middle point on the curve lies inside B.
+            assert!(a.distance(*x).0.abs() < 1e-9 || b.distance(*x).0.abs() < 1e-9, "{off:e}");
+        }
+        let s = separation(&a, &b, None);
+        if s.value > 1e-9 {
+            apart += 1;
+            assert!(points.is_empty(), "apart by {} but the sides meet in {points:?}", s.value);
+            // Moved together along the normal, the sides touch in the witness, if sides hold the witnesses.
+            if s.features == [Feature::Face; 2]
+                && [&a, &b].iter().zip([s.normal, -s.normal]).all(|(r, n)| {
+                    let (Convex::Cone(r), c) = (r, n) else { return false };
+                    (c.dot(r.axis) - r.lean).abs() < 1e-9
+                })
+            {
+                touching += 1;
+                let moved = |gap: f64| {
+                    let shift = s.normal * (gap - s.value);
+                    let c = Round { centers: q.centers.map(|c| c + shift), ..*q };
+                    let sides = sides(&c);
+                    (miller::critical_generators(&sides.0, &sides.1), miller::curve(&sides.0, &sides.1))
+                };
+                assert!(moved(1e-10).1.is_empty() && !moved(-1e-10).1.is_empty(), "the curve appears at touch");
+                let nearest = moved(0.0).0.into_iter().map(|g| (g.discriminant, (g.point - s.points[0]).length()));
+                let (d, off) = nearest.min_by(|x, y| x.1.total_cmp(&y.1)).expect("a critical generator");
+                worst = [worst[0].max(d.abs()), worst[1].max(off)];
+            }
+        } else if !points.is_empty() {
+            crossing += 1;
+            assert!(s.value < 0.0, "crossing sides overlap: {}", s.value);
+        }
+    }
+    println!(
+        "{crossing} crossing, {apart} apart, {touching} brought to touch: discriminant {:.1e}, point {:.1e}",
+        worst[0], worst[1]
+    );
+    assert!(crossing > 500 && apart > 500 && touching > 50);
+    assert!(worst[0] < 1e-13 && worst[1] < 1e-6);
+}
+
+#[test]
 fn the_clearance_in_a_cavity_is_that_of_its_nearest_point() {
-    // The smallest clearance over many boundary points of the body never undercuts the closed form, and comes close.
+    // The smallest clearance over many boundary points of the body never undercuts the closed form, and comes close:
+    // for tilted and for parallel axes.
     let mut dice = Dice(5);
-    let mut counted = 0;
+    let mut counted = [[0; KINDS]; KINDS];
     for i in 0..KINDS {
         for j in 0..KINDS {
-            for _ in 0..20 {
+            for k in 0..40 {
                 let s = dice.stand(0.1);
                 let (a, b) = (dice.shape(i), dice.shape(j));
-                let shift = s.axes * DVec3::new(0.05, -0.03, 0.02);
-                let a = Convex::of(&a).expect("bounded").placed(&Stand { origin: s.origin + shift, axes: s.axes });
+                let axes = if k % 4 == 0 { s.axes } else { dice.stand(0.0).axes };
+                let stand = Stand { origin: s.origin + s.axes * dice.vector(0.1), axes };
+                let mut a = Convex::of(&a).expect("bounded").placed(&stand);
                 let b = Convex::of(&b).expect("bounded").placed(&s);
-                let Some(c) = clearance(&a, &b) else { continue };
+                // Small enough to find room: shrunk about its middle.
+                let scale = dice.range(0.15, 0.6);
+                a.shrink(scale);
+                let c = clearance(&a, &b);
                 if c.value <= 0.0 {
                     continue;
                 }
-                counted += 1;
+                counted[i][j] += 1;
                 let mut least = -b.distance(c.point).0;
                 assert!((least - c.value).abs() < 1e-13);
                 assert!(a.distance(c.point).0.abs() < 1e-13, "the point lies on the body");
                 for _ in 0..300 {
-                    let p = a.support(dice.vector(1.0));
-                    least = least.min(-b.distance(p).0);
+                    least = least.min(-b.distance(a.support(dice.vector(1.0))).0);
                 }
-                assert!(least > c.value - 1e-12, "{} in {}: {} {least}", named(&a), named(&b), c.value);
+                // Along the rims, which hold the extreme points of a round body.
+                if let Convex::Cylinder(p) | Convex::Cone(p) = &a {
+                    for rim in p.rims() {
+                        for n in 0..400 {
+                            let e = crate::math::any_perpendicular(rim.axis);
+                            let (sin, cos) = (f64::from(n) * std::f64::consts::TAU / 400.0).sin_cos();
+                            let x = rim.center + (e * cos + rim.axis.cross(e) * sin) * rim.radius;
+                            least = least.min(-b.distance(x).0);
+                        }
+                    }
+                    assert!(least - c.value < 1e-3, "{} in {}: {} {least}", named(&a), named(&b), c.value);
+                }
+                assert!(least > c.value - 1e-13, "{} in {}: {} {least}", named(&a), named(&b), c.value);
             }
         }
     }
-    assert!(counted > 100, "{counted}");
+    assert!(counted.iter().flatten().all(|n| *n >= 3), "{counted:?}");
 }
 
 #[test]
-fn spherical_cavities_touch_from_outside_and_from_inside() {
-    let ball = |x: f64, radius: f64| Ball { center: DVec3::X * x, radius };
+fn cavities_touch_from_outside_and_from_inside() {
+    let ball = |x: f64, radius: f64| Convex::Ball(Ball { center: DVec3::X * x, radius });
     assert_eq!(tangency_of_cavities(&ball(0.0, 1.0), &ball(1.5, 0.5)), [0.0, -1.0]);
     assert_eq!(tangency_of_cavities(&ball(0.0, 1.0), &ball(0.5, 0.5)), [-1.0, 0.0]);
+    let hole = |x: f64, z: f64, radius: f64| {
+        let stand = Stand { origin: DVec3::new(x, 0.0, z), axes: DMat3::IDENTITY };
+        Convex::of(&shape::Cylinder { radius, half_height: 1.0 }.into()).expect("bounded").placed(&stand)
+    };
+    let near = |x: [f64; 2], y: [f64; 2]| (x[0] - y[0]).abs().max((x[1] - y[1]).abs()) < 1e-15;
+    assert!(near(tangency_of_cavities(&hole(0.0, 0.0, 1.0), &hole(2.5, 0.0, 1.0)), [0.5, -2.5]));
+    // The smaller one sticks out of the larger one's cap by a quarter.
+    assert!(tangency_of_cavities(&hole(0.0, 0.0, 1.0), &hole(0.25, 0.25, 0.5))[1] == -0.25);
 }
