@@ -1,7 +1,9 @@
 //! The library's own answer to a scene, all stages on.
 
 use crate::scenes::Scene;
-use contactd::contact::{Body, Ideas, Outcome, PairQuery, Scratch, default_resolution, earliest_contact};
+use contactd::contact::{
+    Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+};
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd::solid::Solid;
@@ -34,6 +36,52 @@ pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64
 
 /// Asks about a scene.
 pub fn ask(scene: &Scene) -> Outcome {
+    ask_scene_with(scene, Ideas::default())
+}
+
+/// Asks about a scene with some ideas of the search switched off.
+pub fn ask_scene_with(scene: &Scene, ideas: Ideas) -> Outcome {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
-    ask_solids((scene.a.build(), placed(scene.motion_a)), (scene.b.build(), placed(scene.motion_b)), scene.resolution)
+    let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
+    ask_with((&a, placed(scene.motion_a)), (&b, placed(scene.motion_b)), scene.resolution, ideas)
+}
+
+/// The search alone, without whole-primitive answers in front of it.
+pub const SEARCH_ALONE: Ideas = Ideas { region: true, walk: true, fits: true, hints: true, direct: false };
+
+/// In which fields two answers to one question differ, counters apart; times and places by more than rounding: times
+/// weigh with the closing speed, in units of the pair's size. Where a contact is a line or a patch any of its points will do.
+pub fn differences(x: &Outcome, y: &Outcome, size: f64) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut demand = |same: bool, what: String| {
+        if !same {
+            out.push(what);
+        }
+    };
+    demand(x.status == y.status, format!("status {:?} {:?}", x.status, y.status));
+    let speed = x.normal_speed.abs().max(y.normal_speed.abs()) / size;
+    for (name, s, t) in [
+        ("time_lower", x.time_lower, y.time_lower),
+        ("time", x.time, y.time),
+        ("time_upper", x.time_upper, y.time_upper),
+    ] {
+        demand((s - t).abs() * speed <= 1e-12, format!("{name} {s} {t} at speed {speed}"));
+    }
+    if x.status == Status::Contact && y.status == Status::Contact {
+        let off = (x.point - y.point).length() / size;
+        demand(x.extent != Extent::Point || off <= 1e-6, format!("points {off:e} apart"));
+        let turned = (x.normal - y.normal).length();
+        demand(turned <= 1e-6, format!("normals {turned:e} apart"));
+        demand((x.kind, x.extent) == (y.kind, y.extent), format!("{:?} {:?}", (x.kind, x.extent), (y.kind, y.extent)));
+        let sorted = |mut f: [u32; 3]| {
+            f.sort_unstable();
+            f
+        };
+        let faces = |o: &Outcome| (sorted(o.faces_a), sorted(o.faces_b));
+        demand(faces(x) == faces(y), format!("faces {:?} {:?}", faces(x), faces(y)));
+        demand((x.normal_speed - y.normal_speed).abs() <= 1e-6 * size, "normal speed".into());
+    }
+    let flags = |o: &Outcome| (o.touching, o.not_continued, o.averaged_normal, o.resolution);
+    demand(flags(x) == flags(y), format!("flags {:?} {:?}", flags(x), flags(y)));
+    out
 }

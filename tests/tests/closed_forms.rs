@@ -13,7 +13,7 @@ use contactd::eco::Model;
 use contactd::motion::{Placed, Relative};
 use contactd::solid::Primitive;
 use contactd_proto::{Motion, Pose};
-use contactd_tests::engine::ask_models;
+use contactd_tests::engine::{SEARCH_ALONE, ask_models, ask_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
 use glam::DVec3;
@@ -60,6 +60,9 @@ struct Tally {
     open: usize,
     undecided: usize,
     unanswered: Vec<usize>,
+    answered: usize,
+    flagged: Vec<usize>,
+    differ: Vec<String>,
     refuted: Vec<String>,
     far_off: Vec<String>,
 }
@@ -71,14 +74,26 @@ impl Tally {
         let relative = Relative::new(scene.a.1, scene.b.1);
         let closed = form(&a.solid.primitives[scene.of_a], &b.solid.primitives[scene.of_b], &relative);
         let closed = closed.expect("convex primitives");
-        let o: Outcome = ask_models((a, scene.a.1), (b, scene.b.1), None);
+        let o: Outcome = ask_with((a, scene.a.1), (b, scene.b.1), None, SEARCH_ALONE);
         assert_eq!(o.counters.closed_forms, 0, "the search must stand on its own");
         assert!(o.counters.cells > 0 || o.status == Status::Clear, "an answer without a cell: {o:?}");
+        // The same forms in front of the search must say the same.
+        let fronted = ask_models((a, scene.a.1), (b, scene.b.1), None);
+        self.answered += usize::from(fronted.counters.cells == 0);
         if o.status == Status::Undecided {
             self.unanswered.push(i);
             return;
         }
+        if !o.not_continued {
+            self.differ.extend(differences(&o, &fronted, size).into_iter().map(|d| format!("{i}: {d}")));
+        }
         match closed {
+            // The search says that it could not follow the contact back from depth delta to the touch.
+            Meeting::Contact(c) if o.status == Status::Contact && o.not_continued => {
+                self.flagged.push(i);
+                let late = (o.time - c.time) * c.speed;
+                assert!((0.0..=4.0 * o.resolution).contains(&late), "{i}: {late:e} late at depth {:e}", o.resolution);
+            }
             Meeting::Contact(c) if o.status == Status::Contact => {
                 self.open += usize::from(c.upper.is_infinite());
                 let speed = c.speed.abs().max(o.normal_speed.abs());
@@ -105,24 +120,28 @@ impl Tally {
         let gaps = &self.gaps;
         let at = |f: f64| gaps.get(((gaps.len() as f64 * f) as usize).min(gaps.len().saturating_sub(1))).copied();
         println!(
-            "{name}: {count} pairs: {} contacts, {} clear, {} undecided here, {:?} by the search; gap median {:.1e} 99 % \
-             {:.1e} worst {:.1e}; over 1e-12: {}; upper end open: {}",
+            "{name}: {count} pairs: {} contacts, {} clear, {} undecided here, {:?} by the search, {:?} not continued; gap median {:.1e} 99 % \
+             {:.1e} worst {:.1e}; over 1e-12: {}; upper end open: {}; without a cell: {}",
             gaps.len(),
             self.clear,
             self.undecided,
             self.unanswered,
+            self.flagged,
             at(0.5).unwrap_or(0.0),
             at(0.99).unwrap_or(0.0),
             at(1.0).unwrap_or(0.0),
             self.far_off.len(),
-            self.open
+            self.open,
+            self.answered
         );
+        assert!(self.differ.is_empty(), "{name}: {} differences\n{}", self.differ.len(), self.differ.join("\n"));
         assert!(self.refuted.is_empty(), "{name}: {} refuted:\n{}", self.refuted.len(), self.refuted.join("\n"));
         let least = (count as f64 * share) as usize;
         assert!(gaps.len() > least && self.clear > least, "{name}: {} contacts, {} clear", gaps.len(), self.clear);
         assert_eq!(self.undecided, 0, "{name}");
         // The search may run out of cells where edges are nearly parallel; the closed form answers these.
         assert!(self.unanswered.len() * 100 <= count, "{name}: the search left {:?} open", self.unanswered);
+        assert!(self.flagged.len() * 1000 <= count, "{name}: not continued {:?}", self.flagged);
         assert!(self.far_off.is_empty(), "{name}: over 1e-12:\n{}", self.far_off.join("\n"));
         assert!(self.open * 100 <= gaps.len(), "{name}: {} contacts without a common point", self.open);
     }

@@ -8,7 +8,7 @@ use contactd::contact::{Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd_proto::{Motion, Pose};
-use contactd_tests::engine::ask;
+use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
 use contactd_tests::scenes::{Recipe, Scene};
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
@@ -36,7 +36,11 @@ fn ceiling(name: &str) -> u64 {
 }
 
 fn answer(name: &str, scene: &Scene) -> Outcome {
-    let o = ask(scene);
+    // The stages themselves; a whole-primitive answer in front of them must say the same.
+    let o = ask_scene_with(scene, SEARCH_ALONE);
+    let fronted = ask(scene);
+    let differ = differences(&o, &fronted, scene.delta() / 1e-9);
+    assert!(differ.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
     let gap = KNOWN_GAPS.contains(&name);
     assert_eq!(o.status == Status::Undecided, gap, "{name}, known gap: {gap}: {o:?}");
     assert!(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0, "{o:?}");

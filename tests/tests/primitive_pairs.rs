@@ -6,7 +6,7 @@
 
 use contactd::contact::{Outcome, Status};
 use contactd_proto::{Motion, Pose};
-use contactd_tests::engine::ask;
+use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
 use contactd_tests::judge::folder;
 use contactd_tests::reference::{Effort, Verdict};
 use contactd_tests::scenes::{Recipe, Scene};
@@ -43,49 +43,75 @@ fn rows(file: &str) -> Vec<(Scene, f64)> {
     lines.map(row).collect()
 }
 
-/// Rows that the engine cannot decide yet within the limit; a row that it can must leave this list.
-const KNOWN_GAPS: &[(&str, usize)] = &[];
-
 fn size(scene: &Scene) -> f64 {
     scene.delta() / 1e-9
 }
 
-fn check(file: &str) {
-    let (mut missed, mut false_contacts, mut gaps, mut slowest) = (vec![], vec![], vec![], 0);
-    for (i, (scene, time)) in rows(file).into_iter().enumerate() {
-        let o: Outcome = ask(&scene);
-        if KNOWN_GAPS.contains(&(file, i)) {
-            assert_eq!(o.status, Status::Undecided, "{file} row {i} is decided now: take it off the list");
-            continue;
-        }
-        slowest = slowest.max(o.counters.cells);
+/// One way of answering: its gaps to the known times, and what it missed or invented.
+#[derive(Default)]
+struct Tally {
+    missed: Vec<usize>,
+    false_contacts: Vec<usize>,
+    gaps: Vec<(f64, usize)>,
+}
+
+impl Tally {
+    fn take(&mut self, i: usize, scene: &Scene, time: f64, o: &Outcome) {
         match (time >= 0.0, o.status) {
             (true, Status::Contact) => {
-                assert!(o.time_lower <= o.time && o.time <= o.time_upper, "{file} row {i}: {o:?}");
-                let gap = |t: f64| (o.time - t).abs() * o.normal_speed.abs() / size(&scene);
+                assert!(o.time_lower <= o.time && o.time <= o.time_upper, "row {i}: {o:?}");
+                let gap = |t: f64| (o.time - t).abs() * o.normal_speed.abs() / size(scene);
                 let mut known = gap(time);
                 if known > 1e-10 {
                     // Above the table's own residual the reference decides.
                     known = known.min(gap(scene.truth(Effort::QUICK).time));
                 }
-                gaps.push((known, i));
+                self.gaps.push((known, i));
             }
-            (true, s) => missed.push((i, s)),
+            (true, _) => self.missed.push(i),
             (false, Status::Clear) => {}
-            (false, s) => false_contacts.push((i, s)),
+            (false, _) => self.false_contacts.push(i),
         }
     }
-    gaps.sort_by(|x, y| x.0.total_cmp(&y.0));
-    let (median, worst) = (gaps[gaps.len() / 2].0, gaps[gaps.len() - 1]);
-    println!(
-        "{file}: {} contacts, gap median {median:.1e}, max {:.1e} (row {}), most cells {slowest}",
-        gaps.len(),
-        worst.0,
-        worst.1
-    );
-    assert!(missed.is_empty() && false_contacts.is_empty(), "{file}: missed {missed:?}, false {false_contacts:?}");
-    assert!(median <= 1e-12, "{file}: median gap {median:e}");
-    assert!(worst.0 <= 1e-9, "{file}: gap {:e} in row {}", worst.0, worst.1);
+
+    fn judge(mut self, name: &str) {
+        self.gaps.sort_by(|x, y| x.0.total_cmp(&y.0));
+        let gaps = &self.gaps;
+        let (median, worst) = (gaps[gaps.len() / 2].0, gaps[gaps.len() - 1]);
+        println!("{name}: {} contacts, gap median {median:.1e}, max {:.1e} (row {})", gaps.len(), worst.0, worst.1);
+        let (missed, false_contacts) = (&self.missed, &self.false_contacts);
+        assert!(missed.is_empty() && false_contacts.is_empty(), "{name}: missed {missed:?}, false {false_contacts:?}");
+        assert!(median <= 1e-12, "{name}: median gap {median:e}");
+        assert!(worst.0 <= 1e-9, "{name}: gap {:e} in row {}", worst.0, worst.1);
+    }
+}
+
+/// The search alone, the answers with whole-primitive ones in front of it, and the two against each other.
+fn check(file: &str) {
+    let (mut alone, mut fronted) = (Tally::default(), Tally::default());
+    let (mut slowest, mut evaluations, mut left, mut differ) = (0, vec![], vec![], vec![]);
+    for (i, (scene, time)) in rows(file).into_iter().enumerate() {
+        let (o, p) = (ask_scene_with(&scene, SEARCH_ALONE), ask(&scene));
+        assert!(o.counters.closed_forms == 0 && (o.counters.cells > 0 || o.status == Status::Clear), "row {i}: {o:?}");
+        slowest = slowest.max(o.counters.cells);
+        alone.take(i, &scene, time, &o);
+        fronted.take(i, &scene, time, &p);
+        if p.counters.cells > 0 {
+            left.push(i);
+        } else if p.status == Status::Contact {
+            evaluations.push(p.counters.closed_forms);
+        }
+        differ.extend(differences(&o, &p, size(&scene)).into_iter().map(|d| format!("row {i}: {d}")));
+    }
+    alone.judge(&format!("{file}, search alone (most cells {slowest})"));
+    evaluations.sort_unstable();
+    let most = evaluations.last().copied().unwrap_or(0);
+    let median = evaluations[evaluations.len() / 2];
+    fronted.judge(&format!(
+        "{file}, distance evaluations a hit: median {median}, most {most}; left to the search: {left:?}"
+    ));
+    assert!(differ.is_empty(), "{file}: {} differences\n{}", differ.len(), differ.join("\n"));
+    assert!(median <= 3 && left.len() <= 10, "{file}: {median} evaluations, {} left", left.len());
 }
 
 macro_rules! files {

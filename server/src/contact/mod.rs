@@ -6,6 +6,7 @@ pub mod certificate;
 pub mod clause;
 pub mod closed;
 mod depth;
+mod direct;
 mod fit;
 pub mod literal;
 pub mod lp;

@@ -1,5 +1,6 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
+use super::direct;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
@@ -47,11 +48,14 @@ pub struct Ideas {
     pub fits: bool,
     /// Curved faces touched where a contact was found.
     pub hints: bool,
+    /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
+    /// last digits: both solve the same equations, from another guess.
+    pub direct: bool,
 }
 
 impl Default for Ideas {
     fn default() -> Self {
-        Self { region: true, walk: true, fits: true, hints: true }
+        Self { region: true, walk: true, fits: true, hints: true, direct: true }
     }
 }
 
@@ -99,6 +103,8 @@ pub struct PairSearch<'a> {
     /// 1 or 2: the depth that is searched, in resolutions.
     level: f64,
     search: Option<Search<'a>>,
+    /// The ending that a shortcut in front of the search has found.
+    ending: Option<Ending>,
     outcome: Outcome,
     resolution: f64,
 }
@@ -148,22 +154,34 @@ impl<'a> PairSearch<'a> {
         let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
         let mut search = Search::new(task, scratch);
-        if !a.is_empty() && !b.is_empty() {
+        let ending = if query.ideas.direct { direct::answer(&mut search) } else { None };
+        if ending.is_none() && !a.is_empty() && !b.is_empty() {
             search.start();
         }
-        Self { task, swapped, level: 1.0, search: Some(search), outcome, resolution }
+        Self { task, swapped, level: 1.0, search: Some(search), ending, outcome, resolution }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
-        self.search.as_ref().map_or(f64::INFINITY, Search::earliest)
+        match &self.ending {
+            Some(Ending::Contact(found)) => found.goal,
+            Some(_) => f64::INFINITY,
+            None => self.search.as_ref().map_or(f64::INFINITY, Search::earliest),
+        }
     }
 
     /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Outcome> {
         loop {
             let search = self.search.as_mut()?;
-            let ending = search.run(until)?;
+            let ending = match self.ending.take() {
+                Some(Ending::Contact(found)) if found.goal > until => {
+                    self.ending = Some(Ending::Contact(found));
+                    return None;
+                }
+                Some(ending) => ending,
+                None => search.run(until)?,
+            };
             self.outcome.counters += search.counters;
             search.counters = Default::default();
             match ending {
@@ -320,6 +338,10 @@ impl Active {
             }
             let k = side as usize;
             let list = &mut self.faces[k];
+            if ids.len() > list.len() {
+                // More faces than are told: the first ones, whichever of them hold the contact.
+                list.iter_mut().zip(&ids).for_each(|(f, id)| *f = id.face());
+            }
             for id in &ids {
                 if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
                     && !list.contains(&id.face())

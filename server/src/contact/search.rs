@@ -202,7 +202,7 @@ pub struct Search<'a> {
     pub(super) scratch: Scratch,
     pub(super) stage2: Stage2,
     serial: u64,
-    found: Option<Found>,
+    pub(super) found: Option<Found>,
     instant: Instant,
     /// Work done so far.
     pub counters: Counters,
@@ -510,6 +510,30 @@ impl<'a> Search<'a> {
             let sum: DVec3 = same.map(|(o, l)| problem.row(o, s.x, at, 0.0).gradient * *l).sum();
             -sum.dot(axis) >= sum.length() * (sin - 1e-6)
         })
+    }
+
+    /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed.
+    pub(super) fn confirm(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, lambda: Vec<f64>) -> bool {
+        if !has_both_sides(&active) {
+            return false;
+        }
+        self.stage2.all = true;
+        let confirmed = self.polish(active, x, t, lambda);
+        self.stage2.all = false;
+        confirmed
+    }
+
+    /// The unit normal of a solution, from A, along A's axes.
+    pub(super) fn normal(&self, s: &Solution) -> Option<DVec3> {
+        let at = self.task.relative.at(s.t);
+        let problem = self.problem();
+        let mut sum = DVec3::ZERO;
+        for (c, l) in s.active.iter().zip(&s.lambda) {
+            let (Constraint::Literal(side, _) | Constraint::Apex(side, _, _)) = *c;
+            let sign = if side == Side::A { *l } else { -*l };
+            sum += problem.row(c, s.x, &at, 0.0).gradient * sign;
+        }
+        sum.try_normalize()
     }
 
     /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled

@@ -40,6 +40,8 @@ const SLICE_LEAST: f64 = 1.0 / 64.0;
 #[derive(Debug, Default)]
 pub struct Stage2 {
     handed: [HashSet<u32>; 2],
+    /// Everything is known: a whole-primitive shortcut is at work.
+    pub(super) all: bool,
     candidates: HashSet<(u32, u32)>,
 }
 
@@ -48,7 +50,7 @@ impl Stage2 {
     pub fn knows(&self, task: &Task, c: &Constraint) -> bool {
         let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
         let solid = if side == Side::A { task.a } else { task.b };
-        self.handed[side as usize].contains(&solid.face_owner[id.face() as usize])
+        self.all || self.handed[side as usize].contains(&solid.face_owner[id.face() as usize])
     }
 }
 

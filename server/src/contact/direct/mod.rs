@@ -1,0 +1,341 @@
+//! In front of the search: two whole convex primitives, answered by a proven advance.
+//!
+//! Idea: a direction that separates two convex bodies proves them apart not only now. With h their supports and n fixed in
+//! the world or turning linearly, n(τ) = n₀ + ντ of any length,
+//!
+//! ```text
+//! φ(t) = −h_B(−n) − h_A(n)                                             the gap along n at t
+//! Q    = 2|ν|(|v₀| + ω_A ρ_A + ω_B ρ_B) + |n|(ω_A² ρ_A + ω_B² ρ_B)     ρ: farthest point from the centre of rotation
+//! φ    ≥ (1−s) φ₁ + s φ₂ − ½ Q s(1−s) (t₂−t₁)²                         on [t₁, t₂], s = (t−t₁)/(t₂−t₁)
+//! ```
+//!
+//! since φ is a minimum over pairs of points of functions whose second derivative is at most Q. A body eroded by delta
+//! leaves room for a ball of that radius, so its support is less by delta: a contact of depth delta needs φ ≤ −2 delta, and
+//! φ > −2 delta excludes it. So: (1) nearest points at t by `gjk` give n; (2) the faces at the witnesses are solved for a
+//! contact, as the search does it, and both trees confirm it or it is none; (3) the time up to it is proven with its normal;
+//! (4) otherwise the time that n proves is taken, and again from there. No contact by the end: clear.
+//! What starts nearer than a few resolutions, overlaps, or does not settle is left to the search; nothing is guessed.
+//! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) with the second-order bound above.
+
+mod gjk;
+mod support;
+
+use super::literal::Side;
+use super::newton::Constraint;
+use super::search::{Ending, Search, Task};
+use crate::math::any_perpendicular;
+use crate::motion::Instant;
+use crate::solid::local::LiteralId;
+use crate::solid::{Face, Node, Primitive, Sense, Solid};
+use gjk::nearest;
+use glam::DVec3;
+use smallvec::SmallVec;
+use support::Body;
+
+/// Distance evaluations before a pair is left to the search.
+const ROUNDS: usize = 24;
+/// Evaluations of φ that one proof may take.
+const PROOF: usize = 24;
+/// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
+const APART: f64 = 4.0;
+/// Gap, relative to the pair's scale, below which a contact is looked for.
+const NEAR: f64 = 0.3;
+/// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
+const ACTIVE: [f64; 2] = [1e-7, 1e-3];
+
+/// The answer for two solids that are one convex primitive each; `None` leaves them to the search.
+pub(super) fn answer(search: &mut Search) -> Option<Ending> {
+    let task = search.task;
+    let (a, b) = (whole(task.a)?, whole(task.b)?);
+    let (body_a, body_b) = (body_of(a)?, body_of(b)?);
+    Advance::new(task, (a, body_a), (b, body_b)).run(search)
+}
+
+fn body_of(p: &Primitive) -> Option<Body<'_>> {
+    Body::new(&p.shape, p.frame.matrix(), p.frame.position)
+}
+
+/// The one primitive of a solid that is nothing else.
+fn whole(solid: &Solid) -> Option<&Primitive> {
+    match solid.nodes[solid.root as usize] {
+        Node::Primitive(p) if solid.senses[p as usize] == Sense::Positive => Some(&solid.primitives[p as usize]),
+        _ => None,
+    }
+}
+
+/// An instant with B as A sees it.
+struct Moment<'a> {
+    at: Instant,
+    b: Body<'a>,
+}
+
+/// The gap along a direction at a time.
+#[derive(Clone, Copy)]
+struct Gap {
+    t: f64,
+    /// World axes.
+    n: DVec3,
+    phi: f64,
+}
+
+struct Advance<'a> {
+    task: Task<'a>,
+    a: (&'a Primitive, Body<'a>),
+    b: (&'a Primitive, Body<'a>),
+    /// |v₀| + ω_A ρ_A + ω_B ρ_B.
+    speed: f64,
+    /// ω_A² ρ_A + ω_B² ρ_B.
+    pull: f64,
+    /// φ above this excludes a contact of depth delta.
+    least: f64,
+}
+
+impl<'a> Advance<'a> {
+    fn new(task: Task<'a>, a: (&'a Primitive, Body<'a>), b: (&'a Primitive, Body<'a>)) -> Self {
+        let (pa, pb) = task.relative.placed();
+        let far = |p: &Primitive, center: DVec3| (p.ball.center - center).length() + p.ball.radius;
+        let rho_a = far(a.0, task.relative.center_a());
+        let rho_b = far(b.0, pb.place.inverse().position);
+        let (wa, wb) = (pa.motion.spin.length(), pb.motion.spin.length());
+        let v0 = (pa.motion.velocity - pb.motion.velocity).length();
+        Self {
+            task,
+            a,
+            b,
+            speed: v0 + wa * rho_a + wb * rho_b,
+            pull: wa * wa * rho_a + wb * wb * rho_b,
+            least: -2.0 * task.delta + 4.0 * task.rounding,
+        }
+    }
+
+    fn moment(&self, t: f64) -> Moment<'a> {
+        let at = self.task.relative.at(t);
+        let axes = at.b_from_a.transpose();
+        Moment { at, b: self.b.1.seen(&axes, at.a_point(DVec3::ZERO)) }
+    }
+
+    /// φ along a world direction.
+    fn gap(&self, m: &Moment, n: DVec3) -> Gap {
+        let along = m.at.world_from_a.transpose() * n;
+        Gap { t: m.at.t, n, phi: -m.b.reach(-along) - self.a.1.reach(along) }
+    }
+
+    /// Up to where between two gaps a contact of depth delta is excluded; the end if all of it is.
+    fn proven(&self, p: &Gap, q: &Gap) -> f64 {
+        let h = q.t - p.t;
+        if h <= 0.0 {
+            return if p.phi > self.least { q.t } else { p.t };
+        }
+        let turn = (q.n - p.n).length() / h;
+        let longest = p.n.length().max(q.n.length());
+        let curve = 0.5 * h * h * (2.0 * turn * self.speed + longest * self.pull);
+        // In s: c s² + (φ₂ − φ₁ − c) s + φ₁ − least > 0; a unit direction's least, so the longest is 1.
+        let (f1, f2) = (p.phi - self.least, q.phi - self.least);
+        if f1 <= 0.0 {
+            return p.t;
+        }
+        let slope = f2 - f1 - curve;
+        let root = slope * slope - 4.0 * curve * f1;
+        if f2 > 0.0 && (root < 0.0 || slope >= 0.0 || -slope >= 2.0 * curve) {
+            return q.t;
+        }
+        if root < 0.0 {
+            // Cannot be: f2 <= 0 has a root in [0, 1].
+            return p.t;
+        }
+        // The smaller root, without cancellation.
+        let s = 2.0 * f1 / (-slope + root.sqrt());
+        p.t + (0.999_999 * s).min(1.0) * h
+    }
+
+    /// How far from `p` towards `q` a contact is excluded, the direction going over linearly, in halves where need be.
+    fn prove(&self, p: Gap, q: Gap) -> f64 {
+        let mut stack: SmallVec<[Gap; PROOF]> = SmallVec::new();
+        stack.push(q);
+        let mut p = p;
+        for _ in 0..PROOF {
+            let Some(q) = stack.last().copied() else { break };
+            let until = self.proven(&p, &q);
+            if until >= q.t {
+                p = q;
+                stack.pop();
+                continue;
+            }
+            let middle = 0.5 * (p.t + q.t);
+            if stack.len() == PROOF || middle <= p.t {
+                return until;
+            }
+            let n = 0.5 * (p.n + q.n);
+            let Some(n) = n.try_normalize() else { return until };
+            let gap = self.gap(&self.moment(middle), n);
+            if gap.phi <= self.least {
+                return until;
+            }
+            stack.push(gap);
+        }
+        p.t
+    }
+
+    fn run(&self, search: &mut Search) -> Option<Ending> {
+        let scale = self.task.scale;
+        let mut t = 0.0;
+        let mut start = None;
+        let mut contact: Option<Gap> = None;
+        for round in 0..ROUNDS {
+            let m = self.moment(t);
+            let first = start
+                .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
+            search.counters.closed_forms += 1;
+            let found = nearest(&self.a.1, &m.b, first)?;
+            if round == 0 && found.distance <= APART * self.task.delta {
+                return None;
+            }
+            let n = (m.at.world_from_a * found.normal).normalize();
+            start = Some(n);
+            let here = self.gap(&m, n);
+            if here.phi <= self.least {
+                return None;
+            }
+            let closing = found.normal.dot(m.at.velocity(found.a));
+            if contact.is_none() && closing > 0.0 && found.distance <= NEAR * scale {
+                let guess = (t + found.distance.max(0.0) / closing).min(1.0);
+                contact = self.contact(search, &m, &found, guess);
+            }
+            let goal = contact.map_or(1.0, |c| c.t);
+            if let Some(c) = contact {
+                let until = self.prove(here, c);
+                if until >= c.t {
+                    return search.found.take().map(Ending::Contact);
+                }
+            }
+            // As far as this direction proves; a nearer end tightens the bound.
+            let mut end = goal;
+            let mut until = t;
+            for _ in 0..6 {
+                let there = self.gap(&self.moment(end), n);
+                let proven = self.proven(&here, &there);
+                until = until.max(proven);
+                if proven >= end {
+                    break;
+                }
+                if proven - t > 0.25 * (end - t) {
+                    break;
+                }
+                end = (t + 2.0 * (proven - t)).min(end);
+                if end <= t {
+                    break;
+                }
+            }
+            if until >= 1.0 {
+                return if contact.is_none() { Some(Ending::Clear) } else { None };
+            }
+            if until <= t {
+                return None;
+            }
+            t = until;
+        }
+        None
+    }
+
+    /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees
+    /// confirm it.
+    fn contact(&self, search: &mut Search, m: &Moment, found: &gjk::Nearest, guess: f64) -> Option<Gap> {
+        let b = m.at.b_point(found.b);
+        let normal_b = m.at.b_from_a * -found.normal;
+        let x = 0.5 * (found.a + found.b);
+        for tolerance in ACTIVE {
+            let tol = tolerance * self.task.scale + found.distance.abs() * 1e-3;
+            let mut active: SmallVec<[(Constraint, f64); 8]> = SmallVec::new();
+            faces_at(Side::A, self.a.0, found.a, found.normal, tol, &mut active);
+            let of_a = active.len();
+            faces_at(Side::B, self.b.0, b, normal_b, tol, &mut active);
+            let of_b = active.len() - of_a;
+            // A corner that two faces hold against n, as two opposite ones of four may: they alone leave a line open.
+            let loose = of_a < self.a.1.corner(found.normal) || of_b < self.b.1.corner(normal_b);
+            if loose || active.len() > super::newton::MAX_ACTIVE {
+                continue;
+            }
+            let (constraints, lambda): (Vec<_>, Vec<_>) = active.iter().map(|(c, l)| (*c, 0.5 * l)).unzip();
+            if search.confirm(constraints, x, guess, lambda) {
+                let f = search.found.as_ref()?;
+                let s = f.touch.as_ref().filter(|s| s.t >= 0.0)?;
+                let normal = search.normal(s)?;
+                let at = self.task.relative.at(s.t);
+                let n = (at.world_from_a * normal).normalize();
+                return Some(self.gap(&self.moment(s.t), n));
+            }
+        }
+        None
+    }
+}
+
+/// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
+fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
+    let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
+    for (i, face) in p.faces.iter().enumerate() {
+        let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
+        if let Face::Cone { apex, axis, .. } = *face
+            && (x - apex).length() <= tol
+        {
+            // An apex holds every direction of its normal cone.
+            let u = any_perpendicular(axis);
+            let along = [axis, u, axis.cross(u)];
+            out.extend((0..3).map(|k| (Constraint::Apex(side, id, k), n.dot(along[usize::from(k)]))));
+            return;
+        }
+        let f = face.at(x);
+        if f.value.abs() <= tol && f.normal.dot(n) > -0.99 {
+            near.push((id, f.normal));
+        }
+    }
+    // The least set of them whose normals hold n between them: one, two, then three.
+    let mut best: (f64, SmallVec<[(usize, f64); 3]>) = (f64::INFINITY, SmallVec::new());
+    let mut offer = |set: &[usize]| {
+        let Some(weights) = weights(set, &near, n) else { return };
+        let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| near[*i].1 * *w).sum();
+        // A larger set must be better by more than rounding.
+        let off = (sum - n).length() + 1e-7 * set.len() as f64;
+        if off < 0.5 * best.0 || (off < best.0 && set.len() == best.1.len()) {
+            best = (off, set.iter().copied().zip(weights).collect());
+        }
+    };
+    for i in 0..near.len() {
+        offer(&[i]);
+    }
+    for i in 0..near.len() {
+        for j in i + 1..near.len() {
+            offer(&[i, j]);
+        }
+    }
+    for i in 0..near.len() {
+        for j in i + 1..near.len() {
+            for k in j + 1..near.len() {
+                offer(&[i, j, k]);
+            }
+        }
+    }
+    out.extend(best.1.iter().map(|(i, w)| (Constraint::Literal(side, near[*i].0), *w)));
+}
+
+/// Least-squares weights of some unit vectors for n; `None` if one is negative or they are dependent.
+fn weights(set: &[usize], near: &[(LiteralId, DVec3)], n: DVec3) -> Option<SmallVec<[f64; 3]>> {
+    let g = |i: usize| near[set[i]].1;
+    let w: SmallVec<[f64; 3]> = match set.len() {
+        1 => SmallVec::from_slice(&[g(0).dot(n)]),
+        2 => {
+            let c = g(0).dot(g(1));
+            let det = 1.0 - c * c;
+            let (p, q) = (g(0).dot(n), g(1).dot(n));
+            SmallVec::from_slice(&[(p - c * q) / det, (q - c * p) / det])
+        }
+        _ => {
+            let m = glam::DMat3::from_cols(g(0), g(1), g(2));
+            let det = m.determinant();
+            if det.abs() < 1e-9 {
+                return None;
+            }
+            SmallVec::from_slice(&(m.inverse() * n).to_array())
+        }
+    };
+    w.iter().all(|w| w.is_finite() && *w > 0.0).then_some(w)
+}
