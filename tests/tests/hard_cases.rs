@@ -26,9 +26,6 @@ fn scene(a: Recipe, motion_a: Motion, b: Recipe, motion_b: Motion) -> Scene {
     Scene::new("hard", a, motion_a, b, motion_b)
 }
 
-/// What the engine cannot decide yet: one that it can must leave this list.
-const KNOWN_GAPS: &[&str] = &["ball_same_size"];
-
 fn ceiling(name: &str) -> u64 {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("cell_ceilings.toml");
     let table: toml::Table = std::fs::read_to_string(path).expect("cell_ceilings.toml").parse().expect("valid TOML");
@@ -41,12 +38,11 @@ fn answer(name: &str, scene: &Scene) -> Outcome {
     let fronted = ask(scene);
     let differ = differences(&o, &fronted, scene.delta() / 1e-9);
     assert!(differ.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
-    let gap = KNOWN_GAPS.contains(&name);
-    assert_eq!(o.status == Status::Undecided, gap, "{name}, known gap: {gap}: {o:?}");
+    assert_ne!(o.status, Status::Undecided, "{name}: {o:?}");
     assert!(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0, "{o:?}");
     if std::env::var_os("CONTACTD_RECORD").is_some() {
         println!("RECORD {name} = {}", 2 * o.counters.cells.max(4));
-    } else if !gap {
+    } else {
         let most = ceiling(name);
         assert!(o.counters.cells <= most, "{name}: {} cells, ceiling {most}", o.counters.cells);
     }
@@ -56,11 +52,6 @@ fn answer(name: &str, scene: &Scene) -> Outcome {
 #[track_caller]
 fn meets(name: &str, scene: &Scene, time: f64) -> Outcome {
     let o = answer(name, scene);
-    if KNOWN_GAPS.contains(&name) {
-        // Proven free of the depth delta only: an edge reaches it some delta / speed after touch.
-        assert!(o.time_lower <= time + 1e-7, "{name}: nothing before {}, and yet contact at {time}", o.time_lower);
-        return o;
-    }
     assert_eq!(o.status, Status::Contact, "{name}: expected contact at {time}, {o:?}");
     assert!((o.time - time).abs() <= 1e-9, "{name}: time {}, expected {time}", o.time);
     assert!((o.normal.length() - 1.0).abs() < 1e-9 && o.point.is_finite(), "{name}: {o:?}");
@@ -70,9 +61,6 @@ fn meets(name: &str, scene: &Scene, time: f64) -> Outcome {
 #[track_caller]
 fn meets_along(name: &str, scene: &Scene, time: f64, normal: DVec3) -> Outcome {
     let o = meets(name, scene, time);
-    if KNOWN_GAPS.contains(&name) {
-        return o;
-    }
     assert!(o.normal.distance(normal) < 1e-6, "{name}: normal {}, expected {normal}", o.normal);
     o
 }
@@ -80,9 +68,6 @@ fn meets_along(name: &str, scene: &Scene, time: f64, normal: DVec3) -> Outcome {
 #[track_caller]
 fn misses(name: &str, scene: &Scene) -> Outcome {
     let o = answer(name, scene);
-    if KNOWN_GAPS.contains(&name) {
-        return o;
-    }
     assert_eq!(o.status, Status::Clear, "{name}: {o:?}");
     o
 }

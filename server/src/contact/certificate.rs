@@ -243,7 +243,7 @@ impl<'a> Maker<'a> {
         let truth = falsify(&open.b, &mut b, &mut used, &mut |id| view.truth(Side::B, id));
         let singles: Vec<Vec<Term>> = used
             .iter()
-            .map(|id| vec![Term { literal: (Side::B, *id), other: None, lambda: 1.0, point: view.center_b }])
+            .map(|id| vec![Term { literal: (Side::B, *id), other: None, lambda: [1.0; 2], point: view.center_b }])
             .collect();
         match truth {
             Truth::False => return (h, Some(thinned(singles, &open.a, &open.b)), h, DVec3::ZERO),
@@ -272,7 +272,7 @@ impl<'a> Maker<'a> {
         let dt = if found.dt >= h { h } else { found.dt * HASTE };
         let proofs: &[Proof] = self.scratch.record.as_deref().unwrap_or_default();
         let mut close = singles;
-        close.extend(proofs.iter().filter(|p| p.dt >= dt).map(|p| p.terms.clone()));
+        close.extend(proofs.iter().filter(|p| p.dt >= dt).map(|p| p.until(dt)));
         (h, Some(thinned(close, &open.a, &open.b)), dt, found.cost)
     }
 
@@ -450,12 +450,13 @@ impl Certificate {
                 for group in &span.close {
                     let _ = write!(out, " |");
                     for term in group {
+                        let [from, to] = term.lambda;
                         let _ = match &term.other {
                             Some(other) => {
-                                write!(out, " fit {} {} {:e}", name(&term.literal), name(other), term.lambda)
+                                write!(out, " fit {} {} {from:e} {to:e}", name(&term.literal), name(other))
                             }
                             None => {
-                                write!(out, " {} {:e} {}", name(&term.literal), term.lambda, numbers(&[term.point]))
+                                write!(out, " {} {from:e} {to:e} {}", name(&term.literal), numbers(&[term.point]))
                             }
                         };
                     }

@@ -85,6 +85,15 @@ pub struct Proof {
     pub terms: Vec<Term>,
 }
 
+impl Proof {
+    /// The same proof for a part of its time from the start.
+    pub fn until(&self, dt: f64) -> Vec<Term> {
+        let part = if self.dt > 0.0 { (dt / self.dt).min(1.0) } else { 0.0 };
+        let cut = |t: &Term| Term { lambda: [t.lambda[0], t.lambda[0] + (t.lambda[1] - t.lambda[0]) * part], ..*t };
+        self.terms.iter().map(cut).collect()
+    }
+}
+
 /// One literal of a `Proof`, or the fit of two.
 #[derive(Clone, Copy, Debug)]
 pub struct Term {
@@ -92,8 +101,8 @@ pub struct Term {
     pub literal: (Side, LiteralId),
     /// The negative literal of a fit.
     pub other: Option<(Side, LiteralId)>,
-    /// Its multiplier.
-    pub lambda: f64,
+    /// Its multiplier at the start and at the end of the time; linear between.
+    pub lambda: [f64; 2],
     /// Where a convex face is touched, in the frame of its body.
     pub point: DVec3,
 }
@@ -223,52 +232,108 @@ impl Run<'_, '_> {
     /// Bounds the clause of all literals taken so far. Tangents that were added stay for its completions.
     fn clause(&mut self) -> Advance {
         let h = self.view.motion.h;
-        let mut best = (f64::NEG_INFINITY, self.solve(h));
-        best.0 = self.reach(&best.1);
-        if best.0 >= h {
-            self.note(best);
-            return self.result(best);
+        let last = self.solve(h);
+        let mut best = Reach { dt: f64::NEG_INFINITY, path: [last; 2] };
+        if self.improve(&mut best, None, &last, h) {
+            return self.finish(&best, &last);
         }
-        // Where the bound gives out is where it must get better: look ahead to just that time, and a little beyond it
-        // (at the very time a cell's own wall may hold the bound alone); touch the curved faces at the lowest point
-        // there, and see how much further that reaches.
+        let mut first = self.solve(0.0);
+        if self.improve(&mut best, None, &first, 0.0) || self.improve(&mut best, Some(&first), &last, h) {
+            return self.finish(&best, &first);
+        }
+        // Where the bound gives out is where it must get better: look ahead to just that time; touch the curved faces at
+        // the lowest point there, and see how much further that reaches. Beyond it look where the best bound seems to
+        // vanish, at least a little further (at the very time a cell's own wall may hold the bound alone): where the
+        // multipliers of a later time, at which nothing holds any more, begin to fail, or at half way.
+        let half = self.view.half;
         let beyond = LOOK_BEYOND * self.view.radius / self.view.motion.speed.max(f64::MIN_POSITIVE);
-        let mut lowest = best.1;
-        for _ in 0..ROUNDS {
-            let before = best.0;
+        let mut gone = (h, self.course(&last));
+        let mut lowest = first;
+        for round in 0..ROUNDS {
+            let (before, gone_before) = (best.dt, gone.0);
             let mut touched = false;
-            for extra in [0.0, beyond] {
-                let look = (best.0.max(0.0) + extra).min(h);
-                lowest = self.solve(look);
-                let reach = self.reach(&lowest);
-                if reach > best.0 {
-                    best = (reach, lowest);
-                    if reach >= h {
-                        self.note(best);
-                        return self.result(best);
+            for ahead in [false, true] {
+                let mut look = best.dt.max(0.0);
+                if ahead {
+                    look = (look + beyond).min(h);
+                    if best.dt > 0.0 && gone.0 > look {
+                        let fails = if round % 2 == 0 { gone.1.back(gone.0, half) } else { 0.5 * (best.dt + gone.0) };
+                        look = look.max(fails);
                     }
                 }
+                lowest = self.solve(look);
+                if look == 0.0 {
+                    first = lowest;
+                }
+                if self.improve(&mut best, None, &lowest, look) || self.improve(&mut best, Some(&first), &lowest, look)
+                {
+                    return self.finish(&best, &lowest);
+                }
                 touched |= self.touch(&lowest, look);
+                let course = self.course(&lowest);
+                if look < gone.0 && course.at(look, half) < 0.0 {
+                    gone = (look, course);
+                }
             }
-            if !touched && best.0 <= before + 0.02 * before.abs() {
+            let nearer = gone.0 < gone_before - 0.02 * (gone_before - best.dt.max(0.0));
+            if !touched && !nearer && best.dt <= before + 0.02 * before.abs() {
                 break;
             }
+            if touched && best.dt > 0.0 {
+                first = self.solve(0.0);
+            }
         }
-        self.note(best);
-        self.result((best.0, lowest))
+        self.finish(&best, &lowest)
+    }
+
+    /// Tries the multipliers of `s`, the best at `look`, alone or as the end of a path from those of `from`; true when
+    /// the whole span is proven free.
+    fn improve(&self, best: &mut Reach, from: Option<&Solution>, s: &Solution, look: f64) -> bool {
+        let h = self.view.motion.h;
+        let end = self.course(s);
+        match from {
+            None => {
+                let dt = end.from(0.0, self.view.half).min(h);
+                if dt > best.dt {
+                    *best = Reach { dt, path: [*s; 2] };
+                }
+            }
+            Some(first) => {
+                let start = self.course(first);
+                if start.at(0.0, self.view.half) > 0.0 && end.at(look, self.view.half) > 0.0 {
+                    let far = end.from(look, self.view.half).min(h);
+                    for dt in [far, 0.5 * (look + far), look] {
+                        if dt > best.dt && start.leads_to(&end, dt, self.view.half) {
+                            *best = Reach { dt, path: [*first, *s] };
+                            break;
+                        }
+                    }
+                }
+            }
+        }
+        best.dt >= h
     }
 
     /// Writes down what excluded something, where that is asked for.
-    fn note(&mut self, (dt, s): (f64, Solution)) {
+    fn note(&mut self, best: &Reach) {
         let Some(record) = &mut self.scratch.record else { return };
-        if dt < 0.0 {
+        if best.dt < 0.0 {
             return;
         }
-        let term = |&(i, lambda): &(u32, f64)| {
-            let l = &self.scratch.lits[i as usize];
-            Term { literal: (l.side, l.id), other: l.other, lambda, point: l.point }
-        };
-        record.push(Proof { dt, terms: s.support[..s.count].iter().map(term).collect() });
+        let mut terms: Vec<Term> = Vec::new();
+        let mut seen: Vec<u32> = Vec::new();
+        for (k, s) in best.path.iter().enumerate() {
+            for &(i, lambda) in &s.support[..s.count] {
+                let at = seen.iter().position(|o| *o == i).unwrap_or_else(|| {
+                    let l = &self.scratch.lits[i as usize];
+                    seen.push(i);
+                    terms.push(Term { literal: (l.side, l.id), other: l.other, lambda: [0.0; 2], point: l.point });
+                    terms.len() - 1
+                });
+                terms[at].lambda[k] = lambda;
+            }
+        }
+        record.push(Proof { dt: best.dt, terms });
     }
 
     /// Adds tangents of the curved convex faces that rise above a solution's lowest point there; false when none does.
@@ -283,8 +348,7 @@ impl Run<'_, '_> {
             }
             if l.other.is_some() {
                 if let Some(t) = fit::touch(v, &l, s.y)
-                    && t.bound + look * (t.rate - t.s) - 0.5 * look * look * t.q + t.normal.dot(s.y)
-                        > s.z + 1e-3 * v.delta
+                    && t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * v.delta
                 {
                     self.scratch.lits.push(t);
                     added = true;
@@ -299,7 +363,7 @@ impl Run<'_, '_> {
                 Side::B => v.center_b + v.at.b_from_a * (s.y + v.velocity * look),
             };
             let t = v.tangent(l.side, l.id, point);
-            if t.bound + look * t.rate + t.normal.dot(s.y) > s.z + 1e-3 * v.delta {
+            if t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * v.delta {
                 self.scratch.lits.push(t);
                 added = true;
             }
@@ -313,39 +377,35 @@ impl Run<'_, '_> {
         s.b.clear();
         s.normals.clear();
         for l in &s.lits {
-            s.b.push(l.bound + look * (l.rate - l.s) - 0.5 * look * look * l.q);
-            s.normals.push(l.normal);
+            s.b.push(l.ahead(look));
+            s.normals.push(l.normal_ahead(look));
         }
         lp::min_max(&s.normals, &s.b, self.view.half)
     }
 
-    /// dt of the multipliers of `s`; negative infinity when they exclude nothing now.
-    fn reach(&self, s: &Solution) -> f64 {
+    /// The bound that the multipliers of `s` give, through time.
+    fn course(&self, s: &Solution) -> Course {
         let v = self.view;
-        let (mut value, mut total, mut rate, mut second) = (0.0, 0.0, 0.0, 0.0);
-        let (mut w, mut w_b, mut turn) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let mut c = Course::default();
+        let mut w_b = DVec3::ZERO;
         for &(i, lambda) in &s.support[..s.count] {
             let l = &self.scratch.lits[i as usize];
-            total += lambda;
-            value += lambda * l.bound;
-            w += lambda * l.normal;
-            rate += lambda * (l.rate - l.s);
-            turn += lambda * l.turn;
-            second += lambda * l.q;
+            c.value += lambda * (l.bound - self.rounding);
+            c.w += lambda * l.normal;
+            c.rate += lambda * (l.rate - l.s);
+            c.turn += lambda * l.turn;
+            c.q += lambda * l.q;
             if l.rigid {
                 w_b += lambda * l.normal;
             }
         }
-        let lb = value - w.abs().dot(v.half) - self.rounding * total;
-        if lb.is_nan() || lb <= 0.0 {
-            return f64::NEG_INFINITY;
-        }
-        let s = turn.abs().dot(v.half) - rate;
-        let q = v.motion.curvature(v.at, w_b) + second;
-        span(lb, s, q).min(v.motion.h)
+        c.q += v.motion.curvature(v.at, w_b);
+        c
     }
 
-    fn result(&self, (dt, s): (f64, Solution)) -> Advance {
+    fn finish(&mut self, best: &Reach, s: &Solution) -> Advance {
+        self.note(best);
+        let dt = best.dt;
         let mut a = Advance { dt, support: Vec::new(), y: s.y, cost: DVec3::ZERO };
         let (mut w, mut turn) = (DVec3::ZERO, DVec3::ZERO);
         for &(i, lambda) in &s.support[..s.count] {
@@ -373,6 +433,81 @@ impl Run<'_, '_> {
         a.cost += (w.abs() + turn.abs() * dt.max(0.0)) * self.view.half;
         a
     }
+}
+
+/// What fixed multipliers prove through time: for x = c + y,
+/// Σ λ literal >= value + w·y + (rate + turn·y) t − ½ q t².
+#[derive(Clone, Copy, Debug, Default)]
+struct Course {
+    value: f64,
+    w: DVec3,
+    rate: f64,
+    turn: DVec3,
+    q: f64,
+}
+
+impl Course {
+    /// The bound over the whole cell, dt after the view's instant.
+    fn at(&self, dt: f64, half: DVec3) -> f64 {
+        self.value + self.rate * dt - (self.w + self.turn * dt).abs().dot(half) - 0.5 * self.q * dt * dt
+    }
+
+    /// Until when the bound stays positive, which it must be at `dt` (it is concave in time); else negative infinity.
+    fn from(&self, dt: f64, half: DVec3) -> f64 {
+        let mut end = dt;
+        let s = self.turn.abs().dot(half) - self.rate;
+        for round in 0..3 {
+            let lb = self.at(end, half);
+            if lb.is_nan() || lb <= 0.0 {
+                return if round == 0 { f64::NEG_INFINITY } else { end };
+            }
+            end += span(lb, s + self.q * end, self.q);
+        }
+        end
+    }
+
+    /// Shortly before the bound began to fail that fails at `dt` (Newton, from above as it is concave); zero if it never held.
+    fn back(&self, dt: f64, half: DVec3) -> f64 {
+        let mut at = dt;
+        for _ in 0..3 {
+            let w = self.w + self.turn * at;
+            let rate = self.rate - (w.signum() * self.turn).dot(half) - self.q * at;
+            if rate >= 0.0 {
+                return 0.0;
+            }
+            at -= self.at(at, half) / rate;
+            if at <= 0.0 {
+                return 0.0;
+            }
+        }
+        at - 0.02 * (dt - at)
+    }
+
+    /// Multipliers that go from these to those of `end` linearly over [0, dt] prove all of it. With s = t/dt their bound is
+    ///
+    /// ```text
+    /// (1−s) F0(t) + s F1(t) >= (1−s) F0(0) + s F1(dt) − s(1−s) M,
+    /// M = dt·(rate1 − rate0 + Σ_k e_k |turn1 − turn0|_k) − dt²·min(½ q1, q1 − ½ q0),
+    /// ```
+    ///
+    /// which is positive for all s where M <= (√F0(0) + √F1(dt))².
+    fn leads_to(&self, end: &Course, dt: f64, half: DVec3) -> bool {
+        let (f0, f1) = (self.at(0.0, half), end.at(dt, half));
+        if !(f0 > 0.0 && f1 >= 0.0) {
+            return false;
+        }
+        let m = dt * (end.rate - self.rate + (end.turn - self.turn).abs().dot(half))
+            - dt * dt * (0.5 * end.q).min(end.q - 0.5 * self.q);
+        let root = f0.sqrt() + f1.sqrt();
+        m <= root * root * (1.0 - 1e-12)
+    }
+}
+
+/// How long a clause is proven free, and by which multipliers: from the first to the last, linearly over that time.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    dt: f64,
+    path: [Solution; 2],
 }
 
 /// The largest dt with lb − s·dt − ½·q·dt² >= 0 (lb > 0, q >= 0), a little less for rounding; infinite if always.

@@ -82,6 +82,18 @@ pub struct Linear {
     pub cost: DVec3,
 }
 
+impl Linear {
+    /// The bound at the centre, `dt` ahead.
+    pub fn ahead(&self, dt: f64) -> f64 {
+        self.bound + dt * (self.rate - self.s) - 0.5 * dt * dt * self.q
+    }
+
+    /// The normal, `dt` ahead, to first order.
+    pub fn normal_ahead(&self, dt: f64) -> DVec3 {
+        self.normal + self.turn * dt
+    }
+}
+
 /// A box cell of A at an instant, with bounds on its motion against B over [t, t + h].
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {

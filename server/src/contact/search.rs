@@ -460,7 +460,9 @@ impl<'a> Search<'a> {
         let x = cell.center + advance.y;
         let t = cell.t + advance.dt.max(0.0);
         let active: Vec<_> = advance.support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
-        let lambda: Vec<_> = advance.support.iter().map(|l| l.2).collect();
+        // A fit weighs both of its literals: together they are 1 again.
+        let total: f64 = advance.support.iter().map(|l| l.2).sum();
+        let lambda: Vec<_> = advance.support.iter().map(|l| l.2 / total).collect();
         if self.polish(active, x, t, lambda) {
             return;
         }

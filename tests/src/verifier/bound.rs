@@ -28,8 +28,8 @@ pub struct Term {
     pub literal: Literal,
     /// The negative one of a fit.
     pub other: Option<Literal>,
-    /// Multiplier.
-    pub lambda: f64,
+    /// Multiplier at the start and the end of the span; linear between.
+    pub lambda: [f64; 2],
     /// Point of contact of the tangent, frame of the literal's body.
     pub point: DVec3,
 }
@@ -64,9 +64,13 @@ impl Bounder<'_> {
     pub fn excludes(&mut self, terms: &[Term], region: Region) -> bool {
         let known = |l: &Literal| self.face(l).is_some();
         let fine = terms.iter().all(|t| {
-            t.lambda >= 0.0 && t.lambda.is_finite() && known(&t.literal) && t.other.as_ref().is_none_or(known)
+            t.lambda.iter().all(|l| *l >= 0.0 && l.is_finite())
+                && known(&t.literal)
+                && t.other.as_ref().is_none_or(known)
         });
-        fine && terms.iter().any(|t| t.lambda > 0.0) && self.positive(region, &|s: &Self, x, t| s.sum(terms, x, t))
+        let some = |k: usize| terms.iter().any(|t| t.lambda[k] > 0.0);
+        let span = region.0[3];
+        fine && some(0) && some(1) && self.positive(region, &|s: &Self, x, t| s.sum(terms, span, x, t))
     }
 
     /// True when it is certain that the literal holds with room everywhere in the region.
@@ -138,7 +142,8 @@ impl Bounder<'_> {
         if on_b { self.motions.in_b(x, t) } else { in_a(x) }
     }
 
-    fn sum(&self, terms: &[Term], x: Vector, t: Interval) -> Option<Jet> {
+    /// Σ λ_i(t) ℓ_i, the multipliers linear over the span.
+    fn sum(&self, terms: &[Term], span: (f64, f64), x: Vector, t: Interval) -> Option<Jet> {
         let (a, b) = (in_a(x), self.motions.in_b(x, t));
         let mut sum = Jet::constant(ZERO);
         for term in terms {
@@ -151,7 +156,7 @@ impl Bounder<'_> {
             } else {
                 tangent(face, term.point, y).plus(point(self.depth))
             };
-            sum = sum + jet.scaled(point(term.lambda));
+            sum = sum + weighted(&jet, term.lambda, span, t);
         }
         Some(sum)
     }
@@ -243,6 +248,23 @@ impl Bounder<'_> {
         let room = (r_q + depth).square() - (r_p - depth).square();
         Some((p - q).plus(room).scaled((point(2.0) * (r_p + r_q)).recip()))
     }
+}
+
+/// λ(t)·f, where λ goes linearly from one value at the start of the span to another at its end.
+fn weighted(f: &Jet, [from, to]: [f64; 2], (start, end): (f64, f64), t: Interval) -> Jet {
+    if from == to || start >= end {
+        return f.scaled(point(from));
+    }
+    let slope = (point(to) - point(from)) * (point(end) - point(start)).recip();
+    let value = point(from) + slope * (t - point(start));
+    // Between two values that are not negative it is not negative: only its interval may be.
+    let mut j = f.scaled(Interval::new(value.lo.max(0.0), value.hi.max(0.0)));
+    j.g[3] = j.g[3] + slope * f.v;
+    for k in 0..4 {
+        let twice = if k == 3 { point(2.0) } else { point(1.0) };
+        j.h[place(k, 3)] = j.h[place(k, 3)] + twice * slope * f.g[k];
+    }
+    j
 }
 
 /// The length of a vector.

@@ -199,7 +199,7 @@ pub fn check(
                     let term = Term {
                         literal: literal(name)?,
                         other: None,
-                        lambda: 1.0,
+                        lambda: [1.0; 2],
                         point: DVec3::new(number(x)?, number(y)?, number(z)?),
                     };
                     checked.combinations += 1;
@@ -309,14 +309,15 @@ fn combinations(words: &[&str]) -> Result<Vec<Vec<Term>>, String> {
         let (mut group, mut rest) = (Vec::new(), part);
         while !rest.is_empty() {
             rest = match rest {
-                ["fit", p, q, lambda, rest @ ..] => {
-                    let lambda = number(lambda)?;
+                ["fit", p, q, from, to, rest @ ..] => {
+                    let lambda = [number(from)?, number(to)?];
                     group.push(Term { literal: literal(p)?, other: Some(literal(q)?), lambda, point: DVec3::ZERO });
                     rest
                 }
-                [name, lambda, x, y, z, rest @ ..] => {
+                [name, from, to, x, y, z, rest @ ..] => {
+                    let lambda = [number(from)?, number(to)?];
                     let point = DVec3::new(number(x)?, number(y)?, number(z)?);
-                    group.push(Term { literal: literal(name)?, other: None, lambda: number(lambda)?, point });
+                    group.push(Term { literal: literal(name)?, other: None, lambda, point });
                     rest
                 }
                 _ => return Err("a combination ends early".into()),
