@@ -191,6 +191,44 @@ impl Problem<'_> {
         Some(Solution { x, t, active: active.to_vec(), lambda, stationarity: sum.abs().max_element() })
     }
 
+    /// Plain Newton steps on the same square system, from a good guess: `Err(true)` where the system is singular, which
+    /// `solve` copes with, `Err(false)` where the guess leads nowhere. Nothing is allocated.
+    pub fn refine(
+        &self,
+        active: &[Constraint],
+        mut x: DVec3,
+        mut t: f64,
+        lambda: &mut [f64],
+        level: f64,
+    ) -> Result<(DVec3, f64), bool> {
+        const STEPS: usize = 9;
+        /// Squared residual of rounding.
+        const MET: f64 = 1e-28;
+        let n = active.len() + 4;
+        let (mut f, mut jac) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
+        let mut last = f64::INFINITY;
+        for _ in 0..STEPS {
+            jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
+            let square = self.fill(active, x, t, lambda, level, &mut f, &mut jac);
+            if square <= MET {
+                return Ok((x, t));
+            }
+            // Newton gains or is lost; a first step or two may go astray.
+            if !square.is_finite() || square > 1e2 * last.max(1e-2) {
+                return Err(false);
+            }
+            last = square;
+            let step = eliminate(&mut jac, f, n).ok_or(true)?;
+            x -= DVec3::new(step[0], step[1], step[2]) * self.scale;
+            t -= step[3] * self.time_scale;
+            lambda.iter_mut().zip(&step[4..n]).for_each(|(l, s)| *l -= s);
+            if !(-1.0..=2.0).contains(&t) {
+                return Err(false);
+            }
+        }
+        if last <= 1e-20 { Ok((x, t)) } else { Err(false) }
+    }
+
     /// Minimum-norm steps on the constraints alone until they are met to rounding; `None` when they can't be.
     fn meet(&self, active: &[Constraint], mut x: DVec3, mut t: f64, level: f64) -> Option<(DVec3, f64)> {
         let m = active.len();
@@ -277,6 +315,41 @@ impl Problem<'_> {
         }
         f[..m + 4].iter().map(|v| v * v).sum()
     }
+}
+
+/// Solves J step = f by elimination with partial pivoting; `None` when J is nearly singular.
+fn eliminate(
+    a: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+    mut f: [f64; MAX_UNKNOWNS],
+    n: usize,
+) -> Option<[f64; MAX_UNKNOWNS]> {
+    /// A pivot below this, of rows of about unit size, leaves a direction undetermined.
+    const SINGULAR: f64 = 1e-9;
+    for k in 0..n {
+        let p = (k..n).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs()))?;
+        a.swap(k, p);
+        f.swap(k, p);
+        let pivot = a[k][k];
+        if pivot.is_nan() || pivot.abs() < SINGULAR {
+            return None;
+        }
+        for i in k + 1..n {
+            let factor = a[i][k] / pivot;
+            if factor != 0.0 {
+                for j in k + 1..n {
+                    a[i][j] -= factor * a[k][j];
+                }
+                f[i] -= factor * f[k];
+            }
+        }
+    }
+    for k in (0..n).rev() {
+        for j in k + 1..n {
+            f[k] -= a[k][j] * f[j];
+        }
+        f[k] /= a[k][k];
+    }
+    Some(f)
 }
 
 /// Solves (JᵀJ + μ I) step = −Jᵀ f.

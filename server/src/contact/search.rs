@@ -514,11 +514,26 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// The depth at which witnesses are sought: delta and what rounding may take from it.
+    fn witness_level(&self) -> f64 {
+        self.task.delta * (1.0 + 1e-6) + 4.0 * self.task.rounding
+    }
+
     /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed.
-    pub(super) fn confirm(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, lambda: Vec<f64>) -> bool {
+    pub(super) fn confirm(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
         if !has_both_sides(&active) {
             return false;
         }
+        self.counters.newton += 1;
+        let guess = lambda.clone();
+        let (x, t) = match self.problem().refine(&active, x, t, &mut lambda, self.witness_level()) {
+            Ok(better) => better,
+            Err(true) => {
+                lambda = guess;
+                (x, t)
+            }
+            Err(false) => return false,
+        };
         self.stage2.all = true;
         let confirmed = self.polish(active, x, t, lambda);
         self.stage2.all = false;
@@ -541,7 +556,7 @@ impl<'a> Search<'a> {
     /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled
     /// multipliers was confirmed.
     fn polish(&mut self, mut active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
-        let level = self.task.delta * (1.0 + 1e-6) + 4.0 * self.task.rounding;
+        let level = self.witness_level();
         for _ in 0..7 {
             debug_assert!(
                 active.iter().all(|c| self.stage2.knows(&self.task, c)),

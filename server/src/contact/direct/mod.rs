@@ -40,6 +40,8 @@ const PROOF: usize = 24;
 const APART: f64 = 4.0;
 /// Gap, relative to the pair's scale, below which a contact is looked for.
 const NEAR: f64 = 0.3;
+/// A contact that the closing speed puts later than this is not looked for: speeds grow, but not by that much.
+const LATEST: f64 = 1.25;
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
 const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
@@ -197,9 +199,9 @@ impl<'a> Advance<'a> {
                 return None;
             }
             let closing = found.normal.dot(m.at.velocity(found.a));
-            if contact.is_none() && closing > 0.0 && found.distance <= NEAR * scale {
-                let guess = (t + found.distance.max(0.0) / closing).min(1.0);
-                contact = self.contact(search, &m, &found, guess);
+            let guess = t + found.distance.max(0.0) / closing;
+            if contact.is_none() && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
+                contact = self.contact(search, &m, &found, guess.min(1.0));
             }
             let goal = contact.map_or(1.0, |c| c.t);
             if let Some(c) = contact {

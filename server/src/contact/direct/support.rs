@@ -37,7 +37,7 @@ impl<'s> Body<'s> {
     pub fn support(&self, n: DVec3) -> DVec3 {
         let m = DVec3::new(self.axes.x_axis.dot(n), self.axes.y_axis.dot(n), self.axes.z_axis.dot(n));
         let round = |bottom: f64, top: f64, half: f64| {
-            let len = m.x.hypot(m.y);
+            let len = (m.x * m.x + m.y * m.y).sqrt();
             let above = top * len + half * m.z >= bottom * len - half * m.z;
             let (r, z) = if above { (top, half) } else { (bottom, -half) };
             let k = if len > 0.0 { r / len } else { 0.0 };
