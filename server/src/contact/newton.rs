@@ -205,10 +205,10 @@ impl Problem<'_> {
         /// Squared residual of rounding.
         const MET: f64 = 1e-28;
         let n = active.len() + 4;
-        let (mut f, mut jac) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
+        let mut f = [0.0; MAX_UNKNOWNS];
         let mut last = f64::INFINITY;
         for _ in 0..STEPS {
-            jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
+            let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
             let square = self.fill(active, x, t, lambda, level, &mut f, &mut jac);
             if square <= MET {
                 return Ok((x, t));

@@ -4,10 +4,11 @@
 //! against anything; side against side (the two directions that are normals of both); apex against side, rim and apex;
 //! rim against side (one angle); rim against rim (Newton on the sphere).
 
-use super::directions::{rim_point, rim_rim, ruled_point, ruled_rim, ruled_ruled};
-use super::{Best, Round};
-use crate::math::tolerance::NEARLY_TOUCHING;
+use super::directions::{Rim, rim_point, rim_rim, ruled_point, ruled_rim, ruled_ruled};
+use super::{Best, Convex, Round};
+use crate::math::{any_perpendicular, tolerance::NEARLY_TOUCHING};
 use glam::DVec3;
+use std::f64::consts::TAU;
 
 /// Offers every configuration of a pair in general position.
 pub(super) fn general(a: &Round, b: &Round, best: &mut Best) {
@@ -47,4 +48,45 @@ pub(super) fn general(a: &Round, b: &Round, best: &mut Best) {
             best.offer_all(&mut list);
         }
     }
+
+    // Newton may stop at a kink, where a rim's plane is square to n. The nearest point of one rim to the other body is a
+    // question in one angle, with the exact distance of a point.
+    if best.value <= NEAR_A_KINK * (a.half() + b.half()) {
+        for (own, other, sign) in [(a, best.b, -1.0), (b, best.a, 1.0)] {
+            for rim in own.rims() {
+                let start = nearest_of_rim(&rim, other) * sign;
+                best.offer(start);
+                let rims = if sign < 0.0 { b.rims() } else { a.rims() };
+                let from: Vec<DVec3> = rims
+                    .map(|r| if sign < 0.0 { rim_rim(&rim, &r, start) } else { rim_rim(&r, &rim, start) })
+                    .collect();
+                list.extend(from);
+                best.offer_all(&mut list);
+            }
+        }
+    }
+}
+
+/// Separations below this fraction of the heights are asked along the rims too.
+const NEAR_A_KINK: f64 = 1e-2;
+
+/// Unit gradient of the distance to a body at the point of a rim that is nearest to it: samples, then a golden section.
+fn nearest_of_rim(rim: &Rim, body: &Convex) -> DVec3 {
+    const STEPS: usize = 64;
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let e = any_perpendicular(rim.axis);
+    let f = rim.axis.cross(e);
+    let at = |angle: f64| {
+        let (s, c) = angle.sin_cos();
+        body.distance(rim.center + (e * c + f * s) * rim.radius)
+    };
+    let step = TAU / STEPS as f64;
+    let nearest = (0..STEPS).map(|k| (at(k as f64 * step).0, k)).min_by(|x, y| x.0.total_cmp(&y.0));
+    let middle = nearest.map_or(0.0, |n| n.1 as f64 * step);
+    let (mut lo, mut hi) = (middle - step, middle + step);
+    while hi - lo > 1e-9 {
+        let (p, q) = (hi - GOLDEN * (hi - lo), lo + GOLDEN * (hi - lo));
+        if at(p).0 < at(q).0 { hi = q } else { lo = p }
+    }
+    at(0.5 * (lo + hi)).1
 }
