@@ -1,1 +1,16 @@
-//! Harnesses shared by the benchmarks.
+//! What the benchmarks share: options, races of contestants in interleaved blocks, tables with CSV, the peers' shapes.
+//!
+//! `cargo run --release -p contactd-benches --bin kernels|parts [-- --quick] [--csv DIR]`. Each prints a
+//! table and writes it as CSV, counts beside times. Every time stands beside that of a peer measured in the same run, in
+//! blocks that alternate with its own; what is compared is the ratio. Nothing depends on a time but what is printed.
+//!
+//! Peers: parry and rapier in double precision (`parry3d-f64`, `rapier3d-f64`), built as this crate is, their shapes built
+//! outside the timer.
+#![forbid(unsafe_code)]
+
+pub mod facets;
+pub mod options;
+pub mod peer;
+pub mod queries;
+pub mod race;
+pub mod table;

@@ -5,6 +5,7 @@ pub mod engine;
 pub mod fuzz;
 pub mod judge;
 pub mod openscad;
+pub mod primitive_pairs;
 pub mod random_solids;
 pub mod reference;
 pub mod scenes;

@@ -5,43 +5,10 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{Outcome, Status};
-use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
-use contactd_tests::judge::folder;
+use contactd_tests::primitive_pairs::{FAMILIES, rows};
 use contactd_tests::reference::{Effort, Verdict};
-use contactd_tests::scenes::{Recipe, Scene};
-use glam::{DQuat, DVec3};
-use std::collections::HashMap;
-
-/// Scene and known time of each row; negative: never.
-fn rows(file: &str) -> Vec<(Scene, f64)> {
-    let path = folder().join("primitive_pairs").join(file).with_extension("csv");
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().expect("a head").split(',').collect();
-    let row = |line: &str| {
-        let cells: HashMap<&str, &str> = head.iter().copied().zip(line.split(',')).collect();
-        let number = |key: String| -> f64 { cells[key.as_str()].parse().expect("a number") };
-        let vector = |o: &str, k: &str| DVec3::from(["x", "y", "z"].map(|e| number(format!("{o}_{k}{e}"))));
-        let body = |o: &str| {
-            let [d0, d1, d2] = ["d0", "d1", "d2"].map(|d| number(format!("{o}_{d}")));
-            let solid = match cells[format!("{o}_kind").as_str()] {
-                "sphere" => Recipe::sphere(d0),
-                "cylinder" => Recipe::cylinder(d0, d1),
-                "cone" => Recipe::cone(d0, 0.0, d1),
-                "box" => Recipe::cuboid(d0, d1, d2),
-                kind => panic!("{kind}"),
-            };
-            let q = vector(o, "q");
-            let rotation = DQuat::from_xyzw(q.x, q.y, q.z, number(format!("{o}_qw"))).normalize();
-            let start = Pose::new(vector(o, ""), rotation);
-            (solid, Motion::turning(start, start.position + vector(o, "v"), vector(o, "w")))
-        };
-        let ((a, motion_a), (b, motion_b)) = (body("a"), body("b"));
-        (Scene::new("pair", a, motion_a, b, motion_b), number("time".into()))
-    };
-    lines.map(row).collect()
-}
+use contactd_tests::scenes::Scene;
 
 fn size(scene: &Scene) -> f64 {
     scene.delta() / 1e-9
@@ -117,7 +84,7 @@ fn check(file: &str) {
 macro_rules! files {
     ($($file:ident),+ $(,)?) => {
         $(#[test] fn $file() { check(stringify!($file)); })+
-        const FILES: &[&str] = &[$(stringify!($file)),+];
+        #[test] fn every_family_has_its_test() { assert_eq!(FAMILIES, [$(stringify!($file)),+]); }
     };
 }
 
@@ -144,7 +111,7 @@ files!(
 
 #[test]
 fn the_reference_agrees_with_the_known_times() {
-    for file in FILES {
+    for file in FAMILIES {
         for (i, (scene, time)) in rows(file).into_iter().enumerate().step_by(17) {
             let truth = scene.truth(Effort::QUICK);
             assert_eq!(truth.verdict == Verdict::Contact, time >= 0.0, "{file} row {i}: known {time}, {truth:?}");

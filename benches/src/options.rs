@@ -1,0 +1,65 @@
+//! The command line that all benchmarks share.
+
+use clap::{Parser, ValueEnum};
+use contactd::contact::Ideas;
+use std::path::PathBuf;
+
+/// An idea of the search that can be switched off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Idea {
+    /// Stage 1: the collision region by S-bounds.
+    Region,
+    /// Stage 2: candidates from the walk of both octrees.
+    Walk,
+    /// Same-shape fits.
+    Fits,
+    /// Curved faces touched where a contact was found.
+    Hints,
+    /// Whole convex primitives answered in front of the search.
+    Direct,
+}
+
+/// Options of a benchmark.
+#[derive(Clone, Debug, Parser)]
+pub struct Options {
+    /// The short form: fewer cases and blocks, below 20 seconds.
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder for the CSV file; by default `benches` in cargo's target folder.
+    #[arg(long, value_name = "DIR")]
+    pub csv: Option<PathBuf>,
+    /// An idea of the search to switch off; may be given several times.
+    #[arg(long, value_name = "IDEA")]
+    pub without: Vec<Idea>,
+}
+
+impl Options {
+    /// The ideas that are left on.
+    pub fn ideas(&self) -> Ideas {
+        let mut ideas = Ideas::default();
+        for idea in &self.without {
+            match idea {
+                Idea::Region => ideas.region = false,
+                Idea::Walk => ideas.walk = false,
+                Idea::Fits => ideas.fits = false,
+                Idea::Hints => ideas.hints = false,
+                Idea::Direct => ideas.direct = false,
+            }
+        }
+        ideas
+    }
+
+    /// `full`, or `quick` in the short form.
+    pub fn pick<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    /// The folder for CSV files.
+    pub fn folder(&self) -> PathBuf {
+        self.csv.clone().unwrap_or_else(|| {
+            // The program lies in TARGET/release.
+            let program = std::env::current_exe().unwrap_or_default();
+            program.parent().and_then(|p| p.parent()).map_or_else(|| "target".into(), PathBuf::from).join("benches")
+        })
+    }
+}

@@ -1,0 +1,109 @@
+//! Contestants timed against each other on the same cases.
+//!
+//! A machine's speed changes from second to second, with its clock and with its neighbours. So the contestants alternate
+//! in short blocks, each block's ratio is of neighbours in time, and the median over the blocks is what counts.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+/// How long a race is.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    /// Blocks of each contestant on each case.
+    pub blocks: usize,
+    /// A block repeats its call until it has lasted this long by estimate: far above what the clock costs.
+    pub least: Duration,
+}
+
+/// Seconds a call of the two contestants on one case: medians over the blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Lap {
+    /// The first one's.
+    pub own: f64,
+    /// The second one's.
+    pub peer: f64,
+    /// Median over the blocks of own / peer.
+    pub ratio: f64,
+}
+
+/// Runs both contestants on the cases 0..n, in blocks that alternate; the case is the innermost, so that no contestant
+/// learns one by heart.
+pub fn race<A, B>(plan: Plan, n: usize, mut own: impl FnMut(usize) -> A, mut peer: impl FnMut(usize) -> B) -> Vec<Lap> {
+    // The warm-up tells how often a call must be repeated.
+    let repeats: Vec<[u32; 2]> =
+        (0..n).map(|i| [repeats(plan.least, || own(i)), repeats(plan.least, || peer(i))]).collect();
+    let mut times = vec![Vec::with_capacity(plan.blocks); n];
+    for block in 0..plan.blocks {
+        for i in 0..n {
+            let pair = if (block + i) % 2 == 0 {
+                let first = timed(repeats[i][0], || own(i));
+                [first, timed(repeats[i][1], || peer(i))]
+            } else {
+                let second = timed(repeats[i][1], || peer(i));
+                [timed(repeats[i][0], || own(i)), second]
+            };
+            times[i].push(pair);
+        }
+    }
+    times
+        .iter()
+        .map(|t| Lap {
+            own: median(t.iter().map(|p| p[0])),
+            peer: median(t.iter().map(|p| p[1])),
+            ratio: median(t.iter().map(|p| p[0] / p[1])),
+        })
+        .collect()
+}
+
+fn repeats<R>(least: Duration, call: impl FnMut() -> R) -> u32 {
+    let once = timed(1, call);
+    ((least.as_secs_f64() / once.max(1e-8)).ceil() as u32).clamp(1, 10_000)
+}
+
+/// Seconds a call, over `n` calls.
+fn timed<R>(n: u32, mut call: impl FnMut() -> R) -> f64 {
+    let from = Instant::now();
+    for _ in 0..n {
+        black_box(call());
+    }
+    from.elapsed().as_secs_f64() / f64::from(n)
+}
+
+/// The `q` quantile (0..1) of some numbers: the smallest that at least that share does not exceed; NaN when there are none.
+pub fn quantile(values: impl IntoIterator<Item = f64>, q: f64) -> f64 {
+    let mut all: Vec<f64> = values.into_iter().collect();
+    all.sort_by(f64::total_cmp);
+    let rank = (q * all.len() as f64).ceil() as usize;
+    all.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
+/// The median.
+pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The largest number.
+pub fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
+    quantile(values, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_of_the_sorted_values() {
+        let v = || [5.0, 1.0, 4.0, 2.0, 3.0];
+        assert_eq!((median(v()), worst(v()), quantile(v(), 0.2), quantile(v(), 0.21)), (3.0, 5.0, 1.0, 2.0));
+        assert!(median([]).is_nan());
+    }
+
+    #[test]
+    fn every_case_is_called_in_every_block() {
+        let (mut own, mut peer) = ([0; 3], [0; 3]);
+        let plan = Plan { blocks: 4, least: Duration::ZERO };
+        let laps = race(plan, 3, |i| own[i] += 1, |i| peer[i] += 1);
+        assert_eq!((own, peer, laps.len()), ([5; 3], [5; 3], 3));
+        assert!(laps.iter().all(|l| l.own > 0.0 && l.ratio > 0.0));
+    }
+}

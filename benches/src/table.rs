@@ -1,0 +1,150 @@
+//! Tables for people, and the same numbers as CSV for plots.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// One value of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// A word.
+    Text(String),
+    /// A number; NaN is shown as "-" and left empty in CSV.
+    Number(f64),
+}
+
+impl From<&str> for Cell {
+    fn from(s: &str) -> Self {
+        Self::Text(s.into())
+    }
+}
+impl From<String> for Cell {
+    fn from(s: String) -> Self {
+        Self::Text(s)
+    }
+}
+impl From<f64> for Cell {
+    fn from(x: f64) -> Self {
+        Self::Number(x)
+    }
+}
+impl From<usize> for Cell {
+    fn from(n: usize) -> Self {
+        Self::Number(n as f64)
+    }
+}
+impl From<u64> for Cell {
+    fn from(n: u64) -> Self {
+        Self::Number(n as f64)
+    }
+}
+
+impl Cell {
+    /// Three significant digits, or all of a count.
+    fn shown(&self) -> String {
+        match self {
+            Cell::Text(s) => s.clone(),
+            Cell::Number(x) if x.is_nan() => "-".into(),
+            Cell::Number(x) if *x == 0.0 => "0".into(),
+            Cell::Number(x) if x.fract() == 0.0 && x.abs() < 1e9 => format!("{x:.0}"),
+            Cell::Number(x) if x.abs() < 1e-3 || x.abs() >= 1e7 => format!("{x:.1e}"),
+            Cell::Number(x) => {
+                let digits = (2 - x.abs().log10().floor() as i32).max(0) as usize;
+                format!("{x:.digits$}")
+            }
+        }
+    }
+
+    fn csv(&self) -> String {
+        match self {
+            Cell::Text(s) if s.contains([',', '"', '\n']) => format!("\"{}\"", s.replace('"', "\"\"")),
+            Cell::Text(s) => s.clone(),
+            Cell::Number(x) if x.is_nan() => String::new(),
+            Cell::Number(x) => format!("{x}"),
+        }
+    }
+}
+
+/// A row of cells from values of different types.
+#[macro_export]
+macro_rules! row {
+    ($($value:expr),+ $(,)?) => { vec![$($crate::table::Cell::from($value)),+] };
+}
+
+/// A table with named columns.
+#[derive(Clone, Debug)]
+pub struct Table {
+    columns: Vec<&'static str>,
+    rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(columns: &[&'static str]) -> Self {
+        Self { columns: columns.to_vec(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: Vec<Cell>) {
+        assert_eq!(row.len(), self.columns.len(), "a row has as many cells as the table has columns");
+        self.rows.push(row);
+    }
+
+    /// As text: words to the left, numbers to the right.
+    pub fn text(&self) -> String {
+        let shown: Vec<Vec<String>> = self.rows.iter().map(|r| r.iter().map(Cell::shown).collect()).collect();
+        let width = |k: usize| shown.iter().map(|r| r[k].chars().count()).chain([self.columns[k].len()]).max();
+        let widths: Vec<usize> = (0..self.columns.len()).map(|k| width(k).unwrap_or(0)).collect();
+        let is_text = |k: usize| self.rows.iter().any(|r| matches!(r[k], Cell::Text(_)));
+        let mut out = String::new();
+        let mut line = |cells: &[&str]| {
+            let mut text = String::new();
+            for (k, cell) in cells.iter().enumerate() {
+                let w = widths[k];
+                let _ = if is_text(k) { write!(text, "{cell:<w$}  ") } else { write!(text, "{cell:>w$}  ") };
+            }
+            out.push_str(text.trim_end());
+            out.push('\n');
+        };
+        line(&self.columns);
+        for row in &shown {
+            line(&row.iter().map(String::as_str).collect::<Vec<_>>());
+        }
+        out
+    }
+
+    /// As CSV, all digits.
+    pub fn csv(&self) -> String {
+        let mut out = self.columns.join(",") + "\n";
+        for row in &self.rows {
+            out += &(row.iter().map(Cell::csv).collect::<Vec<_>>().join(",") + "\n");
+        }
+        out
+    }
+
+    /// Prints the table and writes `NAME.csv` into a folder.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn publish(&self, name: &str, folder: &Path) -> std::io::Result<()> {
+        print!("{}", self.text());
+        std::fs::create_dir_all(folder)?;
+        let path = folder.join(name).with_extension("csv");
+        std::fs::write(&path, self.csv())?;
+        println!("written: {}", path.display());
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_lines_up_and_its_csv_keeps_all_digits() {
+        let mut t = Table::new(&["case", "us", "cells"]);
+        t.push(row!["a, b", 0.123456, 7usize]);
+        t.push(row!["c", f64::NAN, 1234u64]);
+        assert_eq!(t.text(), "case     us  cells\na, b  0.123      7\nc         -   1234\n");
+        assert_eq!(t.csv(), "case,us,cells\n\"a, b\",0.123456,7\nc,,1234\n");
+    }
+}
