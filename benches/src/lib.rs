@@ -1,6 +1,6 @@
 //! What the benchmarks share: options, races of contestants in interleaved blocks, tables with CSV, the peers' shapes.
 //!
-//! `cargo run --release -p contactd-benches --bin kernels|parts [-- --quick] [--csv DIR]`. Each prints a
+//! `cargo run --release -p contactd-benches --bin kernels|parts|scene|model|latency [-- --quick] [--csv DIR]`. Each prints a
 //! table and writes it as CSV, counts beside times. Every time stands beside that of a peer measured in the same run, in
 //! blocks that alternate with its own; what is compared is the ratio. Nothing depends on a time but what is printed.
 //!
@@ -13,4 +13,6 @@ pub mod options;
 pub mod peer;
 pub mod queries;
 pub mod race;
+pub mod raw;
+pub mod socket;
 pub mod table;
