@@ -29,6 +29,8 @@ const MAX_CLAUSES: u32 = 96;
 const ROUNDS: usize = 5;
 /// Weight of a concave literal's own cost in the choice of the axis to split, whether it holds the bound or not.
 const IDLE_COST: f64 = 0.25;
+/// The same where a fit stands for the literal, which costs more of what matters.
+const FITTED_COST: f64 = 0.02;
 /// How far beyond the end of its reach a clause is looked at, in cell radii of relative motion.
 const LOOK_BEYOND: f64 = 0.02;
 
@@ -135,7 +137,12 @@ pub fn advance(
             run.take(side, range);
         }
     }
-    run.bound(0)
+    let mut found = run.bound(0);
+    if run.left == 0 {
+        // Clauses are missing: what the last one cost says nothing about the cell, its longest axis is halved.
+        found.cost = view.half;
+    }
+    found
 }
 
 struct Run<'a, 'p> {
@@ -427,7 +434,9 @@ impl Run<'_, '_> {
         // A concave literal that stands aside may do so only because the cell is too large for it.
         for l in &self.scratch.lits {
             if l.id.sense() == Sense::Negative {
-                a.cost += l.cost * IDLE_COST;
+                let key = Some((l.side, l.id));
+                let fitted = self.scratch.lits.iter().any(|o| o.other == key);
+                a.cost += l.cost * if fitted { FITTED_COST } else { IDLE_COST };
             }
         }
         a.cost += (w.abs() + turn.abs() * dt.max(0.0)) * self.view.half;

@@ -334,6 +334,19 @@ impl<'a> Search<'a> {
             let pair = clause::Pair { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
         };
+        if std::env::var_os("TRACE").is_some() {
+            eprintln!(
+                "TR t {:.9} half {:.5?} h {:.1e} dt {:.2e} goal {:.9} sup {:?} lits {} c {:.6?}",
+                cell.t,
+                cell.half.to_array(),
+                h,
+                found.dt,
+                self.goal(),
+                found.support.iter().map(|l| (l.0, l.1, (l.2 * 1e3) as i32)).collect::<Vec<_>>(),
+                0,
+                cell.center.to_array()
+            );
+        }
         if one_sided {
             // At the start only: exclusion now suffices. Inside A nothing first happens later; inside B not before h.
             if found.dt >= 0.0 {
@@ -463,8 +476,18 @@ impl<'a> Search<'a> {
         // A fit weighs both of its literals: together they are 1 again.
         let total: f64 = advance.support.iter().map(|l| l.2).sum();
         let lambda: Vec<_> = advance.support.iter().map(|l| l.2 / total).collect();
-        if self.polish(active, x, t, lambda) {
+        if self.polish(active.clone(), x, t, lambda.clone()) {
             return;
+        }
+        // A surface that touches there too with next to no weight (a rim that lies almost in a face) is not in the
+        // support, but without it the system has its solution elsewhere.
+        if active.len() < super::newton::MAX_ACTIVE {
+            for close in self.closest_others(cell, &active, x, &self.task.relative.at(t)).into_iter().flatten() {
+                let more = active.iter().copied().chain([close]).collect();
+                if self.polish(more, x, t, lambda.iter().copied().chain([0.0]).collect()) {
+                    return;
+                }
+            }
         }
         // A cone whose apex is near: the apex is a vertex of its own.
         let apex_of = |l: &(Side, LiteralId, f64)| {
@@ -493,6 +516,29 @@ impl<'a> Search<'a> {
             let (active, lambda) = vertex(&l).chain(vertex(&m)).unzip();
             self.polish(active, apex, t, lambda);
         }
+    }
+
+    /// The two literals of a cell, other than `active`, whose surfaces are nearest to x: no farther than the cell is large.
+    fn closest_others(&self, cell: &Cell, active: &[Constraint], x: DVec3, at: &Instant) -> [Option<Constraint>; 2] {
+        let mut nearest = [(2.0 * cell.half.length(), None); 2];
+        for (side, solid, range, y) in
+            [(Side::A, self.task.a, cell.a, x), (Side::B, self.task.b, cell.b, at.b_point(x))]
+        {
+            for id in local::literals(&self.scratch.pool[range.0 as usize..range.1 as usize]) {
+                let constraint = Constraint::Literal(side, id);
+                let Some(face) = solid.faces.get(id.face() as usize) else { continue };
+                if active.contains(&constraint) || nearest.iter().any(|n| n.1 == Some(constraint)) {
+                    continue;
+                }
+                let distance = face.value(y).abs();
+                if distance < nearest[0].0 {
+                    nearest = [(distance, Some(constraint)), nearest[0]];
+                } else if distance < nearest[1].0 {
+                    nearest[1] = (distance, Some(constraint));
+                }
+            }
+        }
+        [nearest[0].1, nearest[1].1]
     }
 
     /// True when the multiplied normals of every apex in a solution lie in its normal cone: within the right angle less
