@@ -8,7 +8,7 @@ use contactd::contact::{Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd_proto::{Motion, Pose};
-use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
+use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences};
 use contactd_tests::scenes::{Recipe, Scene};
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
@@ -26,12 +26,6 @@ fn scene(a: Recipe, motion_a: Motion, b: Recipe, motion_b: Motion) -> Scene {
     Scene::new("hard", a, motion_a, b, motion_b)
 }
 
-fn ceiling(name: &str) -> u64 {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("cell_ceilings.toml");
-    let table: toml::Table = std::fs::read_to_string(path).expect("cell_ceilings.toml").parse().expect("valid TOML");
-    table.get(name).and_then(toml::Value::as_integer).unwrap_or_else(|| panic!("no ceiling for {name}")) as u64
-}
-
 fn answer(name: &str, scene: &Scene) -> Outcome {
     // The stages themselves; a whole-primitive answer in front of them must say the same.
     let o = ask_scene_with(scene, SEARCH_ALONE);
@@ -43,7 +37,7 @@ fn answer(name: &str, scene: &Scene) -> Outcome {
     if std::env::var_os("CONTACTD_RECORD").is_some() {
         println!("RECORD {name} = {}", 2 * o.counters.cells.max(4));
     } else {
-        let most = ceiling(name);
+        let most = cell_ceiling(name);
         assert!(o.counters.cells <= most, "{name}: {} cells, ceiling {most}", o.counters.cells);
     }
     o

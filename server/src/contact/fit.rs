@@ -24,6 +24,7 @@
 //! |ä| <= |omega||b| + |spin_A×spin_B|. A spin about the face's own axis enters none of these.
 
 use super::literal::{Linear, Side, View};
+use crate::motion::Instant;
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Sense};
 use glam::DVec3;
@@ -100,6 +101,29 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
         rigid: false,
         cost,
     })
+}
+
+/// Where two like faces meet first when their axes or centres drift apart: on `p` in the direction in which it is off
+/// `q`'s axis (or moves off it) at the height of `x`. In A's frame; a start for Newton where the bounds leave the direction
+/// open. `None` for a plane.
+pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVec3) -> Option<DVec3> {
+    let on_axis = |side: Side, face: &Face| {
+        let y = if side == Side::A { x } else { at.b_point(x) };
+        let (o, axis, radius) = match *face {
+            Face::Sphere { center, radius } => (center, None, radius),
+            Face::Cylinder { origin, axis, radius } => (origin, Some(axis), radius),
+            Face::Cone { apex, axis, sin, cos } => (apex, Some(axis), (y - apex).dot(axis).max(0.0) * sin / cos),
+            Face::Plane { .. } => return None,
+        };
+        let o = axis.map_or(o, |a| o + a * (y - o).dot(a));
+        Some(if side == Side::A { (o, axis, radius) } else { (at.a_point(o), axis.map(|a| at.a_vector(a)), radius) })
+    };
+    let side_q = if side_p == Side::A { Side::B } else { Side::A };
+    let ((o_p, axis, radius), (o_q, ..)) = (on_axis(side_p, p)?, on_axis(side_q, q)?);
+    let off = |v: DVec3| axis.map_or(v, |a| v - a * v.dot(a));
+    let (apart, way) = (off(o_p - o_q), off(at.velocity(x)) * if side_p == Side::A { 1.0 } else { -1.0 });
+    let direction = if apart.length() > 1e-6 * radius { apart } else { way };
+    Some(o_p + direction.try_normalize()? * radius)
 }
 
 /// The bound of a sphere in a cylinder, its convex part (y·a_q)²/(4R̄) touched at another point `y` of the cell.

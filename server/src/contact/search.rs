@@ -11,6 +11,7 @@
 //! witness found there restarts the search at 2 delta, then means overlap.
 
 use super::clause::{self, Advance, Hint};
+use super::fit;
 use super::literal::{Faces, Side, View};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::Counters;
@@ -478,6 +479,22 @@ impl<'a> Search<'a> {
         let lambda: Vec<_> = advance.support.iter().map(|l| l.2 / total).collect();
         if self.polish(active.clone(), x, t, lambda.clone()) {
             return;
+        }
+        // Two like faces in a fit: their bound leaves open in which direction they meet.
+        if let [p, q] = advance.support[..] {
+            let (p, q) = if p.1.sense() == Sense::Positive { (p, q) } else { (q, p) };
+            let face = |l: &(Side, LiteralId, f64)| {
+                let solid = if l.0 == Side::A { self.task.a } else { self.task.b };
+                &solid.faces[l.1.face() as usize]
+            };
+            let later = self.task.relative.at(t);
+            if q.1.sense() == Sense::Negative
+                && p.0 != q.0
+                && let Some(x) = fit::first_off_axis(&later, (p.0, face(&p)), face(&q), x)
+                && self.polish(active.clone(), x, t, lambda.clone())
+            {
+                return;
+            }
         }
         // A surface that touches there too with next to no weight (a rim that lies almost in a face) is not in the
         // support, but without it the system has its solution elsewhere.
