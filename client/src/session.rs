@@ -30,7 +30,10 @@ pub struct StepOptions {
     /// Most records, the earliest first; 0: all.
     pub max_records: u32,
     /// Most cells that one pair's search may refine; 0: the server's default.
-    pub cell_limit: u64,
+    pub cell_limit: u32,
+    /// Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
+    /// undecided, the latest first.
+    pub batch_limit: u32,
 }
 
 impl Default for StepOptions {
@@ -44,6 +47,7 @@ impl Default for StepOptions {
             polling: false,
             max_records: 0,
             cell_limit: 0,
+            batch_limit: 0,
         }
     }
 }
@@ -305,6 +309,7 @@ impl<T: Transport> Session<T> {
             advance: o.advance,
             dt: o.dt,
             cell_limit: o.cell_limit,
+            batch_limit: o.batch_limit,
             max_records: o.max_records,
             records: self.transport.loaned().len() as u32,
         };

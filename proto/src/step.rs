@@ -32,7 +32,10 @@ pub struct StepRequest {
     /// Duration of the step in seconds, for objects with a declared largest speed; 0: unknown.
     pub dt: f64,
     /// Most cells that one pair's search may refine; 0: the server's default.
-    pub cell_limit: u64,
+    pub cell_limit: u32,
+    /// Most cells that all searches of the step may refine together; what may meet earliest comes first, the rest stays
+    /// undecided. 0: the server's default.
+    pub batch_limit: u32,
     /// Most contact records of the reply, the earliest first; 0: no cap.
     pub max_records: u32,
     /// Records of the slice that count.

@@ -305,6 +305,7 @@ impl Placed<'_> {
             center_b: self.at.b_point(self.center),
             velocity: self.at.velocity(self.center),
             delta: self.task.delta,
+            rounding: self.task.rounding,
             fits: self.task.ideas.fits,
         }
     }

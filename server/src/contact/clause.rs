@@ -399,9 +399,9 @@ impl Run<'_, '_> {
             let l = &self.scratch.lits[i as usize];
             c.value += lambda * (l.bound - self.rounding);
             c.w += lambda * l.normal;
-            c.rate += lambda * (l.rate - l.s);
+            c.rate += lambda * (l.rate - l.s - v.motion.slip);
             c.turn += lambda * l.turn;
-            c.q += lambda * l.q;
+            c.q += lambda * (l.q + v.motion.bend);
             if l.rigid {
                 w_b += lambda * l.normal;
             }

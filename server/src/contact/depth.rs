@@ -39,6 +39,7 @@ pub fn deepest(task: &Task, at: &Instant, start: DVec3) -> (DVec3, DVec3, f64, V
             center_b: at.b_point(x),
             velocity: DVec3::ZERO,
             delta: -best,
+            rounding: 0.0,
             fits: false,
         };
         let mut pool: Vec<Token> = Vec::new();

@@ -54,20 +54,24 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
     if a_p.is_some() && (r_p - r_q).abs() > 0.5 * SIMILAR * twice_mean {
         return None;
     }
-    // Along A's axes: offset of the centre from the face's centre or axis, and the axis.
+    // Along A's axes: offset of the centre from the face's centre or axis, and the axis; how far off the face's own point is.
     let place = |side: Side, o: DVec3, a: Option<DVec3>| {
         let (mut s, mut axis) = match side {
             Side::A => (view.center - o, a),
             Side::B => (view.at.a_vector(view.center_b - o), a.map(|a| view.at.a_vector(a))),
         };
+        let arm = s.length();
         if let Some(a) = &mut axis {
             *a = a.normalize();
             s -= *a * s.dot(*a);
         }
-        (s, axis)
+        (s, axis, arm)
     };
-    let (u_p, a_p) = place(side_p, o_p, a_p);
-    let (u_q, a_q) = place(side_q, o_q, a_q);
+    let (u_p, a_p, arm_p) = place(side_p, o_p, a_p);
+    let (u_q, a_q, arm_q) = place(side_q, o_q, a_q);
+    // What rounding may do to u and, times the arm, to an axis; and through them to G over the cell.
+    let off = view.rounding + view.motion.rounding.matrix * (arm_p + arm_q + view.radius);
+    let lost = off * (1.0 + (u_p.length() + u_q.length() + 2.0 * view.radius) / twice_mean);
     // The quadratic part of |u_p|² − |u_q|² over the cell: (y·a_q)² − (y·a_p)² = (y·(a_q−a_p))(y·(a_q+a_p)).
     let (lean, sum) = match (a_p, a_q) {
         (None, _) => (DVec3::ZERO, DVec3::ZERO),
@@ -82,11 +86,11 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
     let extent = |v: DVec3| v.abs().dot(e);
     let difference = u_p - u_q;
     let g = difference.dot(u_p + u_q) / (2.0 * twice_mean) + 0.5 * (r_q - r_p) + delta;
-    let bound = g - extent(lean) * extent(sum) / (2.0 * twice_mean);
+    let bound = g - extent(lean) * extent(sum) / (2.0 * twice_mean) - lost;
     let cost = (lean.abs() * extent(sum) + sum.abs() * extent(lean)) * e / (2.0 * twice_mean);
     let normal = difference / twice_mean;
     let (sigma, u, axis) = if side_p == Side::B { (1.0, u_p, a_p) } else { (-1.0, u_q, a_q) };
-    let m = moving(view, sigma, u, axis)?;
+    let m = moving(view, sigma, u, axis, off)?;
     Some(Linear {
         side: side_p,
         id: p,
@@ -134,7 +138,9 @@ pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
     let axis = if side_q == Side::A { axis } else { view.at.a_vector(axis) };
     let (twice_mean, z) = (r_p + r_q, y.dot(axis));
     let normal = fit.normal + axis * (z / twice_mean);
-    Some(Linear { normal, bound: fit.bound - z * z / (2.0 * twice_mean), ..*fit })
+    // |∇G| is no longer 1 or less: its rounding, and that of z.
+    let lost = view.rounding * (z.abs() + 2.0 * view.radius) / twice_mean;
+    Some(Linear { normal, bound: fit.bound - z * z / (2.0 * twice_mean) - lost, ..*fit })
 }
 
 /// The bound of a cone in a cone hole of (nearly) the same angle and direction. With common axis a and angle α,
@@ -172,16 +178,17 @@ fn cones(
     let delta = (o_b - o_a) * sign;
     let across = |v: DVec3| (v - a * v.dot(a)).length();
     let tilt = 0.5 * far * (sin + cos);
+    let lost = view.rounding + view.motion.rounding.matrix * 2.0 * far;
     Some(Linear {
         side: side_p,
         id: p,
         other: Some((side_q, q)),
         point: DVec3::ZERO,
         normal: DVec3::ZERO,
-        bound: 0.5 * (sin * delta.dot(a) - cos * across(delta)) + view.delta - tilt * lean - 0.5 * far * angle,
+        bound: 0.5 * (sin * delta.dot(a) - cos * across(delta)) + view.delta - tilt * lean - 0.5 * far * angle - lost,
         rate: -0.5 * sign * sin * apex_motion.w.dot(a),
         turn: DVec3::ZERO,
-        s: 0.5 * cos * across(apex_motion.w) + tilt * spin_max,
+        s: 0.5 * cos * across(apex_motion.w) + tilt * spin_max + apex_motion.slip,
         q: 0.5 * (sin + cos) * apex_motion.pull,
         rigid: false,
         cost: view.half * (lean + angle),
@@ -198,6 +205,8 @@ struct Travel {
     growth: f64,
     /// |s̈| over the span.
     pull: f64,
+    /// What rounding may do to w.
+    slip: f64,
 }
 
 impl Travel {
@@ -206,9 +215,12 @@ impl Travel {
         let spin_a = at.omega + at.spin_b;
         let arm = o - at.center_a + at.d; // o − p_B
         let w = at.velocity(o);
-        let growth = spin_a.cross(at.v0).length() + at.omega.length() * at.spin_b.cross(arm).length();
-        let pull = growth + spin_a.cross(w).length() + h * spin_a.length() * growth;
-        Self { w, speed: w.length() + h * growth, growth, pull }
+        let (rate, omega, spin_b) = (view.motion.rounding.rate, at.omega.length(), at.spin_b.length());
+        let slip = rate * (at.v0.length() + spin_b * at.d.length() + omega * (o - at.center_a).length());
+        let off = rate * spin_a.length() * at.v0.length() + omega * (rate * spin_b * arm.length());
+        let growth = spin_a.cross(at.v0).length() + at.omega.length() * at.spin_b.cross(arm).length() + off;
+        let pull = growth + spin_a.cross(w).length() + spin_a.length() * (slip + h * growth);
+        Self { w, speed: w.length() + slip + h * growth, growth, pull, slip }
     }
 }
 
@@ -222,24 +234,28 @@ struct Moving {
     second: f64,
 }
 
-fn moving(view: &View, sigma: f64, u: DVec3, axis: Option<DVec3>) -> Option<Moving> {
+/// `off`: what rounding may do to u.
+fn moving(view: &View, sigma: f64, u: DVec3, axis: Option<DVec3>, off: f64) -> Option<Moving> {
     let (at, h, r) = (view.at, view.motion.h, view.radius);
     let (omega, spin_b) = (at.omega, at.spin_b);
     let spin_a = omega + spin_b;
-    let Travel { w, speed, growth: c, pull } = Travel::of(view, view.center - u);
+    let Travel { w, speed, growth: c, pull, slip } = Travel::of(view, view.center - u);
+    let lost = (u.length() + r) * slip + off * speed;
     let Some(a) = axis else {
         let reach = u.length() + r + h * speed;
         let second = if sigma > 0.0 { reach * pull } else { speed * speed + reach * pull };
-        return Some(Moving { rate: sigma * u.dot(w), turn: sigma * w, s: 0.0, second });
+        return Some(Moving { rate: sigma * u.dot(w), turn: sigma * w, s: lost, second });
     };
     let b = omega.cross(a);
-    let b_max = b.length() + h * omega.length() * spin_b.cross(a).length();
+    let rate = view.motion.rounding.rate;
+    let b_max = b.length() + h * omega.length() * spin_b.cross(a).length() + rate * omega.length();
     if h * b_max > 0.5 {
         return None;
     }
-    let a_max = omega.length() * b_max + spin_a.cross(spin_b).length();
+    let a_max = omega.length() * b_max + spin_a.cross(spin_b).length() + rate * spin_a.length() * spin_b.length();
     let across = w - a * w.dot(a);
-    let across_max = across.length() + h * (c + spin_b.cross(a).length() * speed);
+    let across_max =
+        across.length() + slip + h * (c + spin_b.cross(a).length() * speed + rate * spin_b.length() * speed);
     // |u| and |z| over cell and span; each feeds the other through the tilt, h·|b| <= 1/2.
     let z = (r + h * (speed + (u.length() + r + h * across_max) * b_max)) * 4.0 / 3.0;
     let reach = u.length() + r + h * (across_max + z * b_max);
@@ -249,6 +265,6 @@ fn moving(view: &View, sigma: f64, u: DVec3, axis: Option<DVec3>) -> Option<Movi
     } else {
         common + (across_max + z * b_max) * (across_max + z * b_max)
     };
-    let s = a.abs().dot(view.half) * b.abs().dot(view.half);
+    let s = a.abs().dot(view.half) * b.abs().dot(view.half) + lost + r * r * rate * omega.length();
     Some(Moving { rate: sigma * u.dot(w), turn: sigma * (across + a * u.dot(b)), s, second })
 }

@@ -12,6 +12,7 @@
 //! B's literals move: `rate` is d(value)/dt at the centre, `s` and `q` what the concave remainder adds per unit and per
 //! half squared unit of time (D grows at most with the speed bound V).
 
+use super::rounding;
 use crate::motion::{Bounds, Instant};
 use crate::solid::local::{LiteralId, Truth, truth_of};
 use crate::solid::{Face, Sense, Solid, face::FaceAt};
@@ -117,6 +118,8 @@ pub struct View<'a> {
     pub velocity: DVec3,
     /// Depth of the contact that is searched.
     pub delta: f64,
+    /// What rounding may do to a literal's plane over the cell: E, a length (`rounding::of_literals`).
+    pub rounding: f64,
     /// Same-shape fits are used.
     pub fits: bool,
 }
@@ -179,12 +182,12 @@ impl View<'_> {
             let h = self.motion.h;
             let way = self.motion.speed * h;
             let rate = f.normal.dot(self.velocity) * h;
-            let slack =
-                f.normal.cross(self.at.omega).length() * r * h + 0.5 * self.motion.curvature(self.at, f.normal) * h * h;
+            let pull = self.motion.curvature(self.at, f.normal) + self.motion.bend;
+            let slack = (f.normal.cross(self.at.omega).length() * r + self.motion.slip) * h + 0.5 * pull * h * h;
             lo = (lo - way).max(lo + rate.min(0.0) - slack);
             hi = if f.k == 0.0 { (hi + way).min(hi + rate.max(0.0) + slack) } else { hi + way };
         }
-        truth_of(id.sense(), (lo, hi), if faces.is_guard(id.face()) { 0.0 } else { self.delta })
+        truth_of(id.sense(), (lo, hi), if faces.is_guard(id.face()) { 0.0 } else { self.delta }, self.rounding)
     }
 
     /// The literal's linear bound, convex faces touched at `center + y`.
@@ -206,11 +209,14 @@ impl View<'_> {
         let mut normal = -f.normal;
         let (mut remainder, mut s, mut q, mut cost) = (0.0, 0.0, 0.0, DVec3::ZERO);
         if f.k > 0.0 {
+            // Extents and distance from the axis are each known to the rounding; R must not come out too small.
             let (d, radial, tangential) = self.extents(side, face, f.normal);
+            let (d, tangential) = (d + self.rounding, tangential + self.rounding);
+            let rho = (f.rho - self.rounding).max(0.0);
             let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
-            let closest = f.rho - radial - way;
+            let closest = rho - radial - way;
             // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
-            let slab = closest >= SLAB * f.rho && tangential * tangential * f.rho < d * d * closest;
+            let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
             let round = match *face {
                 Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
                     let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
@@ -224,8 +230,8 @@ impl View<'_> {
             } else {
                 round * self.half * self.half * (f.k / (2.0 * f.rho.max(0.5 * d)))
             };
-            if slab || d <= 2.0 * f.rho {
-                let (d, rho) = if slab { (tangential, closest) } else { (d, f.rho) };
+            if slab || d <= 2.0 * rho {
+                let (d, rho) = if slab { (tangential, closest) } else { (d, rho) };
                 remainder = f.k * d * d / (2.0 * rho);
                 s = f.k * self.motion.speed * d / rho;
                 q = f.k * self.motion.speed * self.motion.speed / rho;
@@ -253,7 +259,8 @@ impl View<'_> {
         if side == Side::B {
             f.normal = self.at.a_vector(f.normal);
         }
-        Linear { point, cost: self.bulge(side, face, &f), ..self.plane(side, id, f.normal, value + self.delta) }
+        let bound = value + self.delta - rounding::of_distance((center - point).length());
+        Linear { point, cost: self.bulge(side, face, &f), ..self.plane(side, id, f.normal, bound) }
     }
 
     /// A bound by a plane that is fixed in its body.

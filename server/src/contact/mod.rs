@@ -7,13 +7,14 @@ pub mod clause;
 pub mod closed;
 mod depth;
 mod direct;
-mod fit;
+pub mod fit;
 pub mod literal;
 pub mod lp;
 pub mod newton;
 pub mod outcome;
 pub mod pair;
 pub mod roots;
+pub mod rounding;
 pub mod search;
 mod stage2;
 #[cfg(test)]

@@ -107,6 +107,8 @@ pub struct PairSearch<'a> {
     ending: Option<Ending>,
     outcome: Outcome,
     resolution: f64,
+    /// Cells that the question allows.
+    limit: u64,
 }
 
 impl<'a> PairSearch<'a> {
@@ -121,15 +123,14 @@ impl<'a> PairSearch<'a> {
         let relative = Relative::new(without_own_spin(&carrier), without_own_spin(&other));
         let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
         let scale = model_a.radius.max(model_b.radius);
-        // Positions, matrices and faces are each right to a few units in the last place of the pair's extent over the
-        // step; an angle is right to a few units of its own last place.
         let extent = ball_a.center.length()
             + ball_b.center.length()
             + 2.0 * scale
             + relative.center_a().length()
             + relative.difference(0.0).length().max(relative.difference(1.0).length());
-        let turns = 1.0 + 0.125 * (query.a.placed.motion.spin.length() + query.b.placed.motion.spin.length());
-        let resolution = query.resolution.max(tolerance::LEAST_RESOLUTION * extent);
+        let rounding = super::rounding::of_literals(model_a, model_b, &relative);
+        let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
+        let resolution = query.resolution.max(least);
         let task = Task {
             a,
             b,
@@ -138,12 +139,23 @@ impl<'a> PairSearch<'a> {
             ideas: query.ideas,
             relative,
             delta: resolution,
-            rounding: tolerance::BOUND_ROUNDING * extent * turns,
+            rounding,
             scale,
             still: false,
             limit: query.cell_limit,
         };
         (task, swapped)
+    }
+
+    /// Runs as `run` does, but refines at most `cells` more cells: a search that would need more is undecided.
+    pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
+        let done = self.outcome.counters.cells;
+        if let Some(search) = &mut self.search {
+            let limit = self.limit.saturating_sub(done).min(search.counters.cells.saturating_add(cells));
+            search.task.limit = limit;
+            self.task.limit = limit;
+        }
+        self.run(until)
     }
 
     /// Prepares the search of a pair.
@@ -158,7 +170,7 @@ impl<'a> PairSearch<'a> {
         if ending.is_none() && !a.is_empty() && !b.is_empty() {
             search.start();
         }
-        Self { task, swapped, level: 1.0, search: Some(search), ending, outcome, resolution }
+        Self { task, swapped, level: 1.0, search: Some(search), ending, outcome, resolution, limit: query.cell_limit }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
@@ -182,6 +194,7 @@ impl<'a> PairSearch<'a> {
                 Some(ending) => ending,
                 None => search.run(until)?,
             };
+            let cells = search.counters.cells;
             self.outcome.counters += search.counters;
             search.counters = Default::default();
             match ending {
@@ -197,6 +210,7 @@ impl<'a> PairSearch<'a> {
                         // A body that was stopped at its contact starts at depth 0 ± rounding: search at twice the depth.
                         self.level = 2.0;
                         self.task.delta = 2.0 * self.resolution;
+                        self.task.limit = self.task.limit.saturating_sub(cells);
                         let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
                         let mut search = Search::new(self.task, scratch);
                         search.start();
@@ -232,8 +246,8 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let deep = &found.deep;
     let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
     o.status = Status::Contact;
-    o.time_upper = deep.t;
-    o.time = found.touch.as_ref().map_or(deep.t, |s| s.t.clamp(0.0, deep.t));
+    o.time_upper = found.upper;
+    o.time = found.touch.as_ref().map_or(found.upper, |s| s.t.clamp(0.0, found.upper));
     o.not_continued = found.touch.is_none();
     o.time_lower = o.time.min(found.goal.max(0.0));
     let at = task.relative.at(o.time);
@@ -319,7 +333,7 @@ impl Active {
             let (mut normals, mut each, mut is_apex) = (DVec3::ZERO, Vec::new(), false);
             local::prune(&solid.normal_form, &mut open, &mut |id| {
                 let v = solid.faces[id.face() as usize].value(y);
-                local::truth_of(id.sense(), (v - tol, v + tol), 0.0)
+                local::truth_of(id.sense(), (v, v), 0.0, tol)
             });
             let mut ids: Vec<LiteralId> = local::literals(&open).collect();
             ids.sort_unstable();

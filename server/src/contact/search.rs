@@ -63,12 +63,14 @@ pub(super) struct Cell {
 
 impl Cell {
     pub(super) fn new((t, until): (f64, f64), region: &Aabb, a: Range, b: Range) -> Self {
+        let (center, half) = (region.center(), region.half());
         Self {
             t,
             until,
             serial: 0,
-            center: region.center(),
-            half: region.half(),
+            center,
+            // Centre and half are rounded; the box they make must hold the region.
+            half: half + (center.abs() + half) * f64::EPSILON,
             a,
             b_always: b,
             b,
@@ -110,6 +112,27 @@ pub struct Found {
     pub touch: Option<Solution>,
     /// Time until which everything must be proven free.
     pub goal: f64,
+    /// Earliest time of a witness of depth delta, this contact's or a rival's.
+    pub upper: f64,
+}
+
+impl Found {
+    /// Latest time at which a contact that touches earlier than this one may reach delta and still be preferred to it: its
+    /// witness comes later by no more than this one's own lag behind its touch.
+    fn latest_rival(&self) -> f64 {
+        self.touch.as_ref().map_or(self.goal, |touch| 2.0 * self.deep.t - touch.t.max(0.0))
+    }
+
+    /// The contact to report of two: of those that reach delta at about the same time the one that touches first.
+    fn or(self, other: Self) -> Self {
+        let (goal, upper) = (self.goal.min(other.goal), self.upper.min(other.upper));
+        let (first, second) = if other.goal < self.goal { (other, self) } else { (self, other) };
+        let earlier = match (&first.touch, &second.touch) {
+            (Some(a), Some(b)) => b.t < a.t - SAME_TIME && second.deep.t <= first.latest_rival(),
+            _ => false,
+        };
+        Self { goal, upper, ..if earlier { second } else { first } }
+    }
 }
 
 /// How a search ended.
@@ -142,7 +165,7 @@ pub struct Task<'a> {
     pub relative: Relative,
     /// Depth at which a contact is decided.
     pub delta: f64,
-    /// What rounding may do to one bound.
+    /// What rounding may do to one bound: E of docs/accuracy.md, a length.
     pub rounding: f64,
     /// Length scale of the pair.
     pub scale: f64,
@@ -155,8 +178,14 @@ pub struct Task<'a> {
 /// |Σ λ g| below which multipliers have settled.
 const SETTLED: f64 = 1e-6;
 
-/// Witnesses this close in time are of one contact.
+/// Witnesses this close in time are of one contact; touches this close are at the same time.
 const SAME_TIME: f64 = 1e-12;
+
+/// Cells beyond the goal that are asked whether another contact touches earlier.
+const MAX_RIVALS: u32 = 16;
+
+/// Witnesses this close, in scales of the pair, are one point.
+const SAME_POINT: f64 = 1e-6;
 
 /// Time, fraction of the step, below which an advance is no progress: at a contact a bound runs out in ever smaller ones.
 const LEAST_ADVANCE: f64 = 1e-15;
@@ -181,6 +210,7 @@ impl<'a> Task<'a> {
             center_b: at.b_point(cell.center),
             velocity: at.velocity(cell.center),
             delta: self.delta,
+            rounding: self.rounding,
             fits: self.ideas.fits,
         }
     }
@@ -204,6 +234,8 @@ pub struct Search<'a> {
     pub(super) stage2: Stage2,
     serial: u64,
     pub(super) found: Option<Found>,
+    /// Cells beyond the goal that were asked for a rival.
+    rivals: u32,
     instant: Instant,
     /// Work done so far.
     pub counters: Counters,
@@ -225,6 +257,7 @@ impl<'a> Search<'a> {
             stage2: Stage2::default(),
             serial: 0,
             found: None,
+            rivals: 0,
             instant,
             counters: Counters::default(),
         }
@@ -256,6 +289,11 @@ impl<'a> Search<'a> {
         self.found.as_ref().map_or(f64::INFINITY, |f| f.goal)
     }
 
+    /// Time until which a rival of the contact found may come; the goal or later.
+    fn horizon(&self) -> f64 {
+        self.found.as_ref().map_or(f64::INFINITY, |f| f.latest_rival().max(f.goal))
+    }
+
     /// Runs to the end, or until nothing before `until` is left: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Ending> {
         loop {
@@ -263,12 +301,21 @@ impl<'a> Search<'a> {
                 return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
             };
             if cell.t >= self.goal() {
+                // Proven. What lies just behind may touch earlier all the same: a few cells are asked once more.
+                let asks = cell.source == Source::Cell && cell.t < self.horizon() && self.rivals < MAX_RIVALS;
+                if asks && self.counters.cells < self.task.limit {
+                    self.scratch.heap.pop();
+                    self.rivals += 1;
+                    self.refine(cell);
+                    continue;
+                }
                 return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
             }
             if cell.t > until {
                 return None;
             }
-            if self.counters.cells >= self.task.limit {
+            // Slices of time are few, and cost no cells.
+            if cell.source == Source::Cell && self.counters.cells >= self.task.limit {
                 return Some(Ending::Limit(cell.t));
             }
             self.scratch.heap.pop();
@@ -287,6 +334,7 @@ impl<'a> Search<'a> {
         }
         let at = self.instant;
         let start = cell.t == 0.0;
+        let beyond = cell.t >= self.goal();
         match cell.source {
             Source::Cell => self.counters.cells += 1,
             Source::Slice => {
@@ -299,7 +347,7 @@ impl<'a> Search<'a> {
         }
         let radius = cell.half.length();
         let x_max = (cell.center - at.center_a).length() + radius;
-        let end = if self.task.still { 0.0 } else { self.goal().min(cell.until) - cell.t };
+        let end = if self.task.still { 0.0 } else { self.horizon().min(cell.until) - cell.t };
         // Speed bounds need a span, the span a speed: take the whole rest first, then cut.
         let whole = self.task.relative.bounds(cell.t, end, x_max);
         let h = if whole.speed * end > cell.reach * radius { cell.reach * radius / whole.speed } else { end };
@@ -335,19 +383,15 @@ impl<'a> Search<'a> {
             let pair = clause::Pair { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
         };
-        if std::env::var_os("TRACE").is_some() {
-            eprintln!(
-                "TR t {:.9} half {:.5?} h {:.1e} dt {:.2e} goal {:.9} sup {:?} lits {} c {:.6?}",
-                cell.t,
-                cell.half.to_array(),
-                h,
-                found.dt,
-                self.goal(),
-                found.support.iter().map(|l| (l.0, l.1, (l.2 * 1e3) as i32)).collect::<Vec<_>>(),
-                0,
-                cell.center.to_array()
-            );
-        }
+        // Where the bounds are lowest at the start itself: two faces a few resolutions inside each other leave a layer that
+        // the lowest point of a later time misses.
+        let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
+            let still = View { motion: self.task.relative.bounds(0.0, 0.0, x_max), ..view };
+            let pair = clause::Pair { pool, a: cell.a, b };
+            clause::advance(&still, &pair, hints, self.task.rounding, 0.0, clause_scratch).y
+        } else {
+            found.y
+        };
         if one_sided {
             // At the start only: exclusion now suffices. Inside A nothing first happens later; inside B not before h.
             if found.dt >= 0.0 {
@@ -359,17 +403,18 @@ impl<'a> Search<'a> {
         } else if found.dt >= h {
             self.again(cell, h, end, true);
             return None;
-        } else if found.dt > LEAST_ADVANCE {
+        } else if found.dt > LEAST_ADVANCE && !beyond {
             // What splitting could gain is what the cell's extents cost the bound.
             let gain = found.cost.element_sum().min(radius);
-            if found.dt * motion.speed >= 0.25 * gain || found.dt >= 0.25 * end {
+            let proven = cell.t + found.dt >= self.goal();
+            if found.dt * motion.speed >= 0.25 * gain || found.dt >= 0.25 * end || proven {
                 self.again(cell, found.dt, end, false);
                 return None;
             }
         }
         if start {
-            for x in [cell.center, cell.center + found.y] {
-                if self.is_deep(x, &at) {
+            for x in [cell.center, cell.center + found.y, cell.center + now] {
+                if self.is_deep(x, &at, 0.0) {
                     return Some(x);
                 }
             }
@@ -396,10 +441,15 @@ impl<'a> Search<'a> {
 
     /// Puts a cell back that is free for `dt`, unless that is all the time there is.
     fn again(&mut self, mut cell: Cell, dt: f64, end: f64, capped: bool) {
-        if dt >= end {
+        // Beyond the goal a cell is asked once.
+        if dt >= end || cell.t >= self.goal() {
             return;
         }
-        let t = cell.t + dt;
+        let mut t = cell.t + dt;
+        if rounded_off(cell.t, dt, t) < 0.0 {
+            // Not beyond what is proven.
+            t = t.next_down();
+        }
         if t <= cell.t {
             // Time no longer advances in floating point: only a smaller cell can.
             self.split(cell, DVec3::ZERO);
@@ -425,11 +475,16 @@ impl<'a> Search<'a> {
         for sign in [-1.0, 1.0] {
             let mut child = Cell { half, ..cell };
             child.center[k] += sign * half[k];
+            let off = rounded_off(cell.center[k], sign * half[k], child.center[k]);
+            if off != 0.0 {
+                // The child must still reach from the parent's wall to its middle.
+                child.half[k] = (half[k] + off.abs()).next_up();
+            }
             if cell.a.0 < cell.a.1 {
-                let (faces, delta) = (&self.task.a.faces, self.task.delta);
+                let (faces, delta, rounding) = (&self.task.a.faces, self.task.delta, self.task.rounding);
                 let mut classify = |id: LiteralId| {
-                    let span = local::face_span(&faces[id.face() as usize], child.center, half);
-                    local::truth_of(id.sense(), span, delta)
+                    let span = local::face_span(&faces[id.face() as usize], child.center, child.half);
+                    local::truth_of(id.sense(), span, delta, rounding)
                 };
                 match prune_in_pool(&mut self.scratch.pool, cell.a, &mut classify) {
                     (Truth::False, _) => continue,
@@ -441,9 +496,10 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// True when x (A's frame) is deeper than delta in both whole solids at the instant.
-    fn is_deep(&self, x: DVec3, at: &Instant) -> bool {
-        self.task.a.value(x) <= -self.task.delta && self.task.b.value(at.b_point(x)) <= -self.task.delta
+    /// True when x (A's frame) is at least delta deep in both whole solids at the instant, by `more` as computed.
+    fn is_deep(&self, x: DVec3, at: &Instant, more: f64) -> bool {
+        let level = -self.task.delta - more;
+        self.task.a.value(x) <= level && self.task.b.value(at.b_point(x)) <= level
     }
 
     fn problem(&self) -> Problem<'_> {
@@ -454,7 +510,7 @@ impl<'a> Search<'a> {
             relative: &self.task.relative,
             scale: self.task.scale,
             time_scale: (self.task.scale / speed.max(f64::MIN_POSITIVE)).min(1.0),
-            tolerance: 2.0 * self.task.rounding,
+            tolerance: 0.5 * self.task.rounding,
         }
     }
 
@@ -579,7 +635,8 @@ impl<'a> Search<'a> {
 
     /// The depth at which witnesses are sought: delta and what rounding may take from it.
     fn witness_level(&self) -> f64 {
-        self.task.delta * (1.0 + 1e-6) + 4.0 * self.task.rounding
+        // Deep enough to be so after all rounding, with what Newton may leave.
+        self.task.delta * (1.0 + 1e-6) + 1.5 * self.task.rounding
     }
 
     /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed.
@@ -629,8 +686,11 @@ impl<'a> Search<'a> {
             let Some(s) = self.problem().solve(&active, x, t, &lambda, level) else { return false };
             // Where only an unsettled witness is known, a settled one of the same time is still worth having.
             let settled = self.found.as_ref().is_none_or(|f| f.deep.stationarity < SETTLED);
-            let latest = if settled { self.goal() } else { self.goal() + SAME_TIME };
-            if s.t < 0.0 || s.t > 1.0 || s.t >= latest {
+            let latest = match &self.found {
+                Some(f) if settled => f.latest_rival(),
+                _ => self.goal() + SAME_TIME,
+            };
+            if s.t < 0.0 || s.t > 1.0 || s.t >= latest || self.is_found(&s) {
                 return false;
             }
             // A negative multiplier: that literal holds nothing back.
@@ -649,7 +709,8 @@ impl<'a> Search<'a> {
                 continue;
             }
             let at = self.task.relative.at(s.t);
-            if self.is_deep(s.x, &at) {
+            // Whatever rounding did: a witness of depth delta.
+            if self.is_deep(s.x, &at, self.task.rounding) {
                 return self.holds_at_apexes(&s, &at) && self.accept(s);
             }
             // Something else decides there: it enters, the smallest multiplier leaves. A primitive that the walk has not
@@ -703,6 +764,15 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// True for the contact that is known already.
+    fn is_found(&self, s: &Solution) -> bool {
+        self.found.as_ref().is_some_and(|f| {
+            f.deep.stationarity < SETTLED
+                && (f.deep.t - s.t).abs() <= SAME_TIME
+                && (f.deep.x - s.x).length() <= SAME_POINT * self.task.scale
+        })
+    }
+
     /// Keeps a confirmed witness if it is the earliest; continues it back to the touch.
     fn accept(&mut self, deep: Solution) -> bool {
         self.hint(&deep);
@@ -711,7 +781,7 @@ impl<'a> Search<'a> {
             // A witness, but an earlier one lies beside it: everything before it is still searched.
             let goal = deep.t;
             if goal < self.goal() {
-                self.found = Some(Found { deep, touch: None, goal });
+                self.found = Some(Found { upper: goal, deep, touch: None, goal });
             }
             return false;
         }
@@ -732,12 +802,23 @@ impl<'a> Search<'a> {
                 deep.t - (0.25 * self.task.delta / speed.abs().max(f64::MIN_POSITIVE)).clamp(1e-15, 1e-9)
             }
         };
-        if goal >= self.goal() {
-            return true;
-        }
-        self.found = Some(Found { deep, touch, goal });
+        let new = Found { upper: deep.t, deep, touch, goal };
+        self.found = Some(match self.found.take() {
+            // One that has not settled is only a bound on the time.
+            Some(old) if old.deep.stationarity >= SETTLED => {
+                Found { upper: new.upper.min(old.upper), goal: new.goal.min(old.goal), ..new }
+            }
+            Some(old) => old.or(new),
+            None => new,
+        });
         true
     }
+}
+
+/// What a + b lost when it was rounded to `sum`, exactly (Knuth's two-sum).
+fn rounded_off(a: f64, b: f64, sum: f64) -> f64 {
+    let from_b = sum - a;
+    (a - (sum - from_b)) + (b - from_b)
 }
 
 fn has_both_sides(active: &[Constraint]) -> bool {

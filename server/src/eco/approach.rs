@@ -68,8 +68,8 @@ impl Approach {
             }
             let h = end - t;
             let bounds = self.relative.bounds(t, h, x_max);
-            let s = -n.dot(at.velocity(a.0)) + n.cross(at.omega).length() * r;
-            let q = bounds.curvature(&at, n);
+            let s = -n.dot(at.velocity(a.0)) + n.cross(at.omega).length() * r + bounds.slip;
+            let q = bounds.curvature(&at, n) + bounds.bend;
             let step = first_zero(gap, s, q).max(gap / bounds.speed);
             if step > h {
                 return None;

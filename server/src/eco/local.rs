@@ -247,7 +247,8 @@ fn merge_refs(op: Op, a: Kind, b: Kind, kind: Kind, refs: &mut Vec<u32>, start: 
 pub fn write_literals(solid: &Solid, terms: &[Term], region: &Aabb, delta: f64, out: &mut Vec<Token>) -> Truth {
     let (c, e) = (region.center(), region.half());
     write(solid, terms, Sense::Positive, out, &mut |id| {
-        truth_of(id.sense(), face_span(&solid.faces[id.face() as usize], c, e), delta)
+        // Those bounds lie outward of their rounding.
+        truth_of(id.sense(), face_span(&solid.faces[id.face() as usize], c, e), delta, 0.0)
     })
 }
 

@@ -20,8 +20,8 @@ pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 
 use crate::bound::SBounds;
 use crate::math::tolerance::MODEL_MARGIN;
-use crate::solid::Solid;
 use crate::solid::local::{Token, Truth};
+use crate::solid::{Face, Solid};
 
 /// A solid with what was preprocessed for it. Shared by all objects that use it.
 #[derive(Debug)]
@@ -34,6 +34,8 @@ pub struct Model {
     pub eco: Eco,
     /// Bounding radius: that of the ball around the solid. 0 for an empty solid, infinite for an unbounded one.
     pub radius: f64,
+    /// Largest `Face::reach` of its faces: a cone's apex may lie far outside.
+    pub face_reach: f64,
 }
 
 impl Model {
@@ -48,7 +50,8 @@ impl Model {
         let margin = if radius.is_finite() { MODEL_MARGIN * radius } else { 0.0 };
         let bounds = SBounds::new(&solid, margin);
         let eco = Eco::new(&solid, &bounds, limits);
-        Self { solid, bounds, eco, radius }
+        let face_reach = solid.faces.iter().map(Face::reach).fold(0.0, f64::max);
+        Self { solid, bounds, eco, radius, face_reach }
     }
 
     /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.

@@ -165,7 +165,8 @@ impl Scene {
             first: request.asked & ASK_FIRST != 0,
             clear: request.asked & ASK_CLEAR != 0,
             max_records: cap.max(1) as u32,
-            cell_limit: request.cell_limit,
+            cell_limit: request.cell_limit.into(),
+            batch_limit: request.batch_limit.into(),
         };
         let world = &mut self.world;
         let stepped = catch_unwind(AssertUnwindSafe(|| world.step(&records[..n], &options).map(|_| ())));

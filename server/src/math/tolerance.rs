@@ -4,8 +4,8 @@
 pub const DEFAULT_RESOLUTION: f64 = 1e-9;
 
 /// Below this distance from an axis, relative to the distance from its origin, the radial direction of a cylinder or
-/// cone is noise: any exact perpendicular is used instead.
-pub const ON_AXIS: f64 = 1e-9;
+/// cone is noise (the distance itself is right to two epsilon): any exact perpendicular is used instead.
+pub const ON_AXIS: f64 = 8.0 * f64::EPSILON;
 
 /// Linear parts of a `multmatrix` within this of a similarity are replaced by it: real files print six digits, which
 /// leaves 2e-6.
@@ -48,12 +48,11 @@ pub const BOX_ROUNDING: f64 = 1e-14;
 /// contact: their own brackets may begin before the time at which the resolution's depth is reached.
 pub const FIRST_SLACK: f64 = 1e-6;
 
-/// What rounding may do to one bound, relative to the pair's extent over the step: some thirty operations on numbers of
-/// that size stand between the poses and a literal's value.
-pub const BOUND_ROUNDING: f64 = 32.0 * f64::EPSILON;
-
-/// Smallest resolution relative to the pair's extent over the step: thirty times what rounding may do to a bound.
+/// Smallest resolution relative to the pair's extent over the step …
 pub const LEAST_RESOLUTION: f64 = 1e3 * f64::EPSILON;
+
+/// … and relative to what rounding may do to one bound (docs/accuracy.md): what is left of delta must still exclude.
+pub const LEAST_ROUNDINGS: f64 = 4.0;
 
 /// Sine of an angle that a double cannot tell from 0: axes within it are one direction.
 pub const PARALLEL: f64 = 1e-15;

@@ -7,6 +7,7 @@
 //! with v(x) = v0 − spin_B×d + omega×u, and its acceleration seen from B is
 //! omega×(omega×u) + (omega×spin_B)×u + spin_B×(spin_B×d) − 2 spin_B×v0 (both spins are constant in the world).
 
+use super::rounding::{NORM, Rounding};
 use contactd_proto::{Motion, Pose};
 use glam::{DMat3, DVec3};
 
@@ -34,6 +35,7 @@ pub struct Relative {
     center_a: DVec3,
     /// B's place, position taken to B's model axes.
     offset_b: DVec3,
+    rounding: Rounding,
 }
 
 /// The relative motion at one instant, along A's model axes.
@@ -62,7 +64,7 @@ impl Relative {
     /// The relative motion of two placed models.
     pub fn new(a: Placed, b: Placed) -> Self {
         let (a_axes, b_axes) = (a.place.matrix(), b.place.matrix());
-        Self {
+        let mut this = Self {
             a,
             b,
             a_axes,
@@ -72,7 +74,10 @@ impl Relative {
             omega: a.motion.spin - b.motion.spin,
             center_a: -(a_axes.transpose() * a.place.position),
             offset_b: b_axes.transpose() * b.place.position,
-        }
+            rounding: Rounding { matrix: 0.0, origin: 0.0, arm: 0.0, rate: 0.0 },
+        };
+        this.rounding = Rounding::of(&this);
+        this
     }
 
     /// The two placed models.
@@ -83,6 +88,16 @@ impl Relative {
     /// p_A − p_B at `t`, world axes.
     pub fn difference(&self, t: f64) -> DVec3 {
         self.d0 + self.v0 * t
+    }
+
+    /// Largest distance of the two centres of rotation over the step.
+    pub fn apart(&self) -> f64 {
+        self.difference(0.0).length().max(self.difference(1.0).length())
+    }
+
+    /// What rounding may do to everything computed from this motion.
+    pub fn rounding(&self) -> Rounding {
+        self.rounding
     }
 
     /// A's centre of rotation in A's model frame.
@@ -113,20 +128,29 @@ impl Relative {
         self.a.motion.start.position + self.a.motion.velocity * at.t + at.world_from_a * (x - self.center_a)
     }
 
-    /// Bounds that hold at all times of [t, t + h] for points fixed in A within `x_max` of A's centre of rotation.
+    /// Bounds that hold at all times of [t, t + h] for points fixed in A within `x_max` of A's centre of rotation,
+    /// rounding included.
     pub fn bounds(&self, t: f64, h: f64, x_max: f64) -> Bounds {
         let (d, e) = (self.difference(t), self.difference(t + h));
         let wb = self.b.motion.spin;
         let drift = |d: DVec3| (self.v0 - wb.cross(d)).length();
         let swing = |d: DVec3| (wb.cross(d) - 2.0 * self.v0).length();
-        let omega = self.omega.length();
+        // The terms of a velocity and of an acceleration, without what they take from each other.
+        let (omega, spin_b, v0) = (self.omega.length(), wb.length(), self.v0.length());
+        let carried = spin_b * d.length().max(e.length());
+        let speeds = v0 + carried + omega * x_max;
+        let pulls = (omega + (1.0 + h) * spin_b) * omega * x_max + spin_b * (carried + 2.0 * v0);
+        let outward = |v: f64, terms: f64| v + NORM * terms;
         Bounds {
-            speed: drift(d).max(drift(e)) + omega * x_max,
-            swing: swing(d).max(swing(e)),
-            omega,
-            cross: self.omega.cross(wb).length(),
-            x_max,
+            speed: outward(drift(d).max(drift(e)) + omega * x_max, speeds),
+            swing: outward(swing(d).max(swing(e)), carried + 2.0 * v0),
+            omega: outward(omega, omega),
+            cross: outward(self.omega.cross(wb).length(), omega * spin_b),
+            x_max: outward(x_max, x_max),
             h,
+            slip: self.rounding.rate * speeds,
+            bend: self.rounding.rate * pulls,
+            rounding: self.rounding,
         }
     }
 }
@@ -146,11 +170,17 @@ pub struct Bounds {
     pub x_max: f64,
     /// Length of the span.
     pub h: f64,
+    /// Rounding of a rate n·v(x), |n| = 1, x within `x_max`: length per step.
+    pub slip: f64,
+    /// Rounding of `curvature`, |w| = 1.
+    pub bend: f64,
+    /// The motion's rounding as such.
+    pub rounding: Rounding,
 }
 
 impl Bounds {
     /// q: bound of |w·acceleration| over the span, w = sum of multiplied normals fixed in B, at the span's start.
-    /// |w×spin_B| is constant in B; |w×omega| grows at most |w×spin_B||omega| per unit time.
+    /// |w×spin_B| is constant in B; |w×omega| grows at most |w×spin_B||omega| per unit time. Exact but for `bend`.
     pub fn curvature(&self, at: &Instant, w: DVec3) -> f64 {
         let w_omega = w.cross(at.omega).length();
         let w_spin = w.cross(at.spin_b).length();

@@ -11,7 +11,8 @@
 //! distance to the lateral surface; outside it is the distance where ρ sin α + z cos α >= 0 and a lower bound elsewhere.
 //!
 //! On an axis the radial direction is undefined: closer than `ON_AXIS` any exact perpendicular stands in, elsewhere the
-//! direction is re-orthogonalised against the axis.
+//! direction is re-orthogonalised against the axis. Where it stands in, the tangent plane lies above the face by up to the
+//! distance from the axis, so `ON_AXIS` is rounding and no more.
 
 use crate::math::{any_perpendicular, tolerance::ON_AXIS};
 use contactd_proto::Pose;
@@ -75,7 +76,9 @@ fn radial(offset: DVec3, axis: DVec3) -> (f64, DVec3) {
     let p = offset - axis * z;
     let rho = p.length();
     if rho <= ON_AXIS * offset.length() || rho == 0.0 {
-        return (rho, any_perpendicular(axis));
+        let u = any_perpendicular(axis);
+        // Of its two signs the one towards the point: half as far off.
+        return (rho, if u.dot(p) < 0.0 { -u } else { u });
     }
     let u = p / rho;
     let u = u - axis * u.dot(axis);
@@ -83,6 +86,15 @@ fn radial(offset: DVec3, axis: DVec3) -> (f64, DVec3) {
 }
 
 impl Face {
+    /// Size of the numbers that psi is computed from, beside those of the point: |d|, |o| + r, |apex|. A length.
+    pub fn reach(&self) -> f64 {
+        match *self {
+            Face::Plane { offset, .. } => offset.abs(),
+            Face::Sphere { center: o, radius } | Face::Cylinder { origin: o, radius, .. } => o.length() + radius,
+            Face::Cone { apex, .. } => apex.length(),
+        }
+    }
+
     /// psi at `x`.
     pub fn value(&self, x: DVec3) -> f64 {
         match *self {

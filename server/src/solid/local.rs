@@ -286,22 +286,29 @@ pub fn face_span(face: &Face, center: DVec3, half: DVec3) -> Span {
     (at.value - tilt.min(r), at.value + (tilt + bulge).min(r))
 }
 
-/// Truth of a literal at depth `delta` from the bounds of its psi.
-pub fn truth_of(sense: Sense, (lo, hi): Span, delta: f64) -> Truth {
+/// Truth of a literal at depth `delta` from the bounds of its psi, each of them known to `rounding` (a length).
+pub fn truth_of(sense: Sense, (lo, hi): Span, delta: f64, rounding: f64) -> Truth {
     let (lo, hi) = if sense == Sense::Positive { (lo, hi) } else { (-hi, -lo) };
-    if hi <= -delta {
+    if hi <= -delta - rounding {
         Truth::True
-    } else if lo > -delta {
+    } else if lo > -delta + rounding {
         Truth::False
     } else {
         Truth::Open
     }
 }
 
-/// Prunes an expression over the box `region` of the solid's own frame at depth `delta`.
-pub fn prune_to_box(tokens: &[Token], faces: &[Face], region: &Aabb, delta: f64, out: &mut Vec<Token>) -> Truth {
+/// Prunes an expression over the box `region` of the solid's own frame at depth `delta`, psi over the box being known to
+/// `rounding`.
+pub fn prune_to_box(
+    tokens: &[Token],
+    faces: &[Face],
+    region: &Aabb,
+    (delta, rounding): (f64, f64),
+    out: &mut Vec<Token>,
+) -> Truth {
     let (c, e) = (region.center(), region.half());
-    prune(tokens, out, &mut |id| truth_of(id.sense(), face_span(&faces[id.face() as usize], c, e), delta))
+    prune(tokens, out, &mut |id| truth_of(id.sense(), face_span(&faces[id.face() as usize], c, e), delta, rounding))
 }
 
 #[cfg(test)]
@@ -333,7 +340,7 @@ mod tests {
             assert_eq!(value(&tokens, &mut |face| s.faces[face as usize].value(c)), f);
             let region = Aabb::around(c, DVec3::splat(0.07));
             let mut out = vec![];
-            let truth = prune_to_box(&tokens, &s.faces, &region, 1e-9, &mut out);
+            let truth = prune_to_box(&tokens, &s.faces, &region, (1e-9, 1e-15), &mut out);
             for x in region.corners().into_iter().chain([c]) {
                 let f = s.value(x);
                 match truth {

@@ -1,6 +1,11 @@
 //! The pairs of a step, searched one by one.
 //!
 //! A job reads two bodies and writes its own outcome: jobs may run in any order and on any thread without changing a bit.
+//!
+//! Work is bounded by counted cells, for each pair and for the batch. The jobs are searched one by one as long as the
+//! batch's limit holds; if their sum, which does not depend on their order, goes beyond it, everything is searched anew
+//! under one queue, the pair that may meet earliest first. So the limit is spent on what comes first, and the latest pairs
+//! stay undecided, each with the time up to which it is proven free.
 
 use super::body::Body;
 use super::plan::PairPlan;
@@ -47,11 +52,20 @@ impl Memory {
 pub fn run(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mut Memory) {
     memory.outcomes.clear();
     if options.first && !options.clear {
-        return run_first(bodies, jobs, options, memory);
+        return run_queue(bodies, jobs, options, true, memory);
     }
+    let mut left = batch_limit(options);
     for job in jobs {
         let outcome = if job.near {
-            let outcome = contact::earliest_contact(&query(bodies, job, options), &mut memory.scratch);
+            let mut query = query(bodies, job, options);
+            let beyond = query.cell_limit > left;
+            query.cell_limit = query.cell_limit.min(left);
+            let outcome = contact::earliest_contact(&query, &mut memory.scratch);
+            if beyond && outcome.status == Status::Undecided {
+                memory.outcomes.clear();
+                return run_queue(bodies, jobs, options, false, memory);
+            }
+            left = left.saturating_sub(outcome.counters.cells);
             finished(job, outcome)
         } else {
             Outcome::clear(job.resolution)
@@ -60,16 +74,23 @@ pub fn run(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mu
     }
 }
 
+fn batch_limit(options: &StepOptions) -> u64 {
+    if options.batch_limit == 0 { DEFAULT_BATCH_LIMIT } else { options.batch_limit }
+}
+
 /// One queue over all pairs, ordered by the time before which a pair cannot meet. The pair in front is searched until
-/// another is in front; the first contact found bounds how far any other needs to be searched. A pair that is left
-/// unfinished is clear until later than that, which is all that is said of it.
-fn run_first(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mut Memory) {
+/// another is in front. Where only the first contact is asked for, the one found bounds how far any other needs to be
+/// searched; a pair that is left unfinished is clear until later than that, which is all that is said of it. Once the
+/// batch's cells are spent every pair that needs more of them is undecided.
+fn run_queue(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, first: bool, memory: &mut Memory) {
     let searches = jobs.iter().map(|job| PairSearch::new(&query(bodies, job, options), Scratch::default()));
     let mut searches: Vec<PairSearch> = searches.collect();
     memory.outcomes.extend(jobs.iter().map(|job| Outcome::clear(job.resolution)));
     // All times are >= 0, so their bits order as they do; ties go to the smaller pair.
-    let mut queue: BinaryHeap<Reverse<(u64, usize)>> = (0..jobs.len()).map(|i| Reverse((0, i))).collect();
+    let near = (0..jobs.len()).filter(|i| jobs[*i].near);
+    let mut queue: BinaryHeap<Reverse<(u64, usize)>> = near.map(|i| Reverse((0, i))).collect();
     let mut horizon = f64::INFINITY;
+    let mut left = batch_limit(options);
     while let Some(Reverse((key, i))) = queue.pop() {
         let time = f64::from_bits(key);
         let search = &mut searches[i];
@@ -79,11 +100,14 @@ fn run_first(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &
             continue;
         }
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
-        match search.run(next.max(time).min(horizon)) {
+        let before = search.counters().cells;
+        let ended = search.run_within(next.max(time).min(horizon), left);
+        left = left.saturating_sub(search.counters().cells - before);
+        match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
                 let outcome = finished(&jobs[i], outcome);
-                if !jobs[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
+                if first && !jobs[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
                     horizon = horizon.min(outcome.time_upper + tolerance::FIRST_SLACK);
                 }
                 memory.outcomes[i] = outcome;
@@ -91,6 +115,9 @@ fn run_first(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &
         }
     }
 }
+
+/// Cells that all pairs of a step together may cost by default: sixteen pairs at their own limit.
+pub const DEFAULT_BATCH_LIMIT: u64 = 16 * contact::DEFAULT_CELL_LIMIT;
 
 fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions) -> PairQuery<'a> {
     let side = |index: u32| {

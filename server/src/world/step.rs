@@ -51,11 +51,13 @@ pub struct StepOptions {
     pub max_records: u32,
     /// Most cells that one pair's search refines; 0: the default.
     pub cell_limit: u64,
+    /// Most cells that the searches of the whole step refine, the pairs that may meet earliest first; 0: the default.
+    pub batch_limit: u64,
 }
 
 impl Default for StepOptions {
     fn default() -> Self {
-        Self { advance: 1.0, dt: 0.0, first: false, clear: false, max_records: 0, cell_limit: 0 }
+        Self { advance: 1.0, dt: 0.0, first: false, clear: false, max_records: 0, cell_limit: 0, batch_limit: 0 }
     }
 }
 

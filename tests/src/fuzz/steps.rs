@@ -105,6 +105,7 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
             clear: r.below(2) == 1,
             max_records: r.below(4) as u32,
             cell_limit: CELLS,
+            batch_limit: 0,
         };
         let count = r.one_of(&[1, 2, 3, 2, 1, 3, 4, 5, 7, 0]);
         let records: Vec<PoseRecord> = (0..count).map(|_| record(&mut r)).collect();

@@ -1,0 +1,53 @@
+//! The rounding budget of stage 3: one bound E on what rounding does to a literal's plane over a cell, and to the sum that
+//! excludes a clause. A clause is excluded when its bound is above E.
+//!
+//! For a plane a + n·(x − c) computed at the cell's centre c, x anywhere in the cell, and multipliers λ with sum 1:
+//!
+//! * psi at a point, and how far its computed tangent may lie above psi: `FACE` half units of the numbers that went in;
+//! * for a face of B: the centre in B's frame (`motion::Rounding::point`), the normal taken to A's axes, times the cell's
+//!   radius (`motion::Rounding::matrix`);
+//! * Σ λ b − Σ_k e_k |Σ λ n|_k, four terms at most: included in `FACE` and `CELL`.
+//!
+//! docs/accuracy.md counts the constants. A tangent taken far outside the cell, and a same-shape fit, subtract what they
+//! have beyond E from their own bounds.
+
+use crate::eco::Model;
+use crate::motion::Relative;
+
+/// Half a unit in the last place, with the room that products of errors need.
+const U: f64 = 0.5 * f64::EPSILON * (1.0 + 1e-6);
+
+/// Half units of |x| + `Face::reach`: 13 for psi, 16 for the tangent on an axis, 7 for the sums.
+const FACE: f64 = 36.0;
+/// Half units of the cell's radius: the normal's own rounding, the sums over the cell's half extents.
+const CELL: f64 = 30.0;
+/// Half units of the distance between the cell's centre and the point of a tangent plane.
+const FAR: f64 = 48.0;
+
+/// E for a pair, a length: `a` carries the cells.
+pub fn of_literals(a: &Model, b: &Model, relative: &Relative) -> f64 {
+    let (placed_a, placed_b) = relative.placed();
+    // Farthest point of a model's box from the model's origin, and the box's radius.
+    let size = |m: &Model| {
+        let aabb = m.bounds.root().aabb;
+        if aabb.is_empty() { (0.0, 0.0) } else { (aabb.min.abs().max(aabb.max.abs()).length(), aabb.half().length()) }
+    };
+    let (offset_a, offset_b) = (placed_a.place.position.length(), placed_b.place.position.length());
+    let ((mut reach, mut radius), (reach_b, radius_b)) = (size(a), size(b));
+    if !reach.is_finite() {
+        // An unbounded carrier has cells only where the other body can be.
+        reach = offset_a + relative.apart() + offset_b + reach_b;
+        radius = reach + radius_b;
+    }
+    let rounding = relative.rounding();
+    let arm = reach + offset_a + radius;
+    let on_a = FACE * (reach + a.face_reach) * U;
+    let seen_from_b = arm + relative.apart() + offset_b;
+    let on_b = FACE * (seen_from_b + b.face_reach) * U + rounding.point(arm) + rounding.matrix * radius;
+    on_a.max(on_b) + CELL * radius * U
+}
+
+/// What the plane of a tangent has beyond E (a length), touched at this distance from the cell's centre.
+pub fn of_distance(distance: f64) -> f64 {
+    FAR * distance * U
+}
