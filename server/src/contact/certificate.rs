@@ -11,13 +11,14 @@
 //! the answer rather than the steps by which the search found it. Format: docs/certificate.md.
 
 use super::clause::{self, Hint, Proof, Term};
+use super::depth;
 use super::literal::{Faces, Side, View};
 use super::outcome::{NO_FACE, Outcome, Status};
 use super::pair::{PairQuery, PairSearch};
 use super::search::Task;
 use crate::math::Aabb;
-use crate::solid::Sense;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
+use crate::solid::{Face, Sense};
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -25,11 +26,15 @@ use std::fmt::Write as _;
 type Key = (Side, LiteralId);
 
 /// Room left for a checker: depth proven, relative to the depth claimed.
-const DEPTH: f64 = 0.75;
+const DEPTH: f64 = 0.8;
 /// Room left for a checker: the cell is bounded as if this much larger.
 const SWELL: f64 = 1.02;
 /// Room left for a checker: share of the proven time that is used.
 const HASTE: f64 = 0.85;
+/// Part of the depth that a witness must reach: the point deepened from the touch is right to less than the rest.
+const WITNESS: f64 = 0.995;
+/// How much before `time_lower` the proof of an undecided answer may end, in depths over the fastest speed.
+const BACK: [f64; 3] = [0.0, 10.0, 1000.0];
 /// Combinations of a span above which they are not thinned out.
 const MAX_THINNED: usize = 40;
 
@@ -44,6 +49,8 @@ pub struct Certificate {
     pub until: f64,
     /// The box that is covered, in the carrier's frame.
     pub root: Aabb,
+    /// For a contact: `time_upper`, and the point that is at the depth in both bodies then, in the carrier's frame.
+    pub witness: Option<(f64, DVec3)>,
     /// Cells in preorder.
     pub cells: Vec<CellProof>,
 }
@@ -95,27 +102,66 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     // Coordinates of the box and of what it holds are right to a few units in the last place.
     let slack = hull.half() * 1e-9 + DVec3::splat(depth);
     let root = Aabb::new(hull.min - slack, hull.max + slack);
-    let mut made = Certificate { swapped, depth, until: outcome.time_lower.min(1.0), root, cells: Vec::new() };
+    let made = Certificate {
+        swapped,
+        depth,
+        until: outcome.time_lower.min(1.0),
+        root,
+        witness: witness(&task, outcome, depth),
+        cells: Vec::new(),
+    };
     if task.a.is_empty() || task.b.is_empty() {
         return Some(made);
     }
     if !root.is_finite() {
         return None;
     }
+    if outcome.status != Status::Undecided {
+        return cover(&task, swapped, outcome, made, query.cell_limit);
+    }
+    // The limit may have run out where the bodies are as good as at the depth, too near for what a checker needs: then the
+    // proof ends a little earlier.
+    let speed = task.relative.bounds(0.0, 1.0, task.scale).speed.max(f64::MIN_POSITIVE);
+    let backs = BACK.iter().map(|back| made.until - back * depth / speed).filter(|until| *until >= 0.0);
+    let tries: Vec<Certificate> = backs.map(|until| Certificate { until, ..made.clone() }).collect();
+    let limit = query.cell_limit / BACK.len() as u64;
+    tries.into_iter().find_map(|made| cover(&task, swapped, outcome, made, limit))
+}
+
+/// Covers the box with cells.
+fn cover(task: &Task, swapped: bool, outcome: &Outcome, mut made: Certificate, limit: u64) -> Option<Certificate> {
     let mut scratch = clause::Scratch::recording();
-    let hints = hints(&task, swapped, outcome);
+    let hints = hints(task, swapped, outcome);
     let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
-    let mut stack = vec![Open { region: root, t: 0.0, started: false, a, b, reach: 1.0 }];
+    let mut stack = vec![Open { region: made.root, t: 0.0, started: false, a, b, reach: 1.0 }];
     while let Some(open) = stack.pop() {
-        if made.cells.len() as u64 >= query.cell_limit {
+        if made.cells.len() as u64 >= limit {
             return None;
         }
-        let mut maker = Maker { task: &task, end: made.until, hints: &hints, scratch: &mut scratch };
+        let mut maker = Maker { task, end: made.until, hints: &hints, scratch: &mut scratch };
         let (proof, children) = maker.cell(open);
         made.cells.push(proof);
         stack.extend(children.into_iter().flatten().rev());
     }
     Some(made)
+}
+
+/// The point of a contact, deepened to what both bodies share when it is decided.
+fn witness(task: &Task, o: &Outcome, depth: f64) -> Option<(f64, DVec3)> {
+    if o.status != Status::Contact {
+        return None;
+    }
+    let x = carried(task, o);
+    let at = task.relative.at(o.time_upper);
+    let deep = |x: DVec3| -task.a.value(x).max(task.b.value(at.b_point(x)));
+    let (deepest, ..) = depth::deepest(task, &at, x);
+    [x, deepest].into_iter().find(|x| deep(*x) >= WITNESS * depth).map(|x| (o.time_upper, x))
+}
+
+/// The contact's point in the carrier's frame.
+fn carried(task: &Task, o: &Outcome) -> DVec3 {
+    let at = task.relative.at(o.time);
+    at.world_from_a.transpose() * (o.point - task.relative.world_point(&at, DVec3::ZERO))
 }
 
 /// Where the contact touches curved faces is where they are worth touching all along.
@@ -124,7 +170,7 @@ fn hints(task: &Task, swapped: bool, o: &Outcome) -> Vec<Hint> {
         return Vec::new();
     }
     let at = task.relative.at(o.time);
-    let x = at.world_from_a.transpose() * (o.point - task.relative.world_point(&at, DVec3::ZERO));
+    let x = carried(task, o);
     let (faces_a, faces_b) = if swapped { (&o.faces_b, &o.faces_a) } else { (&o.faces_a, &o.faces_b) };
     let mut hints = Vec::new();
     for (side, solid, faces, point) in [(Side::A, task.a, faces_a, x), (Side::B, task.b, faces_b, at.b_point(x))] {
@@ -135,6 +181,25 @@ fn hints(task: &Task, swapped: bool, o: &Outcome) -> Vec<Hint> {
         }
     }
     hints
+}
+
+impl Task<'_> {
+    /// The point of a curved face at which the tangent belonging to `point` touches it. On an axis or at a centre any
+    /// direction will do, and which one was taken a checker could not know.
+    fn touched(&self, (side, id): Key, point: DVec3) -> DVec3 {
+        let face = &(if side == Side::A { self.a } else { self.b }).faces[id.face() as usize];
+        let normal = face.at(point).normal;
+        match *face {
+            Face::Plane { .. } => point,
+            Face::Sphere { center, radius } => center + normal * radius,
+            Face::Cylinder { origin, axis, radius } => origin + axis * (point - origin).dot(axis) + normal * radius,
+            Face::Cone { apex, axis, sin, cos } => {
+                // Any point on the side of the axis to which the normal leans.
+                let far = (point - apex).length().max(self.scale);
+                apex + axis * (far * cos) + (normal + axis * sin) / cos * (far * sin)
+            }
+        }
+    }
 }
 
 /// A cell yet to be proven.
@@ -169,9 +234,10 @@ impl<'a> Maker<'a> {
             let view = view.view();
             let truth = falsify(tokens, &mut kept[out], &mut used, &mut |id| view.truth(side, id));
             // B's points of tangency are those at the beginning.
-            let point = if side == Side::A { center } else { view.center_b };
+            let center = if side == Side::A { center } else { view.center_b };
+            let point = |id: LiteralId| self.task.touched((side, id), center);
             if truth == Truth::False {
-                proof.never = used.into_iter().map(|id| ((side, id), point)).collect();
+                proof.never = used.into_iter().map(|id| ((side, id), point(id))).collect();
                 return (proof, [None, None]);
             }
             if truth == Truth::True && side == Side::B {
@@ -179,7 +245,7 @@ impl<'a> Maker<'a> {
                 kept[out] = tokens.clone();
                 continue;
             }
-            proof.never.extend(used.into_iter().map(|id| ((side, id), point)));
+            proof.never.extend(used.into_iter().map(|id| ((side, id), point(id))));
         }
         [open.a, open.b] = kept;
         let mut cost;
@@ -243,7 +309,10 @@ impl<'a> Maker<'a> {
         let truth = falsify(&open.b, &mut b, &mut used, &mut |id| view.truth(Side::B, id));
         let singles: Vec<Vec<Term>> = used
             .iter()
-            .map(|id| vec![Term { literal: (Side::B, *id), other: None, lambda: [1.0; 2], point: view.center_b }])
+            .map(|id| {
+                let point = self.task.touched((Side::B, *id), view.center_b);
+                vec![Term { literal: (Side::B, *id), other: None, lambda: [1.0; 2], point }]
+            })
             .collect();
         match truth {
             Truth::False => return (h, Some(thinned(singles, &open.a, &open.b)), h, DVec3::ZERO),
@@ -272,7 +341,13 @@ impl<'a> Maker<'a> {
         let dt = if found.dt >= h { h } else { found.dt * HASTE };
         let proofs: &[Proof] = self.scratch.record.as_deref().unwrap_or_default();
         let mut close = singles;
-        close.extend(proofs.iter().filter(|p| p.dt >= dt).map(|p| p.until(dt)));
+        for proof in proofs.iter().filter(|p| p.dt >= dt) {
+            let touched = |t: &Term| match t.other {
+                Some(_) => *t,
+                None => Term { point: self.task.touched(t.literal, t.point), ..*t },
+            };
+            close.push(proof.until(dt).iter().map(touched).collect());
+        }
         (h, Some(thinned(close, &open.a, &open.b)), dt, found.cost)
     }
 
@@ -442,6 +517,9 @@ impl Certificate {
             self.cells.len(),
             numbers(&[r.min, r.max])
         );
+        if let Some((t, x)) = self.witness {
+            let _ = writeln!(out, "witness {t:e} {}", numbers(&[x]));
+        }
         for cell in &self.cells {
             for (key, point) in &cell.never {
                 let _ = writeln!(out, "never {} {}", name(key), numbers(&[*point]));
@@ -454,7 +532,8 @@ impl Certificate {
                         let [from, to] = term.lambda;
                         let _ = match &term.other {
                             Some(other) => {
-                                write!(out, " fit {} {} {from:e} {to:e}", name(&term.literal), name(other))
+                                let (p, q) = (name(&term.literal), name(other));
+                                write!(out, " fit {p} {q} {from:e} {to:e} {}", numbers(&[term.point]))
                             }
                             None => {
                                 write!(out, " {} {from:e} {to:e} {}", name(&term.literal), numbers(&[term.point]))

@@ -105,7 +105,7 @@ pub struct Term {
     pub other: Option<(Side, LiteralId)>,
     /// Its multiplier at the start and at the end of the time; linear between.
     pub lambda: [f64; 2],
-    /// Where a convex face is touched, in the frame of its body.
+    /// Where a convex face is touched, in the frame of its body; of a fit its convex part, in A's frame.
     pub point: DVec3,
 }
 

@@ -95,7 +95,7 @@ pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, Lite
         side: side_p,
         id: p,
         other: Some((side_q, q)),
-        point: DVec3::ZERO,
+        point: view.center,
         normal,
         bound,
         rate: m.rate / twice_mean,
@@ -140,7 +140,8 @@ pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
     let normal = fit.normal + axis * (z / twice_mean);
     // |∇G| is no longer 1 or less: its rounding, and that of z.
     let lost = view.rounding * (z.abs() + 2.0 * view.radius) / twice_mean;
-    Some(Linear { normal, bound: fit.bound - z * z / (2.0 * twice_mean) - lost, ..*fit })
+    let bound = fit.bound - z * z / (2.0 * twice_mean) - lost;
+    Some(Linear { point: view.center + y, normal, bound, ..*fit })
 }
 
 /// The bound of a cone in a cone hole of (nearly) the same angle and direction. With common axis a and angle α,

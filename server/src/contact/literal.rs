@@ -63,7 +63,7 @@ pub struct Linear {
     pub id: LiteralId,
     /// The other literal of a same-shape fit (`fit`).
     pub other: Option<(Side, LiteralId)>,
-    /// Where a convex face is touched, in the frame of its body.
+    /// Where a convex face is touched, in the frame of its body; of a fit its convex part, in A's frame.
     pub point: DVec3,
     /// n, with the literal's sign.
     pub normal: DVec3,

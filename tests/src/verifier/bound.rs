@@ -30,7 +30,7 @@ pub struct Term {
     pub other: Option<Literal>,
     /// Multiplier at the start and the end of the span; linear between.
     pub lambda: [f64; 2],
-    /// Point of contact of the tangent, frame of the literal's body.
+    /// Point of contact of the tangent, frame of the literal's body; of a fit's convex part in the carrier's frame.
     pub point: DVec3,
 }
 
@@ -113,10 +113,11 @@ impl Bounder<'_> {
                     let q = if j == k { point(0.5) * h * y[k].square() } else { h * (y[k] * y[j]) };
                     second = second + q;
                     let c = if q.lo.is_finite() { -q.lo } else { y[k].mag() * y[j].mag() };
-                    cost[k] += c.max(0.0);
+                    // Halving the time makes the coefficient of a mixed term tighter, too.
+                    cost[if j == 3 { 3 } else { k }] += c.max(0.0);
                     cost[j] += c.max(0.0);
                 }
-                cost[k] += (whole.g[k].hi - whole.g[k].lo).min(1e3) * y[k].mag() * 1e-3;
+                cost[k] += (whole.g[k].hi - whole.g[k].lo).min(1e3) * y[k].mag() * 1e-9;
             }
             let best = [whole.v.lo, second.lo, first.lo].into_iter().fold(f64::NEG_INFINITY, f64::max);
             if best > 0.0 {
@@ -142,6 +143,23 @@ impl Bounder<'_> {
         if on_b { self.motions.in_b(x, t) } else { in_a(x) }
     }
 
+    /// A point fixed in A, in the coordinates of one of the bodies: it depends on time alone.
+    fn fixed(&self, on_b: bool, x: Vector, t: Interval) -> [Jet; 3] {
+        if !on_b {
+            return x.map(Jet::constant);
+        }
+        let mut y = self.motions.in_b(x, t);
+        for jet in &mut y {
+            for k in 0..3 {
+                jet.g[k] = ZERO;
+                for j in k..4 {
+                    jet.h[place(k, j)] = ZERO;
+                }
+            }
+        }
+        y
+    }
+
     /// Σ λ_i(t) ℓ_i, the multipliers linear over the span.
     fn sum(&self, terms: &[Term], span: (f64, f64), x: Vector, t: Interval) -> Option<Jet> {
         let (a, b) = (in_a(x), self.motions.in_b(x, t));
@@ -150,7 +168,7 @@ impl Bounder<'_> {
             let y = if term.literal.on_b { &b } else { &a };
             let face = self.face(&term.literal)?;
             let jet = if let Some(other) = &term.other {
-                self.fit((&term.literal, face), (other, self.face(other)?), (&a, &b), (x, t))?
+                self.fit((&term.literal, face), (other, self.face(other)?), (&a, &b), (x, t), term.point)?
             } else if term.literal.negative {
                 self.psi(face, y).scaled(point(-1.0)).plus(point(self.depth))
             } else {
@@ -213,6 +231,7 @@ impl Bounder<'_> {
         q: (&Literal, &Face),
         (a, b): (&[Jet; 3], &[Jet; 3]),
         (x, t): (Vector, Interval),
+        touched: DVec3,
     ) -> Option<Jet> {
         if p.0.on_b == q.0.on_b || p.0.negative || !q.0.negative {
             return None;
@@ -240,13 +259,45 @@ impl Bounder<'_> {
             }
             Some((s, r))
         };
+        // A sphere in a cylinder leaves the square of the way along the axis: taken from the touched point, it is not
+        // negative and can go, and what is left is linear in space.
+        let along = match (p.1, q.1) {
+            (Face::Sphere { .. }, Face::Cylinder { axis, .. }) => {
+                let from = self.fixed(q.0.on_b, vector(touched.to_array()), t);
+                let y = if q.0.on_b { b } else { a };
+                Some(linear(unit(vector(axis.to_array())), &std::array::from_fn(|i| y[i] - from[i])).square())
+            }
+            _ => None,
+        };
+        let (p_name, q_name) = (p, q);
         let ((p, r_p), (q, r_q)) = (square(p.0, p.1)?, square(q.0, q.1)?);
         if r_p <= self.depth {
             return None;
         }
         let (r_p, r_q, depth) = (point(r_p), point(r_q), point(self.depth));
         let room = (r_q + depth).square() - (r_p - depth).square();
-        Some((p - q).plus(room).scaled((point(2.0) * (r_p + r_q)).recip()))
+        let mut difference = p - q;
+        if let Some(along) = along {
+            difference = difference - along;
+            for i in 0..3 {
+                for j in i..3 {
+                    difference.h[place(i, j)] = ZERO;
+                }
+            }
+        }
+        let mut fit = difference.plus(room).scaled((point(2.0) * (r_p + r_q)).recip());
+        // The curvatures cancel and so do the gradients' widths, but not in intervals: from the middle of the box they are
+        // known as exactly as the Hessian is.
+        let middle = x.map(|x| point((0.5 * (x.lo + x.hi)).clamp(x.lo, x.hi)));
+        if x != middle {
+            let (a, b) = (in_a(middle), self.motions.in_b(middle, t));
+            let at = self.fit(p_name, q_name, (&a, &b), (middle, t), touched)?;
+            let away = minus(x, middle);
+            for k in 0..3 {
+                fit.g[k] = (0..3).fold(at.g[k], |g, j| g + fit.h[place(k, j)] * away[j]);
+            }
+        }
+        Some(fit)
     }
 }
 

@@ -35,7 +35,12 @@ pub struct Checked {
     pub combinations: u64,
     /// Interval evaluations.
     pub evaluations: u64,
+    /// When the witness is at the depth in both bodies, if there is one.
+    pub witness: Option<f64>,
 }
+
+/// Part of the depth that a witness must reach for certain: it is a point found by descent, in doubles.
+const WITNESS: f64 = 0.99;
 
 /// An and/or-tree of literals.
 #[derive(Clone, Debug)]
@@ -147,7 +152,7 @@ pub fn check(
     first: (&Solid, &Placed),
     second: (&Solid, &Placed),
 ) -> Result<Checked, String> {
-    let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>()));
+    let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>())).peekable();
     let (_, head) = lines.next().ok_or("empty certificate")?;
     let [_, a, b, _, carrier, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
         return Err("line 1: not the head of a pair".into());
@@ -180,6 +185,18 @@ pub fn check(
     let mut bounder = Bounder { a: carrier.0, b: other.0, motions, depth, evaluations: 0 };
     let a = expression(carrier.0, carrier.0.root, false, false);
     let b = expression(other.0, other.0.root, false, true);
+    if let Some((line, words)) = lines.next_if(|(_, words)| words[0] == "witness") {
+        let numbers: Vec<f64> = words[1..].iter().map(|s| number(s)).collect::<Result<_, _>>()?;
+        let [t, x, y, z] = numbers.as_slice() else { return Err(format!("line {line}: witness: time and point")) };
+        bounder.depth = WITNESS * depth;
+        let region = Region([(*x, *x), (*y, *y), (*z, *z), (*t, *t)]);
+        let within = (until..=1.0).contains(t);
+        if !within || !certain(&mut bounder, &a, region) || !certain(&mut bounder, &b, region) {
+            return Err(format!("line {line}: the witness is not at the depth in both bodies"));
+        }
+        bounder.depth = depth;
+        checked.witness = Some(*t);
+    }
     let mut stack = vec![Cell { region: root, t: 0.0, started: false, a: Some(a), b: Some(b) }];
     while let Some(mut cell) = stack.pop() {
         let end = format!("the certificate ends with cells missing (of {count})");
@@ -309,9 +326,10 @@ fn combinations(words: &[&str]) -> Result<Vec<Vec<Term>>, String> {
         let (mut group, mut rest) = (Vec::new(), part);
         while !rest.is_empty() {
             rest = match rest {
-                ["fit", p, q, from, to, rest @ ..] => {
+                ["fit", p, q, from, to, x, y, z, rest @ ..] => {
                     let lambda = [number(from)?, number(to)?];
-                    group.push(Term { literal: literal(p)?, other: Some(literal(q)?), lambda, point: DVec3::ZERO });
+                    let point = DVec3::new(number(x)?, number(y)?, number(z)?);
+                    group.push(Term { literal: literal(p)?, other: Some(literal(q)?), lambda, point });
                     rest
                 }
                 [name, from, to, x, y, z, rest @ ..] => {
