@@ -30,6 +30,8 @@ pub struct Campaign<'t> {
     target: &'t Target,
     random: Random,
     pool: Vec<Vec<u8>>,
+    /// The pool's inputs by the first word of what came of them.
+    kinds: BTreeMap<String, Vec<usize>>,
     /// How many of the pool are seeds or corpus.
     seeds: usize,
     words: HashSet<String>,
@@ -52,6 +54,7 @@ impl<'t> Campaign<'t> {
             target,
             random: Random::new(seed),
             pool: Vec::new(),
+            kinds: BTreeMap::new(),
             seeds: 0,
             words: HashSet::new(),
             runs: 0,
@@ -82,8 +85,9 @@ impl<'t> Campaign<'t> {
         match checked(self.target, &input, thorough) {
             Ok(word) => {
                 let first = word.split(' ').next().unwrap_or_default().to_owned();
-                *self.shares.entry(first).or_default() += 1;
+                *self.shares.entry(first.clone()).or_default() += 1;
                 if self.words.insert(word) {
+                    self.kinds.entry(first).or_default().push(self.pool.len());
                     self.fresh.push(input.clone());
                     self.pool.push(input);
                 }
@@ -125,10 +129,17 @@ impl<'t> Campaign<'t> {
             let length = r.below(self.target.longest);
             return (0..length).map(|_| r.bits() as u8).collect();
         }
-        // The seeds lead deepest, and refusals soon outnumber them.
-        let from = if r.below(3) == 0 { self.seeds.min(self.pool.len()) } else { self.pool.len() };
-        let mut input = self.pool[r.below(from)].clone();
-        for _ in 0..=r.below(4) {
+        // The seeds lead deepest; of what grew from them every kind of outcome counts alike, or refusals would soon
+        // outnumber all others. One edit in two cases: what was taken is then often taken again.
+        let i = if r.below(3) == 0 || self.kinds.is_empty() {
+            r.below(self.seeds.clamp(1, self.pool.len()))
+        } else {
+            let kind = self.kinds.values().nth(r.below(self.kinds.len())).expect("a kind");
+            kind[r.below(kind.len())]
+        };
+        let mut input = self.pool[i].clone();
+        let edits = if r.below(2) == 0 { 1 } else { 1 + r.below(4) };
+        for _ in 0..edits {
             let at = r.below(input.len() + 1);
             let end = (at + 1 + r.below(8)).min(input.len());
             match r.below(9) {

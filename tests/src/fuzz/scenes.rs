@@ -11,7 +11,7 @@ use contactd::solid::Op;
 use contactd_proto::{Motion, Pose};
 use glam::DVec3;
 
-pub(super) const TARGET: Target = Target { name: "scenes", run, seeds, words: &[], longest: 160, thorough_every: 500 };
+pub(super) const TARGET: Target = Target { name: "scenes", run, seeds, words: &[], longest: 160, thorough_every: 100 };
 
 /// Cells a pair may cost: answers beyond are undecided, which is an answer, too.
 const CELLS: u64 = 200;
