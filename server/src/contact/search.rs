@@ -280,6 +280,12 @@ impl<'a> Search<'a> {
         self.scratch.heap.push(cell);
     }
 
+    /// Takes the earliest item off the queue.
+    #[cfg(test)]
+    pub(super) fn pop(&mut self) -> Option<Cell> {
+        self.scratch.heap.pop()
+    }
+
     /// Time before which nothing can happen in what is queued; infinite when nothing is.
     pub fn earliest(&self) -> f64 {
         self.scratch.heap.peek().map_or(f64::INFINITY, |c| c.t)
