@@ -382,6 +382,7 @@ impl Placed<'_> {
             delta: self.task.delta,
             rounding: self.task.rounding,
             fits: self.task.ideas.fits,
+            curved: false,
         }
     }
 }

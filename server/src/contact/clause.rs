@@ -101,7 +101,7 @@ impl Proof {
 pub struct Term {
     /// The literal; the positive one of a fit.
     pub literal: (Side, LiteralId),
-    /// The negative literal of a fit.
+    /// The negative literal of a fit; of quadrics, one with even weights.
     pub other: Option<(Side, LiteralId)>,
     /// Its multiplier at the start and at the end of the time; linear between.
     pub lambda: [f64; 2],
@@ -186,9 +186,7 @@ impl Run<'_, '_> {
             }
             let (p, q) =
                 if id.sense() == Sense::Positive { ((side, id), (l.side, l.id)) } else { ((l.side, l.id), (side, id)) };
-            if let Some(g) = fit(self.view, p, q) {
-                self.scratch.lits.push(g);
-            }
+            self.scratch.lits.extend(fit(self.view, p, q));
         }
     }
 
@@ -349,7 +347,9 @@ impl Run<'_, '_> {
         let mut added = false;
         for i in 0..self.scratch.lits.len() {
             let l = self.scratch.lits[i];
-            let again = self.scratch.lits[..i].iter().any(|o| (o.side, o.id, o.other) == (l.side, l.id, l.other));
+            let again = self.scratch.lits[..i]
+                .iter()
+                .any(|o| (o.side, o.id, o.other, o.weights) == (l.side, l.id, l.other, l.weights));
             if again {
                 continue;
             }

@@ -41,6 +41,7 @@ pub fn deepest(task: &Task, at: &Instant, start: DVec3) -> (DVec3, DVec3, f64, V
             delta: -best,
             rounding: 0.0,
             fits: false,
+            curved: false,
         };
         let mut pool: Vec<Token> = Vec::new();
         let truth_a = local::prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));

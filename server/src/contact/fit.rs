@@ -1,23 +1,32 @@
 //! Same-shape fits: one more linear bound where a curved face meets a subtracted one that curves alike.
 //!
-//! A contact of +psi_p against −psi_q needs |u_p| <= R_p − delta and |u_q| >= R_q + delta, with u = P(x − o), P = I for a
-//! sphere and I − aaᵀ for a cylinder, hence, with 2R̄ = R_p + R_q,
+//! Every round face is a quadric: with s = x − o, z = s·a and u = s − z a (a sphere has no axis: u = s),
 //!
 //! ```text
-//! G = [ |u_p|² − |u_q|² + (R_q + delta)² − (R_p − delta)² ] / (4R̄) <= 0.
+//! Q = |u|² − ρ²,   ρ = R for a sphere or cylinder, ρ = z tan α for a cone with its apex in o.
 //! ```
 //!
-//! The curvatures cancel in it: ∇G = (u_p − u_q)/(2R̄); what is left of second order in y = x − c is, over 4R̄, nothing or
-//! more for a sphere in a sphere or cylinder, −(y·a_p)² for a cylinder in a sphere, (y·a_q)² − (y·a_p)² for cylinders,
-//! a product of two extents, one of them small with the axes' angle. A peg in its own hole has G = delta everywhere: one
-//! test excludes it.
+//! A contact of +psi_p against −psi_q at depth delta needs Q_p <= 0 with R_p − delta, or the apex moved inwards by delta/sin α,
+//! and Q_q >= 0 with R_q + delta, or the apex moved outwards (where z_q >= 0, which is asked of the whole cell), hence
+//!
+//! ```text
+//! G = μ_p Q_p − μ_q Q_q <= 0 for any μ > 0; here both 1/2(ρ_p + ρ_q), or 1/4ρ_p and 1/4ρ_q.
+//! ```
+//!
+//! Even weights let what is round about a common axis cancel wholly; with the others the two gradients cancel where the
+//! faces touch off the axis. Of second order in y = x − c remains yᵀMy, M = (μ_p − μ_q) I + μ_q b_q b_qᵀ − μ_p b_p b_pᵀ, b = a/cos α (0 for a sphere). That is
+//! convex but for how the axes lean: its convex part is touched like a convex face, what pulls down is bounded over the cell
+//! as a product of two extents, one of them small with the lean, or along the one direction of a negative eigenvalue. A peg
+//! in its own hole has G = delta everywhere: one test excludes it.
 //!
 //! In time only the face on B moves (σ = +1 if that is p). Seen from A, with o the point of its axis nearest to the
-//! cell's centre, s = x − o, w the velocity of A against B at o, b = omega×a, z = s·a (0 at the centre):
+//! cell's centre, s = x − o, w the velocity of A against B at o, b = omega×a, z = s·a (0 at the centre), z_o the height of o
+//! over the apex and ζ = z_o + z:
 //!
 //! ```text
 //! d/dt ½|u|² = u·w + z u·b,
 //! d²/dt² ½|u|² = |Pw + zb|² + 2(w·a)(u·b) − (u·b)² + u·s̈ − z u·ä,
+//! d/dt ½ζ² = ζ ζ̇,   ζ̇ = w·a − u·b,   ζ̈ = s̈·a − 2w·b + s·ä,
 //! ```
 //!
 //! with |s̈| <= C + |spin_A×w|, C = |spin_A×v0| + |omega||spin_B×(o − p_B)|, |w| growing at most C per unit time, and
@@ -27,83 +36,209 @@ use super::literal::{Linear, Side, View};
 use crate::motion::Instant;
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Sense};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-/// A round face: centre or point of the axis, axis if it has one, radius; the body's own frame.
-fn round(face: &Face) -> Option<(DVec3, Option<DVec3>, f64)> {
-    match *face {
-        Face::Sphere { center, radius } => Some((center, None, radius)),
-        Face::Cylinder { origin, axis, radius } => Some((origin, Some(axis), radius)),
-        Face::Plane { .. } | Face::Cone { .. } => None,
+/// A round face of a contact at depth delta; the body's own frame.
+struct Round {
+    /// Centre, a point of the axis, or the apex as delta moves it.
+    origin: DVec3,
+    axis: Option<DVec3>,
+    /// R as delta changes it; 0 for a cone.
+    radius: f64,
+    /// tan α; 0 unless a cone.
+    slope: f64,
+}
+
+impl Round {
+    fn of(face: &Face, sense: Sense, delta: f64) -> Option<Self> {
+        // What a contact needs: positive faces shrink, subtracted ones grow.
+        let shrink = if sense == Sense::Positive { delta } else { -delta };
+        match *face {
+            Face::Sphere { center, radius } => {
+                Some(Self { origin: center, axis: None, radius: radius - shrink, slope: 0.0 })
+            }
+            Face::Cylinder { origin, axis, radius } => {
+                Some(Self { origin, axis: Some(axis), radius: radius - shrink, slope: 0.0 })
+            }
+            Face::Cone { apex, axis, sin, cos } if sin <= STEEPEST * cos => {
+                Some(Self { origin: apex + axis * (shrink / sin), axis: Some(axis), radius: 0.0, slope: sin / cos })
+            }
+            Face::Cone { .. } | Face::Plane { .. } => None,
+        }
+    }
+
+    /// The same round a cell, along A's axes: u at the cell's centre, the axis, the height of the centre, ρ there.
+    fn at(&self, view: &View, side: Side) -> Around {
+        let (mut u, mut axis) = match side {
+            Side::A => (view.center - self.origin, self.axis),
+            Side::B => (view.at.a_vector(view.center_b - self.origin), self.axis.map(|a| view.at.a_vector(a))),
+        };
+        let (mut z, arm) = (0.0, u.length());
+        if let Some(a) = &mut axis {
+            *a = a.normalize();
+            z = u.dot(*a);
+            u -= *a * z;
+        }
+        let bend = axis.map_or(DVec3::ZERO, |a| a * (1.0 + self.slope * self.slope).sqrt());
+        Around { u, axis, z, arm, rho: self.radius + self.slope * z, slope: self.slope, bend }
     }
 }
 
-/// How far radii may differ, relative to their mean, for a fit to be worth a bound.
+struct Around {
+    u: DVec3,
+    axis: Option<DVec3>,
+    z: f64,
+    /// Distance of the face's own point.
+    arm: f64,
+    rho: f64,
+    slope: f64,
+    /// b: the quadric's second-order part is |y|² − (y·b)².
+    bend: DVec3,
+}
+
+/// tan α of a cone up to which it is taken as a quadric: a flatter one loses digits in its square.
+const STEEPEST: f64 = 4.0;
+
+/// Difference of two cones' axes, or angles in radians, up to which a bound by their tips is worth it.
 const SIMILAR: f64 = 0.25;
 
-/// The bound G of a positive literal `p` against a negative literal `q` of the other body, where both are round alike.
-pub fn fit(view: &View, (side_p, p): (Side, LiteralId), (side_q, q): (Side, LiteralId)) -> Option<Linear> {
-    debug_assert!(side_p != side_q && p.sense() == Sense::Positive && q.sense() == Sense::Negative);
-    let (face_p, face_q) = (view.faces(side_p).get(p.face()), view.faces(side_q).get(q.face()));
-    if let (Face::Cone { .. }, Face::Cone { .. }) = (face_p, face_q) {
-        return cones(view, (side_p, p, face_p), (side_q, q, face_q));
-    }
-    let (o_p, a_p, r_p) = round(view.faces(side_p).get(p.face()))?;
-    let (o_q, a_q, r_q) = round(view.faces(side_q).get(q.face()))?;
-    let twice_mean = r_p + r_q;
-    if a_p.is_some() && (r_p - r_q).abs() > 0.5 * SIMILAR * twice_mean {
-        return None;
-    }
-    // Along A's axes: offset of the centre from the face's centre or axis, and the axis; how far off the face's own point is.
-    let place = |side: Side, o: DVec3, a: Option<DVec3>| {
-        let (mut s, mut axis) = match side {
-            Side::A => (view.center - o, a),
-            Side::B => (view.at.a_vector(view.center_b - o), a.map(|a| view.at.a_vector(a))),
+/// Sine of the angle between two axes up to which a fit is worth a bound.
+const LEAN: f64 = 0.5;
+
+/// The second-order part yᵀMy of a fit: a convex part C, and how far the rest pulls down over the cell.
+struct Bend {
+    convex: DMat3,
+    remainder: f64,
+    /// What each half extent costs.
+    cost: DVec3,
+}
+
+impl Bend {
+    fn of(p: &Around, q: &Around, [mu_p, mu_q]: [f64; 2], half: DVec3, curved: bool) -> Self {
+        let extent = |v: DVec3| v.abs().dot(half);
+        let outer = |v: DVec3, k: f64| DMat3::from_cols(v * (v.x * k), v * (v.y * k), v * (v.z * k));
+        let spare = mu_p - mu_q;
+        // (y·c_q)² − (y·c_p)² = (y·l)(y·m), what is spare of |y|² kept across p's axis.
+        let across = DMat3::IDENTITY * spare - p.axis.map_or(DMat3::ZERO, |a| outer(a, spare));
+        let c_p = p.axis.map_or(DVec3::ZERO, |a| a * (mu_p * p.bend.length_squared() - spare).max(0.0).sqrt());
+        let c_q = q.bend * mu_q.sqrt();
+        let flip = if c_p.dot(c_q) < 0.0 { -1.0 } else { 1.0 };
+        let (l, m) = (c_q - c_p * flip, c_q + c_p * flip);
+        let kappa = if m == DVec3::ZERO { 0.0 } else { l.dot(m) / m.length_squared() };
+        let rest = l - m * kappa;
+        let mut best = if kappa >= 0.0 {
+            let cost = (rest.abs() * extent(m) + m.abs() * extent(rest)) * half;
+            Self { convex: across + outer(m, kappa), remainder: extent(rest) * extent(m), cost }
+        } else {
+            let remainder = (extent(l) * extent(m)).min(extent(rest) * extent(m) - kappa * extent(m) * extent(m));
+            Self { convex: across, remainder, cost: (l.abs() * extent(m) + m.abs() * extent(l)) * half }
         };
-        let arm = s.length();
-        if let Some(a) = &mut axis {
-            *a = a.normalize();
-            s -= *a * s.dot(*a);
+        if let (Some(a_p), Some(a_q), true) = (p.axis, q.axis, curved)
+            && let Some(f) = (a_p - a_q * a_p.dot(a_q)).try_normalize()
+        {
+            // In the plane of both axes M has at most one negative eigenvalue; across it, it is `spare`.
+            let (along, aside) = (p.bend.dot(a_q), p.bend.dot(f));
+            let m11 = spare + mu_q * q.bend.length_squared() - mu_p * along * along;
+            let (m12, m22) = (-mu_p * along * aside, spare - mu_p * aside * aside);
+            let (mean, root) = (0.5 * (m11 + m22), (0.25 * (m11 - m22) * (m11 - m22) + m12 * m12).sqrt());
+            let least = mean - root;
+            let e = if (m11 - least).abs() > (m22 - least).abs() {
+                a_q * m12 - f * (m11 - least)
+            } else {
+                f * m12 - a_q * (m22 - least)
+            };
+            let e = e.normalize_or_zero();
+            let pull = (-least).max(0.0);
+            let remainder = pull * extent(e) * extent(e);
+            if remainder < best.remainder {
+                let whole = DMat3::IDENTITY * spare + outer(q.bend, mu_q) - outer(p.bend, mu_p);
+                best =
+                    Self { convex: whole + outer(e, pull), remainder, cost: e.abs() * half * (2.0 * pull * extent(e)) };
+            }
         }
-        (s, axis, arm)
+        let diagonal = DVec3::new(best.convex.x_axis.x, best.convex.y_axis.y, best.convex.z_axis.z);
+        best.cost += diagonal.max(DVec3::ZERO) * half * half;
+        best
+    }
+}
+
+/// The weights of the two quadrics: even, so that what is round about a common axis cancels wholly, or as steep as each
+/// other, so that a contact off the axis is the lowest point of G.
+fn weights(p: &Around, q: &Around, even: bool) -> [f64; 2] {
+    if even {
+        return [0.5 / (p.rho.max(0.0) + q.rho); 2];
+    }
+    let of_q = 0.25 / q.rho;
+    [if p.rho > 0.0 { (0.25 / p.rho).clamp(of_q, 4.0 * of_q) } else { of_q }, of_q]
+}
+
+/// The bounds G of a positive literal `p` against a negative literal `q` of the other body, where both are round alike.
+pub fn fit(
+    view: &View,
+    (side_p, p): (Side, LiteralId),
+    (side_q, q): (Side, LiteralId),
+) -> impl Iterator<Item = Linear> {
+    debug_assert!(side_p != side_q && p.sense() == Sense::Positive && q.sense() == Sense::Negative);
+    let (face_p, face_q) = (*view.faces(side_p).get(p.face()), *view.faces(side_q).get(q.face()));
+    let of = |even| quadrics(view, (side_p, p, &face_p), (side_q, q, &face_q), even);
+    let even = of(true);
+    // Radii alike to a hundredth bend alike: one bound will do.
+    let steep =
+        even.filter(|_| view.curved).and_then(|_| of(false)).filter(|l| l.weights.is_some_and(|[p, q]| p > 1.01 * q));
+    let tips = match (even, &face_p, &face_q) {
+        (None, Face::Cone { .. }, Face::Cone { .. }) => cones(view, (side_p, p, &face_p), (side_q, q, &face_q)),
+        _ => None,
     };
-    let (u_p, a_p, arm_p) = place(side_p, o_p, a_p);
-    let (u_q, a_q, arm_q) = place(side_q, o_q, a_q);
-    // What rounding may do to u and, times the arm, to an axis; and through them to G over the cell.
-    let off = view.rounding + view.motion.rounding.matrix * (arm_p + arm_q + view.radius);
-    let lost = off * (1.0 + (u_p.length() + u_q.length() + 2.0 * view.radius) / twice_mean);
-    // The quadratic part of |u_p|² − |u_q|² over the cell: (y·a_q)² − (y·a_p)² = (y·(a_q−a_p))(y·(a_q+a_p)).
-    let (lean, sum) = match (a_p, a_q) {
-        (None, _) => (DVec3::ZERO, DVec3::ZERO),
-        (Some(p), Some(q)) if p.dot(q) >= 0.0 => (q - p, q + p),
-        (Some(p), Some(q)) => (q + p, q - p),
-        (Some(p), None) => (p, p),
-    };
-    if lean.length() > 2.0 * SIMILAR && a_q.is_some() {
+    [even, steep, tips].into_iter().flatten()
+}
+
+fn quadrics(
+    view: &View,
+    (side_p, p, face_p): (Side, LiteralId, &Face),
+    (side_q, q, face_q): (Side, LiteralId, &Face),
+    even: bool,
+) -> Option<Linear> {
+    let (round_p, round_q) =
+        (Round::of(face_p, Sense::Positive, view.delta)?, Round::of(face_q, Sense::Negative, view.delta)?);
+    if !view.curved && (round_p.slope > 0.0 || round_q.slope > 0.0) {
         return None;
     }
-    let (delta, e) = (view.delta, view.half);
-    let extent = |v: DVec3| v.abs().dot(e);
-    let difference = u_p - u_q;
-    let g = difference.dot(u_p + u_q) / (2.0 * twice_mean) + 0.5 * (r_q - r_p) + delta;
-    let bound = g - extent(lean) * extent(sum) / (2.0 * twice_mean) - lost;
-    let cost = (lean.abs() * extent(sum) + sum.abs() * extent(lean)) * e / (2.0 * twice_mean);
-    let normal = difference / twice_mean;
-    let (sigma, u, axis) = if side_p == Side::B { (1.0, u_p, a_p) } else { (-1.0, u_q, a_q) };
-    let m = moving(view, sigma, u, axis, off)?;
+    let (at_p, at_q) = (round_p.at(view, side_p), round_q.at(view, side_q));
+    let way = if side_q == Side::B { view.motion.speed * view.motion.h } else { 0.0 };
+    if at_q.slope > 0.0 && at_q.z <= view.radius + way {
+        return None;
+    }
+    if let (Some(a), Some(b)) = (at_p.axis, at_q.axis)
+        && a.cross(b).length() > LEAN
+    {
+        return None;
+    }
+    let mu = weights(&at_p, &at_q, even);
+    let bend = Bend::of(&at_p, &at_q, mu, view.half, view.curved);
+    // Value and half the gradient of Q at the cell's centre.
+    let value = |f: &Around| f.u.length_squared() - f.rho * f.rho;
+    let slope = |f: &Around| f.u - f.axis.map_or(DVec3::ZERO, |a| a * (f.slope * f.rho));
+    let (sigma, mu_b, moved) = if side_p == Side::B { (1.0, mu[0], &at_p) } else { (-1.0, mu[1], &at_q) };
+    // What rounding may do to u and z and, times the arm, to an axis; and through them to G over the cell.
+    let off = view.rounding + view.motion.rounding.matrix * (at_p.arm + at_q.arm + view.radius);
+    let gradient = |f: &Around| (1.0 + f.slope * f.slope) * (f.u.length() + f.rho.abs() + 2.0 * view.radius);
+    let lost = off * (1.0 + 4.0 * (mu[0] * gradient(&at_p) + mu[1] * gradient(&at_q)));
+    let m = moving(view, sigma, moved, off)?;
+    let twice = 2.0 * mu_b;
     Some(Linear {
         side: side_p,
         id: p,
         other: Some((side_q, q)),
+        weights: Some(mu),
         point: view.center,
-        normal,
-        bound,
-        rate: m.rate / twice_mean,
-        turn: m.turn / twice_mean,
-        s: m.s / twice_mean,
-        q: m.second / twice_mean,
+        normal: 2.0 * (slope(&at_p) * mu[0] - slope(&at_q) * mu[1]),
+        bound: value(&at_p) * mu[0] - value(&at_q) * mu[1] - bend.remainder - lost,
+        rate: m.rate * twice,
+        turn: m.turn * twice,
+        s: m.s * twice,
+        q: m.second * twice,
         rigid: false,
-        cost,
+        cost: bend.cost,
     })
 }
 
@@ -130,18 +265,21 @@ pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVe
     Some(o_p + direction.try_normalize()? * radius)
 }
 
-/// The bound of a sphere in a cylinder, its convex part (y·a_q)²/(4R̄) touched at another point `y` of the cell.
+/// The bound of a fit, its convex part yᵀCy touched at another point `y` of the cell; `None` for cones taken by their tips.
 pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
-    let (side_q, q) = fit.other?;
+    let ((side_q, q), mu) = (fit.other?, fit.weights?);
     let (p, q) = (view.faces(fit.side).get(fit.id.face()), view.faces(side_q).get(q.face()));
-    let (Face::Sphere { radius: r_p, .. }, Face::Cylinder { axis, radius: r_q, .. }) = (*p, *q) else { return None };
-    let axis = if side_q == Side::A { axis } else { view.at.a_vector(axis) };
-    let (twice_mean, z) = (r_p + r_q, y.dot(axis));
-    let normal = fit.normal + axis * (z / twice_mean);
-    // |∇G| is no longer 1 or less: its rounding, and that of z.
-    let lost = view.rounding * (z.abs() + 2.0 * view.radius) / twice_mean;
-    let bound = fit.bound - z * z / (2.0 * twice_mean) - lost;
-    Some(Linear { point: view.center + y, normal, bound, ..*fit })
+    if !view.curved && !matches!(p, Face::Sphere { .. }) {
+        return None;
+    }
+    let at_p = Round::of(p, Sense::Positive, view.delta)?.at(view, fit.side);
+    let at_q = Round::of(q, Sense::Negative, view.delta)?.at(view, side_q);
+    let pull = Bend::of(&at_p, &at_q, mu, view.half, view.curved).convex * y;
+    // |∇G| has grown: its rounding, and that of C.
+    let steep = (1.0 + at_p.slope * at_p.slope) * mu[0] + (1.0 + at_q.slope * at_q.slope) * mu[1];
+    let lost = view.rounding * (2.0 * pull.length() + 8.0 * steep * view.radius);
+    let bound = fit.bound - y.dot(pull) - lost;
+    Some(Linear { point: view.center + y, normal: fit.normal + 2.0 * pull, bound, ..*fit })
 }
 
 /// The bound of a cone in a cone hole of (nearly) the same angle and direction. With common axis a and angle α,
@@ -184,6 +322,7 @@ fn cones(
         side: side_p,
         id: p,
         other: Some((side_q, q)),
+        weights: None,
         point: DVec3::ZERO,
         normal: DVec3::ZERO,
         bound: 0.5 * (sin * delta.dot(a) - cos * across(delta)) + view.delta - tilt * lean - 0.5 * far * angle - lost,
@@ -235,14 +374,13 @@ struct Moving {
     second: f64,
 }
 
-/// `off`: what rounding may do to u.
-fn moving(view: &View, sigma: f64, u: DVec3, axis: Option<DVec3>, off: f64) -> Option<Moving> {
-    let (at, h, r) = (view.at, view.motion.h, view.radius);
+fn moving(view: &View, sigma: f64, f: &Around, off: f64) -> Option<Moving> {
+    let (at, h, r, u) = (view.at, view.motion.h, view.radius, f.u);
     let (omega, spin_b) = (at.omega, at.spin_b);
     let spin_a = omega + spin_b;
     let Travel { w, speed, growth: c, pull, slip } = Travel::of(view, view.center - u);
     let lost = (u.length() + r) * slip + off * speed;
-    let Some(a) = axis else {
+    let Some(a) = f.axis else {
         let reach = u.length() + r + h * speed;
         let second = if sigma > 0.0 { reach * pull } else { speed * speed + reach * pull };
         return Some(Moving { rate: sigma * u.dot(w), turn: sigma * w, s: lost, second });
@@ -266,6 +404,22 @@ fn moving(view: &View, sigma: f64, u: DVec3, axis: Option<DVec3>, off: f64) -> O
     } else {
         common + (across_max + z * b_max) * (across_max + z * b_max)
     };
-    let s = a.abs().dot(view.half) * b.abs().dot(view.half) + lost + r * r * rate * omega.length();
-    Some(Moving { rate: sigma * u.dot(w), turn: sigma * (across + a * u.dot(b)), s, second })
+    let extent = |v: DVec3| v.abs().dot(view.half);
+    let s = extent(a) * extent(b) + lost + r * r * rate * omega.length();
+    let mut m = Moving { rate: sigma * u.dot(w), turn: sigma * (across + a * u.dot(b)), s, second };
+    if f.slope > 0.0 {
+        // −½ tan²α ζ².
+        let (steep, sign) = (f.slope * f.slope, -sigma * f.slope * f.slope);
+        let climb = w.dot(a) - u.dot(b);
+        m.rate += sign * f.z * climb;
+        m.turn += sign * (climb * a - f.z * b);
+        let slips = slip + rate * omega.length() * (u.length() + r);
+        m.s +=
+            steep * (extent(a) * extent(b) + (f.z.abs() + 2.0 * r) * slips + off * (speed + b_max * (u.length() + r)));
+        let twist = pull + 2.0 * speed * b_max + (reach + z) * a_max;
+        let climb_max = climb.abs() + slips + r * b_max + h * twist;
+        let height = f.z.abs() + r + h * climb_max;
+        m.second += steep * (height * twist + if sigma > 0.0 { climb_max * climb_max } else { 0.0 });
+    }
+    Some(m)
 }

@@ -63,6 +63,8 @@ pub struct Linear {
     pub id: LiteralId,
     /// The other literal of a same-shape fit (`fit`).
     pub other: Option<(Side, LiteralId)>,
+    /// Weights of the two quadrics that such a fit is made of (`fit`).
+    pub weights: Option<[f64; 2]>,
     /// Where a convex face is touched, in the frame of its body; of a fit its convex part, in A's frame.
     pub point: DVec3,
     /// n, with the literal's sign.
@@ -122,6 +124,8 @@ pub struct View<'a> {
     pub rounding: f64,
     /// Same-shape fits are used.
     pub fits: bool,
+    /// Those too that stay curved: of cones, and with quadrics weighed as steep as each other. Dearer to check by intervals.
+    pub curved: bool,
 }
 
 impl View<'_> {
@@ -273,6 +277,7 @@ impl View<'_> {
             side,
             id,
             other: None,
+            weights: None,
             point: DVec3::ZERO,
             normal,
             bound,

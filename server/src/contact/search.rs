@@ -212,6 +212,7 @@ impl<'a> Task<'a> {
             delta: self.delta,
             rounding: self.rounding,
             fits: self.ideas.fits,
+            curved: true,
         }
     }
 }
