@@ -147,23 +147,28 @@ fn psi(face: &Face, x: &Vector) -> Big {
 }
 
 /// G of a fit (`contact::fit`) over A's frame, for round faces: squares, radii, depth.
-fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64) -> Option<Big> {
-    let square = |face: &Face, x: &Vector| match *face {
-        Face::Sphere { center, radius } => {
-            let u = x.minus(&Vector::of(center));
-            Some((u.dot(&u), radius))
-        }
-        Face::Cylinder { origin, axis, radius } => {
-            // The fit takes the axis' direction, not its stored length.
-            let (o, a) = (x.minus(&Vector::of(origin)), Vector::of(axis));
-            let z = o.dot(&a);
-            Some((o.dot(&o) - &z * &z / a.dot(&a), radius))
-        }
-        _ => None,
+fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2]) -> Option<Big> {
+    // |u|² − ρ² of a face that delta shrinks; the fit takes an axis' direction, not its stored length.
+    let square = |face: &Face, x: &Vector, shrink: f64| {
+        let (origin, axis, radius, steep) = match *face {
+            Face::Sphere { center, radius } => (Vector::of(center), None, big(radius) - big(shrink), big(0.0)),
+            Face::Cylinder { origin, axis, radius } => {
+                (Vector::of(origin), Some(axis), big(radius) - big(shrink), big(0.0))
+            }
+            Face::Cone { apex, axis, sin, cos } => {
+                let tan = big(sin) / big(cos);
+                (Vector::of(apex + axis * (shrink / sin)), Some(axis), big(0.0), &tan * &tan)
+            }
+            Face::Plane { .. } => return None,
+        };
+        let o = x.minus(&origin);
+        let along = axis.map_or(big(0.0), |a| {
+            let (z, a) = (o.dot(&Vector::of(a)), Vector::of(a));
+            &z * &z / a.dot(&a)
+        });
+        Some(o.dot(&o) - along * (big(1.0) + steep) - &radius * &radius)
     };
-    let ((up, rp), (uq, rq)) = (square(p.0, p.1)?, square(q.0, q.1)?);
-    let twice = big(rp) + big(rq);
-    Some((up - uq) / (big(2.0) * twice) + (big(rq) - big(rp)) / big(2.0) + big(delta))
+    Some(big(mu[0]) * square(p.0, p.1, delta)? - big(mu[1]) * square(q.0, q.1, -delta)?)
 }
 
 /// Random models: primitives and trees, frusta with a far apex, faces far from the model's origin.
@@ -287,6 +292,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 delta: 1e-9,
                 rounding: budget,
                 fits: true,
+                curved: true,
             };
             let inside = |r: &mut Random| (center + half * r.vector(1.0)).clamp(center - half, center + half);
             let (c_b, c_a) = in_b(center);
@@ -330,16 +336,19 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 worst.see(|w| &mut w.plane, double(&above).max(0.0), budget, &what);
                 // Neither does a fit's.
                 let other = if side == Side::A { &b.solid } else { &a.solid };
-                let round = |f: &Face| matches!(f, Face::Sphere { .. } | Face::Cylinder { .. });
+                let round = |f: &Face| !matches!(f, Face::Plane { .. });
                 let fitting = (0..other.faces.len()).find(|i| round(face) && round(&other.faces[*i]));
                 if let (Sense::Positive, Some(i)) = (sense, fitting) {
                     let other_side = if side == Side::A { Side::B } else { Side::A };
                     let q = LiteralId::new(i as u32, Sense::Negative);
-                    if let Some(l) = fit::fit(&view, (side, id), (other_side, q)) {
+                    for l in fit::fit(&view, (side, id), (other_side, q)) {
+                        let Some(mu) = l.weights else { continue };
                         let (in_p, in_q) = if side == Side::A { (&x_a, &x_b) } else { (&x_b, &x_a) };
-                        let g = exact_fit((face, in_p), (&other.faces[i], in_q), view.delta).expect("round");
+                        let g = exact_fit((face, in_p), (&other.faces[i], in_q), view.delta, mu).expect("round");
                         // Its own rounding is subtracted already; E stands for the sums.
-                        worst.see(|w| &mut w.fit, double(&(plane(&l) - g)).max(0.0), budget, &what);
+                        worst.see(|w| &mut w.fit, double(&(plane(&l) - &g)).max(0.0), budget, &what);
+                        let touched = fit::touch(&view, &l, inside(&mut r) - center).expect("curved fits");
+                        worst.see(|w| &mut w.fit, double(&(plane(&touched) - &g)).max(0.0), budget, &what);
                     }
                 }
             }
