@@ -270,13 +270,16 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
         let aabb = a.bounds.root().aabb;
         for _ in 0..6 {
             let mut center = r.point_in(&aabb);
-            if r.chance(0.2) {
-                // On an axis, where directions are noise.
+            let mut size = 10f64.powf(r.within(-9.0, -0.5));
+            if r.chance(0.3) {
+                // On an axis, where directions are noise, or very near it, in a cell of that size.
                 if let Some(origin) = axis_point(&mut r, a) {
-                    center = origin.clamp(aabb.min, aabb.max);
+                    size = 10f64.powf(r.within(-14.0, -8.0));
+                    let beside = if r.chance(0.3) { DVec3::ZERO } else { r.direction() * size * aabb.half().length() };
+                    center = (origin + beside).clamp(aabb.min, aabb.max);
                 }
             }
-            let half = (aabb.half() * 10f64.powf(r.within(-9.0, -0.5))).min(aabb.max - center).min(center - aabb.min);
+            let half = (aabb.half() * size).min(aabb.max - center).min(center - aabb.min);
             let x_max = (center - at.center_a).length() + half.length();
             let h = r.within(0.0, 1.0 - t);
             let view = View {
@@ -325,7 +328,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 }
                 // The literal's plane never lies above the literal, wherever it is touched.
                 let l = if sense == Sense::Positive && r.chance(0.5) {
-                    let far = 10f64.powf(r.within(-3.0, 3.0));
+                    let far = 10f64.powf(r.within(-3.0, 6.0));
                     view.tangent(side, id, point + r.vector(far))
                 } else {
                     view.linear(side, id, DVec3::ZERO)
