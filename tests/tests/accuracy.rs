@@ -271,17 +271,7 @@ fn pegs() -> (World, Vec<PoseRecord>) {
     for i in 0..4u32 {
         let x = DVec3::X * 4.0 * f64::from(i);
         let mut add = |id: u32, part: &Arc<Part>, is_static: bool, pose: Pose| {
-            let spec = ObjectSpec {
-                id,
-                name: format!("object {id}"),
-                group: "default".into(),
-                part: part.clone(),
-                is_static,
-                rotates: true,
-                max_speed: f64::INFINITY,
-                place: Pose::IDENTITY,
-                pose,
-            };
+            let spec = ObjectSpec { is_static, ..ObjectSpec::new(id, part, pose) };
             world.add_object(spec).expect("an object");
         };
         add(2 * i, &plate, true, Pose::at(x));

@@ -505,18 +505,7 @@ fn other_pairs_of_the_step_change_no_bit() {
         let parts = [&scene.a, &scene.b].map(|r| Arc::new(Part::new(Arc::new(Model::new(r.build())))));
         let mut world = World::new(8, 8);
         let mut add = |id: u32, part: &Arc<Part>, motion: &Motion| {
-            let spec = ObjectSpec {
-                id,
-                name: format!("object {id}"),
-                group: "default".into(),
-                part: part.clone(),
-                is_static: false,
-                rotates: true,
-                max_speed: f64::INFINITY,
-                place: Pose::IDENTITY,
-                pose: motion.start,
-            };
-            world.add_object(spec).map(|_| ()).map_err(|e| e.to_string())
+            world.add_object(ObjectSpec::new(id, part, motion.start)).map(|_| ()).map_err(|e| e.to_string())
         };
         let free = Motion::turning(scenes::pose(random, 1.0), random.vector(1.0), random.vector(2.0));
         let motions = [scene.motion_a, free, scene.motion_b, free];

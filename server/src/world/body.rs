@@ -59,6 +59,23 @@ pub struct ObjectSpec {
     pub pose: Pose,
 }
 
+impl ObjectSpec {
+    /// A moving object of the group "default" about which nothing is declared, its model in its own frame.
+    pub fn new(id: u32, part: &Arc<Part>, pose: Pose) -> Self {
+        Self {
+            id,
+            name: format!("object {id}"),
+            group: "default".into(),
+            part: part.clone(),
+            is_static: false,
+            rotates: true,
+            max_speed: f64::INFINITY,
+            place: Pose::IDENTITY,
+            pose,
+        }
+    }
+}
+
 /// An object of the world.
 #[derive(Clone, Debug)]
 pub struct Body {
@@ -156,17 +173,8 @@ mod tests {
         let part = Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))));
         let spins = [0.0, 1e-3, 0.7, 3.0, 9.0, 60.0];
         for (i, spin) in spins.into_iter().enumerate() {
-            let spec = ObjectSpec {
-                id: 1,
-                name: String::new(),
-                group: String::new(),
-                part: part.clone(),
-                is_static: false,
-                rotates: true,
-                max_speed: f64::INFINITY,
-                place: Pose::new(DVec3::new(-1.0, 0.5, 0.0), quat_of_rotation_vector(DVec3::new(0.3, 1.0, i as f64))),
-                pose: Pose::IDENTITY,
-            };
+            let place = Pose::new(DVec3::new(-1.0, 0.5, 0.0), quat_of_rotation_vector(DVec3::new(0.3, 1.0, i as f64)));
+            let spec = ObjectSpec { place, ..ObjectSpec::new(1, &part, Pose::IDENTITY) };
             let mut body = Body::new(spec, 0);
             let start = Pose::new(DVec3::new(5.0, -2.0, 1.0), quat_of_rotation_vector(DVec3::new(1.0, 0.2, 0.0)));
             let axis = DVec3::new(0.6, -0.8, 0.0);

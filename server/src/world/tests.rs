@@ -24,17 +24,7 @@ fn slab(half: DVec3) -> Arc<Part> {
 }
 
 fn object(id: u32, part: &Arc<Part>, at: DVec3) -> ObjectSpec {
-    ObjectSpec {
-        id,
-        name: format!("object {id}"),
-        group: "default".into(),
-        part: part.clone(),
-        is_static: false,
-        rotates: true,
-        max_speed: f64::INFINITY,
-        place: Pose::IDENTITY,
-        pose: Pose::at(at),
-    }
+    ObjectSpec::new(id, part, Pose::at(at))
 }
 
 /// A floor (1, static, top at z = 0) and balls of radius 1 (2, 3, …) at z = 3, four apart.

@@ -41,17 +41,7 @@ fn world() -> World {
     let [plate, ball, cube] = parts();
     let mut world = World::new(8, 6);
     let mut add = |id, part: &Arc<Part>, at: DVec3, is_static, rotates, max_speed| {
-        let spec = ObjectSpec {
-            id,
-            name: format!("object {id}"),
-            group: "default".into(),
-            part: part.clone(),
-            is_static,
-            rotates,
-            max_speed,
-            place: Pose::IDENTITY,
-            pose: Pose::at(at),
-        };
+        let spec = ObjectSpec { is_static, rotates, max_speed, ..ObjectSpec::new(id, part, Pose::at(at)) };
         world.add_object(spec).expect("an object of the world");
     };
     add(1, &plate, DVec3::ZERO, true, true, f64::INFINITY);
