@@ -19,12 +19,18 @@ use crate::motion::{Instant, Relative};
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
 
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
 /// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
 const LEAST_DAMPING: f64 = 1e-14;
 const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
+
+/// Active constraints, in place.
+pub type Actives = SmallVec<[Constraint; MAX_ACTIVE]>;
+/// Their multipliers, in place.
+pub type Weights = SmallVec<[f64; MAX_ACTIVE]>;
 
 /// One active constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,9 +49,9 @@ pub struct Solution {
     /// Time, fraction of the step.
     pub t: f64,
     /// The active constraints.
-    pub active: Vec<Constraint>,
+    pub active: Actives,
     /// Their multipliers.
-    pub lambda: Vec<f64>,
+    pub lambda: Weights,
     /// Largest |Σ λ g| left.
     pub stationarity: f64,
 }
@@ -141,7 +147,7 @@ impl Problem<'_> {
         let m = active.len();
         debug_assert!(m <= MAX_ACTIVE && lambda.len() == m);
         let n = m + 4;
-        let (mut x, mut t, mut lambda) = (x, t, lambda.to_vec());
+        let (mut x, mut t, mut lambda) = (x, t, Weights::from_slice(lambda));
         let mut f = [0.0; MAX_UNKNOWNS];
         let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
         let mut best: f64 = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
@@ -158,7 +164,7 @@ impl Problem<'_> {
                 return None;
             }
             let (nx, nt) = (x + sx, t + st);
-            let nl: Vec<f64> = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
+            let nl: Weights = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
             let (mut nf, mut nj) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
             if nt.abs() > 4.0 {
                 damping *= 16.0;
@@ -188,7 +194,7 @@ impl Problem<'_> {
         (x, t) = self.meet(active, x, t, level)?;
         let at = self.relative.at(t);
         let sum = active.iter().zip(&lambda).map(|(c, l)| self.row(c, x, &at, level).gradient * *l).sum::<DVec3>();
-        Some(Solution { x, t, active: active.to_vec(), lambda, stationarity: sum.abs().max_element() })
+        Some(Solution { x, t, active: Actives::from_slice(active), lambda, stationarity: sum.abs().max_element() })
     }
 
     /// Plain Newton steps on the same square system, from a good guess: `Err(true)` where the system is singular, which
@@ -198,20 +204,27 @@ impl Problem<'_> {
         active: &[Constraint],
         mut x: DVec3,
         mut t: f64,
-        lambda: &mut [f64],
+        mut lambda: Weights,
         level: f64,
-    ) -> Result<(DVec3, f64), bool> {
+    ) -> Result<Solution, bool> {
         const STEPS: usize = 9;
         /// Squared residual of rounding.
-        const MET: f64 = 1e-28;
+        const MET: f64 = 1e-29;
+        /// Squared residual from which the surfaces alone are met.
+        const SMALL: f64 = 1e-20;
         let n = active.len() + 4;
         let mut f = [0.0; MAX_UNKNOWNS];
         let mut last = f64::INFINITY;
         for _ in 0..STEPS {
             let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
-            let square = self.fill(active, x, t, lambda, level, &mut f, &mut jac);
-            if square <= MET {
-                return Ok((x, t));
+            let square = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+            if square <= MET || (square <= SMALL && square > 1e-3 * last) {
+                if square > MET {
+                    (x, t) = self.meet(active, x, t, level).ok_or(false)?;
+                }
+                let n = active.len();
+                let stationarity = f[n..n + 3].iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                return Ok(Solution { x, t, active: Actives::from_slice(active), lambda, stationarity });
             }
             // Newton gains or is lost; a first step or two may go astray.
             if !square.is_finite() || square > 1e2 * last.max(1e-2) {
@@ -226,7 +239,25 @@ impl Problem<'_> {
                 return Err(false);
             }
         }
-        if last <= 1e-20 { Ok((x, t)) } else { Err(false) }
+        Err(false)
+    }
+
+    /// The constraints met by minimum-norm steps, the multipliers kept as they are: for lines and patches of contacts, which
+    /// leave x open. `None` when the constraints cannot be met or the multipliers do not balance to rounding: a tilt of 1e-9
+    /// decides at which end of a line the bodies touch.
+    pub fn along(&self, active: &[Constraint], x: DVec3, t: f64, mut lambda: Weights, level: f64) -> Option<Solution> {
+        /// Imbalance of unit normals that rounding leaves.
+        const BALANCED: f64 = 1e-13;
+        if let [Constraint::Literal(..), Constraint::Literal(..)] = active {
+            // Two unit normals balance at equal weights or not at all.
+            lambda.fill(0.5);
+        }
+        let (x, t) = self.meet(active, x, t, level)?;
+        let at = self.relative.at(t);
+        let sum: DVec3 = active.iter().zip(&lambda).map(|(c, l)| self.row(c, x, &at, level).gradient * *l).sum();
+        let stationarity = sum.abs().max_element();
+        let active = Actives::from_slice(active);
+        (stationarity <= BALANCED).then_some(Solution { x, t, active, lambda, stationarity })
     }
 
     /// Minimum-norm steps on the constraints alone until they are met to rounding; `None` when they can't be.
@@ -325,21 +356,32 @@ fn eliminate(
 ) -> Option<[f64; MAX_UNKNOWNS]> {
     /// A pivot below this, of rows of about unit size, leaves a direction undetermined.
     const SINGULAR: f64 = 1e-9;
+    let n = n.min(MAX_UNKNOWNS);
     for k in 0..n {
-        let p = (k..n).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs()))?;
-        a.swap(k, p);
-        f.swap(k, p);
-        let pivot = a[k][k];
-        if pivot.is_nan() || pivot.abs() < SINGULAR {
+        let (mut p, mut largest) = (k, a[k][k].abs());
+        for (i, row) in a.iter().enumerate().take(n).skip(k + 1) {
+            if row[k].abs() > largest {
+                (p, largest) = (i, row[k].abs());
+            }
+        }
+        if largest.is_nan() || largest < SINGULAR {
             return None;
         }
-        for i in k + 1..n {
-            let factor = a[i][k] / pivot;
-            if factor != 0.0 {
-                for j in k + 1..n {
-                    a[i][j] -= factor * a[k][j];
+        if p != k {
+            a.swap(k, p);
+            f.swap(k, p);
+        }
+        let (above, below) = a.split_at_mut(k + 1);
+        let row = &above[k];
+        let inverse = 1.0 / row[k];
+        for (i, other) in below.iter_mut().take(n - k - 1).enumerate() {
+            // Most of the system is zeros.
+            if other[k] != 0.0 {
+                let factor = other[k] * inverse;
+                for (o, r) in other[k + 1..n].iter_mut().zip(&row[k + 1..n]) {
+                    *o -= factor * r;
                 }
-                f[i] -= factor * f[k];
+                f[k + 1 + i] -= factor * f[k];
             }
         }
     }

@@ -13,7 +13,7 @@
 use super::clause::{self, Advance, Hint};
 use super::fit;
 use super::literal::{Faces, Side, View};
-use super::newton::{Constraint, Problem, Solution};
+use super::newton::{Actives, Constraint, Problem, Solution, Weights};
 use super::outcome::Counters;
 use super::pair::Ideas;
 use super::stage2::Stage2;
@@ -136,6 +136,8 @@ impl Found {
 }
 
 /// How a search ended.
+// The contact is kept in place: one a query, and nothing allocated.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub enum Ending {
     /// No contact within the step.
@@ -641,28 +643,45 @@ impl<'a> Search<'a> {
     }
 
     /// The depth at which witnesses are sought: delta and what rounding may take from it.
-    fn witness_level(&self) -> f64 {
+    pub(super) fn witness_level(&self) -> f64 {
         // Deep enough to be so after all rounding, with what Newton may leave.
         self.task.delta * (1.0 + 1e-6) + 1.5 * self.task.rounding
     }
 
-    /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed.
-    pub(super) fn confirm(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
+    /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed. With
+    /// `mend` an active set that does not hold is mended as the search does it, which costs many times more.
+    pub(super) fn confirm(&mut self, active: Actives, x: DVec3, t: f64, lambda: Weights, mend: bool) -> bool {
         if !has_both_sides(&active) {
             return false;
         }
         self.counters.newton += 1;
-        let guess = lambda.clone();
-        let (x, t) = match self.problem().refine(&active, x, t, &mut lambda, self.witness_level()) {
-            Ok(better) => better,
-            Err(true) => {
-                lambda = guess;
-                (x, t)
-            }
-            Err(false) => return false,
-        };
         self.stage2.all = true;
-        let confirmed = self.polish(active, x, t, lambda);
+        let confirmed = match self.problem().refine(&active, x, t, lambda.clone(), self.witness_level()) {
+            Ok(s) if !(0.0..=1.0).contains(&s.t) || s.t >= self.goal() => false,
+            Ok(s) => {
+                let at = self.task.relative.at(s.t);
+                let holds = |(c, l): (&Constraint, &f64)| matches!(c, Constraint::Apex(..)) || *l >= -1e-9;
+                if s.active.iter().zip(&s.lambda).all(holds) && self.is_deep(s.x, &at, self.task.rounding) {
+                    self.holds_at_apexes(&s, &at) && self.accept(s)
+                } else {
+                    mend && self.polish(active.into_vec(), s.x, s.t, s.lambda.into_vec())
+                }
+            }
+            // A line or patch of contacts leaves x open: where the guess' multipliers hold, the surfaces alone tell the rest.
+            Err(true) => match self.problem().along(&active, x, t, lambda.clone(), self.witness_level()) {
+                Some(s) if (0.0..=1.0).contains(&s.t) && s.t < self.goal() && s.stationarity < SETTLED => {
+                    let at = self.task.relative.at(s.t);
+                    if self.is_deep(s.x, &at, self.task.rounding) {
+                        self.holds_at_apexes(&s, &at) && self.accept(s)
+                    } else {
+                        mend && self.polish(active.into_vec(), x, t, lambda.into_vec())
+                    }
+                }
+                // What turns into a line of contact has other multipliers there.
+                _ => (mend || self.task.relative.turns()) && self.polish(active.into_vec(), x, t, lambda.into_vec()),
+            },
+            Err(false) => false,
+        };
         self.stage2.all = false;
         confirmed
     }
@@ -793,7 +812,17 @@ impl<'a> Search<'a> {
             return false;
         }
         let problem = self.problem();
-        let touch = problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0).filter(|s| {
+        // A whole primitive's contact is regular as a rule: a plain step or two.
+        let plain = self.stage2.all.then(|| problem.refine(&deep.active, deep.x, deep.t, deep.lambda.clone(), 0.0));
+        let touch = match plain {
+            Some(Ok(s)) if (s.x - deep.x).length() <= SAME_POINT * self.task.scale => Some(s),
+            Some(Err(true)) => problem.along(&deep.active, deep.x, deep.t, deep.lambda.clone(), 0.0),
+            _ => None,
+        };
+        let touch = touch
+            .filter(|s| s.stationarity < SETTLED)
+            .or_else(|| problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0));
+        let touch = touch.filter(|s| {
             let at = self.task.relative.at(s.t);
             let tol = 16.0 * self.task.rounding;
             s.t <= deep.t && self.task.a.value(s.x).abs() <= tol && self.task.b.value(at.b_point(s.x)).abs() <= tol

@@ -35,6 +35,8 @@ pub struct Relative {
     center_a: DVec3,
     /// B's place, position taken to B's model axes.
     offset_b: DVec3,
+    /// World from model at the start, of a body that does not turn: it stays so.
+    still: [Option<DMat3>; 2],
     rounding: Rounding,
 }
 
@@ -74,6 +76,8 @@ impl Relative {
             omega: a.motion.spin - b.motion.spin,
             center_a: -(a_axes.transpose() * a.place.position),
             offset_b: b_axes.transpose() * b.place.position,
+            still: [(a, a_axes), (b, b_axes)]
+                .map(|(p, axes)| (p.motion.spin == DVec3::ZERO).then(|| p.motion.matrix_at(0.0) * axes)),
             rounding: Rounding { matrix: 0.0, origin: 0.0, arm: 0.0, rate: 0.0 },
         };
         this.rounding = Rounding::of(&this);
@@ -100,6 +104,11 @@ impl Relative {
         self.rounding
     }
 
+    /// True when one of the two bodies turns.
+    pub fn turns(&self) -> bool {
+        self.still.iter().any(Option::is_none)
+    }
+
     /// A's centre of rotation in A's model frame.
     pub fn center_a(&self) -> DVec3 {
         self.center_a
@@ -107,8 +116,8 @@ impl Relative {
 
     /// The relative motion at `t`.
     pub fn at(&self, t: f64) -> Instant {
-        let wa = self.a.motion.matrix_at(t) * self.a_axes;
-        let wb = self.b.motion.matrix_at(t) * self.b_axes;
+        let wa = self.still[0].unwrap_or_else(|| self.a.motion.matrix_at(t) * self.a_axes);
+        let wb = self.still[1].unwrap_or_else(|| self.b.motion.matrix_at(t) * self.b_axes);
         let aw = wa.transpose();
         Instant {
             t,
