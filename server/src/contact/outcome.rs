@@ -168,4 +168,10 @@ impl Outcome {
             counters: Counters::default(),
         }
     }
+
+    /// The same answer with a and b exchanged.
+    pub(super) fn swap_sides(&mut self) {
+        self.normal = -self.normal;
+        std::mem::swap(&mut self.faces_a, &mut self.faces_b);
+    }
 }

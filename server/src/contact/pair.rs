@@ -72,7 +72,11 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 
 /// Searches a pair to its end.
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
-    let mut search = PairSearch::new(query, std::mem::take(scratch));
+    let (task, swapped) = PairSearch::task(query);
+    if let Some(outcome) = direct::quick(query, &task, swapped) {
+        return outcome;
+    }
+    let mut search = PairSearch::of_task(query, task, swapped, std::mem::take(scratch));
     let outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
     *scratch = search.into_scratch();
     outcome
@@ -105,6 +109,8 @@ pub struct PairSearch<'a> {
     search: Option<Search<'a>>,
     /// The ending that a shortcut in front of the search has found.
     ending: Option<Ending>,
+    /// The answer of two whole primitives, found without a search.
+    told: Option<Outcome>,
     outcome: Outcome,
     resolution: f64,
     /// Cells that the question allows.
@@ -161,6 +167,16 @@ impl<'a> PairSearch<'a> {
     /// Prepares the search of a pair.
     pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
         let (task, swapped) = Self::task(query);
+        if let Some(outcome) = direct::quick(query, &task, swapped) {
+            let (resolution, limit) = (task.delta, query.cell_limit);
+            let told = Some(outcome);
+            return Self { task, swapped, level: 1.0, search: None, ending: None, told, outcome, resolution, limit };
+        }
+        Self::of_task(query, task, swapped, scratch)
+    }
+
+    /// Prepares the search of a task.
+    fn of_task(query: &PairQuery<'a>, task: Task<'a>, swapped: bool, scratch: Scratch) -> Self {
         let (a, b) = (task.a, task.b);
         let resolution = task.delta;
         let mut outcome = Outcome::clear(resolution);
@@ -170,11 +186,15 @@ impl<'a> PairSearch<'a> {
         if ending.is_none() && !a.is_empty() && !b.is_empty() {
             search.start();
         }
-        Self { task, swapped, level: 1.0, search: Some(search), ending, outcome, resolution, limit: query.cell_limit }
+        let limit = query.cell_limit;
+        Self { task, swapped, level: 1.0, search: Some(search), ending, told: None, outcome, resolution, limit }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
+        if let Some(told) = &self.told {
+            return if told.status == Status::Clear { f64::INFINITY } else { told.time_lower };
+        }
         match &self.ending {
             Some(Ending::Contact(found)) => found.goal,
             Some(_) => f64::INFINITY,
@@ -184,6 +204,9 @@ impl<'a> PairSearch<'a> {
 
     /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Outcome> {
+        if let Some(told) = self.told {
+            return (told.status == Status::Clear || told.time_lower <= until).then_some(told);
+        }
         loop {
             let search = self.search.as_mut()?;
             let ending = match self.ending.take() {
@@ -221,9 +244,7 @@ impl<'a> PairSearch<'a> {
                 }
             }
             if self.swapped {
-                let o = &mut self.outcome;
-                o.normal = -o.normal;
-                std::mem::swap(&mut o.faces_a, &mut o.faces_b);
+                self.outcome.swap_sides();
             }
             return Some(self.outcome);
         }
@@ -242,7 +263,8 @@ impl<'a> PairSearch<'a> {
     }
 }
 
-fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
+/// Fills in what a found contact says.
+pub(super) fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let deep = &found.deep;
     let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
     o.status = Status::Contact;

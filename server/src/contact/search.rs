@@ -642,12 +642,6 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The depth at which witnesses are sought: delta and what rounding may take from it.
-    pub(super) fn witness_level(&self) -> f64 {
-        // Deep enough to be so after all rounding, with what Newton may leave.
-        self.task.delta * (1.0 + 1e-6) + 1.5 * self.task.rounding
-    }
-
     /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed. With
     /// `mend` an active set that does not hold is mended as the search does it, which costs many times more.
     pub(super) fn confirm(&mut self, active: Actives, x: DVec3, t: f64, lambda: Weights, mend: bool) -> bool {
@@ -656,7 +650,7 @@ impl<'a> Search<'a> {
         }
         self.counters.newton += 1;
         self.stage2.all = true;
-        let confirmed = match self.problem().refine(&active, x, t, lambda.clone(), self.witness_level()) {
+        let confirmed = match self.problem().refine(&active, x, t, lambda.clone(), witness_level(&self.task)) {
             Ok(s) if !(0.0..=1.0).contains(&s.t) || s.t >= self.goal() => false,
             Ok(s) => {
                 let at = self.task.relative.at(s.t);
@@ -668,7 +662,7 @@ impl<'a> Search<'a> {
                 }
             }
             // A line or patch of contacts leaves x open: where the guess' multipliers hold, the surfaces alone tell the rest.
-            Err(true) => match self.problem().along(&active, x, t, lambda.clone(), self.witness_level()) {
+            Err(true) => match self.problem().along(&active, x, t, lambda.clone(), witness_level(&self.task)) {
                 Some(s) if (0.0..=1.0).contains(&s.t) && s.t < self.goal() && s.stationarity < SETTLED => {
                     let at = self.task.relative.at(s.t);
                     if self.is_deep(s.x, &at, self.task.rounding) {
@@ -702,7 +696,7 @@ impl<'a> Search<'a> {
     /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled
     /// multipliers was confirmed.
     fn polish(&mut self, mut active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
-        let level = self.witness_level();
+        let level = witness_level(&self.task);
         for _ in 0..7 {
             debug_assert!(
                 active.iter().all(|c| self.stage2.knows(&self.task, c)),
@@ -849,6 +843,12 @@ impl<'a> Search<'a> {
         });
         true
     }
+}
+
+/// The depth at which witnesses are sought: delta and what rounding may take from it.
+pub(super) fn witness_level(task: &Task) -> f64 {
+    // Deep enough to be so after all rounding, with what Newton may leave.
+    task.delta * (1.0 + 1e-6) + 1.5 * task.rounding
 }
 
 /// What a + b lost when it was rounded to `sum`, exactly (Knuth's two-sum).

@@ -19,11 +19,14 @@
 
 mod balls;
 mod gjk;
+mod straight;
 mod support;
 
 use super::literal::Side;
 use super::newton::Constraint;
-use super::search::{Ending, Search, Task};
+use super::outcome::Outcome;
+use super::pair::{PairQuery, fill_contact};
+use super::search::{Ending, Search, Task, witness_level};
 use crate::math::any_perpendicular;
 use crate::motion::Instant;
 use crate::solid::local::LiteralId;
@@ -31,6 +34,7 @@ use crate::solid::{Face, Node, Primitive, Sense, Solid};
 use gjk::nearest;
 use glam::DVec3;
 use smallvec::SmallVec;
+use straight::Straight;
 use support::Body;
 
 /// Distance evaluations before a pair is left to the search.
@@ -51,14 +55,34 @@ const MEND: (f64, usize) = (0.01, 4);
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
 const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
+/// The answer for two whole primitives that only move along, from the stack alone; `None` leaves them to others.
+pub(super) fn quick(query: &PairQuery, task: &Task, swapped: bool) -> Option<Outcome> {
+    let (a, b) = (whole(task.a)?, whole(task.b)?);
+    if task.relative.turns() || !query.ideas.direct {
+        return None;
+    }
+    let mut outcome = Outcome::clear(task.delta);
+    outcome.counters.primitives = 2;
+    let level = witness_level(task);
+    let found = if let Some(found) = balls::meet(task, a, b, level) {
+        outcome.counters.closed_forms = 1;
+        found
+    } else {
+        Straight::new(task, a, b)?.meet(level, &mut outcome.counters.closed_forms)?
+    };
+    if let Some(found) = found {
+        fill_contact(&mut outcome, task, &found);
+        if swapped {
+            outcome.swap_sides();
+        }
+    }
+    Some(outcome)
+}
+
 /// The answer for two solids that are one convex primitive each; `None` leaves them to the search.
 pub(super) fn answer(search: &mut Search) -> Option<Ending> {
     let task = search.task;
     let (a, b) = (whole(task.a)?, whole(task.b)?);
-    if let Some(found) = balls::meet(&task, a, b, search.witness_level()) {
-        search.counters.closed_forms += 1;
-        return Some(found.map_or(Ending::Clear, Ending::Contact));
-    }
     let (body_a, body_b) = (body_of(a)?, body_of(b)?);
     let advance = Advance::new(task, (a, body_a), (b, body_b));
     if advance.never_near() { Some(Ending::Clear) } else { advance.run(search) }
