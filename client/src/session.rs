@@ -5,7 +5,7 @@
 use crate::journal::Journal;
 use crate::transport::{Opened, Transport};
 use crate::{Error, SharedMemory};
-use contactd_proto::contact_record::{ContactRecord, DetailSlot, PatchSlot};
+use contactd_proto::contact_record::{ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 use contactd_proto::control::{Answer, Command, FaceName, Facets, ObjectSpec, WireRule};
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
 use contactd_proto::step::{ASK_CLEAR, ASK_DETAILS, ASK_FIRST, ASK_POLLING, NO_INDEX, STEP_REFUSED};
@@ -523,6 +523,20 @@ impl<'s> Reply<'s> {
     /// The patch slots of a record, when its rule reports patches.
     pub fn patches(&self, record: &ContactRecord) -> impl Iterator<Item = &'s PatchSlot> + use<'s> {
         self.further(record).filter_map(ContactRecord::as_patch)
+    }
+
+    /// The contact regions of a record in order, each with the slots of the points that bound it, when its rule reports
+    /// patches or has a margin.
+    pub fn regions(
+        &self,
+        record: &ContactRecord,
+    ) -> impl Iterator<Item = (&'s RegionSlot, impl Iterator<Item = &'s PatchSlot> + use<'s>)> + use<'s> {
+        let reply = *self;
+        let record = *record;
+        self.further(&record).filter_map(ContactRecord::as_region).map(move |region| {
+            let number = region.region;
+            (region, reply.patches(&record).filter(move |slot| slot.region[0] == number))
+        })
     }
 
     fn further(&self, record: &ContactRecord) -> impl Iterator<Item = &'s ContactRecord> + use<'s> {

@@ -32,6 +32,8 @@ pub const NOT_CONTINUED: u8 = 2;
 pub const AVERAGED_NORMAL: u8 = 4;
 /// `flags`: a sensor pair, which never stops a search for the scene's first contact.
 pub const SENSOR: u8 = 8;
+/// `flags`: the work limit cut the search for contact regions: there may be more, and [`TOUCHING`] may be a mere caution.
+pub const REGIONS_INCOMPLETE: u8 = 16;
 
 /// `valid`: time and time_lower.
 pub const VALID_TIME: u32 = 1;
@@ -66,7 +68,7 @@ pub struct ContactRecord {
     pub kind: u8,
     /// Index into [`EXTENT_NAMES`].
     pub extent: u8,
-    /// [`TOUCHING`], [`NOT_CONTINUED`], [`AVERAGED_NORMAL`], [`SENSOR`].
+    /// [`TOUCHING`], [`NOT_CONTINUED`], [`AVERAGED_NORMAL`], [`SENSOR`], [`REGIONS_INCOMPLETE`].
     pub flags: u8,
     /// A bit per field that has meaning.
     pub valid: u32,
@@ -96,6 +98,37 @@ pub struct ContactRecord {
 pub const DETAIL_SLOT: u32 = 1;
 /// First word of a [`PatchSlot`].
 pub const PATCH_SLOT: u32 = 2;
+
+/// First word of a [`RegionSlot`].
+pub const REGION_SLOT: u32 = 3;
+
+/// A further slot: a contact region; the [`PatchSlot`]s with its points follow it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, Pod, Zeroable)]
+#[repr(C)]
+pub struct RegionSlot {
+    /// [`REGION_SLOT`].
+    pub tag: u32,
+    /// Which region of the pair it is, from 0.
+    pub region: u32,
+    /// Index into [`KIND_NAMES`].
+    pub kind: u8,
+    /// Index into [`EXTENT_NAMES`].
+    pub extent: u8,
+    /// Zero.
+    pub reserved: [u8; 2],
+    /// Number of points that bound it.
+    pub points: u32,
+    /// Unit normal from a to b, world frame; the mean one of a curved patch.
+    pub normal: [f64; 3],
+    /// Faces of a that meet there, by id within its model; [`NO_FACE`] fills.
+    pub faces_a: [u32; 3],
+    /// Faces of b.
+    pub faces_b: [u32; 3],
+    /// Smallest separation of its points, length.
+    pub separation: f64,
+    /// Zero.
+    pub spare: [u64; 7],
+}
 
 /// A further slot: what few callers need of every pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, Pod, Zeroable)]
@@ -139,6 +172,7 @@ pub struct PatchSlot {
 
 const _: () = {
     assert!(size_of::<ContactRecord>() == 128 && size_of::<DetailSlot>() == 128 && size_of::<PatchSlot>() == 128);
+    assert!(size_of::<RegionSlot>() == 128 && std::mem::offset_of!(RegionSlot, normal) == 16);
     assert!(std::mem::offset_of!(ContactRecord, status) == 8);
     assert!(std::mem::offset_of!(ContactRecord, valid) == 12);
     assert!(std::mem::offset_of!(ContactRecord, time) == 16);
@@ -157,6 +191,12 @@ impl ContactRecord {
         (slot.tag == DETAIL_SLOT).then_some(slot)
     }
 
+    /// This slot as a region slot, if it is one.
+    pub fn as_region(&self) -> Option<&RegionSlot> {
+        let slot: &RegionSlot = bytemuck::cast_ref(self);
+        (slot.tag == REGION_SLOT).then_some(slot)
+    }
+
     /// This slot as a patch slot, if it is one.
     pub fn as_patch(&self) -> Option<&PatchSlot> {
         let slot: &PatchSlot = bytemuck::cast_ref(self);
@@ -166,6 +206,12 @@ impl ContactRecord {
 
 impl From<DetailSlot> for ContactRecord {
     fn from(slot: DetailSlot) -> Self {
+        bytemuck::cast(slot)
+    }
+}
+
+impl From<RegionSlot> for ContactRecord {
+    fn from(slot: RegionSlot) -> Self {
         bytemuck::cast(slot)
     }
 }

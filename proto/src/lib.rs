@@ -19,7 +19,7 @@ pub mod status;
 pub mod step;
 pub mod track;
 
-pub use contact_record::{ContactRecord, DetailSlot, PatchSlot};
+pub use contact_record::{ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 pub use error::ErrorCode;
 pub use motion::Motion;
 pub use pose::Pose;

@@ -121,11 +121,13 @@ pub struct WorkCounters {
     pub closed_forms: u64,
     /// Discrete tests of pairs that moved far enough to have passed through each other.
     pub may_have_passed: u64,
+    /// Cells' worth of work on one instant of a pair: whether it touches, its contact regions, its deepest point.
+    pub instant_cells: u64,
 }
 
 const _: () = {
     assert!(size_of::<StepRequest>() == 64);
-    assert!(size_of::<StepReply>() == 136 && size_of::<WorkCounters>() == 80);
+    assert!(size_of::<StepReply>() == 144 && size_of::<WorkCounters>() == 88);
     assert!(std::mem::offset_of!(StepReply, status) == 16);
     assert!(std::mem::offset_of!(StepReply, safe_time) == 48);
 };

@@ -177,6 +177,8 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
                 names: [&a.name, &b.name],
                 solids: [&a.part.model.solid, &b.part.model.solid],
                 outcome: &p.outcome,
+                regions: outcome.regions_of(p),
+                regions_complete: p.regions_complete,
             }
         })
         .collect();

@@ -4,7 +4,7 @@
 //! without meaning for a status is null: a clear pair has no point. Features name the primitive by its index in file
 //! order and the format's name, its face, and its sense in the solid.
 
-use crate::contact::{Counters, Outcome, Status};
+use crate::contact::{Counters, Outcome, Region, Status};
 use crate::solid::{Sense, Solid};
 use glam::DVec3;
 use serde::Serialize;
@@ -19,6 +19,10 @@ pub struct PairReport<'a> {
     pub solids: [&'a Solid; 2],
     /// The answer.
     pub outcome: &'a Outcome,
+    /// Its contact regions, where its rule asks for them.
+    pub regions: &'a [Region],
+    /// False when there may be more of them.
+    pub regions_complete: bool,
 }
 
 /// The object that `check --json` prints.
@@ -50,6 +54,28 @@ pub struct PairAnswer {
     pub resolution: f64,
     pub features: Option<Features>,
     pub cells: u64,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<RegionAnswer>,
+    /// Told when the work limit cut the search for regions.
+    #[serde(skip_serializing_if = "is_true")]
+    pub regions_complete: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_true(b: &bool) -> bool {
+    *b
+}
+
+/// A region in which a pair touches: points with the separation at each, and the faces that meet.
+#[derive(Debug, Serialize)]
+#[allow(missing_docs)]
+pub struct RegionAnswer {
+    pub kind: &'static str,
+    pub extent: &'static str,
+    pub normal: [f64; 3],
+    pub points: Vec<[f64; 3]>,
+    pub separations: Vec<f64>,
+    pub features: Features,
 }
 
 /// The faces that meet, on each side.
@@ -143,6 +169,8 @@ impl PairAnswer {
         let o = pair.outcome;
         let meets = matches!(o.status, Status::Contact | Status::Overlap);
         let met = o.status == Status::Contact;
+        // A clear pair that touches has the fields of its nearest region.
+        let rests = o.status == Status::Clear && !pair.regions.is_empty();
         let told = meets || (o.touching && o.status == Status::Clear);
         let features = |solid: &Solid, faces: &[u32; 3]| {
             faces.iter().filter_map(|f| Feature::of_face(solid, *f)).collect::<Vec<_>>()
@@ -155,16 +183,32 @@ impl PairAnswer {
             time_lower: o.time_lower,
             time_upper: o.time_upper,
             touching: o.touching,
-            point: meets.then(|| o.point.to_array()),
-            normal: meets.then(|| o.normal.to_array()),
+            point: (meets || rests).then(|| o.point.to_array()),
+            normal: (meets || rests).then(|| o.normal.to_array()),
             separation: told.then_some(o.separation),
-            normal_speed: meets.then_some(o.normal_speed),
-            kind: met.then(|| o.kind.name()),
-            extent: met.then(|| o.extent.name()),
+            normal_speed: (meets || rests).then_some(o.normal_speed),
+            kind: (met || rests).then(|| o.kind.name()),
+            extent: (met || rests).then(|| o.extent.name()),
             resolution: o.resolution,
-            features: meets
+            features: (meets || rests)
                 .then(|| Features { a: features(pair.solids[0], &o.faces_a), b: features(pair.solids[1], &o.faces_b) }),
             cells: o.counters.cells,
+            regions: pair
+                .regions
+                .iter()
+                .map(|r| RegionAnswer {
+                    kind: r.kind.name(),
+                    extent: r.extent.name(),
+                    normal: r.normal.to_array(),
+                    points: r.points.iter().map(|p| p.point.to_array()).collect(),
+                    separations: r.points.iter().map(|p| p.separation).collect(),
+                    features: Features {
+                        a: features(pair.solids[0], &r.faces_a),
+                        b: features(pair.solids[1], &r.faces_b),
+                    },
+                })
+                .collect(),
+            regions_complete: pair.regions_complete,
         }
     }
 }
@@ -238,7 +282,13 @@ mod tests {
     fn json_is_exact_and_names_features() {
         let solid = plate();
         let outcome = contact();
-        let pair = PairReport { names: ["a", "b"], solids: [&solid, &solid], outcome: &outcome };
+        let pair = PairReport {
+            names: ["a", "b"],
+            solids: [&solid, &solid],
+            outcome: &outcome,
+            regions: &[],
+            regions_complete: true,
+        };
         let json = Answer::of_pairs(&[pair]).json().expect("finite numbers");
         let expected = concat!(
             r#"{"safe_time":0.1,"pairs":[{"a":"a","b":"b","status":"contact","time":0.30000000000000004,"#,
@@ -255,7 +305,13 @@ mod tests {
     fn fields_without_meaning_are_null() {
         let solid = plate();
         let clear = Outcome::clear(1e-9);
-        let pair = PairReport { names: ["a", "b"], solids: [&solid, &solid], outcome: &clear };
+        let pair = PairReport {
+            names: ["a", "b"],
+            solids: [&solid, &solid],
+            outcome: &clear,
+            regions: &[],
+            regions_complete: true,
+        };
         let answer = Answer::of_pairs(&[pair]);
         let p = &answer.pairs[0];
         assert!(p.point.is_none() && p.normal.is_none() && p.kind.is_none() && p.extent.is_none());
@@ -268,7 +324,13 @@ mod tests {
     fn the_table_has_nine_digits() {
         let solid = plate();
         let outcome = contact();
-        let pair = PairReport { names: ["peg", "plate"], solids: [&solid, &solid], outcome: &outcome };
+        let pair = PairReport {
+            names: ["peg", "plate"],
+            solids: [&solid, &solid],
+            outcome: &outcome,
+            regions: &[],
+            regions_complete: true,
+        };
         let table = Answer::of_pairs(&[pair]).table();
         assert!(table.contains("0.300000000"), "{table}");
         assert!(table.contains("side of subtracted cylinder 1 on peg"), "{table}");

@@ -16,6 +16,7 @@ use super::literal::{Faces, Side, View};
 use super::outcome::{NO_FACE, Outcome, Status};
 use super::pair::{PairQuery, PairSearch};
 use super::search::Task;
+use super::work::Work;
 use crate::math::Aabb;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
 use crate::solid::{Face, Sense};
@@ -154,7 +155,7 @@ fn witness(task: &Task, o: &Outcome, depth: f64) -> Option<(f64, DVec3)> {
     let x = carried(task, o);
     let at = task.relative.at(o.time_upper);
     let deep = |x: DVec3| -task.a.value(x).max(task.b.value(at.b_point(x)));
-    let (deepest, ..) = depth::deepest(task, &at, x);
+    let (deepest, ..) = depth::climb(task, &at, x, &Work::new(u64::MAX));
     [x, deepest].into_iter().find(|x| deep(*x) >= WITNESS * depth).map(|x| (o.time_upper, x))
 }
 

@@ -2,12 +2,17 @@
 //!
 //! From a common point, sequential linear programming on the tree's own linear bounds: linearise every literal that can
 //! matter within a trust box, find the box's lowest point of the weakest alternative, move there if max(f_A, f_B) falls,
-//! shrink the box otherwise. The result is a local optimum; its depth is a proven lower bound of the separating
-//! translation whatever it is, since a ball of that radius is common to both bodies.
+//! shrink the box otherwise. That ends in a local optimum, so branch and bound goes on from there: boxes in which a point
+//! deeper by more than `BETTER` may lie are halved, and each deeper point found is climbed from. With all boxes dropped
+//! the point is the deepest of all up to that tolerance; should `MOST_CELLS` run out, it is the deepest found.
+//! Either way its depth g is a proven lower bound: a ball of radius g is common to both bodies, so no translation
+//! shorter than 2g takes them apart.
 
 use super::clause::{self, Pair};
 use super::literal::{Faces, Side, View};
 use super::search::Task;
+use super::separation::{self, Cover};
+use super::work::Work;
 use crate::motion::Instant;
 use crate::solid::Sense;
 use crate::solid::local::{self, LiteralId, Token, Truth};
@@ -16,9 +21,70 @@ use glam::DVec3;
 /// Trust boxes tried before the climb ends.
 const ROUNDS: usize = 200;
 
-/// (point in A's frame, unit normal from a to b along A's axes, depth, deciding literals).
-pub fn deepest(task: &Task, at: &Instant, start: DVec3) -> (DVec3, DVec3, f64, Vec<(Side, LiteralId)>) {
-    let f = |x: DVec3| task.a.value(x).max(task.b.value(at.b_point(x)));
+/// A point this much deeper, relative to the depth, is worth another climb.
+const BETTER: f64 = 1e-3;
+
+/// Cells' worth of work that the search for the deepest point may cost, should the pair's limit allow more.
+pub const MOST_CELLS: u64 = 4_000;
+
+/// Point in A's frame, unit normal from a to b along A's axes, depth, deciding literals.
+pub type Deepest = (DVec3, DVec3, f64, Vec<(Side, LiteralId)>);
+
+/// The deepest common point, and whether no other is deeper by more than the tolerance (proven).
+pub fn deepest(task: &Task, at: &Instant, start: DVec3, work: &Work) -> (Deepest, bool) {
+    let mut best = climb(task, at, start, work);
+    let proven = lower(task, at, f64::NEG_INFINITY, work, |x| {
+        if let Some(x) = x {
+            let other = climb(task, at, x, work);
+            if other.2 > best.2 {
+                best = other;
+            }
+        }
+        -better(task, best.2)
+    });
+    (best, proven)
+}
+
+/// Where two bodies that have nothing in common are nearest to it: F at its lowest, if no more than half of `reach`.
+pub fn nearest(task: &Task, at: &Instant, reach: f64, work: &Work) -> (Option<Deepest>, bool) {
+    let mut best: Option<Deepest> = None;
+    let proven = lower(task, at, 0.5 * reach, work, |x| {
+        if let Some(x) = x {
+            let other = climb(task, at, x, work);
+            if best.as_ref().is_none_or(|b| other.2 > b.2) {
+                best = Some(other);
+            }
+        }
+        best.as_ref().map_or(0.5 * reach, |b| -better(task, b.2))
+    });
+    (best, proven)
+}
+
+/// The least depth that is worth another climb.
+fn better(task: &Task, depth: f64) -> f64 {
+    depth + (BETTER * depth.abs()).max(task.delta)
+}
+
+/// Branch and bound: hands out points with F no more than the level that `found` gives (at first for no point), until none
+/// is left: then true.
+fn lower(task: &Task, at: &Instant, far: f64, work: &Work, mut found: impl FnMut(Option<DVec3>) -> f64) -> bool {
+    let mut cover = Cover::new(task, at, f64::INFINITY, far, work);
+    let mut level = found(None);
+    while let Some(place) = cover.next(level) {
+        for x in [place.lowest, place.center] {
+            work.look(task.a.faces.len() + task.b.faces.len());
+            if separation::value(task, at, x) <= level {
+                level = found(Some(x));
+            }
+        }
+        cover.split(place);
+    }
+    cover.is_done()
+}
+
+/// Climbs from `start` to a locally deepest point; negative depth: the nearest to common.
+pub fn climb(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
+    let f = |x: DVec3| separation::value(task, at, x);
     let (mut x, mut best) = (start, f(start));
     let mut size = 0.5 * task.scale;
     let mut scratch = clause::Scratch::default();
@@ -27,6 +93,7 @@ pub fn deepest(task: &Task, at: &Instant, start: DVec3) -> (DVec3, DVec3, f64, V
         if size < 1e-13 * task.scale {
             break;
         }
+        work.bound();
         // Literals decided against the present depth over the trust box fold away.
         let view = View {
             a: Faces { solid: task.a, guards: &[] },

@@ -13,13 +13,17 @@ pub mod lp;
 pub mod newton;
 pub mod outcome;
 pub mod pair;
+pub mod region;
 pub mod roots;
 pub mod rounding;
 pub mod search;
+pub mod separation;
 mod stage2;
 #[cfg(test)]
 mod tests;
+mod work;
 
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
 pub use pair::{Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact};
+pub use region::{Region, RegionPoint, Regions};
 pub use search::Scratch;

@@ -21,11 +21,15 @@ use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
+/// How far from the step a solution is looked for, in steps; farther only while a slow pair has hardly moved by then.
+const FARTHEST: f64 = 4.0;
+/// Way, in scales, that hardly is one.
+const HARDLY: f64 = 1e-6;
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
 /// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
 const LEAST_DAMPING: f64 = 1e-14;
-const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
+pub(super) const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
 
 /// Active constraints, in place.
 pub type Actives = SmallVec<[Constraint; MAX_ACTIVE]>;
@@ -87,7 +91,7 @@ fn outer(u: DVec3, v: DVec3) -> DMat3 {
 }
 
 /// Hessian of psi of a face at a point, given its normal there, in the face's own frame.
-fn hessian(face: &Face, x: DVec3) -> DMat3 {
+pub(super) fn hessian(face: &Face, x: DVec3) -> DMat3 {
     match *face {
         Face::Plane { .. } => DMat3::ZERO,
         Face::Sphere { .. } => {
@@ -152,12 +156,15 @@ impl Problem<'_> {
         let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
         let mut best: f64 = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
         let mut damping = 1.0;
+        let far = FARTHEST.max(HARDLY * self.time_scale);
         for _ in 0..60 {
             if best < 1e-30 {
                 break;
             }
             let mu = damping * best.min(1e-2);
             let step = damped_step(&jac, &f, n, mu.max(LEAST_DAMPING))?;
+            let shrink = (0.5 * far / (step[3] * self.time_scale).abs()).min(1.0);
+            let step = step.map(|s| s * shrink);
             let sx = DVec3::new(step[0], step[1], step[2]) * self.scale;
             let st = step[3] * self.time_scale;
             if !(sx.is_finite() && st.is_finite()) {
@@ -166,7 +173,7 @@ impl Problem<'_> {
             let (nx, nt) = (x + sx, t + st);
             let nl: Weights = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
             let (mut nf, mut nj) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
-            if nt.abs() > 4.0 {
+            if nt.abs() > far {
                 damping *= 16.0;
                 if damping > 1e12 {
                     return None;
@@ -395,7 +402,7 @@ fn eliminate(
 }
 
 /// Solves (JᵀJ + μ I) step = −Jᵀ f.
-fn damped_step(
+pub(super) fn damped_step(
     jac: &[[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
     f: &[f64; MAX_UNKNOWNS],
     n: usize,
@@ -420,7 +427,7 @@ fn damped_step(
 }
 
 /// Solves a symmetric positive definite system in place.
-fn cholesky_solve(
+pub(super) fn cholesky_solve(
     a: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
     mut b: [f64; MAX_UNKNOWNS],
     n: usize,

@@ -88,6 +88,8 @@ pub struct Counters {
     pub newton: u64,
     /// Whole-primitive closed forms used.
     pub closed_forms: u64,
+    /// Cells' worth of work on one instant: whether a pair touches, its regions, its deepest point.
+    pub instant_cells: u64,
 }
 
 impl std::ops::AddAssign for Counters {
@@ -100,6 +102,7 @@ impl std::ops::AddAssign for Counters {
         self.clauses += o.clauses;
         self.newton += o.newton;
         self.closed_forms += o.closed_forms;
+        self.instant_cells += o.instant_cells;
     }
 }
 

@@ -1,10 +1,12 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
+use super::depth;
 use super::direct;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
 use super::search::{Ending, Found, Scratch, Search, Task};
+use super::work::Work;
 use crate::eco::Model;
 use crate::math::tolerance;
 use crate::motion::{Instant, Placed, Relative};
@@ -146,6 +148,7 @@ impl<'a> PairSearch<'a> {
             relative,
             delta: resolution,
             rounding,
+            nearly: rounding,
             scale,
             still: false,
             limit: query.cell_limit,
@@ -234,6 +237,7 @@ impl<'a> PairSearch<'a> {
                         self.level = 2.0;
                         self.task.delta = 2.0 * self.resolution;
                         self.task.limit = self.task.limit.saturating_sub(cells);
+                        self.task.nearly = 0.0;
                         let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
                         let mut search = Search::new(self.task, scratch);
                         search.start();
@@ -434,12 +438,14 @@ fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
     }
 }
 
-/// Overlap at the start: climbs from a common point to a locally deepest one.
+/// Overlap at the start: from a common point to the deepest one.
 fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     o.status = Status::Overlap;
     (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
     let at = task.relative.at(0.0);
-    let (deepest, normal, depth, faces) = super::depth::deepest(task, &at, x);
+    let work = Work::new(task.limit.min(depth::MOST_CELLS));
+    let ((deepest, normal, depth, faces), _) = depth::deepest(task, &at, x, &work);
+    o.counters.instant_cells += work.cells();
     o.point = task.relative.world_point(&at, deepest);
     o.normal = (at.world_from_a * normal).normalize();
     o.separation = -2.0 * depth;

@@ -169,6 +169,8 @@ pub struct Task<'a> {
     pub delta: f64,
     /// What rounding may do to one bound: E of docs/accuracy.md, a length.
     pub rounding: f64,
+    /// What is this near to delta at the start counts as that deep: rounding, where a second search follows; else 0.
+    pub nearly: f64,
     /// Length scale of the pair.
     pub scale: f64,
     /// Search only the instant t = 0.
@@ -179,6 +181,9 @@ pub struct Task<'a> {
 
 /// |Σ λ g| below which multipliers have settled.
 const SETTLED: f64 = 1e-6;
+
+/// Steps in which the slowest motion that is told from rest passes the scale of a pair.
+const SLOWEST: f64 = 1e12;
 
 /// Witnesses this close in time are of one contact; touches this close are at the same time.
 const SAME_TIME: f64 = 1e-12;
@@ -191,6 +196,9 @@ const SAME_POINT: f64 = 1e-6;
 
 /// Time, fraction of the step, below which an advance is no progress: at a contact a bound runs out in ever smaller ones.
 const LEAST_ADVANCE: f64 = 1e-15;
+
+/// A cell thinner than this part of the pair's scale may be held by one body alone.
+const THIN: f64 = 1e-6;
 
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
@@ -423,7 +431,7 @@ impl<'a> Search<'a> {
         }
         if start {
             for x in [cell.center, cell.center + found.y, cell.center + now] {
-                if self.is_deep(x, &at, 0.0) {
+                if self.is_deep_at_start(x, &at) {
                     return Some(x);
                 }
             }
@@ -511,6 +519,13 @@ impl<'a> Search<'a> {
         self.task.a.value(x) <= level && self.task.b.value(at.b_point(x)) <= level
     }
 
+    /// True when x is deep at the start, or so nearly that rounding forbids to prove the contrary: what the first search
+    /// takes for deep is searched again at twice the depth.
+    fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
+        let level = self.task.delta - (8.0 * self.task.nearly).min(0.5 * self.task.delta);
+        self.task.a.value(x) <= -level && self.task.b.value(at.b_point(x)) <= -level
+    }
+
     fn problem(&self) -> Problem<'_> {
         let speed = self.task.relative.bounds(0.0, 1.0, self.task.scale).speed;
         Problem {
@@ -518,30 +533,49 @@ impl<'a> Search<'a> {
             b: Faces { solid: self.task.b, guards: &[] },
             relative: &self.task.relative,
             scale: self.task.scale,
-            time_scale: (self.task.scale / speed.max(f64::MIN_POSITIVE)).min(1.0),
+            // However slow the pair: else equations that only time can meet look as if they had no solution.
+            time_scale: (self.task.scale / speed.max(f64::MIN_POSITIVE)).min(SLOWEST),
             tolerance: 0.5 * self.task.rounding,
         }
     }
 
     /// Tries to find the contact that a cell's weakest clause points to.
     fn attempt(&mut self, cell: &Cell, advance: &Advance, at: &Instant) {
-        let sides = |s: Side| advance.support.iter().filter(|l| l.0 == s).count();
-        if sides(Side::A) == 0 || sides(Side::B) == 0 {
-            return;
-        }
         let level = advance.cost.element_sum().log2().floor() as i32;
-        let mut key: Vec<_> = advance.support.iter().map(|l| (l.0, l.1)).collect();
+        let x = cell.center + advance.y;
+        let mut support = advance.support.clone();
+        // A thin cell is held by one body alone: what decides of the other there stands beside it.
+        let bodies = [
+            (Side::A, Faces { solid: self.task.a, guards: &[] }, cell.a, x),
+            (Side::B, Faces { solid: self.task.b, guards: &self.scratch.guards_b }, cell.b, at.b_point(x)),
+        ];
+        for (side, faces, range, y) in bodies {
+            if support.iter().all(|l| l.0 != side) {
+                if cell.half.min_element() > THIN * self.task.scale {
+                    return;
+                }
+                let tokens = &self.scratch.pool[range.0 as usize..range.1 as usize];
+                if tokens.is_empty() {
+                    return;
+                }
+                let (_, id) = local::deciding(tokens, &mut |f| faces.get(f).value(y));
+                if faces.is_guard(id.face()) {
+                    return;
+                }
+                support.push((side, id, 1.0));
+            }
+        }
+        let mut key: Vec<_> = support.iter().map(|l| (l.0, l.1)).collect();
         key.sort_unstable();
         if self.scratch.tried.iter().any(|(k, l)| *l == level && *k == key) {
             return;
         }
         self.scratch.tried.push((key, level));
-        let x = cell.center + advance.y;
         let t = cell.t + advance.dt.max(0.0);
-        let active: Vec<_> = advance.support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
+        let active: Vec<_> = support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
         // A fit weighs both of its literals: together they are 1 again.
-        let total: f64 = advance.support.iter().map(|l| l.2).sum();
-        let lambda: Vec<_> = advance.support.iter().map(|l| l.2 / total).collect();
+        let total: f64 = support.iter().map(|l| l.2).sum();
+        let lambda: Vec<_> = support.iter().map(|l| l.2 / total).collect();
         if self.polish(active.clone(), x, t, lambda.clone()) {
             return;
         }
@@ -579,13 +613,13 @@ impl<'a> Search<'a> {
             let near = (apex - cell.center).length() <= 4.0 * cell.half.length();
             (l.1.sense() == Sense::Positive && near).then_some(apex)
         };
-        let apexes: Vec<_> = advance.support.iter().filter_map(|l| Some((*l, apex_of(l)?))).collect();
+        let apexes: Vec<_> = support.iter().filter_map(|l| Some((*l, apex_of(l)?))).collect();
         let vertex = |l: &(Side, LiteralId, f64)| {
             let (side, id, weight) = *l;
             (0..3).map(move |k| (Constraint::Apex(side, id, k), if k == 0 { -weight } else { 0.0 }))
         };
         for (l, apex) in &apexes {
-            let others = advance.support.iter().filter(|o| o.0 != l.0);
+            let others = support.iter().filter(|o| o.0 != l.0);
             let others = others.map(|o| (Constraint::Literal(o.0, o.1), o.2));
             let (active, lambda) = vertex(l).chain(others).take(super::newton::MAX_ACTIVE).unzip();
             if self.polish(active, *apex, t, lambda) {
@@ -821,17 +855,18 @@ impl<'a> Search<'a> {
             let tol = 16.0 * self.task.rounding;
             s.t <= deep.t && self.task.a.value(s.x).abs() <= tol && self.task.b.value(at.b_point(s.x)).abs() <= tol
         });
+        let at = self.task.relative.at(deep.t);
+        let rates = deep.active.iter().zip(&deep.lambda).map(|(c, l)| l * problem.row(c, deep.x, &at, 0.0).rate);
+        let speed = rates.sum::<f64>().abs().max(f64::MIN_POSITIVE);
+        // The depth delta itself is reached a little before the witness, which a slow pair takes its time for.
+        let crossing = deep.t - (witness_level(&self.task) - self.task.delta) / speed;
         let goal = match &touch {
-            Some(s) => 0.5 * (s.t.max(0.0) + deep.t),
-            None => {
-                let at = self.task.relative.at(deep.t);
-                let mut speed = 0.0;
-                for (c, l) in deep.active.iter().zip(&deep.lambda) {
-                    speed += l * problem.row(c, deep.x, &at, 0.0).rate;
-                }
-                deep.t - (0.25 * self.task.delta / speed.abs().max(f64::MIN_POSITIVE)).clamp(1e-15, 1e-9)
-            }
+            Some(s) if s.t > 0.0 => 0.5 * (s.t + deep.t),
+            // Touching at the start: nothing but the start needs a proof.
+            Some(_) => 0.5 * crossing,
+            None => crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9),
         };
+        let goal = if goal > 0.0 { goal } else { 0.5 * crossing.max(f64::MIN_POSITIVE) };
         let new = Found { upper: deep.t, deep, touch, goal };
         self.found = Some(match self.found.take() {
             // One that has not settled is only a bound on the time.

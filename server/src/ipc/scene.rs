@@ -165,6 +165,7 @@ impl Scene {
             first: request.asked & ASK_FIRST != 0,
             clear: request.asked & ASK_CLEAR != 0,
             max_records: cap.max(1) as u32,
+            max_patch_slots: u32::try_from(self.max_records).unwrap_or(u32::MAX),
             cell_limit: request.cell_limit.into(),
             batch_limit: request.batch_limit.into(),
         };

@@ -19,6 +19,7 @@ mod search;
 pub mod step;
 #[cfg(test)]
 mod tests;
+mod touch;
 
 pub use body::{ObjectSpec, Part};
 pub use plan::{PairPlan, Plans};

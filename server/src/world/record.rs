@@ -1,29 +1,82 @@
 //! Outcomes as 128-byte slots: what the pair's plan asks for, everything else zero with its `valid` bit clear.
+//!
+//! Behind the records stand their further slots, pair by pair: the detail slot where asked for, then for each region its
+//! own slot and the points that bound it, four a slot.
 
 use super::World;
 use super::step::{PairOutcome, StepOutcome};
-use crate::contact::Status;
-use contactd_proto::contact_record::{self as wire, ContactRecord, DetailSlot};
+use crate::contact::{Region, Status};
+use contactd_proto::contact_record::{self as wire, ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 use contactd_proto::step::{STEP_CLEAR, STEP_CONTACT, STEP_UNDECIDED, StepReply, WorkCounters};
 use contactd_proto::{Report, step};
 
 /// Number of slots that the reply to a step needs.
 pub fn slots_of(out: &StepOutcome, details: bool) -> usize {
-    out.pairs.len() * if details { 2 } else { 1 }
+    let patches = out.pairs.last().map_or(0, |p| p.patch_slots.0 + p.patch_slots.1);
+    out.pairs.len() * if details { 2 } else { 1 } + patches as usize
 }
 
-/// Slot `index` of the reply: records first, then their detail slots, in the same order.
+/// Further slots that some regions take.
+pub fn patch_slots(regions: &[Region]) -> u32 {
+    regions.iter().map(|r| 1 + r.points.len().div_ceil(4) as u32).sum()
+}
+
+/// Slot `index` of the reply: records first, then their further slots, in the same order.
 pub fn slot(world: &World, out: &StepOutcome, details: bool, index: usize) -> ContactRecord {
     let n = out.pairs.len();
-    if index >= n {
-        return detail(world, &out.pairs[index - n]).into();
+    let detail_slots = usize::from(details);
+    let start = |i: usize| n + i * detail_slots + out.pairs[i].patch_slots.0 as usize;
+    if index < n {
+        let mut record = record(&out.pairs[index]);
+        let slots = detail_slots as u32 + out.pairs[index].patch_slots.1;
+        if slots > 0 {
+            (record.slot, record.slots) = (start(index) as u32, slots);
+        }
+        return record;
     }
-    let mut record = record(&out.pairs[index]);
-    if details {
-        record.slot = (n + index) as u32;
-        record.slots = 1;
+    // The last pair whose slots begin at or before this one; pairs without slots share their beginning with the next.
+    let (mut low, mut high) = (0, n);
+    while high - low > 1 {
+        let middle = (low + high) / 2;
+        if start(middle) <= index { low = middle } else { high = middle }
     }
-    record
+    let pair = &out.pairs[low];
+    let own = index - start(low);
+    if own < detail_slots { detail(world, pair).into() } else { patch(out.regions_of(pair), own - detail_slots) }
+}
+
+/// Slot `index` of a pair's regions.
+fn patch(regions: &[Region], mut index: usize) -> ContactRecord {
+    for (k, r) in regions.iter().enumerate() {
+        let slots = 1 + r.points.len().div_ceil(4);
+        if index >= slots {
+            index -= slots;
+            continue;
+        }
+        if index == 0 {
+            let slot = RegionSlot {
+                tag: wire::REGION_SLOT,
+                region: k as u32,
+                kind: r.kind as u8 + 1,
+                extent: r.extent as u8 + 1,
+                points: r.points.len() as u32,
+                normal: r.normal.to_array(),
+                faces_a: r.faces_a,
+                faces_b: r.faces_b,
+                separation: r.separation(),
+                ..RegionSlot::default()
+            };
+            return slot.into();
+        }
+        let mut slot = PatchSlot { tag: wire::PATCH_SLOT, region: [k as u32, 0], ..PatchSlot::default() };
+        for (i, p) in r.points.iter().skip(4 * (index - 1)).take(4).enumerate() {
+            slot.count += 1;
+            slot.points[i] = p.point.to_array();
+            slot.separations[i] = p.separation as f32;
+        }
+        return slot.into();
+    }
+    ContactRecord::default()
 }
 
 /// The header of a reply: everything but the step number and the epoch.
@@ -56,6 +109,7 @@ pub fn reply(out: &StepOutcome, details: bool) -> StepReply {
             newton: c.newton,
             closed_forms: c.closed_forms,
             may_have_passed: out.may_have_passed,
+            instant_cells: c.instant_cells,
         },
         ..StepReply::default()
     }
@@ -76,9 +130,12 @@ fn record(p: &PairOutcome) -> ContactRecord {
         (r.time, r.time_lower) = (o.time, o.time_lower);
         r.flags |= if o.touching { wire::TOUCHING } else { 0 };
         r.flags |= if o.not_continued { wire::NOT_CONTINUED } else { 0 };
+        r.flags |= if p.regions_complete { 0 } else { wire::REGIONS_INCOMPLETE };
     }
     let meets = matches!(o.status, Status::Contact | Status::Overlap);
-    if p.plan.report >= Report::Contact && meets {
+    // A clear pair that touches has the fields of its nearest region, where its rule asks for them.
+    let rests = o.status == Status::Clear && p.regions.1 > 0;
+    if p.plan.report >= Report::Contact && (meets || rests) {
         r.valid |= wire::VALID_POINT | wire::VALID_NORMAL | wire::VALID_SEPARATION | wire::VALID_NORMAL_SPEED;
         r.valid |= wire::VALID_KIND | wire::VALID_FACES;
         r.flags |= if o.averaged_normal { wire::AVERAGED_NORMAL } else { 0 };

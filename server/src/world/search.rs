@@ -39,12 +39,19 @@ pub struct PairJob {
 pub struct Memory {
     outcomes: Vec<Outcome>,
     scratch: Scratch,
+    /// Cells that the batch's limit left.
+    left: u64,
 }
 
 impl Memory {
     /// Outcomes of the last run, in the order of its jobs.
     pub fn outcomes(&self) -> &[Outcome] {
         &self.outcomes
+    }
+
+    /// Cells that the last run left of the batch's limit.
+    pub fn left(&self) -> u64 {
+        self.left
     }
 }
 
@@ -72,6 +79,7 @@ pub fn run(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mu
         };
         memory.outcomes.push(outcome);
     }
+    memory.left = left;
 }
 
 fn batch_limit(options: &StepOptions) -> u64 {
@@ -114,12 +122,13 @@ fn run_queue(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, first: bo
             }
         }
     }
+    memory.left = left;
 }
 
 /// Cells that all pairs of a step together may cost by default: sixteen pairs at their own limit.
 pub const DEFAULT_BATCH_LIMIT: u64 = 16 * contact::DEFAULT_CELL_LIMIT;
 
-fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions) -> PairQuery<'a> {
+pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions) -> PairQuery<'a> {
     let side = |index: u32| {
         let body = &bodies[index as usize];
         let discrete = job.plan.detect == Detect::Discrete;

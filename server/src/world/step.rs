@@ -9,7 +9,8 @@ use super::broad::BroadPhase;
 use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
-use crate::contact::{Counters, Outcome, Status};
+use super::touch;
+use crate::contact::{Counters, Outcome, Region, Status};
 use crate::math::Aabb;
 use contactd_proto::pose_record::Order;
 use contactd_proto::step::{EFFECT_CONTACT, EFFECT_CONTINUOUS, EFFECT_DISCRETE, EFFECT_MARGIN, EFFECT_PATCH};
@@ -49,6 +50,8 @@ pub struct StepOptions {
     pub clear: bool,
     /// Most pairs told, the earliest first; 0: all.
     pub max_records: u32,
+    /// Most further slots for contact regions, those of the earliest pairs; 0: all.
+    pub max_patch_slots: u32,
     /// Most cells that one pair's search refines; 0: the default.
     pub cell_limit: u64,
     /// Most cells that the searches of the whole step refine, the pairs that may meet earliest first; 0: the default.
@@ -57,7 +60,16 @@ pub struct StepOptions {
 
 impl Default for StepOptions {
     fn default() -> Self {
-        Self { advance: 1.0, dt: 0.0, first: false, clear: false, max_records: 0, cell_limit: 0, batch_limit: 0 }
+        Self {
+            advance: 1.0,
+            dt: 0.0,
+            first: false,
+            clear: false,
+            max_records: 0,
+            max_patch_slots: 0,
+            cell_limit: 0,
+            batch_limit: 0,
+        }
     }
 }
 
@@ -72,6 +84,14 @@ pub struct PairOutcome {
     pub plan: PairPlan,
     /// What was found.
     pub outcome: Outcome,
+    /// Index of its job.
+    pub(super) job: u32,
+    /// False when the work limit cut the search for its regions: there may be more, and whether it touches may be open.
+    pub regions_complete: bool,
+    /// Where its regions stand in `StepOutcome::regions`: the first one, and how many; none unless asked for.
+    pub regions: (u32, u32),
+    /// Further slots that the regions of the pairs before it take, and its own.
+    pub patch_slots: (u32, u32),
 }
 
 /// The answer of a step. Valid until the next one.
@@ -79,6 +99,8 @@ pub struct PairOutcome {
 pub struct StepOutcome {
     /// Told pairs in the order (time, a, b).
     pub pairs: Vec<PairOutcome>,
+    /// The contact regions of told pairs, pair by pair.
+    pub regions: Vec<Region>,
     /// More pairs would have been told without `max_records`.
     pub truncated: bool,
     /// Smallest time_lower over all pairs, told or not.
@@ -261,13 +283,19 @@ impl World {
         search::run(bodies, &state.jobs, options, &mut state.searches);
         *out = StepOutcome {
             pairs: std::mem::take(&mut out.pairs),
+            regions: std::mem::take(&mut out.regions),
             safe_time: 1.0,
             box_tests: state.broad.tests,
             ..StepOutcome::default()
         };
         out.pairs.clear();
+        out.regions.clear();
         let mut earliest = f64::INFINITY;
-        for (job, outcome) in state.jobs.iter().zip(state.searches.outcomes()) {
+        let mut left = state.searches.left();
+        for (i, (job, found)) in state.jobs.iter().zip(state.searches.outcomes()).enumerate() {
+            let mut outcome = *found;
+            let outcome = &mut outcome;
+            let regions_complete = touch::decide(bodies, job, options, &mut left, outcome);
             out.counters += outcome.counters;
             out.searched += u32::from(job.near);
             out.effects |= effects_of(&job.plan, job.near);
@@ -281,7 +309,16 @@ impl World {
             }
             if is_told(&job.plan, outcome, options) {
                 let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
-                out.pairs.push(PairOutcome { a, b, plan: job.plan, outcome: *outcome });
+                out.pairs.push(PairOutcome {
+                    a,
+                    b,
+                    plan: job.plan,
+                    outcome: *outcome,
+                    job: i as u32,
+                    regions_complete,
+                    regions: (0, 0),
+                    patch_slots: (0, 0),
+                });
             }
         }
         out.undecided = state.searches.outcomes().iter().any(|o| is_undecided_before(o, earliest));
@@ -297,6 +334,7 @@ impl World {
             out.pairs.truncate(options.max_records as usize);
             out.truncated = true;
         }
+        touch::find_regions(bodies, &state.jobs, options, left, out);
     }
 }
 
@@ -327,6 +365,13 @@ fn effects_of(plan: &PairPlan, near: bool) -> u32 {
 fn passes(job: &PairJob, bodies: &[Body]) -> bool {
     let (a, b) = (&bodies[job.a as usize], &bodies[job.b as usize]);
     a.speed(&a.track.motion) + b.speed(&b.track.motion) > a.part.smallest.min(b.part.smallest)
+}
+
+impl StepOutcome {
+    /// The contact regions of a told pair.
+    pub fn regions_of(&self, pair: &PairOutcome) -> &[Region] {
+        &self.regions[pair.regions.0 as usize..][..pair.regions.1 as usize]
+    }
 }
 
 fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {

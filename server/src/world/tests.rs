@@ -3,8 +3,8 @@
 use super::*;
 use crate::contact::Status;
 use crate::eco::Model;
-use crate::solid::primitive::{Cuboid, Sphere};
-use crate::solid::{Label, SolidBuilder};
+use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
+use crate::solid::{Label, Op, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::pose_record::{END, START};
 use contactd_proto::{Detect, ErrorCode, Pose, PoseRecord, Report, Rule};
@@ -27,10 +27,23 @@ fn object(id: u32, part: &Arc<Part>, at: DVec3) -> ObjectSpec {
     ObjectSpec::new(id, part, Pose::at(at))
 }
 
+/// A slab with a drilled hole far aside: what meets it is answered by the search, not in front of it.
+fn drilled(half: DVec3) -> Arc<Part> {
+    let mut b = SolidBuilder::new();
+    let slab = b.primitive(Cuboid { half }, Pose::IDENTITY, Label::default());
+    let aside = Pose::at(DVec3::new(-0.5 * half.x, 0.0, 0.0));
+    let drill = b.primitive(Cylinder { radius: 0.1 * half.x, half_height: 2.0 * half.z }, aside, Label::default());
+    let root = b.operation(Op::Difference, &[slab, drill]);
+    Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))))
+}
+
 /// A floor (1, static, top at z = 0) and balls of radius 1 (2, 3, …) at z = 3, four apart.
 fn balls(n: u32) -> World {
+    balls_over(slab(DVec3::new(1e3, 1e3, 1.0)), n)
+}
+
+fn balls_over(floor: Arc<Part>, n: u32) -> World {
     let mut world = World::new(2000, 4096);
-    let floor = slab(DVec3::new(1e3, 1e3, 1.0));
     world.add_object(ObjectSpec { is_static: true, group: "floor".into(), ..object(1, &floor, -DVec3::Z) }).unwrap();
     let part = ball(1.0);
     for i in 0..n {
@@ -73,21 +86,22 @@ fn contacts_come_by_time_whatever_the_order_of_the_batch() {
 
 #[test]
 fn first_and_max_records_keep_the_earliest() {
+    let balls = || balls_over(drilled(DVec3::new(1e3, 1e3, 1.0)), 3);
     let records = [to(2, 0.0, 0.0), to(3, 4.0, -1.0), to(4, 8.0, -1.0)];
     let first = StepOptions { first: true, ..StepOptions::default() };
     assert_eq!(
-        keys(balls(3).step(&records, &first).unwrap()),
+        keys(balls().step(&records, &first).unwrap()),
         [(1, 3, Status::Contact), (1, 4, Status::Contact)],
         "two contacts at the same time are both first"
     );
-    let all = balls(3).step(&records, &StepOptions::default()).unwrap().clone();
-    let mut world = balls(3);
+    let all = balls().step(&records, &StepOptions::default()).unwrap().clone();
+    let mut world = balls();
     let out = world.step(&records, &first).unwrap();
     let same = |p: &PairOutcome| all.pairs.iter().any(|q| (q.a, q.b, &q.outcome) == (p.a, p.b, &p.outcome));
     assert!(out.pairs.iter().all(same), "asking for less changes no bit of what remains");
     assert!(out.counters.cells <= all.counters.cells && out.safe_time == all.safe_time);
     let capped = StepOptions { max_records: 1, ..StepOptions::default() };
-    let mut world = balls(3);
+    let mut world = balls();
     let out = world.step(&records, &capped).unwrap();
     assert_eq!(keys(out), [(1, 3, Status::Contact)]);
     assert!(out.truncated);
@@ -246,4 +260,57 @@ fn objects_come_and_go_by_ids_that_are_never_used_again() {
     for (resolution, fits) in [(1e-6, true), (0.4, true), (0.5, false), (0.0, false), (f64::NAN, false)] {
         assert_eq!(small.set_resolution(Some(resolution)).is_ok(), fits, "{resolution} in a ball of diameter 2");
     }
+}
+
+#[test]
+fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
+    use contactd_proto::contact_record as wire;
+    let resting = |rule: Option<Rule>| {
+        let mut world = World::new(10, 10);
+        let (floor, cube) = (slab(DVec3::new(9.0, 9.0, 1.0)), slab(DVec3::ONE));
+        world
+            .add_object(ObjectSpec { is_static: true, group: "floor".into(), ..object(1, &floor, -DVec3::Z) })
+            .unwrap();
+        for (id, x) in [(2, 0.0), (3, 3.0)] {
+            world.add_object(object(id, &cube, DVec3::new(x, 0.0, 1.0))).unwrap();
+        }
+        world.set_rules(rule.into_iter().collect()).unwrap();
+        world
+    };
+    // Nobody asks: no record, no work.
+    let mut world = resting(None);
+    let out = world.step(&[], &StepOptions::default()).unwrap();
+    assert_eq!((out.pairs.len(), out.regions.len(), out.counters.instant_cells), (0, 0, 0));
+    // Asked for by patches, or by a margin; with detail slots between and without.
+    let rule = |report: Report, margin: f64| Rule { report, margin, ..Rule::new(["floor".into(), "default".into()]) };
+    for (rule, details) in
+        [(rule(Report::Patch, 0.0), false), (rule(Report::Patch, 0.0), true), (rule(Report::Contact, 1e-3), true)]
+    {
+        let mut world = resting(Some(rule));
+        world.step(&[], &StepOptions::default()).unwrap();
+        let out = world.outcome();
+        assert_eq!(keys(out), [(1, 2, Status::Clear), (1, 3, Status::Clear)]);
+        assert!(out.pairs.iter().all(|p| p.outcome.touching && out.regions_of(p).len() == 1));
+        assert!(out.pairs.iter().all(|p| p.regions_complete && p.outcome.counters.instant_cells > 0));
+        let total = record::slots_of(out, details);
+        assert_eq!(total, 2 * if details { 4 } else { 3 });
+        let slots: Vec<_> = (0..total).map(|i| record::slot(&world, out, details, i)).collect();
+        for (r, x) in slots[..2].iter().zip([0.0, 3.0]) {
+            assert_eq!((r.status, r.flags, r.separation, r.normal_speed), (wire::CLEAR, wire::TOUCHING, 0.0, 0.0));
+            assert_eq!(r.normal, [0.0, 0.0, 1.0]);
+            assert!(r.valid & wire::VALID_POINT != 0 && r.valid & wire::VALID_KIND != 0);
+            let own = &slots[r.slot as usize..][..r.slots as usize];
+            assert_eq!(own.iter().filter(|s| s.as_detail().is_some()).count(), usize::from(details));
+            let region = own.iter().find_map(|s| s.as_region()).expect("a region");
+            assert_eq!((region.kind, region.extent, region.points, region.normal), (1, 3, 4, [0.0, 0.0, 1.0]));
+            let patch = own.iter().find_map(|s| s.as_patch()).expect("its points");
+            assert_eq!((patch.count, patch.region, patch.separations), (4, [0, 0], [0.0; 4]));
+            assert!(patch.points.iter().all(|p| (p[0] - x).abs() == 1.0 && p[1].abs() == 1.0 && p[2] == 0.0));
+        }
+    }
+    // No room for all of them: the earliest pairs keep theirs, and the header says that some are missing.
+    let mut world = resting(Some(rule(Report::Patch, 0.0)));
+    world.step(&[], &StepOptions { max_patch_slots: 3, ..StepOptions::default() }).unwrap();
+    let out = world.outcome();
+    assert!(out.truncated && record::slots_of(out, false) == 4);
 }

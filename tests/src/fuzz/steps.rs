@@ -94,6 +94,7 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
             first: r.below(2) == 1,
             clear: r.below(2) == 1,
             max_records: r.below(4) as u32,
+            max_patch_slots: 0,
             cell_limit: CELLS,
             batch_limit: 0,
         };

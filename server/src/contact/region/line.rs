@@ -1,0 +1,439 @@
+//! Lines: curves along which two bodies touch without an area.
+//!
+//! Candidates are the straight and the circular edges of either body, and the curves along which round faces touch: the
+//! ruling of a cylinder or cone on a plane, of two parallel cylinders, the circle of a ball in a cylinder or cone. On a
+//! candidate the places where any other face passes are found exactly (every face is 1-Lipschitz, so a piece whose
+//! middle is farther from it than half its length is free of it), and between two of them the bodies touch everywhere or
+//! nowhere: one point decides, confirmed by both whole trees. Runs of pieces that touch are the lines.
+
+use super::local::{Bodies, Lit};
+use super::patch::{Corner, key_of};
+use super::surface::{Pair, Standing, is_convex, standing};
+use crate::contact::literal::Side;
+use crate::contact::separation::Place;
+use crate::solid::Face;
+use glam::DVec3;
+use std::f64::consts::{FRAC_PI_4, TAU};
+
+/// A straight or circular curve, its parameter a length or an angle.
+#[derive(Clone, Copy, Debug)]
+pub enum Curve {
+    Line { origin: DVec3, along: DVec3 },
+    Circle { center: DVec3, axis: DVec3, zero: DVec3, radius: f64 },
+}
+
+/// A curve on which the bodies may touch, and the faces that make it.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    pub curve: Curve,
+    /// The faces whose common points it consists of; they do not cut it.
+    pub faces: [Lit; 2],
+}
+
+/// A piece of a curve on which the bodies touch.
+#[derive(Clone, Debug)]
+pub struct Run {
+    pub curve: Curve,
+    pub from: f64,
+    pub to: f64,
+    /// A point of it that is no end.
+    pub middle: DVec3,
+    /// Feet of that point on A and B.
+    pub feet: [DVec3; 2],
+    pub ends: Vec<Corner>,
+}
+
+impl Curve {
+    pub fn point(&self, s: f64) -> DVec3 {
+        match *self {
+            Curve::Line { origin, along } => origin + along * s,
+            Curve::Circle { center, axis, zero, radius } => {
+                let (sin, cos) = libm::sincos(s);
+                center + (zero * cos + axis.cross(zero) * sin) * radius
+            }
+        }
+    }
+
+    fn speed(&self) -> f64 {
+        match *self {
+            Curve::Line { .. } => 1.0,
+            Curve::Circle { radius, .. } => radius,
+        }
+    }
+
+    /// Parameter of the point next to `x`, and how far off it is.
+    pub fn nearest(&self, x: DVec3) -> (f64, f64) {
+        let s = match *self {
+            Curve::Line { origin, along } => (x - origin).dot(along),
+            Curve::Circle { center, axis, zero, .. } => {
+                let d = x - center;
+                d.dot(axis.cross(zero)).atan2(d.dot(zero)).rem_euclid(TAU)
+            }
+        };
+        (s, (self.point(s) - x).length())
+    }
+
+    /// The part of it that may lie in a box.
+    fn range(&self, place: &Place) -> (f64, f64) {
+        match *self {
+            Curve::Line { origin, along } => {
+                let (s, e) = ((place.center - origin).dot(along), place.half.length());
+                (s - e, s + e)
+            }
+            Curve::Circle { .. } => (0.0, TAU),
+        }
+    }
+}
+
+/// The edges of one body among some of its faces.
+fn edges(bodies: &Bodies, lits: &[Lit], out: &mut Vec<Candidate>) {
+    for (i, p) in lits.iter().enumerate() {
+        for q in &lits[i + 1..] {
+            edge(bodies, *p, *q, &mut |curve| out.push(Candidate { curve, faces: [*p, *q] }));
+        }
+    }
+}
+
+/// Straight and circular curves that two faces have in common.
+fn edge(bodies: &Bodies, p: Lit, q: Lit, found: &mut impl FnMut(Curve)) {
+    const PARALLEL: f64 = 1e-9;
+    let side = p.0;
+    let mut circle = |center: DVec3, axis: DVec3, squared: f64| {
+        if squared > (bodies.eps * bodies.eps).max(0.0) {
+            let zero = bodies.material(side, axis);
+            found(Curve::Circle { center, axis, zero, radius: squared.sqrt() });
+        }
+    };
+    match (*bodies.face(p), *bodies.face(q)) {
+        (Face::Plane { normal: m, offset: d }, Face::Plane { normal: n, offset: e }) => {
+            let w = m.cross(n);
+            if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
+                let origin = (n.cross(w) * d + w.cross(m) * e) / w.length_squared();
+                found(Curve::Line { origin, along });
+            }
+        }
+        (Face::Plane { normal, offset }, Face::Sphere { center, radius }) => {
+            let h = normal.dot(center) - offset;
+            circle(center - normal * h, normal, (radius - h) * (radius + h));
+        }
+        (Face::Plane { normal, offset }, Face::Cylinder { origin, axis, radius }) => {
+            let h = normal.dot(origin) - offset;
+            if normal.cross(axis).length() <= PARALLEL {
+                circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
+            } else if normal.dot(axis).abs() <= PARALLEL {
+                let half = (radius - h) * (radius + h);
+                if half > 0.0 {
+                    let w = normal.cross(axis).normalize() * half.sqrt();
+                    found(Curve::Line { origin: origin - normal * h + w, along: axis });
+                    found(Curve::Line { origin: origin - normal * h - w, along: axis });
+                }
+            }
+        }
+        (Face::Plane { normal, offset }, Face::Cone { apex, axis, sin, cos }) => {
+            let z = (offset - normal.dot(apex)) / normal.dot(axis);
+            if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
+                circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
+            }
+        }
+        (Face::Sphere { center: o, radius: r }, Face::Sphere { center: c, radius: s }) => {
+            let d = (c - o).length();
+            if d > PARALLEL * bodies.size {
+                let x = (d * d + (r - s) * (r + s)) / (2.0 * d);
+                circle(o + (c - o) * (x / d), (c - o) / d, (r - x) * (r + x));
+            }
+        }
+        (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: c, axis: b, radius: s }) => {
+            let w = (c - o) - a * (c - o).dot(a);
+            let d = w.length();
+            if a.cross(b).length() <= PARALLEL && d > PARALLEL * bodies.size {
+                let x = (d * d + (r - s) * (r + s)) / (2.0 * d);
+                let half = (r - x) * (r + x);
+                if half > 0.0 {
+                    let v = a.cross(w / d) * half.sqrt();
+                    found(Curve::Line { origin: o + w * (x / d) + v, along: a });
+                    found(Curve::Line { origin: o + w * (x / d) - v, along: a });
+                }
+            }
+        }
+        (Face::Sphere { center, radius: s }, Face::Cylinder { origin, axis, radius }) => {
+            let off = (center - origin) - axis * (center - origin).dot(axis);
+            let h = (s - radius) * (s + radius);
+            if off.length() <= PARALLEL * bodies.size && h > 0.0 {
+                circle(center + axis * h.sqrt(), axis, radius * radius);
+                circle(center - axis * h.sqrt(), axis, radius * radius);
+            }
+        }
+        (Face::Cylinder { origin, axis: a, radius }, Face::Cone { apex, axis, sin, cos }) => {
+            let off = (apex - origin) - a * (apex - origin).dot(a);
+            if a.cross(axis).length() <= PARALLEL && off.length() <= PARALLEL * bodies.size {
+                circle(apex + axis * (radius * cos / sin), axis, radius * radius);
+            }
+        }
+        // The same pairs the other way round; two cones, and a cone and a sphere, share no line or circle that is looked for.
+        (_, Face::Plane { .. })
+        | (Face::Cylinder { .. }, Face::Sphere { .. })
+        | (Face::Cone { .. }, Face::Cylinder { .. }) => edge(bodies, q, p, found),
+        _ => {}
+    }
+}
+
+/// The curve along which a face of one body touches one of the other without lying on it.
+fn tangent(bodies: &Bodies, p: Lit, q: Lit) -> Option<Curve> {
+    let near = |d: f64| d.abs() <= bodies.tau;
+    let parallel = |sine: f64| (sine * bodies.size).abs() <= bodies.lie;
+    match (*bodies.face(p), *bodies.face(q)) {
+        (Face::Cylinder { origin, axis, radius }, Face::Plane { .. }) if is_convex(p) => {
+            let g = bodies.look(q, origin).normal;
+            let u = -(g - axis * g.dot(axis)).try_normalize()?;
+            let line = Curve::Line { origin: origin + u * radius, along: axis };
+            parallel(g.dot(axis)).then_some(line)
+        }
+        (Face::Cone { apex, axis, sin, cos }, Face::Plane { .. }) if is_convex(p) => {
+            let g = bodies.look(q, apex).normal;
+            let u = -(g - axis * g.dot(axis)).try_normalize()?;
+            parallel(g.dot(axis) - sin).then_some(Curve::Line { origin: apex, along: axis * cos + u * sin })
+        }
+        (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: c, axis: b, radius: s })
+            if is_convex(p) =>
+        {
+            let u = ((c - o) - a * (c - o).dot(a)).try_normalize()?;
+            let d = (c - o).dot(u);
+            let (gap, u) = if is_convex(q) { (d - r - s, u) } else { (s - r - d, -u) };
+            (near(gap) && parallel(a.cross(b).length())).then_some(Curve::Line { origin: o + u * r, along: a })
+        }
+        (Face::Sphere { center, radius }, Face::Cylinder { origin, axis, radius: s })
+            if is_convex(p) && !is_convex(q) =>
+        {
+            let off = (center - origin) - axis * (center - origin).dot(axis);
+            let zero = bodies.material(q.0, axis);
+            near(off.length() + (radius - s).abs()).then_some(Curve::Circle { center, axis, zero, radius })
+        }
+        (Face::Sphere { center, radius }, Face::Cone { apex, axis, sin, cos }) if is_convex(p) && !is_convex(q) => {
+            let z = (center - apex).dot(axis);
+            let off = (center - apex) - axis * z;
+            let zero = bodies.material(q.0, axis);
+            let circle = Curve::Circle { center: center - axis * (radius * sin), axis, zero, radius: radius * cos };
+            (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
+        }
+        _ => None,
+    }
+}
+
+/// The candidates among the faces of a box.
+pub fn candidates(bodies: &Bodies, place: &Place) -> Vec<Candidate> {
+    let [a, b] = [Side::A, Side::B].map(|s| place.lits(s));
+    let mut out = Vec::new();
+    edges(bodies, &a, &mut out);
+    edges(bodies, &b, &mut out);
+    for p in &a {
+        for q in &b {
+            let curve = tangent(bodies, *p, *q).or_else(|| tangent(bodies, *q, *p));
+            out.extend(curve.map(|curve| Candidate { curve, faces: [*p, *q] }));
+        }
+    }
+    out
+}
+
+/// True when a box holds a curve along which the bodies touch: it need not be halved to tell points apart.
+pub fn has_line(bodies: &Bodies, place: &Place) -> bool {
+    candidates(bodies, place).iter().any(|c| {
+        let on = |side: Side| {
+            let own = c.faces.iter().any(|l| l.0 == side);
+            let range = c.curve.range(place);
+            own || place.lits(side).iter().any(|lit| lies_in(bodies, &c.curve, range, *lit))
+        };
+        on(Side::A) && on(Side::B)
+    })
+}
+
+/// True when a piece of a curve lies in a face, or runs along it within the threshold, and would if it went on: more points
+/// than a conic and a quadric can have in common, some of them so far beyond its ends that a curve which only bends close
+/// has left.
+fn lies_in(bodies: &Bodies, curve: &Curve, (from, to): (f64, f64), lit: Lit) -> bool {
+    let pad = (3.0 * (bodies.lie * bodies.size).sqrt() / curve.speed()).max(to - from);
+    let slack = 4.0 * bodies.lie + bodies.eps;
+    let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
+    (0..7).all(|k| {
+        let v = bodies.value(lit, curve.point(from - pad + (to - from + 2.0 * pad) * f64::from(k) / 6.0));
+        (lo, hi) = (lo.min(v), hi.max(v));
+        hi - lo <= 2.0 * slack && v.abs() <= (bodies.tau + bodies.eps).max(slack)
+    })
+}
+
+/// True when the straight way between two points of a pair's flat patch leaves it nowhere.
+pub fn sees(bodies: &Bodies, pair: &Pair, lits: &[Lit], x: DVec3, y: DVec3) -> bool {
+    let Some(along) = (y - x).try_normalize() else { return true };
+    let (curve, length) = (Curve::Line { origin: x, along }, (y - x).length());
+    let mut stops = vec![0.0, length];
+    for lit in lits {
+        roots(bodies, &curve, *lit, (0.0, length), &mut stops);
+    }
+    stops.sort_by(f64::total_cmp);
+    stops
+        .windows(2)
+        .filter(|w| w[1] - w[0] > 1e-6 * length)
+        .all(|w| standing(bodies, pair, curve.point(0.5 * (w[0] + w[1]))) != Standing::Outside)
+}
+
+/// Parameters in [from, to] at which a face passes through the curve.
+fn roots(bodies: &Bodies, curve: &Curve, lit: Lit, (from, to): (f64, f64), out: &mut Vec<f64>) {
+    let value = |s: f64| bodies.value(lit, curve.point(s));
+    // A curve that lies in a face (more common points than a conic and a quadric can have) has no crossing with it.
+    if (0..6).all(|k| value(from + (to - from) * (0.07 + 0.15 * f64::from(k))).abs() <= bodies.lie + bodies.eps) {
+        return;
+    }
+    let (speed, least) = (curve.speed(), 1e-4 * bodies.size);
+    let mut stack = vec![(from, to)];
+    while let Some((s, e)) = stack.pop() {
+        let m = 0.5 * (s + e);
+        let v = value(m);
+        if v.abs() > 0.5 * (e - s) * speed || bodies.work.is_spent() {
+            continue;
+        }
+        if (e - s) * speed > least {
+            stack.extend([(m, e), (s, m)]);
+            continue;
+        }
+        let (vs, ve) = (value(s), value(e));
+        if (vs < 0.0) != (ve < 0.0) {
+            let (mut lo, mut hi) = (s, e);
+            for _ in 0..80 {
+                let m = 0.5 * (lo + hi);
+                if (value(m) < 0.0) == (vs < 0.0) { lo = m } else { hi = m }
+            }
+            out.push(0.5 * (lo + hi));
+        }
+    }
+}
+
+/// The feet of a point of a candidate on both bodies where they touch there: on faces of each, within the threshold,
+/// confirmed by the whole trees.
+fn touches(bodies: &Bodies, faces: &[Lit; 2], others: &[Lit], x: DVec3) -> Option<[DVec3; 2]> {
+    // An edge lies on its own body; a tangent curve on the face it was taken from.
+    let foot_on = |side: Side| {
+        if bodies.f(side, x).abs() <= bodies.eps {
+            return Some(x);
+        }
+        faces
+            .iter()
+            .chain(others)
+            .filter(|l| l.0 == side && bodies.value(**l, x).abs() <= bodies.tau + bodies.eps)
+            .map(|l| bodies.foot(*l, x))
+            .find(|y| bodies.f(side, *y).abs() <= bodies.eps)
+    };
+    let feet = [foot_on(Side::A)?, foot_on(Side::B)?];
+    let bodily = bodies.is_bodily(Side::A, feet[0]) && bodies.is_bodily(Side::B, feet[1]);
+    (bodily && (feet[1] - feet[0]).length() <= bodies.tau + bodies.eps).then_some(feet)
+}
+
+/// The runs of a candidate on which the bodies touch and no patch holds them already.
+pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn(DVec3) -> bool) -> Vec<Run> {
+    let mut others: Vec<Lit> = places
+        .iter()
+        .flat_map(|p| [Side::A, Side::B].map(|s| p.lits(s)).concat())
+        .filter(|l| !c.faces.contains(l))
+        .collect();
+    others.sort_unstable();
+    others.dedup();
+    let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
+    let Some(range) = range else { return Vec::new() };
+    let mut stops = Vec::new();
+    for lit in &others {
+        if bodies.work.is_spent() {
+            return Vec::new();
+        }
+        roots(bodies, &c.curve, *lit, range, &mut stops);
+    }
+    for lit in &c.faces {
+        // A ruling ends at its apex.
+        if let (Face::Cone { apex, .. }, Curve::Line { .. }) = (bodies.face(*lit), c.curve) {
+            stops.push(c.curve.nearest(*apex).0);
+        }
+    }
+    stops.sort_by(f64::total_cmp);
+    let merge = 1e-9 * bodies.size / c.curve.speed();
+    stops.dedup_by(|b, a| *b - *a <= merge);
+    let round = matches!(c.curve, Curve::Circle { .. });
+    if round {
+        // Once around, starting at the first stop.
+        let first = stops.first().copied().unwrap_or(0.0);
+        if stops.is_empty() {
+            stops.push(first);
+        }
+        stops.push(first + TAU);
+    }
+    let mut pieces: Vec<(f64, f64, Option<[DVec3; 2]>)> = stops
+        .windows(2)
+        .map(|w| {
+            let x = c.curve.point(0.5 * (w[0] + w[1]));
+            (w[0], w[1], touches(bodies, &c.faces, &others, x).filter(|_| !in_patch(x)))
+        })
+        .collect();
+    // A circle starts behind a piece that does not touch, so that no run is cut at its first stop.
+    if round && let Some(i) = pieces.iter().position(|p| p.2.is_none()) {
+        pieces.rotate_left(i);
+        for k in 1..pieces.len() {
+            while pieces[k].0 < pieces[k - 1].0 {
+                pieces[k].0 += TAU;
+                pieces[k].1 += TAU;
+            }
+        }
+    }
+    let mut out: Vec<Run> = Vec::new();
+    let mut open = false;
+    for (from, to, feet) in pieces {
+        let Some(feet) = feet else {
+            open = false;
+            continue;
+        };
+        match out.last_mut().filter(|_| open) {
+            Some(run) => run.to = to,
+            None => out.push(Run {
+                curve: c.curve,
+                from,
+                to,
+                middle: c.curve.point(0.5 * (from + to)),
+                feet,
+                ends: Vec::new(),
+            }),
+        }
+        open = true;
+    }
+    // A curve that only bends close to a face is no line: it would leave it if it went on. One that lies in it stays.
+    out.retain(|run| {
+        let on = |side: Side| {
+            // The faces that make it hold it by construction.
+            let own = c.faces.iter().any(|l| l.0 == side);
+            own || others.iter().any(|l| l.0 == side && lies_in(bodies, &c.curve, (run.from, run.to), *l))
+        };
+        on(Side::A) && on(Side::B)
+    });
+    for run in &mut out {
+        let whole = round && run.to - run.from >= TAU - 1e-9;
+        let mut params = if whole { Vec::new() } else { vec![run.from, run.to] };
+        if round {
+            // Points of an arc in eight directions that are fixed in a body.
+            let marks = (0..16).map(|k| f64::from(k) * FRAC_PI_4);
+            let inside = |s: &f64| *s > run.from + 1e-6 && *s < run.to - 1e-6;
+            match whole {
+                true => params.extend((0..8).map(|k| f64::from(k) * FRAC_PI_4)),
+                false => params.extend(marks.filter(inside)),
+            }
+        }
+        let key = [key_of(c.faces[0]), key_of(c.faces[1]), 0];
+        run.ends = params
+            .into_iter()
+            .enumerate()
+            .map(|(i, s)| {
+                let x = c.curve.point(s);
+                // Gaps are linear along a line to first order; where its very end has no feet, those of the middle tell.
+                let (x, gap) = touches(bodies, &c.faces, &others, x).map_or_else(
+                    || (x, (run.feet[1] - run.feet[0]).length()),
+                    |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()),
+                );
+                Corner { x, gap, key: [key[0], key[1], i as u64] }
+            })
+            .collect();
+    }
+    out
+}

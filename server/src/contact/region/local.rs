@@ -1,0 +1,255 @@
+//! The two solids around one point: which faces pass there, what is solid in which direction, what kind of feature it is.
+//!
+//! Everything stands along A's axes at one instant; B's faces are carried there once. A literal within `eps` of a point
+//! passes through it; how it looks from there is read off its gradient and Hessian, not from points nearby.
+
+use crate::contact::literal::Side;
+use crate::contact::newton;
+use crate::contact::search::Task;
+use crate::contact::work::Work;
+use crate::motion::Instant;
+use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
+use crate::solid::{Face, Sense};
+use glam::{DMat3, DVec3};
+
+/// Gradients within this angle are parallel.
+pub const ANGLE: f64 = 1e-7;
+
+/// Largest separation, in diameters of the smaller body, at which surfaces are said to touch in regions. From farther away
+/// all of a body is near: there one place counts, the nearest.
+const REACH: f64 = 0.125;
+/// Largest deviation, in the same unit, with which they lie along each other.
+const LIE: f64 = 0.01;
+
+/// Both bodies at an instant.
+pub struct Bodies<'t, 'a> {
+    pub task: &'t Task<'a>,
+    pub at: &'t Instant,
+    /// Separation up to which surfaces touch.
+    pub tau: f64,
+    /// Deviation up to which curves and faces lie along each other: the same, but small against the bodies.
+    pub lie: f64,
+    /// A face nearer to a point than this passes through it: some hundred roundings.
+    pub eps: f64,
+    /// Diameter of the smaller body.
+    pub size: f64,
+    /// B's faces in A's frame.
+    faces_b: Vec<Face>,
+    /// Every look at a face counts.
+    pub work: &'t Work,
+}
+
+/// A literal at a point: value, gradient, Hessian, with its sign.
+#[derive(Clone, Copy, Debug)]
+pub struct At {
+    pub value: f64,
+    pub normal: DVec3,
+    pub hessian: DMat3,
+}
+
+/// A literal of one of the bodies.
+pub type Lit = (Side, LiteralId);
+
+impl<'t, 'a> Bodies<'t, 'a> {
+    /// Separations up to `tau` count, and up to `REACH`.
+    pub fn new(task: &'t Task<'a>, at: &'t Instant, tau: f64, work: &'t Work) -> Self {
+        let size = 2.0 * task.model_a.radius.min(task.model_b.radius);
+        let carried = |f: &Face| match *f {
+            Face::Plane { normal, offset } => {
+                let n = at.a_vector(normal).normalize();
+                Face::Plane { normal: n, offset: n.dot(at.a_point(normal * offset)) }
+            }
+            Face::Sphere { center, radius } => Face::Sphere { center: at.a_point(center), radius },
+            Face::Cylinder { origin, axis, radius } => {
+                Face::Cylinder { origin: at.a_point(origin), axis: at.a_vector(axis).normalize(), radius }
+            }
+            Face::Cone { apex, axis, sin, cos } => {
+                Face::Cone { apex: at.a_point(apex), axis: at.a_vector(axis).normalize(), sin, cos }
+            }
+        };
+        Self {
+            task,
+            at,
+            tau: tau.min(REACH * size),
+            lie: tau.min(LIE * size),
+            eps: 256.0 * task.rounding,
+            size,
+            faces_b: task.b.faces.iter().map(carried).collect(),
+            work,
+        }
+    }
+
+    /// The face of a literal, in A's frame.
+    pub fn face(&self, (side, id): Lit) -> &Face {
+        match side {
+            Side::A => &self.task.a.faces[id.face() as usize],
+            Side::B => &self.faces_b[id.face() as usize],
+        }
+    }
+
+    /// A literal at a point.
+    pub fn look(&self, lit: Lit, x: DVec3) -> At {
+        self.work.look(1);
+        let face = self.face(lit);
+        let f = face.at(x);
+        let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
+        At { value: f.value * sign, normal: f.normal * sign, hessian: newton::hessian(face, x) * sign }
+    }
+
+    /// A literal's value at a point.
+    pub fn value(&self, lit: Lit, x: DVec3) -> f64 {
+        self.work.look(1);
+        let v = self.face(lit).value(x);
+        if lit.1.sense() == Sense::Positive { v } else { -v }
+    }
+
+    /// f of one body.
+    pub fn f(&self, side: Side, x: DVec3) -> f64 {
+        let (solid, y) = match side {
+            Side::A => (self.task.a, x),
+            Side::B => (self.task.b, self.at.b_point(x)),
+        };
+        self.work.look(solid.faces.len());
+        solid.value(y)
+    }
+
+    /// Bounds of a face's psi over a box.
+    pub fn span(&self, face: &Face, center: DVec3, half: DVec3) -> local::Span {
+        self.work.look(1);
+        local::face_span(face, center, half)
+    }
+
+    /// The point of a literal's surface next to `x`.
+    pub fn foot(&self, lit: Lit, mut x: DVec3) -> DVec3 {
+        for _ in 0..3 {
+            let at = self.look(lit, x);
+            x -= at.normal * at.value;
+        }
+        x
+    }
+
+    /// A perpendicular of `axis` that is fixed in a body: the same material direction however the body moves.
+    pub fn material(&self, side: Side, axis: DVec3) -> DVec3 {
+        let own = if side == Side::A { axis } else { self.at.b_from_a * axis };
+        // Rounding must not choose between axes of equal rank.
+        let m = (own.abs() * 1e6).round();
+        let e = if m.x <= m.y && m.x <= m.z {
+            DVec3::X
+        } else if m.y <= m.z {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        let u = if side == Side::A { e } else { self.at.a_vector(e) };
+        (u - axis * u.dot(axis)).normalize()
+    }
+
+    /// What of a body's tree is open at a point, literals through it alone.
+    pub fn open(&self, side: Side, x: DVec3) -> (Truth, Vec<Token>) {
+        let solid = if side == Side::A { self.task.a } else { self.task.b };
+        self.work.look(solid.faces.len());
+        let mut out = Vec::new();
+        let truth = local::prune(&solid.normal_form, &mut out, &mut |id| {
+            let v = self.face((side, id)).value(x);
+            local::truth_of(id.sense(), (v, v), 0.0, self.eps)
+        });
+        (truth, out)
+    }
+
+    /// The literals through a point, each once.
+    pub fn through(&self, side: Side, x: DVec3) -> Vec<LiteralId> {
+        let (_, tokens) = self.open(side, x);
+        let mut ids: Vec<LiteralId> = local::literals(&tokens).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    }
+
+    /// Direction in which a literal rises at `x`; away from the cone along the axis at an apex, and whether it is one.
+    pub fn rise(&self, lit: Lit, x: DVec3) -> (DVec3, bool) {
+        match *self.face(lit) {
+            Face::Cone { apex, axis, .. } if (x - apex).length() <= self.eps => {
+                (if lit.1.sense() == Sense::Positive { -axis } else { axis }, true)
+            }
+            _ => (self.look(lit, x).normal, false),
+        }
+    }
+
+    /// 1 on a face of a body, 2 on an edge, 3 at a vertex: dimensions that the normals of the faces through `x` span.
+    pub fn rank(&self, side: Side, x: DVec3) -> usize {
+        let mut span: Vec<DVec3> = Vec::new();
+        for id in self.through(side, x) {
+            let (g, is_apex) = self.rise((side, id), x);
+            if is_apex {
+                return 3;
+            }
+            let r = span.iter().fold(g, |r, e| r - *e * e.dot(r));
+            if r.length() > 1e-6 && span.len() < 3 {
+                span.push(r.normalize());
+            }
+        }
+        span.len().max(1)
+    }
+
+    /// The sum of the normals of the faces through `x`, as the paper averages them.
+    pub fn average(&self, side: Side, x: DVec3) -> DVec3 {
+        self.through(side, x).iter().map(|id| self.rise((side, *id), x).0).sum::<DVec3>().normalize_or_zero()
+    }
+
+    /// True when `x` is a limit of interior points of a body: no skin without volume passes for a surface. Some
+    /// direction must lower all literals of a clause.
+    pub fn is_bodily(&self, side: Side, x: DVec3) -> bool {
+        let (truth, tokens) = self.open(side, x);
+        if truth != Truth::Open {
+            return truth == Truth::True;
+        }
+        clauses(&tokens).iter().any(|clause| {
+            let rises: Vec<DVec3> = clause.iter().map(|id| self.rise((side, *id), x).0).collect();
+            has_descent(&rises, 1e-6)
+        })
+    }
+}
+
+/// True when a unit direction is found along which every one of some gradients falls by more than `least`: the
+/// perceptron's rule. Then no combination of them is zero, nor shorter than `least`.
+pub fn has_descent(gradients: &[DVec3], least: f64) -> bool {
+    let mut d = -gradients.iter().copied().sum::<DVec3>();
+    for _ in 0..64 {
+        d = d.normalize_or_zero();
+        match gradients.iter().max_by(|g, h| g.dot(d).total_cmp(&h.dot(d))) {
+            Some(g) if g.dot(d) > -least => d -= *g * (g.dot(d) + 0.1),
+            _ => return true,
+        }
+    }
+    false
+}
+
+/// The alternatives of an expression, each a set of literals that must hold together; the first few of many.
+fn clauses(tokens: &[Token]) -> Vec<Vec<LiteralId>> {
+    const MOST: usize = 64;
+    fn of(e: Expression<'_>) -> Vec<Vec<LiteralId>> {
+        match e {
+            Expression::Literal(id) => vec![vec![id]],
+            Expression::Or(body) => local::operands(body).flat_map(of).take(MOST).collect(),
+            Expression::And(body) => local::operands(body).map(of).fold(vec![vec![]], |all, one| {
+                all.iter()
+                    .flat_map(|left| one.iter().map(move |right| [left.as_slice(), right].concat()))
+                    .take(MOST)
+                    .collect()
+            }),
+        }
+    }
+    of(local::first(tokens).0)
+}
+
+/// True when an expression holds given the truth of its literals.
+pub fn holds(tokens: &[Token], truth: &mut impl FnMut(LiteralId) -> bool) -> bool {
+    fn of(e: Expression<'_>, truth: &mut impl FnMut(LiteralId) -> bool) -> bool {
+        match e {
+            Expression::Literal(id) => truth(id),
+            Expression::And(body) => local::operands(body).all(|e| of(e, truth)),
+            Expression::Or(body) => local::operands(body).any(|e| of(e, truth)),
+        }
+    }
+    of(local::first(tokens).0, truth)
+}

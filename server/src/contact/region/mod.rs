@@ -1,0 +1,450 @@
+//! All regions in which two bodies touch at an instant: points, lines, patches, each with the points that bound it.
+//!
+//! Two bodies touch where their surfaces are within a threshold of each other, `tau`: the pair's margin, or twice the
+//! resolution. `separation` covers what may touch by boxes, proven to hold all of it; a box is halved until few faces
+//! are left in it. From the faces of the boxes, in this order,
+//!
+//! * patches: two faces lie on each other (`surface`); told by the corners of their common area (`patch`);
+//! * lines: an edge lies on a face or an edge, or round faces touch along a ruling or a circle (`line`);
+//! * points: what touches nowhere else (`point`).
+//!
+//! All points are roots of the faces' own equations and are confirmed by both whole trees: nothing is sampled. Faces that
+//! make up one surface (abutting operands of a union) count as one. Regions and their points are ordered by face ids and
+//! by directions fixed in the bodies, never by position, so that a body at rest has the same list from step to step.
+//!
+//! Not promised: a line along which two cones touch side by side, or one along a curve that is neither straight nor
+//! circular, comes as points; isolated points closer to each other than 1/24 of the smaller body's radius may come as one.
+
+mod line;
+mod local;
+mod patch;
+mod point;
+mod surface;
+
+use super::depth;
+use super::literal::Side;
+use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use super::pair::{PairQuery, PairSearch};
+use super::separation::{self, Cover, Place, Within};
+use super::work::Work;
+use crate::solid::Face;
+use glam::DVec3;
+use line::Candidate;
+use local::{Bodies, Lit};
+use patch::Corner;
+use std::collections::BTreeMap;
+use surface::{Pair, Standing, same_surface};
+
+/// A point of a region.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionPoint {
+    /// Half way between the surfaces; world frame.
+    pub point: DVec3,
+    /// Distance of the surfaces there, along the normal.
+    pub separation: f64,
+}
+
+/// Where two bodies touch without interruption.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// Which features meet.
+    pub kind: Kind,
+    /// Point, line or patch.
+    pub extent: Extent,
+    /// Unit normal from a to b, world frame; of a curved patch the mean one.
+    pub normal: DVec3,
+    /// Faces of a that meet there; `NO_FACE` fills.
+    pub faces_a: [u32; 3],
+    /// Faces of b.
+    pub faces_b: [u32; 3],
+    /// What bounds it: one point, two ends (a circle: points all round), the corners of a patch.
+    pub points: Vec<RegionPoint>,
+}
+
+/// All regions of a pair at an instant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Regions {
+    /// In a fixed order: patches, lines, points, each by face ids.
+    pub regions: Vec<Region>,
+    /// False when the work limit cut the search: there may be more.
+    pub complete: bool,
+    /// Boxes looked at.
+    pub cells: u64,
+}
+
+/// Cells' worth of work that one pair's regions may cost, should its cell limit allow more.
+const MOST_CELLS: u64 = 20_000;
+/// A box with no more faces than this, of both sides together, is not halved for their number: 132 sets of them may balance.
+const FEW_FACES: usize = 8;
+/// Boxes in which curved faces may touch at several points are halved down to this part of the smaller body's radius …
+const ROUND: f64 = 1.0 / 24.0;
+/// … and those in which many faces run together down to this one, or to where all that is left in them is near.
+const SMALLEST: f64 = 1e-3;
+
+/// The threshold of touching for a pair: its margin, at least twice the resolution.
+pub fn threshold(resolution: f64, margin: f64) -> f64 {
+    margin.max(2.0 * resolution)
+}
+
+/// Cells' worth of work that a question allows for one instant.
+fn limit(query: &PairQuery) -> u64 {
+    query.cell_limit.min(MOST_CELLS)
+}
+
+/// All regions in which the bodies of a question touch at `time`: surfaces within `threshold` of each other. Where
+/// none is found, since all are farther apart than `local::REACH` of the smaller body, the nearest place is the one region.
+pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
+    let (task, swapped) = PairSearch::task(query);
+    if task.a.is_empty() || task.b.is_empty() {
+        return Regions { complete: true, ..Regions::default() };
+    }
+    let at = task.relative.at(time);
+    let limit = limit(query);
+    // A quarter is kept for the nearest place, so that a pair which touches has at least one region.
+    let work = Work::new(limit - limit / 4);
+    let bodies = Bodies::new(&task, &at, threshold, &work);
+    let mut found = find(&bodies);
+    found.cells = work.cells();
+    if found.regions.is_empty() {
+        let rest = Work::new(limit.saturating_sub(found.cells));
+        let (nearest, proven) = depth::nearest(&task, &at, threshold, &rest);
+        found.regions.extend(nearest.map(|lowest| point_region(&bodies, &point::nearest(&bodies, &lowest))));
+        found.complete &= proven;
+        found.cells += rest.cells();
+    }
+    for r in &mut found.regions {
+        r.normal = (at.world_from_a * r.normal).normalize();
+        for p in &mut r.points {
+            p.point = task.relative.world_point(&at, p.point);
+        }
+        if swapped {
+            r.normal = -r.normal;
+            std::mem::swap(&mut r.faces_a, &mut r.faces_b);
+        }
+    }
+    found
+}
+
+/// Whether the bodies of a question are within `threshold` of each other at the start, proven or witnessed, and the cells'
+/// worth of work that it took.
+pub fn touching(query: &PairQuery, threshold: f64) -> (Within, u64) {
+    let (task, _) = PairSearch::task(query);
+    if task.a.is_empty() || task.b.is_empty() {
+        return (Within::Apart, 0);
+    }
+    let work = Work::new(limit(query));
+    let within = separation::within(&task, &task.relative.at(0.0), 0.5 * threshold, &work);
+    (within, work.cells())
+}
+
+/// The regions of an answered question: at the contact, or at the start where the pair touches and does not meet; such a
+/// pair's answer gets the separation, normal and features of its nearest region.
+pub fn complete(query: &PairQuery, outcome: &mut Outcome, threshold: f64) -> Regions {
+    let time = match outcome.status {
+        Status::Contact => outcome.time,
+        Status::Clear if outcome.touching => 0.0,
+        _ => return Regions { complete: true, ..Regions::default() },
+    };
+    let mut found = regions(query, time, threshold);
+    if outcome.status == Status::Contact && found.regions.is_empty() {
+        // A contact that its own faces cannot be followed to: the point is what is known.
+        found.regions.push(Region {
+            kind: outcome.kind,
+            extent: Extent::Point,
+            normal: outcome.normal,
+            faces_a: outcome.faces_a,
+            faces_b: outcome.faces_b,
+            points: vec![RegionPoint { point: outcome.point, separation: 0.0 }],
+        });
+        found.complete = false;
+    }
+    if outcome.status == Status::Clear
+        && let Some(r) = found.regions.iter().min_by(|r, s| r.separation().total_cmp(&s.separation()))
+    {
+        outcome.point = r.points.iter().map(|p| p.point).sum::<DVec3>() / r.points.len() as f64;
+        outcome.normal = r.normal;
+        outcome.separation = r.separation();
+        outcome.normal_speed = normal_speed(query, outcome.point, r.normal);
+        (outcome.kind, outcome.extent) = (r.kind, r.extent);
+        (outcome.faces_a, outcome.faces_b) = (r.faces_a, r.faces_b);
+        outcome.averaged_normal = r.kind == Kind::VertexVertex;
+    }
+    outcome.counters.instant_cells += found.cells;
+    found
+}
+
+impl Region {
+    /// Smallest separation of its points.
+    pub fn separation(&self) -> f64 {
+        self.points.iter().map(|p| p.separation).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Speed at which the bodies approach at a point of the start, along a normal from a to b.
+fn normal_speed(query: &PairQuery, point: DVec3, normal: DVec3) -> f64 {
+    let velocity = |m: &contactd_proto::Motion| m.velocity + m.spin.cross(point - m.start.position);
+    (velocity(&query.a.placed.motion) - velocity(&query.b.placed.motion)).dot(normal)
+}
+
+/// All regions along A's axes; those found until the work ran out.
+fn find(bodies: &Bodies) -> Regions {
+    let (places, covered) = cover(bodies);
+    let mut out = Regions::default();
+    let patches = pairs(bodies, &places);
+    for (pair, of) in &patches {
+        for part in parts(bodies, &places, of) {
+            let corners = patch::corners(bodies, pair, &part);
+            if bodies.work.is_spent() {
+                return out;
+            }
+            for corners in apart(bodies, pair, &part, corners) {
+                out.regions.push(patch_region(bodies, pair, &corners));
+            }
+        }
+    }
+    let in_patch = |x: DVec3| {
+        patches.iter().any(|(pair, _)| {
+            [pair.alpha, pair.beta].iter().all(|l| bodies.value(*l, x).abs() <= bodies.tau + bodies.eps)
+                && surface::standing(bodies, pair, x) != Standing::Outside
+        })
+    };
+    let mut lines: Vec<line::Run> = Vec::new();
+    for (candidate, of) in candidates(bodies, &places) {
+        let of: Vec<&Place> = of.iter().map(|i| &places[*i]).collect();
+        let runs = line::runs(bodies, &candidate, &of, &in_patch);
+        if bodies.work.is_spent() {
+            return out;
+        }
+        for run in runs {
+            // Two faces may have an edge in common that a third one shares.
+            let same = |l: &line::Run| on_run(bodies, l, run.middle) && on_run(bodies, &run, l.middle);
+            if !lines.iter().any(same) {
+                out.regions.push(line_region(bodies, &run));
+                lines.push(run);
+            }
+        }
+    }
+    let mut points: Vec<DVec3> = Vec::new();
+    for m in point::meetings(bodies, &places) {
+        let x = m.middle();
+        let known = points.iter().any(|p| (*p - x).length() <= 1e-6 * bodies.size + bodies.lie)
+            || lines.iter().any(|l| on_run(bodies, l, x))
+            || in_patch(x);
+        if !known {
+            out.regions.push(point_region(bodies, &m));
+            points.push(x);
+        }
+    }
+    let rank = |r: &Region| (2 - r.extent as u8, r.faces_a, r.faces_b);
+    out.regions.sort_by_key(rank);
+    out.complete = covered && !bodies.work.is_spent();
+    out
+}
+
+/// True when a point lies on a run, its ends included.
+fn on_run(bodies: &Bodies, run: &line::Run, x: DVec3) -> bool {
+    let (s, off) = run.curve.nearest(x);
+    let slack = 1e-6;
+    let within = |s: f64| s >= run.from - slack * bodies.size && s <= run.to + slack * bodies.size;
+    let turn = std::f64::consts::TAU;
+    let round = matches!(run.curve, line::Curve::Circle { .. });
+    off <= bodies.tau + slack * bodies.size && (within(s) || (round && (within(s + turn) || within(s + 2.0 * turn))))
+}
+
+/// Boxes that hold all that touches, each with few faces, and whether that is proven.
+fn cover(bodies: &Bodies) -> (Vec<Place>, bool) {
+    let tau = bodies.tau;
+    let mut cover = Cover::new(bodies.task, bodies.at, tau, tau, bodies.work);
+    let mut places = Vec::new();
+    let smallest = (0.5 * SMALLEST * bodies.size).max(0.5 * tau);
+    while let Some(place) = cover.next(0.5 * tau) {
+        let radius = place.half.length();
+        let sides = [Side::A, Side::B].map(|s| place.lits(s));
+        if sides.iter().any(Vec::is_empty) {
+            // Inside one body: no surface of it.
+            continue;
+        }
+        let few = sides[0].len() + sides[1].len() <= FEW_FACES;
+        let is_flat = sides.iter().flatten().all(|l| matches!(bodies.face(*l), Face::Plane { .. }));
+        let simple = few && (is_flat || radius <= ROUND * 0.5 * bodies.size || is_simple(bodies, &place));
+        if simple || radius <= smallest {
+            places.push(place);
+        } else if !few || point::may_meet(bodies, &place) {
+            cover.split(place);
+        }
+    }
+    (places, cover.is_done())
+}
+
+/// True when faces touch in a box over an area or along a line: halving it would only cut that up.
+fn is_simple(bodies: &Bodies, place: &Place) -> bool {
+    let b = place.lits(Side::B);
+    let pairs = place.lits(Side::A).iter().any(|p| b.iter().any(|q| Pair::of(bodies, *p, *q).is_some()));
+    pairs || line::has_line(bodies, place)
+}
+
+/// The pairs of surfaces that lie on each other, and the boxes in which they do.
+fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<(Pair, Vec<usize>)> {
+    let mut boxes: BTreeMap<(Lit, Lit), Vec<usize>> = BTreeMap::new();
+    for (i, place) in places.iter().enumerate() {
+        let b = place.lits(Side::B);
+        for p in place.lits(Side::A) {
+            b.iter().for_each(|q| boxes.entry((p, *q)).or_default().push(i));
+        }
+    }
+    let mut found: Vec<(Pair, Vec<usize>)> = Vec::new();
+    for ((p, q), of) in boxes {
+        let known = found.iter_mut().find(|(k, _)| same_surface(bodies, k.alpha, p) && same_surface(bodies, k.beta, q));
+        match known {
+            Some((_, all)) => all.extend(of),
+            None => found.extend(Pair::of(bodies, p, q).map(|pair| (pair, of))),
+        }
+    }
+    for (_, of) in &mut found {
+        of.sort_unstable();
+        of.dedup();
+    }
+    found
+}
+
+/// Boxes in groups that hang together.
+fn parts<'p>(bodies: &Bodies, places: &'p [Place], of: &[usize]) -> Vec<Vec<&'p Place>> {
+    let mut groups: Vec<Vec<&Place>> = Vec::new();
+    for (i, index) in of.iter().enumerate() {
+        // Some comparisons make one look.
+        bodies.work.look(i / 8);
+        if bodies.work.is_spent() {
+            return Vec::new();
+        }
+        let place = &places[*index];
+        let meets = |o: &&Place| {
+            let gap = (o.center - place.center).abs() - (o.half + place.half) * (1.0 + 1e-9);
+            gap.max_element() <= 0.0
+        };
+        let (near, far): (Vec<_>, Vec<_>) = groups.into_iter().partition(|g| g.iter().any(meets));
+        groups = far;
+        groups.push(near.into_iter().flatten().chain([place]).collect());
+    }
+    groups
+}
+
+/// The points of a flat patch in groups that see each other: one a piece. Curved ones stay as they are.
+fn apart(bodies: &Bodies, pair: &Pair, places: &[&Place], corners: Vec<Corner>) -> Vec<Vec<Corner>> {
+    if corners.is_empty() {
+        return Vec::new();
+    }
+    // Fewer points than two triangles have make no two pieces.
+    if corners.len() < 6 || !matches!(bodies.face(pair.alpha), Face::Plane { .. }) {
+        return vec![corners];
+    }
+    let mut lits: Vec<Lit> = Vec::new();
+    for side in [Side::A, Side::B] {
+        lits.extend(places.iter().flat_map(|p| p.lits(side)));
+    }
+    lits.sort_unstable();
+    lits.dedup();
+    let mut groups: Vec<Vec<Corner>> = Vec::new();
+    for c in corners {
+        let sees = |g: &Vec<Corner>| g.iter().any(|o| line::sees(bodies, pair, &lits, o.x, c.x));
+        let (near, far): (Vec<_>, Vec<_>) = groups.into_iter().partition(sees);
+        groups = far;
+        groups.push(near.into_iter().flatten().chain([c]).collect());
+    }
+    for g in &mut groups {
+        patch::order(bodies, pair, g);
+    }
+    groups.sort_by_key(|g| g.iter().map(|c| c.key).min());
+    groups
+}
+
+/// Candidates for lines, each once, with the boxes that name it.
+fn candidates(bodies: &Bodies, places: &[Place]) -> Vec<(Candidate, Vec<usize>)> {
+    let mut found: Vec<(Candidate, Vec<usize>)> = Vec::new();
+    let mut index: BTreeMap<([Lit; 2], usize), usize> = BTreeMap::new();
+    for (i, place) in places.iter().enumerate() {
+        let mut count: BTreeMap<[Lit; 2], usize> = BTreeMap::new();
+        for c in line::candidates(bodies, place) {
+            // Two faces may have two curves in common.
+            let nth = count.entry(c.faces).or_default();
+            let key = (c.faces, *nth);
+            *nth += 1;
+            match index.get(&key) {
+                Some(k) => found[*k].1.push(i),
+                None => {
+                    index.insert(key, found.len());
+                    found.push((c, vec![i]));
+                }
+            }
+        }
+    }
+    found
+}
+
+fn three(ids: impl IntoIterator<Item = u32>) -> [u32; 3] {
+    let mut out = [NO_FACE; 3];
+    let mut ids: Vec<u32> = ids.into_iter().collect();
+    ids.sort_unstable();
+    ids.dedup();
+    for (slot, id) in out.iter_mut().zip(ids) {
+        *slot = id;
+    }
+    out
+}
+
+fn faces_at(bodies: &Bodies, side: Side, x: DVec3) -> [u32; 3] {
+    three(bodies.through(side, x).iter().map(|id| id.face()))
+}
+
+fn points_of(corners: &[Corner]) -> Vec<RegionPoint> {
+    corners.iter().map(|c| RegionPoint { point: c.x, separation: c.gap }).collect()
+}
+
+fn patch_region(bodies: &Bodies, pair: &Pair, corners: &[Corner]) -> Region {
+    let normals = corners.iter().map(|c| bodies.look(pair.alpha, c.x).normal);
+    let mean = normals.clone().sum::<DVec3>();
+    let normal = if mean.length() > 1e-3 { mean.normalize() } else { normals.clone().next().unwrap_or(DVec3::Z) };
+    Region {
+        kind: Kind::FaceFace,
+        extent: Extent::Patch,
+        normal,
+        faces_a: three([pair.alpha.1.face()]),
+        faces_b: three([pair.beta.1.face()]),
+        points: points_of(corners),
+    }
+}
+
+fn line_region(bodies: &Bodies, run: &line::Run) -> Region {
+    let [on_a, on_b] = run.feet;
+    let (rank_a, rank_b) = (bodies.rank(Side::A, on_a), bodies.rank(Side::B, on_b));
+    let (of_a, of_b) = (bodies.average(Side::A, on_a), bodies.average(Side::B, on_b));
+    // A face has a normal of its own; two edges along each other have the average of the adjacent ones.
+    let normal = match (rank_a, rank_b) {
+        (1, _) => of_a,
+        (_, 1) => -of_b,
+        _ => (of_a - of_b).normalize_or(of_a),
+    };
+    Region {
+        kind: Kind::of_active(rank_a.min(2), rank_b.min(2)),
+        extent: Extent::Line,
+        normal,
+        faces_a: faces_at(bodies, Side::A, on_a),
+        faces_b: faces_at(bodies, Side::B, on_b),
+        points: points_of(&run.ends),
+    }
+}
+
+fn point_region(bodies: &Bodies, m: &point::Meeting) -> Region {
+    let [on_a, on_b] = m.feet;
+    let kind = Kind::of_active(bodies.rank(Side::A, on_a), bodies.rank(Side::B, on_b));
+    // Where a vertex meets a vertex the average of the adjacent normals stands for the normal, as in the paper.
+    let average = bodies.average(Side::A, on_a) - bodies.average(Side::B, on_b);
+    let normal = if kind == Kind::VertexVertex { average.normalize_or(m.normal) } else { m.normal };
+    Region {
+        kind,
+        extent: Extent::Point,
+        normal,
+        faces_a: faces_at(bodies, Side::A, on_a),
+        faces_b: faces_at(bodies, Side::B, on_b),
+        points: vec![RegionPoint { point: m.middle(), separation: m.gap }],
+    }
+}

@@ -1,0 +1,316 @@
+//! Points: where two bodies touch at a single point, or come nearest to each other within the threshold.
+//!
+//! Such a point is a stationary point of F = max(f_A, f_B): literals of both bodies at one level, their gradients
+//! balanced. Every choice of one to three faces a side is solved by Newton's method (the faces of a box are few); a
+//! solution counts if both whole trees have that value there, so that no other face decides. Surfaces apart are then
+//! followed back from the level to each body's own surface, which gives both feet and their distance. A cone's apex is
+//! a point of its own.
+
+use super::local::{Bodies, Lit, has_descent};
+use crate::contact::depth::Deepest;
+use crate::contact::literal::Side;
+use crate::contact::newton::{MAX_UNKNOWNS, cholesky_solve, damped_step};
+use crate::contact::separation::Place;
+use crate::solid::{Face, Sense};
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// A stationary point of the distance of two bodies.
+#[derive(Clone, Debug)]
+pub struct Meeting {
+    /// Feet on A and B.
+    pub feet: [DVec3; 2],
+    /// From A to B.
+    pub normal: DVec3,
+    /// Distance of the feet along the normal.
+    pub gap: f64,
+}
+
+impl Meeting {
+    pub fn middle(&self) -> DVec3 {
+        (self.feet[0] + self.feet[1]) * 0.5
+    }
+}
+
+/// Multipliers below this, and sums of gradients above it, are no balance.
+const BALANCE: f64 = 1e-7;
+
+/// How far off its box a meeting may be found, in boxes.
+const SLACK: f64 = 1e-3;
+
+/// The meetings within some boxes.
+pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
+    let mut out = Vec::new();
+    for (lits, of) in systems(bodies, places) {
+        // Planes balance nowhere, in one place, or all along a flat of which the trees choose a part.
+        let is_flat = lits.iter().all(|l| matches!(bodies.face(*l), Face::Plane { .. }));
+        let mut last: Option<DVec3> = None;
+        for place in of {
+            if bodies.work.is_spent() {
+                return out;
+            }
+            let start = [place.lowest, place.center];
+            let found = start.into_iter().find_map(|x| {
+                let balance = balance(bodies, &lits, x)?;
+                Some((balance.0, meeting(bodies, place, &lits, balance)))
+            });
+            let met = found.as_ref().is_some_and(|f| f.1.is_some());
+            let again = |x: DVec3| last.is_some_and(|y| (x - y).length() <= bodies.eps);
+            let all = is_flat && (met || found.as_ref().is_none_or(|f| again(f.0)));
+            last = found.as_ref().map(|f| f.0);
+            out.extend(found.and_then(|f| f.1));
+            if all {
+                break;
+            }
+        }
+    }
+    for place in places {
+        for (side, other) in [(Side::A, Side::B), (Side::B, Side::A)] {
+            for lit in place.lits(side) {
+                let Face::Cone { apex, .. } = *bodies.face(lit) else { continue };
+                if lit.1.sense() == Sense::Positive && place.holds(apex, bodies.tau) {
+                    out.extend(at_apex(bodies, side, apex, &place.lits(other)));
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The sets of one to three faces a side that may balance, each once with the boxes in which they may.
+fn systems<'p>(bodies: &Bodies, places: &'p [Place]) -> BTreeMap<Vec<Lit>, Vec<&'p Place>> {
+    let mut found: BTreeMap<Vec<Lit>, Vec<&Place>> = BTreeMap::new();
+    for place in places {
+        let ways_b = choices(&place.lits(Side::B));
+        for of_a in choices(&place.lits(Side::A)) {
+            for of_b in ways_b.iter().filter(|of_b| of_a.len() + of_b.len() <= 4) {
+                if bodies.work.is_spent() {
+                    return found;
+                }
+                let lits = [of_a.as_slice(), of_b.as_slice()].concat();
+                if may_balance(bodies, place, &lits) {
+                    found.entry(lits).or_default().push(place);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// False when nothing balances in a box.
+pub fn may_meet(bodies: &Bodies, place: &Place) -> bool {
+    !systems(bodies, std::slice::from_ref(place)).is_empty()
+}
+
+/// False when some direction leads down all of some literals wherever one is in a box: their gradients have no sum zero.
+fn may_balance(bodies: &Bodies, place: &Place, lits: &[Lit]) -> bool {
+    let reach = place.half.length() * (1.0 + SLACK);
+    let mut gradients = Vec::with_capacity(lits.len());
+    let mut turn: f64 = 10.0 * BALANCE;
+    for lit in lits {
+        let at = bodies.face(*lit).at(place.center);
+        // How far a gradient turns on the way through the box.
+        turn = turn.max(if at.k == 0.0 {
+            0.0
+        } else if at.rho > reach {
+            at.k * reach / (at.rho - reach)
+        } else {
+            2.0
+        });
+        gradients.push(if lit.1.sense() == Sense::Positive { at.normal } else { -at.normal });
+    }
+    bodies.work.look(2 * lits.len());
+    !has_descent(&gradients, turn)
+}
+
+/// All choices of one to three of some literals; of many, those of one and two.
+fn choices(lits: &[Lit]) -> Vec<Vec<Lit>> {
+    let mut out = Vec::new();
+    for (i, p) in lits.iter().enumerate() {
+        out.push(vec![*p]);
+        for (j, q) in lits.iter().enumerate().skip(i + 1) {
+            out.push(vec![*p, *q]);
+            if lits.len() <= 8 {
+                out.extend(lits[j + 1..].iter().map(|r| vec![*p, *q, *r]));
+            }
+        }
+    }
+    out
+}
+
+/// Steps to and fro between two surfaces.
+const MOST_PACES: usize = 32;
+
+/// A place where literals balance: point, level, multipliers.
+type Balance = (DVec3, f64, Vec<f64>);
+
+/// What a balance within a box is to the bodies.
+fn meeting(bodies: &Bodies, place: &Place, lits: &[Lit], (x, level, lambda): Balance) -> Option<Meeting> {
+    let eps = bodies.eps;
+    if !place.holds(x, bodies.eps + SLACK * place.half.max_element()) || level.abs() > 0.5 * bodies.tau + eps {
+        return None;
+    }
+    // The whole trees have this value there, and no other.
+    if (bodies.f(Side::A, x) - level).abs() > eps || (bodies.f(Side::B, x) - level).abs() > eps {
+        return None;
+    }
+    let sum = |side: Side| {
+        let of = lits.iter().zip(&lambda).filter(|(l, _)| l.0 == side);
+        of.map(|(l, w)| bodies.look(*l, x).normal * *w).sum::<DVec3>()
+    };
+    let normal = (sum(Side::A) - sum(Side::B)).try_normalize()?;
+    on_feet(bodies, lits, x, normal).filter(|m| m.gap.abs() <= bodies.tau + eps)
+}
+
+/// From a point at which literals balance back to each body's own surface, where both trees confirm it.
+fn on_feet(bodies: &Bodies, lits: &[Lit], x: DVec3, normal: DVec3) -> Option<Meeting> {
+    // The sharper feature first: a face is met under it, not under the point at which the levels agree.
+    let own = |side: Side| lits.iter().filter(|l| l.0 == side).copied().collect::<Vec<Lit>>();
+    let (of_a, of_b) = (own(Side::A), own(Side::B));
+    let feet = if of_a.len() >= of_b.len() {
+        let on_a = follow(bodies, &of_a, x);
+        [on_a, follow(bodies, &of_b, if of_a.len() > of_b.len() { on_a } else { x })]
+    } else {
+        let on_b = follow(bodies, &of_b, x);
+        [follow(bodies, &of_a, on_b), on_b]
+    };
+    let on = |feet: [DVec3; 2]| {
+        let on = |side: Side, y: DVec3| bodies.f(side, y).abs() <= bodies.eps && bodies.is_bodily(side, y);
+        on(Side::A, feet[0]) && on(Side::B, feet[1])
+    };
+    // F is lowest where the faces' levels agree, the distance a little beside it: to and fro until the feet stay.
+    let mut closer = feet;
+    for _ in 0..MOST_PACES {
+        let on_a = follow(bodies, &of_a, closer[1]);
+        let next = [on_a, follow(bodies, &of_b, on_a)];
+        let moved = (next[0] - closer[0]).length().max((next[1] - closer[1]).length());
+        closer = next;
+        if moved <= bodies.eps {
+            break;
+        }
+    }
+    let feet = [closer, feet].into_iter().find(|feet| on(*feet))?;
+    let way = feet[1] - feet[0];
+    // From some distance on the way itself tells the normal best.
+    let is_apart = way.dot(normal) > bodies.eps / SLACK;
+    let normal = if is_apart { way.normalize() } else { normal };
+    Some(Meeting { feet, normal, gap: way.dot(normal) })
+}
+
+/// The meeting at the lowest point of F. Where its faces cannot be followed, what F itself proves: no less than 2F apart.
+pub fn nearest(bodies: &Bodies, (x, normal, depth, lits): &Deepest) -> Meeting {
+    on_feet(bodies, lits, *x, *normal).unwrap_or_else(|| Meeting {
+        feet: [*x + *normal * *depth, *x - *normal * *depth],
+        normal: *normal,
+        gap: -2.0 * depth,
+    })
+}
+
+/// Solves literal_i = level, Σ λ g = 0, Σ λ = 1 with λ >= 0 for x, level, λ.
+fn balance(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> Option<Balance> {
+    let m = lits.len();
+    let n = m + 4;
+    let size = bodies.size;
+    let mut level = 0.0;
+    let mut lambda = vec![1.0 / m as f64; m];
+    let fill = |x: DVec3, level: f64, lambda: &[f64]| {
+        let (mut f, mut jac) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
+        let mut total = -1.0;
+        for (i, lit) in lits.iter().enumerate() {
+            let at = bodies.look(*lit, x);
+            f[i] = (at.value - level) / size;
+            jac[i][3] = -1.0;
+            for k in 0..3 {
+                jac[i][k] = at.normal[k];
+                jac[m + k][4 + i] = at.normal[k];
+                f[m + k] += lambda[i] * at.normal[k];
+                for j in 0..3 {
+                    jac[m + k][j] += lambda[i] * at.hessian.col(j)[k] * size;
+                }
+            }
+            total += lambda[i];
+            jac[m + 3][4 + i] = 1.0;
+        }
+        f[m + 3] = total;
+        let square: f64 = f[..n].iter().map(|v| v * v).sum();
+        (f, jac, square)
+    };
+    let (mut f, mut jac, mut best) = fill(x, level, &lambda);
+    let mut damping = 1e-3;
+    for _ in 0..40 {
+        if best < 1e-32 {
+            break;
+        }
+        let step = damped_step(&jac, &f, n, (damping * best.min(1e-2)).max(1e-15))?;
+        let nx = x + DVec3::new(step[0], step[1], step[2]) * size;
+        let nlevel = level + step[3] * size;
+        let nlambda: Vec<f64> = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
+        let next = fill(nx, nlevel, &nlambda);
+        if next.2 < best {
+            let slow = next.2 > 0.25 * best && best < 1e-26;
+            (x, level, lambda) = (nx, nlevel, nlambda);
+            (f, jac, best) = next;
+            damping = (damping * 0.1).max(1e-9);
+            if slow {
+                break;
+            }
+        } else {
+            damping *= 16.0;
+            if damping > 1e12 || best < 1e-26 {
+                break;
+            }
+        }
+    }
+    let balanced = f[m..m + 3].iter().all(|v| v.abs() <= BALANCE);
+    let held = lambda.iter().all(|l| *l >= -BALANCE);
+    (balanced && held && x.is_finite() && f[..m].iter().all(|v| v.abs() * size <= bodies.eps))
+        .then_some((x, level, lambda))
+}
+
+/// The nearest point to `x` at which some literals vanish.
+fn follow(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> DVec3 {
+    let m = lits.len();
+    for _ in 0..6 {
+        let at: Vec<_> = lits.iter().map(|l| bodies.look(*l, x)).collect();
+        let (mut gram, mut rhs) = ([[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS], [0.0; MAX_UNKNOWNS]);
+        for i in 0..m {
+            for j in 0..m {
+                gram[i][j] = at[i].normal.dot(at[j].normal);
+            }
+            gram[i][i] += 1e-13;
+            rhs[i] = -at[i].value;
+        }
+        let Some(y) = cholesky_solve(&mut gram, rhs, m) else { break };
+        x += (0..m).map(|i| at[i].normal * y[i]).sum::<DVec3>();
+    }
+    x
+}
+
+/// A body's apex at or over the other body.
+fn at_apex(bodies: &Bodies, side: Side, apex: DVec3, others: &[Lit]) -> Option<Meeting> {
+    let eps = bodies.eps;
+    if bodies.f(side, apex).abs() > eps || !bodies.is_bodily(side, apex) {
+        return None;
+    }
+    let other = if side == Side::A { Side::B } else { Side::A };
+    let foot = if bodies.f(other, apex).abs() <= eps {
+        apex
+    } else {
+        others
+            .iter()
+            .filter(|l| bodies.value(**l, apex).abs() <= bodies.tau + eps)
+            .map(|l| bodies.foot(*l, apex))
+            .find(|y| bodies.f(other, *y).abs() <= eps)?
+    };
+    if !bodies.is_bodily(other, foot) {
+        return None;
+    }
+    // On a face its normal; against an edge, a vertex or another apex the average of the adjacent normals.
+    let opposite = bodies.average(other, foot);
+    let mine = bodies.average(side, apex);
+    let out = if bodies.rank(other, foot) == 1 { -opposite } else { mine - opposite };
+    let normal = if side == Side::A { out } else { -out }.try_normalize()?;
+    let feet = if side == Side::A { [apex, foot] } else { [foot, apex] };
+    let gap = (feet[1] - feet[0]).dot(normal);
+    (gap.abs() <= bodies.tau + eps).then_some(Meeting { feet, normal, gap })
+}

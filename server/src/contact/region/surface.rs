@@ -1,0 +1,237 @@
+//! Two faces, one of each body, that lie on each other: what their common surface is, and which part of it is contact.
+//!
+//! At a point of the surface the tangent plane is cut into sectors by the faces that pass through it. In each sector the
+//! bodies' trees are evaluated with the point moved a little along the sector, then off the surface into the body: A on
+//! one side and B on the other make it a contact. No sector: outside; all: inside the patch; some: on its boundary, and
+//! at a corner unless the boundary goes straight on.
+
+use super::local::{ANGLE, At, Bodies, Lit, holds};
+use crate::contact::literal::Side;
+use crate::math::any_perpendicular;
+use crate::solid::local::{LiteralId, Truth};
+use crate::solid::{Face, Sense};
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+
+/// A face of A and one of B that coincide within the threshold of touching, facing each other.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    pub alpha: Lit,
+    pub beta: Lit,
+    /// Where flat faces lean against each other: the half-space in which their gap is within the threshold.
+    pub limit: Option<(DVec3, f64)>,
+}
+
+/// Faces that lean apart further than this many thresholds of lying on each other across a body touch along an edge, not
+/// over an area.
+const LEAN: f64 = 4.0;
+
+impl Pair {
+    /// The pair of two literals, if they lie on each other.
+    pub fn of(bodies: &Bodies, alpha: Lit, beta: Lit) -> Option<Self> {
+        let (tau, size) = (bodies.tau, bodies.size);
+        let near = |d: f64| d.abs() <= tau;
+        let opposite = alpha.1.sense() != beta.1.sense();
+        let found = match (*bodies.face(alpha), *bodies.face(beta)) {
+            (Face::Plane { .. }, Face::Plane { .. }) => {
+                let (a, b) = (bodies.look(alpha, DVec3::ZERO), bodies.look(beta, DVec3::ZERO));
+                let lean = a.normal + b.normal;
+                let tilt = lean.length();
+                if tilt * size > LEAN * bodies.lie {
+                    return None;
+                }
+                // gap(x) = a(x) + b(x): both are distances from their bodies.
+                let limit = (tilt * size > 0.25 * tau).then(|| (lean / tilt, (tau - a.value - b.value) / tilt));
+                return Some(Self { alpha, beta, limit });
+            }
+            (Face::Sphere { center: o, radius: r }, Face::Sphere { center: p, radius: s }) => {
+                near((o - p).length() + (r - s).abs())
+            }
+            (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: p, axis: b, radius: s }) => {
+                let lean = a.cross(b).length() * size;
+                near(lean + (o - p).cross(a).length() + (r - s).abs())
+            }
+            (Face::Cone { apex: o, axis: a, sin: r, .. }, Face::Cone { apex: p, axis: b, sin: s, .. }) => {
+                a.dot(b) > 0.0 && near(a.cross(b).length() * size + (o - p).length() + (r - s).abs() * size)
+            }
+            _ => false,
+        };
+        (found && opposite).then_some(Self { alpha, beta, limit: None })
+    }
+
+    /// Feet of a point on both faces, and the normal from A to B.
+    pub fn feet(&self, bodies: &Bodies, x: DVec3) -> (DVec3, DVec3, DVec3) {
+        (bodies.foot(self.alpha, x), bodies.foot(self.beta, x), bodies.look(self.alpha, x).normal)
+    }
+
+    /// Separation of the faces at a point.
+    pub fn gap(&self, bodies: &Bodies, x: DVec3) -> f64 {
+        let (a, b, n) = self.feet(bodies, x);
+        (b - a).dot(n)
+    }
+
+    /// Half way between the faces: value and gradient.
+    pub fn middle(&self, bodies: &Bodies, x: DVec3) -> (f64, DVec3) {
+        let (a, b) = (bodies.look(self.alpha, x), bodies.look(self.beta, x));
+        (0.5 * (a.value - b.value), (a.normal - b.normal) * 0.5)
+    }
+}
+
+/// What a point of the common surface is to the patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    Outside,
+    Inside,
+    /// On the boundary, which goes straight on.
+    Boundary,
+    Corner,
+}
+
+/// A literal's part in the tangent plane of a point.
+struct Part {
+    side: Side,
+    id: LiteralId,
+    at: At,
+    /// Its gradient within the tangent plane; zero where it is tangent to the surface.
+    across: DVec3,
+}
+
+/// What the point `x` of a pair's surface is to its patch.
+pub fn standing(bodies: &Bodies, pair: &Pair, x: DVec3) -> Standing {
+    let (x_a, x_b, n) = pair.feet(bodies, x);
+    let ((truth_a, tokens_a), (truth_b, tokens_b)) = (bodies.open(Side::A, x_a), bodies.open(Side::B, x_b));
+    if truth_a != Truth::Open || truth_b != Truth::Open || (x_b - x_a).dot(n) > bodies.tau * (1.0 + 1e-9) {
+        return Standing::Outside;
+    }
+    let surface = bodies.look(pair.alpha, x_a);
+    let mut parts = Vec::new();
+    for (side, y) in [(Side::A, x_a), (Side::B, x_b)] {
+        for id in bodies.through(side, y) {
+            let at = bodies.look((side, id), y);
+            let across = at.normal - n * at.normal.dot(n);
+            // Leaning faces of a pair count as parallel.
+            let flat = ANGLE.max(2.0 * LEAN * bodies.lie / bodies.size);
+            let across = if across.length() <= flat { DVec3::ZERO } else { across.normalize() };
+            parts.push(Part { side, id, at, across });
+        }
+    }
+    let limit = pair.limit.map(|(m, offset)| ((m - n * m.dot(n)).normalize_or_zero(), m.dot(x) - offset));
+    let at_limit = limit.is_some_and(|(_, v)| v.abs() <= bodies.eps / (bodies.tau / bodies.size).min(1.0));
+    if limit.is_some_and(|(_, v)| v > 0.0) && !at_limit {
+        return Standing::Outside;
+    }
+    // Directions in which the sectors meet.
+    let e1 = any_perpendicular(n);
+    let e2 = n.cross(e1);
+    let angle = |d: DVec3| d.dot(e2).atan2(d.dot(e1)).rem_euclid(TAU);
+    let mut cuts: Vec<(f64, Option<usize>)> = Vec::new();
+    for (i, part) in parts.iter().enumerate().filter(|(_, p)| p.across != DVec3::ZERO) {
+        let t = n.cross(part.across);
+        cuts.extend([(angle(t), Some(i)), (angle(-t), Some(i))]);
+    }
+    if let (Some((m, _)), true) = (limit, at_limit) {
+        let t = n.cross(m);
+        cuts.extend([(angle(t), None), (angle(-t), None)]);
+    }
+    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    cuts.dedup_by(|b, a| b.0 - a.0 <= ANGLE);
+    let full = |d: DVec3| {
+        if at_limit && limit.is_some_and(|(m, _)| m.dot(d) > 0.0) {
+            return false;
+        }
+        let sign = |side: Side, id: LiteralId| {
+            let Some(p) = parts.iter().find(|p| (p.side, p.id) == (side, id)) else { return false };
+            if p.across != DVec3::ZERO {
+                return p.across.dot(d) < 0.0;
+            }
+            // Tangent: how it bends away from the surface, then on which side of it the body lies.
+            let bend = d.dot(p.at.hessian * d) - p.at.normal.dot(surface.normal) * d.dot(surface.hessian * d);
+            if bend.abs() * bodies.size > 1e-6 {
+                return bend < 0.0;
+            }
+            let into = if side == Side::A { -1.0 } else { 1.0 };
+            into * p.at.normal.dot(n) < 0.0
+        };
+        holds(&tokens_a, &mut |id| sign(Side::A, id)) && holds(&tokens_b, &mut |id| sign(Side::B, id))
+    };
+    if cuts.is_empty() {
+        return if full(e1) { Standing::Inside } else { Standing::Outside };
+    }
+    let count = cuts.len();
+    let inside: Vec<bool> = (0..count)
+        .map(|i| {
+            let (from, to) = (cuts[i].0, if i + 1 < count { cuts[i + 1].0 } else { cuts[0].0 + TAU });
+            let (s, c) = libm::sincos(0.5 * (from + to));
+            full(e1 * c + e2 * s)
+        })
+        .collect();
+    match inside.iter().filter(|i| **i).count() {
+        0 => return Standing::Outside,
+        n if n == count => return Standing::Inside,
+        _ => {}
+    }
+    let turns: Vec<&(f64, Option<usize>)> =
+        (0..count).filter(|i| inside[*i] != inside[(*i + count - 1) % count]).map(|i| &cuts[i]).collect();
+    let straight = turns.len() == 2 && ((turns[1].0 - turns[0].0) - PI).abs() <= 10.0 * ANGLE;
+    // A line that runs into an arc: as straight, but another curve.
+    let bend = |i: Option<usize>| {
+        let Some(i) = i else { return 0.0 };
+        let t = n.cross(parts[i].across);
+        t.dot(parts[i].at.hessian * t)
+    };
+    let same = straight && (bend(turns[0].1) - bend(turns[1].1)).abs() * bodies.size <= 1e-6;
+    if same { Standing::Boundary } else { Standing::Corner }
+}
+
+/// The literals of a list by surface: the first one that coincides with each stands for it.
+pub fn same_surface(bodies: &Bodies, p: Lit, q: Lit) -> bool {
+    if p == q {
+        return true;
+    }
+    let near = |d: f64| d <= bodies.eps;
+    let size = bodies.size;
+    let sense = p.0 == q.0 && p.1.sense() == q.1.sense();
+    match (*bodies.face(p), *bodies.face(q)) {
+        (Face::Plane { .. }, Face::Plane { .. }) if p.0 == q.0 => {
+            let (a, b) = (bodies.look(p, DVec3::ZERO), bodies.look(q, DVec3::ZERO));
+            near((a.normal - b.normal).length() * size) && near((a.value - b.value).abs())
+        }
+        (Face::Sphere { center: o, radius: r }, Face::Sphere { center: c, radius: s }) => {
+            sense && near((o - c).length() + (r - s).abs())
+        }
+        (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: c, axis: b, radius: s }) => {
+            sense && near(a.cross(b).length() * size + (o - c).cross(a).length() + (r - s).abs())
+        }
+        (Face::Cone { apex: o, axis: a, sin: r, .. }, Face::Cone { apex: c, axis: b, sin: s, .. }) => {
+            sense && near((a - b).length() * size + (o - c).length() + (r - s).abs() * size)
+        }
+        _ => false,
+    }
+}
+
+/// The axis about which the curve of two faces is symmetric, if it has one: a point, a direction, and a perpendicular
+/// that moves with the body.
+pub fn axis_of_curve(bodies: &Bodies, p: Lit, q: Lit) -> Option<(DVec3, DVec3, DVec3)> {
+    let (origin, axis, side) = match (*bodies.face(p), *bodies.face(q)) {
+        (Face::Cylinder { origin, axis, .. } | Face::Cone { apex: origin, axis, .. }, other) => {
+            let along = matches!(other, Face::Plane { normal, .. } if normal.dot(axis).abs() < 1e-6);
+            let parallel = matches!(other, Face::Cylinder { axis: b, .. } if axis.cross(b).length() < 1e-6);
+            if along || parallel {
+                return None;
+            }
+            (origin, axis, p.0)
+        }
+        (Face::Sphere { center, .. }, Face::Plane { normal, .. }) => (center, normal, p.0),
+        (Face::Sphere { center, .. }, Face::Sphere { center: other, .. }) => {
+            (center, (other - center).try_normalize()?, p.0)
+        }
+        (_, Face::Cylinder { .. } | Face::Cone { .. } | Face::Sphere { .. }) => return axis_of_curve(bodies, q, p),
+        _ => return None,
+    };
+    Some((origin, axis, bodies.material(side, axis)))
+}
+
+/// True for a face that bends outwards from its body.
+pub fn is_convex(lit: Lit) -> bool {
+    lit.1.sense() == Sense::Positive
+}

@@ -1,0 +1,232 @@
+//! How near two bodies are at one instant, without motion: what a threshold of separation decides.
+//!
+//! F(x) = max(f_A, f_B) is what both bodies' distance functions say of a point. A point with F <= level lies within
+//! `level` of both; where none exists their distance exceeds 2·level (f is 1-Lipschitz). `Cover` walks the boxes in which
+//! such a point may exist: a box is dropped once a combination of its literals' planes, the search's own bound
+//! (`clause`), proves F > level over it. So "apart" is a proof, and "within" has a witness.
+//!
+//! The same walk with a level that sinks to the best point found is branch and bound: it makes the deepest point of an
+//! overlap the deepest of all, up to a tolerance.
+
+use super::clause;
+use super::literal::{Faces, Side, View};
+use super::search::Task;
+use super::work::Work;
+use crate::math::Aabb;
+use crate::motion::Instant;
+use crate::solid::Face;
+use crate::solid::local::{self, LiteralId, Token, Truth};
+use glam::DVec3;
+
+/// A box of A's frame with what is left there of both trees, for depths and distances below the cover's reach.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub center: DVec3,
+    pub half: DVec3,
+    pub a: Vec<Token>,
+    pub b: Vec<Token>,
+    /// Where the bounds are lowest.
+    pub lowest: DVec3,
+    cost: DVec3,
+}
+
+impl Place {
+    /// The faces of a side that matter here, each once, in order.
+    pub fn faces(&self, side: Side) -> Vec<LiteralId> {
+        let mut ids: Vec<LiteralId> = local::literals(if side == Side::A { &self.a } else { &self.b }).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    }
+
+    /// The same as literals of their side.
+    pub fn lits(&self, side: Side) -> Vec<(Side, LiteralId)> {
+        self.faces(side).into_iter().map(|id| (side, id)).collect()
+    }
+
+    /// True when `x` lies in the box, or off it by at most `slack`.
+    pub fn holds(&self, x: DVec3, slack: f64) -> bool {
+        ((x - self.center).abs() - self.half).max_element() <= slack
+    }
+}
+
+/// Sides of a box differ by no more than about this.
+const SLAB: f64 = 4.0;
+
+/// Boxes in which a point with F <= level may exist, depth first and in a fixed order.
+pub(super) struct Cover<'t, 'a> {
+    task: &'t Task<'a>,
+    at: &'t Instant,
+    /// Depths and distances up to which the boxes' trees are kept.
+    deep: f64,
+    far: f64,
+    /// Same-shape fits hold up to this level: the smallest radius there is.
+    fits_below: f64,
+    stack: Vec<Place>,
+    scratch: clause::Scratch,
+    work: &'t Work,
+}
+
+impl<'t, 'a> Cover<'t, 'a> {
+    /// A cover of what two bodies have in common, as far as the work goes. Their trees are kept for depths up to `deep` and
+    /// distances up to `far`, or up to the level that is asked for.
+    pub fn new(task: &'t Task<'a>, at: &'t Instant, deep: f64, far: f64, work: &'t Work) -> Self {
+        let radius = |f: &Face| match *f {
+            Face::Sphere { radius, .. } | Face::Cylinder { radius, .. } => radius,
+            Face::Plane { .. } | Face::Cone { .. } => f64::INFINITY,
+        };
+        let faces = task.a.faces.iter().chain(&task.b.faces);
+        let mut cover = Self {
+            task,
+            at,
+            deep,
+            far,
+            fits_below: faces.map(radius).fold(f64::INFINITY, f64::min),
+            stack: Vec::new(),
+            scratch: clause::Scratch::default(),
+            work,
+        };
+        let (of_a, of_b) = (task.model_a.bounds.root().aabb, task.model_b.bounds.root().aabb);
+        let of_b = if of_b.is_finite() {
+            Aabb::of_points(of_b.corners().iter().map(|c| at.a_point(*c)))
+        } else if of_b.is_empty() {
+            Aabb::EMPTY
+        } else {
+            Aabb::ALL
+        };
+        let reach = far.max(0.0);
+        let region = of_a.grown(reach).intersection(&of_b.grown(reach));
+        if region.is_finite() {
+            let (center, half) = (region.center(), region.half());
+            let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
+            cover.stack.push(Place { center, half, a, b, lowest: center, cost: DVec3::ZERO });
+        }
+        cover
+    }
+
+    /// True when nothing is left: what was not handed out is proven free.
+    pub fn is_done(&self) -> bool {
+        self.stack.is_empty()
+    }
+
+    fn view(&self, place: &Place, delta: f64) -> View<'t> {
+        View {
+            a: Faces { solid: self.task.a, guards: &[] },
+            b: Faces { solid: self.task.b, guards: &[] },
+            at: self.at,
+            motion: self.task.relative.bounds(self.at.t, 0.0, 0.0),
+            center: place.center,
+            half: place.half,
+            radius: place.half.length(),
+            center_b: self.at.b_point(place.center),
+            velocity: DVec3::ZERO,
+            delta,
+            rounding: self.task.rounding,
+            fits: -delta < self.fits_below,
+            curved: false,
+        }
+    }
+
+    /// The next box that may hold a point with F <= level; `None` at the end and where the work ran out.
+    pub fn next(&mut self, level: f64) -> Option<Place> {
+        while !self.work.is_spent() {
+            let mut place = self.stack.pop()?;
+            self.work.bound();
+            let (near, far) = (self.view(&place, self.deep), self.view(&place, -level.max(self.far)));
+            let prune = |side: Side, tokens: &[Token], out: &mut Vec<Token>| {
+                if tokens.is_empty() {
+                    return Truth::True;
+                }
+                local::prune(tokens, out, &mut |id| {
+                    if far.truth(side, id) == Truth::False {
+                        Truth::False
+                    } else if near.truth(side, id) == Truth::True {
+                        Truth::True
+                    } else {
+                        Truth::Open
+                    }
+                })
+            };
+            let mut pool = Vec::new();
+            let truth_a = prune(Side::A, &place.a, &mut pool);
+            let middle = pool.len() as u32;
+            let truth_b = prune(Side::B, &place.b, &mut pool);
+            let end = pool.len() as u32;
+            if truth_a == Truth::False || truth_b == Truth::False {
+                continue;
+            }
+            place.a = pool[..middle as usize].to_vec();
+            place.b = pool[middle as usize..].to_vec();
+            if end > 0 {
+                let pair = clause::Pair { pool: &pool, a: (0, middle), b: (middle, end) };
+                let view = self.view(&place, -level);
+                let found = clause::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch);
+                if found.dt >= 0.0 {
+                    continue;
+                }
+                place.lowest = place.center + found.y;
+                place.cost = found.cost;
+            }
+            return Some(place);
+        }
+        None
+    }
+
+    /// Puts the halves of a box back: cut across the axis that costs its bound most, as the search does, unless that would
+    /// make a slab of it.
+    pub fn split(&mut self, place: Place) {
+        let longest = |v: DVec3| (0..3).max_by(|i, j| v[*i].total_cmp(&v[*j])).unwrap_or(0);
+        let dearest = longest(place.cost + place.half * 1e-6);
+        let side = longest(place.half);
+        let k = if place.half[dearest] * SLAB < place.half[side] { side } else { dearest };
+        for sign in [1.0, -1.0] {
+            let mut child = place.clone();
+            child.half[k] *= 0.5;
+            child.center[k] += sign * child.half[k];
+            self.stack.push(child);
+        }
+    }
+}
+
+/// F at a point of A's frame.
+pub(super) fn value(task: &Task, at: &Instant, x: DVec3) -> f64 {
+    task.a.value(x).max(task.b.value(at.b_point(x)))
+}
+
+/// Whether two bodies are within a threshold of each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Within {
+    /// A point with F <= level, A's frame.
+    Witness(DVec3),
+    /// Proven: there is none.
+    Apart,
+    /// The limit ran out before either was found.
+    Open,
+}
+
+/// Decides whether a point with F <= level exists.
+pub(super) fn within(task: &Task, at: &Instant, level: f64, work: &Work) -> Within {
+    let mut cover = Cover::new(task, at, 2.0 * level, 2.0 * level, work);
+    let smallest = task.scale * f64::EPSILON;
+    let mut boxes = 0u64;
+    while let Some(place) = cover.next(level) {
+        for x in [place.lowest, place.center] {
+            if value(task, at, x) <= level {
+                return Within::Witness(x);
+            }
+        }
+        // A curved valley is followed down; each box deserves one climb while boxes are few.
+        boxes += 1;
+        if boxes.is_power_of_two() {
+            let (x, _, depth, _) = super::depth::climb(task, at, place.lowest, work);
+            if -depth <= level {
+                return Within::Witness(x);
+            }
+        }
+        if place.half.max_element() <= smallest {
+            return Within::Open;
+        }
+        cover.split(place);
+    }
+    if cover.is_done() { Within::Apart } else { Within::Open }
+}
