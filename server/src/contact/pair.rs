@@ -13,6 +13,7 @@ use crate::motion::{Instant, Placed, Relative};
 use crate::solid::local::{self, LiteralId};
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
 
 /// One body of a pair.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +38,14 @@ pub struct PairQuery<'a> {
     pub cell_limit: u64,
     /// Ideas of the search that are switched on: all, unless their worth is measured.
     pub ideas: Ideas,
+}
+
+impl PairQuery<'_> {
+    /// True when b carries the cells: small and without cavities is cheap to cover.
+    pub(super) fn is_swapped(&self) -> bool {
+        let weight = |m: &Model| m.radius * if m.solid.senses.contains(&Sense::Negative) { HOLLOW } else { 1.0 };
+        weight(self.b.model) < weight(self.a.model)
+    }
 }
 
 /// The ideas of the search, each of which can be switched off. None changes what an answer promises, only the work.
@@ -74,10 +83,12 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 
 /// Searches a pair to its end.
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
-    let (task, swapped) = PairSearch::task(query);
-    if let Some(outcome) = direct::quick(query, &task, swapped) {
+    let mut outcome = Outcome::clear(query.resolution);
+    outcome.counters.primitives = 2;
+    if direct::quick(query, &mut outcome) {
         return outcome;
     }
+    let (task, swapped) = PairSearch::task(query);
     let mut search = PairSearch::of_task(query, task, swapped, std::mem::take(scratch));
     let outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
     *scratch = search.into_scratch();
@@ -85,7 +96,7 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
 }
 
 /// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
-fn without_own_spin(body: &Body) -> Placed {
+pub(super) fn without_own_spin(body: &Body) -> Placed {
     let mut placed = body.placed;
     let spin = placed.motion.spin;
     if spin != DVec3::ZERO {
@@ -122,9 +133,7 @@ pub struct PairSearch<'a> {
 impl<'a> PairSearch<'a> {
     /// What is searched for a question, and whether its second body carries the cells.
     pub(super) fn task(query: &PairQuery<'a>) -> (Task<'a>, bool) {
-        // The body that carries the cells: small and without cavities is cheap to cover.
-        let weight = |m: &Model| m.radius * if m.solid.senses.contains(&Sense::Negative) { HOLLOW } else { 1.0 };
-        let swapped = weight(query.b.model) < weight(query.a.model);
+        let swapped = query.is_swapped();
         let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
         let (model_a, model_b) = (carrier.model, other.model);
         let (a, b) = (&model_a.solid, &model_b.solid);
@@ -170,7 +179,9 @@ impl<'a> PairSearch<'a> {
     /// Prepares the search of a pair.
     pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
         let (task, swapped) = Self::task(query);
-        if let Some(outcome) = direct::quick(query, &task, swapped) {
+        let mut outcome = Outcome::clear(query.resolution);
+        outcome.counters.primitives = 2;
+        if direct::quick(query, &mut outcome) {
             let (resolution, limit) = (task.delta, query.cell_limit);
             let told = Some(outcome);
             return Self { task, swapped, level: 1.0, search: None, ending: None, told, outcome, resolution, limit };
@@ -267,8 +278,7 @@ impl<'a> PairSearch<'a> {
     }
 }
 
-/// Fills in what a found contact says.
-pub(super) fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
+fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let deep = &found.deep;
     let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
     o.status = Status::Contact;
@@ -301,6 +311,20 @@ pub(super) fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     o.separation = 0.0;
 }
 
+/// Adds a face to those of a contact, once, where there is room.
+pub(super) fn note(list: &mut [u32; 3], face: u32) {
+    if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
+        && !list.contains(&face)
+    {
+        list[slot] = face;
+    }
+}
+
+/// How many faces are told.
+pub(super) fn noted(list: &[u32; 3]) -> usize {
+    list.iter().filter(|f| **f != NO_FACE).count()
+}
+
 /// What a solution's multipliers say about the contact.
 struct Active {
     count: [usize; 2],
@@ -313,7 +337,7 @@ struct Active {
 }
 
 /// A multiplier above this holds its face in the contact.
-const ACTIVE: f64 = 1e-8;
+pub(super) const ACTIVE: f64 = 1e-8;
 
 impl Active {
     fn of(problem: &Problem, s: &Solution) -> Self {
@@ -321,7 +345,7 @@ impl Active {
         let mut count = [0; 2];
         let mut faces = [[NO_FACE; 3]; 2];
         let mut sums = [DVec3::ZERO; 2];
-        let mut gradients = Vec::new();
+        let mut gradients: SmallVec<[DVec3; 6]> = SmallVec::new();
         let mut curvature = DMat3::ZERO;
         for (c, l) in s.active.iter().zip(&s.lambda) {
             let row = problem.row(c, s.x, &at, 0.0);
@@ -335,10 +359,7 @@ impl Active {
             };
             if active {
                 gradients.push(row.gradient);
-                let new = !faces[k].contains(&id.face());
-                if let Some(slot) = faces[k].iter().position(|f| *f == NO_FACE).filter(|_| new) {
-                    faces[k][slot] = id.face();
-                }
+                note(&mut faces[k], id.face());
                 count[k] += 1;
             }
         }
@@ -383,11 +404,7 @@ impl Active {
                 list.iter_mut().zip(&ids).for_each(|(f, id)| *f = id.face());
             }
             for id in &ids {
-                if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
-                    && !list.contains(&id.face())
-                {
-                    list[slot] = id.face();
-                }
+                note(list, id.face());
             }
             // Faces that share one edge make an edge, however many they are.
             let rank = if is_apex { 3 } else { span_of(&each).len() };
@@ -400,11 +417,11 @@ impl Active {
 }
 
 /// A face within this many roundings of a contact point passes through it.
-const INCIDENT: f64 = 16.0;
+pub(super) const INCIDENT: f64 = 16.0;
 
 /// Orthonormal basis of the span of some unit vectors (Gram-Schmidt).
-fn span_of(vectors: &[DVec3]) -> Vec<DVec3> {
-    let mut span: Vec<DVec3> = Vec::new();
+fn span_of(vectors: &[DVec3]) -> SmallVec<[DVec3; 3]> {
+    let mut span: SmallVec<[DVec3; 3]> = SmallVec::new();
     for g in vectors {
         let r = span.iter().fold(*g, |r, e| r - *e * e.dot(r));
         if r.length() > 1e-6 && span.len() < 3 {
@@ -415,7 +432,7 @@ fn span_of(vectors: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
-fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
+pub(super) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
     let span = span_of(gradients);
     let flat = |v: f64| v.abs() * scale < 1e-6;
     match span.len() {
@@ -452,12 +469,7 @@ fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     o.normal_speed = at.velocity(deepest).dot(normal);
     for (side, id) in faces {
         let list = if side == Side::A { &mut o.faces_a } else { &mut o.faces_b };
-        if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
-            && !list.contains(&id.face())
-        {
-            list[slot] = id.face();
-        }
+        note(list, id.face());
     }
-    let count = |list: &[u32; 3]| list.iter().filter(|f| **f != NO_FACE).count();
-    o.kind = Kind::of_active(count(&o.faces_a), count(&o.faces_b));
+    o.kind = Kind::of_active(noted(&o.faces_a), noted(&o.faces_b));
 }

@@ -12,7 +12,7 @@
 //! have beyond E from their own bounds.
 
 use crate::eco::Model;
-use crate::motion::Relative;
+use crate::motion::{Relative, Rounding};
 
 /// Half a unit in the last place, with the room that products of errors need.
 const U: f64 = 0.5 * f64::EPSILON * (1.0 + 1e-6);
@@ -27,22 +27,22 @@ const FAR: f64 = 48.0;
 /// E for a pair, a length: `a` carries the cells.
 pub fn of_literals(a: &Model, b: &Model, relative: &Relative) -> f64 {
     let (placed_a, placed_b) = relative.placed();
-    // Farthest point of a model's box from the model's origin, and the box's radius.
-    let size = |m: &Model| {
-        let aabb = m.bounds.root().aabb;
-        if aabb.is_empty() { (0.0, 0.0) } else { (aabb.min.abs().max(aabb.max.abs()).length(), aabb.half().length()) }
-    };
-    let (offset_a, offset_b) = (placed_a.place.position.length(), placed_b.place.position.length());
-    let ((mut reach, mut radius), (reach_b, radius_b)) = (size(a), size(b));
+    let offsets = [placed_a.place.position.length(), placed_b.place.position.length()];
+    of_motion(a, b, offsets, relative.apart(), &relative.rounding())
+}
+
+/// The same from the distances of the centres of rotation from the models' origins, how far these centres come apart, and
+/// what rounding does to the motion.
+pub fn of_motion(a: &Model, b: &Model, [offset_a, offset_b]: [f64; 2], apart: f64, rounding: &Rounding) -> f64 {
+    let ([mut reach, mut radius], [reach_b, radius_b]) = (a.extents, b.extents);
     if !reach.is_finite() {
         // An unbounded carrier has cells only where the other body can be.
-        reach = offset_a + relative.apart() + offset_b + reach_b;
+        reach = offset_a + apart + offset_b + reach_b;
         radius = reach + radius_b;
     }
-    let rounding = relative.rounding();
     let arm = reach + offset_a + radius;
     let on_a = FACE * (reach + a.face_reach) * U;
-    let seen_from_b = arm + relative.apart() + offset_b;
+    let seen_from_b = arm + apart + offset_b;
     let on_b = FACE * (seen_from_b + b.face_reach) * U + rounding.point(arm) + rounding.matrix * radius;
     on_a.max(on_b) + CELL * radius * U
 }

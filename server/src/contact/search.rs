@@ -684,7 +684,13 @@ impl<'a> Search<'a> {
         }
         self.counters.newton += 1;
         self.stage2.all = true;
-        let confirmed = match self.problem().refine(&active, x, t, lambda.clone(), witness_level(&self.task)) {
+        let confirmed = match self.problem().refine(
+            &active,
+            x,
+            t,
+            lambda.clone(),
+            witness_level(self.task.delta, self.task.rounding),
+        ) {
             Ok(s) if !(0.0..=1.0).contains(&s.t) || s.t >= self.goal() => false,
             Ok(s) => {
                 let at = self.task.relative.at(s.t);
@@ -696,7 +702,13 @@ impl<'a> Search<'a> {
                 }
             }
             // A line or patch of contacts leaves x open: where the guess' multipliers hold, the surfaces alone tell the rest.
-            Err(true) => match self.problem().along(&active, x, t, lambda.clone(), witness_level(&self.task)) {
+            Err(true) => match self.problem().along(
+                &active,
+                x,
+                t,
+                lambda.clone(),
+                witness_level(self.task.delta, self.task.rounding),
+            ) {
                 Some(s) if (0.0..=1.0).contains(&s.t) && s.t < self.goal() && s.stationarity < SETTLED => {
                     let at = self.task.relative.at(s.t);
                     if self.is_deep(s.x, &at, self.task.rounding) {
@@ -730,7 +742,7 @@ impl<'a> Search<'a> {
     /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled
     /// multipliers was confirmed.
     fn polish(&mut self, mut active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
-        let level = witness_level(&self.task);
+        let level = witness_level(self.task.delta, self.task.rounding);
         for _ in 0..7 {
             debug_assert!(
                 active.iter().all(|c| self.stage2.knows(&self.task, c)),
@@ -859,7 +871,7 @@ impl<'a> Search<'a> {
         let rates = deep.active.iter().zip(&deep.lambda).map(|(c, l)| l * problem.row(c, deep.x, &at, 0.0).rate);
         let speed = rates.sum::<f64>().abs().max(f64::MIN_POSITIVE);
         // The depth delta itself is reached a little before the witness, which a slow pair takes its time for.
-        let crossing = deep.t - (witness_level(&self.task) - self.task.delta) / speed;
+        let crossing = deep.t - (witness_level(self.task.delta, self.task.rounding) - self.task.delta) / speed;
         let goal = match &touch {
             Some(s) if s.t > 0.0 => 0.5 * (s.t + deep.t),
             // Touching at the start: nothing but the start needs a proof.
@@ -881,9 +893,9 @@ impl<'a> Search<'a> {
 }
 
 /// The depth at which witnesses are sought: delta and what rounding may take from it.
-pub(super) fn witness_level(task: &Task) -> f64 {
+pub(super) fn witness_level(delta: f64, rounding: f64) -> f64 {
     // Deep enough to be so after all rounding, with what Newton may leave.
-    task.delta * (1.0 + 1e-6) + 1.5 * task.rounding
+    delta * (1.0 + 1e-6) + 1.5 * rounding
 }
 
 /// What a + b lost when it was rounded to `sum`, exactly (Knuth's two-sum).

@@ -22,6 +22,7 @@ use crate::bound::SBounds;
 use crate::math::tolerance::MODEL_MARGIN;
 use crate::solid::local::{Token, Truth};
 use crate::solid::{Face, Solid};
+use glam::DVec3;
 
 /// A solid with what was preprocessed for it. Shared by all objects that use it.
 #[derive(Debug)]
@@ -34,6 +35,8 @@ pub struct Model {
     pub eco: Eco,
     /// Bounding radius: that of the ball around the solid. 0 for an empty solid, infinite for an unbounded one.
     pub radius: f64,
+    /// Farthest point of its box from the model's origin, and the radius of the box; 0 for an empty solid.
+    pub extents: [f64; 2],
     /// Largest `Face::reach` of its faces: a cone's apex may lie far outside.
     pub face_reach: f64,
 }
@@ -51,7 +54,13 @@ impl Model {
         let bounds = SBounds::new(&solid, margin);
         let eco = Eco::new(&solid, &bounds, limits);
         let face_reach = solid.faces.iter().map(Face::reach).fold(0.0, f64::max);
-        Self { solid, bounds, eco, radius, face_reach }
+        let aabb = bounds.root().aabb;
+        let extents = if aabb.is_empty() {
+            [0.0; 2]
+        } else {
+            [aabb.min.abs().max(aabb.max.abs()), aabb.half()].map(DVec3::length)
+        };
+        Self { solid, bounds, eco, radius, extents, face_reach }
     }
 
     /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.

@@ -50,14 +50,20 @@ impl Rounding {
     pub(super) fn of(relative: &Relative) -> Self {
         let (a, b) = relative.placed();
         let turns = a.motion.spin.length() + b.motion.spin.length();
-        let matrix = PAIR_MATRIX + BODY_MATRIX_TURN * turns;
         let place = a.place.position.length() + b.place.position.length();
+        Self::with(turns, relative.apart(), place)
+    }
+
+    /// From how far both bodies turn (radians), how far their centres of rotation come apart, and the sum of the distances
+    /// of these from the models' origins; larger for larger ones.
+    pub fn with(turns: f64, apart: f64, place: f64) -> Self {
+        let matrix = PAIR_MATRIX + BODY_MATRIX_TURN * turns;
         // A time is itself rounded by up to u, in which the pair moves on: 2 D for the origins, and what the turns add.
         let moved = 2.0 + turns;
         let origins = matrix + POINT_ORIGINS + BODY_MATRIX_TURN * turns + moved;
         Self {
             matrix: matrix * U,
-            origin: (origins * relative.apart() + POINT_PLACE * place) * U,
+            origin: (origins * apart + POINT_PLACE * place) * U,
             arm: (matrix + POINT_ARM + turns) * U,
             rate: (RATE + RATE_TURN * turns) * U,
         }

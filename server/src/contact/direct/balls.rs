@@ -1,4 +1,4 @@
-//! Two balls that do not turn: one quadratic.
+//! Two balls that only move along: one quadratic.
 //!
 //! With c the way from A's centre to B's at the start, v the velocity of A against B and R the distance of the centres that is
 //! asked for, |c − vt| = R has the earlier root
@@ -10,66 +10,50 @@
 //! which cancels nothing for an approaching pair outside R. The distance is convex in time, so over a span that ends before
 //! the closest approach it is least at the end: one evaluation there is the proof.
 
-use super::super::literal::Side;
-use super::super::newton::{Actives, Constraint, Solution, Weights};
-use super::super::search::{Found, Task};
-use super::{APART, Advance};
-use crate::solid::local::LiteralId;
-use crate::solid::{Face, Primitive, Sense};
-use glam::DVec3;
+use super::super::outcome::{Outcome, Status};
+use super::super::pair::INCIDENT;
+use super::{APART, Pair, excluded};
 
-/// The answer for two balls that only move along, `Some(None)` where they miss each other; `None` leaves them to others:
-/// they turn, start too near, or come within rounding of depth delta. `level` is the depth of a witness.
-pub fn meet(task: &Task, a: &Primitive, b: &Primitive, level: f64) -> Option<Option<Found>> {
-    let ([Face::Sphere { center: on_a, radius: ra }], [Face::Sphere { center: on_b, radius: rb }]) =
-        (a.faces.as_slice(), b.faces.as_slice())
-    else {
-        return None;
-    };
-    let (pa, pb) = task.relative.placed();
-    if pa.motion.spin != DVec3::ZERO || pb.motion.spin != DVec3::ZERO {
-        return None;
-    }
-    let start = task.relative.at(0.0);
-    let c = start.a_point(*on_b) - *on_a;
-    let v = start.velocity(*on_a);
-    let (sum, least) = (ra + rb, Advance::least(task));
-    if c.length() - sum <= APART * task.delta {
+/// Fills in the contact of two balls, or leaves `out` clear where they miss each other; `None` leaves them to others: they
+/// start too near or come within rounding of depth delta.
+pub fn meet(pair: &Pair, radii: [f64; 2], out: &mut Outcome) -> Option<()> {
+    let (c, v) = (pair.way, pair.velocity);
+    let (sum, least) = (radii[0] + radii[1], excluded(pair.delta, pair.rounding));
+    let apart = c.length_squared();
+    let touching = sum + APART * pair.delta;
+    if apart <= touching * touching {
         return None;
     }
     let (square, along) = (v.length_squared(), c.dot(v));
     let closest = if along > 0.0 { (along / square).min(1.0) } else { 0.0 };
-    let gap = |t: f64| (c - v * t).length() - sum;
-    if gap(closest) > least {
-        return Some(None);
+    let (reach, miss) = ((c - v * closest).length_squared(), sum + least);
+    if reach > miss * miss {
+        return Some(());
     }
-    let solution = |level: f64| {
-        let reach = sum - 2.0 * level;
-        let root = square * reach * reach - c.cross(v).length_squared();
-        let t = (c.length_squared() - reach * reach) / (along + root.max(0.0).sqrt());
-        let n = (c - v * t).normalize();
-        let literal = |side, p: &Primitive| Constraint::Literal(side, LiteralId::new(p.first_face, Sense::Positive));
-        Solution {
-            x: *on_a + n * (ra - level),
-            t,
-            active: Actives::from_iter([literal(Side::A, a), literal(Side::B, b)]),
-            lambda: Weights::from_iter([0.5, 0.5]),
-            stationarity: 0.0,
-        }
+    let beside = c.cross(v).length_squared();
+    let root = |reach: f64| {
+        let root = square * reach * reach - beside;
+        (apart - reach * reach) / (along + root.max(0.0).sqrt())
     };
-    let (deep, touch) = (solution(level), solution(0.0));
-    let goal = 0.5 * (touch.t + deep.t);
-    let ordered = 0.0 <= touch.t && touch.t <= deep.t && deep.t <= closest;
-    // Both computed, as the trees see them.
-    let depth = |s: &Solution| {
-        let y = task.relative.at(s.t).b_point(s.x);
-        [task.a.value(s.x), task.b.value(y)]
-    };
-    let is_deep = depth(&deep).iter().all(|f| *f <= -task.delta - task.rounding);
-    let touches = depth(&touch).iter().all(|f| f.abs() <= 16.0 * task.rounding);
-    if !(ordered && is_deep && touches && gap(goal) > least) {
+    let level = pair.witness_level();
+    let (touch, deep) = (root(sum), root(sum - 2.0 * level));
+    let way = c - v * touch;
+    let distance = way.length();
+    // A's point at `level` is that deep in B, too.
+    let is_deep = (c - v * deep).length() <= sum - level - pair.delta - pair.rounding;
+    let ordered = 0.0 <= touch && touch <= deep && deep <= closest;
+    let gap = distance - sum;
+    if !(ordered && is_deep && gap.abs() <= INCIDENT * pair.rounding && gap > least) {
         return None;
     }
-    let upper = deep.t;
-    Some(Some(Found { deep, touch: Some(touch), goal, upper }))
+    let n = way / distance;
+    out.counters.closed_forms += 1;
+    out.status = Status::Contact;
+    (out.time_lower, out.time, out.time_upper) = (touch, touch, deep);
+    out.point = pair.point(n * radii[0], touch);
+    out.normal = n;
+    out.normal_speed = n.dot(v);
+    out.faces_a[0] = pair.primitives[0].first_face;
+    out.faces_b[0] = pair.primitives[1].first_face;
+    Some(())
 }

@@ -24,15 +24,15 @@ mod support;
 
 use super::literal::Side;
 use super::newton::Constraint;
-use super::outcome::Outcome;
-use super::pair::{PairQuery, fill_contact};
+use super::outcome::{Outcome, Status};
+use super::pair::{self, PairQuery};
 use super::search::{Ending, Search, Task, witness_level};
-use crate::math::any_perpendicular;
-use crate::motion::Instant;
+use crate::math::{any_perpendicular, tolerance};
+use crate::motion::{Instant, Rounding};
 use crate::solid::local::LiteralId;
-use crate::solid::{Face, Node, Primitive, Sense, Solid};
+use crate::solid::{Face, Node, Primitive, Sense, Shape, Solid};
 use gjk::nearest;
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
 use smallvec::SmallVec;
 use straight::Straight;
 use support::Body;
@@ -55,28 +55,113 @@ const MEND: (f64, usize) = (0.01, 4);
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
 const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
-/// The answer for two whole primitives that only move along, from the stack alone; `None` leaves them to others.
-pub(super) fn quick(query: &PairQuery, task: &Task, swapped: bool) -> Option<Outcome> {
-    let (a, b) = (whole(task.a)?, whole(task.b)?);
-    if task.relative.turns() || !query.ideas.direct {
-        return None;
-    }
-    let mut outcome = Outcome::clear(task.delta);
-    outcome.counters.primitives = 2;
-    let level = witness_level(task);
-    let found = if let Some(found) = balls::meet(task, a, b, level) {
-        outcome.counters.closed_forms = 1;
-        found
-    } else {
-        Straight::new(task, a, b)?.meet(level, &mut outcome.counters.closed_forms)?
-    };
-    if let Some(found) = found {
-        fill_contact(&mut outcome, task, &found);
-        if swapped {
-            outcome.swap_sides();
+/// Two whole primitives that only move along; world axes.
+struct Pair<'a> {
+    bodies: [&'a pair::Body<'a>; 2],
+    primitives: [&'a Primitive; 2],
+    /// From an object's origin to its primitive's centre.
+    offsets: [DVec3; 2],
+    /// From A's centre to B's at the start.
+    way: DVec3,
+    /// Of A against B, length per step.
+    velocity: DVec3,
+    /// Depth at which a contact is decided.
+    delta: f64,
+    /// What rounding may do to one bound.
+    rounding: f64,
+    /// Length scale of the pair.
+    scale: f64,
+}
+
+impl<'a> Pair<'a> {
+    /// The pair of two bodies, the first of which carries; `None` if one of them turns, is no primitive, or the resolution
+    /// needs raising.
+    fn new(bodies: [&'a pair::Body<'a>; 2], primitives: [&'a Primitive; 2], resolution: f64) -> Option<Self> {
+        let [a, b] = bodies;
+        let turns = |body: &pair::Body| {
+            body.placed.motion.spin != DVec3::ZERO && pair::without_own_spin(body).motion.spin != DVec3::ZERO
+        };
+        if turns(a) || turns(b) {
+            return None;
         }
+        let (from, to) = (&a.placed.motion, &b.placed.motion);
+        let difference = from.start.position - to.start.position;
+        let velocity = from.velocity - to.velocity;
+        let apart = difference.length_squared().max((difference + velocity).length_squared()).sqrt();
+        let places = bodies.map(|body| {
+            let place = body.placed.place.position;
+            if place == DVec3::ZERO { 0.0 } else { place.length() }
+        });
+        let motion = Rounding::with(0.0, apart, places[0] + places[1]);
+        let rounding = super::rounding::of_motion(a.model, b.model, places, apart, &motion);
+        let scale = a.model.radius.max(b.model.radius);
+        // Sums of components: no less than lengths, and no roots.
+        let centers = bodies.map(|body| body.model.bounds.root().ball.center.abs().element_sum());
+        let extent = centers[0] + centers[1] + 2.0 * scale + places[0] + apart;
+        let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
+        if resolution.is_nan() || resolution < least {
+            return None;
+        }
+        let offset = |body: &pair::Body, primitive: &Primitive| {
+            let (place, frame) = (&body.placed.place, primitive.frame.position);
+            if place.position == DVec3::ZERO && frame == DVec3::ZERO {
+                DVec3::ZERO
+            } else {
+                body.placed.motion.start.rotation * place.point(frame)
+            }
+        };
+        let offsets = [offset(a, primitives[0]), offset(b, primitives[1])];
+        let way = offsets[1] - offsets[0] - difference;
+        Some(Self { bodies, primitives, offsets, way, velocity, delta: resolution, rounding, scale })
     }
-    Some(outcome)
+
+    /// World from model: the rotation.
+    fn axes(&self, k: usize) -> DMat3 {
+        let placed = &self.bodies[k].placed;
+        let (start, place) = (placed.motion.start.rotation, placed.place.rotation);
+        DMat3::from_quat(if place == DQuat::IDENTITY { start } else { start * place })
+    }
+
+    /// From A's centre to B's at a time.
+    fn at(&self, t: f64) -> DVec3 {
+        self.way - self.velocity * t
+    }
+
+    /// A point seen from A's centre in the world.
+    fn point(&self, x: DVec3, t: f64) -> DVec3 {
+        let motion = &self.bodies[0].placed.motion;
+        motion.start.position + motion.velocity * t + (self.offsets[0] + x)
+    }
+
+    fn witness_level(&self) -> f64 {
+        witness_level(self.delta, self.rounding)
+    }
+}
+
+/// Fills in the answer for two whole primitives that only move along, from the stack alone; `outcome` is clear before.
+/// False leaves them to others.
+pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> bool {
+    let (Some(a), Some(b)) = (whole(&query.a.model.solid), whole(&query.b.model.solid)) else { return false };
+    if !query.ideas.direct {
+        return false;
+    }
+    // As `PairQuery::is_swapped` has it for bodies without cavities.
+    let swapped = query.b.model.radius < query.a.model.radius;
+    let (bodies, primitives) = if swapped { ([&query.b, &query.a], [b, a]) } else { ([&query.a, &query.b], [a, b]) };
+    let Some(pair) = Pair::new(bodies, primitives, query.resolution) else { return false };
+    let met = match (&primitives[0].shape, &primitives[1].shape) {
+        (Shape::Sphere(p), Shape::Sphere(q)) => balls::meet(&pair, [p.radius, q.radius], outcome),
+        _ => Straight::new(&pair).and_then(|straight| straight.meet(outcome)),
+    };
+    if swapped && outcome.status == Status::Contact {
+        outcome.swap_sides();
+    }
+    met.is_some()
+}
+
+/// φ above this excludes a contact of depth delta, rounding included.
+fn excluded(delta: f64, rounding: f64) -> f64 {
+    -2.0 * delta + 4.0 * rounding
 }
 
 /// The answer for two solids that are one convex primitive each; `None` leaves them to the search.
@@ -144,13 +229,8 @@ impl<'a> Advance<'a> {
             speed: v0 + wa * rho_a + wb * rho_b,
             pull: wa * wa * rho_a + wb * wb * rho_b,
             reach: rho_a + rho_b,
-            least: Self::least(&task),
+            least: excluded(task.delta, task.rounding),
         }
-    }
-
-    /// φ above this excludes a contact of depth delta, rounding included.
-    fn least(task: &Task) -> f64 {
-        -2.0 * task.delta + 4.0 * task.rounding
     }
 
     /// True when the balls about the two centres of rotation that hold the bodies stay apart: these centres move straight.

@@ -18,18 +18,18 @@
 //!    converge quadratically; with H the second derivative of φ, along a circle n·a = lean with multiplier μ it is H + μ lean.
 //!
 //! The point follows from the features, the witness of depth delta from one linear step, and both trees confirm it. What
-//! does not settle, starts near or leaves a patch open is left to the advance.
+//! does not settle, starts near, or meets in more than its faces tell is left to the advance.
 
 use super::super::literal::Side;
-use super::super::newton::{Actives, Constraint, Solution, Weights};
-use super::super::search::{Found, Task};
+use super::super::newton::{Constraint, MAX_ACTIVE};
+use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use super::super::pair::{self, INCIDENT};
 use super::support::Body;
-use super::{APART, Advance};
+use super::{APART, Pair, excluded};
 use crate::math::any_perpendicular;
-use crate::motion::Instant;
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Primitive, Sense, Shape};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use smallvec::SmallVec;
 
 /// Cutting planes at most.
@@ -191,6 +191,32 @@ impl<'a> Part<'a> {
     }
 }
 
+/// An active constraint where it is met; world axes.
+#[derive(Clone, Copy, Default)]
+struct Row {
+    value: f64,
+    normal: DVec3,
+    /// How much its value has to fall for a depth of 1.
+    sinks: f64,
+    /// Curvature: across the axis, or in every direction along the surface.
+    bend: f64,
+    axis: DVec3,
+    all: bool,
+}
+
+impl Row {
+    fn hessian(&self) -> DMat3 {
+        let outer = |u: DVec3| DMat3::from_cols(u * u.x, u * u.y, u * u.z) * self.bend;
+        if self.bend == 0.0 {
+            DMat3::ZERO
+        } else if self.all {
+            DMat3::from_diagonal(DVec3::splat(self.bend)) - outer(self.normal)
+        } else {
+            outer(self.axis.cross(self.normal).normalize_or_zero())
+        }
+    }
+}
+
 /// A point of the difference of the bodies: across the motion, and along it.
 #[derive(Clone, Copy)]
 struct Cut {
@@ -198,53 +224,70 @@ struct Cut {
     along: f64,
 }
 
-/// The pair in A's model axes.
+/// The pair along the world's axes, seen from A's centre.
 pub struct Straight<'a> {
-    task: &'a Task<'a>,
-    /// Both at the start.
-    at: Instant,
+    pair: &'a Pair<'a>,
+    /// World from model.
+    axes: [DMat3; 2],
     parts: [Part<'a>; 2],
     bodies: [Body<'a>; 2],
-    centers: [DVec3; 2],
-    /// Velocity of A against B.
-    w: DVec3,
 }
 
 impl<'a> Straight<'a> {
-    /// The pair of a task, where it is one for this.
-    pub fn new(task: &'a Task<'a>, a: &'a Primitive, b: &'a Primitive) -> Option<Self> {
-        if task.relative.turns() {
-            return None;
-        }
-        let at = task.relative.at(0.0);
-        let axes_a = a.frame.matrix();
-        let axes_b = at.b_from_a.transpose() * b.frame.matrix();
-        let centers = [a.frame.position, at.a_point(b.frame.position)];
-        let bodies = [Body::new(&a.shape, axes_a, centers[0])?, Body::new(&b.shape, axes_b, centers[1])?];
-        let parts = [Part::new(a, axes_a)?, Part::new(b, axes_b)?];
-        Some(Self { task, at, parts, bodies, centers, w: at.v0 })
+    /// The pair, where it is one for this.
+    #[inline]
+    pub fn new(pair: &'a Pair<'a>) -> Option<Self> {
+        let [a, b] = pair.primitives;
+        let axes = [pair.axes(0), pair.axes(1)];
+        let place = |k: usize, p: &Primitive| {
+            let frame = p.frame.rotation;
+            if frame == DQuat::IDENTITY { axes[k] } else { axes[k] * DMat3::from_quat(frame) }
+        };
+        let (axes_a, axes_b) = (place(0, a), place(1, b));
+        Some(Self {
+            pair,
+            axes,
+            parts: [Part::new(a, axes_a)?, Part::new(b, axes_b)?],
+            bodies: [Body::new(&a.shape, axes_a, DVec3::ZERO)?, Body::new(&b.shape, axes_b, pair.way)?],
+        })
     }
 
-    /// The earliest contact, `Some(None)` if there is none in this step; `None` leaves the pair to others. `level` is the
-    /// depth of a witness; tries are counted.
-    pub fn meet(&self, level: f64, tries: &mut u64) -> Option<Option<Found>> {
-        let c = self.centers[1] - self.centers[0];
-        let least = Advance::least(self.task);
+    /// A point seen from A's centre in a body's own model.
+    fn own(&self, k: usize, x: DVec3, t: f64) -> DVec3 {
+        let x = if k == 0 { x } else { x - self.pair.at(t) };
+        self.axes[k].transpose() * x + self.parts[k].primitive.frame.position
+    }
+
+    /// psi of a body at a point seen from A's centre.
+    fn value(&self, k: usize, x: DVec3, t: f64) -> f64 {
+        self.parts[k].primitive.value(self.own(k, x, t))
+    }
+
+    /// How many faces of a body pass within `tol` of a point.
+    fn passing(&self, k: usize, x: DVec3, t: f64, tol: f64) -> usize {
+        let own = self.own(k, x, t);
+        self.parts[k].primitive.faces.iter().filter(|f| f.value(own).abs() <= tol).count()
+    }
+
+    /// Fills in the earliest contact, or leaves `out` clear; `None` leaves the pair to others. Tries are counted.
+    pub fn meet(&self, out: &mut Outcome) -> Option<()> {
+        let (c, w) = (self.pair.way, self.pair.velocity);
+        let free = excluded(self.pair.delta, self.pair.rounding).max(0.0);
         let [a, b] = &self.bodies;
         let phi = |n: DVec3| -b.reach(-n) - a.reach(n);
-        let speed = self.w.length();
+        let speed = w.length();
         // Along the centres: most pairs that stay apart are told at once.
         let first = phi(c);
-        let rate = c.dot(self.w);
+        let rate = c.dot(w);
         let long = c.length();
-        if first.min(first - rate) > least.max(0.0) * long {
-            return Some(None);
+        if first.min(first - rate) > free * long {
+            return Some(());
         }
         if speed <= f64::MIN_POSITIVE {
             return None;
         }
         let size = self.size();
-        let way = self.w / speed;
+        let way = w / speed;
         let e = any_perpendicular(way);
         let f = way.cross(e);
         let margin = a.margin + b.margin;
@@ -268,18 +311,18 @@ impl<'a> Straight<'a> {
             let d = b.support(-n) - a.support(n) - n * (margin / length);
             let below = n.dot(d);
             // Free from the start to the end.
-            if below.min(below - speed) > least.max(0.0) * length {
-                return Some(None);
+            if below.min(below - speed) > free * length {
+                return Some(());
             }
             if next < TRIES.len() && above - below <= TRIES[next].0 * size {
                 while next < TRIES.len() && above - below <= TRIES[next].0 * size {
                     next += 1;
                 }
-                *tries += 1;
-                if let Some(n) = self.settle(n / length, TRIES[next - 1].1)
-                    && let Some(found) = self.contact(n, level, least)
+                out.counters.closed_forms += 1;
+                if let Some((n, shown)) = self.settle(n / length, TRIES[next - 1].1)
+                    && self.contact(n, &shown, out).is_some()
                 {
-                    return Some(found);
+                    return Some(());
                 }
                 if next == TRIES.len() {
                     return None;
@@ -309,7 +352,7 @@ impl<'a> Straight<'a> {
 
     /// The direction of the maximum near n, with the features that meet; a unit vector.
     fn settle(&self, mut n: DVec3, tol: f64) -> Option<(DVec3, [Shown; 2])> {
-        let c = self.centers[1] - self.centers[0];
+        let (c, w) = (self.pair.way, self.pair.velocity);
         // Which circles hold it is told once.
         let mut held = [self.parts[0].held(n, tol), self.parts[1].held(-n, tol)];
         if held[0].1 || held[1].1 {
@@ -324,11 +367,11 @@ impl<'a> Straight<'a> {
         let mut shown = [self.parts[0].shown(n, held[0]), self.parts[1].shown(-n, held[1])];
         for _ in 0..STEPS {
             let d = c + shown[1].ends[0] - shown[0].ends[0];
-            let s = n.dot(self.w);
+            let s = n.dot(w);
             if s <= 0.0 {
                 return None;
             }
-            let g = d - self.w * (n.dot(d) / s);
+            let g = d - w * (n.dot(d) / s);
             let e = any_perpendicular(n);
             let f = n.cross(e);
             let flat = |v: DVec3| DVec2::new(v.dot(e), v.dot(f));
@@ -342,18 +385,20 @@ impl<'a> Straight<'a> {
                 yy -= part.bend * t.y * t.y;
             }
             // Circles of both bodies; of two that are one the second says nothing.
-            let mut circles: SmallVec<[(DVec2, f64, f64); 4]> = SmallVec::new();
+            let (mut circles, mut count) = ([(DVec2::ZERO, 0.0, 0.0); 2], 0);
             for (k, sign) in [1.0, -1.0].into_iter().enumerate() {
                 for (a, lean) in self.parts[k].circles(held[k].0) {
                     let way = flat(a * sign);
                     let off = n.dot(a) * sign - lean;
-                    let same = circles.iter().any(|h| h.0.perp_dot(way).abs() <= 1e-6 * h.0.length() * way.length());
-                    if !same && circles.len() < 2 {
-                        circles.push((way, off, lean));
+                    let same =
+                        circles[..count].iter().any(|h| h.0.perp_dot(way).abs() <= 1e-6 * h.0.length() * way.length());
+                    if !same && count < 2 {
+                        circles[count] = (way, off, lean);
+                        count += 1;
                     }
                 }
             }
-            let step = match circles.as_slice() {
+            let step = match &circles[..count] {
                 [] => {
                     let det = xx * yy - xy * xy;
                     if det <= 1e-6 * xx * yy || xx >= 0.0 {
@@ -392,64 +437,90 @@ impl<'a> Straight<'a> {
         None
     }
 
-    /// The contact along n, confirmed by both trees; `Some(None)` when it comes after the step.
-    fn contact(&self, (n, shown): (DVec3, [Shown; 2]), level: f64, least: f64) -> Option<Option<Found>> {
+    /// Tells the contact along n if both trees confirm it, or leaves `out` clear if it comes after the step.
+    fn contact(&self, n: DVec3, shown: &[Shown; 2], out: &mut Outcome) -> Option<()> {
+        let pair = self.pair;
         let [a, b] = &self.bodies;
         let phi = -b.reach(-n) - a.reach(n);
-        let speed = n.dot(self.w);
-        if phi <= APART * self.task.delta || speed <= 0.0 {
+        let speed = n.dot(pair.velocity);
+        let least = excluded(pair.delta, pair.rounding);
+        if phi <= APART * pair.delta || speed <= 0.0 {
             return None;
+        }
+        if phi - speed > least.max(0.0) {
+            return Some(());
         }
         let t = phi / speed;
-        if phi - speed > least.max(0.0) {
-            return Some(None);
-        }
-        let x = self.point(n, t, &shown)?;
+        let x = self.point(n, t, shown)?;
         let mut active: SmallVec<[(Constraint, f64); 8]> = SmallVec::new();
-        self.parts[0].faces(Side::A, n, n, &shown[0], &mut active);
-        self.parts[1].faces(Side::B, -n, -(self.at.b_from_a * n), &shown[1], &mut active);
-        if active.len() > super::super::newton::MAX_ACTIVE {
+        self.parts[0].faces(Side::A, n, self.axes[0].transpose() * n, &shown[0], &mut active);
+        let of_a = active.len();
+        self.parts[1].faces(Side::B, -n, self.axes[1].transpose() * -n, &shown[1], &mut active);
+        if active.len() > MAX_ACTIVE {
             return None;
         }
-        let literal = |c: &Constraint| matches!(c, Constraint::Literal(..));
-        let sum: f64 = active.iter().filter(|c| literal(&c.0)).map(|c| c.1).sum();
-        let sum = if sum > 0.0 { sum } else { 1.0 };
-        let (x, t) = self.sink(&active, x, t, 0.0)?;
-        let (deep_x, deep_t) = self.sink(&active, x, t, level)?;
-        let (task, moved) = (self.task, |t: f64| self.at_time(t));
-        let tol = 16.0 * task.rounding;
-        let touches = task.a.value(x).abs() <= tol && task.b.value(moved(t).b_point(x)).abs() <= tol;
-        let bottom = -task.delta - task.rounding;
-        let is_deep = task.a.value(deep_x) <= bottom && task.b.value(moved(deep_t).b_point(deep_x)) <= bottom;
+        let mut rows = self.rows(&active, x, t);
+        let (mut x, mut t) = (x, t);
+        let meets = |x: DVec3, t: f64| [self.value(0, x, t), self.value(1, x, t)];
+        let tol = INCIDENT * pair.rounding;
+        let touches = |x: DVec3, t: f64| meets(x, t).iter().all(|v| v.abs() <= tol);
+        if !touches(x, t) {
+            (x, t) = self.sink(&rows, &active, x, t, 0.0)?;
+            rows = self.rows(&active, x, t);
+            if !touches(x, t) {
+                return None;
+            }
+        }
+        let (deep_x, deep_t) = self.sink(&rows, &active, x, t, pair.witness_level())?;
+        let is_deep = meets(deep_x, deep_t).iter().all(|v| *v <= -pair.delta - pair.rounding);
         let ordered = 0.0 <= t && t <= deep_t && deep_t <= 1.0;
         // The proof and the point are of one time.
         let left = phi - t * speed;
-        if !(touches && is_deep && ordered && left > least && left.abs() <= CLOSED * self.size()) {
+        if !(is_deep && ordered && left > least && left.abs() <= CLOSED * self.size()) {
             return None;
         }
-        let solution = |x, t| Solution {
-            x,
-            t,
-            active: active.iter().map(|c| c.0).collect::<Actives>(),
-            lambda: active.iter().map(|c| c.1 / sum).collect::<Weights>(),
-            stationarity: 0.0,
-        };
-        let (deep, touch) = (solution(deep_x, deep_t), solution(x, t));
-        Some(Some(Found { goal: 0.5 * (t + deep_t), upper: deep_t, deep, touch: Some(touch) }))
+
+        let literal = |c: &Constraint| matches!(c, Constraint::Literal(..));
+        let sum: f64 = active.iter().filter(|c| literal(&c.0)).map(|c| c.1).sum();
+        let sum = if sum > 0.0 { sum } else { 1.0 };
+        let mut gradients: SmallVec<[DVec3; 8]> = SmallVec::new();
+        let (mut curvature, mut count) = (DMat3::ZERO, [0; 2]);
+        for (k, ((c, weight), row)) in active.iter().zip(&rows).enumerate() {
+            let side = usize::from(k >= of_a);
+            let (Constraint::Literal(_, id) | Constraint::Apex(_, id, _)) = c;
+            curvature += row.hessian() * (weight / sum);
+            if !literal(c) || weight / sum > pair::ACTIVE {
+                gradients.push(row.normal);
+                count[side] += 1;
+                let list = if side == 0 { &mut out.faces_a } else { &mut out.faces_b };
+                pair::note(list, id.face());
+            }
+        }
+        out.extent = pair::extent(&gradients, curvature, pair.scale);
+        out.kind = Kind::of_active(count[0], count[1]);
+        // Faces that pass through the point and hold nothing are the search's to tell.
+        let faces = [&out.faces_a, &out.faces_b].map(pair::noted);
+        let passing = [0, 1].map(|k| self.passing(k, x, t, tol));
+        if out.kind == Kind::VertexVertex || (out.extent == Extent::Point && passing != faces) {
+            (out.faces_a, out.faces_b) = ([NO_FACE; 3], [NO_FACE; 3]);
+            return None;
+        }
+        out.status = Status::Contact;
+        (out.time_lower, out.time, out.time_upper) = (t, t, deep_t);
+        out.point = pair.point(x, t);
+        out.normal = n;
+        out.normal_speed = speed;
+        Some(())
     }
 
     fn size(&self) -> f64 {
         self.parts[0].primitive.ball.radius + self.parts[1].primitive.ball.radius
     }
 
-    fn at_time(&self, t: f64) -> Instant {
-        self.task.relative.at(t)
-    }
-
     /// A point of both bodies at the time of contact.
     fn point(&self, n: DVec3, t: f64, shown: &[Shown; 2]) -> Option<DVec3> {
-        let of_a = shown[0].ends.map(|p| self.centers[0] + p);
-        let of_b = shown[1].ends.map(|p| self.centers[1] + p - self.w * t);
+        let of_a = shown[0].ends;
+        let of_b = shown[1].ends.map(|p| self.pair.at(t) + p);
         let free = |s: &Shown| !s.flat && s.held == 0;
         if free(&shown[0]) {
             return Some(of_a[0]);
@@ -474,7 +545,7 @@ impl<'a> Straight<'a> {
 
     /// The middle of what two discs have in common, or a disc and a segment.
     fn on_flat(&self, n: DVec3, t: f64, shown: &[Shown; 2]) -> Option<DVec3> {
-        let centers = [self.centers[0], self.centers[1] - self.w * t];
+        let centers = [DVec3::ZERO, self.pair.at(t)];
         let disc = |k: usize| {
             let Core::Round { radii, half, .. } = self.parts[k].core else { return None };
             let outward = if k == 0 { n } else { -n };
@@ -506,43 +577,54 @@ impl<'a> Straight<'a> {
         }
     }
 
-    /// The least step from (x, t) to where every active constraint is met at a depth, to first order.
-    fn sink(&self, active: &[(Constraint, f64)], x: DVec3, t: f64, level: f64) -> Option<(DVec3, f64)> {
-        let at = self.at_time(t);
-        let y = at.b_point(x);
-        let time = (self.task.scale / self.w.length()).min(1.0);
-        let m = active.len();
-        let (mut rows, mut rhs) = ([[0.0; 4]; 6], [0.0; 6]);
-        for (k, (constraint, _)) in active.iter().enumerate() {
+    /// The active constraints at (x, t).
+    fn rows(&self, active: &[(Constraint, f64)], x: DVec3, t: f64) -> [Row; MAX_ACTIVE] {
+        let own = [self.own(0, x, t), self.own(1, x, t)];
+        let mut rows = [Row::default(); MAX_ACTIVE];
+        for (row, (constraint, _)) in rows.iter_mut().zip(active) {
             let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *constraint;
-            let (part, own) = if side == Side::A { (&self.parts[0], x) } else { (&self.parts[1], y) };
-            let face = &part.primitive.faces[(id.face() - part.primitive.first_face) as usize];
-            let (value, normal) = match *constraint {
-                Constraint::Literal(..) => {
+            let (primitive, own) = (self.parts[side as usize].primitive, own[side as usize]);
+            let face = &primitive.faces[(id.face() - primitive.first_face) as usize];
+            let axes = &self.axes[side as usize];
+            match (*constraint, face) {
+                (Constraint::Apex(_, _, i), Face::Cone { apex, axis, sin, .. }) => {
+                    let u = any_perpendicular(*axis);
+                    let n = [*axis, u, axis.cross(u)][i as usize];
+                    (row.value, row.normal) = (n.dot(own - *apex), *axes * n);
+                    row.sinks = if i == 0 { -1.0 / sin } else { 0.0 };
+                }
+                _ => {
                     let f = face.at(own);
-                    (f.value + level, f.normal)
+                    (row.value, row.normal, row.sinks) = (f.value, *axes * f.normal, 1.0);
+                    row.bend = if f.rho > 0.0 { f.k / f.rho } else { 0.0 };
+                    (row.axis, row.all) = match face {
+                        Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => (*axes * *axis, false),
+                        _ => (DVec3::ZERO, true),
+                    };
                 }
-                Constraint::Apex(_, _, i) => {
-                    let Face::Cone { apex, axis, sin, .. } = *face else { return None };
-                    let u = any_perpendicular(axis);
-                    let n = [axis, u, axis.cross(u)][i as usize];
-                    (n.dot(own - apex) - if i == 0 { level / sin } else { 0.0 }, n)
-                }
-            };
-            let (normal, rate) = if side == Side::A {
-                (normal, 0.0)
-            } else {
-                let n = at.a_vector(normal);
-                (n, n.dot(self.w) * time)
-            };
-            rows[k] = [normal.x, normal.y, normal.z, rate / self.task.scale];
-            rhs[k] = -value / self.task.scale;
+            }
+        }
+        rows
+    }
+
+    /// The least step from (x, t) to where every active constraint is met at a depth, to first order.
+    fn sink(&self, rows: &[Row], active: &[(Constraint, f64)], x: DVec3, t: f64, level: f64) -> Option<(DVec3, f64)> {
+        let (scale, w) = (self.pair.scale, self.pair.velocity);
+        let time = (scale / w.length()).min(1.0);
+        let m = active.len();
+        let (mut lines, mut rhs) = ([[0.0; 4]; 6], [0.0; 6]);
+        for (k, (row, (constraint, _))) in rows.iter().zip(active).enumerate() {
+            let (Constraint::Literal(side, _) | Constraint::Apex(side, _, _)) = *constraint;
+            let n = row.normal;
+            let rate = if side == Side::A { 0.0 } else { n.dot(w) * time / scale };
+            lines[k] = [n.x, n.y, n.z, rate];
+            rhs[k] = -(row.value + row.sinks * level) / scale;
         }
         // Gram matrix of the rows, a trace of damping for redundant ones; Cholesky in place.
         let mut gram = [[0.0; 6]; 6];
         for i in 0..m {
             for j in 0..=i {
-                gram[i][j] = (0..4).map(|k| rows[i][k] * rows[j][k]).sum();
+                gram[i][j] = (0..4).map(|k| lines[i][k] * lines[j][k]).sum();
             }
             gram[i][i] += 1e-13;
         }
@@ -573,8 +655,8 @@ impl<'a> Straight<'a> {
             }
             rhs[i] /= gram[i][i];
         }
-        let step: [f64; 4] = std::array::from_fn(|k| (0..m).map(|i| rows[i][k] * rhs[i]).sum());
-        let x = x + DVec3::new(step[0], step[1], step[2]) * self.task.scale;
+        let step: [f64; 4] = std::array::from_fn(|k| (0..m).map(|i| lines[i][k] * rhs[i]).sum());
+        let x = x + DVec3::new(step[0], step[1], step[2]) * scale;
         let t = t + step[3] * time;
         (x.is_finite() && t.is_finite()).then_some((x, t))
     }
