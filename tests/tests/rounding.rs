@@ -271,9 +271,11 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
         for _ in 0..6 {
             let mut center = r.point_in(&aabb);
             let mut size = 10f64.powf(r.within(-9.0, -0.5));
+            let mut beside_axis_of = None;
             if r.chance(0.3) {
                 // On an axis, where directions are noise, or very near it, in a cell of that size.
-                if let Some(origin) = axis_point(&mut r, a) {
+                if let Some((face, origin)) = axis_point(&mut r, a) {
+                    beside_axis_of = Some(face);
                     size = 10f64.powf(r.within(-14.0, -8.0));
                     let beside = if r.chance(0.3) { DVec3::ZERO } else { r.direction() * size * aabb.half().length() };
                     center = (origin + beside).clamp(aabb.min, aabb.max);
@@ -302,10 +304,12 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
             let x = inside(&mut r);
             let (x_b, x_a) = in_b(x);
             for _ in 0..6 {
-                let side = if r.chance(0.3) { Side::A } else { Side::B };
+                // The face whose axis is near is asked most of the time.
+                let near = beside_axis_of.filter(|_| r.chance(0.7));
+                let side = if near.is_some() || r.chance(0.3) { Side::A } else { Side::B };
                 let solid = if side == Side::A { &a.solid } else { &b.solid };
                 let sense = if r.chance(0.6) { Sense::Positive } else { Sense::Negative };
-                let id = LiteralId::new(r.below(solid.faces.len()) as u32, sense);
+                let id = LiteralId::new(near.unwrap_or_else(|| r.below(solid.faces.len())) as u32, sense);
                 let face = &solid.faces[id.face() as usize];
                 let sign = if sense == Sense::Positive { big(1.0) } else { big(-1.0) };
                 let own = |in_a: &Vector, in_b: &Vector| psi(face, if side == Side::A { in_a } else { in_b });
@@ -387,11 +391,16 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
     assert!(worst.value > 0.01, "the budget is a hundred times what was ever seen");
 }
 
-fn axis_point(r: &mut Random, m: &Model) -> Option<DVec3> {
-    match m.solid.faces[r.below(m.solid.faces.len())] {
-        Face::Cylinder { origin, axis, .. } => Some(origin + axis * r.within(-1.0, 1.0)),
-        Face::Cone { apex, axis, .. } => Some(apex + axis * r.within(0.0, 2.0)),
-        Face::Sphere { center, .. } => Some(center),
-        Face::Plane { .. } => None,
-    }
+/// A curved face, drawn from those of the model, and a point of its axis or its centre.
+fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
+    let curved: Vec<usize> =
+        (0..m.solid.faces.len()).filter(|i| !matches!(m.solid.faces[*i], Face::Plane { .. })).collect();
+    let face = *curved.get(r.below(curved.len().max(1)))?;
+    let point = match m.solid.faces[face] {
+        Face::Cylinder { origin, axis, .. } => origin + axis * r.within(-1.0, 1.0),
+        Face::Cone { apex, axis, .. } => apex + axis * r.within(0.0, 2.0),
+        Face::Sphere { center, .. } => center,
+        Face::Plane { .. } => return None,
+    };
+    Some((face, point))
 }

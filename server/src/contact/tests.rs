@@ -44,14 +44,26 @@ fn tilt(v: DVec3) -> glam::DQuat {
     quat_of_rotation_vector(v)
 }
 
+/// The answer of the search alone; a whole-primitive answer in front of it must say the same.
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
+    let o = ask_with(name, a, ma, b, mb, Ideas { direct: false, ..Ideas::default() });
+    let fronted = ask_with(name, a, ma, b, mb, Ideas::default());
+    assert_eq!((o.status, o.kind, o.extent), (fronted.status, fronted.kind, fronted.extent), "{name}");
+    assert!((o.time - fronted.time).abs() < 1e-12, "{name}: {} and {}", o.time, fronted.time);
+    assert!((o.separation - fronted.separation).abs() < 1e-12, "{name}: {} and {}", o.separation, fronted.separation);
+    assert!(fronted.time_lower <= fronted.time && fronted.time <= fronted.time_upper, "{name}");
+    assert!((o.normal - fronted.normal).length() < 1e-6, "{name}: {} and {}", o.normal, fronted.normal);
+    o
+}
+
+fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, ideas: Ideas) -> Outcome {
     let place = Pose::IDENTITY;
     let q = PairQuery {
         a: Body { model: a, placed: Placed { place, motion: ma } },
         b: Body { model: b, placed: Placed { place, motion: mb } },
         resolution: default_resolution(a, b),
         cell_limit: 300_000,
-        ideas: Ideas::default(),
+        ideas,
     };
     let began = std::time::Instant::now();
     let o = earliest_contact(&q, &mut Scratch::default());
