@@ -308,6 +308,17 @@ fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
             assert!(patch.points.iter().all(|p| (p[0] - x).abs() == 1.0 && p[1].abs() == 1.0 && p[2] == 0.0));
         }
     }
+    // At rest, and put at its own place again: the same bits from step to step.
+    let mut world = resting(Some(rule(Report::Patch, 0.0)));
+    let mut told = |records: &[PoseRecord]| {
+        let out = world.step(records, &StepOptions::default()).unwrap();
+        (out.pairs.clone(), out.regions.clone())
+    };
+    let first = told(&[]);
+    for k in 0..4 {
+        let again = [to(2, 0.0, 1.0), to(3, 3.0, 1.0)];
+        assert_eq!(told(&again[..k % 3]), first, "step {k}");
+    }
     // No room for all of them: the earliest pairs keep theirs, and the header says that some are missing.
     let mut world = resting(Some(rule(Report::Patch, 0.0)));
     world.step(&[], &StepOptions { max_patch_slots: 3, ..StepOptions::default() }).unwrap();
