@@ -64,6 +64,8 @@ pub struct Scratch {
     lits: Vec<Linear>,
     normals: Vec<DVec3>,
     b: Vec<f64>,
+    /// Where the clause's last program ended.
+    warm: lp::Warm,
     ors: Vec<(Side, u32, u32)>,
     /// Clauses bounded so far, over the whole query.
     pub clauses: u64,
@@ -237,6 +239,7 @@ impl Run<'_, '_> {
     /// Bounds the clause of all literals taken so far. Tangents that were added stay for its completions.
     fn clause(&mut self) -> Advance {
         let h = self.view.motion.h;
+        self.scratch.warm = lp::Warm::default();
         let last = self.solve(h);
         let mut best = Reach { dt: f64::NEG_INFINITY, path: [last; 2] };
         if self.improve(&mut best, None, &last, h) {
@@ -387,7 +390,7 @@ impl Run<'_, '_> {
             s.b.push(l.ahead(look));
             s.normals.push(l.normal_ahead(look));
         }
-        lp::min_max(&s.normals, &s.b, self.view.half)
+        lp::min_max(&s.normals, &s.b, self.view.half, &mut s.warm)
     }
 
     /// The bound that the multipliers of `s` give, through time.

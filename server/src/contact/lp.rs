@@ -9,7 +9,7 @@
 //! needs no first phase. Whatever it returns is only a proposal: callers evaluate the bound of its λ themselves, so an
 //! early stop or rounding can cost work, never correctness.
 
-use glam::DVec3;
+use glam::{DMat4, DVec3, DVec4};
 
 /// The multipliers and the point the program proposes.
 #[derive(Clone, Copy, Debug)]
@@ -26,37 +26,49 @@ pub struct Solution {
 
 /// Pivots after which the current basis is returned as it is.
 const MAX_PIVOTS: usize = 48;
-/// Slack columns stand behind the planes: plane count + 2k (p_k) and + 2k + 1 (q_k).
+/// Slack columns stand before the planes: 2k (p_k) and 2k + 1 (q_k), k < 3; plane i is column `SLACKS` + i.
+const SLACKS: usize = 6;
 const NONE: usize = usize::MAX;
 
-/// Solves the program for planes (n_i, b_i), i < b.len(); at least one is needed.
-pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
+/// A basis to start from: that of the last program, whose planes were much the same.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Warm(Option<[usize; 4]>);
+
+impl Warm {
+    /// The inverse of the basis over these planes; `None` if it is none, nearly singular, or not feasible.
+    fn inverse(&self, normals: &[DVec3], count: usize) -> Option<([usize; 4], [[f64; 4]; 4])> {
+        let basis = self.0?;
+        if basis.iter().any(|c| *c >= SLACKS + count) {
+            return None;
+        }
+        let column = |c: usize| match c.checked_sub(SLACKS) {
+            Some(i) => normals[i].extend(1.0),
+            None => {
+                let mut v = [0.0; 4];
+                v[c / 2] = if c.is_multiple_of(2) { -1.0 } else { 1.0 };
+                DVec4::from_array(v)
+            }
+        };
+        let matrix = DMat4::from_cols(column(basis[0]), column(basis[1]), column(basis[2]), column(basis[3]));
+        let det = matrix.determinant();
+        if det.is_nan() || det.abs() < 1e-6 {
+            return None;
+        }
+        let inv = matrix.inverse().transpose().to_cols_array_2d();
+        inv.iter().all(|row| row[3] >= 0.0).then_some((basis, inv))
+    }
+}
+
+/// Solves the program for planes (n_i, b_i), i < b.len(); at least one is needed. `warm` is where to start, and is left
+/// where this ended.
+pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3, warm: &mut Warm) -> Solution {
     let count = b.len();
     debug_assert!(count > 0 && normals.len() >= count);
-    let mut start = 0;
-    let mut scale: f64 = half.max_element();
-    for i in 0..count {
-        // The first basis: the plane whose own minimum over the box is highest.
-        let own = |i: usize| b[i] - normals[i].abs().dot(half);
-        if own(i) > own(start) {
-            start = i;
-        }
-        scale = scale.max(b[i].abs());
-    }
+    let scale = b.iter().fold(half.max_element(), |m: f64, b| m.max(b.abs()));
     let tol = 1e-14 * scale;
     // Rows of the basis inverse; `basis[r]` is the column in row r.
-    let mut inv = [[0.0f64; 4]; 4];
-    let mut basis = [NONE; 4];
-    for k in 0..3 {
-        let n = normals[start][k];
-        let (column, sign) = if n >= 0.0 { (count + 2 * k, -1.0) } else { (count + 2 * k + 1, 1.0) };
-        basis[k] = column;
-        inv[k][k] = sign;
-        inv[k][3] = -sign * n;
-    }
-    basis[3] = start;
-    inv[3][3] = 1.0;
-    let profit = |c: usize| if c < count { b[c] } else { -half[(c - count) / 2] };
+    let (mut basis, mut inv) = warm.inverse(normals, count).unwrap_or_else(|| single(normals, b, half));
+    let profit = |c: usize| if c >= SLACKS { b[c - SLACKS] } else { -half[c / 2] };
     let mut y = [0.0; 4];
     for _ in 0..MAX_PIVOTS {
         let p = [profit(basis[0]), profit(basis[1]), profit(basis[2]), profit(basis[3])];
@@ -69,16 +81,16 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
             let n = normals[i];
             let g = b[i] - (n.x * y[0] + n.y * y[1] + n.z * y[2] + y[3]);
             if g > gain {
-                (entering, gain) = (i, g);
+                (entering, gain) = (SLACKS + i, g);
             }
         }
         for k in 0..3 {
             let e = half[k];
             if y[k] - e > gain {
-                (entering, gain) = (count + 2 * k, y[k] - e);
+                (entering, gain) = (2 * k, y[k] - e);
             }
             if -y[k] - e > gain {
-                (entering, gain) = (count + 2 * k + 1, -y[k] - e);
+                (entering, gain) = (2 * k + 1, -y[k] - e);
             }
         }
         if entering == NONE {
@@ -86,12 +98,12 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
         }
         let mut d = [0.0; 4];
         for r in 0..4 {
-            d[r] = if entering < count {
-                let n = normals[entering];
+            d[r] = if entering >= SLACKS {
+                let n = normals[entering - SLACKS];
                 inv[r][0] * n.x + inv[r][1] * n.y + inv[r][2] * n.z + inv[r][3]
             } else {
-                let k = (entering - count) / 2;
-                if (entering - count).is_multiple_of(2) { -inv[r][k] } else { inv[r][k] }
+                let k = entering / 2;
+                if entering.is_multiple_of(2) { -inv[r][k] } else { inv[r][k] }
             };
         }
         let (mut leaving, mut ratio) = (NONE, f64::INFINITY);
@@ -120,15 +132,37 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
         }
         basis[leaving] = entering;
     }
+    warm.0 = Some(basis);
     let mut s = Solution { z: y[3], y: DVec3::new(-y[0], -y[1], -y[2]), support: [(0, 0.0); 4], count: 0 };
     s.y = s.y.clamp(-half, half);
     for r in 0..4 {
-        if basis[r] < count && inv[r][3] > 0.0 {
-            s.support[s.count] = (basis[r] as u32, inv[r][3]);
+        if basis[r] >= SLACKS && inv[r][3] > 0.0 {
+            s.support[s.count] = ((basis[r] - SLACKS) as u32, inv[r][3]);
             s.count += 1;
         }
     }
     s
+}
+
+/// The first basis: the plane whose own minimum over the box is highest, with its slacks.
+fn single(normals: &[DVec3], b: &[f64], half: DVec3) -> ([usize; 4], [[f64; 4]; 4]) {
+    let mut best = (f64::NEG_INFINITY, 0);
+    for (i, b) in b.iter().enumerate() {
+        let own = b - normals[i].abs().dot(half);
+        if own > best.0 {
+            best = (own, i);
+        }
+    }
+    let (mut basis, mut inv) = ([SLACKS + best.1; 4], [[0.0; 4]; 4]);
+    for k in 0..3 {
+        let n = normals[best.1][k];
+        let (column, sign) = if n >= 0.0 { (2 * k, -1.0) } else { (2 * k + 1, 1.0) };
+        basis[k] = column;
+        inv[k][k] = sign;
+        inv[k][3] = -sign * n;
+    }
+    inv[3][3] = 1.0;
+    (basis, inv)
 }
 
 #[cfg(test)]
@@ -136,7 +170,16 @@ mod tests {
     use super::*;
 
     fn check(normals: &[DVec3], b: &[f64], half: DVec3) {
-        let s = min_max(normals, b, half);
+        let mut warm = Warm::default();
+        let cold = min_max(normals, b, half, &mut warm);
+        judge(&cold, normals, b, half);
+        // The same program, and one a little further on, from the basis of the first.
+        judge(&min_max(normals, b, half, &mut warm), normals, b, half);
+        let moved: Vec<f64> = b.iter().enumerate().map(|(i, b)| b + 0.1 * (i as f64).sin()).collect();
+        judge(&min_max(normals, &moved, half, &mut warm), normals, &moved, half);
+    }
+
+    fn judge(s: &Solution, normals: &[DVec3], b: &[f64], half: DVec3) {
         let top = |y: DVec3| (0..b.len()).map(|i| b[i] + normals[i].dot(y)).fold(f64::NEG_INFINITY, f64::max);
         // Strong duality: the multipliers' bound equals the value at the point.
         let (mut value, mut w) = (0.0, DVec3::ZERO);
