@@ -25,12 +25,13 @@ use smallvec::SmallVec;
 const FARTHEST: f64 = 4.0;
 /// Way, in scales, that hardly is one.
 const HARDLY: f64 = 1e-6;
-/// Steps in which a slow pair passes its scale.
-const SLOW: f64 = 1e3;
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
 /// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
 const LEAST_DAMPING: f64 = 1e-14;
+/// A guess from which the squared residual does not fall by `PROGRESS` in so many steps leads nowhere.
+const PATIENCE: usize = 8;
+const PROGRESS: f64 = 0.25;
 pub(super) const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
 
 /// Active constraints, in place.
@@ -148,8 +149,17 @@ impl Problem<'_> {
         Row { value, gradient, hessian: h, rate, gradient_rate }
     }
 
-    /// Solves from a starting guess. `None` when it does not converge to finite numbers.
-    pub fn solve(&self, active: &[Constraint], x: DVec3, t: f64, lambda: &[f64], level: f64) -> Option<Solution> {
+    /// Solves from a starting guess. `None` when it does not converge to finite numbers, or, where one is not `patient`, not
+    /// steadily.
+    pub fn solve(
+        &self,
+        active: &[Constraint],
+        x: DVec3,
+        t: f64,
+        lambda: &[f64],
+        level: f64,
+        patient: bool,
+    ) -> Option<Solution> {
         let m = active.len();
         debug_assert!(m <= MAX_ACTIVE && lambda.len() == m);
         let n = m + 4;
@@ -157,19 +167,18 @@ impl Problem<'_> {
         let mut f = [0.0; MAX_UNKNOWNS];
         let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
         let mut best: f64 = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
-        if self.time_scale > SLOW {
-            // Multipliers first: in the time that a slow pair takes to turn its normals towards wrong ones it is far away.
-            let mut still = jac;
-            still.iter_mut().for_each(|row| row[..4].fill(0.0));
-            let step = damped_step(&still, &f, n, LEAST_DAMPING)?;
-            lambda.iter_mut().zip(&step[4..n]).for_each(|(l, s)| *l += s);
-            best = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
-        }
         let mut damping = 1.0;
         let far = FARTHEST.max(HARDLY * self.time_scale);
-        for _ in 0..60 {
+        let mut checked = best;
+        for round in 0..60 {
             if best < 1e-30 {
                 break;
+            }
+            if !patient && round % PATIENCE == PATIENCE - 1 {
+                if best > checked * PROGRESS && best > 1e-20 {
+                    return None;
+                }
+                checked = best;
             }
             let mu = damping * best.min(1e-2);
             let step = damped_step(&jac, &f, n, mu.max(LEAST_DAMPING))?;

@@ -310,13 +310,25 @@ impl<'a> Advance<'a> {
         p.t
     }
 
+    /// True when the way between the centres, without a distance, keeps the bodies apart for the whole step.
+    fn frees_all(&self, m: &Moment, end: &Moment) -> bool {
+        let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.a.0.ball.center);
+        let Some(n) = way.try_normalize() else { return false };
+        let here = self.gap(m, n);
+        here.phi > APART * self.task.delta && self.proven(&here, &self.gap(end, n)) >= 1.0
+    }
+
     fn run(&self, search: &mut Search) -> Option<Ending> {
         let scale = self.task.scale;
         let mut t = 0.0;
         let mut start = None;
         let mut contact: Option<Gap> = None;
+        let end_of_step = self.moment(1.0);
         for round in 0..ROUNDS {
             let m = self.moment(t);
+            if round == 0 && self.frees_all(&m, &end_of_step) {
+                return Some(Ending::Clear);
+            }
             let first = start
                 .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
             search.counters.closed_forms += 1;
@@ -329,6 +341,10 @@ impl<'a> Advance<'a> {
             let here = self.gap(&m, n);
             if here.phi <= self.least {
                 return None;
+            }
+            let last = self.gap(&end_of_step, n);
+            if contact.is_none() && self.proven(&here, &last) >= 1.0 {
+                return Some(Ending::Clear);
             }
             let closing = found.normal.dot(m.at.velocity(found.a));
             let guess = t + found.distance.max(0.0) / closing;
@@ -349,7 +365,7 @@ impl<'a> Advance<'a> {
             let mut end = goal;
             let mut until = t;
             for _ in 0..6 {
-                let there = self.gap(&self.moment(end), n);
+                let there = if end == 1.0 { last } else { self.gap(&self.moment(end), n) };
                 let proven = self.proven(&here, &there);
                 until = until.max(proven);
                 if proven >= end {
