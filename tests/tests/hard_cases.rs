@@ -276,6 +276,20 @@ fn touching_at_the_start_and_receding_or_sliding_is_clear_and_pressing_on_is_con
     meets_along("touching_pressing", &cubes(DOWN), 0.0, DVec3::Z);
 }
 
+/// A cone on its side, its quarter turn rounded, is pressed into the floor by some resolutions: the path of its ball, as
+/// stage 1 sees it, is a point that rounding put outside another bound of the same path.
+#[test]
+fn a_cone_turned_by_a_rounded_quarter_is_not_lost_by_its_bounds() {
+    let cone = Recipe::cone(11.360090248447385, 0.0, 10.345243011755127);
+    let floor = Recipe::cuboid(472.9246992801496, 472.9246992801496, 78.35102281627485);
+    let turn = DQuat::from_xyzw(0.0, std::f64::consts::FRAC_1_SQRT_2, 0.0, -0.7071067811865475);
+    let start = Pose::new(DVec3::new(-3.3219316049759318, 17.168436174577245, 11.360089680668677), turn);
+    let velocity = DVec3::new(0.0, 7.4363007389118e-6, -1.0388944281054617e-5);
+    let below = Motion::resting(Pose::at(DVec3::Z * -78.35102281627485));
+    let press = Motion { start, velocity, spin: DVec3::ZERO };
+    meets_along("rounded_quarter_turn", &scene(floor, below, cone, press), 0.0, DVec3::Z);
+}
+
 #[test]
 fn fast_bodies_do_not_tunnel() {
     let wall = Recipe::cuboid(0.1, 2.0, 2.0);

@@ -3,10 +3,12 @@
 //! A loop that stops a body at `time` or at `time_lower` starts its next step at depth 0, give or take rounding and
 //! the resolution. Whatever it does next must have an answer that lets it go on: pressing on is a contact at once, with
 //! a normal; resting, sliding and receding are clear; overlap never comes up. And a body that is pressed on forever
-//! stays where it is: nothing of it is ever deeper than what twice the resolution allows. An answer that the work limit
-//! leaves undecided is counted: none on a floor, few where curved faces meet (a known gap, see `check`).
+//! stays where it is: nothing of it is ever deeper than what twice the resolution allows. No answer is left
+//! undecided.
 //!
-//! 20,000 stops here; `CONTACTD_STOPS=1000000 cargo test -p contactd-tests --test stopping` makes a million.
+//! 20,000 stops here; `CONTACTD_STOPS=1000000 cargo test -p contactd-tests --test stopping` makes a million. Known gap: of
+//! some 500,000 a handful are left undecided by the limit on cells, a ball just grazing a cone or cylinder and a peg that moves
+//! by thousandths of the resolution in its hole.
 #![allow(missing_docs)]
 
 use contactd::contact::{Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
@@ -65,11 +67,14 @@ impl Table {
         o
     }
 
-    /// Deepest common point of some candidates in the moving body's frame, by the plain value of the trees.
+    /// Depth of the deepest common point on the ways from some points of the moving body's surface to its middle, by the
+    /// plain value of the trees; it is reached within some resolutions of them, or some hundred at sharp edges.
     fn depth_at(&self, pose: &Pose, points: &[DVec3]) -> f64 {
         let into_fixed = self.place.inverse();
-        points.iter().fold(f64::NEG_INFINITY, |depth, p| {
-            let f = self.fixed.solid.value(into_fixed.point(pose.point(*p))).max(self.moving.solid.value(*p));
+        let ways = points.iter().flat_map(|p| (0..=40).map(move |k| (*p, 1.25f64.powi(k))));
+        ways.fold(f64::NEG_INFINITY, |depth, (p, steps)| {
+            let x = p - p.normalize_or_zero() * (0.5 * self.delta * steps);
+            let f = self.fixed.solid.value(into_fixed.point(pose.point(x))).max(self.moving.solid.value(x));
             depth.max(-f)
         })
     }
@@ -183,11 +188,9 @@ fn stops() -> usize {
     std::env::var("CONTACTD_STOPS").ok().and_then(|n| n.parse().ok()).unwrap_or(STOPS)
 }
 
-/// `gaps`: part of the stops that may be left undecided, a known gap: curved faces that are pressed on by hardly more than
-/// the resolution.
-fn check(seen: [usize; 3], stops: usize, gaps: f64) {
+fn check(seen: [usize; 3], stops: usize) {
     println!("{stops} stops: {} at once, {} free steps, {} undecided", seen[0], seen[1], seen[2]);
-    assert!(seen[2] as f64 <= gaps * stops as f64, "{} of {stops} undecided", seen[2]);
+    assert_eq!(seen[2], 0, "undecided of {stops}");
     assert!(seen[0] > stops / 2 && seen[1] > stops / 2, "the test does not test what it says: {seen:?}");
 }
 
@@ -208,7 +211,7 @@ fn a_body_on_a_floor_is_stopped_again_and_again() {
         let spin = if r.chance(0.5) { DVec3::ZERO } else { DVec3::Z * r.within(-2.0, 2.0) };
         (Table::new(Recipe::of(shape), floor, place), Motion { start, velocity, spin }, size, low)
     });
-    check(seen, stops, 0.0);
+    check(seen, stops);
 }
 
 #[test]
@@ -226,7 +229,7 @@ fn convex_bodies_that_meet_at_any_angle_are_stopped_again_and_again() {
         let motion = Motion { start, velocity: -away * (size * r.within(6.0, 60.0)), spin: DVec3::ZERO };
         (Table::new(Recipe::of(a), Recipe::of(b), Pose::new(DVec3::ZERO, fixed_turn)), motion, size, low)
     });
-    check(seen, stops, 0.02);
+    check(seen, stops);
 }
 
 #[test]
@@ -245,5 +248,5 @@ fn a_peg_in_its_hole_is_stopped_again_and_again() {
         let motion = Motion { start, velocity: side * (clearance * r.within(2.0, 50.0)), spin: DVec3::ZERO };
         (Table::new(peg, plate, Pose::IDENTITY), motion, clearance, vec![side * radius])
     });
-    check(seen, stops, 0.02);
+    check(seen, stops);
 }

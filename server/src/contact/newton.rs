@@ -25,6 +25,8 @@ use smallvec::SmallVec;
 const FARTHEST: f64 = 4.0;
 /// Way, in scales, that hardly is one.
 const HARDLY: f64 = 1e-6;
+/// Steps in which a slow pair passes its scale.
+const SLOW: f64 = 1e3;
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
 /// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
@@ -167,6 +169,14 @@ impl Problem<'_> {
         let mut f = [0.0; MAX_UNKNOWNS];
         let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
         let mut best: f64 = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+        if self.time_scale > SLOW {
+            // Multipliers first: in the time that a slow pair takes to turn its normals towards wrong ones it is far away.
+            let mut still = jac;
+            still.iter_mut().for_each(|row| row[..4].fill(0.0));
+            let step = damped_step(&still, &f, n, LEAST_DAMPING)?;
+            lambda.iter_mut().zip(&step[4..n]).for_each(|(l, s)| *l += s);
+            best = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+        }
         let mut damping = 1.0;
         let far = FARTHEST.max(HARDLY * self.time_scale);
         let mut checked = best;

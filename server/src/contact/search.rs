@@ -864,11 +864,7 @@ impl<'a> Search<'a> {
         let touch = touch
             .filter(|s| s.stationarity < SETTLED)
             .or_else(|| problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0, true));
-        let touch = touch.filter(|s| {
-            let at = self.task.relative.at(s.t);
-            let tol = 16.0 * self.task.rounding;
-            s.t <= deep.t && self.task.a.value(s.x).abs() <= tol && self.task.b.value(at.b_point(s.x)).abs() <= tol
-        });
+        let touch = touch.and_then(|s| if self.is_touch(&s, deep.t) { Some(s) } else { self.touch_beside(s, deep.t) });
         let at = self.task.relative.at(deep.t);
         let rates = deep.active.iter().zip(&deep.lambda).map(|(c, l)| l * problem.row(c, deep.x, &at, 0.0).rate);
         let speed = rates.sum::<f64>().abs().max(f64::MIN_POSITIVE);
@@ -878,7 +874,10 @@ impl<'a> Search<'a> {
             Some(s) if s.t > 0.0 => 0.5 * (s.t + deep.t),
             // Touching at the start: nothing but the start needs a proof.
             Some(_) => 0.5 * crossing,
-            None => crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9),
+            // Rounding forbids to prove what is nearer to the crossing.
+            None => {
+                crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9).max(4.0 * self.task.rounding / speed)
+            }
         };
         let goal = if goal > 0.0 { goal } else { 0.5 * crossing.max(f64::MIN_POSITIVE) };
         let new = Found { upper: deep.t, deep, touch, goal };
@@ -891,6 +890,25 @@ impl<'a> Search<'a> {
             None => new,
         });
         true
+    }
+
+    /// True when the surfaces meet in a solution, as both whole trees say, no later than the witness.
+    fn is_touch(&self, s: &Solution, latest: f64) -> bool {
+        let at = self.task.relative.at(s.t);
+        let tol = 16.0 * self.task.rounding;
+        s.t <= latest && self.task.a.value(s.x).abs() <= tol && self.task.b.value(at.b_point(s.x)).abs() <= tol
+    }
+
+    /// A touch along a line or over a patch, at a point that the faces beside it have left meanwhile: moved to their edge.
+    fn touch_beside(&self, s: Solution, latest: f64) -> Option<Solution> {
+        let beside = self.deciding(s.x, &self.task.relative.at(s.t));
+        let full = s.active.len() == super::newton::MAX_ACTIVE;
+        if full || s.active.contains(&beside) || !self.stage2.knows(&self.task, &beside) {
+            return None;
+        }
+        let active: Vec<_> = s.active.iter().copied().chain([beside]).collect();
+        let lambda: Vec<_> = s.lambda.iter().copied().chain([0.0]).collect();
+        self.problem().solve(&active, s.x, s.t, &lambda, 0.0, true).filter(|s| self.is_touch(s, latest))
     }
 }
 

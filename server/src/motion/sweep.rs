@@ -81,9 +81,11 @@ impl Sweep {
             return Aabb::ALL;
         }
         let x = (ball.center - self.mover_center).length();
-        let path = self.pieces(x, t0, t1, |at| Aabb::of_points([at.b_point(ball.center)]));
-        let center = self.pieces(0.0, t0, t1, |at| Aabb::of_points([at.b_point(self.mover_center)])).grown(x);
-        self.finished(path.intersection(&center).grown(ball.radius), x + ball.radius, t0, t1)
+        let path = self.pieces(x, t0, t1, |at| Aabb::of_points([at.b_point(ball.center)])).grown(ball.radius);
+        let center = self.pieces(0.0, t0, t1, |at| Aabb::of_points([at.b_point(self.mover_center)]));
+        // A path is as thin as a point, and may lie on the very face of the other bound: rounding must not part them.
+        let slack = self.rounding(x + ball.radius, t0, t1);
+        self.finished(path.intersection(&center.grown(x + ball.radius + slack)), x + ball.radius, t0, t1)
     }
 
     /// The union over the pieces of [t0, t1] of the boxes at both ends, grown by what lies between; `x` bounds the
@@ -106,14 +108,61 @@ impl Sweep {
         swept
     }
 
-    /// Clipped by the ball around the observer's centre of rotation, and grown by the rounding of carried points
-    /// (angles round in proportion to themselves).
+    /// Clipped by the ball around the observer's centre of rotation, and grown by the rounding of carried points.
     fn finished(&self, swept: Aabb, x: f64, t0: f64, t1: f64) -> Aabb {
-        let far = self.relative.difference(t0).length().max(self.relative.difference(t1).length());
-        let reach = far + x;
-        let scale = reach + self.mover_center.length() + self.observer_center.length();
-        let turn = 1.0 + self.spin + self.observer_spin;
-        let ball = Aabb::around(self.observer_center, DVec3::splat(reach));
-        swept.intersection(&ball).grown(scale * turn * CARRIED)
+        let ball = Aabb::around(self.observer_center, DVec3::splat(self.farthest(t0, t1) + x));
+        swept.intersection(&ball).grown(self.rounding(x, t0, t1))
+    }
+
+    /// Greatest distance of the two centres of rotation.
+    fn farthest(&self, t0: f64, t1: f64) -> f64 {
+        self.relative.difference(t0).length().max(self.relative.difference(t1).length())
+    }
+
+    /// Rounding of carried points at distances up to `x` from the mover's centre (angles round in proportion to themselves).
+    fn rounding(&self, x: f64, t0: f64, t1: f64) -> f64 {
+        let scale = self.farthest(t0, t1) + x + self.mover_center.length() + self.observer_center.length();
+        scale * (1.0 + self.spin + self.observer_spin) * CARRIED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contactd_proto::{Motion, Pose};
+    use glam::DQuat;
+
+    /// A ball around a point off the centre of rotation, turned by quarters (rounded as callers round them): its path is a
+    /// point on the face of the cube around the centre.
+    #[test]
+    fn a_swept_ball_holds_its_ball_however_it_is_turned() {
+        let quarter = std::f64::consts::FRAC_1_SQRT_2;
+        let turns = [
+            0.0,
+            1.0,
+            quarter,
+            -quarter,
+            f64::from_bits(quarter.to_bits() + 1),
+            -f64::from_bits(quarter.to_bits() - 1),
+        ];
+        let at_rest = Placed { place: Pose::IDENTITY, motion: Motion::resting(Pose::IDENTITY) };
+        let mut cases = 0;
+        for i in 0..6u32.pow(4) {
+            let digit = |k: u32| turns[(i / 6u32.pow(k) % 6) as usize];
+            let q = DQuat::from_xyzw(digit(0), digit(1), digit(2), digit(3));
+            if (q.length_squared() - 1.0).abs() > 1e-9 {
+                continue;
+            }
+            let start = Pose::new(DVec3::new(-3.3219316049759318, 17.168436174577245, 11.360089680668677), q);
+            let mover = Placed { place: Pose::IDENTITY, motion: Motion::resting(start) };
+            for (center, radius) in [(-3.1185695185063014, 13.464216446241402), (-3.1185695185063014, 0.0), (0.1, 1.0)]
+            {
+                let swept = Sweep::new(mover, at_rest).of_ball(&Ball { center: DVec3::Z * center, radius }, 0.0, 1.0);
+                let x = start.point(DVec3::Z * center);
+                assert!(swept.contains(x - radius) && swept.contains(x + radius), "{q}: {swept:?} without {x}");
+                cases += 1;
+            }
+        }
+        assert!(cases > 100, "{cases}");
     }
 }
