@@ -30,6 +30,7 @@ impl Question<'_> {
             resolution: default_resolution(self.a, self.b),
             cell_limit: DEFAULT_CELL_LIMIT,
             ideas,
+            penetration: true,
         };
         earliest_contact(&query, scratch)
     }

@@ -113,6 +113,7 @@ impl Check {
                         resolution: p.outcome.resolution,
                         cell_limit: CERTIFICATE_CELLS,
                         ideas: Ideas::default(),
+                        penetration: true,
                     };
                     certificate::certify(&query, &p.outcome)
                 }

@@ -30,6 +30,7 @@ pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64
         resolution: resolution.unwrap_or_else(|| default_resolution(a.0, b.0)),
         cell_limit: CELL_LIMIT,
         ideas,
+        penetration: true,
     };
     earliest_contact(&query, &mut Scratch::default())
 }

@@ -236,6 +236,7 @@ fn a_pair_stops_at_its_limit_with_what_is_proven_by_then() {
             resolution: default_resolution(&models[0], &models[1]),
             cell_limit: limit,
             ideas: Ideas::default(),
+            penetration: true,
         };
         earliest_contact(&query, &mut Scratch::default())
     };

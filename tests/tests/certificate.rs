@@ -33,6 +33,7 @@ fn certified(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>, ce
         resolution: resolution.unwrap_or_else(|| default_resolution(&model_a, &model_b)),
         cell_limit,
         ideas: Default::default(),
+        penetration: true,
     };
     let outcome = earliest_contact(&query, &mut Scratch::default());
     let text = certify(&PairQuery { cell_limit: CELLS, ..query }, &outcome).map(|c| {

@@ -41,6 +41,7 @@ impl Rest {
             resolution: default_resolution(&self.a, &self.b),
             cell_limit: 100_000,
             ideas: Ideas::default(),
+            penetration: true,
         }
     }
 

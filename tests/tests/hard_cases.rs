@@ -469,6 +469,7 @@ fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
             resolution: 1e-9,
             cell_limit: contactd_tests::engine::CELL_LIMIT,
             ideas: Ideas { region: false, walk: false, ..Ideas::default() },
+            penetration: true,
         };
         let o = earliest_contact(&query, &mut Scratch::default());
         let time = (angle - 0.15f64.asin()) / spin.z;

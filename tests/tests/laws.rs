@@ -493,6 +493,7 @@ fn memory_that_was_used_before_changes_no_bit() {
             resolution: scene.resolution.unwrap_or_else(|| default_resolution(&a, &b)),
             cell_limit: engine::CELL_LIMIT,
             ideas: Default::default(),
+            penetration: true,
         };
         same_bits(o, &earliest_contact(&query, &mut scratch.borrow_mut()), "warm")
     });

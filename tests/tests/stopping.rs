@@ -53,6 +53,7 @@ impl Table {
             resolution: self.delta,
             cell_limit: CELLS,
             ideas: Ideas::default(),
+            penetration: true,
         };
         let o = earliest_contact(&query, &mut self.scratch);
         assert!(

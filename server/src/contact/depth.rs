@@ -21,6 +21,9 @@ use glam::DVec3;
 /// Trust boxes tried before the climb ends.
 const ROUNDS: usize = 200;
 
+/// The same where the deepest point is not asked for.
+const GLIMPSE: usize = 2;
+
 /// A point this much deeper, relative to the depth, is worth another climb.
 const BETTER: f64 = 1e-3;
 
@@ -82,14 +85,23 @@ fn lower(task: &Task, at: &Instant, far: f64, work: &Work, mut found: impl FnMut
     cover.is_done()
 }
 
+/// A common point near `start` with a direction and a depth that is proven for it: enough to say that two bodies overlap.
+pub fn some(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
+    climb_for(GLIMPSE, task, at, start, work)
+}
+
 /// Climbs from `start` to a locally deepest point; negative depth: the nearest to common.
 pub fn climb(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
+    climb_for(ROUNDS, task, at, start, work)
+}
+
+fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
     let f = |x: DVec3| separation::value(task, at, x);
     let (mut x, mut best) = (start, f(start));
     let mut size = 0.5 * task.scale;
     let mut scratch = clause::Scratch::default();
     let mut support: Vec<(Side, LiteralId, f64)> = Vec::new();
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         if size < 1e-13 * task.scale {
             break;
         }

@@ -4,6 +4,7 @@
 
 pub mod certificate;
 pub mod clause;
+pub mod clearance;
 pub mod closed;
 mod depth;
 mod direct;
@@ -24,6 +25,8 @@ mod tests;
 mod work;
 
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
-pub use pair::{Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact};
+pub use pair::{
+    Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, resolution_of,
+};
 pub use region::{Region, RegionPoint, Regions};
 pub use search::Scratch;

@@ -38,6 +38,8 @@ pub struct PairQuery<'a> {
     pub cell_limit: u64,
     /// Ideas of the search that are switched on: all, unless their worth is measured.
     pub ideas: Ideas,
+    /// Of an overlap at the start the deepest point is looked for; otherwise the first common point found is told.
+    pub penetration: bool,
 }
 
 impl PairQuery<'_> {
@@ -79,6 +81,11 @@ pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
 /// 1e-9 of the larger bounding radius of the two models.
 pub fn default_resolution(a: &Model, b: &Model) -> f64 {
     tolerance::DEFAULT_RESOLUTION * a.radius.max(b.radius)
+}
+
+/// The resolution that a question's answer will tell: its own, or the least that its rounding allows.
+pub fn resolution_of(query: &PairQuery) -> f64 {
+    PairSearch::task(query).0.delta
 }
 
 /// Searches a pair to its end.
@@ -154,12 +161,14 @@ impl<'a> PairSearch<'a> {
             model_a,
             model_b,
             ideas: query.ideas,
+            penetration: query.penetration,
             relative,
             delta: resolution,
             rounding,
             nearly: rounding,
             scale,
             still: false,
+            lead: 0.0,
             limit: query.cell_limit,
         };
         (task, swapped)
@@ -455,13 +464,14 @@ pub(super) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Exten
     }
 }
 
-/// Overlap at the start: from a common point to the deepest one.
+/// Overlap at the start: from a common point to the deepest one, where that is asked for.
 fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     o.status = Status::Overlap;
     (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
     let at = task.relative.at(0.0);
     let work = Work::new(task.limit.min(depth::MOST_CELLS));
-    let ((deepest, normal, depth, faces), _) = depth::deepest(task, &at, x, &work);
+    let (deepest, normal, depth, faces) =
+        if task.penetration { depth::deepest(task, &at, x, &work).0 } else { depth::some(task, &at, x, &work) };
     o.counters.instant_cells += work.cells();
     o.point = task.relative.world_point(&at, deepest);
     o.normal = (at.world_from_a * normal).normalize();

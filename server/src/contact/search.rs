@@ -163,6 +163,8 @@ pub struct Task<'a> {
     pub model_b: &'a Model,
     /// Ideas of the search that are switched on.
     pub ideas: Ideas,
+    /// Of an overlap the deepest point is looked for.
+    pub penetration: bool,
     /// Motion of the pair.
     pub relative: Relative,
     /// Depth at which a contact is decided.
@@ -175,6 +177,8 @@ pub struct Task<'a> {
     pub scale: f64,
     /// Search only the instant t = 0.
     pub still: bool,
+    /// Everything is proven up to this long before the contact, a fraction of the step: 0 for an answer.
+    pub lead: f64,
     /// Cells that may be refined.
     pub limit: u64,
 }
@@ -303,7 +307,7 @@ impl<'a> Search<'a> {
     }
 
     fn goal(&self) -> f64 {
-        self.found.as_ref().map_or(f64::INFINITY, |f| f.goal)
+        self.found.as_ref().map_or(f64::INFINITY, |f| f.goal - self.task.lead)
     }
 
     /// Time until which a rival of the contact found may come; the goal or later.
@@ -915,7 +919,7 @@ impl<'a> Search<'a> {
 /// The depth at which witnesses are sought: delta and what rounding may take from it.
 pub(super) fn witness_level(delta: f64, rounding: f64) -> f64 {
     // Deep enough to be so after all rounding, with what Newton may leave.
-    delta * (1.0 + 1e-6) + 1.5 * rounding
+    delta + 1e-6 * delta.abs() + 1.5 * rounding
 }
 
 /// What a + b lost when it was rounded to `sum`, exactly (Knuth's two-sum).

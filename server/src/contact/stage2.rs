@@ -65,11 +65,13 @@ impl<'a> Search<'a> {
         let (t0, t1) = (cell.t, cell.until);
         let (placed_a, placed_b) = self.task.relative.placed();
         let (model_a, model_b) = (self.task.model_a, self.task.model_b);
+        // A clearance is a negative depth; bounds are kept for either.
+        let level = self.task.delta.abs();
         let mut region = None;
         if self.task.ideas.region {
-            let a = Operand { solid: self.task.a, bounds: &model_a.bounds, placed: placed_a };
-            let b = Operand { solid: self.task.b, bounds: &model_b.bounds, placed: placed_b };
-            let Some(found) = locate(&a, &b, t0, t1, self.task.delta) else { return };
+            let a = Operand { solid: self.task.a, bounds: model_a.bounds_for(level), placed: placed_a };
+            let b = Operand { solid: self.task.b, bounds: model_b.bounds_for(level), placed: placed_b };
+            let Some(found) = locate(&a, &b, t0, t1, level) else { return };
             let left = found.a.primitives + found.b.primitives;
             let span = found.a.aabb.half().length().min(found.b.aabb.half().length());
             let bounds = self.task.relative.bounds(t0, t1 - t0, self.task.scale);
@@ -89,11 +91,12 @@ impl<'a> Search<'a> {
         {
             return;
         }
-        let box_a = region.as_ref().map_or(Aabb::ALL, |r| r.a.aabb).intersection(&model_a.bounds.root().aabb);
-        let box_b = region.as_ref().map_or(Aabb::ALL, |r| r.b.aabb).intersection(&model_b.bounds.root().aabb);
+        let box_a =
+            region.as_ref().map_or(Aabb::ALL, |r| r.a.aabb).intersection(&model_a.bounds_for(level).root().aabb);
+        let box_b =
+            region.as_ref().map_or(Aabb::ALL, |r| r.b.aabb).intersection(&model_b.bounds_for(level).root().aabb);
         // Octree and bounds keep f only up to their margin; a coarser resolution works on whole trees.
-        let delta = self.task.delta;
-        let fine = delta <= model_a.margin() && delta <= model_b.margin();
+        let fine = level <= model_a.margin() && level <= model_b.margin();
         let finite = model_a.eco.root().half.is_finite() && model_b.eco.root().half.is_finite();
         if !(self.task.ideas.walk && fine && finite) {
             // Without stage 2 the region as a whole is all that stage 3 knows.
@@ -102,7 +105,7 @@ impl<'a> Search<'a> {
         }
         let roots = roots::alternatives(self.task.a, &a, &box_a, MOST_ALTERNATIVES);
         let detail = Detail { finest: f64::INFINITY, ..Detail::default() };
-        let walk = Walk::new((model_a, placed_a), (model_b, placed_b), region, delta, detail);
+        let walk = Walk::new((model_a, placed_a), (model_b, placed_b), region, level, detail);
         let ends = self.ends(&walk, t0, t1);
         for root in &roots {
             if let Some((time, in_a, in_b)) = self.met(root, &ends) {

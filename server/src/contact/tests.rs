@@ -64,6 +64,7 @@ fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, ideas: Ide
         resolution: default_resolution(a, b),
         cell_limit: 300_000,
         ideas,
+        penetration: true,
     };
     let began = std::time::Instant::now();
     let o = earliest_contact(&q, &mut Scratch::default());
@@ -267,6 +268,7 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             resolution: default_resolution(&fork, &plate),
             cell_limit: 1000,
             ideas: Ideas::default(),
+            penetration: true,
         };
         let (task, _) = PairSearch::task(&query);
         let mut search = search::Search::new(task, Scratch::default());

@@ -19,10 +19,11 @@ pub use tables::{Kind, Meet, meet};
 pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 
 use crate::bound::SBounds;
-use crate::math::tolerance::MODEL_MARGIN;
+use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};
 use crate::solid::local::{Token, Truth};
 use crate::solid::{Face, Solid};
 use glam::DVec3;
+use std::sync::OnceLock;
 
 /// A solid with what was preprocessed for it. Shared by all objects that use it.
 #[derive(Debug)]
@@ -39,6 +40,8 @@ pub struct Model {
     pub extents: [f64; 2],
     /// Largest `Face::reach` of its faces: a cone's apex may lie far outside.
     pub face_reach: f64,
+    /// S-bounds for clearances, with a margin of `WIDE_MARGIN` times the radius; taken when first asked for.
+    wide: OnceLock<SBounds>,
 }
 
 impl Model {
@@ -60,7 +63,16 @@ impl Model {
         } else {
             [aabb.min.abs().max(aabb.max.abs()), aabb.half()].map(DVec3::length)
         };
-        Self { solid, bounds, eco, radius, extents, face_reach }
+        Self { solid, bounds, eco, radius, extents, face_reach, wide: OnceLock::new() }
+    }
+
+    /// S-bounds that tell the truth about f up to a depth or distance of `level` (a length), the closest there are; those
+    /// with the widest margin where even that is less.
+    pub fn bounds_for(&self, level: f64) -> &SBounds {
+        if level <= self.margin() || self.radius.is_infinite() {
+            return &self.bounds;
+        }
+        self.wide.get_or_init(|| SBounds::new(&self.solid, WIDE_MARGIN * self.radius))
     }
 
     /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.

@@ -74,6 +74,11 @@ impl Aabb {
         !self.intersection(other).is_empty()
     }
 
+    /// Distance of two boxes; 0 where they share a point, infinite from an empty one.
+    pub fn distance(&self, other: &Self) -> f64 {
+        (self.min - other.max).max(other.min - self.max).max(DVec3::ZERO).length()
+    }
+
     /// The box moved outwards by `margin` on every side.
     pub fn grown(&self, margin: f64) -> Self {
         if self.is_empty() {

@@ -37,6 +37,10 @@ pub const BOUND_PROGRESS: f64 = 1e-3;
 /// every sensible resolution (also that of a partner ten thousand times larger), far below every voxel.
 pub const MODEL_MARGIN: f64 = 1e-5;
 
+/// The same for the bounds that proofs of a clearance use: coherence over steps works with gaps of this order, and wider
+/// bounds would tell the parts of a model apart less well.
+pub const WIDE_MARGIN: f64 = 1.0 / 128.0;
+
 /// Relative rounding of a point carried through a few rotations and translations.
 pub const CARRIED: f64 = 64.0 * f64::EPSILON;
 

@@ -135,23 +135,56 @@ impl Body {
         motion.velocity.length() + turning
     }
 
-    /// A box that holds the body over the whole of its last motion.
-    pub fn swept(&self) -> Aabb {
+    /// Distance of its farthest corner from the object's origin; infinite for an unbounded model.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// How far the farthest of its points gets in the first part `s` of its motion, at most: |v|·s along, and the chord of
+    /// the angle around, 2 sin(θ/2) <= min(θ, 2).
+    pub fn travel(&self, s: f64) -> f64 {
+        let m = &self.track.motion;
+        let angle = m.spin.length() * s;
+        let turning = if angle == 0.0 { 0.0 } else { angle.min(2.0) * self.reach };
+        (m.velocity.length() * s + turning) * (1.0 + 1e-15)
+    }
+
+    /// How far the farthest of its points is displaced from one pose to another, at most.
+    pub fn displacement(&self, from: &Pose, to: &Pose) -> f64 {
+        let r = to.rotation * from.rotation.conjugate();
+        let half = DVec3::new(r.x, r.y, r.z).length();
+        let turning = if half == 0.0 { 0.0 } else { 2.0 * half * self.reach };
+        let size = from.position.abs().max_element() + to.position.abs().max_element();
+        (to.position - from.position).length() + turning + (size + self.reach) * tolerance::BOX_ROUNDING
+    }
+
+    /// A box that holds the body at the start of its motion.
+    pub fn still(&self) -> Aabb {
+        let start = self.track.motion.start;
+        self.around(Aabb::of_points(self.corners.iter().map(|c| start.point(*c))))
+    }
+
+    /// A box of some of its points, right for unbounded and empty bodies too and rounded outwards.
+    fn around(&self, of_points: Aabb) -> Aabb {
         if self.reach.is_infinite() {
             return Aabb::ALL;
         }
         if self.corners.is_empty() {
             return Aabb::EMPTY;
         }
+        let size = of_points.min.abs().max(of_points.max.abs()).max_element() + self.reach;
+        of_points.grown(size * tolerance::BOX_ROUNDING)
+    }
+
+    /// A box that holds the body over the whole of its last motion.
+    pub fn swept(&self) -> Aabb {
         let m = &self.track.motion;
         let (first, last) = (m.at(0.0), m.at(1.0));
         let theta = m.spin.length();
         let ends = Aabb::of_points(self.corners.iter().flat_map(|c| [first.point(*c), last.point(*c)]));
         let arcs = ends.grown(self.reach * theta * theta / 8.0);
         let balls = Aabb::of_points([first.position, last.position]).grown(self.reach);
-        let swept = if theta == 0.0 { ends } else { arcs.intersection(&balls) };
-        let size = swept.min.abs().max(swept.max.abs()).max_element() + self.reach;
-        swept.grown(size * tolerance::BOX_ROUNDING)
+        self.around(if theta == 0.0 { ends } else { arcs.intersection(&balls) })
     }
 }
 

@@ -3,7 +3,8 @@
 //! A step checks its whole batch first and then takes it whole: a refused batch changes nothing. Every pair that rules
 //! allow and that the broad phase lets through is searched by itself, the smaller object id first, so the answer depends
 //! neither on the order of the batch nor on the order in which pairs are searched. What two swept boxes exclude is
-//! proven clear: the broad phase is part of the certificate, not a filter by taste.
+//! proven clear: the broad phase is part of the certificate, not a filter by taste. What earlier steps have proven of a
+//! pair (`neighbours`, `coherence`) spares its search and changes no answer.
 //!
 //! Invariant: ids are never used again; pairs of two static bodies never exist; buffers are kept from step to step.
 //! It does not know files, sockets or wire layouts other than the two record types.
@@ -12,6 +13,8 @@
 
 pub mod body;
 pub mod broad;
+mod coherence;
+mod neighbours;
 pub mod plan;
 pub mod record;
 pub mod scene;

@@ -128,6 +128,7 @@ impl World {
         let group = self.plans.group(&spec.group);
         self.by_id.insert(spec.id, self.bodies.len() as u32);
         self.bodies.push(Body::new(spec, group));
+        self.state.extend();
         Ok(())
     }
 
@@ -143,6 +144,7 @@ impl World {
         for (i, body) in self.bodies.iter().enumerate().skip(index as usize) {
             self.by_id.insert(body.id, i as u32);
         }
+        self.forget();
         Ok(())
     }
 
@@ -158,6 +160,7 @@ impl World {
             }
         }
         self.plans.set(rules);
+        self.forget();
         Ok(())
     }
 
@@ -173,6 +176,7 @@ impl World {
         }
         check_resolution(resolution, self.smallest, self.coarsest)?;
         self.resolution = resolution;
+        self.forget();
         Ok(())
     }
 
@@ -196,7 +200,13 @@ impl World {
         for (index, (_, track)) in places.into_iter().zip(tracks) {
             self.bodies[index as usize].track = *track;
         }
+        self.forget();
         Ok(())
+    }
+
+    /// Forgets what was proven in earlier steps. It changes no answer, only the work of the next ones.
+    pub fn forget(&mut self) {
+        self.state.forget(&self.bodies);
     }
 
     /// Which of two bodies' pairs is searched and how: `None` when rules or two static bodies rule it out.

@@ -2,25 +2,32 @@
 //!
 //! A job reads two bodies and writes its own outcome: jobs may run in any order and on any thread without changing a bit.
 //!
-//! Work is bounded by counted cells, for each pair and for the batch. The jobs are searched one by one as long as the
-//! batch's limit holds; if their sum, which does not depend on their order, goes beyond it, everything is searched anew
-//! under one queue, the pair that may meet earliest first. So the limit is spent on what comes first, and the latest pairs
-//! stay undecided, each with the time up to which it is proven free.
+//! Work is bounded by counted cells, for each pair and for the batch. The jobs are searched each by itself, on all
+//! threads, as long as the batch's limit holds; if their sum, which does not depend on their order, goes beyond it,
+//! everything is searched anew under one queue, the pair that may meet earliest first. So the limit is spent on what
+//! comes first, and the latest pairs stay undecided, each with the time up to which it is proven free.
 
 use super::body::Body;
+use super::coherence::{Finding, Knowledge, Question};
 use super::plan::PairPlan;
 use super::step::StepOptions;
 use crate::contact::{self, Outcome, PairQuery, PairSearch, Scratch, Status};
 use crate::math::tolerance;
 use crate::motion::Placed;
 use contactd_proto::{Detect, Motion};
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 pub(super) use crate::contact::default_resolution;
 
-/// A pair to search: indices of its bodies, the one with the smaller id first.
-#[derive(Clone, Copy, Debug)]
+/// With fewer pairs to ask about than this one thread is done before others wake up.
+const WORTH_SHARING: usize = 8;
+
+/// A pair of the step: indices of its bodies, the one with the smaller id first.
+#[derive(Debug)]
 pub struct PairJob {
     /// Index of the body with the smaller id.
     pub a: u32,
@@ -32,57 +39,115 @@ pub struct PairJob {
     pub resolution: f64,
     /// The swept boxes meet; otherwise they prove the pair clear.
     pub near: bool,
+    /// Its place in the list of neighbours; `None`: proven clear without being asked about.
+    pub pair: Option<usize>,
+    /// What earlier steps have proven; lent by the list of neighbours.
+    pub knowledge: Knowledge,
+    /// The answer.
+    pub found: Finding,
+}
+
+impl PairJob {
+    /// A pair that is clear unless it is asked about and turns out otherwise.
+    pub fn new(
+        (a, b): (u32, u32),
+        plan: PairPlan,
+        resolution: f64,
+        near: bool,
+        pair: Option<usize>,
+        knowledge: Knowledge,
+    ) -> Self {
+        let known = pair.is_none();
+        let found = Finding { outcome: Outcome::clear(resolution), room: 0.0, known, apart: known };
+        Self { a, b, plan, resolution, near, pair, knowledge, found }
+    }
+
+    fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
+        let query = query(bodies, self, options);
+        let pair = [self.a, self.b].map(|i| &bodies[i as usize]);
+        Question { bodies: pair, query, margin: self.plan.margin, clock }
+    }
+
+    fn take(&mut self, q: &Question, outcome: Outcome) {
+        self.knowledge.learn(q, &outcome);
+        self.found = Finding { outcome: finished(self, outcome), room: 0.0, known: false, apart: false };
+    }
 }
 
 /// Memory of the searches, kept from step to step.
 #[derive(Debug, Default)]
 pub struct Memory {
-    outcomes: Vec<Outcome>,
-    scratch: Scratch,
-    /// Cells that the batch's limit left.
-    left: u64,
+    /// One for each thread.
+    scratches: Vec<Mutex<Scratch>>,
 }
 
 impl Memory {
-    /// Outcomes of the last run, in the order of its jobs.
-    pub fn outcomes(&self) -> &[Outcome] {
-        &self.outcomes
-    }
-
-    /// Cells that the last run left of the batch's limit.
-    pub fn left(&self) -> u64 {
-        self.left
+    /// The calling thread's scratch.
+    fn with<T>(&self, work: impl FnOnce(&mut Scratch) -> T) -> T {
+        let own = rayon::current_thread_index().map_or(0, |i| i + 1);
+        let mut scratch = self.scratches[own].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        work(&mut scratch)
     }
 }
 
-/// Searches every job to its end; when only the first contact is asked for, none further than that needs.
-pub fn run(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, memory: &mut Memory) {
-    memory.outcomes.clear();
-    if options.first && !options.clear {
-        return run_queue(bodies, jobs, options, true, memory);
+/// Searches every pair to its end; when only the first contact is asked for, none further than that needs.
+pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: f64, memory: &mut Memory) {
+    let threads = rayon::current_num_threads();
+    if memory.scratches.len() <= threads {
+        memory.scratches.resize_with(threads + 1, Mutex::default);
     }
-    let mut left = batch_limit(options);
-    for job in jobs {
-        let outcome = if job.near {
-            let mut query = query(bodies, job, options);
-            let beyond = query.cell_limit > left;
-            query.cell_limit = query.cell_limit.min(left);
-            let outcome = contact::earliest_contact(&query, &mut memory.scratch);
-            if beyond && outcome.status == Status::Undecided {
-                memory.outcomes.clear();
-                return run_queue(bodies, jobs, options, false, memory);
+    let memory = &*memory;
+    let first = options.first && !options.clear;
+    let most = batch_limit(options);
+    let (spent, beyond) = (AtomicU64::new(0), AtomicBool::new(false));
+    let work = |job: &mut PairJob| {
+        if job.pair.is_none() || beyond.load(Relaxed) {
+            return;
+        }
+        let mut q = job.question(bodies, options, clock);
+        let cells = memory.with(|scratch| {
+            let (known, counters) = job.knowledge.ask(&q, scratch);
+            if let Some(finding) = known {
+                job.found = Finding { outcome: finished(job, finding.outcome), ..finding };
+                return 0;
             }
-            left = left.saturating_sub(outcome.counters.cells);
-            finished(job, outcome)
-        } else {
-            Outcome::clear(job.resolution)
-        };
-        memory.outcomes.push(outcome);
+            job.found.known = false;
+            if first {
+                return 0;
+            }
+            let cut = q.query.cell_limit > most;
+            q.query.cell_limit = q.query.cell_limit.min(most);
+            let mut outcome = contact::earliest_contact(&q.query, scratch);
+            let cells = outcome.counters.cells;
+            if cut && outcome.status == Status::Undecided {
+                beyond.store(true, Relaxed);
+            }
+            outcome.counters += counters;
+            job.take(&q, outcome);
+            cells
+        });
+        if spent.fetch_add(cells, Relaxed) + cells > most {
+            beyond.store(true, Relaxed);
+        }
+    };
+    if threads > 1 && jobs.len() >= WORTH_SHARING {
+        jobs.par_iter_mut().for_each(work);
+    } else {
+        jobs.iter_mut().for_each(work);
     }
-    memory.left = left;
+    if first || beyond.into_inner() {
+        run_queue(bodies, jobs, options, first, clock);
+    }
+    if options.clear {
+        // A line for each pair, the same whether it was searched or known.
+        for job in jobs.iter_mut().filter(|job| job.near && job.found.known) {
+            job.found.outcome.resolution = contact::resolution_of(&query(bodies, job, options));
+        }
+    }
 }
 
-fn batch_limit(options: &StepOptions) -> u64 {
+/// Cells that the searches of a step may refine together.
+pub(super) fn batch_limit(options: &StepOptions) -> u64 {
     if options.batch_limit == 0 { DEFAULT_BATCH_LIMIT } else { options.batch_limit }
 }
 
@@ -90,21 +155,21 @@ fn batch_limit(options: &StepOptions) -> u64 {
 /// another is in front. Where only the first contact is asked for, the one found bounds how far any other needs to be
 /// searched; a pair that is left unfinished is clear until later than that, which is all that is said of it. Once the
 /// batch's cells are spent every pair that needs more of them is undecided.
-fn run_queue(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, first: bool, memory: &mut Memory) {
-    let searches = jobs.iter().map(|job| PairSearch::new(&query(bodies, job, options), Scratch::default()));
+fn run_queue(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, first: bool, clock: f64) {
+    let mut open: Vec<&mut PairJob> = jobs.iter_mut().filter(|job| job.pair.is_some() && !job.found.known).collect();
+    let questions: Vec<Question> = open.iter().map(|job| job.question(bodies, options, clock)).collect();
+    let searches = questions.iter().map(|q| PairSearch::new(&q.query, Scratch::default()));
     let mut searches: Vec<PairSearch> = searches.collect();
-    memory.outcomes.extend(jobs.iter().map(|job| Outcome::clear(job.resolution)));
     // All times are >= 0, so their bits order as they do; ties go to the smaller pair.
-    let near = (0..jobs.len()).filter(|i| jobs[*i].near);
-    let mut queue: BinaryHeap<Reverse<(u64, usize)>> = near.map(|i| Reverse((0, i))).collect();
+    let mut queue: BinaryHeap<Reverse<(u64, usize)>> = (0..open.len()).map(|i| Reverse((0, i))).collect();
     let mut horizon = f64::INFINITY;
     let mut left = batch_limit(options);
     while let Some(Reverse((key, i))) = queue.pop() {
         let time = f64::from_bits(key);
         let search = &mut searches[i];
         if time > horizon {
-            memory.outcomes[i].time_lower = time.min(1.0);
-            memory.outcomes[i].counters = search.counters();
+            let outcome = Outcome { time_lower: time.min(1.0), counters: search.counters(), ..open[i].found.outcome };
+            open[i].found.outcome = outcome;
             continue;
         }
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
@@ -114,15 +179,13 @@ fn run_queue(bodies: &[Body], jobs: &[PairJob], options: &StepOptions, first: bo
         match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
-                let outcome = finished(&jobs[i], outcome);
-                if first && !jobs[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
-                    horizon = horizon.min(outcome.time_upper + tolerance::FIRST_SLACK);
+                if first && !open[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
+                    horizon = horizon.min(finished(open[i], outcome).time_upper + tolerance::FIRST_SLACK);
                 }
-                memory.outcomes[i] = outcome;
+                open[i].take(&questions[i], outcome);
             }
         }
     }
-    memory.left = left;
 }
 
 /// Cells that all pairs of a step together may cost by default: sixteen pairs at their own limit.
@@ -141,6 +204,7 @@ pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions
         resolution: job.resolution,
         cell_limit: if options.cell_limit == 0 { contact::DEFAULT_CELL_LIMIT } else { options.cell_limit },
         ideas: contact::Ideas::default(),
+        penetration: job.plan.penetration,
     }
 }
 

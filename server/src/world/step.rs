@@ -5,7 +5,7 @@
 //! a, b); nothing in them depends on the order of records or of searches.
 
 use super::body::Body;
-use super::broad::BroadPhase;
+use super::neighbours::Neighbours;
 use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
@@ -109,8 +109,10 @@ pub struct StepOutcome {
     pub undecided: bool,
     /// Some pair meets or overlaps.
     pub contact: bool,
-    /// Pairs that were searched.
+    /// Pairs that were searched, or answered by what was known of them.
     pub searched: u32,
+    /// Those of them that what was known has answered. Pairs that their odometers prove apart are not even counted.
+    pub known: u32,
     /// `EFFECT_…` bits of what ran.
     pub effects: u32,
     /// Work of all searches.
@@ -128,8 +130,15 @@ pub struct StepState {
     serial: u64,
     orders: Vec<(u32, Order)>,
     staged: Vec<(u32, Track)>,
-    boxes: Vec<Aabb>,
-    broad: BroadPhase,
+    /// Bodies that moved in the last step.
+    moving: Vec<u32>,
+    /// When the step begins, in steps taken.
+    clock: f64,
+    neighbours: Neighbours,
+    /// Swept boxes, each with the serial of the step it was taken for.
+    boxes: Vec<(u64, Aabb)>,
+    /// Neighbours that their odometers don't prove apart.
+    asked: Vec<usize>,
     jobs: Vec<PairJob>,
     searches: search::Memory,
     outcome: StepOutcome,
@@ -142,12 +151,27 @@ impl StepState {
             serial: 0,
             orders: Vec::new(),
             staged: Vec::new(),
+            moving: Vec::new(),
+            clock: 0.0,
+            neighbours: Neighbours::default(),
             boxes: Vec::new(),
-            broad: BroadPhase::default(),
+            asked: Vec::new(),
             jobs: Vec::new(),
             searches: search::Memory::default(),
             outcome: StepOutcome::default(),
         }
+    }
+
+    /// There are more bodies than before; what is known of the others stays true.
+    pub(super) fn extend(&mut self) {
+        self.neighbours.extend();
+    }
+
+    /// Bodies, their places or the rules have changed: nothing is known any more.
+    pub(super) fn forget(&mut self, bodies: &[Body]) {
+        self.neighbours.forget();
+        self.moving.clear();
+        self.moving.extend((0..bodies.len()).filter(|i| !bodies[*i].track.is_rest()).map(|i| i as u32));
     }
 }
 
@@ -232,75 +256,120 @@ impl World {
 
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
-        for body in self.bodies.iter_mut().filter(|body| !body.track.is_rest()) {
-            body.track = Track::resting(body.track.at(options.advance));
+        let Self { bodies, state, .. } = self;
+        state.clock += options.advance;
+        state.neighbours.count(bodies.len());
+        for index in state.moving.drain(..) {
+            let body = &mut bodies[index as usize];
+            let mut way = 0.0;
+            if !body.track.is_rest() {
+                way = body.travel(options.advance);
+                body.track = Track::resting(body.track.at(options.advance));
+            }
+            state.neighbours.moved(index, way, 0.0);
         }
-        for (index, track) in self.state.staged.drain(..) {
-            self.bodies[index as usize].track = track;
+        for (index, track) in state.staged.drain(..) {
+            let body = &mut bodies[index as usize];
+            let (was, start) = (body.track.end, track.motion.start);
+            let jump = if was == start { 0.0 } else { body.displacement(&was, &start) };
+            body.track = track;
+            state.neighbours.moved(index, jump, body.travel(1.0));
+            state.moving.push(index);
         }
     }
 
-    /// Fills the jobs: the pairs to search, in the order of their ids.
+    /// Fills the jobs: the pairs to ask about, in the order of their ids; every pair when all are to be told.
     fn find_pairs(&mut self, options: &StepOptions) {
-        let margin = 0.5 * self.plans.largest_margin();
+        let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
+        let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
-        boxes.clear();
-        boxes.extend(self.bodies.iter().map(|body| {
-            // Touching is told within twice the resolution, of which this body answers for its share.
-            let touch = 2.0 * self.resolution.unwrap_or(body.part.resolution);
-            body.swept().grown(margin + touch)
-        }));
-        jobs.clear();
-        let mut broad = std::mem::take(&mut self.state.broad);
-        let mut job = |i: u32, j: u32, near: bool| {
-            let (i, j) = (i.min(j), i.max(j));
-            if let Some(plan) = self.pair_plan(i, j) {
-                jobs.push(PairJob { a: i, b: j, plan, resolution: self.resolution_of(i, j), near });
+        let plan = |i: u32, j: u32| Some((self.pair_plan(i, j)?, self.resolution_of(i, j)));
+        neighbours.update(&self.bodies, &self.state.moving, |body| self.touch(body), plan);
+        boxes.resize(self.bodies.len(), (0, Aabb::EMPTY));
+        let mut swept = |i: u32| {
+            let (serial, place) = &mut boxes[i as usize];
+            if *serial != self.state.serial {
+                let body = &self.bodies[i as usize];
+                (*serial, *place) = (self.state.serial, body.swept().grown(self.touch(body)));
             }
+            *place
         };
-        broad.run(&boxes, |i| self.bodies[i].is_static, |i, j| job(i, j, true));
+        jobs.clear();
         if options.clear {
             // The caller wants a line for every pair: the excluded ones are listed too.
-            for i in 0..boxes.len() {
-                for j in i + 1..boxes.len() {
-                    if !boxes[i].meets(&boxes[j]) {
-                        job(i as u32, j as u32, false);
+            let count = self.bodies.len() as u32;
+            for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
+                let Some((plan, resolution)) = plan(i, j) else { continue };
+                let near = swept(i).meets(&swept(j));
+                let pair = neighbours.find(i, j).filter(|pair| near && !neighbours.is_apart(*pair));
+                let knowledge = pair.map(|pair| neighbours.lend(pair)).unwrap_or_default();
+                jobs.push(PairJob::new((i, j), plan, resolution, near, pair, knowledge));
+            }
+        } else {
+            asked.clear();
+            neighbours.asked(|pair| asked.push(pair));
+            for &pair in &asked {
+                let (i, j) = neighbours.bodies(pair);
+                let entry = neighbours.entry(pair);
+                let (plan, resolution) = (entry.plan, entry.resolution);
+                neighbours.box_tests += 1;
+                let gap = swept(i).distance(&swept(j));
+                if gap > 0.0 {
+                    if plan.detect != Detect::Discrete {
+                        neighbours.note(pair, gap);
                     }
+                    continue;
                 }
+                let knowledge = neighbours.lend(pair);
+                jobs.push(PairJob::new((i, j), plan, resolution, true, Some(pair), knowledge));
             }
         }
-        jobs.sort_unstable_by_key(|job| (job.a, job.b));
+        self.state.neighbours = neighbours;
         self.state.boxes = boxes;
+        self.state.asked = asked;
         self.state.jobs = jobs;
-        self.state.broad = broad;
+    }
+
+    /// What a body's box grows by, so that boxes of bodies within their touching distance or a margin meet.
+    fn touch(&self, body: &Body) -> f64 {
+        // Touching is told within twice the resolution, of which this body answers for its share.
+        0.5 * self.plans.largest_margin() + 2.0 * self.resolution.unwrap_or(body.part.resolution)
     }
 
     /// Searches the jobs and orders what they found.
     fn search(&mut self, options: &StepOptions) {
         let Self { bodies, state, .. } = self;
         let out = &mut state.outcome;
-        search::run(bodies, &state.jobs, options, &mut state.searches);
+        search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches);
+        for job in &mut state.jobs {
+            if let Some(pair) = job.pair {
+                let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
+                state.neighbours.learned(pair, std::mem::take(&mut job.knowledge), room);
+            }
+        }
         *out = StepOutcome {
             pairs: std::mem::take(&mut out.pairs),
             regions: std::mem::take(&mut out.regions),
             safe_time: 1.0,
-            box_tests: state.broad.tests,
+            box_tests: state.neighbours.box_tests,
             ..StepOutcome::default()
         };
         out.pairs.clear();
         out.regions.clear();
         let mut earliest = f64::INFINITY;
-        let mut left = state.searches.left();
-        for (i, (job, found)) in state.jobs.iter().zip(state.searches.outcomes()).enumerate() {
-            let mut outcome = *found;
+        // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
+        let mut left = search::batch_limit(options);
+        for (i, job) in state.jobs.iter().enumerate() {
+            let mut outcome = job.found.outcome;
             let outcome = &mut outcome;
             let regions_complete = touch::decide(bodies, job, options, &mut left, outcome);
             out.counters += outcome.counters;
             out.searched += u32::from(job.near);
+            out.known += u32::from(job.near && job.found.known);
             out.effects |= effects_of(&job.plan, job.near);
             out.safe_time = out.safe_time.min(outcome.time_lower);
-            if job.plan.detect == Detect::Discrete && passes(job, bodies) {
+            if job.near && job.plan.detect == Detect::Discrete && passes(job, bodies) {
                 out.may_have_passed += u64::from(outcome.status == Status::Clear);
             }
             if matches!(outcome.status, Status::Contact | Status::Overlap) {
@@ -321,7 +390,7 @@ impl World {
                 });
             }
         }
-        out.undecided = state.searches.outcomes().iter().any(|o| is_undecided_before(o, earliest));
+        out.undecided = state.jobs.iter().any(|job| is_undecided_before(&job.found.outcome, earliest));
         if options.first {
             keep_first(&mut out.pairs);
         }

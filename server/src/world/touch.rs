@@ -34,7 +34,7 @@ pub(super) fn decide(
     left: &mut u64,
     outcome: &mut Outcome,
 ) -> bool {
-    if outcome.touching || !is_asked(job, options, outcome) {
+    if outcome.touching || job.found.apart || !is_asked(job, options, outcome) {
         return true;
     }
     let query = query(bodies, job, options, outcome, *left);

@@ -113,6 +113,7 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
         resolution,
         cell_limit: CELLS,
         ideas: Default::default(),
+        penetration: true,
     };
     let o = earliest_contact(&query, &mut Scratch::default());
     sound(&o)?;

@@ -41,6 +41,9 @@ use support::Body;
 const ROUNDS: usize = 24;
 /// Evaluations of φ that one proof may take.
 const PROOF: usize = 24;
+/// Distance evaluations that a proof of a kept distance may take, and the shortest time that another one is worth.
+const KEPT: u64 = 6;
+const SHORT: f64 = 1.0 / 32.0;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
 /// Gap, relative to the pair's scale, below which a contact is looked for.
@@ -173,6 +176,51 @@ pub(super) fn answer(search: &mut Search) -> Option<Ending> {
     if advance.never_near() { Some(Ending::Clear) } else { advance.run(search) }
 }
 
+/// Two solids that are one convex primitive each, to be asked how far apart they are.
+pub(super) struct Convex<'a> {
+    advance: Advance<'a>,
+    /// The distance at the start, in its direction.
+    start: Gap,
+}
+
+impl<'a> Convex<'a> {
+    /// `None` for other solids, and where no direction is found that separates them.
+    pub fn new(task: Task<'a>) -> Option<Self> {
+        let (a, b) = (whole(task.a)?, whole(task.b)?);
+        let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
+        let m = advance.moment(0.0);
+        let start = advance.widest(&m, m.b.support(DVec3::ZERO) - a.ball.center)?;
+        Some(Self { advance, start })
+    }
+
+    /// A lower bound of the distance at the start, but for rounding.
+    pub fn distance(&self) -> f64 {
+        self.start.phi
+    }
+
+    /// Time until which the distance stays above `least` (a length), at least; of how many evaluations it took.
+    pub fn keeps(mut self, least: f64) -> (f64, u64) {
+        self.advance.least = least;
+        let (mut here, mut count) = (self.start, 1);
+        while here.phi > least && count < KEPT {
+            let m = self.advance.moment(1.0);
+            let until = self.advance.proven(&here, &self.advance.gap(&m, here.n));
+            if until >= 1.0 {
+                return (1.0, count);
+            }
+            // From where this direction gives out another one.
+            let m = self.advance.moment(until);
+            let Some(next) = self.advance.widest(&m, m.at.world_from_a.transpose() * here.n) else { break };
+            count += 1;
+            if next.t - here.t < SHORT {
+                return (until, count);
+            }
+            here = next;
+        }
+        (here.t, count)
+    }
+}
+
 fn body_of(p: &Primitive) -> Option<Body<'_>> {
     Body::new(&p.shape, p.frame.matrix(), p.frame.position)
 }
@@ -246,6 +294,12 @@ impl<'a> Advance<'a> {
         let at = self.task.relative.at(t);
         let axes = at.b_from_a.transpose();
         Moment { at, b: self.b.1.seen(&axes, at.a_point(DVec3::ZERO)) }
+    }
+
+    /// The gap along the line of nearest points, looked for from a direction along A's axes.
+    fn widest(&self, m: &Moment, first: DVec3) -> Option<Gap> {
+        let found = nearest(&self.a.1, &m.b, first)?;
+        Some(self.gap(m, (m.at.world_from_a * found.normal).normalize()))
     }
 
     /// φ along a world direction.

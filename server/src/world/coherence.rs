@@ -1,0 +1,275 @@
+//! What is known of a pair from earlier steps, so that the next one need not be searched.
+//!
+//! Three kinds of knowledge, each a proof, the cheapest first:
+//! * room: apart by that much when it was measured. While the ways that both bodies have gone since (their odometers)
+//!   stay below it they cannot meet: one comparison (`neighbours`);
+//! * a course: both bodies were proven to keep a distance if they go on as they went. While their true motions stray from
+//!   it by less than the distance leaves room for they cannot meet, however far they go (`contact::clearance`);
+//! * the last question: asked again to the bit, it has the same answer.
+//!
+//! Knowledge only says "clear", or repeats an answer; everything else is searched as if nothing were known. So the
+//! answers are the same bits without it, and what was learned in which step never shows in them.
+//! Source of the odometer: algorithm section 7; of a course: conservative bounds on a deviation (`Deviation`).
+
+use super::body::Body;
+use crate::contact::{Counters, Outcome, PairQuery, Scratch, Status, clearance};
+use contactd_proto::Motion;
+use glam::{DQuat, DVec3};
+
+/// Longest course proven ahead, in steps.
+const LONGEST: f64 = 64.0;
+/// Convex bodies whose distance they could cover in no fewer steps than this need no course; what part of a shorter
+/// distance a course leaves for straying.
+const LONG: f64 = 6.0;
+const HALF: f64 = 0.5;
+/// First course of a pair, in steps.
+const FIRST: f64 = 4.0;
+/// Room of a pair's first course, relative to the smaller of both radii …
+const FIRST_ROOM: f64 = 1e-3;
+/// … the most …
+const MOST_ROOM: f64 = 1.0 / 80.0;
+/// … and the least that is tried, in resolutions.
+const LEAST_ROOM: f64 = 64.0;
+/// A course may cost this many cells …
+const CELLS: u64 = 64;
+/// … or this many times what the pair's last search did.
+const CELLS_FACTOR: u64 = 4;
+/// The end of a course is found to this part of a step.
+const LEAD: f64 = 0.25;
+/// Failed courses double the steps that pass before the next one is tried, up to two to this power.
+const MOST_WAIT: u32 = 6;
+
+/// Two bodies as they were expected to go.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Their motions over the step with which it begins.
+    motions: [Motion; 2],
+    /// When that step began, in steps.
+    begin: f64,
+    /// How many steps they are expected to go on like that; they stand afterwards.
+    steps: f64,
+    /// Until then, in steps, they keep their distance: `steps` at least means from then on.
+    until: f64,
+    /// How far they may stray together.
+    room: f64,
+}
+
+/// A question and its answer.
+#[derive(Clone, Copy, Debug)]
+struct Answer {
+    motions: [Motion; 2],
+    outcome: Outcome,
+}
+
+/// What is known of one pair.
+#[derive(Debug, Default)]
+pub struct Knowledge {
+    course: Option<Box<Course>>,
+    answer: Option<Box<Answer>>,
+    /// Steps and room of the next course; 0 until there was one.
+    steps: f64,
+    room: f64,
+    /// Failed courses in a row, and steps to let pass before the next one.
+    failures: u32,
+    wait: u32,
+    /// Cells of the last search; `None` before the first one and after any that was not clear.
+    cells: Option<u64>,
+}
+
+/// What was found out about a pair in a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Finding {
+    /// The answer.
+    pub outcome: Outcome,
+    /// Apart by more than the touching distance at the start of the step, by this much at least; not positive: unknown.
+    pub room: f64,
+    /// No search was needed.
+    pub known: bool,
+    /// Known to stay farther apart than the touching distance.
+    pub apart: bool,
+}
+
+/// A pair in a step.
+pub struct Question<'a> {
+    /// Its bodies, that of the smaller id first.
+    pub bodies: [&'a Body; 2],
+    /// What is asked of the search.
+    pub query: PairQuery<'a>,
+    /// Separation up to which touching is told.
+    pub margin: f64,
+    /// When the step begins, in steps.
+    pub clock: f64,
+}
+
+impl Knowledge {
+    /// Answers from what is known, or from what little work makes known; `None`: search. `counters` counts the work.
+    fn recall(
+        &mut self,
+        q: &Question,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> Option<(Outcome, Option<f64>)> {
+        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
+        if let Some(last) = &self.answer
+            && last.motions == motions
+        {
+            return Some((last.outcome, None));
+        }
+        let clear = Outcome::clear(q.query.resolution);
+        if let Some(course) = &self.course {
+            match course.strays(q) {
+                Some(way) if way < course.room => return Some((clear, Some(0.0))),
+                Some(_) if !course.is_over(q) => {
+                    // They stray: less far ahead, with more room.
+                    self.steps = (0.5 * self.steps).max(1.0);
+                    self.room = (4.0 * self.room).min(MOST_ROOM * q.size());
+                }
+                _ => self.steps = (2.0 * self.steps).min(LONGEST),
+            }
+            self.course = None;
+        }
+        // A pair that was never searched, or that met something, is searched first.
+        let cells = self.cells?;
+        if let Some(room) = clearance::room(&q.query, q.margin) {
+            counters.closed_forms += 1;
+            let travel = q.travel();
+            if room > LONG * travel || room > travel && self.wait > 0 {
+                self.wait = self.wait.saturating_sub(1);
+                return Some((clear, Some(room)));
+            }
+            // They will be near soon: how they go on is worth more than how far apart they are.
+            self.room = HALF * room;
+            if room > 0.0 && self.try_course(q, cells, scratch, counters) {
+                return Some((clear, Some(0.0)));
+            }
+            return (room > travel).then_some((clear, Some(room)));
+        }
+        self.try_course(q, cells, scratch, counters).then_some((clear, Some(0.0)))
+    }
+
+    /// Plans a course, unless others have failed of late.
+    fn try_course(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
+        if self.wait > 0 {
+            self.wait -= 1;
+            return false;
+        }
+        self.plan_course(q, cells, scratch, counters)
+    }
+
+    /// The answer to a question: what is known, or what little work makes known. `None`: it takes a search, whose
+    /// outcome is to be learned.
+    pub fn ask(&mut self, q: &Question, scratch: &mut Scratch) -> (Option<Finding>, Counters) {
+        let mut counters = Counters::default();
+        let found = self.recall(q, scratch, &mut counters);
+        let finding = found.map(|(outcome, room)| Finding {
+            outcome: Outcome { counters, ..outcome },
+            room: room.unwrap_or(0.0),
+            known: true,
+            apart: room.is_some(),
+        });
+        (finding, counters)
+    }
+
+    /// Tries to prove a course from here; true when it holds over this step at least.
+    fn plan_course(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
+        let size = q.size();
+        if self.steps == 0.0 {
+            self.steps = FIRST;
+        }
+        if self.room == 0.0 {
+            self.room = FIRST_ROOM * size;
+        }
+        self.room = self.room.max(LEAST_ROOM * q.query.resolution);
+        let mut query = q.query;
+        for body in [&mut query.a, &mut query.b] {
+            body.placed.motion.velocity *= self.steps;
+            body.placed.motion.spin *= self.steps;
+        }
+        query.cell_limit = CELLS.max(CELLS_FACTOR * cells).min(query.cell_limit);
+        let kept = clearance::keep(&query, q.margin, self.room, LEAD / self.steps, scratch);
+        *counters += kept.counters;
+        let until = if kept.until >= 1.0 { f64::INFINITY } else { kept.until * self.steps };
+        if until < 1.0 {
+            self.failures += 1;
+            self.wait = 1 << self.failures.min(MOST_WAIT);
+            self.steps = (0.5 * self.steps).max(1.0);
+            self.room *= 0.25;
+            return false;
+        }
+        self.failures = 0;
+        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
+        let course = Course { motions, begin: q.clock, steps: self.steps, until, room: kept.room };
+        self.course = Some(Box::new(course));
+        true
+    }
+
+    /// Learns from a search.
+    pub fn learn(&mut self, q: &Question, outcome: &Outcome) {
+        self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
+        if outcome.status == Status::Undecided {
+            self.answer = None;
+            return;
+        }
+        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
+        let answer = Answer { motions, outcome: *outcome };
+        match &mut self.answer {
+            Some(place) => **place = answer,
+            None => self.answer = Some(Box::new(answer)),
+        }
+    }
+}
+
+impl Question<'_> {
+    /// The smaller of both radii.
+    fn size(&self) -> f64 {
+        self.query.a.model.radius.min(self.query.b.model.radius)
+    }
+
+    /// How far the farthest points of both bodies go in the step.
+    fn travel(&self) -> f64 {
+        self.bodies.iter().map(|b| b.travel(1.0)).sum()
+    }
+}
+
+impl Course {
+    /// True once the bodies are expected to stand.
+    fn is_over(&self, q: &Question) -> bool {
+        q.clock - self.begin >= self.steps
+    }
+
+    /// How far both bodies stray from it over the step; `None` where nothing was proven.
+    fn strays(&self, q: &Question) -> Option<f64> {
+        let begin = q.clock - self.begin;
+        let end = begin + 1.0;
+        // A step that begins before the bodies are expected to stand and ends later has a bend in it.
+        let stands = self.is_over(q);
+        if !stands && end > self.steps.min(self.until) || stands && self.until < f64::INFINITY {
+            return None;
+        }
+        let mut sum = 0.0;
+        let now = [q.query.a.placed.motion, q.query.b.placed.motion];
+        for ((expected, motion), body) in self.motions.iter().zip(&now).zip(q.bodies) {
+            let time = begin.min(self.steps);
+            let (velocity, spin) = if stands { (DVec3::ZERO, DVec3::ZERO) } else { (expected.velocity, expected.spin) };
+            let pose = expected.at(time);
+            let off = motion.start.position - pose.position;
+            let later = off + (motion.velocity - velocity);
+            let turned = half_angle_sine(motion.start.rotation, pose.rotation);
+            // Chords of the angle at the start and of what it grows by, at the farthest point.
+            let turning = 2.0 * turned + (motion.spin - spin).length();
+            let size = motion.start.position.abs().max_element() + pose.position.abs().max_element() + body.reach();
+            let arm = body.reach() + self.room;
+            sum += off.length().max(later.length()) + turning.min(2.0) * arm + size * ROUNDING;
+        }
+        Some(sum)
+    }
+}
+
+/// Relative rounding of a pose that is carried over a course, against the one that is given.
+const ROUNDING: f64 = 1e-13;
+
+/// Sine of half the angle between two rotations.
+fn half_angle_sine(p: DQuat, q: DQuat) -> f64 {
+    let r = p * q.conjugate();
+    DVec3::new(r.x, r.y, r.z).length()
+}

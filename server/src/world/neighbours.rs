@@ -1,0 +1,200 @@
+//! The pairs of bodies near enough to be asked about, kept from step to step.
+//!
+//! A body stays within its box at the start of a step, grown by a distance, as long as the farthest of its points has gone
+//! no further than that. Bodies whose grown boxes share no point need not be looked at while both stay within theirs: the
+//! broad phase runs again only when one leaves. The pairs it lets through are a list; what is known of each stays with it.
+//!
+//! Odometers count how far the farthest point of a body may have gone; each sum is rounded up. A pair that was `room`
+//! apart when its odometers stood at p and q cannot meet before they show p' + q' > p + q + room: the one comparison
+//! that such a pair costs a step.
+//! Invariant: the list holds every pair that may come within its touching distance in this step, in the order of ids.
+
+use super::body::Body;
+use super::broad::BroadPhase;
+use super::coherence::Knowledge;
+use super::plan::PairPlan;
+use crate::math::Aabb;
+
+/// A body's box grows by the way of this many steps like the last one …
+const STEPS: f64 = 8.0;
+/// … but by no more than this part of its radius beyond the step's own way …
+const MOST: f64 = 0.5;
+/// … and by at least this part of it.
+const LEAST: f64 = 0.02;
+
+/// Two bodies, the smaller index first, and the sum of odometers up to which they are known to stay apart.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    a: u32,
+    b: u32,
+    limit: f64,
+}
+
+/// What belongs to a pair.
+#[derive(Debug)]
+pub struct Entry {
+    /// How it is searched.
+    pub plan: PairPlan,
+    /// Its resolution.
+    pub resolution: f64,
+    /// What earlier steps have proven.
+    pub knowledge: Knowledge,
+}
+
+/// How far a body may have gone: before the step, and with it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Odometer {
+    /// At the start of the step.
+    pub start: f64,
+    /// At its end.
+    pub end: f64,
+}
+
+/// The list, and the odometers that keep it true.
+#[derive(Debug, Default)]
+pub struct Neighbours {
+    pairs: Vec<Near>,
+    entries: Vec<Entry>,
+    odometers: Vec<Odometer>,
+    /// Odometer up to which a body stays in its grown box.
+    fences: Vec<f64>,
+    boxes: Vec<Aabb>,
+    broad: BroadPhase,
+    found: Vec<(u32, u32)>,
+    stale: bool,
+    /// Pairs of boxes compared in this step.
+    pub box_tests: u64,
+}
+
+/// The sum, rounded up.
+fn up(x: f64, y: f64) -> f64 {
+    if y == 0.0 { x } else { (x + y).next_up() }
+}
+
+impl Neighbours {
+    /// Forgets the list and what is known of its pairs: bodies or rules have changed.
+    pub fn forget(&mut self) {
+        self.pairs.clear();
+        self.entries.clear();
+        self.stale = true;
+    }
+
+    /// Takes the list anew at the next step, keeping what is known: there are more bodies.
+    pub fn extend(&mut self) {
+        self.stale = true;
+    }
+
+    /// A body was displaced by as much between two steps, and goes as far in this one.
+    pub fn moved(&mut self, body: u32, before: f64, now: f64) {
+        let o = &mut self.odometers[body as usize];
+        o.start = up(o.start, before);
+        o.end = up(o.start, now);
+    }
+
+    /// Readies the odometers for as many bodies.
+    pub fn count(&mut self, bodies: usize) {
+        self.odometers.resize(bodies, Odometer::default());
+        self.box_tests = 0;
+    }
+
+    /// Looks whether all of the bodies that move are still in their grown boxes; if not, the list is taken anew.
+    /// `plan` says how a pair is searched, if at all, and with which resolution.
+    pub fn update(
+        &mut self,
+        bodies: &[Body],
+        moving: &[u32],
+        touch: impl Fn(&Body) -> f64,
+        plan: impl Fn(u32, u32) -> Option<(PairPlan, f64)>,
+    ) {
+        let within = |i: &u32| self.odometers[*i as usize].end <= self.fences[*i as usize];
+        if !self.stale && moving.iter().all(within) {
+            return;
+        }
+        self.stale = false;
+        self.boxes.clear();
+        self.fences.clear();
+        for (body, odometer) in bodies.iter().zip(&self.odometers) {
+            let way = odometer.end - odometer.start;
+            let more =
+                if body.is_static { 0.0 } else { (STEPS * way).min(MOST * body.reach()).max(LEAST * body.reach()) };
+            // What turns without bounds has no way that could be told.
+            let room = if way.is_finite() { way + more } else { 0.0 };
+            self.boxes.push(body.still().grown(room + touch(body)));
+            self.fences.push(odometer.start + 0.999_999 * room);
+        }
+        let (found, boxes) = (&mut self.found, &self.boxes);
+        found.clear();
+        self.broad.run(boxes, |i| bodies[i].is_static, |i, j| found.push((i.min(j), i.max(j))));
+        self.box_tests += self.broad.tests;
+        found.sort_unstable();
+        let mut old = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.entries)).peekable();
+        for &(a, b) in found.iter() {
+            while old.next_if(|(n, _)| (n.a, n.b) < (a, b)).is_some() {}
+            match old.next_if(|(n, _)| (n.a, n.b) == (a, b)) {
+                Some((near, entry)) => {
+                    self.pairs.push(near);
+                    self.entries.push(entry);
+                }
+                None => {
+                    let Some((plan, resolution)) = plan(a, b) else { continue };
+                    self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
+                    self.entries.push(Entry { plan, resolution, knowledge: Knowledge::default() });
+                }
+            }
+        }
+    }
+
+    /// The two bodies of a pair.
+    pub fn bodies(&self, pair: usize) -> (u32, u32) {
+        (self.pairs[pair].a, self.pairs[pair].b)
+    }
+
+    /// Place of a pair in the list.
+    pub fn find(&self, a: u32, b: u32) -> Option<usize> {
+        self.pairs.binary_search_by_key(&(a, b), |n| (n.a, n.b)).ok()
+    }
+
+    /// What belongs to a pair.
+    pub fn entry(&self, pair: usize) -> &Entry {
+        &self.entries[pair]
+    }
+
+    /// Gives what is known of a pair away, until `learned`.
+    pub fn lend(&mut self, pair: usize) -> Knowledge {
+        std::mem::take(&mut self.entries[pair].knowledge)
+    }
+
+    /// Takes it back; with the room found at the start of this step, if it is positive.
+    pub fn learned(&mut self, pair: usize, knowledge: Knowledge, room: f64) {
+        self.entries[pair].knowledge = knowledge;
+        if room > 0.0 {
+            self.note(pair, room);
+        }
+    }
+
+    /// Calls `ask` for every pair that its odometers don't prove apart over this step.
+    pub fn asked(&self, mut ask: impl FnMut(usize)) {
+        for (i, near) in self.pairs.iter().enumerate() {
+            if !self.apart(near) {
+                ask(i);
+            }
+        }
+    }
+
+    /// True when the odometers prove a pair apart over this step.
+    pub fn is_apart(&self, pair: usize) -> bool {
+        self.apart(&self.pairs[pair])
+    }
+
+    fn apart(&self, near: &Near) -> bool {
+        self.odometers[near.a as usize].end + self.odometers[near.b as usize].end <= near.limit
+    }
+
+    /// Notes that a pair is `room` farther apart than its touching distance at the start of this step.
+    pub fn note(&mut self, pair: usize, room: f64) {
+        let near = &mut self.pairs[pair];
+        let sum = self.odometers[near.a as usize].start + self.odometers[near.b as usize].start;
+        near.limit =
+            if (sum + room).is_finite() { (sum.next_down() + room).next_down().next_down() } else { f64::NEG_INFINITY };
+    }
+}

@@ -1,0 +1,147 @@
+//! What the server remembers from step to step saves work and changes nothing: the same bits with everything forgotten
+//! before every step.
+//!
+//! For a long run: `CONTACTD_COHERENT_SCENES=5000 cargo test --release -p contactd-tests --test coherence -- --nocapture`
+#![allow(missing_docs)]
+
+use contactd::contact::{Counters, Outcome, Status};
+use contactd::eco::Model;
+use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World};
+use contactd_proto::{Motion, Pose, PoseRecord};
+use contactd_tests::random_solids::Random;
+use contactd_tests::scenes::{self, Recipe};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+const STEPS: usize = 40;
+
+fn part(recipe: &Recipe) -> Arc<Part> {
+    Arc::new(Part::new(Arc::new(Model::new(recipe.build()))))
+}
+
+/// What a caller sees of an answer; work may differ.
+fn told(out: &StepOutcome) -> (Vec<(u32, u32, Outcome)>, [u64; 2], bool, bool, bool) {
+    let without_work = |p: &PairOutcome| (p.a, p.b, Outcome { counters: Counters::default(), ..p.outcome });
+    let pairs = out.pairs.iter().map(without_work).collect();
+    (pairs, [out.safe_time.to_bits(), out.may_have_passed], out.contact, out.undecided, out.truncated)
+}
+
+/// A body's way through the steps: along a motion, with some disturbance.
+struct Way {
+    motion: Motion,
+    /// Displacement that grows with the square of time, as a fall's does.
+    pull: DVec3,
+    jitter: f64,
+}
+
+impl Way {
+    fn draw(r: &mut Random, motion: Motion) -> Self {
+        let pull = if r.chance(0.3) { r.vector(0.3) } else { DVec3::ZERO };
+        let jitter = if r.chance(0.6) { 0.0 } else { 10f64.powf(r.within(-9.0, -2.0)) };
+        Self { motion, pull, jitter }
+    }
+
+    fn at(&self, t: f64, r: &mut Random) -> Pose {
+        let mut pose = self.motion.at(t);
+        pose.position += self.pull * (t * t) + r.vector(1.0) * self.jitter;
+        pose
+    }
+}
+
+#[derive(Default)]
+struct Work {
+    differences: Vec<String>,
+    steps: usize,
+    contacts: usize,
+    /// Steps without any contact, and those of them that nothing was searched for.
+    clear: usize,
+    known: usize,
+    /// Clauses bounded and pairs of octree nodes walked in them, with memory and without.
+    warm: u64,
+    cold: u64,
+}
+
+/// The same steps in two worlds, one of which forgets.
+fn run(seed: u64) -> Work {
+    let mut r = Random::new(seed);
+    let scene = if r.chance(0.3) { scenes::primitives(&mut r) } else { scenes::any(&mut r) };
+    let other = scenes::any(&mut r);
+    let recipes = [&scene.a, &scene.b, &other.b];
+    let ways = [scene.motion_a, scene.motion_b, other.motion_b].map(|m| Way::draw(&mut r, m));
+    let mut worlds = [World::new(8, 8), World::new(8, 8)];
+    for (i, (recipe, way)) in recipes.iter().zip(&ways).enumerate() {
+        let part = part(recipe);
+        for world in &mut worlds {
+            world.add_object(ObjectSpec::new(i as u32 + 1, &part, way.motion.start)).expect("an object");
+        }
+    }
+    let options = StepOptions {
+        clear: r.chance(0.3),
+        first: r.chance(0.2),
+        // Few pairs need more; what is undecided must be so with memory and without.
+        cell_limit: if r.chance(0.2) { 100 } else { 2_000 },
+        ..StepOptions::default()
+    };
+    let stops = r.chance(0.3);
+    let [warm, cold] = &mut worlds;
+    let mut work = Work::default();
+    let mut advance = 1.0;
+    for k in 1..=STEPS {
+        let t = k as f64 / STEPS as f64;
+        let mut records: Vec<PoseRecord> = Vec::new();
+        for (i, way) in ways.iter().enumerate() {
+            // Sometimes one is not named: it rests.
+            if !r.chance(0.05) {
+                records.push(PoseRecord::end(i as u32 + 1, &way.at(t, &mut r)));
+            }
+        }
+        let options = StepOptions { advance, ..options };
+        cold.forget();
+        let expected = cold.step(&records, &options).expect("a step").clone();
+        let answer = warm.step(&records, &options).expect("a step");
+        if told(answer) != told(&expected) {
+            let text = format!(
+                "seed {seed}, step {k}, {}: {:?}\nforgetting: {:?}",
+                scene.class,
+                told(answer),
+                told(&expected)
+            );
+            work.differences.push(text);
+            break;
+        }
+        work.steps += 1;
+        work.contacts += usize::from(answer.contact);
+        if !answer.contact && !answer.undecided {
+            let cost = |c: &Counters| c.clauses + c.node_pairs;
+            work.clear += 1;
+            work.known += usize::from(answer.known == answer.searched);
+            work.warm += cost(&answer.counters);
+            work.cold += cost(&expected.counters);
+        }
+        // Bodies that stop where they meet rest there: a physics loop.
+        advance = if stops { expected.safe_time } else { 1.0 };
+        if expected.pairs.iter().any(|p| p.outcome.status == Status::Overlap) && k > STEPS / 2 {
+            break;
+        }
+    }
+    work
+}
+
+#[test]
+fn what_is_remembered_changes_no_bit_of_an_answer() {
+    let count = std::env::var("CONTACTD_COHERENT_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
+    let all: Vec<Work> = (0..count).into_par_iter().map(|i| run(7_000_001 + i)).collect();
+    let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
+    let (steps, contacts, clear, known) = (sum(|w| w.steps), sum(|w| w.contacts), sum(|w| w.clear), sum(|w| w.known));
+    let (warm, cold) = (all.iter().map(|w| w.warm).sum::<u64>(), all.iter().map(|w| w.cold).sum::<u64>());
+    println!(
+        "{steps} steps: {contacts} with a contact; {clear} clear, {known} of them without a search; \
+         clauses and pairs of nodes there {warm}, forgetting {cold}"
+    );
+    let differences: Vec<&String> = all.iter().flat_map(|w| &w.differences).collect();
+    assert!(differences.is_empty(), "{} of {count} scenes: {}", differences.len(), differences[0]);
+    assert!(contacts * 10 > steps && clear * 10 > steps, "too few of a kind to say anything");
+    assert!(known * 2 > clear, "hardly anything is remembered");
+    assert!(warm < cold, "what is remembered saves nothing");
+}
