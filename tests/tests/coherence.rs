@@ -145,3 +145,51 @@ fn what_is_remembered_changes_no_bit_of_an_answer() {
     assert!(known * 2 > clear, "hardly anything is remembered");
     assert!(warm < cold, "what is remembered saves nothing");
 }
+
+/// A peg of radius .24 comes down on its hole of radius .25, at an even pace, and slides in.
+fn peg_and_hole(jitter: f64) -> (Vec<u64>, Vec<u64>) {
+    let plate = part(&Recipe::cuboid(0.8, 0.8, 0.2).minus(Recipe::cylinder(0.25, 1.0)));
+    let peg = part(&Recipe::cylinder(0.24, 0.5));
+    let mut r = Random::new(5);
+    let mut worlds = [World::new(2, 2), World::new(2, 2)];
+    for world in &mut worlds {
+        let start = Pose::at(DVec3::new(0.001, 0.002, 2.0));
+        world
+            .add_object(ObjectSpec { is_static: true, ..ObjectSpec::new(1, &plate, Pose::IDENTITY) })
+            .expect("a plate");
+        world.add_object(ObjectSpec::new(2, &peg, start)).expect("a peg");
+    }
+    let (mut warm, mut cold) = (vec![], vec![]);
+    for k in 1..=100 {
+        let at = DVec3::new(0.001, 0.002, 2.0 - 0.02 * f64::from(k)) + r.vector(jitter);
+        let records = [PoseRecord::end(2, &Pose::at(at))];
+        let cells = |world: &mut World| {
+            let out = world.step(&records, &StepOptions::default()).expect("a step");
+            assert!(!out.contact && !out.undecided);
+            out.counters.cells
+        };
+        worlds[1].forget();
+        let [w, c] = &mut worlds;
+        warm.push(cells(w));
+        cold.push(cells(c));
+    }
+    warm.sort_unstable();
+    cold.sort_unstable();
+    (warm, cold)
+}
+
+#[test]
+fn an_approaching_peg_costs_next_to_nothing_a_step() {
+    for jitter in [0.0, 1e-6, 1e-4] {
+        let (warm, cold) = peg_and_hole(jitter);
+        let sum = |cells: &[u64]| cells.iter().sum::<u64>();
+        println!(
+            "jitter {jitter:e}: cells a step, median {}, all {}; forgetting: median {}, all {}",
+            warm[50],
+            sum(&warm),
+            cold[50],
+            sum(&cold)
+        );
+        assert!(warm[50] <= 8 && 2 * sum(&warm) < sum(&cold));
+    }
+}

@@ -65,7 +65,11 @@ struct Answer {
 #[derive(Debug, Default)]
 pub struct Knowledge {
     course: Option<Box<Course>>,
+    /// The course still holds.
+    on_course: bool,
     answer: Option<Box<Answer>>,
+    /// The answer is still that of the last question.
+    answered: bool,
     /// Steps and room of the next course; 0 until there was one.
     steps: f64,
     room: f64,
@@ -102,6 +106,11 @@ pub struct Question<'a> {
 }
 
 impl Knowledge {
+    /// Nothing known, in the memory of what was known of another pair.
+    pub fn emptied(self) -> Self {
+        Self { course: self.course, answer: self.answer, ..Self::default() }
+    }
+
     /// Answers from what is known, or from what little work makes known; `None`: search. `counters` counts the work.
     fn recall(
         &mut self,
@@ -110,13 +119,13 @@ impl Knowledge {
         counters: &mut Counters,
     ) -> Option<(Outcome, Option<f64>)> {
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
-        if let Some(last) = &self.answer
+        if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
             && last.motions == motions
         {
             return Some((last.outcome, None));
         }
         let clear = Outcome::clear(q.query.resolution);
-        if let Some(course) = &self.course {
+        if let Some(course) = self.course.as_ref().filter(|_| self.on_course) {
             match course.strays(q) {
                 Some(way) if way < course.room => return Some((clear, Some(0.0))),
                 Some(_) if !course.is_over(q) => {
@@ -126,7 +135,7 @@ impl Knowledge {
                 }
                 _ => self.steps = (2.0 * self.steps).min(LONGEST),
             }
-            self.course = None;
+            self.on_course = false;
         }
         // A pair that was never searched, or that met something, is searched first.
         let cells = self.cells?;
@@ -199,7 +208,8 @@ impl Knowledge {
         self.failures = 0;
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
         let course = Course { motions, begin: q.clock, steps: self.steps, until, room: kept.room };
-        self.course = Some(Box::new(course));
+        put(&mut self.course, course);
+        self.on_course = true;
         true
     }
 
@@ -207,15 +217,21 @@ impl Knowledge {
     pub fn learn(&mut self, q: &Question, outcome: &Outcome) {
         self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
         if outcome.status == Status::Undecided {
-            self.answer = None;
+            self.answered = false;
             return;
         }
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
         let answer = Answer { motions, outcome: *outcome };
-        match &mut self.answer {
-            Some(place) => **place = answer,
-            None => self.answer = Some(Box::new(answer)),
-        }
+        put(&mut self.answer, answer);
+        self.answered = true;
+    }
+}
+
+/// Writes to the place, which is made when there is none.
+fn put<T>(place: &mut Option<Box<T>>, value: T) {
+    match place {
+        Some(place) => **place = value,
+        None => *place = Some(Box::new(value)),
     }
 }
 

@@ -55,6 +55,10 @@ pub struct Odometer {
 pub struct Neighbours {
     pairs: Vec<Near>,
     entries: Vec<Entry>,
+    old_pairs: Vec<Near>,
+    old_entries: Vec<Entry>,
+    /// Memory of pairs that have left the list.
+    spare: Vec<Knowledge>,
     odometers: Vec<Odometer>,
     /// Odometer up to which a body stays in its grown box.
     fences: Vec<f64>,
@@ -127,9 +131,14 @@ impl Neighbours {
         self.broad.run(boxes, |i| bodies[i].is_static, |i, j| found.push((i.min(j), i.max(j))));
         self.box_tests += self.broad.tests;
         found.sort_unstable();
-        let mut old = std::mem::take(&mut self.pairs).into_iter().zip(std::mem::take(&mut self.entries)).peekable();
+        // The old list beside the new one: both keep their memory.
+        std::mem::swap(&mut self.pairs, &mut self.old_pairs);
+        std::mem::swap(&mut self.entries, &mut self.old_entries);
+        let mut old = self.old_pairs.drain(..).zip(self.old_entries.drain(..)).peekable();
         for &(a, b) in found.iter() {
-            while old.next_if(|(n, _)| (n.a, n.b) < (a, b)).is_some() {}
+            while let Some((_, gone)) = old.next_if(|(n, _)| (n.a, n.b) < (a, b)) {
+                self.spare.push(gone.knowledge.emptied());
+            }
             match old.next_if(|(n, _)| (n.a, n.b) == (a, b)) {
                 Some((near, entry)) => {
                     self.pairs.push(near);
@@ -138,10 +147,12 @@ impl Neighbours {
                 None => {
                     let Some((plan, resolution)) = plan(a, b) else { continue };
                     self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
-                    self.entries.push(Entry { plan, resolution, knowledge: Knowledge::default() });
+                    let knowledge = self.spare.pop().unwrap_or_default();
+                    self.entries.push(Entry { plan, resolution, knowledge });
                 }
             }
         }
+        self.spare.extend(old.map(|(_, gone)| gone.knowledge.emptied()));
     }
 
     /// The two bodies of a pair.
