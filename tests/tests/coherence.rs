@@ -4,10 +4,10 @@
 //! For a long run: `CONTACTD_COHERENT_SCENES=5000 cargo test --release -p contactd-tests --test coherence -- --nocapture`
 #![allow(missing_docs)]
 
-use contactd::contact::{Counters, Outcome, Status};
+use contactd::contact::{Counters, Outcome, Region, Status};
 use contactd::eco::Model;
 use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World};
-use contactd_proto::{Motion, Pose, PoseRecord};
+use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe};
 use glam::DVec3;
@@ -21,10 +21,14 @@ fn part(recipe: &Recipe) -> Arc<Part> {
 }
 
 /// What a caller sees of an answer; work may differ.
-fn told(out: &StepOutcome) -> (Vec<(u32, u32, Outcome)>, [u64; 2], bool, bool, bool) {
-    let without_work = |p: &PairOutcome| (p.a, p.b, Outcome { counters: Counters::default(), ..p.outcome });
+type Told = (Vec<(u32, u32, bool, Outcome)>, Vec<Region>, [u64; 2], [bool; 3]);
+
+fn told(out: &StepOutcome) -> Told {
+    let without_work =
+        |p: &PairOutcome| (p.a, p.b, p.regions_complete, Outcome { counters: Counters::default(), ..p.outcome });
     let pairs = out.pairs.iter().map(without_work).collect();
-    (pairs, [out.safe_time.to_bits(), out.may_have_passed], out.contact, out.undecided, out.truncated)
+    let flags = [out.contact, out.undecided, out.truncated];
+    (pairs, out.regions.clone(), [out.safe_time.to_bits(), out.may_have_passed], flags)
 }
 
 /// A body's way through the steps: along a motion, with some disturbance.
@@ -84,6 +88,13 @@ fn run(seed: u64) -> Work {
         ..StepOptions::default()
     };
     let stops = r.chance(0.3);
+    if r.chance(0.3) {
+        let margin = if r.chance(0.5) { 0.0 } else { 1e-3 };
+        let rule = Rule { report: Report::Patch, margin, ..Rule::new(["default".into(), "default".into()]) };
+        for world in &mut worlds {
+            world.set_rules(vec![rule.clone()]).expect("a rule");
+        }
+    }
     let [warm, cold] = &mut worlds;
     let mut work = Work::default();
     let mut advance = 1.0;

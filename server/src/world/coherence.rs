@@ -9,10 +9,11 @@
 //!
 //! Knowledge only says "clear", or repeats an answer; everything else is searched as if nothing were known. So the
 //! answers are the same bits without it, and what was learned in which step never shows in them.
-//! Source of the odometer: algorithm section 7; of a course: conservative bounds on a deviation (`Deviation`).
+//! Source of the odometer: B. Mirtich, Impulse-based Dynamic Simulation (1996), section 2.4, its queue of times to impact;
+//! that of a course is worked out in `contact::clearance` and `Course::strays`.
 
 use super::body::Body;
-use crate::contact::{Counters, Outcome, PairQuery, Scratch, Status, clearance};
+use crate::contact::{Counters, Outcome, PairQuery, Region, Scratch, Status, clearance};
 use contactd_proto::Motion;
 use glam::{DQuat, DVec3};
 
@@ -48,7 +49,7 @@ struct Course {
     begin: f64,
     /// How many steps they are expected to go on like that; they stand afterwards.
     steps: f64,
-    /// Until then, in steps, they keep their distance: `steps` at least means from then on.
+    /// Until then, in steps, they keep their distance; infinite: standing, too.
     until: f64,
     /// How far they may stray together.
     room: f64,
@@ -61,6 +62,15 @@ struct Answer {
     outcome: Outcome,
 }
 
+/// What was told of an answer beside it: whether the pair touches, and where.
+#[derive(Debug)]
+pub struct Told {
+    /// The outcome with it.
+    pub outcome: Outcome,
+    /// All of the regions; none where they were not looked for.
+    pub regions: Vec<Region>,
+}
+
 /// What is known of one pair.
 #[derive(Debug, Default)]
 pub struct Knowledge {
@@ -70,6 +80,8 @@ pub struct Knowledge {
     answer: Option<Box<Answer>>,
     /// The answer is still that of the last question.
     answered: bool,
+    /// What was told of that answer, if all of it could be found out.
+    told: Option<Box<Told>>,
     /// Steps and room of the next course; 0 until there was one.
     steps: f64,
     room: f64,
@@ -156,6 +168,16 @@ impl Knowledge {
         self.try_course(q, cells, scratch, counters).then_some((clear, Some(0.0)))
     }
 
+    /// What was told of the answer that was recalled.
+    pub fn told(&self) -> Option<&Told> {
+        self.told.as_deref()
+    }
+
+    /// Remembers what is told of the last answer.
+    pub fn tell(&mut self, told: Told) {
+        self.told = self.answered.then(|| Box::new(told));
+    }
+
     /// Plans a course, unless others have failed of late.
     fn try_course(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
         if self.wait > 0 {
@@ -165,8 +187,8 @@ impl Knowledge {
         self.plan_course(q, cells, scratch, counters)
     }
 
-    /// The answer to a question: what is known, or what little work makes known. `None`: it takes a search, whose
-    /// outcome is to be learned.
+    /// The answer to a question: what is known, or what little work makes known; and that work. `None`: it takes a search,
+    /// whose outcome is to be learned.
     pub fn ask(&mut self, q: &Question, scratch: &mut Scratch) -> (Option<Finding>, Counters) {
         let mut counters = Counters::default();
         let found = self.recall(q, scratch, &mut counters);
@@ -224,6 +246,7 @@ impl Knowledge {
         let answer = Answer { motions, outcome: *outcome };
         put(&mut self.answer, answer);
         self.answered = true;
+        self.told = None;
     }
 }
 

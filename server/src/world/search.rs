@@ -1,4 +1,4 @@
-//! The pairs of a step, searched one by one.
+//! The pairs of a step: asked what is known of them, then searched.
 //!
 //! A job reads two bodies and writes its own outcome: jobs may run in any order and on any thread without changing a bit.
 //!

@@ -342,12 +342,6 @@ impl World {
         let Self { bodies, state, .. } = self;
         let out = &mut state.outcome;
         search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches);
-        for job in &mut state.jobs {
-            if let Some(pair) = job.pair {
-                let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
-                state.neighbours.learned(pair, std::mem::take(&mut job.knowledge), room);
-            }
-        }
         *out = StepOutcome {
             pairs: std::mem::take(&mut out.pairs),
             regions: std::mem::take(&mut out.regions),
@@ -360,7 +354,7 @@ impl World {
         let mut earliest = f64::INFINITY;
         // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
         let mut left = search::batch_limit(options);
-        for (i, job) in state.jobs.iter().enumerate() {
+        for (i, job) in state.jobs.iter_mut().enumerate() {
             let mut outcome = job.found.outcome;
             let outcome = &mut outcome;
             let regions_complete = touch::decide(bodies, job, options, &mut left, outcome);
@@ -403,7 +397,13 @@ impl World {
             out.pairs.truncate(options.max_records as usize);
             out.truncated = true;
         }
-        touch::find_regions(bodies, &state.jobs, options, left, out);
+        touch::find_regions(bodies, &mut state.jobs, options, left, out);
+        for job in &mut state.jobs {
+            if let Some(pair) = job.pair {
+                let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
+                state.neighbours.learned(pair, std::mem::take(&mut job.knowledge), room);
+            }
+        }
     }
 }
 

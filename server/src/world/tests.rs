@@ -322,6 +322,7 @@ fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
         let again = [to(2, 0.0, 1.0), to(3, 3.0, 1.0)];
         assert_eq!(told(&again[..k % 3]), first, "step {k}");
     }
+    assert_eq!(world.outcome().counters, Counters::default(), "nothing has changed, nothing is looked for");
     // No room for all of them: the earliest pairs keep theirs, and the header says that some are missing.
     let mut world = resting(Some(rule(Report::Patch, 0.0)));
     world.step(&[], &StepOptions { max_patch_slots: 3, ..StepOptions::default() }).unwrap();

@@ -4,6 +4,7 @@
 //! last, of the told pairs alone and in their order, so that the work that the batch's limit left is spent on the earliest.
 
 use super::body::Body;
+use super::coherence::Told;
 use super::record;
 use super::search::{self, PairJob};
 use super::step::{StepOptions, StepOutcome};
@@ -29,7 +30,7 @@ fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions, outcome: 
 /// such a pair is told as touching, which a loop that solves resting contacts is safe to believe.
 pub(super) fn decide(
     bodies: &[Body],
-    job: &PairJob,
+    job: &mut PairJob,
     options: &StepOptions,
     left: &mut u64,
     outcome: &mut Outcome,
@@ -37,27 +38,45 @@ pub(super) fn decide(
     if outcome.touching || job.found.apart || !is_asked(job, options, outcome) {
         return true;
     }
+    if let Some(told) = told(job) {
+        outcome.touching = told.outcome.touching;
+        return true;
+    }
     let query = query(bodies, job, options, outcome, *left);
     let (within, cells) = region::touching(&query, region::threshold(outcome.resolution, job.plan.margin));
     outcome.touching = within != Within::Apart;
     outcome.counters.instant_cells += cells;
     *left = left.saturating_sub(cells);
+    if within == Within::Apart && outcome.status == Status::Clear {
+        job.knowledge.tell(Told { outcome: *outcome, regions: Vec::new() });
+    }
     within != Within::Open
+}
+
+/// What an earlier step told of the same answer.
+fn told(job: &PairJob) -> Option<&Told> {
+    job.knowledge.told().filter(|_| job.found.known && !job.found.apart)
 }
 
 /// Finds the regions of the told pairs and gives each its slots.
 pub(super) fn find_regions(
     bodies: &[Body],
-    jobs: &[PairJob],
+    jobs: &mut [PairJob],
     options: &StepOptions,
     mut left: u64,
     out: &mut StepOutcome,
 ) {
     let mut slots = 0;
     for p in &mut out.pairs {
-        let job = &jobs[p.job as usize];
+        let job = &mut jobs[p.job as usize];
         p.regions = (out.regions.len() as u32, 0);
-        if is_asked(job, options, &p.outcome) {
+        if !is_asked(job, options, &p.outcome) {
+            // Nothing more is told.
+        } else if let Some(told) = told(job) {
+            p.outcome = Outcome { counters: p.outcome.counters, ..told.outcome };
+            p.regions.1 = told.regions.len() as u32;
+            out.regions.extend_from_slice(&told.regions);
+        } else {
             let query = query(bodies, job, options, &p.outcome, left);
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
             let found = region::complete(&query, &mut p.outcome, threshold);
@@ -65,7 +84,10 @@ pub(super) fn find_regions(
             left = left.saturating_sub(found.cells);
             p.regions_complete &= found.complete;
             p.regions.1 = found.regions.len() as u32;
-            out.regions.extend(found.regions);
+            out.regions.extend_from_slice(&found.regions);
+            if p.regions_complete {
+                job.knowledge.tell(Told { outcome: p.outcome, regions: found.regions });
+            }
         }
         let own = record::patch_slots(&out.regions[p.regions.0 as usize..]);
         let fits = options.max_patch_slots == 0 || slots + own <= options.max_patch_slots;
