@@ -59,7 +59,7 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
     let wanted = 0.5 * (room + touch(&task, margin)) * (1.0 + 1e-9) + 8.0 * task.rounding;
     let level = wanted.min(0.99 * most);
     let room = room.min(2.0 * (level - 8.0 * task.rounding) * (1.0 - 2e-9) - touch(&task, margin));
-    if room <= 0.0 {
+    if !(room > 0.0 && level.is_finite()) {
         return Kept { until: 0.0, room, counters: Counters::default() };
     }
     task.delta = -level;

@@ -204,6 +204,10 @@ fn quadrics(
         return None;
     }
     let (at_p, at_q) = (round_p.at(view, side_p), round_q.at(view, side_q));
+    // Where coordinates near the end of the numbers have no differences left there is no fit; nor round nothing.
+    if !(at_p.rho.is_finite() && at_q.rho.is_finite() && at_q.rho > 0.0) {
+        return None;
+    }
     let way = if side_q == Side::B { view.motion.speed * view.motion.h } else { 0.0 };
     if at_q.slope > 0.0 && at_q.z <= view.radius + way {
         return None;
