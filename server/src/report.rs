@@ -278,17 +278,16 @@ mod tests {
         }
     }
 
+    /// What is reported of the solid and itself, without regions.
+    fn report<'a>(solid: &'a Solid, outcome: &'a Outcome) -> PairReport<'a> {
+        PairReport { names: ["a", "b"], solids: [solid, solid], outcome, regions: &[], regions_complete: true }
+    }
+
     #[test]
     fn json_is_exact_and_names_features() {
         let solid = plate();
         let outcome = contact();
-        let pair = PairReport {
-            names: ["a", "b"],
-            solids: [&solid, &solid],
-            outcome: &outcome,
-            regions: &[],
-            regions_complete: true,
-        };
+        let pair = report(&solid, &outcome);
         let json = Answer::of_pairs(&[pair]).json().expect("finite numbers");
         let expected = concat!(
             r#"{"safe_time":0.1,"pairs":[{"a":"a","b":"b","status":"contact","time":0.30000000000000004,"#,
@@ -305,13 +304,7 @@ mod tests {
     fn fields_without_meaning_are_null() {
         let solid = plate();
         let clear = Outcome::clear(1e-9);
-        let pair = PairReport {
-            names: ["a", "b"],
-            solids: [&solid, &solid],
-            outcome: &clear,
-            regions: &[],
-            regions_complete: true,
-        };
+        let pair = report(&solid, &clear);
         let answer = Answer::of_pairs(&[pair]);
         let p = &answer.pairs[0];
         assert!(p.point.is_none() && p.normal.is_none() && p.kind.is_none() && p.extent.is_none());

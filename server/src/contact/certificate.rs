@@ -15,7 +15,7 @@ use super::depth;
 use super::literal::{Faces, Side, View};
 use super::outcome::{NO_FACE, Outcome, Status};
 use super::pair::{PairQuery, PairSearch};
-use super::search::Task;
+use super::task::Task;
 use super::work::Work;
 use crate::math::Aabb;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
@@ -275,13 +275,7 @@ impl<'a> Maker<'a> {
         }
         // Halves along the axis that costs most.
         let cost: DVec3 = cost + half * 1e-6;
-        let k = if cost.x >= cost.y && cost.x >= cost.z {
-            0
-        } else if cost.y >= cost.z {
-            1
-        } else {
-            2
-        };
+        let k = cost.max_position();
         proof.rest = Rest::Split(k, center[k]);
         let child = |low: bool| {
             let mut region = open.region;

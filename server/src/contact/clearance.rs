@@ -10,7 +10,8 @@ use super::direct::Convex;
 use super::literal::Side;
 use super::outcome::Counters;
 use super::pair::{PairQuery, PairSearch};
-use super::search::{Ending, Scratch, Search, Task};
+use super::search::{Ending, Scratch, Search};
+use super::task::Task;
 use crate::math::tolerance::WIDE_MARGIN;
 use crate::solid::{Face, Sense};
 

@@ -10,8 +10,8 @@
 
 use super::clause::{self, Pair};
 use super::literal::{Faces, Side, View};
-use super::search::Task;
 use super::separation::{self, Cover};
+use super::task::Task;
 use super::work::Work;
 use crate::motion::Instant;
 use crate::solid::Sense;

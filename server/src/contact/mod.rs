@@ -14,12 +14,14 @@ pub mod lp;
 pub mod newton;
 pub mod outcome;
 pub mod pair;
+mod propose;
 pub mod region;
 pub mod roots;
 pub mod rounding;
 pub mod search;
 pub mod separation;
 mod stage2;
+mod task;
 #[cfg(test)]
 mod tests;
 mod work;

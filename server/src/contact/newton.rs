@@ -456,11 +456,7 @@ pub(super) fn damped_step(
 }
 
 /// Solves a symmetric positive definite system in place.
-pub(super) fn cholesky_solve(
-    a: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
-    mut b: [f64; MAX_UNKNOWNS],
-    n: usize,
-) -> Option<[f64; MAX_UNKNOWNS]> {
+pub(super) fn cholesky_solve<const N: usize>(a: &mut [[f64; N]; N], mut b: [f64; N], n: usize) -> Option<[f64; N]> {
     for j in 0..n {
         for k in 0..j {
             let l = a[j][k];

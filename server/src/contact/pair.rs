@@ -5,7 +5,9 @@ use super::direct;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::search::{Ending, Found, Scratch, Search, Task};
+use super::propose::Found;
+use super::search::{Ending, Scratch, Search};
+use super::task::Task;
 use super::work::Work;
 use crate::eco::Model;
 use crate::math::tolerance;
@@ -167,7 +169,6 @@ impl<'a> PairSearch<'a> {
             rounding,
             nearly: rounding,
             scale,
-            still: false,
             lead: 0.0,
             limit: query.cell_limit,
         };

@@ -10,7 +10,7 @@
 
 use super::clause;
 use super::literal::{Faces, Side, View};
-use super::search::Task;
+use super::task::Task;
 use super::work::Work;
 use crate::math::Aabb;
 use crate::motion::Instant;

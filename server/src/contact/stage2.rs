@@ -12,7 +12,8 @@ use super::literal::Side;
 use super::newton::Constraint;
 use super::roots;
 use super::roots::Root;
-use super::search::{Cell, Range, Search, Source, Task};
+use super::search::{Cell, Range, Search, Source};
+use super::task::Task;
 use crate::bound::Region;
 use crate::bound::pair::{Pruned, Side as Operand, locate};
 use crate::eco::span::primitive_span;
@@ -57,7 +58,7 @@ impl Stage2 {
 impl<'a> Search<'a> {
     /// Queues the whole step.
     pub fn start(&mut self) {
-        self.push(Cell::source(0.0, if self.task.still { 0.0 } else { 1.0 }, Source::Slice));
+        self.push(Cell::source(0.0, 1.0, Source::Slice));
     }
 
     /// Stage 1 on a slice of time.

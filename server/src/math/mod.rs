@@ -13,13 +13,6 @@ use glam::DVec3;
 
 /// A unit vector perpendicular to the unit vector `a`, always the same one for the same `a`.
 pub fn any_perpendicular(a: DVec3) -> DVec3 {
-    let m = a.abs();
-    let e = if m.x <= m.y && m.x <= m.z {
-        DVec3::X
-    } else if m.y <= m.z {
-        DVec3::Y
-    } else {
-        DVec3::Z
-    };
+    let e = DVec3::AXES[a.abs().min_position()];
     (e - a * a.dot(e)).normalize()
 }

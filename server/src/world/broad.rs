@@ -116,13 +116,7 @@ fn grow(branches: &mut Vec<Branch>, order: &mut [u32], start: u32, boxes: &[Aabb
         return;
     }
     let spread = centers.max - centers.min;
-    let axis = if spread.x >= spread.y && spread.x >= spread.z {
-        0
-    } else if spread.y >= spread.z {
-        1
-    } else {
-        2
-    };
+    let axis = spread.max_position();
     let middle = order.len() / 2;
     let along = |i: &u32| boxes[*i as usize].center()[axis];
     order.select_nth_unstable_by(middle, |i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));

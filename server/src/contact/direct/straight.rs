@@ -21,7 +21,7 @@
 //! does not settle, starts near, or meets in more than its faces tell is left to the advance.
 
 use super::super::literal::Side;
-use super::super::newton::{Constraint, MAX_ACTIVE};
+use super::super::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
 use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
 use super::super::pair::{self, INCIDENT};
 use super::support::Body;
@@ -620,7 +620,7 @@ impl<'a> Straight<'a> {
             lines[k] = [n.x, n.y, n.z, rate];
             rhs[k] = -(row.value + row.sinks * level) / scale;
         }
-        // Gram matrix of the rows, a trace of damping for redundant ones; Cholesky in place.
+        // Gram matrix of the rows, a trace of damping for redundant ones.
         let mut gram = [[0.0; 6]; 6];
         for i in 0..m {
             for j in 0..=i {
@@ -628,33 +628,7 @@ impl<'a> Straight<'a> {
             }
             gram[i][i] += 1e-13;
         }
-        for j in 0..m {
-            for k in 0..j {
-                let l = gram[j][k];
-                for i in j..m {
-                    gram[i][j] -= gram[i][k] * l;
-                }
-            }
-            if gram[j][j].is_nan() || gram[j][j] <= 0.0 {
-                return None;
-            }
-            let r = 1.0 / gram[j][j].sqrt();
-            for i in j..m {
-                gram[i][j] *= r;
-            }
-        }
-        for i in 0..m {
-            for k in 0..i {
-                rhs[i] -= gram[i][k] * rhs[k];
-            }
-            rhs[i] /= gram[i][i];
-        }
-        for i in (0..m).rev() {
-            for k in i + 1..m {
-                rhs[i] -= gram[k][i] * rhs[k];
-            }
-            rhs[i] /= gram[i][i];
-        }
+        let rhs = cholesky_solve(&mut gram, rhs, m)?;
         let step: [f64; 4] = std::array::from_fn(|k| (0..m).map(|i| lines[i][k] * rhs[i]).sum());
         let x = x + DVec3::new(step[0], step[1], step[2]) * scale;
         let t = t + step[3] * time;

@@ -5,7 +5,7 @@
 
 use crate::contact::literal::Side;
 use crate::contact::newton;
-use crate::contact::search::Task;
+use crate::contact::task::Task;
 use crate::contact::work::Work;
 use crate::motion::Instant;
 use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
@@ -132,14 +132,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     pub fn material(&self, side: Side, axis: DVec3) -> DVec3 {
         let own = if side == Side::A { axis } else { self.at.b_from_a * axis };
         // Rounding must not choose between axes of equal rank.
-        let m = (own.abs() * 1e6).round();
-        let e = if m.x <= m.y && m.x <= m.z {
-            DVec3::X
-        } else if m.y <= m.z {
-            DVec3::Y
-        } else {
-            DVec3::Z
-        };
+        let e = DVec3::AXES[(own.abs() * 1e6).round().min_position()];
         let u = if side == Side::A { e } else { self.at.a_vector(e) };
         (u - axis * u.dot(axis)).normalize()
     }

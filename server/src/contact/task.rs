@@ -1,0 +1,88 @@
+//! What is searched: two solids, their motion, a depth, a limit; and a cell of it as its bounds see it.
+
+use super::literal::{Faces, View};
+use super::pair::Ideas;
+use crate::eco::Model;
+use crate::motion::{Bounds, Instant, Relative};
+use crate::solid::{Face, Solid};
+use glam::DVec3;
+
+/// What to search: two solids, their motion, a depth, a limit.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// The carrier of the cells.
+    pub a: &'a Solid,
+    /// The other solid.
+    pub b: &'a Solid,
+    /// A's octree and bounds.
+    pub model_a: &'a Model,
+    /// B's octree and bounds.
+    pub model_b: &'a Model,
+    /// Ideas of the search that are switched on.
+    pub ideas: Ideas,
+    /// Of an overlap the deepest point is looked for.
+    pub penetration: bool,
+    /// Motion of the pair.
+    pub relative: Relative,
+    /// Depth at which a contact is decided.
+    pub delta: f64,
+    /// What rounding may do to one bound: E of docs/accuracy.md, a length.
+    pub rounding: f64,
+    /// What is this near to delta at the start counts as that deep: rounding, where a second search follows; else 0.
+    pub nearly: f64,
+    /// Length scale of the pair.
+    pub scale: f64,
+    /// Everything is proven up to this long before the contact, a fraction of the step: 0 for an answer.
+    pub lead: f64,
+    /// Cells that may be refined.
+    pub limit: u64,
+}
+
+impl<'a> Task<'a> {
+    /// A cell, by its centre and half extents, at an instant of its own time.
+    pub(super) fn view<'v>(
+        &self,
+        (center, half): (DVec3, DVec3),
+        at: &'v Instant,
+        motion: Bounds,
+        guards_b: &'v [Face],
+    ) -> View<'v>
+    where
+        'a: 'v,
+    {
+        View {
+            a: Faces { solid: self.a, guards: &[] },
+            b: Faces { solid: self.b, guards: guards_b },
+            at,
+            motion,
+            center,
+            half,
+            radius: half.length(),
+            center_b: at.b_point(center),
+            velocity: at.velocity(center),
+            delta: self.delta,
+            rounding: self.rounding,
+            fits: self.ideas.fits,
+            curved: true,
+        }
+    }
+
+    /// True when x (A's frame) is at least delta deep in both whole solids at the instant, by `more` as computed.
+    pub(super) fn is_deep(&self, x: DVec3, at: &Instant, more: f64) -> bool {
+        let level = -self.delta - more;
+        self.a.value(x) <= level && self.b.value(at.b_point(x)) <= level
+    }
+
+    /// True when x is deep at the start, or so nearly that rounding forbids to prove the contrary: what the first search
+    /// takes for deep is searched again at twice the depth.
+    pub(super) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
+        let level = self.delta - (8.0 * self.nearly).min(0.5 * self.delta.abs());
+        self.a.value(x) <= -level && self.b.value(at.b_point(x)) <= -level
+    }
+}
+
+/// The depth at which witnesses are sought: delta and what rounding may take from it.
+pub(super) fn witness_level(delta: f64, rounding: f64) -> f64 {
+    // Deep enough to be so after all rounding, with what Newton may leave.
+    delta + 1e-6 * delta.abs() + 1.5 * rounding
+}
