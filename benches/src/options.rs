@@ -17,6 +17,8 @@ pub enum Idea {
     Hints,
     /// Whole convex primitives answered in front of the search.
     Direct,
+    /// Convex primitives against solids with holes answered in front of the search.
+    Holes,
 }
 
 /// Options of a benchmark.
@@ -44,6 +46,7 @@ impl Options {
                 Idea::Fits => ideas.fits = false,
                 Idea::Hints => ideas.hints = false,
                 Idea::Direct => ideas.direct = false,
+                Idea::Holes => ideas.holes = false,
             }
         }
         ideas

@@ -27,11 +27,17 @@ fn scene(a: Recipe, motion_a: Motion, b: Recipe, motion_b: Motion) -> Scene {
 }
 
 fn answer(name: &str, scene: &Scene) -> Outcome {
+    answer_or(name, scene, |o| o)
+}
+
+/// The answer of a scene that looks the same in a mirror: which of two contacts at one time is told is open.
+fn answer_or(name: &str, scene: &Scene, mirrored: impl Fn(Outcome) -> Outcome) -> Outcome {
     // The stages themselves; a whole-primitive answer in front of them must say the same.
     let o = ask_scene_with(scene, SEARCH_ALONE);
     let fronted = ask(scene);
     let differ = differences(&o, &fronted, scene.delta() / 1e-9);
-    assert!(differ.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
+    let twin = differences(&o, &mirrored(fronted), scene.delta() / 1e-9);
+    assert!(differ.is_empty() || twin.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
     assert_ne!(o.status, Status::Undecided, "{name}: {o:?}");
     assert!(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0, "{o:?}");
     if std::env::var_os("CONTACTD_RECORD").is_some() {
@@ -167,7 +173,13 @@ fn an_off_axis_peg_lands_on_the_plate_around_the_hole() {
 #[test]
 fn a_tilted_peg_meets_the_rim_at_two_edges() {
     let tilted = going(DVec3::Z, DQuat::from_rotation_x(3f64.to_radians()), DOWN, DVec3::ZERO);
-    let o = meets("peg_tilted", &scene(plate(0.25), still(), peg(0.24), tilted), 0.404924248220538);
+    let mirror = |o: Outcome| {
+        let x = |v: DVec3| DVec3 { x: -v.x, ..v };
+        Outcome { point: x(o.point), normal: x(o.normal), ..o }
+    };
+    let o = answer_or("peg_tilted", &scene(plate(0.25), still(), peg(0.24), tilted), mirror);
+    assert_eq!(o.status, Status::Contact, "{o:?}");
+    assert!((o.time - 0.404924248220538).abs() <= 1e-9, "{o:?}");
     assert_eq!(o.kind.name(), "edge-edge");
 }
 

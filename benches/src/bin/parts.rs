@@ -27,6 +27,16 @@ use std::time::{Duration, Instant};
 /// Facets a circle of the full form.
 const FACETS: [usize; 7] = [16, 32, 64, 128, 256, 512, 1024];
 
+/// Options of this benchmark.
+#[derive(Debug, Parser)]
+struct Arguments {
+    #[command(flatten)]
+    options: Options,
+    /// Only the classes whose name holds this.
+    #[arg(long, default_value = "")]
+    only: String,
+}
+
 /// A class of questions: b moves against a.
 struct Class {
     name: &'static str,
@@ -204,7 +214,7 @@ fn part(cases: usize, turning: bool) -> Class {
 }
 
 fn main() -> std::io::Result<()> {
-    let options = Options::parse();
+    let Arguments { options, only } = Arguments::parse();
     let ideas = options.ideas();
     let plan = Plan { blocks: options.pick(5, 3), least: Duration::from_micros(20) };
     let cases = options.pick(50, 6);
@@ -214,6 +224,7 @@ fn main() -> std::io::Result<()> {
     if !options.quick {
         classes.push(part(30, true));
     }
+    classes.retain(|class| class.name.contains(&only));
     let mut table = Table::new(&[
         "class",
         "peer",

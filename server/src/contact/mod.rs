@@ -9,6 +9,7 @@ pub mod closed;
 mod depth;
 mod direct;
 pub mod fit;
+mod hole;
 pub mod literal;
 pub mod lp;
 pub mod newton;

@@ -2,6 +2,7 @@
 
 use super::depth;
 use super::direct;
+use super::hole;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
@@ -66,11 +67,13 @@ pub struct Ideas {
     /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
     /// last digits: both solve the same equations, from another guess.
     pub direct: bool,
+    /// Convex primitives against solids with holes are answered in front of the search, with the same proviso.
+    pub holes: bool,
 }
 
 impl Default for Ideas {
     fn default() -> Self {
-        Self { region: true, walk: true, fits: true, hints: true, direct: true }
+        Self { region: true, walk: true, fits: true, hints: true, direct: true, holes: true }
     }
 }
 
@@ -206,7 +209,10 @@ impl<'a> PairSearch<'a> {
         let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
         let mut search = Search::new(task, scratch);
-        let ending = if query.ideas.direct { direct::answer(&mut search) } else { None };
+        let mut ending = if query.ideas.direct { direct::answer(&mut search) } else { None };
+        if ending.is_none() && query.ideas.holes {
+            ending = hole::answer(&mut search);
+        }
         if ending.is_none() && !a.is_empty() && !b.is_empty() {
             search.start();
         }

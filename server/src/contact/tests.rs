@@ -46,7 +46,7 @@ fn tilt(v: DVec3) -> glam::DQuat {
 
 /// The answer of the search alone; a whole-primitive answer in front of it must say the same.
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
-    let o = ask_with(name, a, ma, b, mb, Ideas { direct: false, ..Ideas::default() });
+    let o = ask_with(name, a, ma, b, mb, Ideas { direct: false, holes: false, ..Ideas::default() });
     let fronted = ask_with(name, a, ma, b, mb, Ideas::default());
     assert_eq!((o.status, o.kind, o.extent), (fronted.status, fronted.kind, fronted.extent), "{name}");
     assert!((o.time - fronted.time).abs() < 1e-12, "{name}: {} and {}", o.time, fronted.time);

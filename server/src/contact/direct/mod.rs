@@ -483,7 +483,14 @@ impl<'a> Advance<'a> {
 }
 
 /// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
-fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
+pub(super) fn faces_at(
+    side: Side,
+    p: &Primitive,
+    x: DVec3,
+    n: DVec3,
+    tol: f64,
+    out: &mut SmallVec<[(Constraint, f64); 8]>,
+) {
     let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
     for (i, face) in p.faces.iter().enumerate() {
         let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);

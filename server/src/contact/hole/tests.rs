@@ -1,0 +1,328 @@
+//! The shortcut against the search without it: the same answers on random placements of pegs, balls and boxes in holes.
+
+use super::body::{Moment, Plane};
+use super::proof::{Verdict, Wall};
+use super::{Pair, parts};
+use crate::contact::literal::Side;
+use crate::contact::{
+    Body, Ideas, Outcome, PairQuery, PairSearch, Scratch, Status, default_resolution, earliest_contact,
+};
+use crate::eco::Model;
+use crate::motion::{Placed, Relative};
+use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
+use crate::solid::{Label, Op, Shape, SolidBuilder};
+use contactd_proto::motion::quat_of_rotation_vector;
+use contactd_proto::{Motion, Pose};
+use glam::{DVec3, dvec3};
+
+/// Pseudo-random numbers of [0, 1) (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn within(&mut self, lo: f64, hi: f64) -> f64 {
+        lo + (hi - lo) * self.unit()
+    }
+
+    fn vector(&mut self, size: f64) -> DVec3 {
+        dvec3(self.within(-size, size), self.within(-size, size), self.within(-size, size))
+    }
+
+    fn across(&mut self, size: f64) -> DVec3 {
+        let angle = self.within(0.0, std::f64::consts::TAU);
+        dvec3(angle.cos(), angle.sin(), 0.0) * size
+    }
+}
+
+fn body(shape: impl Into<Shape>) -> Model {
+    let mut b = SolidBuilder::new();
+    let n = b.primitive(shape, Pose::IDENTITY, Label::default());
+    Model::new(b.finish(n))
+}
+
+fn pierced(outer: impl Into<Shape>, holes: Vec<(Shape, Pose)>) -> Model {
+    let mut b = SolidBuilder::new();
+    let mut all = vec![b.primitive(outer, Pose::IDENTITY, Label::default())];
+    all.extend(holes.into_iter().map(|(shape, at)| b.primitive(shape, at, Label::default())));
+    let n = b.operation(Op::Difference, &all);
+    Model::new(b.finish(n))
+}
+
+fn ask(a: (&Model, Motion), b: (&Model, Motion), ideas: Ideas) -> Outcome {
+    let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+    let query = PairQuery {
+        a: Body { model: a.0, placed: placed(a.1) },
+        b: Body { model: b.0, placed: placed(b.1) },
+        resolution: default_resolution(a.0, b.0),
+        cell_limit: 100_000,
+        ideas,
+        penetration: true,
+    };
+    earliest_contact(&query, &mut Scratch::default())
+}
+
+/// What became of some scenes.
+#[derive(Debug, Default)]
+struct Sum {
+    scenes: usize,
+    told: usize,
+    met: usize,
+    looks: u64,
+    newton: u64,
+}
+
+/// Asks both ways; in which scenes the shortcut answered.
+fn compare(name: &str, count: u64, mut draw: impl FnMut(&mut Random) -> (Motion, Motion), a: &Model, b: &Model) -> Sum {
+    let mut sum = Sum::default();
+    let mut r = Random(0x0048_6f6c_6500 + name.len() as u64);
+    for i in 0..count {
+        let (ma, mb) = draw(&mut r);
+        // Either body first, and either as the carrier of the cells.
+        let (x, y) = if i % 2 == 0 { ((a, ma), (b, mb)) } else { ((b, mb), (a, ma)) };
+        let fronted = ask(x, y, Ideas::default());
+        sum.scenes += 1;
+        if fronted.counters.cells > 0 || fronted.counters.closed_forms == 0 {
+            continue;
+        }
+        sum.told += 1;
+        sum.looks += fronted.counters.closed_forms;
+        sum.newton += fronted.counters.newton;
+        let alone = ask(x, y, Ideas { direct: false, holes: false, ..Ideas::default() });
+        if alone.status == Status::Undecided {
+            continue;
+        }
+        assert_eq!(fronted.status, alone.status, "{name} {i}: {fronted:?} {alone:?}");
+        assert!(fronted.time_lower <= fronted.time && fronted.time <= fronted.time_upper, "{name} {i}: {fronted:?}");
+        if fronted.status != Status::Contact {
+            continue;
+        }
+        sum.met += 1;
+        let speed = fronted.normal_speed.abs().max(alone.normal_speed.abs());
+        // Two contacts at about one time may be told either way.
+        let off = (fronted.time - alone.time).abs() * speed;
+        assert!(off < 2e-9, "{name} {i}: {off:e}: {fronted:?} {alone:?}");
+        assert!(fronted.time_lower <= alone.time_upper && alone.time_lower <= fronted.time_upper, "{name} {i}");
+        if (fronted.point - alone.point).length() < 1e-6 {
+            assert!((fronted.normal - alone.normal).length() < 1e-5, "{name} {i}: {fronted:?} {alone:?}");
+            assert_eq!((fronted.kind, fronted.extent), (alone.kind, alone.extent), "{name} {i}: {fronted:?} {alone:?}");
+        }
+    }
+    println!("{name}: {sum:?}");
+    sum
+}
+
+fn rest() -> Motion {
+    Motion::resting(Pose::IDENTITY)
+}
+
+fn moving(at: DVec3, tilt: DVec3, by: DVec3, spin: DVec3) -> Motion {
+    Motion::turning(Pose::new(at, quat_of_rotation_vector(tilt)), at + by, spin)
+}
+
+fn plate() -> Model {
+    pierced(
+        Cuboid { half: dvec3(0.5, 0.5, 0.1) },
+        vec![(Cylinder { radius: 0.25, half_height: 0.5 }.into(), Pose::IDENTITY)],
+    )
+}
+
+fn peg() -> Model {
+    body(Cylinder { radius: 0.24, half_height: 0.5 })
+}
+
+#[test]
+fn pegs_that_fall_are_told() {
+    let (plate, peg) = (plate(), peg());
+    let tilted = |turns: f64| {
+        move |r: &mut Random| {
+            let (at, tilt) = (r.across(0.005) + DVec3::Z, r.within(0.03, 0.12));
+            let tilt = r.across(tilt);
+            let by = DVec3::Z * -r.within(0.8, 1.0);
+            (rest(), moving(at, tilt, by, r.vector(turns)))
+        }
+    };
+    let straight = compare("tilted", 40, tilted(0.0), &plate, &peg);
+    assert!(straight.told >= 38 && straight.met >= 38, "{straight:?}");
+    let turning = compare("tilted, turning", 40, tilted(0.1), &plate, &peg);
+    assert!(turning.told >= 36, "{turning:?}");
+    let rim = compare(
+        "on the rim",
+        40,
+        |r| {
+            let at = r.within(0.02, 0.3);
+            (rest(), moving(r.across(at) + DVec3::Z, DVec3::ZERO, DVec3::Z * -0.9, DVec3::ZERO))
+        },
+        &plate,
+        &peg,
+    );
+    assert!(rim.told >= 38, "{rim:?}");
+}
+
+#[test]
+fn pegs_that_press_sideways_are_told() {
+    let (plate, peg) = (plate(), peg());
+    for turns in [0.0, 0.05] {
+        let sum = compare(
+            "sideways",
+            40,
+            |r| {
+                let (at, way) = (r.across(0.003), r.within(0.02, 0.1));
+                (rest(), moving(at, DVec3::ZERO, r.across(way), r.vector(turns)))
+            },
+            &plate,
+            &peg,
+        );
+        assert!(sum.told >= 38, "{turns}: {sum:?}");
+    }
+}
+
+#[test]
+fn balls_in_pipes_are_told() {
+    let pipe = pierced(
+        Cylinder { radius: 0.35, half_height: 1.0 },
+        vec![(Cylinder { radius: 0.25, half_height: 1.5 }.into(), Pose::IDENTITY)],
+    );
+    let ball = body(Sphere { radius: 0.2 });
+    let sum = compare(
+        "ball in pipe",
+        60,
+        |r| {
+            let (at, by) = (r.within(0.0, 0.03), r.within(0.0, 0.2));
+            let at = r.across(at) + DVec3::Z * r.within(-0.4, 1.4);
+            let spin = r.vector(1.0);
+            (
+                moving(r.vector(0.01), DVec3::ZERO, r.vector(0.05), DVec3::Z * r.within(0.0, 2.0)),
+                moving(at, DVec3::ZERO, r.across(by) + DVec3::Z * r.within(-0.5, 0.3), spin),
+            )
+        },
+        &pipe,
+        &ball,
+    );
+    assert!(sum.told >= 40, "{sum:?}");
+}
+
+#[test]
+fn other_bodies_and_holes_are_told() {
+    // A blind round hole from above, and a square one through.
+    let blind = pierced(
+        Cuboid { half: dvec3(0.6, 0.6, 0.3) },
+        vec![(Cylinder { radius: 0.25, half_height: 0.3 }.into(), Pose::at(DVec3::Z * 0.2))],
+    );
+    let square = pierced(
+        Cuboid { half: dvec3(0.6, 0.6, 0.3) },
+        vec![(Cuboid { half: dvec3(0.25, 0.25, 0.5) }.into(), Pose::IDENTITY)],
+    );
+    let bodies = [
+        body(Cylinder { radius: 0.22, half_height: 0.4 }),
+        body(Sphere { radius: 0.22 }),
+        body(Cone { bottom: 0.1, top: 0.24, half_height: 0.4 }),
+        body(Cuboid { half: dvec3(0.15, 0.14, 0.4) }),
+    ];
+    let mut told = 0;
+    for (i, hole) in [&blind, &square].into_iter().enumerate() {
+        for (j, body) in bodies.iter().enumerate() {
+            let sum = compare(
+                &format!("body {j} in hole {i}"),
+                24,
+                |r| {
+                    let (at, tilt, turn) = (r.within(0.0, 0.02), r.within(0.0, 0.1), r.within(0.0, 0.3));
+                    let at = r.across(at) + DVec3::Z * r.within(0.75, 0.9);
+                    let by = r.across(0.02) - DVec3::Z * r.within(0.3, 1.0);
+                    let turn = if turn < 0.1 { DVec3::ZERO } else { r.vector(turn) };
+                    (
+                        moving(r.vector(0.02), r.vector(0.02), DVec3::ZERO, turn),
+                        moving(at, r.across(tilt), by, DVec3::ZERO),
+                    )
+                },
+                hole,
+                body,
+            );
+            told += sum.told;
+        }
+    }
+    println!("told: {told} of 192");
+    assert!(told >= 96, "{told}");
+}
+
+#[test]
+fn a_proof_does_not_jump_over_an_arc() {
+    // A ball on an arm of .5 swings through an arc along a pipe with .05 to spare. The arc's middle is off the axis by .06, or by
+    // .04 less its height.
+    let pipe = pierced(
+        Cylinder { radius: 0.5, half_height: 1.0 },
+        vec![(Cylinder { radius: 0.25, half_height: 1.5 }.into(), Pose::IDENTITY)],
+    );
+    let ball = {
+        let mut b = SolidBuilder::new();
+        let n = b.primitive(Sphere { radius: 0.2 }, Pose::at(DVec3::X * 0.5), Label::default());
+        Model::new(b.finish(n))
+    };
+    for (turn, met) in [(0.8, true), (0.2, false)] {
+        let start = Pose::new(DVec3::X * (0.06 - 0.5), quat_of_rotation_vector(DVec3::Y * (-0.5 * turn)));
+        let rise = 0.5 * (1.0 - (0.5 * turn).cos());
+        let start = Pose { position: start.position - DVec3::X * (if met { 0.0 } else { rise + 0.02 }), ..start };
+        let motion = Motion::turning(start, start.position, DVec3::Y * turn);
+        let query = PairQuery {
+            a: Body { model: &pipe, placed: Placed { place: Pose::IDENTITY, motion: rest() } },
+            b: Body { model: &ball, placed: Placed { place: Pose::IDENTITY, motion } },
+            resolution: default_resolution(&pipe, &ball),
+            cell_limit: 1000,
+            ideas: Ideas::default(),
+            penetration: true,
+        };
+        let (task, swapped) = PairSearch::task(&query);
+        let (placed_a, placed_b) = task.relative.placed();
+        let seen = Relative::new(placed_b, placed_a);
+        let (of_pipe, of_ball, side, relative) =
+            if swapped { (task.b, task.a, Side::B, &task.relative) } else { (task.a, task.b, Side::A, &seen) };
+        let part = &parts(of_pipe).expect("a pipe")[0];
+        let pair = Pair::new(&task, &of_ball.primitives[0], part, side, relative).expect("a ball in a pipe");
+        let ends = [0.0, 1.0].map(|t| pair.best(&pair.moment(t), Wall::Round(DVec3::X)).phi);
+        assert!(ends.iter().all(|phi| *phi > 0.0), "{ends:?}");
+        let (verdict, _) = pair.prove(1.0, None);
+        assert_eq!(verdict == Verdict::Proven, !met, "{turn}: {verdict:?}");
+    }
+}
+
+#[test]
+fn a_best_bound_is_the_reach_of_the_cut_body() {
+    // Against the farthest of many points of a tilted cylinder, frustum or box below a plane.
+    let mut r = Random(5);
+    for i in 0..60 {
+        let shape: Shape = match i % 3 {
+            0 => Cylinder { radius: 0.24, half_height: 0.5 }.into(),
+            1 => Cone { bottom: 0.1, top: 0.3, half_height: 0.4 }.into(),
+            _ => Cuboid { half: dvec3(0.2, 0.1, 0.4) }.into(),
+        };
+        let model = body(shape);
+        let motion = moving(r.vector(0.3), r.vector(0.6), DVec3::ZERO, DVec3::ZERO);
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let relative = Relative::new(placed(motion), placed(rest()));
+        let primitive = &model.solid.primitives[0];
+        let planes = [Plane { normal: DVec3::Z, offset: r.within(-0.2, 0.2), face: 0 }];
+        let m = Moment::new(&super::Body::of(primitive).expect("bounded"), relative.at(0.0), &planes);
+        let u = r.across(1.0);
+        let best = m.best(u, 0.0, &planes);
+        let mut reach = f64::NEG_INFINITY;
+        let inside = |x: DVec3| primitive.value(m.at.a_point(x)) <= 1e-9 && x.z <= planes[0].offset + 1e-9;
+        assert!(inside(best.x), "{i}: {}", best.x);
+        for _ in 0..4000 {
+            let x = best.x + r.vector(0.3) * r.unit().powi(4);
+            if primitive.value(m.at.a_point(x)) <= 0.0 && x.z <= planes[0].offset {
+                reach = reach.max(u.dot(x));
+            }
+        }
+        // No point reaches farther than the bound, and the body's own point as far.
+        assert!(reach <= -best.phi + 1e-12, "{i}: {reach} beyond {}", -best.phi);
+        assert!((u.dot(best.x) + best.phi).abs() < 1e-9, "{i}: {} for {}", u.dot(best.x), -best.phi);
+        let own = best.bound.base - best.bound.kappa - m.reach(best.bound.w()).0;
+        assert!((own - best.phi).abs() < 1e-12, "{i}");
+    }
+}
