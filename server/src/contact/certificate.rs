@@ -274,8 +274,7 @@ impl<'a> Maker<'a> {
             }
         }
         // Halves along the axis that costs most.
-        let cost: DVec3 = cost + half * 1e-6;
-        let k = cost.max_position();
+        let k = clause::axis_to_halve(cost, half);
         proof.rest = Rest::Split(k, center[k]);
         let child = |low: bool| {
             let mut region = open.region;

@@ -29,6 +29,8 @@ const MAX_CLAUSES: u32 = 96;
 const ROUNDS: usize = 5;
 /// Weight of a concave literal's own cost in the choice of the axis to split, whether it holds the bound or not.
 const IDLE_COST: f64 = 0.25;
+/// The same of a convex one that curves.
+const IDLE_CONVEX: f64 = 1e-3;
 /// The same where a fit stands for the literal, which costs more of what matters.
 const FITTED_COST: f64 = 0.02;
 /// How far beyond the end of its reach a clause is looked at, in cell radii of relative motion.
@@ -145,6 +147,15 @@ pub fn advance(
         found.cost = view.half;
     }
     found
+}
+
+/// The axis across which halving a cell helps its bound most; the longest one where none costs anything.
+pub fn axis_to_halve(cost: DVec3, half: DVec3) -> usize {
+    // Of equal costs the longer. How long an axis is counts for no more than that: one along a line of contact costs
+    // nothing, however thin the cell must become across it.
+    let most = cost.max_element();
+    let tie = if most > 0.0 { 1e-6 * most / half.max_element() } else { 1.0 };
+    (cost + half * tie).max_position()
 }
 
 struct Run<'a, 'p> {
@@ -434,13 +445,15 @@ impl Run<'_, '_> {
                 }
             }
         }
-        // A concave literal that stands aside may do so only because the cell is too large for it.
+        // A curved literal that stands aside may do so only because the cell is too large for it.
         for l in &self.scratch.lits {
-            if l.id.sense() == Sense::Negative {
-                let key = Some((l.side, l.id));
-                let fitted = self.scratch.lits.iter().any(|o| o.other == key);
-                a.cost += l.cost * if fitted { FITTED_COST } else { IDLE_COST };
-            }
+            let key = Some((l.side, l.id));
+            let part = match l.id.sense() {
+                Sense::Positive => IDLE_CONVEX,
+                Sense::Negative if self.scratch.lits.iter().any(|o| o.other == key) => FITTED_COST,
+                Sense::Negative => IDLE_COST,
+            };
+            a.cost += l.cost * part;
         }
         a.cost += (w.abs() + turn.abs() * dt.max(0.0)) * self.view.half;
         a

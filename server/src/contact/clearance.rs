@@ -74,7 +74,7 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
     let until = match search.run(f64::INFINITY) {
         Some(Ending::Clear) | None => 1.0,
         Some(Ending::Contact(found)) => (found.goal - lead).max(0.0),
-        Some(Ending::Limit(t)) => t,
+        Some(Ending::Limit(t) | Ending::Rounding(t)) => t,
         Some(Ending::Deep(_)) => 0.0,
     };
     let counters = search.counters;

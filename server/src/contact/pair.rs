@@ -138,9 +138,14 @@ pub struct PairSearch<'a> {
     told: Option<Outcome>,
     outcome: Outcome,
     resolution: f64,
+    /// How often the resolution was raised since rounding left its depth untold.
+    raised: usize,
     /// Cells that the question allows.
     limit: u64,
 }
+
+/// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
+const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
 
 impl<'a> PairSearch<'a> {
     /// What is searched for a question, and whether its second body carries the cells.
@@ -197,7 +202,18 @@ impl<'a> PairSearch<'a> {
         if direct::quick(query, &mut outcome) {
             let (resolution, limit) = (task.delta, query.cell_limit);
             let told = Some(outcome);
-            return Self { task, swapped, level: 1.0, search: None, ending: None, told, outcome, resolution, limit };
+            return Self {
+                task,
+                swapped,
+                level: 1.0,
+                search: None,
+                ending: None,
+                told,
+                outcome,
+                resolution,
+                raised: 0,
+                limit,
+            };
         }
         Self::of_task(query, task, swapped, scratch)
     }
@@ -217,7 +233,18 @@ impl<'a> PairSearch<'a> {
             search.start();
         }
         let limit = query.cell_limit;
-        Self { task, swapped, level: 1.0, search: Some(search), ending, told: None, outcome, resolution, limit }
+        Self {
+            task,
+            swapped,
+            level: 1.0,
+            search: Some(search),
+            ending,
+            told: None,
+            outcome,
+            resolution,
+            raised: 0,
+            limit,
+        }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
@@ -257,18 +284,25 @@ impl<'a> PairSearch<'a> {
                     self.outcome.status = Status::Undecided;
                     self.outcome.time_lower = t;
                 }
+                Ending::Rounding(t) => {
+                    // A depth that the motion comes to and stays at is told apart from a slightly larger one.
+                    if let Some(more) = RAISES.get(self.raised) {
+                        self.raised += 1;
+                        self.resolution += 2e-6 * self.resolution + more * self.task.rounding;
+                        self.outcome.resolution = self.resolution;
+                        self.restart(cells);
+                        continue;
+                    }
+                    self.outcome.status = Status::Undecided;
+                    self.outcome.time_lower = t;
+                }
                 Ending::Deep(x) => {
                     self.outcome.touching = true;
                     if self.level == 1.0 {
                         // A body that was stopped at its contact starts at depth 0 ± rounding: search at twice the depth.
                         self.level = 2.0;
-                        self.task.delta = 2.0 * self.resolution;
-                        self.task.limit = self.task.limit.saturating_sub(cells);
                         self.task.nearly = 0.0;
-                        let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
-                        let mut search = Search::new(self.task, scratch);
-                        search.start();
-                        self.search = Some(search);
+                        self.restart(cells);
                         continue;
                     }
                     fill_overlap(&mut self.outcome, &self.task, x);
@@ -279,6 +313,16 @@ impl<'a> PairSearch<'a> {
             }
             return Some(self.outcome);
         }
+    }
+
+    /// Searches anew, at the depth that is to be searched by now; `cells` were spent.
+    fn restart(&mut self, cells: u64) {
+        self.task.delta = self.level * self.resolution;
+        self.task.limit = self.task.limit.saturating_sub(cells);
+        let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
+        let mut search = Search::new(self.task, scratch);
+        search.start();
+        self.search = Some(search);
     }
 
     /// Work done so far.

@@ -412,16 +412,15 @@ impl Search<'_> {
         let speed = rates.sum::<f64>().abs().max(f64::MIN_POSITIVE);
         // The depth delta itself is reached a little before the witness, which a slow pair takes its time for.
         let crossing = deep.t - (witness_level(self.task.delta, self.task.rounding) - self.task.delta) / speed;
+        // Rounding forbids to prove what is nearer to the crossing.
+        let reserve = 4.0 * self.task.rounding / speed;
         let goal = match &touch {
             Some(s) if s.t > 0.0 => 0.5 * (s.t + deep.t),
             // Touching at the start: nothing but the start needs a proof.
-            Some(_) => 0.5 * crossing,
-            // Rounding forbids to prove what is nearer to the crossing.
-            None => {
-                crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9).max(4.0 * self.task.rounding / speed)
-            }
+            Some(_) => (0.5 * crossing).min(crossing - reserve),
+            None => crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9).max(reserve),
         };
-        let goal = if goal > 0.0 { goal } else { 0.5 * crossing.max(f64::MIN_POSITIVE) };
+        let goal = goal.max(f64::MIN_POSITIVE);
         let new = Found { upper: deep.t, deep, touch, goal };
         self.found = Some(match self.found.take() {
             // One that has not settled is only a bound on the time.

@@ -112,6 +112,8 @@ pub enum Ending {
     Contact(Found),
     /// A point of this depth exists at t = 0 (A's frame).
     Deep(DVec3),
+    /// Free before this time; then, to within rounding, as deep as delta: neither excluded nor a contact.
+    Rounding(f64),
     /// The work limit ran out; free before this time.
     Limit(f64),
 }
@@ -121,6 +123,12 @@ const MAX_RIVALS: u32 = 16;
 
 /// Time, fraction of the step, below which an advance is no progress: at a contact a bound runs out in ever smaller ones.
 const LEAST_ADVANCE: f64 = 1e-15;
+
+/// The same as a way, in roundings of a bound.
+const LEAST_STEP: f64 = 1e-2;
+
+/// A point this many roundings short of delta can be neither excluded nor confirmed by much.
+const NEARLY: f64 = 8.0;
 
 /// Memory of a search, kept from one to the next.
 #[derive(Default, Debug)]
@@ -231,16 +239,17 @@ impl<'a> Search<'a> {
                 return Some(Ending::Limit(cell.t));
             }
             self.scratch.heap.pop();
-            let deep = self.refine(cell);
+            let ending = self.refine(cell);
             self.counters.clauses = self.scratch.clause.clauses;
-            if let Some(x) = deep {
-                return Some(Ending::Deep(x));
+            if ending.is_some() {
+                return ending;
             }
         }
     }
 
-    /// Refines one cell; a point deeper than delta in both bodies at t = 0 ends the search.
-    fn refine(&mut self, mut cell: Cell) -> Option<DVec3> {
+    /// Refines one cell. A point deeper than delta in both bodies at t = 0 ends the search, and so does one that rounding
+    /// keeps from being told.
+    fn refine(&mut self, mut cell: Cell) -> Option<Ending> {
         if self.instant.t != cell.t {
             self.instant = self.task.relative.at(cell.t);
         }
@@ -295,12 +304,13 @@ impl<'a> Search<'a> {
             let pair = clause::Pair { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
         };
+        let still = self.task.relative.bounds(cell.t, 0.0, x_max);
         // Where the bounds are lowest at the start itself: two faces a few resolutions inside each other leave a layer that
         // the lowest point of a later time misses.
         let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
-            let still = View { motion: self.task.relative.bounds(0.0, 0.0, x_max), ..view };
+            let view = View { motion: still, ..view };
             let pair = clause::Pair { pool, a: cell.a, b };
-            clause::advance(&still, &pair, hints, self.task.rounding, 0.0, clause_scratch).y
+            clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch).y
         } else {
             found.y
         };
@@ -315,7 +325,7 @@ impl<'a> Search<'a> {
         } else if found.dt >= h {
             self.again(cell, h, end, true);
             return None;
-        } else if found.dt > LEAST_ADVANCE && !beyond {
+        } else if found.dt > LEAST_ADVANCE.max(LEAST_STEP * self.task.rounding / motion.speed) && !beyond {
             // What splitting could gain is what the cell's extents cost the bound.
             let gain = found.cost.element_sum().min(radius);
             let proven = cell.t + found.dt >= self.goal();
@@ -327,7 +337,7 @@ impl<'a> Search<'a> {
         if start {
             for x in [cell.center, cell.center + found.y, cell.center + now] {
                 if self.task.is_deep_at_start(x, &at) {
-                    return Some(x);
+                    return Some(Ending::Deep(x));
                 }
             }
         }
@@ -335,6 +345,19 @@ impl<'a> Search<'a> {
             self.attempt(&cell, &found, &at);
             if cell.t >= self.goal() {
                 return None;
+            }
+            if found.cost.element_sum() <= self.task.rounding {
+                // The bound is as good as rounding lets it be, and its faces may be those of a later time: what of now?
+                let view = self.task.view((cell.center, cell.half), &at, still, &self.scratch.guards_b);
+                let pair = clause::Pair { pool: &self.scratch.pool, a: cell.a, b };
+                let now = clause::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch.clause);
+                self.attempt(&cell, &now, &at);
+                if cell.t >= self.goal() {
+                    return None;
+                }
+                if self.task.is_deep(cell.center + now.y, &at, -NEARLY * self.task.rounding) {
+                    return Some(Ending::Rounding(cell.t));
+                }
             }
         }
         self.split(cell, found.cost);
@@ -374,8 +397,7 @@ impl<'a> Search<'a> {
 
     /// Halves a cell along the axis that costs its bound most (`cost`), the longest one where none does.
     fn split(&mut self, cell: Cell, cost: DVec3) {
-        let cost = cost + cell.half * 1e-6;
-        let k = cost.max_position();
+        let k = clause::axis_to_halve(cost, cell.half);
         let mut half = cell.half;
         half[k] *= 0.5;
         for sign in [-1.0, 1.0] {

@@ -263,6 +263,31 @@ fn objects_come_and_go_by_ids_that_are_never_used_again() {
 }
 
 #[test]
+fn a_contact_says_whether_the_pair_touched_at_the_start() {
+    // A corner: a floor and a wall in one body. What slides along the floor into the wall touches all the while.
+    let mut b = SolidBuilder::new();
+    let floor = b.primitive(Cuboid { half: DVec3::new(9.0, 9.0, 1.0) }, Pose::at(-DVec3::Z), Label::default());
+    let wall = Cuboid { half: DVec3::new(1.0, 9.0, 9.0) };
+    let wall = b.primitive(wall, Pose::at(DVec3::new(5.0, 0.0, 0.0)), Label::default());
+    let root = b.operation(Op::Union, &[floor, wall]);
+    let corner = Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))));
+    for (height, x, down, expected) in [
+        (1.0, 6.0, 0.0, (true, 0.5)),
+        (1.0, 6.0, -1.0, (true, 0.0)),
+        (1.5, 6.0, 0.0, (false, 0.5)),
+        (1.5, 0.0, -1.0, (false, 0.5)),
+    ] {
+        let mut world = World::new(10, 10);
+        world.add_object(ObjectSpec { is_static: true, ..object(1, &corner, DVec3::ZERO) }).unwrap();
+        world.add_object(object(2, &slab(DVec3::ONE), DVec3::new(0.0, 0.0, height))).unwrap();
+        let out = world.step(&[to(2, x, height + down)], &StepOptions::default()).unwrap();
+        let o = out.pairs[0].outcome;
+        assert_eq!((o.touching, o.status), (expected.0, Status::Contact), "{height} {x} {down}");
+        assert!((o.time - expected.1).abs() < 1e-15, "{height} {x} {down}: {}", o.time);
+    }
+}
+
+#[test]
 fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
     use contactd_proto::contact_record as wire;
     let resting = |rule: Option<Rule>| {

@@ -35,7 +35,13 @@ pub(super) fn decide(
     left: &mut u64,
     outcome: &mut Outcome,
 ) -> bool {
-    if outcome.touching || job.found.apart || !is_asked(job, options, outcome) {
+    // The flag stands beside every contact, whether regions are asked or not.
+    let is_told = outcome.status == Status::Contact || is_asked(job, options, outcome);
+    if outcome.touching || job.found.apart || !is_told {
+        return true;
+    }
+    if outcome.status == Status::Contact && outcome.time == 0.0 {
+        outcome.touching = true;
         return true;
     }
     if let Some(told) = told(job) {

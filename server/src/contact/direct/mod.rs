@@ -14,7 +14,8 @@
 //! φ > −2 delta excludes it. So: (1) nearest points at t by `gjk` give n; (2) the faces at the witnesses are solved for a
 //! contact, as the search does it, and both trees confirm it or it is none; (3) the time up to it is proven with its normal;
 //! (4) otherwise the time that n proves is taken, and again from there. No contact by the end: clear.
-//! What starts nearer than a few resolutions, overlaps, or does not settle is left to the search; nothing is guessed.
+//! What overlaps, does not settle, or meets after it has started nearer than a few resolutions is left to the search;
+//! nothing is guessed.
 //! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) with the second-order bound above.
 
 mod balls;
@@ -47,6 +48,8 @@ const KEPT: u64 = 6;
 const SHORT: f64 = 1.0 / 32.0;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
+/// Resolutions by which bodies that lie in each other are set apart to find what separates them.
+const OFF: f64 = 64.0;
 /// Gap, relative to the pair's scale, below which a contact is looked for.
 const NEAR: f64 = 0.3;
 /// A contact that the closing speed puts later than this is not looked for: speeds grow, but not by that much.
@@ -297,6 +300,13 @@ impl<'a> Advance<'a> {
         Moment { at, b: self.b.1.seen(&axes, at.a_point(DVec3::ZERO)) }
     }
 
+    /// B a few resolutions off: of bodies that lie in each other by less a direction is found that separates them, but for
+    /// that much.
+    fn set_off(&self, m: &Moment<'a>) -> Body<'a> {
+        let way = m.b.support(DVec3::ZERO) - self.a.0.ball.center;
+        m.b.seen(&DMat3::IDENTITY, way.normalize_or(DVec3::X) * (OFF * self.task.delta))
+    }
+
     /// The gap along the line of nearest points, looked for from a direction along A's axes.
     fn widest(&self, m: &Moment, first: DVec3) -> Option<Gap> {
         let found = nearest(&self.a.1, &m.b, first)?;
@@ -377,6 +387,7 @@ impl<'a> Advance<'a> {
         let scale = self.task.scale;
         let mut t = 0.0;
         let mut start = None;
+        let mut near = false;
         let mut contact: Option<Gap> = None;
         let end_of_step = self.moment(1.0);
         for round in 0..ROUNDS {
@@ -387,23 +398,30 @@ impl<'a> Advance<'a> {
             let first = start
                 .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
             search.counters.closed_forms += 1;
-            let found = nearest(&self.a.1, &m.b, first)?;
-            if round == 0 && found.distance <= APART * self.task.delta {
-                return None;
-            }
-            let n = (m.at.world_from_a * found.normal).normalize();
+            let seen = |b: &Body| {
+                let found = nearest(&self.a.1, b, first)?;
+                let n = (m.at.world_from_a * found.normal).normalize();
+                Some((found, self.gap(&m, n))).filter(|(_, gap)| gap.phi > self.least)
+            };
+            let (found, here) = match seen(&m.b) {
+                Some(seen) => seen,
+                None if round == 0 || near => {
+                    near = true;
+                    seen(&self.set_off(&m))?
+                }
+                None => return None,
+            };
+            // What may be touching is told by the search; that nothing comes of it, here.
+            near |= round == 0 && found.distance <= APART * self.task.delta;
+            let n = here.n;
             start = Some(n);
-            let here = self.gap(&m, n);
-            if here.phi <= self.least {
-                return None;
-            }
             let last = self.gap(&end_of_step, n);
             if contact.is_none() && self.proven(&here, &last) >= 1.0 {
                 return Some(Ending::Clear);
             }
             let closing = found.normal.dot(m.at.velocity(found.a));
             let guess = t + found.distance.max(0.0) / closing;
-            if contact.is_none() && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
+            if contact.is_none() && !near && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
                 let mend = found.distance <= MEND.0 * scale || round >= MEND.1;
                 contact = self.contact(search, &m, &found, guess.min(1.0), mend);
             }

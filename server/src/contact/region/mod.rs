@@ -22,6 +22,7 @@ mod point;
 mod surface;
 
 use super::depth;
+use super::direct;
 use super::literal::Side;
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
 use super::pair::{PairQuery, PairSearch};
@@ -130,6 +131,10 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
 pub fn touching(query: &PairQuery, threshold: f64) -> (Within, u64) {
     let (task, _) = PairSearch::task(query);
     if task.a.is_empty() || task.b.is_empty() {
+        return (Within::Apart, 0);
+    }
+    // Of two convex primitives the nearest points tell, where they are apart.
+    if direct::Convex::new(task).is_some_and(|c| c.distance() > threshold + 8.0 * task.rounding) {
         return (Within::Apart, 0);
     }
     let work = Work::new(limit(query));
