@@ -41,6 +41,9 @@ const APART: f64 = 4.0;
 const ROUNDS: usize = 16;
 /// A clearance below this part of the wall's radius, or of the body's size, is small: the equations take over.
 const ARRIVED: f64 = 0.02;
+/// Clearance in eight directions, in the same measure, above which none is used up between them: what reaches R in one
+/// direction reaches R cos(π/8) in the next, so 1 − cos(π/8) = .077 would do.
+const BETWEEN: f64 = 0.1;
 /// Way, in the same measure, that a look goes farther than the clearance lasts.
 const HASTY: f64 = 0.04;
 /// How near to its point, relative to the pair's scale, a face passes that is active there.
@@ -264,7 +267,7 @@ impl<'a> Pair<'a> {
             let (Some((mut when, mut wall, mut best)), Some((mut nearest, mut low))) = (soonest, least) else {
                 return First::Near;
             };
-            if let Wall::Round(_) = nearest {
+            if let (Wall::Round(_), true) = (nearest, low.phi <= BETWEEN * self.size()) {
                 let (u, best) = self.lowest_beside(&m, low, 3);
                 (nearest, low) = (Wall::Round(u), best);
             }

@@ -166,6 +166,18 @@ fn pegs_that_fall_are_told() {
 }
 
 #[test]
+fn a_peg_that_grazes_its_hole_is_told() {
+    // Tilted by .031, off by .005 towards the tilt: it just fits through. The search took 62,174 cells for it.
+    let (plate, peg) = (plate(), peg());
+    let at = dvec3(-0.002715196629327541, -0.004198536324016783, 1.0);
+    let tilt = dvec3(0.026286416733871252, -0.016413599220984947, 0.0);
+    let o = ask((&plate, rest()), (&peg, moving(at, tilt, DVec3::Z * -0.9, DVec3::ZERO)), Ideas::default());
+    println!("{o:?}");
+    assert!(o.counters.cells == 0 && o.counters.closed_forms > 0, "{o:?}");
+    assert!(matches!(o.status, Status::Contact | Status::Clear), "{o:?}");
+}
+
+#[test]
 fn pegs_that_press_sideways_are_told() {
     let (plate, peg) = (plate(), peg());
     for turns in [0.0, 0.05] {
