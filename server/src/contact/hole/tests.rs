@@ -264,6 +264,40 @@ fn other_bodies_and_holes_are_told() {
 }
 
 #[test]
+fn combs_of_pegs_are_told() {
+    // 36 pegs on a bar over 36 holes, from nearly straight, where many pegs come close together, to clearly tilted.
+    let grid = || (0..36).map(|i| dvec3(f64::from(i % 6) - 2.5, f64::from(i / 6) - 2.5, 0.0));
+    let holes = grid().map(|at| (Cylinder { radius: 0.25, half_height: 0.5 }.into(), Pose::at(at)));
+    let plate = pierced(Cuboid { half: dvec3(3.25, 3.25, 0.2) }, holes.collect());
+    let mut b = SolidBuilder::new();
+    let mut all =
+        vec![b.primitive(Cuboid { half: dvec3(3.25, 3.25, 0.2) }, Pose::at(DVec3::Z * 0.6), Label::default())];
+    all.extend(
+        grid().map(|at| b.primitive(Cylinder { radius: 0.24, half_height: 0.5 }, Pose::at(at), Label::default())),
+    );
+    let n = b.operation(Op::Union, &all);
+    let comb = Model::new(b.finish(n));
+    let mut r = Random(36);
+    let (mut told, count) = (0, 40);
+    for i in 0..count {
+        let (off, angle) = (r.within(0.0, 0.008), 10f64.powf(r.within(-3.0, -1.0)));
+        let (at, tilt) = (r.across(off), r.vector(1.0).normalize() * angle);
+        let motion = moving(at + DVec3::Z * (1.0 + 3.5 * angle), tilt, DVec3::Z * -0.7, DVec3::ZERO);
+        let o = ask((&plate, rest()), (&comb, motion), Ideas::default());
+        assert_ne!(o.status, Status::Undecided, "{i}: {o:?}");
+        told += u32::from(o.counters.cells == 0);
+        if i % 8 == 0 {
+            let alone =
+                ask((&plate, rest()), (&comb, motion), Ideas { direct: false, holes: false, ..Ideas::default() });
+            assert_eq!(o.status, alone.status, "{i}: {o:?} {alone:?}");
+            assert!((o.time - alone.time).abs() < 1e-8, "{i}: {o:?} {alone:?}");
+        }
+    }
+    println!("comb: {told} of {count}");
+    assert!(told * 5 >= count * 4, "{told} of {count}");
+}
+
+#[test]
 fn a_proof_does_not_jump_over_an_arc() {
     // A ball on an arm of .5 swings through an arc along a pipe with .05 to spare. The arc's middle is off the axis by .06, or by
     // .04 less its height.
