@@ -176,6 +176,10 @@ impl<'a> Search<'a> {
 
     /// Hands an alternative of A within the box `in_a` to stage 3, with what of B lies in `in_b`.
     pub(super) fn hand_over(&mut self, (t, until): (f64, f64), in_a: &Aabb, in_b: &Aabb, a: &[Token], b: &[Token]) {
+        // The bounds of region and body, made one from the other by different ways, may have no point in common.
+        if in_a.is_empty() || in_b.is_empty() {
+            return;
+        }
         let depth = (self.task.delta, self.task.rounding);
         let (mut of_a, mut of_b) = (Vec::new(), Vec::new());
         let truth_a = local::prune_to_box(a, &self.task.a.faces, in_a, depth, &mut of_a);
