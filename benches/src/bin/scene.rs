@@ -9,6 +9,7 @@
 //! they stay apart. Pairs of rapier's are those that its broad phase let through, with and without contacts.
 
 use clap::{Parser, ValueEnum};
+use contactd::ipc::Embedded;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
 use contactd_benches::facets::{Drilled, Outline};
@@ -16,7 +17,7 @@ use contactd_benches::options::Options;
 use contactd_benches::race::{median, worst};
 use contactd_benches::table::Table;
 use contactd_benches::{peer, row};
-use contactd_client::{Error, Object};
+use contactd_client::{Error, Object, Session};
 use contactd_proto::contact_record::{CONTACT, OVERLAP, UNDECIDED};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Pose, PoseRecord, StepReply};
@@ -216,6 +217,20 @@ impl Rapier {
     }
 }
 
+/// Our side: a session with all objects in it, and their ids.
+fn session(twins: &[Twin], paths: &[Path]) -> Result<(Session<Embedded>, Vec<u32>), Error> {
+    let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default())?;
+    let mut models = Vec::new();
+    for (k, (text, _)) in twins.iter().enumerate() {
+        models.push(session.load_model(&format!("{k}.csg"), text)?.id);
+    }
+    let mut ids = Vec::with_capacity(paths.len());
+    for (i, path) in paths.iter().enumerate() {
+        ids.push(session.add_object(Object::new("object", models[i % models.len()]).at(path.at(0)))?);
+    }
+    Ok((session, ids))
+}
+
 /// What a scene of `n` objects cost, step by step.
 #[derive(Default)]
 struct Run {
@@ -234,15 +249,7 @@ fn run(kind: Kind, n: usize, steps: usize) -> Result<Run, Error> {
     let twins = kind.twins();
     let paths = paths(&twins, n);
     let mut rapier = Rapier::new(&twins, &paths);
-    let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default())?;
-    let mut models = Vec::new();
-    for (k, (text, _)) in twins.iter().enumerate() {
-        models.push(session.load_model(&format!("{k}.csg"), text)?.id);
-    }
-    let mut ids = Vec::with_capacity(n);
-    for (i, path) in paths.iter().enumerate() {
-        ids.push(session.add_object(Object::new("object", models[i % models.len()]).at(path.at(0)))?);
-    }
+    let (mut session, ids) = session(&twins, &paths)?;
     let mut run = Run::default();
     // Enough to ask about an undecided pair alone.
     let pair_of = |i: usize, k: usize| {
@@ -303,10 +310,54 @@ fn run(kind: Kind, n: usize, steps: usize) -> Result<Run, Error> {
     Ok(run)
 }
 
+/// Steps ours alone, and tells what was asked and what it cost in each tenth of the steps.
+fn profile(n: usize, steps: usize) -> Result<(), Error> {
+    let twins = Kind::Primitives.twins();
+    let paths = paths(&twins, n);
+    let (mut session, ids) = session(&twins, &paths)?;
+    let (mut times, mut count) = (Vec::new(), [0usize; 4]);
+    for k in 1..=steps {
+        let poses: Vec<Pose> = paths.iter().map(|p| p.at(k)).collect();
+        let from = Instant::now();
+        for ((slot, id), pose) in session.begin_step(n)?.iter_mut().zip(&ids).zip(&poses) {
+            *slot = PoseRecord::end(*id, pose);
+        }
+        let reply = session.finish(Duration::from_secs(3600))?;
+        times.push(1e3 * from.elapsed().as_secs_f64());
+        let of = |s: u8| reply.records().iter().filter(|c| c.status == s).count();
+        let now = [reply.header().pairs as usize, of(CONTACT), of(OVERLAP), reply.header().counters.cells as usize];
+        count.iter_mut().zip(now).for_each(|(sum, n)| *sum += n);
+        if k % (steps / 10).max(1) == 0 {
+            println!("to step {k}: {:.3} ms; asked, contacts, overlaps, cells: {count:?}", median(times.drain(..)));
+            count = [0; 4];
+        }
+    }
+    Ok(())
+}
+
+/// Options of its own beside those of all benchmarks.
+#[derive(Debug, Parser)]
+struct Arguments {
+    #[command(flatten)]
+    options: Options,
+    /// Only primitives, and this many of them.
+    #[arg(long, value_name = "NUMBER")]
+    objects: Option<usize>,
+    /// Steps of a scene.
+    #[arg(long, value_name = "NUMBER")]
+    steps: Option<usize>,
+    /// Ours alone, for a profiler.
+    #[arg(long)]
+    alone: bool,
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let options = Options::parse();
+    let Arguments { options, objects, steps, alone } = Arguments::parse();
     // Rapier's collision step runs on one thread here: so does ours.
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
+    if alone {
+        return Ok(profile(objects.unwrap_or(1_000), steps.unwrap_or(30))?);
+    }
     let mut table = Table::new(&[
         "scene",
         "objects",
@@ -327,10 +378,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     ]);
     let full: [&[usize]; 2] = [&[100, 1_000, 10_000, 100_000], &[100, 1_000, 10_000]];
     let quick: [&[usize]; 2] = [&[100, 1_000], &[100]];
-    let sizes = options.pick(full, quick);
+    let only = objects.as_slice();
+    let sizes = if only.is_empty() { options.pick(full, quick) } else { [only, &[]] };
     for (kind, sizes) in [Kind::Primitives, Kind::Parts].into_iter().zip(sizes) {
         for n in sizes {
-            let steps = options.pick((30_000 / n).clamp(2, 30), 3);
+            let steps = steps.unwrap_or(options.pick((30_000 / n).clamp(2, 30), 3));
             eprintln!("{kind:?}: {n} objects, {steps} steps");
             let run = run(kind, *n, steps)?;
             let over = |x: &[f64], y: &[f64]| -> Vec<f64> { x.iter().zip(y).map(|(x, y)| x / y).collect() };

@@ -27,6 +27,7 @@ mod task;
 mod tests;
 mod work;
 
+pub(crate) use direct::{Glance, Glancing, Hull, Stance};
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
 pub use pair::{
     Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, resolution_of,

@@ -1,11 +1,11 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
 use super::depth;
-use super::direct;
+use super::direct::{self, Quick};
 use super::hole;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
-use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
 use super::propose::Found;
 use super::search::{Ending, Scratch, Search};
 use super::task::Task;
@@ -97,11 +97,12 @@ pub fn resolution_of(query: &PairQuery) -> f64 {
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
     let mut outcome = Outcome::clear(query.resolution);
     outcome.counters.primitives = 2;
-    if direct::quick(query, &mut outcome) {
+    let quick = direct::quick(query, &mut outcome);
+    if let Quick::Told = quick {
         return outcome;
     }
     let (task, swapped) = PairSearch::task(query);
-    let mut search = PairSearch::of_task(query, task, swapped, std::mem::take(scratch));
+    let mut search = PairSearch::of_task(query, task, swapped, (quick, outcome.counters), std::mem::take(scratch));
     let outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
     *scratch = search.into_scratch();
     outcome
@@ -199,7 +200,8 @@ impl<'a> PairSearch<'a> {
         let (task, swapped) = Self::task(query);
         let mut outcome = Outcome::clear(query.resolution);
         outcome.counters.primitives = 2;
-        if direct::quick(query, &mut outcome) {
+        let quick = direct::quick(query, &mut outcome);
+        if let Quick::Told = quick {
             let (resolution, limit) = (task.delta, query.cell_limit);
             let told = Some(outcome);
             return Self {
@@ -215,36 +217,44 @@ impl<'a> PairSearch<'a> {
                 limit,
             };
         }
-        Self::of_task(query, task, swapped, scratch)
+        Self::of_task(query, task, swapped, (quick, outcome.counters), scratch)
     }
 
-    /// Prepares the search of a task.
-    fn of_task(query: &PairQuery<'a>, task: Task<'a>, swapped: bool, scratch: Scratch) -> Self {
+    /// Prepares the search of a task, of which a quick look has told something.
+    fn of_task(
+        query: &PairQuery<'a>,
+        task: Task<'a>,
+        swapped: bool,
+        (quick, before): (Quick, Counters),
+        scratch: Scratch,
+    ) -> Self {
         let (a, b) = (task.a, task.b);
         let resolution = task.delta;
         let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
+        outcome.counters.closed_forms = before.closed_forms;
         let mut search = Search::new(task, scratch);
-        let mut ending = if query.ideas.direct { direct::answer(&mut search) } else { None };
-        if ending.is_none() && query.ideas.holes {
+        let (mut ending, mut told) = (None, None);
+        match quick {
+            Quick::Overlap(x) => {
+                outcome.touching = true;
+                fill_overlap(&mut outcome, &task, x);
+                if swapped {
+                    outcome.swap_sides();
+                }
+                told = Some(outcome);
+            }
+            Quick::Open(along) if query.ideas.direct => ending = direct::answer(&mut search, along),
+            _ => {}
+        }
+        if ending.is_none() && told.is_none() && query.ideas.holes {
             ending = hole::answer(&mut search);
         }
-        if ending.is_none() && !a.is_empty() && !b.is_empty() {
+        if ending.is_none() && told.is_none() && !a.is_empty() && !b.is_empty() {
             search.start();
         }
         let limit = query.cell_limit;
-        Self {
-            task,
-            swapped,
-            level: 1.0,
-            search: Some(search),
-            ending,
-            told: None,
-            outcome,
-            resolution,
-            raised: 0,
-            limit,
-        }
+        Self { task, swapped, level: 1.0, search: Some(search), ending, told, outcome, resolution, raised: 0, limit }
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
@@ -326,9 +336,9 @@ impl<'a> PairSearch<'a> {
     }
 
     /// Work done so far.
-    pub fn counters(&self) -> super::Counters {
+    pub fn counters(&self) -> Counters {
         let mut counters = self.outcome.counters;
-        counters += self.search.as_ref().map_or_else(super::Counters::default, |search| search.counters);
+        counters += self.search.as_ref().map_or_else(Counters::default, |search| search.counters);
         counters
     }
 
@@ -517,13 +527,13 @@ pub(super) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Exten
 
 /// Overlap at the start: from a common point to the deepest one, where that is asked for.
 fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
-    o.status = Status::Overlap;
-    (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
     let at = task.relative.at(0.0);
     let work = Work::new(task.limit.min(depth::MOST_CELLS));
     let (deepest, normal, depth, faces) =
         if task.penetration { depth::deepest(task, &at, x, &work).0 } else { depth::some(task, &at, x, &work) };
     o.counters.instant_cells += work.cells();
+    o.status = Status::Overlap;
+    (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
     o.point = task.relative.world_point(&at, deepest);
     o.normal = (at.world_from_a * normal).normalize();
     o.separation = -2.0 * depth;

@@ -4,6 +4,7 @@
 //! leaves its chord by at most |c|·θ²/8 (interpolation error of a function with |f''| <= |c|·θ²). And the point never
 //! leaves the ball of radius |c| around the origin's path. The smaller of the two bounds is taken, side by side.
 
+use crate::contact::Hull;
 use crate::eco::Model;
 use crate::math::{Aabb, tolerance};
 use contactd_proto::{Motion, Pose, Track};
@@ -101,6 +102,8 @@ pub struct Body {
     corners: Vec<DVec3>,
     /// Largest distance of a corner from the object's origin.
     reach: f64,
+    /// The body as one convex primitive, where it is one.
+    pub(super) hull: Option<Hull>,
     /// Step in which a record named it with a start, and with a motion.
     pub(super) named: [u64; 2],
 }
@@ -112,6 +115,7 @@ impl Body {
         let corners: Vec<DVec3> =
             if aabb.is_finite() { aabb.corners().iter().map(|c| spec.place.point(*c)).collect() } else { Vec::new() };
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let hull = Hull::new(&spec.part.model, &spec.place);
         let reach = if aabb.is_finite() || aabb.is_empty() { reach } else { f64::INFINITY };
         Self {
             id: spec.id,
@@ -123,6 +127,7 @@ impl Body {
             max_speed: spec.max_speed,
             place: spec.place,
             track: Track::resting(spec.pose),
+            hull,
             corners,
             reach,
             named: [0; 2],

@@ -13,7 +13,9 @@ use super::body::Body;
 use super::broad::BroadPhase;
 use super::coherence::Knowledge;
 use super::plan::PairPlan;
+use crate::contact::Glance;
 use crate::math::Aabb;
+use glam::DVec3;
 
 /// A body's box grows by the way of this many steps like the last one …
 const STEPS: f64 = 8.0;
@@ -28,6 +30,8 @@ struct Near {
     a: u32,
     b: u32,
     limit: f64,
+    /// Place of what belongs to it.
+    entry: u32,
 }
 
 /// What belongs to a pair.
@@ -37,6 +41,10 @@ pub struct Entry {
     pub plan: PairPlan,
     /// Its resolution.
     pub resolution: f64,
+    /// A direction along which its bodies were apart.
+    pub along: Option<DVec3>,
+    /// They met when they were last asked about.
+    pub met: bool,
     /// What earlier steps have proven.
     pub knowledge: Knowledge,
 }
@@ -54,11 +62,11 @@ pub struct Odometer {
 #[derive(Debug, Default)]
 pub struct Neighbours {
     pairs: Vec<Near>,
+    /// What belongs to pairs stays in its place while the list changes …
     entries: Vec<Entry>,
+    /// … and these places are of pairs that have left it.
+    spare: Vec<u32>,
     old_pairs: Vec<Near>,
-    old_entries: Vec<Entry>,
-    /// Memory of pairs that have left the list.
-    spare: Vec<Knowledge>,
     odometers: Vec<Odometer>,
     /// Odometer up to which a body stays in its grown box.
     fences: Vec<f64>,
@@ -80,6 +88,7 @@ impl Neighbours {
     pub fn forget(&mut self) {
         self.pairs.clear();
         self.entries.clear();
+        self.spare.clear();
         self.stale = true;
     }
 
@@ -131,28 +140,32 @@ impl Neighbours {
         self.broad.run(boxes, |i| bodies[i].is_static, |i, j| found.push((i.min(j), i.max(j))));
         self.box_tests += self.broad.tests;
         found.sort_unstable();
-        // The old list beside the new one: both keep their memory.
+        // The old list beside the new one.
         std::mem::swap(&mut self.pairs, &mut self.old_pairs);
-        std::mem::swap(&mut self.entries, &mut self.old_entries);
-        let mut old = self.old_pairs.drain(..).zip(self.old_entries.drain(..)).peekable();
+        self.pairs.clear();
+        let mut old = self.old_pairs.iter().copied().peekable();
         for &(a, b) in found.iter() {
-            while let Some((_, gone)) = old.next_if(|(n, _)| (n.a, n.b) < (a, b)) {
-                self.spare.push(gone.knowledge.emptied());
+            while let Some(gone) = old.next_if(|n| (n.a, n.b) < (a, b)) {
+                self.spare.push(gone.entry);
             }
-            match old.next_if(|(n, _)| (n.a, n.b) == (a, b)) {
-                Some((near, entry)) => {
-                    self.pairs.push(near);
-                    self.entries.push(entry);
-                }
-                None => {
-                    let Some((plan, resolution)) = plan(a, b) else { continue };
-                    self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
-                    let knowledge = self.spare.pop().unwrap_or_default();
-                    self.entries.push(Entry { plan, resolution, knowledge });
-                }
+            if let Some(near) = old.next_if(|n| (n.a, n.b) == (a, b)) {
+                self.pairs.push(near);
+                continue;
             }
+            let Some((plan, resolution)) = plan(a, b) else { continue };
+            let mut new = Entry { plan, resolution, along: None, met: false, knowledge: Knowledge::default() };
+            let entry = if let Some(entry) = self.spare.pop() {
+                let place = &mut self.entries[entry as usize];
+                new.knowledge = std::mem::take(&mut place.knowledge).emptied();
+                *place = new;
+                entry
+            } else {
+                self.entries.push(new);
+                self.entries.len() as u32 - 1
+            };
+            self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY, entry });
         }
-        self.spare.extend(old.map(|(_, gone)| gone.knowledge.emptied()));
+        self.spare.extend(old.map(|gone| gone.entry));
     }
 
     /// The two bodies of a pair.
@@ -167,17 +180,31 @@ impl Neighbours {
 
     /// What belongs to a pair.
     pub fn entry(&self, pair: usize) -> &Entry {
-        &self.entries[pair]
+        &self.entries[self.pairs[pair].entry as usize]
+    }
+
+    fn entry_mut(&mut self, pair: usize) -> &mut Entry {
+        &mut self.entries[self.pairs[pair].entry as usize]
+    }
+
+    /// Notes what was seen of a pair at the start of this step.
+    pub fn noticed(&mut self, pair: usize, glance: &Glance) {
+        self.entry_mut(pair).along = Some(glance.along);
+        if glance.room > 0.0 {
+            self.note(pair, glance.room);
+        }
     }
 
     /// Gives what is known of a pair away, until `learned`.
     pub fn lend(&mut self, pair: usize) -> Knowledge {
-        std::mem::take(&mut self.entries[pair].knowledge)
+        std::mem::take(&mut self.entry_mut(pair).knowledge)
     }
 
-    /// Takes it back; with the room found at the start of this step, if it is positive.
-    pub fn learned(&mut self, pair: usize, knowledge: Knowledge, room: f64) {
-        self.entries[pair].knowledge = knowledge;
+    /// Takes it back; with the room found at the start of this step, if it is positive, and whether the bodies met.
+    pub fn learned(&mut self, pair: usize, knowledge: Knowledge, room: f64, met: bool) {
+        let entry = self.entry_mut(pair);
+        entry.knowledge = knowledge;
+        entry.met = met;
         if room > 0.0 {
             self.note(pair, room);
         }

@@ -5,12 +5,12 @@
 //! a, b); nothing in them depends on the order of records or of searches.
 
 use super::body::Body;
-use super::neighbours::Neighbours;
+use super::neighbours::{Entry, Neighbours};
 use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
 use super::touch;
-use crate::contact::{Counters, Outcome, Region, Status};
+use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Stance, Status};
 use crate::math::Aabb;
 use contactd_proto::pose_record::Order;
 use contactd_proto::step::{EFFECT_CONTACT, EFFECT_CONTINUOUS, EFFECT_DISCRETE, EFFECT_MARGIN, EFFECT_PATCH};
@@ -137,9 +137,15 @@ pub struct StepState {
     neighbours: Neighbours,
     /// Swept boxes, each with the serial of the step it was taken for.
     boxes: Vec<(u64, Aabb)>,
+    /// Convex bodies in this step, each with the serial of the step that it was taken for.
+    stances: Vec<(u64, Option<Stance>)>,
     /// Neighbours that their odometers don't prove apart.
     asked: Vec<usize>,
+    /// How many of them a direction proved apart.
+    glanced: u32,
     jobs: Vec<PairJob>,
+    /// Keys of the told pairs, to be ordered.
+    order: Vec<(i64, u32, u32, u32)>,
     searches: search::Memory,
     outcome: StepOutcome,
 }
@@ -155,8 +161,11 @@ impl StepState {
             clock: 0.0,
             neighbours: Neighbours::default(),
             boxes: Vec::new(),
+            stances: Vec::new(),
             asked: Vec::new(),
+            glanced: 0,
             jobs: Vec::new(),
+            order: Vec::new(),
             searches: search::Memory::default(),
             outcome: StepOutcome::default(),
         }
@@ -206,13 +215,17 @@ impl World {
         }
         self.state.serial += 1;
         self.state.orders.clear();
+        let mut expected = 0;
         for (i, record) in records.iter().enumerate() {
             // One copy: another process may write to the slot while it is read.
             let record = *record;
             let refuse = |code| StepError { code, index: Some(i as u32) };
-            let Some(index) = self.by_id.get(&record.object).copied() else {
+            // Batches mostly name the objects in their order.
+            let next = self.bodies.get(expected as usize).filter(|body| body.id == record.object);
+            let Some(index) = next.map(|_| expected).or_else(|| self.by_id.get(&record.object).copied()) else {
                 return Err(refuse(ErrorCode::UnknownObject));
             };
+            expected = index + 1;
             let order = record.decode().map_err(refuse)?;
             let body = &mut self.bodies[index as usize];
             if body.is_static {
@@ -282,6 +295,7 @@ impl World {
     fn find_pairs(&mut self, options: &StepOptions) {
         let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
+        let mut stances = std::mem::take(&mut self.state.stances);
         let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
         let plan = |i: u32, j: u32| Some((self.pair_plan(i, j)?, self.resolution_of(i, j)));
@@ -295,6 +309,8 @@ impl World {
             }
             *place
         };
+        stances.resize(self.bodies.len(), (0, None));
+        let mut glanced = 0;
         jobs.clear();
         if options.clear {
             // The caller wants a line for every pair: the excluded ones are listed too.
@@ -313,6 +329,24 @@ impl World {
                 let (i, j) = neighbours.bodies(pair);
                 let entry = neighbours.entry(pair);
                 let (plan, resolution) = (entry.plan, entry.resolution);
+                let met = entry.met;
+                let glance = if met || plan.detect == Detect::Discrete {
+                    None
+                } else {
+                    self.glance((i, j), entry, &mut stances)
+                };
+                if let Some(glance) = glance {
+                    neighbours.noticed(pair, &glance);
+                    if glance.apart {
+                        glanced += 1;
+                        continue;
+                    }
+                }
+                if met || glance.is_some() {
+                    let knowledge = neighbours.lend(pair);
+                    jobs.push(PairJob::new((i, j), plan, resolution, true, Some(pair), knowledge));
+                    continue;
+                }
                 neighbours.box_tests += 1;
                 let gap = swept(i).distance(&swept(j));
                 if gap > 0.0 {
@@ -327,8 +361,26 @@ impl World {
         }
         self.state.neighbours = neighbours;
         self.state.boxes = boxes;
+        self.state.stances = stances;
+        self.state.glanced = glanced;
         self.state.asked = asked;
         self.state.jobs = jobs;
+    }
+
+    /// What a direction tells of a pair of convex bodies.
+    fn glance(&self, (i, j): (u32, u32), entry: &Entry, stances: &mut [(u64, Option<Stance>)]) -> Option<Glance> {
+        for k in [i, j] {
+            let body = &self.bodies[k as usize];
+            let hull = body.hull.as_ref()?;
+            let place = &mut stances[k as usize];
+            if place.0 != self.state.serial {
+                *place = (self.state.serial, Some(hull.stance(&body.track)));
+            }
+        }
+        let touch = entry.plan.margin.max(2.0 * entry.resolution);
+        let stances = [stances[i as usize].1.as_ref()?, stances[j as usize].1.as_ref()?];
+        let models = [&*self.bodies[i as usize].part.model, &*self.bodies[j as usize].part.model];
+        Some(Glancing::new(models, stances, touch)?.look(entry.along))
     }
 
     /// What a body's box grows by, so that boxes of bodies within their touching distance or a margin meet.
@@ -346,6 +398,8 @@ impl World {
             pairs: std::mem::take(&mut out.pairs),
             regions: std::mem::take(&mut out.regions),
             safe_time: 1.0,
+            searched: state.glanced,
+            known: state.glanced,
             box_tests: state.neighbours.box_tests,
             ..StepOutcome::default()
         };
@@ -388,11 +442,7 @@ impl World {
         if options.first {
             keep_first(&mut out.pairs);
         }
-        let key = |p: &PairOutcome| (p.outcome.time, p.a, p.b);
-        out.pairs.sort_unstable_by(|p, q| {
-            let (p, q) = (key(p), key(q));
-            p.0.total_cmp(&q.0).then((p.1, p.2).cmp(&(q.1, q.2)))
-        });
+        order(&mut out.pairs, &mut state.order);
         if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
             out.pairs.truncate(options.max_records as usize);
             out.truncated = true;
@@ -401,7 +451,9 @@ impl World {
         for job in &mut state.jobs {
             if let Some(pair) = job.pair {
                 let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
-                state.neighbours.learned(pair, std::mem::take(&mut job.knowledge), room);
+                // What meets now will mostly do so in the next step: no look is worth its while.
+                let met = job.found.outcome.status != Status::Clear;
+                state.neighbours.learned(pair, std::mem::take(&mut job.knowledge), room, met);
             }
         }
     }
@@ -452,6 +504,29 @@ fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
 
 fn is_undecided_before(o: &Outcome, earliest: f64) -> bool {
     o.status == Status::Undecided && o.time_lower < earliest
+}
+
+/// Puts the pairs in the order (time, a, b). They are large: keys are sorted, and each pair is moved once.
+fn order(pairs: &mut [PairOutcome], keys: &mut Vec<(i64, u32, u32, u32)>) {
+    keys.clear();
+    // The bits of a number as `f64::total_cmp` orders them.
+    let bits = |time: f64| {
+        let bits = time.to_bits() as i64;
+        bits ^ (((bits >> 63) as u64) >> 1) as i64
+    };
+    keys.extend(pairs.iter().enumerate().map(|(i, p)| (bits(p.outcome.time), p.a, p.b, i as u32)));
+    keys.sort_unstable();
+    // The place of each cycle's beginning is filled last.
+    for i in 0..keys.len() {
+        let mut at = i;
+        while keys[at].3 as usize != i {
+            let from = keys[at].3 as usize;
+            pairs.swap(at, from);
+            keys[at].3 = at as u32;
+            at = from;
+        }
+        keys[at].3 = at as u32;
+    }
 }
 
 /// Keeps the pairs whose bracket meets that of the earliest contact; sensors stop nothing.

@@ -6,12 +6,12 @@
 //! simplex by its regions after C. Ericson, Real-Time Collision Detection, 5.1.
 
 use super::support::Body;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Points tried at most: curved bodies converge to this accuracy long before.
 const ROUNDS: usize = 48;
-/// Relative gap between the distance and its lower bound at which the direction is good enough.
-const GOOD: f64 = 1e-9;
+/// Relative gap between the distance and its lower bound at which a direction is good enough to solve for a contact.
+pub const GOOD: f64 = 1e-9;
 
 /// The nearest points of two disjoint bodies.
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +33,24 @@ struct Corner {
     weight: f64,
 }
 
-/// Distance of `a` and `b`, from a first direction; `None` if their cores overlap, or nearly so.
-pub fn nearest(a: &Body, b: &Body, start: DVec3) -> Option<Nearest> {
+/// How two bodies stand to each other.
+pub enum Meeting {
+    /// Their cores are apart.
+    Apart(Nearest),
+    /// A point of both cores, as far as rounding goes.
+    Common(DVec3),
+    /// Neither was found.
+    Open,
+}
+
+/// Distance of `a` and `b`, as `meeting` finds it; `None` if their cores overlap, or nearly so.
+pub fn nearest(a: &Body, b: &Body, start: DVec3, good: f64) -> Option<Nearest> {
+    if let Meeting::Apart(found) = meeting(a, b, start, good) { Some(found) } else { None }
+}
+
+/// The nearest points of `a` and `b`, from a first direction, to a relative gap of `good` between their distance and its
+/// lower bound; or a common point.
+pub fn meeting(a: &Body, b: &Body, start: DVec3, good: f64) -> Meeting {
     let mut simplex = [Corner::default(); 4];
     let mut count = 0;
     let mut v = start;
@@ -42,11 +58,14 @@ pub fn nearest(a: &Body, b: &Body, start: DVec3) -> Option<Nearest> {
         let sa = a.support(v);
         let w = b.support(-v) - sa;
         let square = v.length_squared();
-        if round > 0 && (square - v.dot(w) <= GOOD * square || simplex[..count].iter().any(|c| c.w == w)) {
+        if round > 0 && (square - v.dot(w) <= good * square || simplex[..count].iter().any(|c| c.w == w)) {
             break;
         }
         simplex[count] = Corner { a: sa, w, weight: 1.0 };
-        count = reduce(&mut simplex, count + 1)?;
+        let Some(kept) = reduce(&mut simplex, count + 1) else {
+            return common(&simplex).map_or(Meeting::Open, Meeting::Common);
+        };
+        count = kept;
         let next: DVec3 = simplex[..count].iter().map(|c| c.w * c.weight).sum();
         if round > 1 && next.length_squared() >= square {
             break;
@@ -56,12 +75,39 @@ pub fn nearest(a: &Body, b: &Body, start: DVec3) -> Option<Nearest> {
     let length = v.length();
     let normal = v / length;
     if !normal.is_finite() {
-        return None;
+        return Meeting::Open;
     }
     let on_a: DVec3 = simplex[..count].iter().map(|c| c.a * c.weight).sum();
     let distance = length - a.margin - b.margin;
     let on_a = on_a + normal * a.margin;
-    Some(Nearest { distance, normal, a: on_a, b: on_a + normal * distance })
+    Meeting::Apart(Nearest { distance, normal, a: on_a, b: on_a + normal * distance })
+}
+
+/// The shortest convex combination of some vectors; `None` if it is 0, or there are none.
+pub fn least_of(vectors: &[DVec3]) -> Option<DVec3> {
+    let mut simplex = [Corner::default(); 4];
+    let mut count = 0;
+    let mut v = *vectors.first()?;
+    for _ in 0..ROUNDS {
+        let w = vectors.iter().copied().fold(v, |w, g| if g.dot(v) < w.dot(v) { g } else { w });
+        if count > 0 && (v.dot(v) - v.dot(w) <= GOOD * v.dot(v) || simplex[..count].iter().any(|c| c.w == w)) {
+            break;
+        }
+        simplex[count] = Corner { a: DVec3::ZERO, w, weight: 1.0 };
+        count = reduce(&mut simplex, count + 1)?;
+        v = simplex[..count].iter().map(|c| c.w * c.weight).sum();
+    }
+    Some(v)
+}
+
+/// The point of A that the corners of a tetrahedron around 0 make.
+fn common(s: &[Corner; 4]) -> Option<DVec3> {
+    let [o, p, q, r] = s.map(|c| c.w);
+    let edges = DMat3::from_cols(p - o, q - o, r - o);
+    let weights = edges.inverse() * -o;
+    let rest = 1.0 - weights.element_sum();
+    let x = s[0].a * rest + s[1].a * weights.x + s[2].a * weights.y + s[3].a * weights.z;
+    x.is_finite().then_some(x)
 }
 
 /// Keeps the corners that hold the point of the simplex nearest to 0, with their weights; `None` if 0 lies inside.

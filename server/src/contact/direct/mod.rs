@@ -20,6 +20,8 @@
 
 mod balls;
 mod gjk;
+mod overlap;
+mod stance;
 mod straight;
 mod support;
 
@@ -33,9 +35,11 @@ use crate::math::{any_perpendicular, tolerance};
 use crate::motion::{Instant, Rounding};
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Node, Primitive, Sense, Shape, Solid};
-use gjk::nearest;
+use gjk::{GOOD, Nearest, nearest};
 use glam::{DMat3, DQuat, DVec3};
+use overlap::{Look, Start};
 use smallvec::SmallVec;
+pub use stance::{Glance, Glancing, Hull, Stance};
 use straight::Straight;
 use support::Body;
 
@@ -62,7 +66,7 @@ const MEND: (f64, usize) = (0.01, 4);
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
 const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
-/// Two whole primitives that only move along; world axes.
+/// Two whole primitives at the start and as they move along; world axes.
 struct Pair<'a> {
     bodies: [&'a pair::Body<'a>; 2],
     primitives: [&'a Primitive; 2],
@@ -81,16 +85,9 @@ struct Pair<'a> {
 }
 
 impl<'a> Pair<'a> {
-    /// The pair of two bodies, the first of which carries; `None` if one of them turns, is no primitive, or the resolution
-    /// needs raising.
+    /// The pair of two bodies, the first of which carries; `None` if the resolution needs raising.
     fn new(bodies: [&'a pair::Body<'a>; 2], primitives: [&'a Primitive; 2], resolution: f64) -> Option<Self> {
         let [a, b] = bodies;
-        let turns = |body: &pair::Body| {
-            body.placed.motion.spin != DVec3::ZERO && pair::without_own_spin(body).motion.spin != DVec3::ZERO
-        };
-        if turns(a) || turns(b) {
-            return None;
-        }
         let (from, to) = (&a.placed.motion, &b.placed.motion);
         let difference = from.start.position - to.start.position;
         let velocity = from.velocity - to.velocity;
@@ -99,7 +96,11 @@ impl<'a> Pair<'a> {
             let place = body.placed.place.position;
             if place == DVec3::ZERO { 0.0 } else { place.length() }
         });
-        let motion = Rounding::with(0.0, apart, places[0] + places[1]);
+        let turns = bodies.map(|body| {
+            let spin = body.placed.motion.spin;
+            if spin == DVec3::ZERO { 0.0 } else { spin.length() }
+        });
+        let motion = Rounding::with(turns[0] + turns[1], apart, places[0] + places[1]);
         let rounding = super::rounding::of_motion(a.model, b.model, places, apart, &motion);
         let scale = a.model.radius.max(b.model.radius);
         // Sums of components: no less than lengths, and no roots.
@@ -120,6 +121,13 @@ impl<'a> Pair<'a> {
         let offsets = [offset(a, primitives[0]), offset(b, primitives[1])];
         let way = offsets[1] - offsets[0] - difference;
         Some(Self { bodies, primitives, offsets, way, velocity, delta: resolution, rounding, scale })
+    }
+
+    /// True when one of them turns, about another axis than its own.
+    fn turns(&self) -> bool {
+        self.bodies.iter().any(|body| {
+            body.placed.motion.spin != DVec3::ZERO && pair::without_own_spin(body).motion.spin != DVec3::ZERO
+        })
     }
 
     /// World from model: the rotation.
@@ -145,25 +153,54 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// Fills in the answer for two whole primitives that only move along, from the stack alone; `outcome` is clear before.
-/// False leaves them to others.
-pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> bool {
-    let (Some(a), Some(b)) = (whole(&query.a.model.solid), whole(&query.b.model.solid)) else { return false };
+/// What is known of a pair of whole primitives from its start and from moving along.
+pub(super) enum Quick {
+    /// The answer.
+    Told,
+    /// They overlap at the start: a point of both, in the frame of the body that carries.
+    Overlap(DVec3),
+    /// Not the answer; perhaps a direction (world axes) that separates them at the start.
+    Open(Option<DVec3>),
+}
+
+/// Fills in the answer for two whole primitives that overlap at the start or only move along, from the stack alone;
+/// `outcome` is clear before.
+pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
+    let nothing = Quick::Open(None);
+    let (Some(a), Some(b)) = (whole(&query.a.model.solid), whole(&query.b.model.solid)) else { return nothing };
     if !query.ideas.direct {
-        return false;
+        return nothing;
     }
     // As `PairQuery::is_swapped` has it for bodies without cavities.
     let swapped = query.b.model.radius < query.a.model.radius;
     let (bodies, primitives) = if swapped { ([&query.b, &query.a], [b, a]) } else { ([&query.a, &query.b], [a, b]) };
-    let Some(pair) = Pair::new(bodies, primitives, query.resolution) else { return false };
-    let met = match (&primitives[0].shape, &primitives[1].shape) {
-        (Shape::Sphere(p), Shape::Sphere(q)) => balls::meet(&pair, [p.radius, q.radius], outcome),
-        _ => Straight::new(&pair).and_then(|straight| straight.meet(outcome)),
+    let Some(pair) = Pair::new(bodies, primitives, query.resolution) else { return nothing };
+    let balls = match (&primitives[0].shape, &primitives[1].shape) {
+        (Shape::Sphere(p), Shape::Sphere(q)) => Some([p.radius, q.radius]),
+        _ => None,
     };
-    if swapped && outcome.status == Status::Contact {
+    let met = match balls {
+        Some(radii) if !pair.turns() => balls::meet(&pair, radii, outcome),
+        _ => None,
+    };
+    if met.is_none() {
+        let Some(start) = Start::new(&pair) else { return nothing };
+        match start.look(&mut outcome.counters.closed_forms) {
+            Look::Overlap(x, _) if query.penetration => return Quick::Overlap(start.own(0, x)),
+            Look::Overlap(x, depth) => start.tell(x, depth, outcome),
+            Look::Apart(n) => {
+                let straight = if balls.is_some() || pair.turns() { None } else { Straight::new(&pair) };
+                if straight.and_then(|straight| straight.meet(outcome)).is_none() {
+                    return Quick::Open(Some(n));
+                }
+            }
+            Look::Open => return nothing,
+        }
+    }
+    if swapped && outcome.status != Status::Clear {
         outcome.swap_sides();
     }
-    met.is_some()
+    Quick::Told
 }
 
 /// φ above this excludes a contact of depth delta, rounding included.
@@ -171,13 +208,14 @@ fn excluded(delta: f64, rounding: f64) -> f64 {
     -2.0 * delta + 4.0 * rounding
 }
 
-/// The answer for two solids that are one convex primitive each; `None` leaves them to the search.
-pub(super) fn answer(search: &mut Search) -> Option<Ending> {
+/// The answer for two solids that are one convex primitive each; `None` leaves them to the search. The distance at the
+/// start is looked for along a direction of the world first, if one is given.
+pub(super) fn answer(search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
     let task = search.task;
     let (a, b) = (whole(task.a)?, whole(task.b)?);
     let (body_a, body_b) = (body_of(a)?, body_of(b)?);
     let advance = Advance::new(task, (a, body_a), (b, body_b));
-    if advance.never_near() { Some(Ending::Clear) } else { advance.run(search) }
+    if advance.never_near() { Some(Ending::Clear) } else { advance.run(search, along) }
 }
 
 /// Two solids that are one convex primitive each, to be asked how far apart they are.
@@ -309,7 +347,7 @@ impl<'a> Advance<'a> {
 
     /// The gap along the line of nearest points, looked for from a direction along A's axes.
     fn widest(&self, m: &Moment, first: DVec3) -> Option<Gap> {
-        let found = nearest(&self.a.1, &m.b, first)?;
+        let found = nearest(&self.a.1, &m.b, first, GOOD)?;
         Some(self.gap(m, (m.at.world_from_a * found.normal).normalize()))
     }
 
@@ -383,23 +421,23 @@ impl<'a> Advance<'a> {
         here.phi > APART * self.task.delta && self.proven(&here, &self.gap(end, n)) >= 1.0
     }
 
-    fn run(&self, search: &mut Search) -> Option<Ending> {
+    fn run(&self, search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
         let scale = self.task.scale;
         let mut t = 0.0;
-        let mut start = None;
         let mut near = false;
         let mut contact: Option<Gap> = None;
         let end_of_step = self.moment(1.0);
+        let mut along = along;
         for round in 0..ROUNDS {
             let m = self.moment(t);
             if round == 0 && self.frees_all(&m, &end_of_step) {
                 return Some(Ending::Clear);
             }
-            let first = start
+            let first = along
                 .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
             search.counters.closed_forms += 1;
             let seen = |b: &Body| {
-                let found = nearest(&self.a.1, b, first)?;
+                let found = nearest(&self.a.1, b, first, GOOD)?;
                 let n = (m.at.world_from_a * found.normal).normalize();
                 Some((found, self.gap(&m, n))).filter(|(_, gap)| gap.phi > self.least)
             };
@@ -414,7 +452,7 @@ impl<'a> Advance<'a> {
             // What may be touching is told by the search; that nothing comes of it, here.
             near |= round == 0 && found.distance <= APART * self.task.delta;
             let n = here.n;
-            start = Some(n);
+            along = Some(n);
             let last = self.gap(&end_of_step, n);
             if contact.is_none() && self.proven(&here, &last) >= 1.0 {
                 return Some(Ending::Clear);
@@ -465,7 +503,7 @@ impl<'a> Advance<'a> {
 
     /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees
     /// confirm it.
-    fn contact(&self, search: &mut Search, m: &Moment, found: &gjk::Nearest, guess: f64, mend: bool) -> Option<Gap> {
+    fn contact(&self, search: &mut Search, m: &Moment, found: &Nearest, guess: f64, mend: bool) -> Option<Gap> {
         let b = m.at.b_point(found.b);
         let normal_b = m.at.b_from_a * -found.normal;
         let x = 0.5 * (found.a + found.b);

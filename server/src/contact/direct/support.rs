@@ -4,6 +4,7 @@
 //! A ball is its centre and a margin: then the distance of two balls is that of two points, found at once.
 
 use crate::solid::Shape;
+use crate::solid::primitive::Geometry;
 use glam::{DMat3, DVec3};
 
 /// A bounded convex primitive in a frame.
@@ -30,6 +31,14 @@ impl<'s> Body<'s> {
     /// The same body in a frame that sees its own by `axes` and `origin`.
     pub fn seen(&self, axes: &DMat3, origin: DVec3) -> Self {
         Self { axes: *axes * self.axes, origin: *axes * self.origin + origin, ..*self }
+    }
+
+    /// The centre of its frame, a point inside.
+    pub fn center(&self) -> DVec3 {
+        match self.shape {
+            Shape::Polyhedron(p) => self.origin + self.axes * p.interior_point(),
+            _ => self.origin,
+        }
     }
 
     /// The core's farthest point along n, which may have any length.
