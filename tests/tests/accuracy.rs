@@ -219,9 +219,11 @@ fn the_parts_of_the_assembly_meet_at_the_same_times_at_a_thousandth_of_the_resol
 
 // Bounded work.
 
+/// The peg is made by an intersection: nothing in front of the search answers for it.
 fn tilted_peg() -> (Recipe, Recipe, Motion) {
     let start = Pose::new(DVec3::Z, DQuat::from_rotation_y(3f64.to_radians()));
-    (plate(0.25), Recipe::cylinder(0.24, 0.5), Motion { start, velocity: DOWN, spin: DVec3::ZERO })
+    let peg = Recipe::cylinder(0.24, 1.0).intersection(Recipe::cuboid(1.0, 1.0, 0.5));
+    (plate(0.25), peg, Motion { start, velocity: DOWN, spin: DVec3::ZERO })
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `fuzz TARGET [--runs N] [--seed N] [--keep N]`: runs a fuzz target over mutated inputs of its corpus.
 //!
-//! Prints what came of them and every finding with its shortest input; `--keep` adds up to so many of the inputs that
+//! Prints every finding with its input at once, and what came of them at the end; `--keep` adds up to so many of the inputs that
 //! showed something new to the corpus. Exit status 1 when something was found.
 
 use contactd_tests::fuzz::{Campaign, TARGETS};
@@ -28,8 +28,15 @@ fn main() -> Result<(), String> {
     // Findings are told below; the panic's own text would drown them.
     std::panic::set_hook(Box::new(|_| {}));
     let mut campaign = Campaign::new(target, &corpus, seed);
+    let mut told = 0;
     while campaign.runs < runs {
         campaign.step();
+        // At once: a run that is cut short has told what it found.
+        for finding in &campaign.findings[told..] {
+            let hex: String = finding.input.iter().map(|b| format!("{b:02x}")).collect();
+            println!("FOUND after {} runs: {}\n  input {hex}", campaign.runs, finding.what);
+        }
+        told = campaign.findings.len();
         if campaign.runs.is_multiple_of(100_000) {
             eprintln!(
                 "{name}: {} runs, {} new, {} found",
@@ -46,10 +53,6 @@ fn main() -> Result<(), String> {
     for input in campaign.fresh.iter().take(keep) {
         let file = folder.join(format!("{:016x}", contactd_tests::fuzz::digest(input)));
         std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&file, input)).map_err(|e| e.to_string())?;
-    }
-    for finding in &campaign.findings {
-        let hex: String = finding.input.iter().map(|b| format!("{b:02x}")).collect();
-        println!("FOUND {}\n  input {hex}", finding.what);
     }
     if campaign.findings.is_empty() { Ok(()) } else { Err(format!("{} findings", campaign.findings.len())) }
 }
