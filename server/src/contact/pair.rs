@@ -351,6 +351,11 @@ impl<'a> PairSearch<'a> {
 fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let deep = &found.deep;
     let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
+    // Where the touch was before the start: the point on the way from it to the witness, now.
+    let now = found.touch.as_ref().filter(|s| s.t < 0.0 && deep.t > 0.0).map(|s| {
+        let share = -s.t / (deep.t - s.t);
+        s.x + (deep.x - s.x) * share
+    });
     o.status = Status::Contact;
     o.time_upper = found.upper;
     o.time = found.touch.as_ref().map_or(found.upper, |s| s.t.clamp(0.0, found.upper));
@@ -365,7 +370,9 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
         time_scale: 1.0,
         tolerance: task.rounding,
     };
-    o.point = task.relative.world_point(&at, s.x);
+    let common = |x: DVec3| task.a.value(x).max(task.b.value(at.b_point(x)));
+    let x = now.filter(|x| common(*x) < common(s.x)).unwrap_or(s.x);
+    o.point = task.relative.world_point(&at, x);
     let mut active = Active::of(&problem, s);
     if active.extent == Extent::Point && found.touch.as_ref().is_some_and(|touch| touch.t >= 0.0) {
         active.add_incident(task, s.x, &at);
