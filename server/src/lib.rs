@@ -28,6 +28,9 @@
 //!        and the cell's two halves ---------------------------------------------+
 //! ```
 //!
+//! In front of the queue stand two proofs that need no cells: two convex primitives (`contact::direct`), convex bodies at
+//! solids with holes (`contact::hole`). What they do not settle is queued.
+//!
 //! It ends when the earliest item lies beyond the confirmed contact: then all that is still queued is the proof that
 //! nothing came before (`contact`). An empty queue is `clear`; a spent work limit is `undecided`, with the time up to
 //! which the proof reached. Inside both bodies at the start is `overlap`. No stage knows the next one's answer, so each can

@@ -2,7 +2,8 @@
 //! that bound them, against what elementary geometry says.
 #![allow(missing_docs)]
 
-use contactd::contact::region::{Region, Regions, complete, regions, threshold, touching};
+use contactd::contact::clearance::touching;
+use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::separation::Within;
 use contactd::contact::{
     Body, DEFAULT_CELL_LIMIT, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,

@@ -168,6 +168,7 @@ fn single(normals: &[DVec3], b: &[f64], half: DVec3) -> ([usize; 4], [[f64; 4]; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::Random;
 
     fn check(normals: &[DVec3], b: &[f64], half: DVec3) {
         let mut warm = Warm::default();
@@ -194,11 +195,8 @@ mod tests {
 
     #[test]
     fn primal_and_dual_agree_on_random_planes() {
-        let mut seed = 1u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        };
+        let mut numbers = Random(1);
+        let mut random = || numbers.within(-1.0, 1.0);
         for round in 0..20000 {
             let count = 1 + round % 12;
             let normals: Vec<DVec3> = (0..count)

@@ -341,7 +341,8 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        if !one_sided {
+        // Bodies that stand still to each other meet at the start or never.
+        if !one_sided && motion.speed > 0.0 {
             self.attempt(&cell, &found, &at);
             if cell.t >= self.goal() {
                 return None;

@@ -14,7 +14,6 @@ use super::task::Task;
 use super::work::Work;
 use crate::math::Aabb;
 use crate::motion::Instant;
-use crate::solid::Face;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use glam::DVec3;
 
@@ -60,7 +59,7 @@ pub(super) struct Cover<'t, 'a> {
     /// Depths and distances up to which the boxes' trees are kept.
     deep: f64,
     far: f64,
-    /// Same-shape fits hold up to this level: the smallest radius there is.
+    /// Same-shape fits hold up to this level.
     fits_below: f64,
     stack: Vec<Place>,
     scratch: clause::Scratch,
@@ -71,17 +70,12 @@ impl<'t, 'a> Cover<'t, 'a> {
     /// A cover of what two bodies have in common, as far as the work goes. Their trees are kept for depths up to `deep` and
     /// distances up to `far`, or up to the level that is asked for.
     pub fn new(task: &'t Task<'a>, at: &'t Instant, deep: f64, far: f64, work: &'t Work) -> Self {
-        let radius = |f: &Face| match *f {
-            Face::Sphere { radius, .. } | Face::Cylinder { radius, .. } => radius,
-            Face::Plane { .. } | Face::Cone { .. } => f64::INFINITY,
-        };
-        let faces = task.a.faces.iter().chain(&task.b.faces);
         let mut cover = Self {
             task,
             at,
             deep,
             far,
-            fits_below: faces.map(radius).fold(f64::INFINITY, f64::min),
+            fits_below: task.fits_below(),
             stack: Vec::new(),
             scratch: clause::Scratch::default(),
             work,
@@ -175,10 +169,9 @@ impl<'t, 'a> Cover<'t, 'a> {
     /// Puts the halves of a box back: cut across the axis that costs its bound most, as the search does, unless that would
     /// make a slab of it.
     pub fn split(&mut self, place: Place) {
-        let longest = |v: DVec3| (0..3).max_by(|i, j| v[*i].total_cmp(&v[*j])).unwrap_or(0);
-        let dearest = longest(place.cost + place.half * 1e-6);
-        let side = longest(place.half);
-        let k = if place.half[dearest] * SLAB < place.half[side] { side } else { dearest };
+        let dearest = clause::axis_to_halve(place.cost, place.half);
+        let longest = place.half.max_position();
+        let k = if place.half[dearest] * SLAB < place.half[longest] { longest } else { dearest };
         for sign in [1.0, -1.0] {
             let mut child = place.clone();
             child.half[k] *= 0.5;

@@ -4,7 +4,7 @@ use super::literal::{Faces, View};
 use super::pair::Ideas;
 use crate::eco::Model;
 use crate::motion::{Bounds, Instant, Relative};
-use crate::solid::{Face, Solid};
+use crate::solid::{Face, Sense, Solid};
 use glam::DVec3;
 
 /// What to search: two solids, their motion, a depth, a limit.
@@ -65,6 +65,22 @@ impl<'a> Task<'a> {
             fits: self.ideas.fits,
             curved: true,
         }
+    }
+
+    /// Same-shape fits hold for distances of both bodies below this: half the smallest radius of a subtracted round face,
+    /// which grown bodies take from it.
+    pub(super) fn fits_below(&self) -> f64 {
+        let of = |solid: &Solid| {
+            let faces = solid.faces.iter().zip(&solid.face_owner);
+            let hollow = faces.filter(|(_, owner)| solid.senses[**owner as usize] == Sense::Negative);
+            hollow
+                .map(|(f, _)| match *f {
+                    Face::Sphere { radius, .. } | Face::Cylinder { radius, .. } => radius,
+                    Face::Plane { .. } | Face::Cone { .. } => f64::INFINITY,
+                })
+                .fold(f64::INFINITY, f64::min)
+        };
+        0.5 * of(self.a).min(of(self.b))
     }
 
     /// True when x (A's frame) is at least delta deep in both whole solids at the instant, by `more` as computed.

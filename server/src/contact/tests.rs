@@ -2,30 +2,15 @@
 
 use super::*;
 use crate::eco::Model;
+use crate::eco::testing::{pierced, simple};
 use crate::motion::Placed;
-use crate::solid::{Label, Op, Shape, SolidBuilder, primitive::*};
+use crate::solid::{Shape, primitive::*};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use glam::DVec3;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
-}
-
-fn simple(shape: impl Into<Shape>) -> Model {
-    let mut b = SolidBuilder::new();
-    let n = b.primitive(shape, Pose::IDENTITY, Label::default());
-    Model::new(b.finish(n))
-}
-
-fn minus(a: impl Into<Shape>, cuts: Vec<(Shape, Pose)>) -> Model {
-    let mut b = SolidBuilder::new();
-    let mut all = vec![b.primitive(a, Pose::IDENTITY, Label::default())];
-    for (s, p) in cuts {
-        all.push(b.primitive(s, p, Label::default()));
-    }
-    let n = b.operation(Op::Difference, &all);
-    Model::new(b.finish(n))
 }
 
 fn rest() -> Motion {
@@ -99,7 +84,10 @@ fn clear(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) {
 }
 
 fn plate(hole: f64) -> Model {
-    minus(Cuboid { half: v(0.5, 0.5, 0.1) }, vec![(Cylinder { radius: hole, half_height: 0.3 }.into(), Pose::IDENTITY)])
+    pierced(
+        Cuboid { half: v(0.5, 0.5, 0.1) },
+        vec![(Cylinder { radius: hole, half_height: 0.3 }.into(), Pose::IDENTITY)],
+    )
 }
 
 fn peg(r: f64) -> Model {
@@ -199,7 +187,7 @@ fn cones_and_sockets() {
     hits("cone apex on apex", &cone, apex_on_ball, &cone, rest(), 0.5);
     let needle = simple(Cone { bottom: 0.01, top: 0.0, half_height: 0.5 });
     hits("needle on face", &needle, down(flipped), &cube, rest(), 0.5);
-    let socket = minus(
+    let socket = pierced(
         Cuboid { half: DVec3::splat(0.7) },
         vec![(Cone { bottom: 0.5, top: 0.0, half_height: 0.5 }.into(), Pose::new(v(0., 0., 0.2), flipped))],
     );
@@ -212,7 +200,7 @@ fn cones_and_sockets() {
         0.5,
     );
     let bowl =
-        minus(Cuboid { half: v(0.7, 0.7, 0.5) }, vec![(Sphere { radius: 0.5 }.into(), Pose::at(v(0., 0., 0.5)))]);
+        pierced(Cuboid { half: v(0.7, 0.7, 0.5) }, vec![(Sphere { radius: 0.5 }.into(), Pose::at(v(0., 0., 0.5)))]);
     let drop = slide(v(0., 0., 1.4), v(0., 0., -1.0));
     hits("ball .5 into socket .5", &bowl, rest(), &ball, drop, 0.9);
     hits("ball .499 into socket .5", &bowl, rest(), &simple(Sphere { radius: 0.499 }), drop, 0.901);
@@ -231,7 +219,7 @@ fn overlaps_and_cavities() {
     let o = ask("pressed by a tenth", &cube, rest(), &cube, slide(v(0.0, 0.0, 0.9), v(0., 0., 1.)));
     assert_eq!(o.status, Status::Overlap);
     assert!((o.separation + 0.1).abs() < 1e-9 && (o.normal - DVec3::Z).length() < 1e-9, "{o:?}");
-    let shell = minus(Sphere { radius: 1.1 }, vec![(Sphere { radius: 1.0 }.into(), Pose::IDENTITY)]);
+    let shell = pierced(Sphere { radius: 1.1 }, vec![(Sphere { radius: 1.0 }.into(), Pose::IDENTITY)]);
     let ball = simple(Sphere { radius: 0.2 });
     let o = hits("ball meets the cavity's wall", &shell, rest(), &ball, slide(v(0.1, 0., 0.), v(1., 0., 0.)), 0.7);
     assert!((o.normal + DVec3::X).length() < 1e-6, "{:?}", o.normal);
@@ -253,9 +241,9 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
         (Shape::from(Cylinder { radius: 0.08, half_height: 0.3 }), at)
     };
     let holes = (-2..=2).flat_map(|i| (-2..=2).map(move |j| hole(i, j))).collect();
-    let plate = minus(Cuboid { half: v(0.7, 0.7, 0.1) }, holes);
+    let plate = pierced(Cuboid { half: v(0.7, 0.7, 0.1) }, holes);
     let slot = |y: f64| (Shape::from(Cuboid { half: v(1.0, 0.12, 0.4) }), Pose::at(v(0., y, -0.3)));
-    let fork = minus(Cuboid { half: v(0.1, 0.6, 0.5) }, vec![slot(-0.25), slot(0.25)]);
+    let fork = pierced(Cuboid { half: v(0.1, 0.6, 0.5) }, vec![slot(-0.25), slot(0.25)]);
     let (mut held, mut kept_out) = (0, 0);
     for k in 0..40 {
         let r = |a: f64| (f64::from(k) * a).fract() * 2.0 - 1.0;

@@ -11,6 +11,8 @@ pub mod local;
 pub mod octree;
 pub mod span;
 pub mod tables;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod walk;
 
 pub use approach::Approach;

@@ -4,6 +4,8 @@
 
 pub mod aabb;
 pub mod ball;
+#[cfg(test)]
+pub(crate) mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;

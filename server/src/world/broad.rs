@@ -129,21 +129,14 @@ fn grow(branches: &mut Vec<Branch>, order: &mut [u32], start: u32, boxes: &[Aabb
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::Random;
     use glam::DVec3;
-
-    /// Reproducible numbers in 0..1.
-    fn numbers(seed: u64) -> impl FnMut() -> f64 {
-        let mut s = seed;
-        move || {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 11) as f64 / (1u64 << 53) as f64
-        }
-    }
 
     #[test]
     fn it_finds_what_comparing_all_finds() {
         for seed in 0..40 {
-            let mut n = numbers(seed);
+            let mut numbers = Random(seed);
+            let mut n = || numbers.unit();
             let mut boxes: Vec<Aabb> = (0..120)
                 .map(|_| {
                     // Coordinates on a coarse grid, so that sides coincide often.
@@ -173,7 +166,8 @@ mod tests {
     #[test]
     fn tests_a_pair_hardly_grow_with_the_number_of_boxes() {
         let tests = |count: usize| {
-            let mut n = numbers(count as u64);
+            let mut numbers = Random(count as u64);
+            let mut n = || numbers.unit();
             let side = (count as f64).cbrt();
             let mut at = || DVec3::new(n(), n(), n()) * side;
             let boxes: Vec<Aabb> = (0..count).map(|_| Aabb::around(at(), DVec3::splat(0.5))).collect();
@@ -190,7 +184,8 @@ mod tests {
 
     #[test]
     fn a_thousand_scattered_boxes_cost_far_less_than_all_pairs() {
-        let mut n = numbers(1);
+        let mut numbers = Random(1);
+        let mut n = || numbers.unit();
         let boxes: Vec<Aabb> =
             (0..1000).map(|_| Aabb::around(DVec3::new(n(), n(), n()) * 20.0, DVec3::splat(0.5))).collect();
         let mut broad = BroadPhase::default();

@@ -3,6 +3,7 @@
 use super::*;
 use crate::contact::{Counters, Outcome, Status};
 use crate::eco::Model;
+use crate::eco::testing::{pierced, simple};
 use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
 use crate::solid::{Label, Op, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -11,16 +12,16 @@ use contactd_proto::{Detect, ErrorCode, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
+fn part(model: Model) -> Arc<Part> {
+    Arc::new(Part::new(Arc::new(model)))
+}
+
 fn ball(radius: f64) -> Arc<Part> {
-    let mut b = SolidBuilder::new();
-    let root = b.primitive(Sphere { radius }, Pose::IDENTITY, Label::default());
-    Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))))
+    part(simple(Sphere { radius }))
 }
 
 fn slab(half: DVec3) -> Arc<Part> {
-    let mut b = SolidBuilder::new();
-    let root = b.primitive(Cuboid { half }, Pose::IDENTITY, Label::default());
-    Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))))
+    part(simple(Cuboid { half }))
 }
 
 fn object(id: u32, part: &Arc<Part>, at: DVec3) -> ObjectSpec {
@@ -29,12 +30,9 @@ fn object(id: u32, part: &Arc<Part>, at: DVec3) -> ObjectSpec {
 
 /// A slab with a drilled hole far aside: what meets it is answered by the search, not in front of it.
 fn drilled(half: DVec3) -> Arc<Part> {
-    let mut b = SolidBuilder::new();
-    let slab = b.primitive(Cuboid { half }, Pose::IDENTITY, Label::default());
     let aside = Pose::at(DVec3::new(-0.5 * half.x, 0.0, 0.0));
-    let drill = b.primitive(Cylinder { radius: 0.1 * half.x, half_height: 2.0 * half.z }, aside, Label::default());
-    let root = b.operation(Op::Difference, &[slab, drill]);
-    Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))))
+    let drill = Cylinder { radius: 0.1 * half.x, half_height: 2.0 * half.z };
+    part(pierced(Cuboid { half }, vec![(drill.into(), aside)]))
 }
 
 /// A floor (1, static, top at z = 0) and balls of radius 1 (2, 3, …) at z = 3, four apart.

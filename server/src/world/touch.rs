@@ -8,6 +8,7 @@ use super::coherence::Told;
 use super::record;
 use super::search::{self, PairJob};
 use super::step::{StepOptions, StepOutcome};
+use crate::contact::clearance;
 use crate::contact::separation::Within;
 use crate::contact::{Outcome, PairQuery, Status, region};
 use contactd_proto::Report;
@@ -49,7 +50,7 @@ pub(super) fn decide(
         return true;
     }
     let query = query(bodies, job, options, outcome, *left);
-    let (within, cells) = region::touching(&query, region::threshold(outcome.resolution, job.plan.margin));
+    let (within, cells) = clearance::touching(&query, region::threshold(outcome.resolution, job.plan.margin));
     outcome.touching = within != Within::Apart;
     outcome.counters.instant_cells += cells;
     *left = left.saturating_sub(cells);

@@ -1,42 +1,30 @@
 //! Separations against their own optimality: disjoint bodies are proven by a slab and by witnesses of equal distance.
 
 use super::*;
+use crate::math::random::Random;
 use crate::solid::{Shape, primitive as shape};
 use contactd_proto::motion::quat_of_rotation_vector;
 use glam::{DMat3, DVec3};
 
-/// A small generator of our own: splitmix64.
-struct Dice(u64);
+/// Random numbers, bodies and where they stand.
+struct Dice(Random);
 
 impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-    fn range(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.unit()
-    }
-    fn vector(&mut self, r: f64) -> DVec3 {
-        DVec3::new(self.range(-r, r), self.range(-r, r), self.range(-r, r))
-    }
     fn shape(&mut self, kind: usize) -> Shape {
-        let r = self.range(0.2, 1.0);
-        let h = self.range(0.2, 1.0);
+        let r = self.0.within(0.2, 1.0);
+        let h = self.0.within(0.2, 1.0);
         match kind {
             0 => shape::Sphere { radius: r }.into(),
             1 => shape::Cylinder { radius: r, half_height: h }.into(),
             2 => shape::Cone { bottom: r, top: 0.0, half_height: h }.into(),
             3 => shape::Cone { bottom: 0.5 * r, top: r, half_height: h }.into(),
-            4 => shape::Cuboid { half: DVec3::new(r, h, self.range(0.2, 1.0)) }.into(),
+            4 => shape::Cuboid { half: DVec3::new(r, h, self.0.within(0.2, 1.0)) }.into(),
             _ => shape::Polyhedron::platonic([4, 8, 12, 20][kind % 4], r).expect("a regular body").into(),
         }
     }
     fn stand(&mut self, far: f64) -> Stand {
-        let q = quat_of_rotation_vector(self.vector(2.0));
-        Stand { origin: self.vector(far), axes: DMat3::from_quat(q) }
+        let q = quat_of_rotation_vector(self.0.vector(2.0));
+        Stand { origin: self.0.vector(far), axes: DMat3::from_quat(q) }
     }
     fn body(&mut self, kind: usize, far: f64) -> Convex {
         let stand = self.stand(far);
@@ -85,7 +73,7 @@ fn every_unordered_pair_of_kinds_has_one_row() {
 
 #[test]
 fn witnesses_and_slab_prove_each_other_when_apart() {
-    let mut dice = Dice(1);
+    let mut dice = Dice(Random(1));
     let mut worst = 0.0f64;
     let mut failed = Vec::new();
     let mut apart = 0;
@@ -117,7 +105,7 @@ fn witnesses_and_slab_prove_each_other_when_apart() {
 #[test]
 fn a_negative_separation_has_a_common_point() {
     // Alternating projections are an independent verdict: they converge to a common point or to a gap.
-    let mut dice = Dice(2);
+    let mut dice = Dice(Random(2));
     let mut overlapping = 0;
     for i in 0..KINDS {
         for j in 0..KINDS {
@@ -146,7 +134,7 @@ fn a_negative_separation_has_a_common_point() {
 
 #[test]
 fn swapping_the_pair_turns_the_normal() {
-    let mut dice = Dice(3);
+    let mut dice = Dice(Random(3));
     for i in 0..KINDS {
         for j in 0..KINDS {
             let (a, b) = (dice.body(i, 1.5), dice.body(j, 1.5));
@@ -159,7 +147,7 @@ fn swapping_the_pair_turns_the_normal() {
 
 #[test]
 fn parallel_cylinders_agree_with_the_general_configurations() {
-    let mut dice = Dice(4);
+    let mut dice = Dice(Random(4));
     for _ in 0..500 {
         let s = dice.stand(0.5);
         let place = |c: &Shape, o: DVec3| {
@@ -167,7 +155,7 @@ fn parallel_cylinders_agree_with_the_general_configurations() {
             Convex::of(c).expect("bounded").placed(&stand)
         };
         let (a, b) = (dice.shape(1), dice.shape(1));
-        let (a, b) = (place(&a, DVec3::ZERO), place(&b, dice.vector(2.5)));
+        let (a, b) = (place(&a, DVec3::ZERO), place(&b, dice.0.vector(2.5)));
         let (value, _) = separation_only(&a, &b, None);
         let (Convex::Cylinder(p), Convex::Cylinder(q)) = (&a, &b) else { unreachable!() };
         let mut best = Best::new(&a, &b, None);
@@ -178,13 +166,13 @@ fn parallel_cylinders_agree_with_the_general_configurations() {
 
 #[test]
 fn parallel_cones_agree_with_the_general_configurations() {
-    let mut dice = Dice(6);
+    let mut dice = Dice(Random(6));
     let mut apart = 0;
     for i in 0..600 {
         let s = dice.stand(0.5);
         let (ka, kb) = ([1, 2, 3][i % 3], [2, 3][i / 3 % 2]);
         let (a, b) = (dice.shape(ka), dice.shape(kb));
-        let offset = if i % 5 == 0 { DVec3::Z * dice.range(-3.0, 3.0) } else { dice.vector(2.5) };
+        let offset = if i % 5 == 0 { DVec3::Z * dice.0.within(-3.0, 3.0) } else { dice.0.vector(2.5) };
         let place = |c: &Shape, o: DVec3| {
             let stand = Stand { origin: s.origin + s.axes * o, axes: s.axes };
             Convex::of(c).expect("bounded").placed(&stand)
@@ -204,7 +192,7 @@ fn parallel_cones_agree_with_the_general_configurations() {
 
 #[test]
 fn the_curve_of_two_cones_is_there_when_their_sides_cross_and_shrinks_to_the_touching_point() {
-    let mut dice = Dice(7);
+    let mut dice = Dice(Random(7));
     let (mut crossing, mut touching, mut apart) = (0, 0, 0);
     let mut worst = [0.0f64; 2];
     for i in 0..4000 {
@@ -260,7 +248,7 @@ fn the_curve_of_two_cones_is_there_when_their_sides_cross_and_shrinks_to_the_tou
 fn the_clearance_in_a_cavity_is_that_of_its_nearest_point() {
     // The smallest clearance over many boundary points of the body never undercuts the closed form, and comes close:
     // for tilted and for parallel axes.
-    let mut dice = Dice(5);
+    let mut dice = Dice(Random(5));
     let mut counted = [[0; KINDS]; KINDS];
     for i in 0..KINDS {
         for j in 0..KINDS {
@@ -268,11 +256,11 @@ fn the_clearance_in_a_cavity_is_that_of_its_nearest_point() {
                 let s = dice.stand(0.1);
                 let (a, b) = (dice.shape(i), dice.shape(j));
                 let axes = if k % 4 == 0 { s.axes } else { dice.stand(0.0).axes };
-                let stand = Stand { origin: s.origin + s.axes * dice.vector(0.1), axes };
+                let stand = Stand { origin: s.origin + s.axes * dice.0.vector(0.1), axes };
                 let mut a = Convex::of(&a).expect("bounded").placed(&stand);
                 let b = Convex::of(&b).expect("bounded").placed(&s);
                 // Small enough to find room: shrunk about its middle.
-                let scale = dice.range(0.15, 0.6);
+                let scale = dice.0.within(0.15, 0.6);
                 a.shrink(scale);
                 let c = clearance(&a, &b);
                 if c.value <= 0.0 {
@@ -283,7 +271,7 @@ fn the_clearance_in_a_cavity_is_that_of_its_nearest_point() {
                 assert!((least - c.value).abs() < 1e-13);
                 assert!(a.distance(c.point).0.abs() < 1e-13, "the point lies on the body");
                 for _ in 0..300 {
-                    least = least.min(-b.distance(a.support(dice.vector(1.0))).0);
+                    least = least.min(-b.distance(a.support(dice.0.vector(1.0))).0);
                 }
                 // Along the rims, which hold the extreme points of a round body.
                 if let Convex::Cylinder(p) | Convex::Cone(p) = &a {

@@ -194,15 +194,10 @@ impl<'a> Glancing<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eco::testing::simple;
+    use crate::math::random::Random;
     use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
-    use crate::solid::{Label, SolidBuilder};
     use contactd_proto::Motion;
-
-    fn model(shape: impl Into<Shape>) -> Model {
-        let mut b = SolidBuilder::new();
-        let root = b.primitive(shape, Pose::IDENTITY, Label::default());
-        Model::new(b.finish(root))
-    }
 
     fn track(start: DVec3, end: DVec3, spin: DVec3) -> Track {
         let motion = Motion::turning(Pose::at(start), end, spin);
@@ -214,19 +209,10 @@ mod tests {
         Glancing::new(models, [&stances[0], &stances[1]], touch).expect("convex").look(None)
     }
 
-    /// Reproducible numbers in −1..1.
-    fn numbers(seed: u64) -> impl FnMut() -> f64 {
-        let mut s = seed;
-        move || {
-            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (s >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
-
     #[test]
     fn a_bar_that_sweeps_past_between_both_ends_of_the_step_is_seen() {
-        let bar = model(Cuboid { half: DVec3::new(1.0, 0.02, 0.02) });
-        let ball = model(Sphere { radius: 0.1 });
+        let bar = simple(Cuboid { half: DVec3::new(1.0, 0.02, 0.02) });
+        let ball = simple(Sphere { radius: 0.1 });
         let at_rest = |at| track(at, at, DVec3::ZERO);
         // It ends each quarter turn as far from the ball as it begins, and passes through it in between.
         let turning = track(DVec3::ZERO, DVec3::ZERO, DVec3::Z * std::f64::consts::FRAC_PI_2);
@@ -244,9 +230,10 @@ mod tests {
 
     #[test]
     fn what_a_glance_calls_apart_has_no_point_in_common() {
-        let rod = model(Cylinder { radius: 0.1, half_height: 0.6 });
-        let block = model(Cuboid { half: DVec3::new(0.4, 0.3, 0.2) });
-        let mut n = numbers(3);
+        let rod = simple(Cylinder { radius: 0.1, half_height: 0.6 });
+        let block = simple(Cuboid { half: DVec3::new(0.4, 0.3, 0.2) });
+        let mut numbers = Random(3);
+        let mut n = || numbers.within(-1.0, 1.0);
         let mut v = |size: f64| DVec3::new(n(), n(), n()) * size;
         let (mut apart, mut meet) = (0, 0);
         for _ in 0..2000 {

@@ -8,6 +8,8 @@ use crate::contact::{
     Body, Ideas, Outcome, PairQuery, PairSearch, Scratch, Status, default_resolution, earliest_contact,
 };
 use crate::eco::Model;
+use crate::eco::testing::{pierced, simple};
+use crate::math::random::Random;
 use crate::motion::{Placed, Relative};
 use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
 use crate::solid::{Label, Op, Shape, SolidBuilder};
@@ -15,44 +17,10 @@ use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use glam::{DVec3, dvec3};
 
-/// Pseudo-random numbers of [0, 1) (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, lo: f64, hi: f64) -> f64 {
-        lo + (hi - lo) * self.unit()
-    }
-
-    fn vector(&mut self, size: f64) -> DVec3 {
-        dvec3(self.within(-size, size), self.within(-size, size), self.within(-size, size))
-    }
-
-    fn across(&mut self, size: f64) -> DVec3 {
-        let angle = self.within(0.0, std::f64::consts::TAU);
-        dvec3(angle.cos(), angle.sin(), 0.0) * size
-    }
-}
-
-fn body(shape: impl Into<Shape>) -> Model {
-    let mut b = SolidBuilder::new();
-    let n = b.primitive(shape, Pose::IDENTITY, Label::default());
-    Model::new(b.finish(n))
-}
-
-fn pierced(outer: impl Into<Shape>, holes: Vec<(Shape, Pose)>) -> Model {
-    let mut b = SolidBuilder::new();
-    let mut all = vec![b.primitive(outer, Pose::IDENTITY, Label::default())];
-    all.extend(holes.into_iter().map(|(shape, at)| b.primitive(shape, at, Label::default())));
-    let n = b.operation(Op::Difference, &all);
-    Model::new(b.finish(n))
+/// A vector of length `size` across the hole.
+fn across(n: &mut Random, size: f64) -> DVec3 {
+    let angle = n.within(0.0, std::f64::consts::TAU);
+    dvec3(angle.cos(), angle.sin(), 0.0) * size
 }
 
 fn ask(a: (&Model, Motion), b: (&Model, Motion), ideas: Ideas) -> Outcome {
@@ -134,7 +102,7 @@ fn plate() -> Model {
 }
 
 fn peg() -> Model {
-    body(Cylinder { radius: 0.24, half_height: 0.5 })
+    simple(Cylinder { radius: 0.24, half_height: 0.5 })
 }
 
 #[test]
@@ -142,8 +110,8 @@ fn pegs_that_fall_are_told() {
     let (plate, peg) = (plate(), peg());
     let tilted = |turns: f64| {
         move |r: &mut Random| {
-            let (at, tilt) = (r.across(0.005) + DVec3::Z, r.within(0.03, 0.12));
-            let tilt = r.across(tilt);
+            let (at, tilt) = (across(r, 0.005) + DVec3::Z, r.within(0.03, 0.12));
+            let tilt = across(r, tilt);
             let by = DVec3::Z * -r.within(0.8, 1.0);
             (rest(), moving(at, tilt, by, r.vector(turns)))
         }
@@ -157,7 +125,7 @@ fn pegs_that_fall_are_told() {
         40,
         |r| {
             let at = r.within(0.02, 0.3);
-            (rest(), moving(r.across(at) + DVec3::Z, DVec3::ZERO, DVec3::Z * -0.9, DVec3::ZERO))
+            (rest(), moving(across(r, at) + DVec3::Z, DVec3::ZERO, DVec3::Z * -0.9, DVec3::ZERO))
         },
         &plate,
         &peg,
@@ -185,8 +153,8 @@ fn pegs_that_press_sideways_are_told() {
             "sideways",
             40,
             |r| {
-                let (at, way) = (r.across(0.003), r.within(0.02, 0.1));
-                (rest(), moving(at, DVec3::ZERO, r.across(way), r.vector(turns)))
+                let (at, way) = (across(r, 0.003), r.within(0.02, 0.1));
+                (rest(), moving(at, DVec3::ZERO, across(r, way), r.vector(turns)))
             },
             &plate,
             &peg,
@@ -201,17 +169,17 @@ fn balls_in_pipes_are_told() {
         Cylinder { radius: 0.35, half_height: 1.0 },
         vec![(Cylinder { radius: 0.25, half_height: 1.5 }.into(), Pose::IDENTITY)],
     );
-    let ball = body(Sphere { radius: 0.2 });
+    let ball = simple(Sphere { radius: 0.2 });
     let sum = compare(
         "ball in pipe",
         60,
         |r| {
             let (at, by) = (r.within(0.0, 0.03), r.within(0.0, 0.2));
-            let at = r.across(at) + DVec3::Z * r.within(-0.4, 1.4);
+            let at = across(r, at) + DVec3::Z * r.within(-0.4, 1.4);
             let spin = r.vector(1.0);
             (
                 moving(r.vector(0.01), DVec3::ZERO, r.vector(0.05), DVec3::Z * r.within(0.0, 2.0)),
-                moving(at, DVec3::ZERO, r.across(by) + DVec3::Z * r.within(-0.5, 0.3), spin),
+                moving(at, DVec3::ZERO, across(r, by) + DVec3::Z * r.within(-0.5, 0.3), spin),
             )
         },
         &pipe,
@@ -232,10 +200,10 @@ fn other_bodies_and_holes_are_told() {
         vec![(Cuboid { half: dvec3(0.25, 0.25, 0.5) }.into(), Pose::IDENTITY)],
     );
     let bodies = [
-        body(Cylinder { radius: 0.22, half_height: 0.4 }),
-        body(Sphere { radius: 0.22 }),
-        body(Cone { bottom: 0.1, top: 0.24, half_height: 0.4 }),
-        body(Cuboid { half: dvec3(0.15, 0.14, 0.4) }),
+        simple(Cylinder { radius: 0.22, half_height: 0.4 }),
+        simple(Sphere { radius: 0.22 }),
+        simple(Cone { bottom: 0.1, top: 0.24, half_height: 0.4 }),
+        simple(Cuboid { half: dvec3(0.15, 0.14, 0.4) }),
     ];
     let mut told = 0;
     for (i, hole) in [&blind, &square].into_iter().enumerate() {
@@ -245,12 +213,12 @@ fn other_bodies_and_holes_are_told() {
                 24,
                 |r| {
                     let (at, tilt, turn) = (r.within(0.0, 0.02), r.within(0.0, 0.1), r.within(0.0, 0.3));
-                    let at = r.across(at) + DVec3::Z * r.within(0.75, 0.9);
-                    let by = r.across(0.02) - DVec3::Z * r.within(0.3, 1.0);
+                    let at = across(r, at) + DVec3::Z * r.within(0.75, 0.9);
+                    let by = across(r, 0.02) - DVec3::Z * r.within(0.3, 1.0);
                     let turn = if turn < 0.1 { DVec3::ZERO } else { r.vector(turn) };
                     (
                         moving(r.vector(0.02), r.vector(0.02), DVec3::ZERO, turn),
-                        moving(at, r.across(tilt), by, DVec3::ZERO),
+                        moving(at, across(r, tilt), by, DVec3::ZERO),
                     )
                 },
                 hole,
@@ -281,7 +249,7 @@ fn combs_of_pegs_are_told() {
     let (mut told, count) = (0, 40);
     for i in 0..count {
         let (off, angle) = (r.within(0.0, 0.008), 10f64.powf(r.within(-3.0, -1.0)));
-        let (at, tilt) = (r.across(off), r.vector(1.0).normalize() * angle);
+        let (at, tilt) = (across(&mut r, off), r.vector(1.0).normalize() * angle);
         let motion = moving(at + DVec3::Z * (1.0 + 3.5 * angle), tilt, DVec3::Z * -0.7, DVec3::ZERO);
         let o = ask((&plate, rest()), (&comb, motion), Ideas::default());
         assert_ne!(o.status, Status::Undecided, "{i}: {o:?}");
@@ -347,14 +315,14 @@ fn a_best_bound_is_the_reach_of_the_cut_body() {
             1 => Cone { bottom: 0.1, top: 0.3, half_height: 0.4 }.into(),
             _ => Cuboid { half: dvec3(0.2, 0.1, 0.4) }.into(),
         };
-        let model = body(shape);
+        let model = simple(shape);
         let motion = moving(r.vector(0.3), r.vector(0.6), DVec3::ZERO, DVec3::ZERO);
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let relative = Relative::new(placed(motion), placed(rest()));
         let primitive = &model.solid.primitives[0];
         let planes = [Plane { normal: DVec3::Z, offset: r.within(-0.2, 0.2), face: 0 }];
         let m = Moment::new(&super::Body::of(primitive).expect("bounded"), relative.at(0.0), &planes);
-        let u = r.across(1.0);
+        let u = across(&mut r, 1.0);
         let best = m.best(u, 0.0, &planes);
         let mut reach = f64::NEG_INFINITY;
         let inside = |x: DVec3| primitive.value(m.at.a_point(x)) <= 1e-9 && x.z <= planes[0].offset + 1e-9;

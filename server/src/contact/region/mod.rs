@@ -22,11 +22,10 @@ mod point;
 mod surface;
 
 use super::depth;
-use super::direct;
 use super::literal::Side;
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
 use super::pair::{PairQuery, PairSearch};
-use super::separation::{self, Cover, Place, Within};
+use super::separation::{Cover, Place};
 use super::work::Work;
 use crate::solid::Face;
 use glam::DVec3;
@@ -74,7 +73,7 @@ pub struct Regions {
 }
 
 /// Cells' worth of work that one pair's regions may cost, should its cell limit allow more.
-const MOST_CELLS: u64 = 20_000;
+pub(super) const MOST_CELLS: u64 = 20_000;
 /// A box with no more faces than this, of both sides together, is not halved for their number: 132 sets of them may balance.
 const FEW_FACES: usize = 8;
 /// Boxes in which curved faces may touch at several points are halved down to this part of the smaller body's radius …
@@ -124,22 +123,6 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
         }
     }
     found
-}
-
-/// Whether the bodies of a question are within `threshold` of each other at the start, proven or witnessed, and the cells'
-/// worth of work that it took.
-pub fn touching(query: &PairQuery, threshold: f64) -> (Within, u64) {
-    let (task, _) = PairSearch::task(query);
-    if task.a.is_empty() || task.b.is_empty() {
-        return (Within::Apart, 0);
-    }
-    // Of two convex primitives the nearest points tell, where they are apart.
-    if direct::Convex::new(task).is_some_and(|c| c.distance() > threshold + 8.0 * task.rounding) {
-        return (Within::Apart, 0);
-    }
-    let work = Work::new(limit(query));
-    let within = separation::within(&task, &task.relative.at(0.0), 0.5 * threshold, &work);
-    (within, work.cells())
 }
 
 /// The regions of an answered question: at the contact, or at the start where the pair touches and does not meet; such a
