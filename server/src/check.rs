@@ -5,7 +5,7 @@
 
 use crate::contact::{Body, Ideas, PairQuery, certificate};
 use crate::eco::Model;
-use crate::import::{Import, Scene};
+use crate::import::Scene;
 use crate::motion::Placed;
 use crate::world::{ObjectSpec, Part, Refusal, StepError, StepOptions, StepOutcome, World};
 use contactd_proto::{Detect, PoseRecord};
@@ -47,16 +47,19 @@ pub struct Check {
 }
 
 impl Check {
-    /// Puts the objects of `scene` into a world; `imports` are its models, in order, and `resolution` (length) stands
-    /// before the scene's own.
+    /// Puts the objects of `scene` into a world; `models` are its models, in order, and `resolution` (length) stands
+    /// before the scene's own. Objects of one model share it, and so do models that are one.
     ///
     /// # Errors
     /// What the world refuses.
-    pub fn new(scene: &Scene, imports: Vec<Import>, resolution: Option<f64>) -> Result<Self, CheckError> {
+    pub fn new(scene: &Scene, models: &[Arc<Model>], resolution: Option<f64>) -> Result<Self, CheckError> {
         let file = scene.file.clone();
         let refused = |refusal| CheckError::World { file: scene.file.clone(), refusal };
-        let parts: Vec<Arc<Part>> =
-            imports.into_iter().map(|i| Arc::new(Part::new(Arc::new(Model::new(i.solid))))).collect();
+        let mut parts: Vec<Arc<Part>> = Vec::with_capacity(models.len());
+        for model in models {
+            let same = parts.iter().find(|p| Arc::ptr_eq(&p.model, model)).cloned();
+            parts.push(same.unwrap_or_else(|| Arc::new(Part::new(model.clone()))));
+        }
         let count = scene.objects.len();
         let mut world = World::new(count, count);
         world.set_resolution(resolution.or(scene.resolution)).map_err(refused)?;

@@ -1,6 +1,6 @@
 //! What was imported and how, as text: kinds, bounds, notes, tree.
 
-use crate::import::{Import, Note, Scene};
+use crate::import::{Note, Scene};
 use crate::math::Aabb;
 use crate::solid::{Node, NodeId, Op, Sense, Shape, Solid};
 use std::collections::BTreeMap;
@@ -9,9 +9,8 @@ use std::fmt::Write as _;
 /// The tree is cut off after this many lines; the counts above it are complete.
 const TREE_LINES: usize = 400;
 
-/// All about one model; `file` is its heading.
-pub fn model(file: &str, import: &Import) -> String {
-    let Import { solid, notes } = import;
+/// All about one model and what its import had to say; `file` is its heading.
+pub fn model(file: &str, solid: &Solid, notes: &[Note]) -> String {
     let mut out = String::new();
     let mut kinds: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for (p, sense) in solid.primitives.iter().zip(&solid.senses) {

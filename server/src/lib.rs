@@ -49,6 +49,7 @@
 //! | 4 | [`bound`] | stage 1 |
 //! | 5 | [`eco`] | stage 2: extended CSG octrees and their walk |
 //! | 6 | [`contact`] | stage 3 and the queue: the answer for a pair |
+//! | 6 | [`cache`] | preprocessed models kept on disk |
 //! | 7 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
 //! | 8 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
 //! | 9 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
@@ -82,6 +83,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bound;
+pub mod cache;
 pub mod check;
 pub mod contact;
 pub mod demo;

@@ -2,12 +2,13 @@
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
+use contactd::cache::{self, Cache, Prepared};
 use contactd::check::Check;
 use contactd::contact::Status;
 use contactd::eco::Model;
-use contactd::import::{self, Facets, Limits};
+use contactd::import::{self, Facets, Limits, Scene};
 use contactd::inspect;
-use contactd::ipc::ServerConfig;
+use contactd::ipc::{CacheFolder, ServerConfig};
 use contactd::picture::{
     self,
     drawing::Drawing,
@@ -19,6 +20,7 @@ use std::error::Error;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Certified earliest contact of solids modelled by constructive solid geometry.
 #[derive(Parser)]
@@ -40,9 +42,8 @@ enum Command {
         /// A TOML file of limits and waiting times.
         #[arg(long)]
         config: Option<PathBuf>,
-        /// Where preprocessed models are kept between runs: off (this version keeps none).
-        #[arg(long, default_value = "off", value_parser = ["off"])]
-        cache: String,
+        #[command(flatten)]
+        cache: CacheArguments,
     },
     /// A server process and a client process on real parts: steps, earliest contacts, latencies.
     Demo {
@@ -58,6 +59,8 @@ enum Command {
         /// Where that scene and its models go.
         #[arg(long, value_name = "FOLDER", default_value = ".")]
         into: PathBuf,
+        #[command(flatten)]
+        cache: CacheArguments,
     },
     /// What is in a model or scene file, and how it was imported.
     Inspect {
@@ -69,7 +72,24 @@ enum Command {
         /// Also draw it, into an .svg or .png file: a model's tree with its bounds and its octree, a scene's contacts.
         #[arg(long, value_name = "FILE")]
         picture: Option<PathBuf>,
+        #[command(flatten)]
+        cache: CacheArguments,
     },
+}
+
+#[derive(clap::Args)]
+struct CacheArguments {
+    /// Folder in which preprocessed models are kept between runs, made if need be; or off, which is the default.
+    #[arg(long, value_name = "DIR|off")]
+    cache: Option<CacheFolder>,
+}
+
+impl CacheArguments {
+    /// The cache, where one is asked for and can be used.
+    fn open(&self) -> Option<Cache> {
+        let folder = self.cache.as_ref().and_then(CacheFolder::folder)?;
+        Cache::open(folder, cache::DEFAULT_BYTES).map_err(|e| warn(&e)).ok()
+    }
 }
 
 #[derive(clap::Args)]
@@ -94,6 +114,8 @@ struct CheckArguments {
     /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
     #[arg(long, default_value = "auto", value_parser = facets)]
     facets: Facets,
+    #[command(flatten)]
+    cache: CacheArguments,
 }
 
 /// What the process ends with.
@@ -108,9 +130,9 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Check(arguments) => check_scene(&arguments),
         Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
-        Command::Demo { embedded, csv, .. } => run_demo(embedded, csv.as_deref()),
-        Command::Inspect { file, facets, picture } => inspect_file(&file, facets, picture.as_deref()),
-        Command::Serve { name, config, .. } => serve(&name, config.as_deref()),
+        Command::Demo { embedded, csv, cache, .. } => run_demo(embedded, csv.as_deref(), cache),
+        Command::Inspect { file, facets, picture, cache } => inspect_file(&file, facets, picture.as_deref(), &cache),
+        Command::Serve { name, config, cache } => serve(&name, config.as_deref(), cache),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
@@ -122,8 +144,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn serve(name: &str, config: Option<&Path>) -> Result<Done, Box<dyn Error>> {
-    let config = config.map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
+fn serve(name: &str, config: Option<&Path>, cache: CacheArguments) -> Result<Done, Box<dyn Error>> {
+    let mut config = config.map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
+    // The command line stands before the file, `off` too.
+    config.cache = cache.cache.unwrap_or(config.cache);
     let ready = || {
         let pid = std::process::id();
         // A reader that has gone away does not stop a server.
@@ -133,8 +157,8 @@ fn serve(name: &str, config: Option<&Path>) -> Result<Done, Box<dyn Error>> {
     Ok(Done::Well)
 }
 
-fn run_demo(embedded: bool, csv: Option<&Path>) -> Result<Done, Box<dyn Error>> {
-    let (text, run) = contactd::demo::run(embedded, csv)?;
+fn run_demo(embedded: bool, csv: Option<&Path>, cache: CacheArguments) -> Result<Done, Box<dyn Error>> {
+    let (text, run) = contactd::demo::run(embedded, csv, &cache.cache.unwrap_or_default())?;
     print(&text)?;
     Ok(if run.undecided > 0 { Done::Undecided } else { Done::Well })
 }
@@ -156,8 +180,8 @@ fn length(word: &str) -> Result<f64, String> {
 
 fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     let scene = import::read_scene(&arguments.scene)?;
-    let imports = scene.load_models(arguments.facets, &Limits::default())?;
-    let mut check = Check::new(&scene, imports, arguments.resolution)?;
+    let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
+    let mut check = Check::new(&scene, &models_of(&prepared), arguments.resolution)?;
     let outcome = check.step(arguments.first)?.clone();
     if let Some(to) = &arguments.certificate {
         let (text, without) = check.certificates(&outcome);
@@ -197,25 +221,47 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     Ok(if undecided { Done::Undecided } else { Done::Well })
 }
 
-fn inspect_file(file: &Path, facets: Facets, picture: Option<&Path>) -> Result<Done, Box<dyn Error>> {
-    let limits = Limits::default();
+/// The models of a scene, with a word on standard error where the cache is in trouble.
+fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
+    let prepared = cache::prepare_scene(cache.open().as_ref(), scene, facets, &Limits::default())?;
+    prepared.iter().filter_map(|p| p.trouble.as_deref()).for_each(warn);
+    Ok(prepared)
+}
+
+fn models_of(prepared: &[Prepared]) -> Vec<Arc<Model>> {
+    prepared.iter().map(|p| p.model.clone()).collect()
+}
+
+fn warn(sentence: &str) {
+    eprintln!("contactd: {sentence}");
+}
+
+fn inspect_file(
+    file: &Path,
+    facets: Facets,
+    picture: Option<&Path>,
+    cache: &CacheArguments,
+) -> Result<Done, Box<dyn Error>> {
     let text = if file.extension().is_some_and(|e| e == "toml") {
         let scene = import::read_scene(file)?;
-        let models = scene.load_models(facets, &limits)?;
+        let models = prepare_scene(&scene, facets, cache)?;
         let mut text = inspect::scene(&scene);
-        for (source, import) in scene.models.iter().zip(&models) {
-            text.push_str(&inspect::model(&source.path.display().to_string(), import));
+        for (source, p) in scene.models.iter().zip(&models) {
+            text.push_str(&inspect::model(&source.path.display().to_string(), &p.model.solid, &p.notes));
         }
         if let Some(to) = picture {
-            write_picture(to, &scene_picture(&scene, models)?)?;
+            write_picture(to, &scene_picture(&scene, &models_of(&models))?)?;
         }
         text
     } else {
-        let import = import::read_csg(file, facets, &limits)?;
-        let text = inspect::model(&file.display().to_string(), &import);
+        let (limits, name) = (Limits::default(), file.display().to_string());
+        let text = import::read_text(file, &limits)?;
+        let prepared = cache::prepare(cache.open().as_ref(), &name, &text, facets, &limits)?;
+        prepared.trouble.as_deref().into_iter().for_each(warn);
+        let text = inspect::model(&name, &prepared.model.solid, &prepared.notes);
         if let Some(to) = picture {
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
-            write_picture(to, &picture::model(&name, &Model::new(import.solid)))?;
+            write_picture(to, &picture::model(&name, &prepared.model))?;
         }
         text
     };
@@ -224,7 +270,7 @@ fn inspect_file(file: &Path, facets: Facets, picture: Option<&Path>) -> Result<D
 }
 
 /// The scene at its contacts, solved as `check` does.
-fn scene_picture(scene: &import::Scene, models: Vec<import::Import>) -> Result<Drawing, Box<dyn Error>> {
+fn scene_picture(scene: &Scene, models: &[Arc<Model>]) -> Result<Drawing, Box<dyn Error>> {
     let mut check = Check::new(scene, models, None)?;
     let outcome = check.step(false)?.clone();
     let bodies = check.world.bodies();

@@ -106,6 +106,40 @@ fn bad_input_is_one_line_and_status_2() {
 }
 
 #[test]
+fn a_cache_changes_nothing_that_is_told() {
+    let folder = folder(&[("ball.csg", BALL), ("s.toml", &scene(4.0))]);
+    let kept = || {
+        let files = std::fs::read_dir(folder.path().join("kept")).into_iter().flatten().flatten();
+        files.map(|f| f.path()).collect::<Vec<_>>()
+    };
+    let plain = run(folder.path(), &["check", "s.toml", "--json"]);
+    run(folder.path(), &["check", "s.toml", "--json", "--cache", "off"]);
+    assert!(kept().is_empty() && !folder.path().join("off").exists());
+    for arguments in [&["check", "s.toml", "--json", "--cache", "kept"][..]; 2] {
+        let out = run(folder.path(), arguments);
+        assert_eq!((out.status.code(), out.stderr.len()), (Some(0), 0), "{}", text(&out.stderr));
+        assert_eq!(text(&out.stdout), text(&plain.stdout));
+        assert_eq!(kept().len(), 1);
+    }
+    let inspected = run(folder.path(), &["inspect", "ball.csg", "--cache", "kept"]).stdout;
+    assert_eq!(inspected, run(folder.path(), &["inspect", "ball.csg"]).stdout);
+    assert_eq!(kept().len(), 1, "one text, one file, whoever asks");
+    // A file that is no longer what it was is told, and replaced.
+    let good = std::fs::read(&kept()[0]).expect("the kept model");
+    std::fs::write(&kept()[0], &good[..good.len() - 1]).expect("a damaged file");
+    let out = run(folder.path(), &["check", "s.toml", "--json", "--cache", "kept"]);
+    assert_eq!((out.status.code(), text(&out.stdout)), (Some(0), text(&plain.stdout)));
+    assert!(text(&out.stderr).starts_with("contactd: kept/"), "{}", text(&out.stderr));
+    assert!(text(&out.stderr).ends_with("expected a kept model, found damage; the model is imported anew\n"));
+    assert!(std::fs::read(&kept()[0]).expect("the kept model") == good);
+    // A folder that can't be one is told, too; both with the answers as they are.
+    let out = run(folder.path(), &["check", "s.toml", "--json", "--cache", "ball.csg/kept"]);
+    assert_eq!((out.status.code(), text(&out.stdout)), (Some(0), text(&plain.stdout)));
+    assert!(text(&out.stderr).contains("expected a folder for preprocessed models"), "{}", text(&out.stderr));
+    assert_eq!(text(&out.stderr).lines().count(), 1);
+}
+
+#[test]
 fn inspect_tells_what_was_imported_and_how() {
     let model = "difference() {\n  cube(size = [4, 4, 1], center = true);\n  cylinder($fn = 6, h = 2, r1 = 1, r2 = 1, center = true);\n}\n";
     let folder = folder(&[("m.csg", model), ("ball.csg", BALL), ("s.toml", &scene(4.0))]);

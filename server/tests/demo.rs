@@ -1,5 +1,6 @@
 //! The demo as a user runs it: two processes, a thousand steps, and every row of its table solved again by `check`.
 
+use contactd::cache::prepare_scene;
 use contactd::check::Check;
 use contactd::contact::Outcome;
 use contactd::demo::{chosen, play, scene};
@@ -12,8 +13,9 @@ use std::process::Command;
 /// The answer of `check` for a pair of a scene file.
 fn checked(scene_file: &Path, a: &str, b: &str) -> Outcome {
     let scene = read_scene(scene_file).unwrap_or_else(|e| panic!("{e}"));
-    let models = scene.load_models(Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
-    let mut check = Check::new(&scene, models, None).unwrap_or_else(|e| panic!("{e}"));
+    let models = prepare_scene(None, &scene, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+    let models: Vec<_> = models.into_iter().map(|p| p.model).collect();
+    let mut check = Check::new(&scene, &models, None).unwrap_or_else(|e| panic!("{e}"));
     let outcome = check.step(false).unwrap_or_else(|e| panic!("{e}")).clone();
     let id = |name: &str| scene.objects.iter().position(|o| o.name == name).expect("an object of the scene") as u32;
     let pair = outcome.pairs.iter().find(|p| (p.a, p.b) == (id(a), id(b))).expect("the pair was searched");

@@ -12,6 +12,7 @@ use contactd_client::{Error, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
 use harness::scene::{Bits, bits, build, fill, set_options};
 use harness::{PATIENCE, ServerProcess, serve_command};
+use std::os::unix::fs::MetadataExt as _;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
@@ -280,6 +281,42 @@ fn batches_and_replies_grow_far_beyond_their_first_size() {
     }
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+#[test]
+fn two_servers_share_a_cache_and_a_third_begins_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = || -> Vec<(String, u64)> {
+        let files = std::fs::read_dir(folder.path()).unwrap().flatten();
+        let mut files: Vec<_> =
+            files.map(|f| (f.file_name().to_string_lossy().into_owned(), f.metadata().unwrap().ino())).collect();
+        files.sort();
+        files
+    };
+    let config = format!("cache = {:?}", folder.path());
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ids = build(&mut own, PEGS);
+    let expected = step(&mut own, &ids, 1, 8).unwrap();
+    let answer = |server: &ServerProcess| {
+        let mut session = Session::connect_to(server.address.clone()).unwrap();
+        let ids = build(&mut session, PEGS);
+        step(&mut session, &ids, 1, 8).unwrap()
+    };
+    let servers = [0, 1].map(|i| ServerProcess::start(&format!("cache-{i}"), &config));
+    let answers = std::thread::scope(|scope| {
+        let each = servers.each_ref().map(|s| scope.spawn(|| answer(s)));
+        each.map(|thread| thread.join().unwrap())
+    });
+    assert!(answers.iter().all(|a| *a == expected));
+    let first = kept();
+    assert_eq!(first.len(), 2, "a plate and a peg: {first:?}");
+    // Read and not written again: a new file would be another one.
+    let third = ServerProcess::start("cache-2", &config);
+    assert_eq!(answer(&third), expected);
+    assert_eq!(kept(), first);
+    // A folder that is no folder: the server serves.
+    let none = ServerProcess::start("cache-3", &format!("cache = {:?}", folder.path().join(&first[0].0)));
+    assert_eq!(answer(&none), expected);
 }
 
 #[test]

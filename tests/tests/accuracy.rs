@@ -1,6 +1,7 @@
 //! What docs/accuracy.md promises beside the rounding budget: far from the origin, brackets, ties, bounded work.
 #![allow(missing_docs)]
 
+use contactd::cache::prepare_scene;
 use contactd::check::Check;
 use contactd::contact::{Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
 use contactd::eco::Model;
@@ -202,8 +203,9 @@ fn the_parts_of_the_assembly_meet_at_the_same_times_at_a_thousandth_of_the_resol
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/models/assembly.toml");
     let scene = import::scene::read_scene(&path).expect("the scene");
     let outcome = |resolution: Option<f64>| {
-        let models = scene.load_models(import::Facets::Exact, &Limits::default()).expect("its models");
-        let mut check = Check::new(&scene, models, resolution).expect("a world");
+        let models = prepare_scene(None, &scene, import::Facets::Exact, &Limits::default()).expect("its models");
+        let models: Vec<_> = models.into_iter().map(|p| p.model).collect();
+        let mut check = Check::new(&scene, &models, resolution).expect("a world");
         check.step(false).expect("a step").clone()
     };
     let (coarse, fine) = (outcome(None), outcome(Some(8e-11)));

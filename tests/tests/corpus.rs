@@ -36,6 +36,11 @@ fn any_bytes_are_a_message_or_refused() {
 }
 
 #[test]
+fn any_content_of_a_kept_model_is_one_that_can_be_asked_or_refused() {
+    replay("cache", 5000);
+}
+
+#[test]
 fn any_batch_is_taken_whole_or_changes_nothing() {
     replay("steps", 2000);
 }

@@ -4,8 +4,12 @@
 //! query lowers a peg, slightly tilted, into one of the holes. The peer is parry's `Compound` of the same plate at 16 wedges
 //! a hole: loading is told against its construction, a query against its `cast_shapes`. Memory is what the allocator holds
 //! more afterwards.
+//!
+//! A second table has the ways to load the same text: on one thread, on all, and from the disk cache, its file in the
+//! system's memory. The ways take turns; ratios are of one turn, their median is told.
 
 use clap::Parser;
+use contactd::cache::{self, Cache, Key, Origin, Prepared};
 use contactd::contact::{Outcome, Scratch, Status};
 use contactd::eco::Model;
 use contactd::import::{Facets, Limits, import_csg};
@@ -106,8 +110,77 @@ fn wedges(holes: &[DVec3]) -> peer::Body {
     peer::Body::new(facets::compound(&holes.iter().map(|h| block(*h)).collect::<Vec<_>>(), 16))
 }
 
+/// How the same text is loaded in several ways, and that it makes the same model.
+fn loading(options: &Options) -> std::io::Result<()> {
+    let limits = Limits::default();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let (one, all) = (pool(1), pool(cores));
+    let folder = tempfile::tempdir()?;
+    let kept = Cache::open(folder.path(), cache::DEFAULT_BYTES).expect("a folder");
+    let mut table = Table::new(&[
+        "primitives",
+        "nodes",
+        "threads",
+        "import_ms",
+        "cold_ms",
+        "parallel_ms",
+        "first_ms",
+        "cache_ms",
+        "file_kB",
+        "ratio_parallel",
+        "ratio_preprocessing",
+        "ratio_cache",
+    ]);
+    let sizes: &[usize] = options.pick(&[1, 10, 100, 1_000, 8_259, 30_000], &[10, 1_000, 8_259]);
+    for &primitives in sizes {
+        let text = text(&holes(primitives - 1));
+        let prepare = |cache| cache::prepare(cache, "plate.csg", &text, Facets::Auto, &limits).expect("a valid text");
+        let key = Key::of(&text, Facets::Auto, &limits);
+        let bytes = |p: &Prepared| cache::encode(&p.model, &p.notes).expect("a tree of few levels");
+        let mut laps = Vec::new();
+        let mut nodes = 0;
+        for _ in 0..options.pick(15, 5) {
+            let import = made(1, || import_csg("plate.csg", &text, Facets::Auto, &limits).expect("a valid text").solid);
+            let [alone, shared] =
+                [&one, &all].map(|pool| pool.install(|| made(1, || Model::new(import.value.clone()))));
+            drop((alone.value, shared.value));
+            let [cold, parallel] = [&one, &all].map(|pool| pool.install(|| made(1, || prepare(None))));
+            let _ = std::fs::remove_file(kept.path(&key));
+            let first = all.install(|| made(1, || prepare(Some(&kept))));
+            let cached = one.install(|| made(1, || prepare(Some(&kept))));
+            assert_eq!((first.value.origin, cached.value.origin), (Origin::Built, Origin::Kept));
+            let expected = bytes(&cold.value);
+            assert!([&parallel, &first, &cached].iter().all(|m| bytes(&m.value) == expected), "the same model");
+            nodes = cached.value.model.eco.census().nodes();
+            let [import, cold, parallel] = [import.seconds, cold.seconds, parallel.seconds];
+            laps.push([import, cold, parallel, first.seconds, cached.seconds, shared.seconds / alone.seconds]);
+        }
+        let of = |value: fn(&[f64; 6]) -> f64| median(laps.iter().map(value));
+        table.push(row![
+            primitives,
+            nodes,
+            cores,
+            of(|l| 1e3 * l[0]),
+            of(|l| 1e3 * l[1]),
+            of(|l| 1e3 * l[2]),
+            of(|l| 1e3 * l[3]),
+            of(|l| 1e3 * l[4]),
+            std::fs::metadata(kept.path(&key))?.len() as f64 / 1e3,
+            of(|l| l[2] / l[1]),
+            of(|l| l[5]),
+            of(|l| l[4] / l[1]),
+        ]);
+    }
+    println!(
+        "loading: text -> model on one thread (cold), on all (parallel), the same and kept (first), from the disk cache"
+    );
+    table.publish("model_loading", &options.folder())
+}
+
 fn main() -> std::io::Result<()> {
     let options = Options::parse();
+    loading(&options)?;
     let ideas = options.ideas();
     let plan = Plan { blocks: options.pick(7, 3), least: Duration::from_micros(20) };
     let peg = Model::new(Recipe::cylinder(0.24, 0.5).build());

@@ -14,6 +14,7 @@ mod table;
 pub use play::{Row, Run, play};
 pub use table::{chosen, csv};
 
+use crate::ipc::{CacheFolder, ServerConfig};
 use contactd_client::Session;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{BufRead as _, BufReader};
@@ -24,11 +25,12 @@ use std::time::{Duration, Instant};
 /// How long the server may take to start, and to stop.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Runs the demo and returns what it prints; contacts in full go to `csv_file` when there is one.
+/// Runs the demo and returns what it prints; contacts in full go to `csv_file` when there is one. Its models are kept in
+/// `cache`.
 ///
 /// # Errors
 /// One sentence.
-pub fn run(embedded: bool, csv_file: Option<&Path>) -> Result<(String, Run), String> {
+pub fn run(embedded: bool, csv_file: Option<&Path>, cache: &CacheFolder) -> Result<(String, Run), String> {
     let acts = script::acts();
     let total: usize = acts.iter().map(|a| a.steps).sum();
     let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr_with_hz(10));
@@ -40,11 +42,12 @@ pub fn run(embedded: bool, csv_file: Option<&Path>) -> Result<(String, Run), Str
     };
     let failed = |e: contactd_client::Error| format!("demo: {e}");
     let (run, way) = if embedded {
-        let mut session = crate::ipc::embedded(&crate::ipc::ServerConfig::default()).map_err(failed)?;
+        let mut session =
+            crate::ipc::embedded(&ServerConfig { cache: cache.clone(), ..ServerConfig::default() }).map_err(failed)?;
         (play(&mut session, progress).map_err(failed)?, "in this process")
     } else {
         let name = format!("demo-{}", std::process::id());
-        let mut server = ServerProcess::start(&name)?;
+        let mut server = ServerProcess::start(&name, cache)?;
         let mut session = Session::connect(&name).map_err(failed)?;
         let run = play(&mut session, progress).map_err(failed)?;
         session.close().map_err(failed)?;
@@ -65,10 +68,13 @@ struct ServerProcess {
 }
 
 impl ServerProcess {
-    fn start(name: &str) -> Result<Self, String> {
+    fn start(name: &str, cache: &CacheFolder) -> Result<Self, String> {
         let program = std::env::current_exe().map_err(|e| format!("expected to find this program, found {e}"))?;
         let mut command = Command::new(program);
         command.args(["serve", "--name", name]).stdin(Stdio::null()).stdout(Stdio::piped());
+        if let Some(folder) = cache.folder() {
+            command.arg("--cache").arg(folder);
+        }
         let child = command.spawn().map_err(|e| format!("expected to start a server, found {e}"))?;
         let mut server = Self { child };
         let mut line = String::new();

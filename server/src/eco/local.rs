@@ -39,6 +39,14 @@ impl Term {
     pub fn len_below(self) -> usize {
         self.len as usize
     }
+    /// The term as plain words.
+    pub(super) fn words(self) -> [u32; 2] {
+        [self.node, self.len]
+    }
+    /// The term of such words.
+    pub(super) fn of_words([node, len]: [u32; 2]) -> Self {
+        Self { node, len }
+    }
 }
 
 /// The whole tree of a solid as a local tree; empty for an empty solid.

@@ -2,13 +2,14 @@
 //!
 //! M. Zeiller 1993. `tables` holds the paper's four decision tables as data, `local` classifies a voxel, `octree` builds
 //! and refines, `approach` bounds when two moving voxels can meet, `walk` finds the pairs of primitives that two moving
-//! octrees hand to stage 3.
+//! octrees hand to stage 3, `snapshot` writes a model down and reads it back.
 //!
 //! Floor 5: imports `bound`, `motion`, `solid`, `math`.
 
 pub mod approach;
 pub mod local;
 pub mod octree;
+pub mod snapshot;
 pub mod span;
 pub mod tables;
 #[cfg(test)]
@@ -17,6 +18,7 @@ pub mod walk;
 
 pub use approach::Approach;
 pub use octree::{Census, Eco, Limits, Node};
+pub use snapshot::{Snapshot, SnapshotView};
 pub use tables::{Kind, Meet, meet};
 pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 
@@ -54,10 +56,15 @@ impl Model {
 
     /// Preprocesses a solid; its octree is built to the given limits.
     pub fn with_limits(solid: Solid, limits: Limits) -> Self {
-        let radius = SBounds::new(&solid, 0.0).root().ball.radius.max(0.0);
+        let radius = SBounds::shared(&solid, 0.0).root().ball.radius.max(0.0);
         let margin = if radius.is_finite() { MODEL_MARGIN * radius } else { 0.0 };
-        let bounds = SBounds::new(&solid, margin);
+        let bounds = SBounds::shared(&solid, margin);
         let eco = Eco::new(&solid, &bounds, limits);
+        Self::of_parts(solid, bounds, eco, radius)
+    }
+
+    /// A model of its parts; the rest follows from them.
+    fn of_parts(solid: Solid, bounds: SBounds, eco: Eco, radius: f64) -> Self {
         let face_reach = solid.faces.iter().map(Face::reach).fold(0.0, f64::max);
         let aabb = bounds.root().aabb;
         let extents = if aabb.is_empty() {
@@ -74,6 +81,7 @@ impl Model {
         if level <= self.margin() || self.radius.is_infinite() {
             return &self.bounds;
         }
+        // On this thread alone: other searches may wait for them.
         self.wide.get_or_init(|| SBounds::new(&self.solid, WIDE_MARGIN * self.radius))
     }
 

@@ -5,8 +5,10 @@
 //! depth first to a depth that a budget of evaluated primitives sets, so that a part of thousands of primitives still
 //! loads at once; `expand` decomposes mixed leaves further, on demand and for good.
 //!
+//! The levels built at load are shared between threads, subtrees of large octrees and the eight children of large nodes.
+//!
 //! Invariant: everything about a node is a function of the solid and the node's cube: it does not matter who asked for it,
-//! or when. All that is said of a node holds for every depth and distance up to the margin of the S-bounds.
+//! or when, or on which thread. All that is said of a node holds for every depth and distance up to the margin of the S-bounds.
 //! Not promised: the smallest octree; a voxel near an edge may count a primitive as partly in that is not.
 
 use super::local::{Classifier, Term, whole};
@@ -15,6 +17,7 @@ use crate::bound::SBounds;
 use crate::math::Aabb;
 use crate::solid::Solid;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// How far an octree is built at load. Counts, not times: the same model gives the same octree everywhere.
@@ -45,7 +48,7 @@ impl Default for Limits {
 const FINEST: f64 = 16.0;
 
 /// Levels below the root at most: a path fits 64 bits.
-const DEEPEST: u8 = 20;
+pub(super) const DEEPEST: u8 = 20;
 
 /// A node of an octree.
 #[derive(Debug)]
@@ -58,11 +61,11 @@ pub struct Node {
     pub f_lo: f64,
     /// Proven upper bound of f over the cube, as far as it tells within ±margin.
     pub f_hi: f64,
-    kind: Kind,
-    path: u64,
-    refs: Box<[u32]>,
-    terms: Box<[Term]>,
-    children: OnceLock<Box<[Node; 8]>>,
+    pub(super) kind: Kind,
+    pub(super) path: u64,
+    pub(super) refs: Box<[u32]>,
+    pub(super) terms: Box<[Term]>,
+    pub(super) children: OnceLock<Box<[Node; 8]>>,
 }
 
 impl Node {
@@ -91,6 +94,12 @@ impl Node {
     pub fn aabb(&self) -> Aabb {
         Aabb::around(self.center, DVec3::splat(self.half))
     }
+    /// Cube of child `i`: its centre and half its side.
+    pub(super) fn cube_of_child(&self, i: usize) -> (DVec3, f64) {
+        let h = 0.5 * self.half;
+        let sign = |bit: usize| if i >> bit & 1 == 0 { -h } else { h };
+        (self.center + DVec3::new(sign(0), sign(1), sign(2)), h)
+    }
     /// The children that exist already, from (−,−,−) to (+,+,+), x first.
     pub fn children(&self) -> Option<&[Node; 8]> {
         self.children.get().map(|c| &**c)
@@ -100,8 +109,8 @@ impl Node {
 /// The octree of a solid.
 #[derive(Debug)]
 pub struct Eco {
-    root: Node,
-    depth: u8,
+    pub(super) root: Node,
+    pub(super) depth: u8,
 }
 
 /// Numbers of nodes by kind and depth.
@@ -126,15 +135,7 @@ impl Eco {
     /// Builds the octree of a solid inside the smallest cube around its S-bounds' root box. An unbounded solid has a
     /// single mixed node without limits, an empty one a single empty node.
     pub fn new(solid: &Solid, bounds: &SBounds, limits: Limits) -> Self {
-        let b = bounds.root().aabb;
-        let (center, half) = match () {
-            () if b.is_empty() => (DVec3::ZERO, 0.0),
-            () if b.is_finite() => {
-                let c = b.center();
-                (c, (b.max - c).max(c - b.min).max_element())
-            }
-            () => (DVec3::ZERO, f64::INFINITY),
-        };
+        let (center, half) = cube_of(bounds);
         let terms = whole(solid, bounds);
         let (mut work, mut nodes) = (0, 1);
         let root = if half.is_finite() {
@@ -152,7 +153,7 @@ impl Eco {
             if next_nodes == 0 || work + next_work > limits.work || nodes + next_nodes > limits.nodes {
                 break;
             }
-            deepen(solid, bounds, &mut eco.root, &mut work);
+            work += deepen(solid, bounds, &mut eco.root, next_work >= SHARED_LEVEL);
             nodes += next_nodes;
             eco.depth += 1;
         }
@@ -175,7 +176,7 @@ impl Eco {
         if let Some(children) = node.children() {
             return Some(children);
         }
-        can_expand(bounds, node).then(|| &**node.children.get_or_init(|| children_of(solid, bounds, node, &mut 0)))
+        can_expand(bounds, node).then(|| &**node.children.get_or_init(|| children_of(solid, bounds, node)))
     }
 
     /// The deepest node that holds `x` (model frame) among those built so far; `None` outside the root.
@@ -207,6 +208,19 @@ impl Eco {
         let mut census = Census::default();
         count(&self.root, &mut census);
         census
+    }
+}
+
+/// The smallest cube around the root's box, as centre and half its side.
+pub(super) fn cube_of(bounds: &SBounds) -> (DVec3, f64) {
+    let b = bounds.root().aabb;
+    match () {
+        () if b.is_empty() => (DVec3::ZERO, 0.0),
+        () if b.is_finite() => {
+            let c = b.center();
+            (c, (b.max - c).max(c - b.min).max_element())
+        }
+        () => (DVec3::ZERO, f64::INFINITY),
     }
 }
 
@@ -245,25 +259,53 @@ fn classified(
     }
 }
 
-fn children_of(solid: &Solid, bounds: &SBounds, node: &Node, work: &mut usize) -> Box<[Node; 8]> {
-    let h = 0.5 * node.half;
-    Box::new(std::array::from_fn(|i| {
-        let sign = |bit: usize| if i >> bit & 1 == 0 { -h } else { h };
-        let center = node.center + DVec3::new(sign(0), sign(1), sign(2));
-        classified(solid, bounds, &node.terms, center, h, 8 * node.path + i as u64, work)
-    }))
+/// Child `i` of a node, and the primitives evaluated for it.
+fn child(solid: &Solid, bounds: &SBounds, node: &Node, i: usize) -> (Node, usize) {
+    let (center, half) = node.cube_of_child(i);
+    let mut work = 0;
+    let child = classified(solid, bounds, &node.terms, center, half, 8 * node.path + i as u64, &mut work);
+    (child, work)
 }
 
-/// Decomposes every mixed leaf once, depth first.
-fn deepen(solid: &Solid, bounds: &SBounds, node: &mut Node, work: &mut usize) {
+/// The children of a node, on the calling thread alone: a search asks for them within its `OnceLock`, where a thread that
+/// waited for others could take up another search that asks for the same ones.
+fn children_of(solid: &Solid, bounds: &SBounds, node: &Node) -> Box<[Node; 8]> {
+    Box::new(std::array::from_fn(|i| child(solid, bounds, node, i).0))
+}
+
+/// Primitives to be evaluated for a level, from which it is shared between threads.
+const SHARED_LEVEL: usize = 4096;
+
+/// Levels whose nodes' subtrees are built side by side.
+const SHARED_DEPTH: u8 = 3;
+
+/// Terms of a node from which its children are made side by side.
+const SHARED_TERMS: usize = 256;
+
+/// Decomposes every mixed leaf once; `shared` between threads where that pays. Returns the primitives evaluated.
+fn deepen(solid: &Solid, bounds: &SBounds, node: &mut Node, shared: bool) -> usize {
+    let depth = node.depth();
     if let Some(children) = node.children.get_mut() {
-        for c in children.iter_mut() {
-            deepen(solid, bounds, c, work);
+        if shared && depth < SHARED_DEPTH {
+            return children.par_iter_mut().map(|c| deepen(solid, bounds, c, true)).sum();
         }
-    } else if can_expand(bounds, node) {
-        node.children = OnceLock::from(children_of(solid, bounds, node, work));
-        node.kind = Kind::Grey;
+        return children.iter_mut().map(|c| deepen(solid, bounds, c, shared)).sum();
     }
+    if !can_expand(bounds, node) {
+        return 0;
+    }
+    let each = |i| child(solid, bounds, node, i);
+    let made: Vec<(Node, usize)> = if shared && node.terms.len() >= SHARED_TERMS {
+        (0..8).into_par_iter().map(each).collect()
+    } else {
+        (0..8).map(each).collect()
+    };
+    let work = made.iter().map(|(_, work)| work).sum();
+    let children: Vec<Node> = made.into_iter().map(|(child, _)| child).collect();
+    let children: Box<[Node; 8]> = children.try_into().expect("eight children");
+    node.children = OnceLock::from(children);
+    node.kind = Kind::Grey;
+    work
 }
 
 /// What one more level would decompose.

@@ -10,7 +10,7 @@
 pub mod csg;
 pub mod scene;
 
-pub use csg::{Problem, import_csg, read_csg};
+pub use csg::{Problem, import_csg, read_csg, read_text};
 pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
 
 use crate::solid::Solid;

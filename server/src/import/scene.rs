@@ -4,7 +4,7 @@
 //! Nothing is guessed: NaN and infinity are refused, a quaternion is normalised only when it nearly is one. The models'
 //! files are read by `Scene::load_models`, so that a scene can be looked at without them.
 
-use super::csg::read_csg;
+use super::csg::{import_csg, read_text};
 use super::{Facets, Import, ImportError, Limits, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule, Track};
@@ -156,8 +156,21 @@ impl Scene {
 
     /// Reads every model of the scene, in order.
     pub fn load_models(&self, facets: Facets, limits: &Limits) -> Result<Vec<Import>, SceneError> {
+        self.each_model(limits, |file, text| import_csg(file, &text, facets, limits))
+    }
+
+    /// What `read` makes of each of the models, in order, from the name and the text of its file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and whatever `read` refuses.
+    pub fn each_model<T>(
+        &self,
+        limits: &Limits,
+        mut read: impl FnMut(&str, String) -> Result<T, ImportError>,
+    ) -> Result<Vec<T>, SceneError> {
         let each = self.models.iter().map(|m| {
-            read_csg(&m.path, facets, limits).map_err(|e| match e {
+            let text = read_text(&m.path, limits);
+            text.and_then(|text| read(&m.path.display().to_string(), text)).map_err(|e| match e {
                 ImportError::Read { file, reason } => SceneError::Value {
                     file: self.file.clone(),
                     at: m.at,

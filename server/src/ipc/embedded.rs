@@ -28,7 +28,7 @@ pub struct Embedded {
 /// None today; the signature is that of every session.
 pub fn embedded(config: &ServerConfig) -> Result<Session<Embedded>, Error> {
     Session::new(Embedded {
-        models: Arc::new(Models::new(config.import_limits())),
+        models: Arc::new(Models::new(config)),
         scene: Scene::new(config),
         max_batch: config.batch as u32,
         records: Vec::new(),

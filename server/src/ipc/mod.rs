@@ -17,6 +17,6 @@ mod scene;
 mod serve;
 mod services;
 
-pub use config::ServerConfig;
+pub use config::{CacheFolder, ServerConfig};
 pub use embedded::{Embedded, embedded};
 pub use serve::{ServeError, Server, serve};

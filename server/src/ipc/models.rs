@@ -1,8 +1,10 @@
 //! Models by content: two sessions that load the same text share one model.
 //!
 //! The text itself is the key, so no two texts are ever taken for each other. An entry lives as long as a session uses it.
+//! With a disk cache, models are kept beyond that, and between runs.
 
-use crate::eco::Model;
+use super::config::ServerConfig;
+use crate::cache::{self, Cache, Prepared};
 use crate::import::{self, ImportError, Problem};
 use crate::solid::Sense;
 use crate::world::{Part, Refusal};
@@ -27,13 +29,16 @@ pub struct Loaded {
 #[derive(Debug)]
 pub struct Models {
     limits: import::Limits,
+    cache: Option<Cache>,
     loaded: Mutex<HashMap<(Facets, Arc<str>), Weak<Loaded>>>,
 }
 
 impl Models {
-    /// None yet.
-    pub fn new(limits: import::Limits) -> Self {
-        Self { limits, loaded: Mutex::new(HashMap::new()) }
+    /// None yet. A disk cache that cannot be used is a warning on standard error.
+    pub fn new(config: &ServerConfig) -> Self {
+        let cache = config.cache.folder().map(|folder| Cache::open(folder, config.cache_mb << 20));
+        let cache = cache.and_then(|opened| opened.map_err(|e| warn(&e)).ok());
+        Self { limits: config.import_limits(), cache, loaded: Mutex::new(HashMap::new()) }
     }
 
     /// The model of a text, imported if it is not in use already. May take seconds for a large one.
@@ -46,7 +51,7 @@ impl Models {
         if let Some(known) = known {
             return Ok(known);
         }
-        let made = catch_unwind(AssertUnwindSafe(|| make(name, text, facets, &self.limits)));
+        let made = catch_unwind(AssertUnwindSafe(|| self.make(name, text, facets)));
         let loaded =
             made.unwrap_or_else(|_| Err(Refusal::new(ErrorCode::Internal, format!("{name}: import failed"))))?;
         let loaded = Arc::new(loaded);
@@ -55,20 +60,30 @@ impl Models {
         map.insert(key, Arc::downgrade(&loaded));
         Ok(loaded)
     }
+
+    fn make(&self, name: &str, text: &str, facets: Facets) -> Result<Loaded, Refusal> {
+        let facets = match facets {
+            Facets::Auto => import::Facets::Auto,
+            Facets::Exact => import::Facets::Exact,
+            Facets::AsWritten => import::Facets::AsWritten,
+        };
+        if text.len() > self.limits.text {
+            return Err(Refusal::new(ErrorCode::LimitText, format!("{name}: {} bytes", text.len())));
+        }
+        let prepared = cache::prepare(self.cache.as_ref(), name, text, facets, &self.limits);
+        let prepared = prepared.map_err(|e| Refusal::new(code_of(&e), e.to_string()))?;
+        if let Some(trouble) = &prepared.trouble {
+            warn(trouble);
+        }
+        Ok(loaded(prepared))
+    }
 }
 
-fn make(name: &str, text: &str, facets: Facets, limits: &import::Limits) -> Result<Loaded, Refusal> {
-    let facets = match facets {
-        Facets::Auto => import::Facets::Auto,
-        Facets::Exact => import::Facets::Exact,
-        Facets::AsWritten => import::Facets::AsWritten,
-    };
-    if text.len() > limits.text {
-        return Err(Refusal::new(ErrorCode::LimitText, format!("{name}: {} bytes", text.len())));
-    }
-    let import =
-        import::import_csg(name, text, facets, limits).map_err(|e| Refusal::new(code_of(&e), e.to_string()))?;
-    let model = Arc::new(Model::new(import.solid));
+fn warn(sentence: &str) {
+    eprintln!("contactd: {sentence}");
+}
+
+fn loaded(Prepared { model, notes, .. }: Prepared) -> Loaded {
     let solid = &model.solid;
     let faces = (0..solid.faces.len()).map(|id| {
         let primitive = solid.face_owner[id];
@@ -81,11 +96,7 @@ fn make(name: &str, text: &str, facets: Facets, limits: &import::Limits) -> Resu
         }
     });
     let faces = faces.collect();
-    Ok(Loaded {
-        faces,
-        warnings: import.notes.iter().map(ToString::to_string).collect(),
-        part: Arc::new(Part::new(model)),
-    })
+    Loaded { faces, warnings: notes.iter().map(ToString::to_string).collect(), part: Arc::new(Part::new(model)) }
 }
 
 fn code_of(error: &ImportError) -> ErrorCode {
@@ -97,5 +108,32 @@ fn code_of(error: &ImportError) -> ErrorCode {
             _ => ErrorCode::LimitNodes,
         },
         _ => ErrorCode::Model,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::CacheFolder;
+    use super::*;
+
+    const PART: &str = "difference() { cube(size = [4, 4, 1], center = true); sphere(r = 1); }";
+
+    #[test]
+    fn whoever_loads_a_text_shares_one_model_while_it_is_in_use() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = CacheFolder::from(folder.path().to_path_buf());
+        for config in [ServerConfig::default(), ServerConfig { cache, ..ServerConfig::default() }] {
+            let models = Models::new(&config);
+            let load = |name: &str, facets| models.load(name, PART, facets).expect("a valid text");
+            let (first, second) = (load("one", Facets::Auto), load("another", Facets::Auto));
+            assert!(Arc::ptr_eq(&first, &second));
+            assert!(!Arc::ptr_eq(&first, &load("exact", Facets::Exact)));
+            let all = format!("{:?}", first.part.model);
+            let gone = Arc::downgrade(&first.part.model);
+            drop((first, second));
+            assert!(gone.upgrade().is_none(), "nobody uses it");
+            assert!(format!("{:?}", load("again", Facets::Auto).part.model) == all);
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "auto and exact");
     }
 }

@@ -40,6 +40,9 @@ pub enum ServeError {
     /// It has no place.
     #[error(transparent)]
     Root(#[from] RootError),
+    /// There are no threads for imports.
+    #[error("expected threads for imports, found {0}")]
+    Threads(String),
     /// Shared memory failed.
     #[error("{0}")]
     System(Error),
@@ -86,18 +89,22 @@ impl Server {
         let services = Services::create(address, root.epoch(), &config, status(&root, &config, 0, 0))?;
         let (imports, work) = channel::<(u64, Import)>();
         let (finished, imported) = channel();
-        let models = Models::new(config.import_limits());
+        let models = Models::new(&config);
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        // Threads of their own: in those that steps are searched on, a step would wait for what is being built. The loop
+        // keeps a core.
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(cores.saturating_sub(1).max(1)).build();
+        let threads = threads.map_err(|e| ServeError::Threads(e.to_string()))?;
         // Ends when the server drops its sender.
         std::thread::spawn(move || {
             for (session, import) in work {
-                let loaded = models.load(&import.name, &import.text, import.facets);
+                let loaded = threads.install(|| models.load(&import.name, &import.text, import.facets));
                 if finished.send((session, import.model, loaded)).is_err() {
                     break;
                 }
             }
         });
         root.publish()?;
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self {
             pending: Vec::new(),
             sessions: BTreeMap::new(),

@@ -80,6 +80,33 @@ pub struct Solid {
 }
 
 impl Solid {
+    /// A solid of primitives in file order and of nodes, children before their parents; each primitive stands at one leaf and
+    /// each node below one other. The rest follows from them.
+    pub(crate) fn of_parts(primitives: Vec<Primitive>, nodes: Vec<Node>, root: NodeId) -> Self {
+        let mut senses = vec![Sense::Positive; primitives.len()];
+        let mut stack = vec![(root, Sense::Positive)];
+        while let Some((n, sense)) = stack.pop() {
+            match &nodes[n as usize] {
+                Node::Empty => {}
+                Node::Primitive(p) => senses[*p as usize] = sense,
+                Node::Op(op, children) => {
+                    for (i, c) in children.iter().enumerate() {
+                        let flip = *op == Op::Difference && i > 0;
+                        stack.push((*c, if flip { sense.flipped() } else { sense }));
+                    }
+                }
+            }
+        }
+        let faces = primitives.iter().flat_map(|p| p.faces.iter().copied()).collect();
+        let owners = primitives.iter().enumerate();
+        let face_owner = owners.flat_map(|(i, p)| std::iter::repeat_n(i as u32, p.faces.len())).collect();
+        let mut solid = Self { primitives, nodes, root, faces, face_owner, senses, normal_form: Vec::new() };
+        let mut normal_form = Vec::new();
+        local::write_tree(&solid, &mut normal_form);
+        solid.normal_form = normal_form;
+        solid
+    }
+
     /// The box of the solid by the plain upward rule (no pruning); the bound floor does better.
     pub fn aabb(&self) -> Aabb {
         let mut boxes: Vec<Aabb> = Vec::with_capacity(self.nodes.len());
@@ -158,36 +185,7 @@ impl SolidBuilder {
 
     /// Finishes the solid with `root` on top.
     pub fn finish(self, root: NodeId) -> Solid {
-        let mut senses = vec![Sense::Positive; self.primitives.len()];
-        let mut stack = vec![(root, Sense::Positive)];
-        while let Some((n, sense)) = stack.pop() {
-            match &self.nodes[n as usize] {
-                Node::Empty => {}
-                Node::Primitive(p) => senses[*p as usize] = sense,
-                Node::Op(op, children) => {
-                    for (i, c) in children.iter().enumerate() {
-                        let flip = *op == Op::Difference && i > 0;
-                        stack.push((*c, if flip { sense.flipped() } else { sense }));
-                    }
-                }
-            }
-        }
-        let faces = self.primitives.iter().flat_map(|p| p.faces.iter().copied()).collect();
-        let owners = self.primitives.iter().enumerate();
-        let face_owner = owners.flat_map(|(i, p)| std::iter::repeat_n(i as u32, p.faces.len())).collect();
-        let mut solid = Solid {
-            primitives: self.primitives,
-            nodes: self.nodes,
-            root,
-            faces,
-            face_owner,
-            senses,
-            normal_form: Vec::new(),
-        };
-        let mut normal_form = Vec::new();
-        local::write_tree(&solid, &mut normal_form);
-        solid.normal_form = normal_form;
-        solid
+        Solid::of_parts(self.primitives, self.nodes, root)
     }
 
     fn push(&mut self, node: Node) -> NodeId {

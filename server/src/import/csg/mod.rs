@@ -72,6 +72,11 @@ pub fn import_csg(file: &str, text: &str, facets: Facets, limits: &Limits) -> Re
 
 /// Reads a model from a flattened file.
 pub fn read_csg(path: &Path, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
+    import_csg(&path.display().to_string(), &read_text(path, limits)?, facets, limits)
+}
+
+/// Reads the text of a flattened file.
+pub fn read_text(path: &Path, limits: &Limits) -> Result<String, ImportError> {
     let file = path.display().to_string();
     let read = |reason| ImportError::Read { file: file.clone(), reason };
     if std::fs::metadata(path).map_err(read)?.len() > limits.text as u64 {
@@ -79,13 +84,11 @@ pub fn read_csg(path: &Path, facets: Facets, limits: &Limits) -> Result<Import, 
         return Err(ImportError::Content { file, at: Place::START, problem });
     }
     let bytes = std::fs::read(path).map_err(read)?;
-    match std::str::from_utf8(&bytes) {
-        Ok(text) => import_csg(&file, text, facets, limits),
-        Err(e) => {
-            let before = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
-            let at = Place::of_offset(&before, before.len());
-            let found = format!("the byte 0x{:02x}", bytes[e.valid_up_to()]);
-            Err(ImportError::Content { file, at, problem: Problem::syntax("text in UTF-8", found) })
-        }
-    }
+    String::from_utf8(bytes).map_err(|e| {
+        let (valid, bytes) = (e.utf8_error().valid_up_to(), e.as_bytes());
+        let before = String::from_utf8_lossy(&bytes[..valid]);
+        let at = Place::of_offset(&before, before.len());
+        let found = format!("the byte 0x{:02x}", bytes[valid]);
+        ImportError::Content { file, at, problem: Problem::syntax("text in UTF-8", found) }
+    })
 }
