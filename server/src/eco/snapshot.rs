@@ -23,6 +23,7 @@ use crate::solid::{self, Label, Op, Primitive, Shape, Solid};
 use bincode::{BorrowDecode, Encode};
 use contactd_proto::Pose;
 use glam::{DQuat, DVec3};
+use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
@@ -303,12 +304,18 @@ impl<'a> Streams<'a> {
         Ok(u32::from_le_bytes(*word))
     }
 
-    /// The next `count` words.
-    fn words(&mut self, count: usize) -> Checked<impl ExactSizeIterator<Item = u32> + 'a> {
-        let bytes = count.checked_mul(4).ok_or("more words")?;
+    /// The next `count` groups of N words.
+    fn groups<const N: usize>(&mut self, count: usize) -> Checked<impl ExactSizeIterator<Item = [u32; N]> + 'a> {
+        let bytes = count.checked_mul(4 * N).ok_or("more words")?;
         let (words, rest) = self.words.split_at_checked(bytes).ok_or("more words")?;
         self.words = rest;
-        Ok(words.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])))
+        let word = |group: &[u8], i: usize| u32::from_le_bytes(std::array::from_fn(|k| group[4 * i + k]));
+        Ok(words.chunks_exact(4 * N).map(move |group| std::array::from_fn(|i| word(group, i))))
+    }
+
+    /// The next `count` words.
+    fn words(&mut self, count: usize) -> Checked<impl ExactSizeIterator<Item = u32> + 'a> {
+        Ok(self.groups(count)?.map(|[word]| word))
     }
 
     /// A number that is one.
@@ -392,9 +399,7 @@ impl<'a> Streams<'a> {
         if refs.len() < least || refs.iter().any(|p| *p as usize >= solid.primitives.len()) {
             return Err("primitives of a voxel");
         }
-        let mut words = self.words(terms.saturating_mul(2))?;
-        let terms: Box<[Term]> =
-            (0..terms).map_while(|_| Some(Term::of_words([words.next()?, words.next()?]))).collect();
+        let terms: Box<[Term]> = self.groups(terms)?.map(Term::of_words).collect();
         if terms.is_empty() != matches!(kind, Kind::Full | Kind::Empty) {
             return Err("a tree in a voxel of the surface, and nowhere else");
         }
@@ -421,7 +426,7 @@ impl<'a> Streams<'a> {
 fn well_nested(solid: &Solid, terms: &[Term]) -> Checked<()> {
     const EXPECTED: &str = "the tree in a voxel";
     // Node and end of each term that is still open.
-    let mut open: Vec<(u32, usize)> = Vec::new();
+    let mut open: SmallVec<[(u32, usize); 16]> = SmallVec::new();
     for (i, t) in terms.iter().enumerate() {
         while open.last().is_some_and(|(_, end)| *end == i) {
             open.pop();
