@@ -9,29 +9,24 @@ use contactd_proto::{Motion, Pose};
 
 /// A prepared question: cold, as nothing of an earlier answer is kept.
 #[derive(Clone, Copy)]
-pub struct Question<'a> {
-    /// First model.
-    pub a: &'a Model,
-    /// Its motion.
-    pub motion_a: Motion,
-    /// Second model.
-    pub b: &'a Model,
-    /// Its motion.
-    pub motion_b: Motion,
-}
+pub struct Question<'a>(PairQuery<'a>);
 
-impl Question<'_> {
-    /// The certified answer at the default resolution, 1e-9 of the larger radius.
-    pub fn ask(&self, ideas: Ideas, scratch: &mut Scratch) -> Outcome {
+impl<'a> Question<'a> {
+    /// Two moving models, at the default resolution of 1e-9 of the larger radius.
+    pub fn new((a, motion_a): (&'a Model, Motion), (b, motion_b): (&'a Model, Motion), ideas: Ideas) -> Self {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
-        let query = PairQuery {
-            a: Body { model: self.a, placed: placed(self.motion_a) },
-            b: Body { model: self.b, placed: placed(self.motion_b) },
-            resolution: default_resolution(self.a, self.b),
+        Self(PairQuery {
+            a: Body { model: a, placed: placed(motion_a) },
+            b: Body { model: b, placed: placed(motion_b) },
+            resolution: default_resolution(a, b),
             cell_limit: DEFAULT_CELL_LIMIT,
             ideas,
             penetration: true,
-        };
-        earliest_contact(&query, scratch)
+        })
+    }
+
+    /// The certified answer.
+    pub fn ask(&self, scratch: &mut Scratch) -> Outcome {
+        earliest_contact(&self.0, scratch)
     }
 }

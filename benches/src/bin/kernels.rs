@@ -44,12 +44,12 @@ fn main() -> std::io::Result<()> {
         let own: Vec<queries::Question> = cases
             .iter()
             .zip(&models)
-            .map(|((s, _), [a, b])| queries::Question { a, motion_a: s.motion_a, b, motion_b: s.motion_b })
+            .map(|((s, _), [a, b])| queries::Question::new((a, s.motion_a), (b, s.motion_b), ideas))
             .collect();
         let other: Vec<peer::Question> = cases.iter().map(|(s, _)| peer::Question::of_scene(s)).collect();
 
         let mut scratch = Scratch::default();
-        let answers: Vec<Outcome> = own.iter().map(|q| q.ask(ideas, &mut scratch)).collect();
+        let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
         let theirs: Vec<Option<f64>> = other.iter().map(peer::Question::time).collect();
         let met = |k: usize| cases[k].1 >= 0.0;
         let wrong = (0..cases.len()).filter(|k| met(*k) != (answers[*k].status == Status::Contact)).count();
@@ -58,7 +58,7 @@ fn main() -> std::io::Result<()> {
         let errors = both().map(|k| (answers[k].time - cases[k].1).abs());
         let peer_errors = both().filter_map(|k| theirs[k].map(|t| (t - cases[k].1).abs()));
 
-        let laps: Vec<Lap> = race(plan, cases.len(), |i| own[i].ask(ideas, &mut scratch), |i| other[i].ask());
+        let laps: Vec<Lap> = race(plan, cases.len(), |i| own[i].ask(&mut scratch), |i| other[i].ask());
         let micros = |of: fn(&Lap) -> f64| 1e6 * median(laps.iter().map(of));
         let count = |of: fn(&Outcome) -> u64| answers.iter().map(move |o| of(o) as f64);
         table.push(row![

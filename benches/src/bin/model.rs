@@ -225,16 +225,14 @@ fn main() -> std::io::Result<()> {
             })
             .collect();
         let rest = Motion::resting(Pose::IDENTITY);
-        let own: Vec<queries::Question> = steps
-            .iter()
-            .map(|m| queries::Question { a: &model.value, motion_a: rest, b: &peg, motion_b: *m })
-            .collect();
+        let own: Vec<queries::Question> =
+            steps.iter().map(|m| queries::Question::new((&model.value, rest), (&peg, *m), ideas)).collect();
         let other: Vec<peer::Question> =
             steps.iter().map(|m| peer::Question::new(compound.value.clone(), &rest, shaft.clone(), m)).collect();
         let mut scratch = Scratch::default();
-        let answers: Vec<Outcome> = own.iter().map(|q| q.ask(ideas, &mut scratch)).collect();
+        let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
         let count = |of: fn(&Outcome) -> u64| answers.iter().map(move |o| of(o) as f64);
-        let laps = race(plan, own.len(), |i| own[i].ask(ideas, &mut scratch), |i| other[i].ask());
+        let laps = race(plan, own.len(), |i| own[i].ask(&mut scratch), |i| other[i].ask());
         table.push(row![
             primitives,
             text.len() as f64 / 1e3,

@@ -247,13 +247,10 @@ fn main() -> std::io::Result<()> {
     // A row may take so long, with fewer cases if need be; a peer whose one answer takes longer gets no more facets.
     let budget = options.pick(2.0, 0.3);
     for class in &classes {
-        let own: Vec<queries::Question> = class
-            .steps
-            .iter()
-            .map(|[m, n]| queries::Question { a: &class.a, motion_a: *m, b: &class.b, motion_b: *n })
-            .collect();
+        let own: Vec<queries::Question> =
+            class.steps.iter().map(|[m, n]| queries::Question::new((&class.a, *m), (&class.b, *n), ideas)).collect();
         let mut scratch = Scratch::default();
-        let answers: Vec<Outcome> = own.iter().map(|q| q.ask(ideas, &mut scratch)).collect();
+        let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
         let cells = || answers.iter().map(|o| o.counters.cells as f64);
         let met = |o: &Outcome| o.status == Status::Contact;
         let mut too_slow = [false; 2];
@@ -282,7 +279,7 @@ fn main() -> std::io::Result<()> {
                 let wrong = decided().filter(|(o, t)| met(o) != t.is_some()).count();
                 let errors = || decided().filter(|(o, _)| met(o)).filter_map(|(o, t)| t.map(|t| (t - o.time).abs()));
                 let plan = Plan { blocks: if too_slow[k] { 1 } else { plan.blocks }, ..plan };
-                let laps = race(plan, count, |i| own[i].ask(ideas, &mut scratch), |i| other[i].ask());
+                let laps = race(plan, count, |i| own[i].ask(&mut scratch), |i| other[i].ask());
                 table.push(row![
                     class.name,
                     faceted.kind,

@@ -9,9 +9,12 @@
 //! they stay apart. Pairs of rapier's are those that its broad phase let through, with and without contacts.
 
 use clap::{Parser, ValueEnum};
+use contactd::eco::Model;
+use contactd::import::{Facets, ImportError, Limits, import_csg};
 use contactd::ipc::Embedded;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
+use contactd::world::{ObjectSpec, Part, StepOptions, World};
 use contactd_benches::facets::{Drilled, Outline};
 use contactd_benches::options::Options;
 use contactd_benches::race::{median, worst};
@@ -28,6 +31,7 @@ use rapier3d_f64::prelude::{
     ActiveCollisionTypes, BroadPhaseBvh, ColliderBuilder, ColliderHandle, ColliderSet, CollisionPipeline,
     IslandManager, NarrowPhase, RigidBodySet, SharedShape,
 };
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Distance of neighbouring places.
@@ -335,6 +339,37 @@ fn profile(n: usize, steps: usize) -> Result<(), Error> {
     Ok(())
 }
 
+/// The cells of whole steps of `n` parts, the busiest thread's share of them, and the seconds they took, on so many threads.
+fn shared(n: usize, steps: usize, threads: usize) -> Result<[f64; 3], Box<dyn std::error::Error>> {
+    let twins = Kind::Parts.twins();
+    let paths = paths(&twins, n);
+    let parts = twins.iter().map(|(text, _)| {
+        let imported = import_csg("part.csg", text, Facets::default(), &Limits::default())?;
+        Ok(Arc::new(Part::new(Arc::new(Model::new(imported.solid)))))
+    });
+    let parts = parts.collect::<Result<Vec<_>, ImportError>>()?;
+    let mut world = World::new(n, n);
+    for (i, path) in paths.iter().enumerate() {
+        world.add_object(ObjectSpec::new(i as u32 + 1, &parts[i % parts.len()], path.at(0))).map_err(|e| e.detail)?;
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let mut sum = [0.0; 3];
+    for k in 1..=steps + 1 {
+        let poses = paths.iter().zip(1..).map(|(path, id)| PoseRecord::end(id, &path.at(k)));
+        let poses: Vec<PoseRecord> = poses.collect();
+        let from = Instant::now();
+        let out =
+            pool.install(|| world.step(&poses, &StepOptions::default()).cloned()).map_err(|e| format!("{e:?}"))?;
+        // The first step is the warm-up.
+        if k > 1 {
+            let took = from.elapsed().as_secs_f64();
+            let step = [out.counters.cells as f64, out.busiest_cells as f64, took];
+            sum.iter_mut().zip(step).for_each(|(sum, x)| *sum += x);
+        }
+    }
+    Ok([sum[0], sum[1] / sum[0], sum[2]])
+}
+
 /// Options of its own beside those of all benchmarks.
 #[derive(Debug, Parser)]
 struct Arguments {
@@ -413,6 +448,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("contacts, overlaps: a step; parts are {FACETS} wedges a circle for rapier");
     table.publish("scene", &options.folder())?;
+    let (n, steps) = (objects.unwrap_or(options.pick(1_000, 100)), steps.unwrap_or(options.pick(10, 3)));
+    let (one, two) = (shared(n, steps, 1)?, shared(n, steps, 2)?);
+    let mut table = Table::new(&["objects", "steps", "cells", "cells_two_threads", "busiest_share", "speed_up"]);
+    table.push(row![n, steps, one[0], two[0], two[1], one[2] / two[2]]);
+    println!("two threads share the pairs of {n} parts");
+    table.publish("scene_threads", &options.folder())?;
     println!(
         "harness check: parry's sphere-sphere to box-box is 1 : {:.1} (about 1 : 17 is right)",
         peer::sphere_to_box()

@@ -16,6 +16,7 @@
 
 use super::literal::{Faces, Side};
 use crate::motion::{Instant, Relative};
+use crate::solid::face::FaceAt;
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
@@ -95,24 +96,42 @@ fn outer(u: DVec3, v: DVec3) -> DMat3 {
     DMat3::from_cols(u * v.x, u * v.y, u * v.z)
 }
 
-/// Hessian of psi of a face at a point, given its normal there, in the face's own frame.
-pub(super) fn hessian(face: &Face, x: DVec3) -> DMat3 {
-    match *face {
-        Face::Plane { .. } => DMat3::ZERO,
-        Face::Sphere { .. } => {
-            let f = face.at(x);
-            if f.rho == 0.0 { DMat3::ZERO } else { (DMat3::IDENTITY - outer(f.normal, f.normal)) * (1.0 / f.rho) }
+/// The Hessian of psi of a face at a point, `each`·I + `factor`·`along`⊗`along`, in the face's own frame: a form that
+/// turns by turning one vector.
+struct Curvature {
+    each: f64,
+    factor: f64,
+    along: DVec3,
+}
+
+impl Curvature {
+    const NONE: Self = Self { each: 0.0, factor: 0.0, along: DVec3::ZERO };
+
+    fn of(face: &Face, f: &FaceAt) -> Self {
+        if f.rho == 0.0 {
+            return Self::NONE;
         }
-        Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
-            let f = face.at(x);
-            if f.rho == 0.0 {
-                return DMat3::ZERO;
+        match *face {
+            Face::Plane { .. } => Self::NONE,
+            Face::Sphere { .. } => {
+                let each = 1.0 / f.rho;
+                Self { each, factor: -each, along: f.normal }
             }
-            // The tangent across the axis is the same for the cone's normal and its radial direction.
-            let t = axis.cross(f.normal).normalize_or_zero();
-            outer(t, t) * (f.k / f.rho)
+            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+                // The tangent across the axis is the same for the cone's normal and its radial direction.
+                Self { each: 0.0, factor: f.k / f.rho, along: axis.cross(f.normal).normalize_or_zero() }
+            }
         }
     }
+
+    fn matrix(&self) -> DMat3 {
+        outer(self.along, self.along * self.factor) + DMat3::from_diagonal(DVec3::splat(self.each))
+    }
+}
+
+/// Hessian of psi of a face at a point, in the face's own frame.
+pub(super) fn hessian(face: &Face, x: DVec3) -> DMat3 {
+    Curvature::of(face, &face.at(x)).matrix()
 }
 
 impl Problem<'_> {
@@ -121,14 +140,15 @@ impl Problem<'_> {
         let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
         let face = if side == Side::A { self.a.get(id.face()) } else { self.b.get(id.face()) };
         let own = if side == Side::A { x } else { at.b_point(x) };
-        let (value, mut gradient, mut h) = match *c {
+        let (value, mut gradient, mut curvature) = match *c {
             Constraint::Literal(..) => {
                 let f = face.at(own);
-                let h = hessian(face, own);
+                let curvature = Curvature::of(face, &f);
                 if id.sense() == Sense::Positive {
-                    (f.value + level, f.normal, h)
+                    (f.value + level, f.normal, curvature)
                 } else {
-                    (-f.value + level, -f.normal, h * -1.0)
+                    let (each, factor) = (-curvature.each, -curvature.factor);
+                    (-f.value + level, -f.normal, Curvature { each, factor, ..curvature })
                 }
             }
             Constraint::Apex(_, _, k) => {
@@ -136,19 +156,20 @@ impl Problem<'_> {
                 let u = crate::math::any_perpendicular(axis);
                 let n = [axis, u, axis.cross(u)][k as usize];
                 let shift = if k == 0 { level / sin } else { 0.0 };
-                (n.dot(own - apex) - shift, n, DMat3::ZERO)
+                (n.dot(own - apex) - shift, n, Curvature::NONE)
             }
         };
         let (mut rate, mut gradient_rate) = (0.0, DVec3::ZERO);
         if side == Side::B {
             gradient = at.a_vector(gradient);
-            h = at.b_from_a.transpose() * h * at.b_from_a;
+            curvature.along = at.a_vector(curvature.along);
             let v = at.velocity(x);
             rate = gradient.dot(v);
+            let bent = v * curvature.each + curvature.along * (curvature.factor * curvature.along.dot(v));
             // B's field turns with −omega against A and is passed through at v.
-            gradient_rate = h * v - at.omega.cross(gradient);
+            gradient_rate = bent - at.omega.cross(gradient);
         }
-        Row { value, gradient, hessian: h, rate, gradient_rate }
+        Row { value, gradient, hessian: curvature.matrix(), rate, gradient_rate }
     }
 
     /// Solves from a starting guess. `None` when it does not converge to finite numbers, or, where one is not `patient`, not
@@ -387,17 +408,31 @@ impl Problem<'_> {
 /// Solves J step = f by elimination with partial pivoting; `None` when J is nearly singular.
 fn eliminate(
     a: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
-    mut f: [f64; MAX_UNKNOWNS],
+    f: [f64; MAX_UNKNOWNS],
     n: usize,
+) -> Option<[f64; MAX_UNKNOWNS]> {
+    // Of a size that is known beforehand the loops hold no tests of their own.
+    match n {
+        6 => eliminate_of::<6>(a, f),
+        7 => eliminate_of::<7>(a, f),
+        8 => eliminate_of::<8>(a, f),
+        9 => eliminate_of::<9>(a, f),
+        10 => eliminate_of::<10>(a, f),
+        _ => unreachable!("between two and six faces meet"),
+    }
+}
+
+fn eliminate_of<const N: usize>(
+    a: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+    mut f: [f64; MAX_UNKNOWNS],
 ) -> Option<[f64; MAX_UNKNOWNS]> {
     /// A pivot below this, of rows of about unit size, leaves a direction undetermined.
     const SINGULAR: f64 = 1e-9;
-    let n = n.min(MAX_UNKNOWNS);
-    for k in 0..n {
+    for k in 0..N {
         let (mut p, mut largest) = (k, a[k][k].abs());
-        for (i, row) in a.iter().enumerate().take(n).skip(k + 1) {
-            if row[k].abs() > largest {
-                (p, largest) = (i, row[k].abs());
+        for i in k + 1..N {
+            if a[i][k].abs() > largest {
+                (p, largest) = (i, a[i][k].abs());
             }
         }
         if largest.is_nan() || largest < SINGULAR {
@@ -407,22 +442,21 @@ fn eliminate(
             a.swap(k, p);
             f.swap(k, p);
         }
-        let (above, below) = a.split_at_mut(k + 1);
-        let row = &above[k];
+        let row = a[k];
         let inverse = 1.0 / row[k];
-        for (i, other) in below.iter_mut().take(n - k - 1).enumerate() {
+        for i in k + 1..N {
             // Most of the system is zeros.
-            if other[k] != 0.0 {
-                let factor = other[k] * inverse;
-                for (o, r) in other[k + 1..n].iter_mut().zip(&row[k + 1..n]) {
-                    *o -= factor * r;
+            if a[i][k] != 0.0 {
+                let factor = a[i][k] * inverse;
+                for j in k + 1..N {
+                    a[i][j] -= factor * row[j];
                 }
-                f[k + 1 + i] -= factor * f[k];
+                f[i] -= factor * f[k];
             }
         }
     }
-    for k in (0..n).rev() {
-        for j in k + 1..n {
+    for k in (0..N).rev() {
+        for j in k + 1..N {
             f[k] -= a[k][j] * f[j];
         }
         f[k] /= a[k][k];

@@ -96,16 +96,29 @@ pub fn resolution_of(query: &PairQuery) -> f64 {
 /// Searches a pair to its end.
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
     let mut outcome = Outcome::clear(query.resolution);
-    outcome.counters.primitives = 2;
-    let quick = direct::quick(query, &mut outcome);
-    if let Quick::Told = quick {
-        return outcome;
+    let quick = quick(query, &mut outcome);
+    if !matches!(quick, Quick::Told) {
+        search(query, quick, &mut outcome, scratch);
     }
+    outcome
+}
+
+/// Answers what is not told without a search. A function of its own, so that what is told stays where it was written.
+#[inline(never)]
+fn search(query: &PairQuery, quick: Quick, outcome: &mut Outcome, scratch: &mut Scratch) {
     let (task, swapped) = PairSearch::task(query);
     let mut search = PairSearch::of_task(query, task, swapped, (quick, outcome.counters), std::mem::take(scratch));
-    let outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
+    *outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
     *scratch = search.into_scratch();
-    outcome
+}
+
+/// What is told of two whole primitives without a search; `outcome` is clear before.
+fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
+    outcome.counters.primitives = 2;
+    match direct::balls(query, outcome) {
+        Some(()) => Quick::Told,
+        None => direct::quick(query, outcome),
+    }
 }
 
 /// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
@@ -199,8 +212,7 @@ impl<'a> PairSearch<'a> {
     pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
         let (task, swapped) = Self::task(query);
         let mut outcome = Outcome::clear(query.resolution);
-        outcome.counters.primitives = 2;
-        let quick = direct::quick(query, &mut outcome);
+        let quick = quick(query, &mut outcome);
         if let Quick::Told = quick {
             let (resolution, limit) = (task.delta, query.cell_limit);
             let told = Some(outcome);

@@ -78,23 +78,39 @@ impl PairJob {
 #[derive(Debug, Default)]
 pub struct Memory {
     /// One for each thread.
-    scratches: Vec<Mutex<Scratch>>,
+    seats: Vec<Mutex<Seat>>,
+}
+
+/// A thread's scratch, and the cells that it has refined in this step.
+#[derive(Debug, Default)]
+struct Seat {
+    scratch: Scratch,
+    cells: u64,
 }
 
 impl Memory {
-    /// The calling thread's scratch.
-    fn with<T>(&self, work: impl FnOnce(&mut Scratch) -> T) -> T {
+    /// The calling thread's seat.
+    fn with<T>(&self, work: impl FnOnce(&mut Seat) -> T) -> T {
         let own = rayon::current_thread_index().map_or(0, |i| i + 1);
-        let mut scratch = self.scratches[own].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        work(&mut scratch)
+        let mut seat = self.seats[own].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        work(&mut seat)
+    }
+
+    /// Cells that the busiest thread has refined in the last step.
+    pub fn busiest(&mut self) -> u64 {
+        let cells = |seat: &mut Mutex<Seat>| seat.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells;
+        self.seats.iter_mut().map(cells).max().unwrap_or(0)
     }
 }
 
 /// Searches every pair to its end; when only the first contact is asked for, none further than that needs.
 pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: f64, memory: &mut Memory) {
     let threads = rayon::current_num_threads();
-    if memory.scratches.len() <= threads {
-        memory.scratches.resize_with(threads + 1, Mutex::default);
+    if memory.seats.len() <= threads {
+        memory.seats.resize_with(threads + 1, Mutex::default);
+    }
+    for seat in &mut memory.seats {
+        seat.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
     }
     let memory = &*memory;
     let first = options.first && !options.clear;
@@ -105,10 +121,11 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
             return;
         }
         let mut q = job.question(bodies, options, clock);
-        let cells = memory.with(|scratch| {
-            let (known, counters) = job.knowledge.ask(&q, scratch);
+        let cells = memory.with(|seat| {
+            let (known, counters) = job.knowledge.ask(&q, &mut seat.scratch);
             if let Some(finding) = known {
                 job.found = Finding { outcome: finished(job, finding.outcome), ..finding };
+                seat.cells += job.found.outcome.counters.cells;
                 return 0;
             }
             job.found.known = false;
@@ -117,12 +134,13 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
             }
             let cut = q.query.cell_limit > most;
             q.query.cell_limit = q.query.cell_limit.min(most);
-            let mut outcome = contact::earliest_contact(&q.query, scratch);
+            let mut outcome = contact::earliest_contact(&q.query, &mut seat.scratch);
             let cells = outcome.counters.cells;
             if cut && outcome.status == Status::Undecided {
                 beyond.store(true, Relaxed);
             }
             outcome.counters += counters;
+            seat.cells += outcome.counters.cells;
             job.take(&q, outcome);
             cells
         });

@@ -117,6 +117,8 @@ pub struct StepOutcome {
     pub effects: u32,
     /// Work of all searches.
     pub counters: Counters,
+    /// Cells that one thread refined at most, of those that were shared out: how even the work was.
+    pub busiest_cells: u64,
     /// Pairs of boxes compared.
     pub box_tests: u64,
     /// Discrete pairs that moved far enough to have passed through each other.
@@ -401,6 +403,7 @@ impl World {
             searched: state.glanced,
             known: state.glanced,
             box_tests: state.neighbours.box_tests,
+            busiest_cells: state.searches.busiest(),
             ..StepOutcome::default()
         };
         out.pairs.clear();

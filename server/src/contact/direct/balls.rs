@@ -9,51 +9,149 @@
 //!
 //! which cancels nothing for an approaching pair outside R. The distance is convex in time, so over a span that ends before
 //! the closest approach it is least at the end: one evaluation there is the proof.
+//!
+//! Balls in the origins of their objects, the common case, need nothing else of a pair (`quick`).
 
 use super::super::outcome::{Outcome, Status};
-use super::super::pair::INCIDENT;
-use super::{APART, Pair, excluded};
+use super::super::pair::{self, INCIDENT, PairQuery};
+use super::super::rounding;
+use super::super::task::witness_level;
+use super::{APART, Pair, excluded, whole};
+use crate::math::tolerance;
+use crate::motion::Rounding;
+use crate::solid::{Primitive, Shape};
+use glam::DVec3;
 
-/// Fills in the contact of two balls, or leaves `out` clear where they miss each other; `None` leaves them to others: they
-/// start too near or come within rounding of depth delta.
-pub fn meet(pair: &Pair, radii: [f64; 2], out: &mut Outcome) -> Option<()> {
-    let (c, v) = (pair.way, pair.velocity);
-    let (sum, least) = (radii[0] + radii[1], excluded(pair.delta, pair.rounding));
-    let apart = c.length_squared();
-    let touching = sum + APART * pair.delta;
-    if apart <= touching * touching {
+/// Two balls, the first of which carries; world axes.
+struct Balls {
+    radii: [f64; 2],
+    /// Their faces' ids.
+    faces: [u32; 2],
+    /// A's centre at the start, and its velocity.
+    center: DVec3,
+    own: DVec3,
+    /// From A's centre to B's at the start.
+    way: DVec3,
+    /// Of A against B, length per step.
+    velocity: DVec3,
+    /// Depth at which a contact is decided.
+    delta: f64,
+    /// What rounding may do to one bound.
+    rounding: f64,
+}
+
+/// Fills in the answer for two balls about the origins of objects that do not turn; `None` leaves them to others. `out` is
+/// clear before, and written in place: copies of an answer cost as much as the answer.
+pub fn quick(query: &PairQuery, out: &mut Outcome) -> Option<()> {
+    let swapped = query.b.model.radius < query.a.model.radius;
+    let (a, b) = if swapped { (&query.b, &query.a) } else { (&query.a, &query.b) };
+    let (radius_a, face_a) = centered(a)?;
+    let (radius_b, face_b) = centered(b)?;
+    let (from, to) = (&a.placed.motion, &b.placed.motion);
+    let way = to.start.position - from.start.position;
+    let velocity = from.velocity - to.velocity;
+    let apart = way.length_squared().max((way - velocity).length_squared()).sqrt();
+    let rounding = rounding::of_motion(a.model, b.model, [0.0; 2], apart, &Rounding::with(0.0, apart, 0.0));
+    let extent = 2.0 * b.model.radius + apart;
+    let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
+    // Also false for what is not a number.
+    if !(query.ideas.direct && query.resolution >= least) {
         return None;
     }
-    let (square, along) = (v.length_squared(), c.dot(v));
-    let closest = if along > 0.0 { (along / square).min(1.0) } else { 0.0 };
-    let (reach, miss) = ((c - v * closest).length_squared(), sum + least);
-    if reach > miss * miss {
-        return Some(());
-    }
-    let beside = c.cross(v).length_squared();
-    let root = |reach: f64| {
-        let root = square * reach * reach - beside;
-        (apart - reach * reach) / (along + root.max(0.0).sqrt())
+    let balls = Balls {
+        radii: [radius_a, radius_b],
+        faces: [face_a, face_b],
+        center: from.start.position,
+        own: from.velocity,
+        way,
+        velocity,
+        delta: query.resolution,
+        rounding,
     };
-    let level = pair.witness_level();
-    let (touch, deep) = (root(sum), root(sum - 2.0 * level));
-    let way = c - v * touch;
-    let distance = way.length();
-    // A's point at `level` is that deep in B, too.
-    let is_deep = (c - v * deep).length() <= sum - level - pair.delta - pair.rounding;
-    let ordered = 0.0 <= touch && touch <= deep && deep <= closest;
-    let gap = distance - sum;
-    if !(ordered && is_deep && gap.abs() <= INCIDENT * pair.rounding && gap > least) {
-        return None;
+    balls.meet(out)?;
+    if swapped && out.status != Status::Clear {
+        out.swap_sides();
     }
-    let n = way / distance;
-    out.counters.closed_forms += 1;
-    out.status = Status::Contact;
-    (out.time_lower, out.time, out.time_upper) = (touch, touch, deep);
-    out.point = pair.point(n * radii[0], touch);
-    out.normal = n;
-    out.normal_speed = n.dot(v);
-    out.faces_a[0] = pair.primitives[0].first_face;
-    out.faces_b[0] = pair.primitives[1].first_face;
     Some(())
+}
+
+/// The radius and the face of a body that is a ball about its object's origin and does not turn.
+#[inline(always)] // Its answer passes through memory otherwise: a quarter of the time that two balls take.
+fn centered(body: &pair::Body) -> Option<(f64, u32)> {
+    let Primitive { shape: Shape::Sphere(ball), frame, first_face, .. } = whole(&body.model.solid)? else {
+        return None;
+    };
+    let placed = &body.placed;
+    // Zeros of either sign: one comparison for nine numbers.
+    let bits = |v: DVec3| v.x.to_bits() | v.y.to_bits() | v.z.to_bits();
+    let stays = (bits(placed.motion.spin) | bits(placed.place.position) | bits(frame.position)) << 1 == 0;
+    stays.then_some((ball.radius, *first_face))
+}
+
+/// Fills in the contact of two balls that do not turn, or leaves `out` clear where they miss each other; `None` leaves
+/// them to others: they start too near or come within rounding of depth delta.
+pub fn meet(pair: &Pair, radii: [f64; 2], out: &mut Outcome) -> Option<()> {
+    let motion = &pair.bodies[0].placed.motion;
+    let balls = Balls {
+        radii,
+        faces: pair.primitives.map(|p| p.first_face),
+        center: motion.start.position + pair.offsets[0],
+        own: motion.velocity,
+        way: pair.way,
+        velocity: pair.velocity,
+        delta: pair.delta,
+        rounding: pair.rounding,
+    };
+    balls.meet(out)
+}
+
+impl Balls {
+    #[inline(always)]
+    fn meet(&self, out: &mut Outcome) -> Option<()> {
+        let (c, v) = (self.way, self.velocity);
+        let (sum, least) = (self.radii[0] + self.radii[1], excluded(self.delta, self.rounding));
+        let apart = c.length_squared();
+        let touching = sum + APART * self.delta;
+        let (miss, level) = (sum + least, witness_level(self.delta, self.rounding));
+        let deepest = sum - level - self.delta - self.rounding;
+        if apart <= touching * touching || deepest.min(miss) <= 0.0 {
+            return None;
+        }
+        let (square, along) = (v.length_squared(), c.dot(v));
+        // They come closest at the start, at the end, or in between, where v is across the way.
+        if along <= 0.0 {
+            return Some(());
+        }
+        let beside = c.cross(v).length_squared();
+        let within = along < square;
+        if if within { beside > miss * miss * square } else { (c - v).length_squared() > miss * miss } {
+            return Some(());
+        }
+        let root = |reach: f64| {
+            let root = square * reach * reach - beside;
+            (apart - reach * reach) / (along + root.max(0.0).sqrt())
+        };
+        let (touch, deep) = (root(sum), root(sum - 2.0 * level));
+        let way = c - v * touch;
+        // |way| = sum·√(1 + 2e) with e of the size of rounding: its square is less than that.
+        let each = 1.0 / sum;
+        let e = 0.5 * (way.length_squared() * (each * each) - 1.0);
+        // A's point at `level` is that deep in B, too.
+        let is_deep = (c - v * deep).length_squared() <= deepest * deepest;
+        let ordered = 0.0 <= touch && touch <= deep && deep <= 1.0 && deep * square <= along;
+        let gap = e * sum;
+        if !(ordered && is_deep && gap.abs() <= INCIDENT * self.rounding && gap > least) {
+            return None;
+        }
+        let n = way * (each - e * each);
+        out.counters.closed_forms += 1;
+        out.status = Status::Contact;
+        (out.time_lower, out.time, out.time_upper) = (touch, touch, deep);
+        out.point = self.center + self.own * touch + n * self.radii[0];
+        out.normal = n;
+        out.normal_speed = n.dot(v);
+        out.faces_a[0] = self.faces[0];
+        out.faces_b[0] = self.faces[1];
+        Some(())
+    }
 }

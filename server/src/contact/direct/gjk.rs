@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 /// Points tried at most: curved bodies converge to this accuracy long before.
 const ROUNDS: usize = 48;
 /// Relative gap between the distance and its lower bound at which a direction is good enough to solve for a contact.
-pub const GOOD: f64 = 1e-9;
+pub const GOOD: f64 = 1e-6;
 
 /// The nearest points of two disjoint bodies.
 #[derive(Clone, Copy, Debug)]
@@ -112,93 +112,94 @@ fn common(s: &[Corner; 4]) -> Option<DVec3> {
 
 /// Keeps the corners that hold the point of the simplex nearest to 0, with their weights; `None` if 0 lies inside.
 fn reduce(s: &mut [Corner; 4], count: usize) -> Option<usize> {
-    match count {
-        1 => s[0].weight = 1.0,
-        2 => return Some(segment(s)),
-        3 => return Some(triangle(s)),
-        _ => return tetrahedron(s),
-    }
-    Some(1)
-}
-
-fn segment(s: &mut [Corner; 4]) -> usize {
-    let d = s[1].w - s[0].w;
-    let t = -s[0].w.dot(d);
-    let length = d.length_squared();
-    if t <= 0.0 {
-        s[0].weight = 1.0;
-        return 1;
-    }
-    if t >= length {
-        s[0] = s[1];
-        s[0].weight = 1.0;
-        return 1;
-    }
-    let t = t / length;
-    (s[0].weight, s[1].weight) = (1.0 - t, t);
-    2
-}
-
-fn triangle(s: &mut [Corner; 4]) -> usize {
-    let (a, b, c) = (s[0].w, s[1].w, s[2].w);
-    let (ab, ac) = (b - a, c - a);
-    let mut keep = |i: usize| {
-        s[0] = s[i];
-        s[0].weight = 1.0;
-        1
+    let w = [s[0].w, s[1].w, s[2].w, s[3].w];
+    let weights = match count {
+        1 => [1.0, 0.0, 0.0, 0.0],
+        2 => {
+            let [a, b] = segment([w[0], w[1]]);
+            [a, b, 0.0, 0.0]
+        }
+        3 => {
+            let [a, b, c] = triangle([w[0], w[1], w[2]]);
+            [a, b, c, 0.0]
+        }
+        _ => tetrahedron(w)?,
     };
+    let mut kept = 0;
+    for (i, weight) in weights.into_iter().enumerate() {
+        if weight > 0.0 {
+            s[kept] = Corner { weight, ..s[i] };
+            kept += 1;
+        }
+    }
+    Some(kept)
+}
+
+/// The weights of the corners in the point nearest to 0; 0 for those that do not hold it.
+fn segment([a, b]: [DVec3; 2]) -> [f64; 2] {
+    let d = b - a;
+    let t = (-a.dot(d)).max(0.0);
+    let length = d.length_squared();
+    if t < length {
+        let t = t / length;
+        [1.0 - t, t]
+    } else {
+        [0.0, 1.0]
+    }
+}
+
+/// The same of a triangle.
+fn triangle([a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    let (ab, ac) = (b - a, c - a);
     let (d1, d2) = (-ab.dot(a), -ac.dot(a));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return keep(0);
+        return [1.0, 0.0, 0.0];
     }
     let (d3, d4) = (-ab.dot(b), -ac.dot(b));
     if d3 >= 0.0 && d4 <= d3 {
-        return keep(1);
+        return [0.0, 1.0, 0.0];
     }
     let (d5, d6) = (-ab.dot(c), -ac.dot(c));
     if d6 >= 0.0 && d5 <= d6 {
-        return keep(2);
+        return [0.0, 0.0, 1.0];
     }
-    let mut edge = |i: usize, j: usize, t: f64| {
-        (s[0], s[1]) = (s[i], s[j]);
-        (s[0].weight, s[1].weight) = (1.0 - t, t);
-        2
-    };
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return edge(0, 1, d1 / (d1 - d3));
+        let t = d1 / (d1 - d3);
+        return [1.0 - t, t, 0.0];
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return edge(0, 2, d2 / (d2 - d6));
+        let t = d2 / (d2 - d6);
+        return [1.0 - t, 0.0, t];
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return edge(1, 2, (d4 - d3) / ((d4 - d3) + (d5 - d6)));
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - t, t];
     }
     let sum = va + vb + vc;
-    (s[0].weight, s[1].weight, s[2].weight) = (va / sum, vb / sum, vc / sum);
-    3
+    [va / sum, vb / sum, vc / sum]
 }
 
-fn tetrahedron(s: &mut [Corner; 4]) -> Option<usize> {
+/// The same of a tetrahedron; `None` if 0 lies inside.
+fn tetrahedron(w: [DVec3; 4]) -> Option<[f64; 4]> {
     const FACES: [[usize; 4]; 4] = [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]];
-    let mut best: Option<(f64, [Corner; 4], usize)> = None;
+    let mut best = None;
+    let mut least = f64::INFINITY;
     for [i, j, k, l] in FACES {
-        let (a, b, c, d) = (s[i].w, s[j].w, s[k].w, s[l].w);
+        let (a, b, c, d) = (w[i], w[j], w[k], w[l]);
         let n = (b - a).cross(c - a);
         // 0 on the other side of the face than the fourth corner, or the tetrahedron flat.
         if -a.dot(n) * (d - a).dot(n) <= 0.0 {
-            let mut t = [s[i], s[j], s[k], s[l]];
-            let count = triangle(&mut t);
-            let p: DVec3 = t[..count].iter().map(|c| c.w * c.weight).sum();
-            let square = p.length_squared();
-            if best.as_ref().is_none_or(|b| square < b.0) {
-                best = Some((square, t, count));
+            let t = triangle([a, b, c]);
+            let square = (a * t[0] + b * t[1] + c * t[2]).length_squared();
+            if best.is_none() || square < least {
+                let mut weights = [0.0; 4];
+                (weights[i], weights[j], weights[k]) = (t[0], t[1], t[2]);
+                (best, least) = (Some(weights), square);
             }
         }
     }
-    let (_, t, count) = best?;
-    *s = t;
-    Some(count)
+    best
 }

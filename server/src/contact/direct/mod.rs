@@ -26,7 +26,7 @@ mod straight;
 mod support;
 
 use super::literal::Side;
-use super::newton::Constraint;
+use super::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
 use super::outcome::{Outcome, Status};
 use super::pair::{self, PairQuery};
 use super::search::{Ending, Search};
@@ -35,6 +35,7 @@ use crate::math::{any_perpendicular, tolerance};
 use crate::motion::{Instant, Rounding};
 use crate::solid::local::LiteralId;
 use crate::solid::{Face, Node, Primitive, Sense, Shape, Solid};
+pub(super) use balls::quick as balls;
 use gjk::{GOOD, Nearest, nearest};
 use glam::{DMat3, DQuat, DVec3};
 use overlap::{Look, Start};
@@ -507,6 +508,7 @@ impl<'a> Advance<'a> {
         let b = m.at.b_point(found.b);
         let normal_b = m.at.b_from_a * -found.normal;
         let x = 0.5 * (found.a + found.b);
+        let mut tried = Actives::new();
         for tolerance in ACTIVE {
             let tol = tolerance * self.task.scale + found.distance.abs() * 1e-3;
             let mut active: SmallVec<[(Constraint, f64); 8]> = SmallVec::new();
@@ -516,10 +518,14 @@ impl<'a> Advance<'a> {
             let of_b = active.len() - of_a;
             // A corner that two faces hold against n, as two opposite ones of four may: they alone leave a line open.
             let loose = of_a < self.a.1.corner(found.normal) || of_b < self.b.1.corner(normal_b);
-            if loose || active.len() > super::newton::MAX_ACTIVE {
+            if loose || active.len() > MAX_ACTIVE {
                 continue;
             }
-            let (constraints, lambda) = active.iter().map(|(c, l)| (*c, 0.5 * l)).unzip();
+            let (constraints, lambda): (Actives, Weights) = active.iter().map(|(c, l)| (*c, 0.5 * l)).unzip();
+            if constraints == tried {
+                break;
+            }
+            tried.clone_from(&constraints);
             if search.confirm(constraints, x, guess, lambda, mend) {
                 if search.found.as_ref().is_some_and(|f| f.deep.stationarity > BALANCED) {
                     // Balanced but for a slight tilt: which end of the line comes first is not told.

@@ -33,8 +33,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Pairs of parts beyond which the search does better.
 const MOST_PAIRS: usize = 256;
-/// Holes and parts of one solid that are looked through.
-const MOST_PARTS: usize = 256;
+/// Primitives of one solid that are looked through, all of them for each query: larger ones are asked by their octrees.
+const MOST_PRIMITIVES: usize = 256;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
 /// Moments at which the first contact is looked for.
@@ -62,9 +62,12 @@ struct Part<'a> {
 
 /// The parts of which a solid is the union; `None` where it is no union of such.
 fn parts(solid: &Solid) -> Option<SmallVec<[Part<'_>; 1]>> {
+    if solid.primitives.len() > MOST_PRIMITIVES {
+        return None;
+    }
     let mut out = SmallVec::new();
     take(solid, solid.root, &mut out)?;
-    (out.len() <= MOST_PARTS).then_some(out)
+    Some(out)
 }
 
 fn take<'a>(solid: &'a Solid, node: NodeId, out: &mut SmallVec<[Part<'a>; 1]>) -> Option<()> {
