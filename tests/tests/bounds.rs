@@ -1,11 +1,13 @@
 //! Laws of stage 1: swept bounds, S-bounds, and the collision region of a pair, over random trees and motions.
 
-use contactd::bound::{Pruned, SBounds, Side, locate};
+use contactd::bound::{Pruned, SBounds, Side, Volumes, locate};
 use contactd::math::{Aabb, Ball};
 use contactd::motion::{Instant, Placed, Relative, Sweep};
 use contactd::solid::{Node, Op, Solid};
 use contactd_tests::random_solids::{Random, perforated_plate, placed, solid};
 use glam::DVec3;
+
+const VOLUMES: [Volumes; 4] = [Volumes::Both, Volumes::Balls, Volumes::Boxes, Volumes::Oriented];
 
 fn random_box(r: &mut Random) -> Aabb {
     let half = DVec3::new(r.within(0.0, 1.0), r.within(0.0, 1.0), r.within(0.0, 1.0));
@@ -45,7 +47,7 @@ fn a_ball_rule_holds_what_its_operands_hold() {
 #[test]
 fn a_swept_box_or_ball_holds_every_moved_point() {
     let mut r = Random::new(2);
-    let (mut looseness, mut turning) = (vec![], 0);
+    let (mut looseness, mut tight, mut turning) = (vec![], vec![], 0);
     for i in 0..600 {
         let (mover, observer) = (placed(&mut r, 3.0), placed(&mut r, 3.0));
         let b = random_box(&mut r);
@@ -54,6 +56,7 @@ fn a_swept_box_or_ball_holds_every_moved_point() {
         let t1 = if i % 3 == 0 { 1.0 } else { r.within(t0, 1.0) };
         let sweep = Sweep::new(mover, observer);
         let (swept, swept_ball) = (sweep.of_box(&b, t0, t1), sweep.of_ball(&ball, t0, t1));
+        let (around, along) = (sweep.around_ball(&ball, t0, t1), sweep.along_mover(&b, t0, t1));
         turning += usize::from(observer.motion.spin != DVec3::ZERO && mover.motion.spin != DVec3::ZERO);
         let mut seen = Aabb::EMPTY;
         for k in 0..=400 {
@@ -63,10 +66,16 @@ fn a_swept_box_or_ball_holds_every_moved_point() {
             for x in b.corners().into_iter().chain([r.point_in(&b)]) {
                 let y = back.point(world(x));
                 assert!(swept.contains(y), "{i} at {t}: {y} outside {swept:?}");
+                let own = along.axes.transpose() * (y - along.center);
+                assert!(own.abs().cmple(along.half).all(), "{i} at {t}: {own} outside {along:?}");
                 seen = seen.union(&Aabb::of_points([y]));
             }
             let n = r.vector(1.0).normalize();
-            assert!(swept_ball.contains(back.point(world(ball.center + n * ball.radius))));
+            let y = back.point(world(ball.center + n * ball.radius));
+            assert!(swept_ball.contains(y) && (y - around.center).length() <= around.radius);
+        }
+        if t1 - t0 < 0.1 {
+            tight.push(along.half.element_product() / swept.half().element_product());
         }
         looseness.push((swept.half() / seen.half()).max_element());
     }
@@ -75,7 +84,13 @@ fn a_swept_box_or_ball_holds_every_moved_point() {
         "swept boxes: 600, both bodies turning {turning}; side against sampled side: median {:.4}, p90 {:.4}, worst {:.2}",
         looseness[300], looseness[540], looseness[599]
     );
-    assert!(turning > 120 && looseness[300] < 1.05);
+    tight.sort_by(f64::total_cmp);
+    println!(
+        "along the mover's axes, over less than a tenth: {} boxes, volume against the other's {:.2}",
+        tight.len(),
+        tight[tight.len() / 2]
+    );
+    assert!(turning > 120 && looseness[300] < 1.05 && tight.len() > 20 && tight[tight.len() / 2] < 1.0);
 }
 
 /// f of the subtree when every node is +infinity outside its bound.
@@ -103,14 +118,17 @@ fn bounded_value(s: &Solid, b: &SBounds, n: u32, x: DVec3) -> f64 {
 #[test]
 fn s_bounds_hold_their_solid_and_what_they_leave_out_contributes_nothing() {
     let mut r = Random::new(3);
-    let (mut inside, mut pruned, mut primitives, mut points, mut rounds) = (0, 0, 0, 0, vec![]);
+    let (mut inside, mut primitives, mut points, mut rounds) = (0, 0, 0, vec![]);
+    let mut pruned = [0; VOLUMES.len()];
     for i in 0..400 {
         let s = solid(&mut r, 1 + i % 4);
         let margin = [0.0, 1e-6, 0.02][i % 3];
-        let b = SBounds::new(&s, margin);
-        rounds.push(b.rounds());
+        let bounds = VOLUMES.map(|volumes| SBounds::with_volumes(&s, margin, volumes));
+        rounds.push(bounds[0].rounds());
         primitives += s.primitives.len();
-        pruned += s.primitives.len() - b.primitives_left(&s);
+        for (count, b) in pruned.iter_mut().zip(&bounds) {
+            *count += s.primitives.len() - b.primitives_left(&s);
+        }
         let root = s.aabb().grown(0.1);
         assert!(root.is_finite(), "the generator makes bounded solids");
         for _ in 0..300 {
@@ -118,35 +136,40 @@ fn s_bounds_hold_their_solid_and_what_they_leave_out_contributes_nothing() {
             let f = s.value(x);
             points += 1;
             inside += usize::from(f <= 0.0);
-            if f <= margin {
-                assert!(b.root().aabb.contains(x), "seed {i}: f {f} outside the root's box");
-                assert!((x - b.root().ball.center).length() <= b.root().ball.radius);
+            for b in &bounds {
+                if f <= margin {
+                    assert!(b.root().aabb.contains(x), "seed {i}: f {f} outside the root's box");
+                    assert!((x - b.root().ball.center).length() <= b.root().ball.radius);
+                }
+                let g = bounded_value(&s, b, s.root, x);
+                assert_eq!(f.clamp(-margin, margin), g.clamp(-margin, margin), "seed {i} at {x}: f {f}, bounded {g}");
+                assert_eq!(f <= margin, g <= margin);
             }
-            let g = bounded_value(&s, &b, s.root, x);
-            assert_eq!(f.clamp(-margin, margin), g.clamp(-margin, margin), "seed {i} at {x}: f {f}, bounded {g}");
-            assert_eq!(f <= margin, g <= margin);
         }
     }
     rounds.sort();
     println!(
-        "S-bounds: 400 solids, {primitives} primitives, {pruned} pruned; {points} points, {:.0}% inside; rounds: median {}, p95 {}, most {}",
+        "S-bounds: 400 solids, {primitives} primitives, {pruned:?} pruned by {VOLUMES:?}; {points} points, {:.0}% inside; rounds: median {}, p95 {}, most {}",
         100.0 * inside as f64 / points as f64,
         rounds[200],
         rounds[380],
         rounds[399]
     );
-    assert!(inside * 20 > points && pruned * 50 > primitives && rounds[380] < 8);
+    assert!(inside * 20 > points && pruned[0] * 50 > primitives && rounds[380] < 8);
+    // Balls and boxes together tell more than either.
+    assert!(pruned[0] > pruned[1].max(pruned[2]));
 }
 
 #[test]
 fn a_pair_outside_its_collision_region_never_meets_and_inside_pruning_changes_nothing() {
     let mut r = Random::new(4);
-    let (mut none, mut contact, mut overlap, mut subtracted, mut before, mut after) = (0, 0, 0, 0, 0, 0);
+    let (mut contact, mut overlap, mut subtracted, mut before) = (0, 0, 0, 0);
+    let (mut none, mut after) = ([0; VOLUMES.len()], [0; VOLUMES.len()]);
     let pairs = 300;
     for i in 0..pairs {
         let (sa, sb) = (solid(&mut r, 1 + i % 4), solid(&mut r, 1 + i % 3));
         let margin = [0.0, 1e-7, 0.01][i % 3];
-        let (ba, bb) = (SBounds::new(&sa, 1e-6), SBounds::new(&sb, 1e-6));
+        let bounds = VOLUMES.map(|v| [&sa, &sb].map(|s| SBounds::with_volumes(s, 1e-6, v)));
         // The deepest common point seen at a time: of the solids' own boxes, in turn.
         let depth = |r: &mut Random, at: &Instant, k: usize| {
             let x = if k.is_multiple_of(2) { r.point_in(&sa.aabb()) } else { at.a_point(r.point_in(&sb.aabb())) };
@@ -178,9 +201,11 @@ fn a_pair_outside_its_collision_region_never_meets_and_inside_pruning_changes_no
                 break;
             }
         }
-        let a = Side { solid: &sa, bounds: &ba, placed: pa };
-        let b = Side { solid: &sb, bounds: &bb, placed: pb };
-        let region = locate(&a, &b, 0.0, 1.0, margin);
+        let regions = bounds.each_ref().map(|[ba, bb]| {
+            let a = Side { solid: &sa, bounds: ba, placed: pa };
+            let b = Side { solid: &sb, bounds: bb, placed: pb };
+            locate(&a, &b, 0.0, 1.0, margin)
+        });
         let relative = Relative::new(pa, pb);
         let (mut met, mut met_cut) = (false, false);
         for k in 0..800 {
@@ -189,10 +214,12 @@ fn a_pair_outside_its_collision_region_never_meets_and_inside_pruning_changes_no
             if fa.max(fb) <= margin {
                 met = true;
                 met_cut |= cut_nearby(&sa, x) || cut_nearby(&sb, y);
-                let region = region.as_ref().expect("a meeting pair has a region");
-                assert!(region.a.aabb.contains(x) && region.b.aabb.contains(y), "pair {i}");
+                for region in &regions {
+                    let region = region.as_ref().expect("a meeting pair has a region");
+                    assert!(region.a.aabb.contains(x) && region.b.aabb.contains(y), "pair {i}");
+                }
             }
-            if let Some(g) = &region {
+            for g in regions.iter().flatten() {
                 for (s, p, x, f) in [(&sa, &g.a, x, fa), (&sb, &g.b, y, fb)] {
                     if p.aabb.contains(x) {
                         let v = p.value(s, x);
@@ -202,21 +229,23 @@ fn a_pair_outside_its_collision_region_never_meets_and_inside_pruning_changes_no
                 }
             }
         }
-        none += usize::from(region.is_none());
         overlap += usize::from(overlaps);
         contact += usize::from(met && !overlaps);
         subtracted += usize::from(met_cut && !overlaps);
-        if let Some(g) = &region {
-            before += g.a.primitives_before + g.b.primitives_before;
-            after += g.a.primitives + g.b.primitives;
+        before += sa.primitives.len() + sb.primitives.len();
+        for (k, region) in regions.iter().enumerate() {
+            none[k] += usize::from(region.is_none());
+            after[k] += region.as_ref().map_or(0, |g| g.a.primitives + g.b.primitives);
         }
     }
     let clear = pairs - contact - overlap;
     println!(
-        "collision regions: {pairs} pairs, {contact} contact ({subtracted} at subtracted surfaces), {clear} clear ({none} \
-         without a region), {overlap} overlap; primitives {before} -> {after}"
+        "collision regions: {pairs} pairs, {contact} contact ({subtracted} at subtracted surfaces), {clear} clear ({none:?} \
+         without a region, by {VOLUMES:?}), {overlap} overlap; primitives {before} -> {after:?}"
     );
-    assert!(contact * 10 >= pairs * 3 && subtracted * 100 >= pairs * 15 && none * 20 > pairs && after < before);
+    assert!(contact * 10 >= pairs * 3 && subtracted * 100 >= pairs * 15 && none[0] * 20 > pairs && after[0] < before);
+    let [both, balls, boxes, oriented] = after;
+    assert!(both < balls && both < boxes && oriented < both && none[3] >= none[0] && none[0] > none[1].max(none[2]));
 }
 
 /// True when the surface of a subtracted primitive passes within 0.1 of `x`.

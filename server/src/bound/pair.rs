@@ -12,8 +12,8 @@
 //! two boxes (each in its own frame) no time of the span brings max(f_A, f_B) to the margin or below.
 //! Not promised: time within the span; a long span is best cut by the caller.
 
-use super::SBounds;
-use crate::math::{Aabb, tolerance::BOUND_PROGRESS};
+use super::{SBounds, Volumes};
+use crate::math::{Aabb, Ball, Oriented, tolerance::BOUND_PROGRESS};
 use crate::motion::{Placed, Sweep};
 use crate::solid::{Node, NodeId, Op, Solid};
 use glam::DVec3;
@@ -60,31 +60,162 @@ pub struct Region {
 /// to a common point (max(f_A, f_B) > margin everywhere). `margin` (a length) may not exceed the margin of either
 /// side's bounds, otherwise those are taken anew for it.
 pub fn locate(a: &Side, b: &Side, t0: f64, t1: f64, margin: f64) -> Option<Region> {
-    let wide = |s: &Side| (margin > s.bounds.margin()).then(|| SBounds::new(s.solid, margin));
+    let wide =
+        |s: &Side| (margin > s.bounds.margin()).then(|| SBounds::with_volumes(s.solid, margin, s.bounds.volumes()));
     let (wide_a, wide_b) = (wide(a), wide(b));
     let bounds_a = wide_a.as_ref().unwrap_or(a.bounds);
     let bounds_b = wide_b.as_ref().unwrap_or(b.bounds);
-    let a_from_b = Sweep::new(b.placed, a.placed);
-    let b_from_a = Sweep::new(a.placed, b.placed);
-
-    let swept = |s: &Sweep, bounds: &SBounds, aabb: &Aabb| {
+    let sides = [(a.solid, bounds_a), (b.solid, bounds_b)];
+    // Each mover as the other one sees it.
+    let sweeps = [Sweep::new(b.placed, a.placed), Sweep::new(a.placed, b.placed)];
+    let boxes = [bounds_a.root().aabb, bounds_b.root().aabb];
+    let clipped = |k: usize, own: &Aabb, other: &Aabb| {
         // The ball as a whole and what is left of the box: both hold the mover, each is the better one at times.
-        s.of_box(aabb, t0, t1).intersection(&s.of_ball(&bounds.root().ball, t0, t1))
+        let whole = sweeps[k].of_ball(&sides[1 - k].1.root().ball, t0, t1);
+        own.intersection(&sweeps[k].of_box(other, t0, t1).intersection(&whole))
     };
-    let mut box_a = bounds_a.root().aabb;
-    let mut box_b = bounds_b.root().aabb;
+    let [box_a, box_b] = match (bounds_a.volumes(), bounds_b.volumes()) {
+        (Volumes::Balls, Volumes::Balls) => {
+            let clip = |k: usize, own: &Ball, other: &Ball| own.intersection(&sweeps[k].around_ball(other, t0, t1));
+            settled(&sides, [bounds_a.root().ball, bounds_b.root().ball], clip)?.map(|ball| ball.aabb())
+        }
+        (Volumes::Oriented, Volumes::Oriented) if boxes.iter().all(Aabb::is_finite) => {
+            let clip = |k: usize, own: &Tight, other: &Tight| Tight {
+                aabb: clipped(k, &own.aabb, &other.aabb),
+                partner: sweeps[k].along_mover(&other.aabb, t0, t1),
+            };
+            settled(&sides, boxes.map(|aabb| Tight { aabb, partner: Oriented::of_box(&aabb) }), clip)?.map(|t| t.aabb)
+        }
+        _ => settled(&sides, boxes, clipped)?,
+    };
+    Some(Region { a: Pruned::within(a.solid, bounds_a, box_a)?, b: Pruned::within(b.solid, bounds_b, box_b)? })
+}
+
+/// What is left of both trees once each has clipped the other, in turn, until neither shrinks; `None` when nothing is.
+fn settled<C: Clip>(
+    sides: &[(&Solid, &SBounds); 2],
+    mut left: [C; 2],
+    clip: impl Fn(usize, &C, &C) -> C,
+) -> Option<[C; 2]> {
     for _ in 0..MAX_ROUNDS {
-        let (was_a, was_b) = (box_a, box_b);
-        box_a = descend(a.solid, bounds_a, &box_a.intersection(&swept(&a_from_b, bounds_b, &box_b)), None);
-        box_b = descend(b.solid, bounds_b, &box_b.intersection(&swept(&b_from_a, bounds_a, &box_a)), None);
-        if box_a.is_empty() || box_b.is_empty() {
+        let was = left;
+        for k in 0..2 {
+            if left.iter().any(C::is_empty) {
+                return None;
+            }
+            left[k] = left_in(sides[k].0, sides[k].1, &clip(k, &left[k], &left[1 - k]));
+        }
+        if left.iter().any(C::is_empty) {
             return None;
         }
-        if !(shrank(&box_a, &was_a) || shrank(&box_b, &was_b)) {
+        if !(0..2).any(|k| shrank(&left[k].aabb(), &was[k].aabb())) {
             break;
         }
     }
-    Some(Region { a: Pruned::within(a.solid, bounds_a, box_a)?, b: Pruned::within(b.solid, bounds_b, box_b)? })
+    Some(left)
+}
+
+/// What a tree is clipped by: a box, a ball, or a box with what another box along other axes leaves of it.
+trait Clip: Copy + PartialEq {
+    /// Nothing, of the same kind.
+    fn nothing(&self) -> Self;
+    fn is_empty(&self) -> bool;
+    /// What of a node's bound lies in it.
+    fn part_of(&self, bounds: &SBounds, n: NodeId) -> Self;
+    /// True when it is a node's whole bound: no rule below it gains anything.
+    fn is_whole(&self, bounds: &SBounds, n: NodeId) -> bool;
+    fn union(&self, other: &Self) -> Self;
+    fn aabb(&self) -> Aabb;
+}
+
+impl Clip for Aabb {
+    fn nothing(&self) -> Self {
+        Self::EMPTY
+    }
+    fn is_empty(&self) -> bool {
+        Aabb::is_empty(self)
+    }
+    fn part_of(&self, bounds: &SBounds, n: NodeId) -> Self {
+        let bound = bounds.node(n);
+        if bound.is_empty() || bound.ball.misses(self) {
+            return Self::EMPTY;
+        }
+        let part = bound.aabb.intersection(self);
+        match bounds.oriented(n) {
+            Some(own) if part.is_finite() && own.misses(&Oriented::of_box(&part)) => Self::EMPTY,
+            _ => part,
+        }
+    }
+    fn is_whole(&self, bounds: &SBounds, n: NodeId) -> bool {
+        *self == bounds.node(n).aabb
+    }
+    fn union(&self, other: &Self) -> Self {
+        Aabb::union(self, other)
+    }
+    fn aabb(&self) -> Aabb {
+        *self
+    }
+}
+
+impl Clip for Ball {
+    fn nothing(&self) -> Self {
+        Self::EMPTY
+    }
+    fn is_empty(&self) -> bool {
+        Ball::is_empty(self)
+    }
+    fn part_of(&self, bounds: &SBounds, n: NodeId) -> Self {
+        self.intersection(&bounds.node(n).ball)
+    }
+    fn is_whole(&self, bounds: &SBounds, n: NodeId) -> bool {
+        *self == bounds.node(n).ball
+    }
+    fn union(&self, other: &Self) -> Self {
+        Ball::union(self, other)
+    }
+    fn aabb(&self) -> Aabb {
+        Ball::aabb(self)
+    }
+}
+
+/// A box of which only what meets the partner's box along its own axes counts. What is left is handed on as a box: f of
+/// the pruned tree must be right in all of it.
+#[derive(Clone, Copy, Debug)]
+struct Tight {
+    aabb: Aabb,
+    partner: Oriented,
+}
+
+impl PartialEq for Tight {
+    fn eq(&self, other: &Self) -> bool {
+        self.aabb == other.aabb
+    }
+}
+
+impl Clip for Tight {
+    fn nothing(&self) -> Self {
+        Self { aabb: Aabb::EMPTY, ..*self }
+    }
+    fn is_empty(&self) -> bool {
+        self.aabb.is_empty()
+    }
+    fn part_of(&self, bounds: &SBounds, n: NodeId) -> Self {
+        let part = self.aabb.part_of(bounds, n);
+        let missed = part.is_empty()
+            || self.partner.misses(&Oriented::of_box(&part))
+            || bounds.oriented(n).is_some_and(|own| self.partner.misses(own));
+        Self { aabb: if missed { Aabb::EMPTY } else { part }, ..*self }
+    }
+    fn is_whole(&self, _: &SBounds, _: NodeId) -> bool {
+        // The partner may miss some of what is below.
+        false
+    }
+    fn union(&self, other: &Self) -> Self {
+        Self { aabb: self.aabb.union(&other.aabb), ..*self }
+    }
+    fn aabb(&self) -> Aabb {
+        self.aabb
+    }
 }
 
 impl Pruned {
@@ -94,10 +225,11 @@ impl Pruned {
             nodes: vec![0; solid.nodes.len().div_ceil(64)],
             primitives: vec![0; solid.primitives.len().div_ceil(64)],
         };
-        let aabb = descend(solid, bounds, &region, Some(&mut alive));
+        let aabb = left_in(solid, bounds, &region);
         if aabb.is_empty() {
             return None;
         }
+        mark(solid, bounds, solid.root, &aabb, &mut alive);
         let primitives = alive.primitives.iter().map(|w| w.count_ones() as usize).sum();
         let (alive, alive_primitives) = (alive.nodes, alive.primitives);
         Some(Self { aabb, alive, alive_primitives, primitives, primitives_before: solid.primitives.len() })
@@ -164,33 +296,22 @@ fn shrank(now: &Aabb, was: &Aabb) -> bool {
     (0..3).any(|k| e[k] < f[k] * (1.0 - BOUND_PROGRESS))
 }
 
-/// The box of what is left of the tree inside `clip`, and marks for it.
-fn descend(solid: &Solid, bounds: &SBounds, clip: &Aabb, marks: Option<&mut Alive>) -> Aabb {
-    if clip.is_empty() {
-        return Aabb::EMPTY;
-    }
-    let left = left_of(solid, bounds, solid.root, clip);
-    if let (Some(marks), false) = (marks, left.is_empty()) {
-        mark(solid, bounds, solid.root, &left, marks);
-    }
-    left
+/// What is left of the whole tree inside `clip`.
+fn left_in<C: Clip>(solid: &Solid, bounds: &SBounds, clip: &C) -> C {
+    if clip.is_empty() { *clip } else { left_of(solid, bounds, solid.root, clip) }
 }
 
 /// What is left of node `n` inside `clip`: both rules below `n`, without marks.
-fn left_of(solid: &Solid, bounds: &SBounds, n: NodeId, clip: &Aabb) -> Aabb {
-    let bound = bounds.node(n);
-    if bound.is_empty() || bound.ball.misses(clip) {
-        return Aabb::EMPTY;
-    }
-    let b = bound.aabb.intersection(clip);
-    if b.is_empty() || b == bound.aabb {
+fn left_of<C: Clip>(solid: &Solid, bounds: &SBounds, n: NodeId, clip: &C) -> C {
+    let b = clip.part_of(bounds, n);
+    if b.is_empty() || b.is_whole(bounds, n) {
         return b;
     }
     match &solid.nodes[n as usize] {
-        Node::Empty => Aabb::EMPTY,
+        Node::Empty => b.nothing(),
         Node::Primitive(_) => b,
         Node::Op(Op::Union, children) => {
-            let mut hull = Aabb::EMPTY;
+            let mut hull = b.nothing();
             for c in children {
                 if hull == b {
                     break;
@@ -207,7 +328,7 @@ fn left_of(solid: &Solid, bounds: &SBounds, n: NodeId, clip: &Aabb) -> Aabb {
                 for c in children {
                     left = left_of(solid, bounds, *c, &left);
                     if left.is_empty() {
-                        return Aabb::EMPTY;
+                        return left;
                     }
                 }
                 if left == before {

@@ -2,10 +2,27 @@
 //!
 //! A bound is an upper estimate: every rule's result holds the exact result of its operation on whatever its operands
 //! hold, rounding included. Rules never make a bound larger than what box and ball rules give by themselves.
+//! Balls alone or boxes alone (`Volumes`) are there for comparison: the other kind then follows from the first and says nothing of its own.
 
-use crate::math::{Aabb, Ball, tolerance::OUTWARD};
+use crate::math::{Aabb, Ball, Oriented, tolerance::OUTWARD};
 use crate::solid::{Op, Primitive};
+use contactd_proto::Pose;
 use glam::DVec3;
+
+/// Which bounding volumes stage 1 works with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Volumes {
+    /// Balls alone.
+    Balls,
+    /// Boxes alone, along the model's axes.
+    Boxes,
+    /// A ball and a box at every node, each tightened by the other.
+    #[default]
+    Both,
+    /// Both, and besides a box along each primitive's own axes, and one along the other body's axes around where it moves:
+    /// tighter, at the cost of tests of separating axes.
+    Oriented,
+}
 
 /// A ball and a box around the same points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +31,29 @@ pub struct Bound {
     pub aabb: Aabb,
     /// Ball, model frame.
     pub ball: Ball,
+}
+
+/// By how much of their distance from an interior point c a primitive's points go out to hold {psi <= margin}.
+fn reach(p: &Primitive, c: DVec3, margin: f64) -> Option<f64> {
+    let rho = -p.value(c);
+    let reach = if margin > 0.0 { margin / rho } else { 0.0 };
+    (rho > 0.0 && reach.is_finite()).then_some(reach)
+}
+
+/// A box along a primitive's own axes around {psi <= margin}, model frame; `None` for one without bounds.
+pub(super) fn oriented(p: &Primitive, margin: f64) -> Option<Oriented> {
+    let geometry = p.shape.geometry();
+    let c = geometry.interior_point();
+    let reach = reach(p, p.frame.point(c), margin)?;
+    let own = geometry.aabb(&Pose::IDENTITY);
+    if !own.is_finite() {
+        return None;
+    }
+    let center = own.center();
+    let center = center + (center - c) * reach;
+    let half = own.half() * (1.0 + reach);
+    let rounding = (center.abs() + c.abs() + half + p.frame.position.abs()).element_sum() * OUTWARD;
+    Some(Oriented { center: p.frame.point(center), axes: p.frame.matrix(), half: half + rounding })
 }
 
 impl Bound {
@@ -32,13 +72,9 @@ impl Bound {
     /// psi is convex and psi(c) = −rho at an interior point c. So y with psi(y) <= margin lies on the ray from c through
     /// a point x of the primitive with |y−c| <= (1 + margin/rho)|x−c|: scaling the primitive's own bounds about c by
     /// 1 + margin/rho bounds the dilated set, whatever the primitive.
-    pub fn of_primitive(p: &Primitive, margin: f64) -> Self {
+    pub fn of_primitive(p: &Primitive, margin: f64, volumes: Volumes) -> Self {
         let c = p.frame.point(p.shape.geometry().interior_point());
-        let rho = -p.value(c);
-        let reach = if margin > 0.0 { margin / rho } else { 0.0 };
-        if !(rho > 0.0 && reach.is_finite()) {
-            return Self::ALL;
-        }
+        let Some(reach) = reach(p, c, margin) else { return Self::ALL };
         let outward = |x: DVec3, sign: f64| {
             // x + reach·(x − c), with the rounding of the primitive's own box on top; infinite sides stay so.
             let y = x + (x - c) * reach + (x.abs() + c.abs()) * (sign * OUTWARD);
@@ -48,7 +84,7 @@ impl Bound {
         let center = p.ball.center + (p.ball.center - c) * reach;
         let radius =
             p.ball.radius * ((1.0 + reach) * (1.0 + OUTWARD)) + (p.ball.center.abs() + c.abs()).max_element() * OUTWARD;
-        Self { aabb, ball: Ball { center, radius } }.tightened()
+        Self { aabb, ball: Ball { center, radius } }.tightened(volumes)
     }
 
     /// True when it holds no point.
@@ -61,8 +97,15 @@ impl Bound {
         self.aabb.is_finite() && self.ball.radius.is_finite()
     }
 
-    /// Box and ball each tightened by the other; empty when they miss each other.
-    pub fn tightened(self) -> Self {
+    /// Box and ball each tightened by the other, empty when they miss each other; of one kind alone the other one follows.
+    pub fn tightened(self, volumes: Volumes) -> Self {
+        match volumes {
+            Volumes::Balls if self.ball.is_empty() => return Self::EMPTY,
+            Volumes::Balls => return Self { aabb: self.ball.aabb(), ball: self.ball },
+            Volumes::Boxes if self.aabb.is_empty() => return Self::EMPTY,
+            Volumes::Boxes => return Self::of_box(self.aabb),
+            Volumes::Both | Volumes::Oriented => {}
+        }
         if self.is_empty() || self.ball.misses(&self.aabb) {
             return Self::EMPTY;
         }
@@ -76,35 +119,35 @@ impl Bound {
     }
 
     /// A bound of what both hold.
-    pub fn intersection(&self, other: &Self) -> Self {
+    pub fn intersection(&self, other: &Self, volumes: Volumes) -> Self {
         let aabb = self.aabb.intersection(&other.aabb);
-        Self { aabb, ball: self.ball.intersection(&other.ball) }.tightened()
+        Self { aabb, ball: self.ball.intersection(&other.ball) }.tightened(volumes)
     }
 
     /// A bound of what either holds.
-    pub fn union(&self, other: &Self) -> Self {
+    pub fn union(&self, other: &Self, volumes: Volumes) -> Self {
         if self.is_empty() {
             return *other;
         }
         if other.is_empty() {
             return *self;
         }
-        Self { aabb: self.aabb.union(&other.aabb), ball: self.ball.union(&other.ball) }.tightened()
+        Self { aabb: self.aabb.union(&other.aabb), ball: self.ball.union(&other.ball) }.tightened(volumes)
     }
 
     /// The upward rule: a bound of an operation's result from the bounds of its operands, in order.
-    pub fn upward(op: Op, mut operands: impl Iterator<Item = Bound>) -> Self {
+    pub fn upward(op: Op, mut operands: impl Iterator<Item = Bound>, volumes: Volumes) -> Self {
         match op {
-            Op::Union => operands.fold(Self::EMPTY, |a, b| a.union(&b)),
-            Op::Intersection => operands.fold(Self::ALL, |a, b| a.intersection(&b)),
+            Op::Union => operands.fold(Self::EMPTY, |a, b| a.union(&b, volumes)),
+            Op::Intersection => operands.fold(Self::ALL, |a, b| a.intersection(&b, volumes)),
             Op::Difference => operands.next().unwrap_or(Self::EMPTY),
         }
     }
 
     /// A bound with the smaller box of the two and the smaller ball, both of which must hold the same points.
-    pub fn smaller(&self, other: &Self) -> Self {
+    pub fn smaller(&self, other: &Self, volumes: Volumes) -> Self {
         let ball = if other.ball.radius < self.ball.radius { other.ball } else { self.ball };
-        Self { aabb: self.aabb.intersection(&other.aabb), ball }.tightened()
+        Self { aabb: self.aabb.intersection(&other.aabb), ball }.tightened(volumes)
     }
 
     /// True when `self` is smaller than `before` by more than the fraction `progress`, or newly empty or finite.

@@ -14,8 +14,9 @@
 //! downward rule where the parent's f is.) So a node with an empty bound contributes nothing, and is pruned.
 //! Not promised: that a bound is the smallest one, or that it holds all of a node's own solid: only what counts of it.
 
-use super::Bound;
-use crate::math::tolerance::BOUND_PROGRESS;
+use super::rules::oriented;
+use super::{Bound, Volumes};
+use crate::math::{Oriented, tolerance::BOUND_PROGRESS};
 use crate::solid::{Node, NodeId, Solid};
 use rayon::prelude::*;
 
@@ -26,6 +27,9 @@ const MAX_ROUNDS: usize = 12;
 #[derive(Clone, Debug)]
 pub struct SBounds {
     bounds: Vec<Bound>,
+    /// Of the primitives' nodes, a box along the primitive's own axes; empty unless such boxes are asked for.
+    oriented: Vec<Option<Oriented>>,
+    volumes: Volumes,
     root: NodeId,
     margin: f64,
     rounds: usize,
@@ -34,55 +38,67 @@ pub struct SBounds {
 impl SBounds {
     /// Bounds that keep f of `solid` clamped to ±`margin` (a length, at least 0), taken on the calling thread alone.
     pub fn new(solid: &Solid, margin: f64) -> Self {
-        Self::on_threads(solid, margin, usize::MAX)
+        Self::with_volumes(solid, margin, Volumes::default())
+    }
+
+    /// The same from other volumes than a ball and a box at every node.
+    pub fn with_volumes(solid: &Solid, margin: f64, volumes: Volumes) -> Self {
+        Self::on_threads(solid, margin, volumes, usize::MAX)
     }
 
     /// The same, large levels shared between threads: not within a lock that searches wait for, for a thread that waits
     /// for others may take up one of them.
-    pub fn shared(solid: &Solid, margin: f64) -> Self {
-        Self::on_threads(solid, margin, SHARED)
+    pub fn shared(solid: &Solid, margin: f64, volumes: Volumes) -> Self {
+        Self::on_threads(solid, margin, volumes, SHARED)
     }
 
     /// Levels of so many nodes are shared.
-    fn on_threads(solid: &Solid, margin: f64, share: usize) -> Self {
+    fn on_threads(solid: &Solid, margin: f64, volumes: Volumes, share: usize) -> Self {
         let levels = Levels::new(solid);
         let bounds = vec![Bound::EMPTY; solid.nodes.len()];
-        let mut this = Self { bounds, root: solid.root, margin, rounds: 0 };
+        let own = |node: &Node| match node {
+            Node::Primitive(p) => oriented(&solid.primitives[*p as usize], margin),
+            _ => None,
+        };
+        let along_own_axes = volumes == Volumes::Oriented;
+        let oriented = if along_own_axes { solid.nodes.iter().map(own).collect() } else { Vec::new() };
+        let mut this = Self { bounds, oriented, volumes, root: solid.root, margin, rounds: 0 };
         for level in &levels.by_height {
             this.replace(level, share, |n, bounds| match &solid.nodes[n as usize] {
                 Node::Empty => Bound::EMPTY,
-                Node::Primitive(p) => Bound::of_primitive(&solid.primitives[*p as usize], margin),
-                Node::Op(op, children) => Bound::upward(*op, children.iter().map(|c| bounds[*c as usize])),
+                Node::Primitive(p) => Bound::of_primitive(&solid.primitives[*p as usize], margin, volumes),
+                Node::Op(op, children) => Bound::upward(*op, children.iter().map(|c| bounds[*c as usize]), volumes),
             });
         }
         while this.rounds < MAX_ROUNDS && this.round(solid, &levels, share) {}
         this
     }
 
-    /// Bounds as they came out before, one for each node of a solid.
+    /// Bounds as they came out before, of the default volumes, one for each node of a solid.
     pub(crate) fn of_parts(bounds: Vec<Bound>, root: NodeId, margin: f64, rounds: usize) -> Self {
-        Self { bounds, root, margin, rounds }
+        Self { bounds, oriented: Vec::new(), volumes: Volumes::default(), root, margin, rounds }
     }
 
     /// One round, downward then upward; true when a bound shrank noticeably.
     fn round(&mut self, solid: &Solid, levels: &Levels, share: usize) -> bool {
         self.rounds += 1;
+        let volumes = self.volumes;
         let mut moved = false;
         for level in levels.by_height.iter().rev() {
             moved |= self.replace(level, share, |n, bounds| match levels.parent[n as usize] {
                 NO_PARENT => bounds[n as usize],
                 parent => {
-                    let clipped = bounds[parent as usize].intersection(&bounds[n as usize]);
-                    tighter(&bounds[n as usize], clipped)
+                    let clipped = bounds[parent as usize].intersection(&bounds[n as usize], volumes);
+                    tighter(&bounds[n as usize], clipped, volumes)
                 }
             });
         }
         for level in &levels.by_height {
             moved |= self.replace(level, share, |n, bounds| match &solid.nodes[n as usize] {
                 Node::Op(op, children) => {
-                    let joined = Bound::upward(*op, children.iter().map(|c| bounds[*c as usize]));
+                    let joined = Bound::upward(*op, children.iter().map(|c| bounds[*c as usize]), volumes);
                     let before = bounds[n as usize];
-                    tighter(&before, before.smaller(&joined))
+                    tighter(&before, before.smaller(&joined, volumes), volumes)
                 }
                 _ => bounds[n as usize],
             });
@@ -117,6 +133,16 @@ impl SBounds {
         &self.bounds[n as usize]
     }
 
+    /// A box along the own axes of a primitive's node, where such boxes were asked for.
+    pub(super) fn oriented(&self, n: NodeId) -> Option<&Oriented> {
+        self.oriented.get(n as usize)?.as_ref()
+    }
+
+    /// What the bounds are made of.
+    pub fn volumes(&self) -> Volumes {
+        self.volumes
+    }
+
     /// The bound of the solid.
     pub fn root(&self) -> &Bound {
         self.node(self.root)
@@ -140,8 +166,8 @@ impl SBounds {
 }
 
 /// `next` for a bound that was `before` where it is the smaller one; both hold what counts of the node.
-fn tighter(before: &Bound, next: Bound) -> Bound {
-    let next = if next.is_empty() { Bound::EMPTY } else { before.smaller(&next) };
+fn tighter(before: &Bound, next: Bound, volumes: Volumes) -> Bound {
+    let next = if next.is_empty() { Bound::EMPTY } else { before.smaller(&next, volumes) };
     if next.is_empty() { Bound::EMPTY } else { next }
 }
 

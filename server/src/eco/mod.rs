@@ -22,7 +22,7 @@ pub use snapshot::{Snapshot, SnapshotView};
 pub use tables::{Kind, Meet, meet};
 pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 
-use crate::bound::SBounds;
+use crate::bound::{SBounds, Volumes};
 use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};
 use crate::solid::local::{Token, Truth};
 use crate::solid::{Face, Solid};
@@ -56,9 +56,14 @@ impl Model {
 
     /// Preprocesses a solid; its octree is built to the given limits.
     pub fn with_limits(solid: Solid, limits: Limits) -> Self {
-        let radius = SBounds::shared(&solid, 0.0).root().ball.radius.max(0.0);
+        Self::with_volumes(solid, limits, Volumes::default())
+    }
+
+    /// Preprocesses a solid with other bounding volumes for stage 1: for comparison, the answers are as good with any.
+    pub fn with_volumes(solid: Solid, limits: Limits, volumes: Volumes) -> Self {
+        let radius = SBounds::shared(&solid, 0.0, Volumes::default()).root().ball.radius.max(0.0);
         let margin = if radius.is_finite() { MODEL_MARGIN * radius } else { 0.0 };
-        let bounds = SBounds::shared(&solid, margin);
+        let bounds = SBounds::shared(&solid, margin, volumes);
         let eco = Eco::new(&solid, &bounds, limits);
         Self::of_parts(solid, bounds, eco, radius)
     }
@@ -82,7 +87,8 @@ impl Model {
             return &self.bounds;
         }
         // On this thread alone: other searches may wait for them.
-        self.wide.get_or_init(|| SBounds::new(&self.solid, WIDE_MARGIN * self.radius))
+        let volumes = self.bounds.volumes();
+        self.wide.get_or_init(|| SBounds::with_volumes(&self.solid, WIDE_MARGIN * self.radius, volumes))
     }
 
     /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.

@@ -16,7 +16,7 @@ use super::local::Term;
 use super::octree::{DEEPEST, Node, cube_of};
 use super::tables::Kind;
 use super::{Eco, Model};
-use crate::bound::{Bound, SBounds};
+use crate::bound::{Bound, SBounds, Volumes};
 use crate::math::{Aabb, Ball};
 use crate::solid::primitive::{Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Sphere};
 use crate::solid::{self, Label, Op, Primitive, Shape, Solid};
@@ -52,10 +52,11 @@ pub struct SnapshotView<'a> {
 }
 
 impl Snapshot {
-    /// The bytes of a model; `None` for a tree of so many levels that it would not be read again.
+    /// The bytes of a model; `None` for a tree of so many levels that it would not be read again, and for bounds of other
+    /// volumes than the default.
     pub fn of(model: &Model) -> Option<Self> {
         let solid = &model.solid;
-        if levels(&solid.nodes) > LEVELS {
+        if levels(&solid.nodes) > LEVELS || model.bounds.volumes() != Volumes::default() {
             return None;
         }
         let mut out = Self::default();

@@ -4,12 +4,14 @@
 
 pub mod aabb;
 pub mod ball;
+pub mod oriented;
 #[cfg(test)]
 pub(crate) mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;
 pub use ball::Ball;
+pub use oriented::Oriented;
 
 use glam::DVec3;
 

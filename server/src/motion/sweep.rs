@@ -17,7 +17,7 @@
 //! Not promised: the smallest box. The number of pieces is bounded, so many whole turns of the observer leave the ball.
 
 use super::{Placed, Relative};
-use crate::math::{Aabb, Ball, tolerance::CARRIED};
+use crate::math::{Aabb, Ball, Oriented, tolerance::CARRIED, tolerance::OUTWARD};
 use glam::DVec3;
 
 /// A piece turns by no more than this angle (radians) unless `MAX_PIECES` says otherwise: the growth Acc·h²/8 is then
@@ -86,6 +86,32 @@ impl Sweep {
         // A path is as thin as a point, and may lie on the very face of the other bound: rounding must not part them.
         let slack = self.rounding(x + ball.radius, t0, t1);
         self.finished(path.intersection(&center.grown(x + ball.radius + slack)), x + ball.radius, t0, t1)
+    }
+
+    /// A ball around a ball of the mover's model frame over [t0, t1], in the observer's model frame.
+    pub fn around_ball(&self, ball: &Ball, t0: f64, t1: f64) -> Ball {
+        if ball.is_empty() || !ball.radius.is_finite() {
+            return *ball;
+        }
+        let path = Ball::of_box(&self.of_ball(&Ball { radius: 0.0, ..*ball }, t0, t1));
+        Ball { radius: (path.radius + ball.radius) * (1.0 + OUTWARD), ..path }
+    }
+
+    /// A box along the mover's axes in the middle of [t0, t1] around a finite box of its model frame, in the observer's model
+    /// frame. About that instant, with c the middle, e the half extents, ω and v as the mover's axes see them, a point goes
+    /// |v_k(c)| + (|ω| × e)_k per unit of time along axis k (the products all positive), but for ½ Acc·dt².
+    pub fn along_mover(&self, b: &Aabb, t0: f64, t1: f64) -> Oriented {
+        let (c, e, h) = (b.center(), b.half(), t1 - t0);
+        let at = self.relative.at(t0 + 0.5 * h);
+        let x = ((c - self.mover_center).abs() + e).length();
+        let bounds = self.relative.bounds(t0, h, x);
+        let acceleration = (bounds.omega * bounds.omega + bounds.cross) * x + self.observer_spin * bounds.swing;
+        let w = at.omega.abs();
+        let turned = DVec3::new(w.y * e.z + w.z * e.y, w.z * e.x + w.x * e.z, w.x * e.y + w.y * e.x);
+        let first = (at.velocity(c).abs() + turned + bounds.slip) * (0.5 * h) + 0.125 * acceleration * h * h;
+        let way = first.min(DVec3::splat(0.5 * bounds.speed * h));
+        let half = (e + way) * (1.0 + OUTWARD) + self.rounding(x, t0, t1);
+        Oriented { center: at.b_point(c), axes: at.b_from_a, half }
     }
 
     /// The union over the pieces of [t0, t1] of the boxes at both ends, grown by what lies between; `x` bounds the

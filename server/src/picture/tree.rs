@@ -8,7 +8,7 @@
 use super::drawing::{Anchor, Color, Drawing, GREY, INK, Size, text_width};
 use super::ray::Traced;
 use super::view::{Camera, Thing, View};
-use crate::bound::{Bound, SBounds};
+use crate::bound::{Bound, SBounds, Volumes};
 use crate::math::Aabb;
 use crate::solid::{Node, NodeId, Op, Sense, Solid};
 use contactd_proto::Pose;
@@ -97,8 +97,8 @@ fn upward_only(solid: &Solid, margin: f64) -> Vec<Bound> {
     for node in &solid.nodes {
         bounds.push(match node {
             Node::Empty => Bound::EMPTY,
-            Node::Primitive(p) => Bound::of_primitive(&solid.primitives[*p as usize], margin),
-            Node::Op(op, children) => Bound::upward(*op, children.iter().map(|c| bounds[*c as usize])),
+            Node::Primitive(p) => Bound::of_primitive(&solid.primitives[*p as usize], margin, Volumes::Both),
+            Node::Op(op, children) => Bound::upward(*op, children.iter().map(|c| bounds[*c as usize]), Volumes::Both),
         });
     }
     bounds
