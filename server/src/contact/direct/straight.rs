@@ -17,7 +17,7 @@
 //!    a circle of directions, two circles hold it altogether, else φ is smooth on what is left. Steps on the unit sphere
 //!    converge quadratically; with H the second derivative of φ, along a circle n·a = lean with multiplier μ it is H + μ lean.
 //!
-//! The point follows from the features, the witness of depth delta from one linear step, and both trees confirm it. What
+//! The point follows from the features, the witness of depth delta from one linear step or a few, and both trees confirm it. What
 //! does not settle, starts near, or meets in more than its faces tell is left to the advance.
 
 use super::super::literal::Side;
@@ -39,6 +39,8 @@ const CUTS: usize = 32;
 const TRIES: [(f64, f64); 4] = [(3e-2, 0.1), (1e-3, 0.03), (1e-5, 3e-3), (1e-8, 1e-4)];
 /// Newton steps of one try.
 const STEPS: usize = 10;
+/// Further steps to where every active constraint is met at a depth.
+const SINKS: usize = 4;
 /// A step this small (radians) leaves an error of its square.
 const SETTLED: f64 = 1e-8;
 
@@ -471,8 +473,18 @@ impl<'a> Straight<'a> {
                 return None;
             }
         }
-        let (deep_x, deep_t) = self.sink(&rows, &active, x, t, pair.witness_level())?;
-        let is_deep = meets(deep_x, deep_t).iter().all(|v| *v <= -pair.delta - pair.rounding);
+        // Round faces bend away from the first order: the deeper, the farther.
+        let is_deep = |(x, t): (DVec3, f64)| meets(x, t).iter().all(|v| *v <= -pair.delta - pair.rounding);
+        let mut deep = self.sink(&rows, &active, x, t, pair.witness_level())?;
+        for _ in 0..SINKS {
+            if is_deep(deep) {
+                break;
+            }
+            let rows = self.rows(&active, deep.0, deep.1);
+            deep = self.sink(&rows, &active, deep.0, deep.1, pair.witness_level())?;
+        }
+        let deep_t = deep.1;
+        let is_deep = is_deep(deep);
         let ordered = 0.0 <= t && t <= deep_t && deep_t <= 1.0;
         // The proof and the point are of one time.
         let left = phi - t * speed;
