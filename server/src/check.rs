@@ -3,12 +3,12 @@
 //! Object ids are the objects' indices in the file. Every pair that the rules allow is told, clear ones too, in the order
 //! (time, a, b); with `first` only those whose bracket meets the earliest contact's.
 
-use crate::contact::{Body, Ideas, PairQuery, certificate};
+use crate::contact::{self, Body, Clock, Ideas, PairQuery, Scratch, certificate};
 use crate::eco::Model;
 use crate::import::Scene;
 use crate::motion::Placed;
-use crate::world::{ObjectSpec, Part, Refusal, StepError, StepOptions, StepOutcome, World};
-use contactd_proto::{Detect, PoseRecord};
+use crate::world::{ObjectSpec, PairOutcome, Part, Refusal, StepError, StepOptions, StepOutcome, World};
+use contactd_proto::{Detect, Motion, PoseRecord};
 use std::sync::Arc;
 
 /// Why a scene that was read cannot be stepped.
@@ -104,24 +104,10 @@ impl Check {
     pub fn certificates(&self, outcome: &StepOutcome) -> (String, usize) {
         let (mut text, mut without) = (format!("{}\n", certificate::HEADER), 0);
         for p in &outcome.pairs {
-            let [a, b] = [p.a, p.b].map(|id| {
-                let body = self.world.body(id)?;
-                Some(Body { model: &body.part.model, placed: Placed { place: body.place, motion: body.track.motion } })
-            });
-            let made = match (a, b) {
-                (Some(a), Some(b)) if p.plan.detect != Detect::Discrete => {
-                    let query = PairQuery {
-                        a,
-                        b,
-                        resolution: p.outcome.resolution,
-                        cell_limit: CERTIFICATE_CELLS,
-                        ideas: Ideas::default(),
-                        penetration: true,
-                    };
-                    certificate::certify(&query, &p.outcome)
-                }
-                _ => None,
-            };
+            let continuous = p.plan.detect != Detect::Discrete;
+            let query = self.query(p, CERTIFICATE_CELLS).filter(|_| continuous);
+            let made =
+                query.and_then(|query| certificate::certify(&PairQuery { penetration: true, ..query }, &p.outcome));
             match made {
                 Some(made) => made.write((p.a as usize, p.b as usize), &mut text),
                 None => without += 1,
@@ -129,7 +115,41 @@ impl Check {
         }
         (text, without)
     }
+
+    /// Where the time of each told pair went: each that the step searched is asked anew, with nothing remembered, some times
+    /// over; the least is told. `None`: the step needed no search, as boxes or one direction told the pair apart.
+    pub fn clocks(&self, outcome: &StepOutcome) -> Vec<Option<Clock>> {
+        let mut scratch = Scratch::timed();
+        let timed = |p: &PairOutcome| {
+            if p.outcome.counters.primitives == 0 {
+                return None;
+            }
+            let query = self.query(p, contact::DEFAULT_CELL_LIMIT)?;
+            let once = |_| {
+                contact::earliest_contact(&query, &mut scratch);
+                scratch.take_clock()
+            };
+            (0..ASKED).filter_map(once).min_by_key(Clock::total)
+        };
+        outcome.pairs.iter().map(timed).collect()
+    }
+
+    /// What the step asked of a pair.
+    fn query(&self, p: &PairOutcome, cell_limit: u64) -> Option<PairQuery<'_>> {
+        let side = |id: u32| {
+            let body = self.world.body(id)?;
+            let discrete = p.plan.detect == Detect::Discrete;
+            let motion = if discrete { Motion::resting(body.track.end) } else { body.track.motion };
+            Some(Body { model: &body.part.model, placed: Placed { place: body.place, motion } })
+        };
+        let (a, b) = (side(p.a)?, side(p.b)?);
+        let (resolution, penetration) = (p.outcome.resolution, p.plan.penetration);
+        Some(PairQuery { a, b, resolution, cell_limit, ideas: Ideas::default(), penetration })
+    }
 }
+
+/// How often a pair is asked for its times: the first one also pays for memory and caches.
+const ASKED: usize = 5;
 
 /// Cells that one certificate may have: a hundred megabytes of text.
 const CERTIFICATE_CELLS: u64 = 200_000;

@@ -108,7 +108,8 @@ struct CheckArguments {
     /// Also write the proof of every answer, for another program to check (docs/certificate.md).
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
-    /// What each answer cost (beside --json: on standard error).
+    /// What each answer cost: by which stage it was told, counts of work, the time of each stage (beside --json: on
+    /// standard error).
     #[arg(long)]
     explain: bool,
     /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
@@ -210,7 +211,7 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     let answer = Answer { safe_time: outcome.safe_time, ..Answer::of_pairs(&pairs) };
     let mut text = if arguments.json { answer.json()? + "\n" } else { answer.table() };
     if arguments.explain {
-        let work = report::work_table(&pairs);
+        let work = report::work_table(&pairs, &check.clocks(&outcome));
         if arguments.json {
             eprint!("{work}");
         } else {

@@ -4,11 +4,12 @@
 //! without meaning for a status is null: a clear pair has no point. Features name the primitive by its index in file
 //! order and the format's name, its face, and its sense in the solid.
 
-use crate::contact::{Counters, Outcome, Region, Status};
+use crate::contact::{Clock, Counters, Outcome, Region, Stage, Status};
 use crate::solid::{Sense, Solid};
 use glam::DVec3;
 use serde::Serialize;
 use std::fmt::Write as _;
+use std::time::Duration;
 
 /// One answer with what it takes to name its features.
 #[derive(Clone, Copy, Debug)]
@@ -213,19 +214,75 @@ impl PairAnswer {
     }
 }
 
-/// What each answer cost: primitives before and after stage 1, octree nodes, candidates, cells, attempts.
-pub fn work_table(pairs: &[PairReport<'_>]) -> String {
-    let header = ["a", "b", "primitives", "after stage 1", "node pairs", "candidates", "cells", "clauses", "newton"];
+/// What each answer cost: the stage that told it, primitives before and after stage 1, octree nodes, candidates, cells,
+/// clauses, attempts, whole-primitive answers, and the time of each stage by a clock for each pair; `None`: no search was
+/// needed.
+pub fn work_table(pairs: &[PairReport<'_>], clocks: &[Option<Clock>]) -> String {
+    let header = [
+        "a",
+        "b",
+        "told by",
+        "primitives",
+        "after stage 1",
+        "node pairs",
+        "candidates",
+        "cells",
+        "clauses",
+        "newton",
+        "closed forms",
+        "instant cells",
+        "in front",
+        "stage 1",
+        "stage 2",
+        "stage 3",
+        "in all",
+    ];
     let mut rows = vec![header.map(String::from)];
-    for p in pairs {
-        let Counters { primitives, after_stage1, node_pairs, candidates, cells, clauses, newton, .. } =
-            p.outcome.counters;
+    let mut sums = [Duration::ZERO; Stage::ALL.len()];
+    for (p, clock) in pairs.iter().zip(clocks) {
+        let Counters {
+            after_stage1, node_pairs, candidates, cells, clauses, newton, closed_forms, instant_cells, ..
+        } = p.outcome.counters;
+        let primitives: usize = p.solids.iter().map(|s| s.primitives.len()).sum();
+        let told = clock.as_ref().map_or("boxes", |c| c.last().name());
+        let searched = clock.as_ref().is_some_and(|c| c.last() != Stage::Front);
+        // What is answered in front never comes to stage 1.
+        let left = if searched { after_stage1.to_string() } else { String::new() };
         let [a, b] = p.names.map(String::from);
-        let numbers = [primitives, after_stage1, node_pairs, candidates, cells, clauses, newton];
-        let [n0, n1, n2, n3, n4, n5, n6] = numbers.map(|n| n.to_string());
-        rows.push([a, b, n0, n1, n2, n3, n4, n5, n6]);
+        let counts =
+            [node_pairs, candidates, cells, clauses, newton, closed_forms, instant_cells].map(|n| n.to_string());
+        let [c0, c1, c2, c3, c4, c5, c6] = counts;
+        let times = Stage::ALL.map(|s| clock.as_ref().map_or_else(String::new, |c| micros(c.of(s))));
+        let [t0, t1, t2, t3] = times;
+        let total = clock.as_ref().map_or_else(String::new, |c| micros(c.total()));
+        for (sum, s) in sums.iter_mut().zip(Stage::ALL) {
+            *sum += clock.as_ref().map_or(Duration::ZERO, |c| c.of(s));
+        }
+        let primitives = primitives.to_string();
+        rows.push([a, b, told.into(), primitives, left, c0, c1, c2, c3, c4, c5, c6, t0, t1, t2, t3, total]);
     }
-    aligned(&rows)
+    let mut out = aligned(&rows);
+    let total: Duration = sums.iter().sum();
+    let share = |d: &Duration| 100.0 * d.as_secs_f64() / total.as_secs_f64().max(1e-9);
+    let shares = sums.iter().zip(Stage::ALL).map(|(d, s)| format!("{} {:.0} %", s.name(), share(d)));
+    let _ = writeln!(
+        out,
+        "in all {} us: {} (one thread, nothing remembered; the least of some runs of each pair)",
+        micros(total),
+        shares.collect::<Vec<_>>().join(", ")
+    );
+    out
+}
+
+/// Microseconds, to three digits.
+fn micros(d: Duration) -> String {
+    let us = 1e6 * d.as_secs_f64();
+    match us {
+        0.0 => "0".into(),
+        _ if us < 10.0 => format!("{us:.2}"),
+        _ if us < 100.0 => format!("{us:.1}"),
+        _ => format!("{us:.0}"),
+    }
 }
 
 /// Columns as wide as their widest entry.
@@ -311,6 +368,22 @@ mod tests {
         assert!(p.separation.is_none() && p.normal_speed.is_none() && p.features.is_none());
         assert_eq!(answer.safe_time, 1.0);
         assert_eq!(Answer::of_pairs(&[]).json().expect("json"), r#"{"safe_time":1.0,"pairs":[]}"#);
+    }
+
+    #[test]
+    fn work_names_the_primitives_of_a_pair_that_no_search_was_needed_for() {
+        let solid = plate();
+        let clear = Outcome::clear(1e-9);
+        let searched = Outcome {
+            counters: Counters { primitives: 4, after_stage1: 3, cells: 7, clauses: 20, ..Counters::default() },
+            ..contact()
+        };
+        let pairs = [report(&solid, &clear), report(&solid, &searched)];
+        let text = work_table(&pairs, &[None, Some(Clock::default())]);
+        let words: Vec<Vec<&str>> = text.lines().map(|l| l.split_whitespace().collect()).collect();
+        assert_eq!(words[1][..4], ["a", "b", "boxes", "4"], "{text}");
+        assert_eq!(words[2][..5], ["a", "b", "in", "front", "4"], "{text}");
+        assert!(words[2].contains(&"7") && words[2].contains(&"20"), "{text}");
     }
 
     #[test]

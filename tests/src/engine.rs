@@ -49,7 +49,7 @@ pub fn ask_scene_with(scene: &Scene, ideas: Ideas) -> Outcome {
 
 /// The search alone, without whole-primitive answers in front of it.
 pub const SEARCH_ALONE: Ideas =
-    Ideas { region: true, walk: true, fits: true, hints: true, direct: false, holes: false };
+    Ideas { region: true, walk: true, multipliers: true, fits: true, hints: true, direct: false, holes: false };
 
 /// In which fields two answers to one question differ, counters apart; times and places by more than rounding: times
 /// weigh with the closing speed, in units of the pair's size. Where a contact is a line or a patch any of its points will do.

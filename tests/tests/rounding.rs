@@ -297,6 +297,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 delta: 1e-9,
                 rounding: budget,
                 fits: true,
+                multipliers: true,
                 curved: true,
             };
             let inside = |r: &mut Random| (center + half * r.vector(1.0)).clamp(center - half, center + half);

@@ -376,6 +376,7 @@ impl Placed<'_> {
             delta: self.task.delta,
             rounding: self.task.rounding,
             fits: self.task.ideas.fits,
+            multipliers: true,
             curved: false,
         }
     }

@@ -401,6 +401,9 @@ impl Run<'_, '_> {
             s.b.push(l.ahead(look));
             s.normals.push(l.normal_ahead(look));
         }
+        if !self.view.multipliers {
+            return lp::best_alone(&s.normals, &s.b, self.view.half);
+        }
         lp::min_max(&s.normals, &s.b, self.view.half, &mut s.warm)
     }
 

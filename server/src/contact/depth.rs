@@ -120,6 +120,7 @@ fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work
             delta: -best,
             rounding: 0.0,
             fits: false,
+            multipliers: true,
             curved: false,
         };
         let mut pool: Vec<Token> = Vec::new();

@@ -124,6 +124,8 @@ pub struct View<'a> {
     pub rounding: f64,
     /// Same-shape fits are used.
     pub fits: bool,
+    /// Several literals hold a bound together; otherwise the best of them does, alone.
+    pub multipliers: bool,
     /// Those too that stay curved: of cones, and with quadrics weighed as steep as each other. Dearer to check by intervals.
     pub curved: bool,
 }

@@ -24,6 +24,14 @@ pub struct Solution {
     pub count: usize,
 }
 
+/// The plane that is highest at its lowest point over the box, alone: the program without multipliers.
+pub fn best_alone(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
+    let lowest = |i: usize| b[i] - normals[i].abs().dot(half);
+    let best = (0..normals.len()).max_by(|i, j| lowest(*i).total_cmp(&lowest(*j))).unwrap_or(0);
+    let y = -half * normals[best].signum();
+    Solution { z: lowest(best), y, support: [(best as u32, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)], count: 1 }
+}
+
 /// Pivots after which the current basis is returned as it is.
 const MAX_PIVOTS: usize = 48;
 /// Slack columns stand before the planes: 2k (p_k) and 2k + 1 (q_k), k < 3; plane i is column `SLACKS` + i.

@@ -5,6 +5,7 @@
 pub mod certificate;
 pub mod clause;
 pub mod clearance;
+pub mod clock;
 pub mod closed;
 mod depth;
 mod direct;
@@ -27,6 +28,7 @@ mod task;
 mod tests;
 mod work;
 
+pub use clock::{Clock, Stage};
 pub(crate) use direct::{Glance, Glancing, Hull, Stance};
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
 pub use pair::{

@@ -1,5 +1,6 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
+use super::clock::Stage;
 use super::depth;
 use super::direct::{self, Quick};
 use super::hole;
@@ -60,6 +61,9 @@ pub struct Ideas {
     pub region: bool,
     /// Stage 2: candidates from the walk of both octrees.
     pub walk: bool,
+    /// Several faces with multipliers bound a cell together; otherwise the best single one does. For measurements only: nearly
+    /// every search then runs into its limit of cells.
+    pub multipliers: bool,
     /// Same-shape fits as bounds of their own.
     pub fits: bool,
     /// Curved faces touched where a contact was found.
@@ -73,7 +77,7 @@ pub struct Ideas {
 
 impl Default for Ideas {
     fn default() -> Self {
-        Self { region: true, walk: true, fits: true, hints: true, direct: true, holes: true }
+        Self { region: true, walk: true, multipliers: true, fits: true, hints: true, direct: true, holes: true }
     }
 }
 
@@ -95,11 +99,13 @@ pub fn resolution_of(query: &PairQuery) -> f64 {
 
 /// Searches a pair to its end.
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
+    scratch.enter(Stage::Front);
     let mut outcome = Outcome::clear(query.resolution);
     let quick = quick(query, &mut outcome);
     if !matches!(quick, Quick::Told) {
         search(query, quick, &mut outcome, scratch);
     }
+    scratch.enter(None);
     outcome
 }
 

@@ -11,6 +11,7 @@
 //! witness found there restarts the search at 2 delta, then means overlap.
 
 use super::clause::{self, Advance, Hint};
+use super::clock::{Clock, Stage};
 use super::literal::{Side, View};
 use super::outcome::Counters;
 use super::propose::Found;
@@ -139,6 +140,26 @@ pub struct Scratch {
     pub(super) clause: clause::Scratch,
     pub(super) hints: Vec<Hint>,
     pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
+    clock: Option<Clock>,
+}
+
+impl Scratch {
+    /// With a clock: `take_clock` tells afterwards where the time went.
+    pub fn timed() -> Self {
+        Self { clock: Some(Clock::default()), ..Self::default() }
+    }
+
+    /// What the clock says, which starts anew.
+    pub fn take_clock(&mut self) -> Option<Clock> {
+        self.clock.as_mut().map(std::mem::take)
+    }
+
+    /// What follows is work of a stage.
+    pub(super) fn enter(&mut self, stage: impl Into<Option<Stage>>) {
+        if let Some(clock) = &mut self.clock {
+            clock.enter(stage.into());
+        }
+    }
 }
 
 /// A search in progress.
@@ -216,6 +237,7 @@ impl<'a> Search<'a> {
 
     /// Runs to the end, or until nothing before `until` is left: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Ending> {
+        self.scratch.enter(Stage::Cells);
         loop {
             let Some(cell) = self.scratch.heap.peek().copied() else {
                 return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
@@ -259,7 +281,9 @@ impl<'a> Search<'a> {
         match cell.source {
             Source::Cell => self.counters.cells += 1,
             Source::Slice => {
+                self.scratch.enter(Stage::Region);
                 self.locate(&cell);
+                self.scratch.enter(Stage::Cells);
                 return None;
             }
         }

@@ -117,6 +117,7 @@ impl<'t, 'a> Cover<'t, 'a> {
             delta,
             rounding: self.task.rounding,
             fits: -delta < self.fits_below,
+            multipliers: true,
             curved: false,
         }
     }

@@ -8,6 +8,7 @@
 //! down to the voxels it may meet (their hull's six planes keep the cell to it: guards).
 //! Stage 3 has no other source of primitives: `knows` tells which were handed over.
 
+use super::clock::Stage;
 use super::literal::Side;
 use super::newton::Constraint;
 use super::roots;
@@ -86,6 +87,7 @@ impl<'a> Search<'a> {
             self.counters.after_stage1 = self.counters.after_stage1.max(left as u64);
             region = Some(Arc::new(found));
         }
+        self.scratch.enter(Stage::Walk);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         if self.whole(Side::A, region.as_ref(), &mut a) != Truth::Open
             || self.whole(Side::B, region.as_ref(), &mut b) != Truth::Open

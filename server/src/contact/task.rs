@@ -63,6 +63,7 @@ impl<'a> Task<'a> {
             delta: self.delta,
             rounding: self.rounding,
             fits: self.ideas.fits,
+            multipliers: self.ideas.multipliers,
             curved: true,
         }
     }

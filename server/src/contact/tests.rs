@@ -301,3 +301,38 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
     println!("{held} points in a cell's solids, {kept_out} kept out by guards alone");
     assert!(held > 100 && kept_out > 100, "{held} {kept_out}");
 }
+
+#[test]
+fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
+    let hole = (Shape::from(Cylinder { radius: 0.2, half_height: 1.0 }), Pose::IDENTITY);
+    let (plate, block) =
+        (pierced(Cuboid { half: v(1.0, 1.0, 0.2) }, vec![hole]), simple(Cuboid { half: v(0.3, 0.2, 0.4) }));
+    let down = turn(Pose::new(v(0.1, 0.05, 2.0), tilt(v(0.3, 0.2, 0.1))), v(0.0, 0.0, -2.5), v(0.2, 0.1, 0.3));
+    let asked = |a: &Model, motion: Motion, ideas: Ideas, scratch: &mut Scratch| {
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let query = PairQuery {
+            a: Body { model: a, placed: placed(rest()) },
+            b: Body { model: &block, placed: placed(motion) },
+            resolution: default_resolution(a, &block),
+            cell_limit: 300_000,
+            ideas,
+            penetration: true,
+        };
+        earliest_contact(&query, scratch)
+    };
+    let search = Ideas { direct: false, holes: false, ..Ideas::default() };
+    let mut timed = Scratch::timed();
+    let own = asked(&plate, down, search, &mut Scratch::default());
+    assert!(own.status == Status::Contact && own.counters.cells > 0, "{own:?}");
+    assert_eq!(asked(&plate, down, search, &mut timed), own);
+    let clock = timed.take_clock().expect("a clock");
+    assert!([Stage::Region, Stage::Walk, Stage::Cells].iter().all(|s| !clock.of(*s).is_zero()), "{clock:?}");
+    assert_eq!(clock.last(), Stage::Cells);
+    assert_eq!(clock.total(), Stage::ALL.iter().map(|s| clock.of(*s)).sum());
+    // Convex bodies are told in front; what was told before is not in it.
+    let ball = simple(Sphere { radius: 0.5 });
+    let met = asked(&ball, down, Ideas::default(), &mut timed);
+    let clock = timed.take_clock().expect("a clock");
+    assert!(met.counters.cells == 0 && clock.last() == Stage::Front && !clock.total().is_zero(), "{met:?} {clock:?}");
+    assert!(Scratch::default().take_clock().is_none());
+}
