@@ -11,6 +11,8 @@ pub enum Idea {
     Region,
     /// Stage 2: candidates from the walk of both octrees.
     Walk,
+    /// Multipliers: several faces bound a cell together.
+    Multipliers,
     /// Same-shape fits.
     Fits,
     /// Curved faces touched where a contact was found.
@@ -43,6 +45,7 @@ impl Options {
             match idea {
                 Idea::Region => ideas.region = false,
                 Idea::Walk => ideas.walk = false,
+                Idea::Multipliers => ideas.multipliers = false,
                 Idea::Fits => ideas.fits = false,
                 Idea::Hints => ideas.hints = false,
                 Idea::Direct => ideas.direct = false,

@@ -57,6 +57,11 @@ impl Body {
         Self { shape, frame: pose(place) * turn }
     }
 
+    /// Where the shape's own frame is at a time of a motion.
+    pub fn pose_at(&self, motion: &Motion, t: f64) -> Pose {
+        pose(&motion.at(t)) * self.frame
+    }
+
     /// The motion of the shape's own frame over the step.
     fn motion(&self, motion: &Motion) -> NonlinearRigidMotion {
         let start = pose(&motion.start) * self.frame;

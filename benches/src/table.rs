@@ -38,19 +38,30 @@ impl From<u64> for Cell {
     }
 }
 
+/// A number to three significant digits, or all of a count.
+pub fn shown(x: f64) -> String {
+    match x.abs() {
+        a if a.is_nan() => "-".into(),
+        0.0 => "0".into(),
+        a if x.fract() == 0.0 && a < 1e9 => format!("{x:.0}"),
+        a if !(1e-3..1e7).contains(&a) => format!("{x:.1e}"),
+        a => {
+            let digits = (2 - a.log10().floor() as i32).max(0) as usize;
+            format!("{x:.digits$}")
+        }
+    }
+}
+
+/// Text for HTML and SVG.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
 impl Cell {
-    /// Three significant digits, or all of a count.
     fn shown(&self) -> String {
         match self {
             Cell::Text(s) => s.clone(),
-            Cell::Number(x) if x.is_nan() => "-".into(),
-            Cell::Number(x) if *x == 0.0 => "0".into(),
-            Cell::Number(x) if x.fract() == 0.0 && x.abs() < 1e9 => format!("{x:.0}"),
-            Cell::Number(x) if x.abs() < 1e-3 || x.abs() >= 1e7 => format!("{x:.1e}"),
-            Cell::Number(x) => {
-                let digits = (2 - x.abs().log10().floor() as i32).max(0) as usize;
-                format!("{x:.digits$}")
-            }
+            Cell::Number(x) => shown(*x),
         }
     }
 
@@ -121,6 +132,44 @@ impl Table {
         out
     }
 
+    /// The rows.
+    pub fn rows(&self) -> &[Vec<Cell>] {
+        &self.rows
+    }
+
+    /// The table with the rows that are chosen.
+    pub fn chosen(&self, is_chosen: impl Fn(&[Cell]) -> bool) -> Self {
+        Self { columns: self.columns.clone(), rows: self.rows.iter().filter(|r| is_chosen(r)).cloned().collect() }
+    }
+
+    /// As Markdown.
+    pub fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let mut out = line(self.columns.iter().map(|c| c.replace('_', " ")).collect());
+        out += &format!("|{}\n", "---|".repeat(self.columns.len()));
+        self.rows.iter().for_each(|r| out += &line(r.iter().map(Cell::shown).collect()));
+        out
+    }
+
+    /// As HTML; all digits of a number in its tool tip.
+    pub fn html(&self) -> String {
+        let mut out = String::from("<table><thead><tr>");
+        self.columns.iter().for_each(|c| out += &format!("<th>{}</th>", escaped(&c.replace('_', " "))));
+        out += "</tr></thead><tbody>\n";
+        for row in &self.rows {
+            out += "<tr>";
+            for cell in row {
+                out += &match cell {
+                    Cell::Text(s) => format!("<td class=\"word\">{}</td>", escaped(s)),
+                    Cell::Number(x) if x.is_nan() => "<td>-</td>".into(),
+                    Cell::Number(x) => format!("<td title=\"{x}\">{}</td>", shown(*x)),
+                };
+            }
+            out += "</tr>\n";
+        }
+        out + "</tbody></table>\n"
+    }
+
     /// Prints the table and writes `NAME.csv` into a folder.
     ///
     /// # Errors
@@ -145,6 +194,8 @@ mod tests {
         t.push(row!["a, b", 0.123456, 7usize]);
         t.push(row!["c", f64::NAN, 1234u64]);
         assert_eq!(t.text(), "case     us  cells\na, b  0.123      7\nc         -   1234\n");
+        assert_eq!(t.markdown(), "| case | us | cells |\n|---|---|---|\n| a, b | 0.123 | 7 |\n| c | - | 1234 |\n");
+        assert!(t.html().contains("<td title=\"0.123456\">0.123</td>") && t.html().contains("<td>-</td>"));
         assert_eq!(t.csv(), "case,us,cells\n\"a, b\",0.123456,7\nc,,1234\n");
     }
 }

@@ -1,88 +1,14 @@
 //! `warm`: what a step costs when earlier steps have proven much of it, against the same step with all of it forgotten.
 //!
-//! Three scenes, stepped side by side in two worlds, one of which forgets before every step; both answer the same bits,
-//! which is checked. `apart`: 512 balls, boxes and cylinders on a grid that each circle around their place and never come
-//! near; `peg`: a peg comes down on its hole, 1 mm at a time, and slides in; `rest`: 64 drilled blocks lie on a floor, and
-//! are told as touching in every step. Times are medians over the steps, `asked` and `cells` means a step.
+//! Three scenes, stepped side by side in two worlds (`stepped`). Times are medians over the steps, `asked` and `cells` means
+//! a step.
 
 use clap::Parser;
-use contactd::eco::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
 use contactd_benches::options::Options;
 use contactd_benches::race::median;
 use contactd_benches::row;
+use contactd_benches::stepped::{scenes, walk};
 use contactd_benches::table::Table;
-use contactd_proto::motion::quat_of_rotation_vector;
-use contactd_proto::{Pose, PoseRecord, Report, Rule};
-use contactd_tests::scenes::Recipe;
-use glam::DVec3;
-use std::sync::Arc;
-use std::time::Instant;
-
-/// A scene: its objects, the first `fixed` of them static, and where the others are after a step.
-struct Scene {
-    name: &'static str,
-    recipes: Vec<Recipe>,
-    fixed: usize,
-    pose: fn(usize, usize) -> Pose,
-    rules: Vec<Rule>,
-}
-
-fn circling(object: usize, step: usize) -> Pose {
-    let grid = DVec3::from([object % 8, object / 8 % 8, object / 64].map(|i| i as f64));
-    let angle = 0.02 * step as f64 + object as f64;
-    let at = 1.2 * grid + 0.05 * DVec3::new(angle.cos(), angle.sin(), (0.7 * angle).sin());
-    Pose::new(at, quat_of_rotation_vector(DVec3::new(0.6, 0.0, 0.8) * (0.5 * angle)))
-}
-
-fn descending(object: usize, step: usize) -> Pose {
-    if object == 0 { Pose::IDENTITY } else { Pose::at(DVec3::new(0.001, 0.002, 2.0 - 0.01 * step as f64)) }
-}
-
-fn lying(object: usize, _: usize) -> Pose {
-    if object == 0 {
-        return Pose::at(DVec3::new(0.0, 0.0, -1.0));
-    }
-    let i = object - 1;
-    Pose::at(DVec3::new(1.5 * (i % 8) as f64, 1.5 * (i / 8) as f64, 0.2))
-}
-
-fn scenes() -> [Scene; 3] {
-    let kinds = [Recipe::sphere(0.4), Recipe::cuboid(0.25, 0.3, 0.25), Recipe::cylinder(0.25, 0.3)];
-    let plate = Recipe::cuboid(0.8, 0.8, 0.2).minus(Recipe::cylinder(0.25, 1.0));
-    let block = Recipe::cuboid(0.5, 0.4, 0.2).minus(Recipe::cylinder(0.15, 1.0));
-    let mut lying_blocks = vec![Recipe::cuboid(20.0, 20.0, 1.0)];
-    lying_blocks.resize(65, block);
-    let patches = Rule { report: Report::Patch, ..Rule::new(["default".into(), "default".into()]) };
-    [
-        Scene {
-            name: "apart",
-            recipes: (0..512).map(|i| kinds[i % 3].clone()).collect(),
-            fixed: 0,
-            pose: circling,
-            rules: vec![],
-        },
-        Scene {
-            name: "peg",
-            recipes: vec![plate, Recipe::cylinder(0.24, 0.5)],
-            fixed: 1,
-            pose: descending,
-            rules: vec![],
-        },
-        Scene { name: "rest", recipes: lying_blocks, fixed: 1, pose: lying, rules: vec![patches] },
-    ]
-}
-
-fn world(scene: &Scene) -> Result<World, Box<dyn std::error::Error>> {
-    let mut world = World::new(scene.recipes.len(), scene.recipes.len());
-    world.set_rules(scene.rules.clone())?;
-    for (i, recipe) in scene.recipes.iter().enumerate() {
-        let part = Arc::new(Part::new(Arc::new(Model::new(recipe.build()))));
-        let spec = ObjectSpec::new(i as u32, &part, (scene.pose)(i, 0));
-        world.add_object(ObjectSpec { is_static: i < scene.fixed, ..spec })?;
-    }
-    Ok(world)
-}
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = Options::parse();
@@ -101,49 +27,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "ratio",
     ]);
     for scene in scenes() {
-        let mut worlds = [world(&scene)?, world(&scene)?];
-        let mut times = [vec![], vec![]];
-        let (mut told, mut asked, mut known, mut cells) = (0, 0, 0, [0, 0]);
-        for step in 1..=steps {
-            let named = scene.fixed..scene.recipes.len();
-            let records: Vec<PoseRecord> = named.map(|i| PoseRecord::end(i as u32, &(scene.pose)(i, step))).collect();
-            worlds[1].forget();
-            // Who goes first changes from step to step.
-            for k in [step % 2, 1 - step % 2] {
-                let from = Instant::now();
-                let out = worlds[k].step(&records, &StepOptions::default())?;
-                // The first step is cold in both.
-                if step > 1 {
-                    times[k].push(from.elapsed().as_secs_f64());
-                    cells[k] += out.counters.cells + out.counters.instant_cells;
-                }
-            }
-            let [warm, cold] = worlds.each_ref().map(World::outcome);
-            let same = warm
-                .pairs
-                .iter()
-                .map(|p| (p.a, p.b, p.outcome.time))
-                .eq(cold.pairs.iter().map(|p| (p.a, p.b, p.outcome.time)));
-            if !same || warm.safe_time != cold.safe_time {
-                return Err(format!("{}: step {step} has another answer when all is forgotten", scene.name).into());
-            }
-            told += warm.pairs.len();
-            asked += warm.searched;
-            known += warm.known;
-        }
+        let walked = walk(&scene, steps)?;
         let n = steps as f64;
-        let ratios = times[0].iter().zip(&times[1]).map(|(warm, cold)| warm / cold);
+        let ratios = walked.times[0].iter().zip(&walked.times[1]).map(|(warm, cold)| warm / cold);
         table.push(row![
             scene.name,
             scene.recipes.len(),
             steps,
-            told as f64 / n,
-            f64::from(asked) / n,
-            f64::from(known) / n,
-            cells[0] as f64 / n,
-            cells[1] as f64 / n,
-            1e6 * median(times[0].iter().copied()),
-            1e6 * median(times[1].iter().copied()),
+            walked.told as f64 / n,
+            f64::from(walked.asked) / n,
+            f64::from(walked.known) / n,
+            walked.cells[0] as f64 / n,
+            walked.cells[1] as f64 / n,
+            1e6 * median(walked.times[0].iter().copied()),
+            1e6 * median(walked.times[1].iter().copied()),
             median(ratios),
         ]);
     }

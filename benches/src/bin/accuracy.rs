@@ -1,0 +1,65 @@
+//! `accuracy`: what accuracy costs in time, as a report of figures, tables and a page.
+//!
+//! The full form takes some minutes. It writes CSV, SVG, PNG and `index.html` into `docs/accuracy` of the repository and the
+//! tables between the marks of `docs/accuracy.md`; with `--csv DIR`, or `--quick`, all of it into that folder (by
+//! default `benches/accuracy` in cargo's target folder) and nothing else is touched.
+
+use clap::Parser;
+use contactd_benches::measure::Known;
+use contactd_benches::options::Options;
+use contactd_benches::page::{between_marks, html};
+use contactd_benches::race::Plan;
+use contactd_benches::report::{Context, ideas, octree, resolution, today, volumes};
+use contactd_benches::workload::classes;
+use std::error::Error;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::parse();
+    let from = Instant::now();
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let in_repository = !options.quick && options.csv.is_none();
+    let folder = if in_repository { docs.join("accuracy") } else { options.folder().join("accuracy") };
+    let plan = Plan { blocks: options.pick(3, 1), least: Duration::from_micros(options.pick(20, 5)) };
+    let classes = classes(options.pick(40, 2))?;
+    eprintln!("accuracy: what is true of {} classes", classes.len());
+    let known = classes.iter().map(Known::of).collect();
+    let context = Context { classes, known, plan, quick: options.quick };
+    let mut sections = resolution(&context);
+    sections.push(today(&context));
+    sections.push(ideas(&context)?);
+    sections.push(volumes(&context));
+    sections.push(octree(&context));
+    let build = if cfg!(debug_assertions) {
+        "debug assertions on: times are not those of a release build"
+    } else {
+        "release build"
+    };
+    let text = format!(
+        "Made by cargo run --release -p contactd-benches --bin accuracy{} ({build}). Times are of one thread of one machine; what \
+         carries over are ratios, measured in blocks that alternate. Medians stand beside the 99th percentile and the slowest: a \
+         mean over easy questions hides the one that takes a second.",
+        if options.quick { " -- --quick" } else { "" }
+    );
+    for section in &sections {
+        section.table.publish(section.name, &folder)?;
+        for figure in &section.figures {
+            figure.write(&folder)?;
+        }
+    }
+    let page = folder.join("index.html");
+    std::fs::write(&page, html("contactd: what accuracy costs", &text, &sections))?;
+    println!("written: {}", page.display());
+    if in_repository {
+        let path = docs.join("accuracy.md");
+        let mut words = std::fs::read_to_string(&path)?;
+        for section in &sections {
+            words = between_marks(&words, section.name, &section.summary.markdown())?;
+        }
+        std::fs::write(&path, words)?;
+        println!("written: {}", path.display());
+    }
+    eprintln!("accuracy: {:.0} s", from.elapsed().as_secs_f64());
+    Ok(())
+}
