@@ -33,8 +33,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Pairs of parts beyond which the search does better.
 const MOST_PAIRS: usize = 256;
-/// Primitives of one solid that are looked through, all of them for each query: larger ones are asked by their octrees.
-const MOST_PRIMITIVES: usize = 256;
+/// Parts of one solid that are looked through.
+const MOST_PARTS: usize = 256;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
 /// Moments at which the first contact is looked for.
@@ -62,12 +62,9 @@ struct Part<'a> {
 
 /// The parts of which a solid is the union; `None` where it is no union of such.
 fn parts(solid: &Solid) -> Option<SmallVec<[Part<'_>; 1]>> {
-    if solid.primitives.len() > MOST_PRIMITIVES {
-        return None;
-    }
     let mut out = SmallVec::new();
     take(solid, solid.root, &mut out)?;
-    Some(out)
+    (out.len() <= MOST_PARTS).then_some(out)
 }
 
 fn take<'a>(solid: &'a Solid, node: NodeId, out: &mut SmallVec<[Part<'a>; 1]>) -> Option<()> {
@@ -157,8 +154,7 @@ impl<'a> Pair<'a> {
         };
         // The hole that the body is deepest in, half way of the step.
         let center = relative.at(0.5).b_point(primitive.ball.center);
-        let depths = part.holes.iter().map(|p| (p.value(center), p));
-        let (_, hole) = depths.min_by(|p, q| p.0.total_cmp(&q.0))?;
+        let hole = deepest(&part.holes, center)?;
         let (mut round, mut directions) = (None, [DVec3::ZERO; 8]);
         for (i, face) in hole.faces.iter().enumerate() {
             match *face {
@@ -374,6 +370,21 @@ impl<'a> Pair<'a> {
         let x = if self.side == Side::A { x } else { at.a_point(x) };
         search.confirm(constraints, x, guess.t, lambda, true)
     }
+}
+
+/// The hole that a point is deepest in, or else nearest to. Of thousands most are dropped by their balls.
+fn deepest<'a>(holes: &[&'a Primitive], point: DVec3) -> Option<&'a Primitive> {
+    let mut best: Option<(f64, &Primitive)> = None;
+    for hole in holes {
+        let within = best.map_or(f64::INFINITY, |(value, _)| hole.ball.radius + value.max(0.0));
+        if (point - hole.ball.center).length_squared() < within * within {
+            let value = hole.value(point);
+            if best.is_none_or(|(least, _)| value < least) {
+                best = Some((value, hole));
+            }
+        }
+    }
+    best.map(|(_, hole)| hole)
 }
 
 /// The answer for two unions of convex primitives, of which one or both have holes; `None` leaves them to the search.
