@@ -15,6 +15,7 @@ pub mod shm;
 pub mod transport;
 
 pub use contactd_proto as proto;
+pub use contactd_proto::{MassOptions, MassProperties};
 pub use error::Error;
 pub use session::{ModelInfo, Object, Reply, Session, StepOptions};
 pub use shm::SharedMemory;

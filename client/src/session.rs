@@ -9,7 +9,7 @@ use contactd_proto::contact_record::{ContactRecord, DetailSlot, PatchSlot, Regio
 use contactd_proto::control::{Answer, Command, FaceName, Facets, ObjectSpec, WireRule};
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
 use contactd_proto::step::{ASK_CLEAR, ASK_DETAILS, ASK_FIRST, ASK_POLLING, NO_INDEX, STEP_REFUSED};
-use contactd_proto::{ErrorCode, Pose, PoseRecord, Rule, StepReply, StepRequest};
+use contactd_proto::{ErrorCode, MassOptions, MassProperties, Pose, PoseRecord, Rule, StepReply, StepRequest};
 use std::time::{Duration, Instant};
 
 /// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
@@ -223,6 +223,21 @@ impl<T: Transport> Session<T> {
         }
     }
 
+    /// Volume, centre of mass and inertia of a model, in the model's own frame and unit, density 1, each with a proven
+    /// bound of its error. [`MassProperties::placed`] takes them to an object's frame, [`MassProperties::with_density`]
+    /// to a material. Closed forms answer at once; other trees may take seconds, in which other sessions go on.
+    ///
+    /// # Errors
+    /// `Refused`: unknown model (`UnknownModel`), an option out of its range (`BadNumber`), a model that reaches to infinity
+    /// (`Unbounded`); `ServerLost`, `Timeout`, `System`. Boxes that do not suffice are no error: the bounds tell.
+    pub fn mass_properties(&mut self, model: u32, options: &MassOptions) -> Result<MassProperties, Error> {
+        let MassOptions { tolerance, boxes } = *options;
+        match self.command(Command::MassProperties { model, tolerance, boxes })? {
+            Answer::Mass(mass) => Ok(MassProperties::from(&mass)),
+            other => Err(unexpected(&other)),
+        }
+    }
+
     /// Adds an object; returns its id.
     ///
     /// # Errors
@@ -425,7 +440,7 @@ impl<T: Transport> Session<T> {
         for command in self.journal.replay() {
             match self.transport.command(command, self.command_timeout)? {
                 Answer::Refused { code, index, detail } => return Err(refused(code, index, detail)),
-                Answer::Opened { .. } | Answer::Loaded { .. } | Answer::Done => {}
+                Answer::Opened { .. } | Answer::Loaded { .. } | Answer::Done | Answer::Mass(_) => {}
             }
         }
         self.stage = Stage::Idle;

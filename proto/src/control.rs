@@ -2,7 +2,7 @@
 //!
 //! Both sides bound what they decode by [`DECODE_LIMIT`], so a forged length cannot make them allocate.
 
-use crate::{Detect, ErrorCode, InitialOverlap, Motion, Pose, Report, Rule, Track};
+use crate::{Detect, ErrorCode, InitialOverlap, MassProperties, Motion, Pose, Report, Rule, Track};
 use bincode::{Decode, Encode, config};
 use glam::{DQuat, DVec3};
 use iceoryx2::prelude::ZeroCopySend;
@@ -164,6 +164,34 @@ impl WireTrack {
     }
 }
 
+/// Mass properties in bytes, of density 1.
+#[derive(Clone, Copy, Debug, PartialEq, Encode, Decode)]
+pub struct WireMass {
+    volume: [f64; 2],
+    center: [[f64; 3]; 2],
+    inertia: [[f64; 6]; 2],
+    boxes: u64,
+}
+
+impl From<&MassProperties> for WireMass {
+    fn from(m: &MassProperties) -> Self {
+        Self {
+            volume: [m.volume, m.volume_error],
+            center: [m.center.to_array(), m.center_error.to_array()],
+            inertia: [m.inertia, m.inertia_error],
+            boxes: m.boxes,
+        }
+    }
+}
+
+impl From<&WireMass> for MassProperties {
+    fn from(m: &WireMass) -> Self {
+        let [center, center_error] = m.center.map(DVec3::from_array);
+        let ([volume, volume_error], [inertia, inertia_error]) = (m.volume, m.inertia);
+        Self { volume, volume_error, center, center_error, density: 1.0, inertia, inertia_error, boxes: m.boxes }
+    }
+}
+
 /// What a client asks of the server beside steps.
 #[derive(Clone, Debug, PartialEq, Encode, Decode)]
 pub enum Command {
@@ -197,6 +225,15 @@ pub enum Command {
     SetResolution(Option<f64>),
     /// Puts objects on the tracks they had (replay).
     Restore(Vec<WireTrack>),
+    /// Computes a model's mass properties; other sessions' steps go on meanwhile.
+    MassProperties {
+        /// The model's id.
+        model: u32,
+        /// As in [`MassOptions`](crate::MassOptions).
+        tolerance: f64,
+        /// As in [`MassOptions`](crate::MassOptions).
+        boxes: u64,
+    },
 }
 
 /// A face of a model, as the client may name it.
@@ -242,6 +279,8 @@ pub enum Answer {
         /// What exactly was wrong, when there is more to say than the code's sentence.
         detail: String,
     },
+    /// A model's mass properties.
+    Mass(WireMass),
 }
 
 /// A command with its session (0 for `Open`).

@@ -54,6 +54,7 @@ codes! {
     23 BadRule "the rule is not valid",
     24 BadCommand "the command cannot be decoded",
     25 BadNumber "an option of the request is out of its range",
+    26 Unbounded "the model reaches to infinity",
 }
 
 impl ErrorCode {

@@ -10,6 +10,7 @@
 pub mod contact_record;
 pub mod control;
 pub mod error;
+pub mod mass;
 pub mod motion;
 pub mod names;
 pub mod pose;
@@ -21,6 +22,7 @@ pub mod track;
 
 pub use contact_record::{ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 pub use error::ErrorCode;
+pub use mass::{MassOptions, MassProperties};
 pub use motion::Motion;
 pub use pose::Pose;
 pub use pose_record::PoseRecord;

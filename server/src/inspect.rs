@@ -1,16 +1,23 @@
-//! What was imported and how, as text: kinds, bounds, notes, tree.
+//! What was imported and how, as text: kinds, bounds, mass, notes, tree.
 
+use crate::eco::Model;
+use crate::eco::mass::mass_properties;
 use crate::import::{Note, Scene};
 use crate::math::Aabb;
 use crate::solid::{Node, NodeId, Op, Sense, Shape, Solid};
+use contactd_proto::MassOptions;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// The tree is cut off after this many lines; the counts above it are complete.
 const TREE_LINES: usize = 400;
 
+/// What a look at a model spends on its mass properties: a tenth of a second or so.
+const MASS: MassOptions = MassOptions { tolerance: 1e-4, boxes: 100_000 };
+
 /// All about one model and what its import had to say; `file` is its heading.
-pub fn model(file: &str, solid: &Solid, notes: &[Note]) -> String {
+pub fn model(file: &str, model: &Model, notes: &[Note]) -> String {
+    let solid = &model.solid;
     let mut out = String::new();
     let mut kinds: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for (p, sense) in solid.primitives.iter().zip(&solid.senses) {
@@ -33,6 +40,7 @@ pub fn model(file: &str, solid: &Solid, notes: &[Note]) -> String {
         let _ = writeln!(out, "    {:>6} {kind} ({negative} subtracted)", positive + negative);
     }
     let _ = writeln!(out, "  bounds {}", bounds(&solid.aabb()));
+    let _ = writeln!(out, "  mass {}", mass(model));
     for line in grouped(notes) {
         let _ = writeln!(out, "  note: {line}");
     }
@@ -115,6 +123,29 @@ fn bounds(b: &Aabb) -> String {
     format!(
         "[{:.6}, {:.6}, {:.6}] to [{:.6}, {:.6}, {:.6}], size {:.6} x {:.6} x {:.6}",
         lo.x, lo.y, lo.z, hi.x, hi.y, hi.z, size.x, size.y, size.z
+    )
+}
+
+/// Volume, centre and the inertia's diagonal of density 1, each with the bound of its error.
+fn mass(model: &Model) -> String {
+    let m = match mass_properties(model, &MASS) {
+        Ok(m) => m,
+        Err(e) => return format!("none: {e}"),
+    };
+    let how = if m.boxes == 0 { "closed form".into() } else { format!("{} boxes", m.boxes) };
+    let (c, i) = (m.center, m.inertia);
+    format!(
+        "volume {:.6} ± {:.1e}, centre [{:.6}, {:.6}, {:.6}] ± {:.1e}, inertia [{:.6}, {:.6}, {:.6}] ± {:.1e} at density 1, {how}",
+        m.volume,
+        m.volume_error,
+        c.x,
+        c.y,
+        c.z,
+        m.center_error.max_element(),
+        i[0],
+        i[1],
+        i[2],
+        m.inertia_error[..3].iter().copied().fold(0.0, f64::max)
     )
 }
 

@@ -248,7 +248,7 @@ fn inspect_file(
         let models = prepare_scene(&scene, facets, cache)?;
         let mut text = inspect::scene(&scene);
         for (source, p) in scene.models.iter().zip(&models) {
-            text.push_str(&inspect::model(&source.path.display().to_string(), &p.model.solid, &p.notes));
+            text.push_str(&inspect::model(&source.path.display().to_string(), &p.model, &p.notes));
         }
         if let Some(to) = picture {
             write_picture(to, &scene_picture(&scene, &models_of(&models))?)?;
@@ -259,7 +259,7 @@ fn inspect_file(
         let text = import::read_text(file, &limits)?;
         let prepared = cache::prepare(cache.open().as_ref(), &name, &text, facets, &limits)?;
         prepared.trouble.as_deref().into_iter().for_each(warn);
-        let text = inspect::model(&name, &prepared.model.solid, &prepared.notes);
+        let text = inspect::model(&name, &prepared.model, &prepared.notes);
         if let Some(to) = picture {
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
             write_picture(to, &picture::model(&name, &prepared.model))?;

@@ -7,6 +7,7 @@ pub mod judge;
 pub mod openscad;
 pub mod primitive_pairs;
 pub mod random_solids;
+pub mod rays;
 pub mod reference;
 pub mod scenes;
 pub mod verifier;

@@ -2,12 +2,13 @@
 //!
 //! M. Zeiller 1993. `tables` holds the paper's four decision tables as data, `local` classifies a voxel, `octree` builds
 //! and refines, `approach` bounds when two moving voxels can meet, `walk` finds the pairs of primitives that two moving
-//! octrees hand to stage 3, `snapshot` writes a model down and reads it back.
+//! octrees hand to stage 3, `snapshot` writes a model down and reads it back, `mass` integrates over a solid.
 //!
 //! Floor 5: imports `bound`, `motion`, `solid`, `math`.
 
 pub mod approach;
 pub mod local;
+pub mod mass;
 pub mod octree;
 pub mod snapshot;
 pub mod span;

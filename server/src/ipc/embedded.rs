@@ -58,6 +58,7 @@ impl Transport for Embedded {
             command => match self.scene.command(command) {
                 Outcome::Answered(answer) => answer,
                 Outcome::Import(import) => self.import(import),
+                Outcome::Integrate(integration) => integration.answer(),
             },
         })
     }

@@ -2,11 +2,12 @@
 
 use super::config::ServerConfig;
 use super::models::Loaded;
+use crate::eco::mass::mass_properties;
 use crate::world::{ObjectSpec, Refusal, StepOptions, World, record};
-use contactd_proto::control::{Answer, Command, Facets, ObjectSpec as WireObject};
+use contactd_proto::control::{Answer, Command, Facets, ObjectSpec as WireObject, WireMass};
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::step::{ASK_ALL, ASK_CLEAR, ASK_DETAILS, ASK_FIRST, NO_INDEX, STEP_REFUSED};
-use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
+use contactd_proto::{ContactRecord, ErrorCode, MassOptions, PoseRecord, StepReply, StepRequest};
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -29,6 +30,27 @@ pub enum Outcome {
     Answered(Answer),
     /// A model has to be imported first; `Scene::loaded` makes the answer.
     Import(Import),
+    /// A model has to be integrated over; `Integration::answer` is the answer.
+    Integrate(Integration),
+}
+
+/// A model whose mass properties are asked for.
+#[derive(Debug)]
+pub struct Integration {
+    model: Arc<Loaded>,
+    options: MassOptions,
+}
+
+impl Integration {
+    /// Computes the answer; may take seconds.
+    pub fn answer(&self) -> Answer {
+        let computed = catch_unwind(AssertUnwindSafe(|| mass_properties(&self.model.part.model, &self.options)));
+        match computed {
+            Ok(Ok(mass)) => Answer::Mass(WireMass::from(&mass)),
+            Ok(Err(e)) => refused(Refusal::new(e.code(), e.to_string())),
+            Err(_) => refused(Refusal::new(ErrorCode::Internal, "the integration failed")),
+        }
+    }
 }
 
 /// A model to be imported.
@@ -58,11 +80,7 @@ impl Scene {
 
     /// Obeys a command other than open and close.
     pub fn command(&mut self, command: Command) -> Outcome {
-        Outcome::Answered(match self.obey(command) {
-            Ok(None) => Answer::Done,
-            Ok(Some(import)) => return Outcome::Import(import),
-            Err(refusal) => refused(refusal),
-        })
+        self.obey(command).unwrap_or_else(|refusal| Outcome::Answered(refused(refusal)))
     }
 
     /// Takes an imported model.
@@ -78,7 +96,7 @@ impl Scene {
         }
     }
 
-    fn obey(&mut self, command: Command) -> Result<Option<Import>, Refusal> {
+    fn obey(&mut self, command: Command) -> Result<Outcome, Refusal> {
         match command {
             Command::Open { .. } | Command::Close => {
                 return Err(Refusal::new(ErrorCode::BadCommand, "open and close are the server's own"));
@@ -88,7 +106,7 @@ impl Scene {
                     let detail = format!("model id {model} was used before");
                     return Err(Refusal::new(ErrorCode::BadCommand, detail));
                 }
-                return Ok(Some(Import { model, name, text, facets }));
+                return Ok(Outcome::Import(Import { model, name, text, facets }));
             }
             Command::AddObject(spec) => {
                 let spec = self.object(spec)?;
@@ -107,8 +125,16 @@ impl Scene {
                     each.map(|(i, t)| Ok((t.object, t.checked().map_err(|code| Refusal::new(code, "").at(i))?)));
                 self.world.restore(&tracks.collect::<Result<Vec<_>, Refusal>>()?)?;
             }
+            Command::MassProperties { model, tolerance, boxes } => {
+                let Some(loaded) = self.models.get(&model) else {
+                    return Err(Refusal::new(ErrorCode::UnknownModel, format!("model id {model}")));
+                };
+                let options = MassOptions { tolerance, boxes }.checked();
+                let options = options.map_err(|sentence| Refusal::new(ErrorCode::BadNumber, sentence))?;
+                return Ok(Outcome::Integrate(Integration { model: loaded.clone(), options }));
+            }
         }
-        Ok(None)
+        Ok(Outcome::Answered(Answer::Done))
     }
 
     fn object(&self, spec: WireObject) -> Result<ObjectSpec, Refusal> {

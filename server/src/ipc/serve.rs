@@ -1,13 +1,13 @@
-//! The server's loop: steps first, then commands, then finished imports; spin, then block.
+//! The server's loop: steps first, then commands, then finished jobs; spin, then block.
 //!
-//! One thread answers all sessions in the order in which their requests are found. Imports run on a thread of their own,
-//! so that a large model delays only its own session. Clients that died are noticed by their pidfd and lose their
+//! One thread answers all sessions in the order in which their requests are found. Imports and mass properties are jobs for
+//! a thread of their own, so that a large model delays only its own session. Clients that died are noticed by their pidfd and lose their
 //! sessions; what they held in shared memory is freed.
 
 use super::config::ServerConfig;
 use super::models::{Loaded, Models};
 use super::root::{Root, RootError};
-use super::scene::{Import, Outcome, Scene, refusal, refused};
+use super::scene::{Import, Integration, Outcome, Scene, refusal, refused};
 use super::services::Services;
 use crate::world::Refusal;
 use contactd_client::Error;
@@ -31,8 +31,8 @@ type ControlCall = ActiveRequest<Variant, [u8], ControlHeader, [u8], ControlHead
 
 /// Time between two looks at the clients' lives, and the longest wait.
 const BEAT: Duration = Duration::from_millis(50);
-/// The longest wait while an import runs: its end wakes nobody.
-const IMPORT_BEAT: Duration = Duration::from_millis(1);
+/// The longest wait while a job runs: its end wakes nobody.
+const JOB_BEAT: Duration = Duration::from_millis(1);
 
 /// Why a server does not run.
 #[derive(Debug, thiserror::Error)]
@@ -40,7 +40,7 @@ pub enum ServeError {
     /// It has no place.
     #[error(transparent)]
     Root(#[from] RootError),
-    /// There are no threads for imports.
+    /// There are no threads for jobs.
     #[error("expected threads for imports, found {0}")]
     Threads(String),
     /// Shared memory failed.
@@ -61,7 +61,29 @@ struct Session {
     /// `None`: the client's process is not visible from here.
     life: Option<ProcessWatch>,
     last_request: Instant,
-    importing: bool,
+    /// A job of its is under way.
+    waiting: bool,
+}
+
+/// What takes too long for the loop.
+enum Job {
+    Import(Import),
+    Integrate(Integration),
+}
+
+/// What came of it.
+enum Finished {
+    Imported(u32, Result<Arc<Loaded>, Refusal>),
+    Integrated(Answer),
+}
+
+impl Job {
+    fn run(self, models: &Models) -> Finished {
+        match self {
+            Job::Import(i) => Finished::Imported(i.model, models.load(&i.name, &i.text, i.facets)),
+            Job::Integrate(integration) => Finished::Integrated(integration.answer()),
+        }
+    }
 }
 
 /// A server that holds its place and has created its services. Dropped in the order of its fields, the place last.
@@ -69,8 +91,8 @@ pub struct Server {
     pending: Vec<(u64, ControlCall)>,
     sessions: BTreeMap<u64, Session>,
     services: Services,
-    imports: Sender<(u64, Import)>,
-    imported: Receiver<(u64, u32, Result<Arc<Loaded>, Refusal>)>,
+    jobs: Sender<(u64, Job)>,
+    finished: Receiver<(u64, Finished)>,
     config: ServerConfig,
     last_session: u64,
     steps: u64,
@@ -87,8 +109,8 @@ impl Server {
     pub fn start(address: &Address, config: ServerConfig) -> Result<Self, ServeError> {
         let root = Root::take(address)?;
         let services = Services::create(address, root.epoch(), &config, status(&root, &config, 0, 0))?;
-        let (imports, work) = channel::<(u64, Import)>();
-        let (finished, imported) = channel();
+        let (jobs, work) = channel::<(u64, Job)>();
+        let (done, finished) = channel();
         let models = Models::new(&config);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         // Threads of their own: in those that steps are searched on, a step would wait for what is being built. The loop
@@ -97,9 +119,9 @@ impl Server {
         let threads = threads.map_err(|e| ServeError::Threads(e.to_string()))?;
         // Ends when the server drops its sender.
         std::thread::spawn(move || {
-            for (session, import) in work {
-                let loaded = threads.install(|| models.load(&import.name, &import.text, import.facets));
-                if finished.send((session, import.model, loaded)).is_err() {
+            for (session, job) in work {
+                let result = threads.install(|| job.run(&models));
+                if done.send((session, result)).is_err() {
                     break;
                 }
             }
@@ -109,8 +131,8 @@ impl Server {
             pending: Vec::new(),
             sessions: BTreeMap::new(),
             services,
-            imports,
-            imported,
+            jobs,
+            finished,
             config,
             last_session: 0,
             steps: 0,
@@ -135,8 +157,8 @@ impl Server {
                 self.command(call);
                 worked = true;
             }
-            while let Ok((session, model, loaded)) = self.imported.try_recv() {
-                self.imported(session, model, loaded);
+            while let Ok((session, result)) = self.finished.try_recv() {
+                self.finished(session, result);
                 worked = true;
             }
             if last_beat.elapsed() >= BEAT {
@@ -148,10 +170,10 @@ impl Server {
             } else if last_work.elapsed() < self.spin() {
                 std::hint::spin_loop();
             } else {
-                let wait = if self.pending.is_empty() { BEAT } else { IMPORT_BEAT };
+                let wait = if self.pending.is_empty() { BEAT } else { JOB_BEAT };
                 // An interrupted wait ends early, a failing one must not become a busy loop.
                 if self.services.wake.timed_wait(|_| {}, wait).is_err() {
-                    std::thread::sleep(IMPORT_BEAT);
+                    std::thread::sleep(JOB_BEAT);
                 }
             }
         }
@@ -174,7 +196,7 @@ impl Server {
         };
         session.last_request = Instant::now();
         self.steps += 1;
-        if session.importing {
+        if session.waiting {
             send_step(&call, 0, refusal(&request, ErrorCode::Busy, None), &|_| ContactRecord::default());
         } else {
             session.scene.step(&request, call.payload(), |n, reply, slot| send_step(&call, n, reply, slot));
@@ -210,8 +232,11 @@ impl Server {
             return answer(&call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
         };
         session.last_request = Instant::now();
-        if session.importing {
-            return answer(&call, &refused(Refusal::new(ErrorCode::Busy, "a model is being imported")));
+        if session.waiting {
+            return answer(
+                &call,
+                &refused(Refusal::new(ErrorCode::Busy, "a model is being imported or integrated over")),
+            );
         }
         let answered = match envelope.command {
             Command::Close => {
@@ -221,21 +246,22 @@ impl Server {
             }
             command => session.scene.command(command),
         };
-        match answered {
+        let job = match answered {
             Outcome::Answered(a) => {
                 answer(&call, &a);
                 drop(call);
                 let _ = session.wake.notify();
+                return;
             }
-            Outcome::Import(import) => {
-                session.importing = true;
-                if self.imports.send((id, import)).is_ok() {
-                    self.pending.push((id, call));
-                } else {
-                    session.importing = false;
-                    answer(&call, &refused(Refusal::new(ErrorCode::Internal, "imports have stopped")));
-                }
-            }
+            Outcome::Import(import) => Job::Import(import),
+            Outcome::Integrate(integration) => Job::Integrate(integration),
+        };
+        session.waiting = true;
+        if self.jobs.send((id, job)).is_ok() {
+            self.pending.push((id, call));
+        } else {
+            session.waiting = false;
+            answer(&call, &refused(Refusal::new(ErrorCode::Internal, "imports have stopped")));
         }
     }
 
@@ -255,7 +281,7 @@ impl Server {
             wake,
             life: ProcessWatch::of(process.0, process.1),
             last_request: Instant::now(),
-            importing: false,
+            waiting: false,
         };
         self.sessions.insert(id, session);
         self.show();
@@ -264,14 +290,18 @@ impl Server {
         Ok(Answer::Opened { session: id, max_batch: self.config.batch as u32, spin_ns: spin * 1000 })
     }
 
-    /// A model has been imported, or refused.
-    fn imported(&mut self, id: u64, model: u32, loaded: Result<Arc<Loaded>, Refusal>) {
+    /// A job is done, or was refused.
+    fn finished(&mut self, id: u64, result: Finished) {
         let Some(at) = self.pending.iter().position(|(session, _)| *session == id) else { return };
         let (_, call) = self.pending.swap_remove(at);
         // A session that ended meanwhile has nobody to answer.
         let Some(session) = self.sessions.get_mut(&id) else { return };
-        session.importing = false;
-        answer(&call, &session.scene.loaded(model, loaded));
+        session.waiting = false;
+        let said = match result {
+            Finished::Imported(model, loaded) => session.scene.loaded(model, loaded),
+            Finished::Integrated(said) => said,
+        };
+        answer(&call, &said);
         drop(call);
         let _ = session.wake.notify();
     }

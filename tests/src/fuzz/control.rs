@@ -1,8 +1,10 @@
 //! The decoder of control messages: any bytes are a message that encodes to itself again, or `BadCommand`.
 
 use super::Target;
-use contactd_proto::control::{Answer, Command, Envelope, Facets, ObjectSpec, WireRule, WireTrack, decode, encode};
-use contactd_proto::{ErrorCode, Motion, Pose, Rule, Track};
+use contactd_proto::control::{
+    Answer, Command, Envelope, Facets, ObjectSpec, WireMass, WireRule, WireTrack, decode, encode,
+};
+use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, Pose, Rule, Track};
 use glam::DVec3;
 
 pub(super) const TARGET: Target =
@@ -34,10 +36,12 @@ fn seeds() -> Vec<Vec<u8>> {
         Command::SetRules(vec![WireRule::from(&rule)]),
         Command::SetResolution(Some(1e-9)),
         Command::Restore(vec![WireTrack::of(7, &track), WireTrack::of(8, &track)]),
+        Command::MassProperties { model: 1, tolerance: 1e-6, boxes: 1_000_000 },
     ];
     let envelope = |command| encode(&Envelope { epoch: 9, session: 3, command });
     let refused = Answer::Refused { code: 3, index: u32::MAX, detail: "why".into() };
-    let answers = [Answer::Done, refused, Answer::Loaded { faces: vec![], warnings: vec!["snapped".into()] }];
+    let loaded = Answer::Loaded { faces: vec![], warnings: vec!["snapped".into()] };
+    let answers = [Answer::Done, refused, loaded, Answer::Mass(WireMass::from(&MassProperties::NOTHING))];
     let answers = answers.iter().map(encode);
     commands.into_iter().map(envelope).chain(answers).map(|bytes| bytes.expect("a small message")).collect()
 }
@@ -100,6 +104,13 @@ fn taken(command: Command) -> Result<String, String> {
         Command::LoadModel { facets, .. } => format!("load {facets:?}"),
         Command::RemoveObject(_) => "remove".into(),
         Command::SetResolution(r) => format!("resolution {:?}", r.map(|r| r.is_finite())),
+        Command::MassProperties { tolerance, boxes, .. } => {
+            let checked = MassOptions { tolerance, boxes }.checked();
+            if checked.as_ref().is_ok_and(|o| !(o.tolerance > 0.0 && o.tolerance < 1.0 && o.boxes > 0)) {
+                return Err(format!("taken for options: {tolerance}, {boxes}"));
+            }
+            format!("mass {}", checked.is_ok())
+        }
     })
 }
 

@@ -1,0 +1,265 @@
+//! Mass properties: volume, centre of mass and inertia of a solid, with proven bounds of their errors.
+//!
+//! Primitives, and trees of such that keep clear of each other, have closed forms (`closed`). Anything else is halved
+//! into boxes, the one with the largest error first. A box that the solid fills or avoids is exact; so is one in which
+//! nothing but planes is left, corners and edges included; in the others every curved face lies between two parallel planes
+//! (`slab`), and the solid between two polyhedral bodies (`voxel`), which are integrated exactly (`cell`). A box is halved
+//! across the direction along which its faces curve most: along a drill's axis nothing has to be halved at all.
+//!
+//! The distance of the planes is of the second order in the size of a box. So with N boxes the error falls as 1/N where
+//! surfaces are curved in two directions, as 1/N² where they are developable.
+//!
+//! *The bounds.* Let c be the centre of mass that is answered, e_b the bound of box b's volume, x_b its centre, h_b its half
+//! extents. Then
+//! - volume: δV = Σ e_b;
+//! - ∫ (x − c)ᵢ: Σ e_b (|x_b − c|ᵢ + h_bᵢ), hence the centre by that over V − δV, and never off by more than the solid's box;
+//! - ∫ (x − c)ᵢ(x − c)ⱼ: Σ e_b (|x_b − c|ᵢ + h_bᵢ)(|x_b − c|ⱼ + h_bⱼ), and for the true centre, δ away from c, another
+//!   (V + δV) δᵢ δⱼ.
+//!
+//! Rounding is part of e_b (`voxel`, `closed`); sums are compensated, what they lose is below the last digit of the bounds,
+//! which are rounded up. Places of boxes are right to a few ε of the largest coordinate.
+//!
+//! The order of the boxes, hence every bit of the answer, depends on nothing but solid and options: boxes are halved in
+//! batches, a batch shared between threads.
+
+mod cell;
+mod closed;
+mod moments;
+mod slab;
+mod voxel;
+
+use super::Model;
+use crate::math::Aabb;
+use contactd_proto::{ErrorCode, MassOptions, MassProperties};
+use glam::DVec3;
+use moments::{MomentSums, Moments, PAIRS, Sum};
+use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use voxel::{Evaluator, Voxel};
+
+/// Boxes of a batch at most …
+const BATCH: usize = 256;
+/// … and their errors, as a fraction of the largest: a batch stays close to the order by error.
+const ALIKE: f64 = 0.5;
+
+/// Relative rounding of a box' place and of what is integrated about it, against the largest coordinate.
+const PLACE_ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// Bounds are sums of products of positive numbers; rounded up by this they are bounds still.
+const UPWARD: f64 = 1.0 + 1e-12;
+
+/// Why there are no mass properties.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MassError {
+    /// The solid has no end.
+    #[error("expected a solid of finite size, found one that reaches to infinity")]
+    Unbounded,
+    /// An option out of its range.
+    #[error("{0}")]
+    Options(String),
+}
+
+impl MassError {
+    /// Its code on the wire.
+    pub fn code(&self) -> ErrorCode {
+        match self {
+            MassError::Unbounded => ErrorCode::Unbounded,
+            MassError::Options(_) => ErrorCode::BadNumber,
+        }
+    }
+}
+
+/// Mass properties of a model in its own frame, density 1.
+///
+/// # Errors
+/// An unbounded solid; options out of their range.
+pub fn mass_properties(model: &Model, options: &MassOptions) -> Result<MassProperties, MassError> {
+    let options = options.checked().map_err(MassError::Options)?;
+    let solid = &model.solid;
+    let around = model.bounds.root().aabb;
+    if around.is_empty() {
+        return Ok(MassProperties::NOTHING);
+    }
+    if !around.is_finite() {
+        return Err(MassError::Unbounded);
+    }
+    let mut found = Found::new(around);
+    match closed::moments(solid, solid.root, around.center()) {
+        Some((moments, error)) => found.settle(&moments, error),
+        None => found.subdivide(model, &options),
+    }
+    Ok(found.answer())
+}
+
+/// A box by its error; equal ones by age.
+#[derive(PartialEq)]
+struct Rank {
+    error: f64,
+    at: usize,
+}
+
+impl Eq for Rank {}
+
+impl Ord for Rank {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.error.total_cmp(&other.error).then(other.at.cmp(&self.at))
+    }
+}
+
+impl PartialOrd for Rank {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// What has been integrated so far, about the centre of the solid's box.
+struct Found {
+    around: Aabb,
+    origin: DVec3,
+    settled: MomentSums,
+    settled_error: Sum,
+    /// Boxes that could be halved further; nothing in the places of those that were.
+    open: Vec<Option<Voxel>>,
+    boxes: u64,
+}
+
+impl Found {
+    fn new(around: Aabb) -> Self {
+        let (settled, settled_error) = Default::default();
+        Self { around, origin: around.center(), settled, settled_error, open: vec![], boxes: 0 }
+    }
+
+    fn settle(&mut self, moments: &Moments, error: f64) {
+        self.settled.add(moments);
+        self.settled_error.add(error);
+    }
+
+    /// Moments of a box about the origin.
+    fn moved(&self, voxel: &Voxel) -> Moments {
+        voxel.moments.moved(voxel.region.center() - self.origin)
+    }
+
+    fn subdivide(&mut self, model: &Model, options: &MassOptions) {
+        let faces = &model.solid.faces;
+        let mut queue = BinaryHeap::new();
+        let (mut volume, mut error) = (Sum::default(), Sum::default());
+        let mut fresh = vec![Evaluator::new(faces).voxel(self.around, &model.solid.normal_form)];
+        let mut batch: Vec<Voxel> = vec![];
+        // Places in `open` of boxes that were halved, to be used again.
+        let mut free: Vec<usize> = vec![];
+        loop {
+            self.boxes += fresh.len() as u64;
+            for voxel in fresh {
+                volume.add(voxel.moments.volume());
+                error.add(voxel.error);
+                if voxel.axis.is_none() {
+                    self.settle(&self.moved(&voxel), voxel.error);
+                    continue;
+                }
+                let at = free.pop().unwrap_or(self.open.len());
+                queue.push(Rank { error: voxel.error, at });
+                if at == self.open.len() {
+                    self.open.push(None);
+                }
+                self.open[at] = Some(voxel);
+            }
+            if error.value() <= options.tolerance * (volume.value() - error.value()) {
+                break;
+            }
+            let left = (options.boxes.saturating_sub(self.boxes) / 2) as usize;
+            let least = queue.peek().map_or(0.0, |rank: &Rank| ALIKE * rank.error);
+            batch.clear();
+            while batch.len() < left.min(BATCH) && queue.peek().is_some_and(|rank: &Rank| rank.error >= least) {
+                let at = queue.pop().map_or(0, |rank| rank.at);
+                let Some(voxel) = self.open[at].take() else { continue };
+                volume.add(-voxel.moments.volume());
+                error.add(-voxel.error);
+                free.push(at);
+                batch.push(voxel);
+            }
+            if batch.is_empty() {
+                break;
+            }
+            fresh = batch.par_iter().map_init(|| Evaluator::new(faces), halves).flatten_iter().collect();
+        }
+    }
+
+    /// The answer of all that was integrated.
+    fn answer(self) -> MassProperties {
+        let mut sums = self.settled;
+        let mut error = self.settled_error;
+        for voxel in self.open.iter().flatten() {
+            sums.add(&self.moved(voxel));
+            error.add(voxel.error);
+        }
+        let total = sums.value();
+        let (volume, volume_error) = (total.volume().max(0.0), error.value() * UPWARD);
+        let half = self.around.half();
+        // Out of reach of all points, and coarser than their rounding.
+        let farthest = (self.around.min.abs().max(self.around.max.abs())) * PLACE_ROUNDING;
+        let least = volume - volume_error;
+        let offset = if volume > 0.0 { (total.first() / volume).clamp(-half, half) } else { DVec3::ZERO };
+        let center = self.origin + offset;
+
+        // Bounds about the centre: far from it what is uncertain counts more.
+        let (mut first, mut second) = ([Sum::default(); 3], [Sum::default(); 6]);
+        let mut count = |error: f64, reach: DVec3| {
+            (0..3).for_each(|i| first[i].add(error * reach[i]));
+            (0..6).for_each(|k| second[k].add(error * reach[PAIRS[k].0] * reach[PAIRS[k].1]));
+        };
+        for voxel in self.open.iter().flatten() {
+            count(voxel.error, (voxel.region.center() - center).abs() + voxel.region.half());
+        }
+        let reach = half + offset.abs() + farthest;
+        count(self.settled_error.value(), reach);
+        let first = DVec3::from_array(first.map(|sum| sum.value())) + farthest * volume;
+        let center_error = if least > 0.0 { first / least * UPWARD } else { DVec3::INFINITY };
+        // Both centres lie in the solid's box.
+        let center_error = center_error.min(half + offset.abs()) + farthest;
+
+        let about = total.moved(-offset);
+        let most = volume + volume_error;
+        let spread: [f64; 6] = std::array::from_fn(|k| {
+            let (i, j) = PAIRS[k];
+            let shifted = most * center_error[i] * center_error[j];
+            // Rounding of places, and of the shift to the centre.
+            let places =
+                most * (reach[i] * farthest[j] + reach[j] * farthest[i]) + shift_rounding(&total, offset, i, j);
+            (second[k].value() + shifted + places) * UPWARD
+        });
+        let s = &about.0[4..];
+        MassProperties {
+            volume,
+            volume_error,
+            center,
+            center_error,
+            density: 1.0,
+            inertia: [s[1] + s[2], s[0] + s[2], s[0] + s[1], -s[3], -s[4], -s[5]],
+            inertia_error: [
+                spread[1] + spread[2],
+                spread[0] + spread[2],
+                spread[0] + spread[1],
+                spread[3],
+                spread[4],
+                spread[5],
+            ],
+            boxes: self.boxes,
+        }
+    }
+}
+
+/// Rounding of ∫ xᵢxⱼ when it is moved by −`offset`.
+fn shift_rounding(total: &Moments, offset: DVec3, i: usize, j: usize) -> f64 {
+    let k = PAIRS.iter().position(|pair| *pair == (i, j)).unwrap_or(0);
+    PLACE_ROUNDING * (total.0[4 + k].abs() + 3.0 * total.volume().abs() * (offset[i] * offset[j]).abs())
+}
+
+/// The two halves of a box.
+fn halves(evaluator: &mut Evaluator<'_>, voxel: &Voxel) -> [Voxel; 2] {
+    let axis = voxel.axis.unwrap_or(0);
+    let (mut low, mut high) = (voxel.region, voxel.region);
+    let middle = voxel.region.center()[axis];
+    (low.max[axis], high.min[axis]) = (middle, middle);
+    [low, high].map(|region| evaluator.voxel(region, &voxel.tokens))
+}
