@@ -156,6 +156,12 @@ fn inspect_tells_what_was_imported_and_how() {
     ] {
         assert!(text(&out.stdout).lines().any(|l| l == line), "{line:?} in\n{}", text(&out.stdout));
     }
+    // 16 less a hexagonal prism of circumradius 1; planes alone, so the bound is rounding.
+    let mass = |out: &[u8]| text(out).lines().find(|l| l.starts_with("  mass ")).map(str::to_owned).unwrap_or_default();
+    let line = mass(&out.stdout);
+    assert!(line.starts_with("  mass volume 13.401924 ± ") && line.contains("centre [") && line.contains("inertia ["));
+    let ball = mass(&run(folder.path(), &["inspect", "ball.csg"]).stdout);
+    assert!(ball.ends_with("at density 1, closed form"), "{ball}");
     let exact = run(folder.path(), &["inspect", "m.csg", "--facets", "exact"]);
     assert!(text(&exact.stdout).contains("1 cylinder r 1, h 2 at 3:3"), "{}", text(&exact.stdout));
     let scene = run(folder.path(), &["inspect", "s.toml"]);

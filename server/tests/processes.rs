@@ -8,7 +8,7 @@ use contactd_client::proto::names::Address;
 use contactd_client::proto::status::StatusRecord;
 use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
 use contactd_client::proto::{ErrorCode, Pose, PoseRecord, StepRequest};
-use contactd_client::{Error, Object, Session, SharedMemory, Transport};
+use contactd_client::{Error, MassOptions, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
 use harness::scene::{Bits, bits, build, fill, set_options};
 use harness::{PATIENCE, ServerProcess, serve_command};
@@ -344,4 +344,46 @@ fn a_large_model_delays_only_the_session_that_loads_it() {
     }
     assert_eq!(loading.join().unwrap(), Ok(15_000));
     assert!(steps > 3, "only {steps} steps while a model was loaded");
+}
+
+#[test]
+fn mass_properties_are_the_embedded_bits_and_other_sessions_step_meanwhile() {
+    let mut server = ServerProcess::start("scales", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    // A ball less a bore: no closed form.
+    let text = "difference() { sphere(r = 2); cylinder(h = 9, r1 = 1, r2 = 1, center = true); }";
+    let ring = session.load_model("ring.csg", text).unwrap().id;
+    assert_eq!(own.load_model("ring.csg", text).unwrap().id, ring);
+    let options = MassOptions { tolerance: 1e-5, ..Default::default() };
+    let other = server.address.clone();
+    // Another client steps while the answer is computed, and is never told that the server is busy.
+    let (go, stop) = std::sync::mpsc::channel::<()>();
+    let stepping = std::thread::spawn(move || {
+        let mut session = Session::connect_to(other).unwrap();
+        let ids = build(&mut session, PEGS);
+        let mut steps = 0u64;
+        while stop.try_recv() == Err(std::sync::mpsc::TryRecvError::Empty) {
+            step(&mut session, &ids, steps, 3).unwrap();
+            steps += 1;
+        }
+        session.close().unwrap();
+        steps
+    });
+    let answers: Vec<_> = (0..3).map(|_| session.mass_properties(ring, &options).unwrap()).collect();
+    drop(go);
+    assert!(stepping.join().unwrap() > 0);
+    let expected = own.mass_properties(ring, &options).unwrap();
+    assert!(expected.volume_error <= 1e-5 * expected.volume && expected.boxes > 100, "{expected:?}");
+    assert!(answers.iter().all(|m| *m == expected), "{answers:?} {expected:?}");
+    for (model, options, code) in [
+        (ring + 1, options, ErrorCode::UnknownModel),
+        (ring, MassOptions { tolerance: 2.0, ..options }, ErrorCode::BadNumber),
+        (ring, MassOptions { boxes: 0, ..options }, ErrorCode::BadNumber),
+    ] {
+        assert_eq!(session.mass_properties(model, &options).unwrap_err().code(), Some(code));
+    }
+    session.close().unwrap();
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new());
 }

@@ -106,8 +106,8 @@ fn closed_forms_agree_with_boxes_under_any_pose() {
         let at = Pose::new(r.vector(3.0), r.rotation());
         let exact = mass(&tree(Op::Union, &[(shape.clone(), at)]), 1e-3);
         assert_eq!(exact.boxes, 0);
-        assert!(exact.volume_error <= 1e-12 * exact.volume, "{shape:?}: {exact:?}");
-        assert!(exact.center_error.max_element() <= 1e-12 && exact.inertia_error.iter().all(|e| *e <= 1e-10));
+        assert!(exact.volume_error <= 1e-11 * exact.volume, "{shape:?}: {exact:?}");
+        assert!(exact.center_error.max_element() <= 1e-10 && exact.inertia_error.iter().all(|e| *e <= 1e-9));
         let boxes = mass(&disguised(&shape, at), 3e-3);
         assert!(boxes.boxes > 0 && boxes.volume_error <= 3e-3 * boxes.volume);
         agree(&exact, &boxes, 0.0, &format!("{shape:?} {at:?}"));
@@ -212,17 +212,18 @@ fn bounds_are_true_for_random_trees() {
 }
 
 #[test]
-fn boxes_grow_as_a_second_order_method_needs() {
+fn boxes_grow_as_the_order_of_the_method_says() {
     let grows = |name: &str, model: &Model, most: f64| {
         let boxes: Vec<f64> = [1e-3, 1e-4, 1e-5].iter().map(|t| mass(model, *t).boxes as f64).collect();
         println!("{name}: {boxes:?} boxes for 1e-3, 1e-4, 1e-5");
-        // Per decade: 10 for the second order, 100 for the first.
+        // Per decade: 10 for the second order, 100 for the first; 10^⅔ where one face is left, of the third.
         assert!(boxes.windows(2).all(|w| w[1] < most * w[0]), "{name}: {boxes:?}");
     };
-    grows("ring", &napkin_ring().0, 12.0);
-    // Developable surfaces bend one way alone: √10 per decade.
-    grows("plate", &plate(1).0, 4.5);
-    grows("plate of ten holes", &plate(10).0, 4.5);
+    grows("ring", &napkin_ring().0, 6.0);
+    grows("rods", &steinmetz().0, 6.0);
+    // Developable surfaces bend one way alone: 10^⅓ per decade.
+    grows("plate", &plate(1).0, 3.2);
+    grows("plate of ten holes", &plate(10).0, 3.2);
 }
 
 #[test]

@@ -37,8 +37,8 @@ impl Plane {
 #[derive(Clone, Debug, Default)]
 pub struct Cell {
     edges: Vec<[DVec3; 2]>,
-    /// Where each face's edges end.
-    ends: Vec<usize>,
+    /// Where each face's edges end, and whether it is a wall.
+    ends: Vec<(usize, bool)>,
 }
 
 impl Cell {
@@ -52,7 +52,7 @@ impl Cell {
                 let [out, right, up] = [out, right, up].map(DVec3::from_array);
                 let corners = [out - right - up, out + right - up, out + right + up, out - right + up];
                 cube.edges.extend((0..4).map(|i| [corners[i], corners[(i + 1) % 4]]));
-                cube.ends.push(cube.edges.len());
+                cube.ends.push((cube.edges.len(), true));
             }
         }
         cube
@@ -71,13 +71,31 @@ impl Cell {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
     }
 
-    /// What of the polyhedron lies in a half-space, into `out`.
-    pub fn cut(&self, plane: &Plane, out: &mut Self) {
+    /// Its corners, each as often as it begins an edge.
+    pub fn corners(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.edges.iter().map(|e| e[0])
+    }
+
+    /// Σ |n·a| over the vector areas a of its walls.
+    pub fn shadow(&self, n: DVec3) -> f64 {
+        let (mut sum, mut from) = (0.0, 0);
+        for &(end, wall) in &self.ends {
+            if wall {
+                let twice: DVec3 = self.edges[from..end].iter().map(|[a, b]| a.cross(*b)).sum();
+                sum += 0.5 * n.dot(twice).abs();
+            }
+            from = end;
+        }
+        sum
+    }
+
+    /// What of the polyhedron lies in a half-space, into `out`; the new face is a wall or is not.
+    pub fn cut(&self, plane: &Plane, wall: bool, out: &mut Self) {
         out.edges.clear();
         out.ends.clear();
         let mut cap: SmallVec<[[DVec3; 2]; 12]> = SmallVec::new();
         let mut from = 0;
-        for &end in &self.ends {
+        for &(end, was_wall) in &self.ends {
             let head = out.edges.len();
             // Where the boundary leaves the half-space and where it comes back: once each, but for rounding.
             let (mut leaves, mut returns) = (SmallVec::<[DVec3; 2]>::new(), SmallVec::<[DVec3; 2]>::new());
@@ -103,13 +121,13 @@ impl Cell {
                 cap.push([back, leave]);
             }
             if out.edges.len() > head {
-                out.ends.push(out.edges.len());
+                out.ends.push((out.edges.len(), was_wall));
             }
             from = end;
         }
         if !cap.is_empty() {
             out.edges.extend(cap);
-            out.ends.push(out.edges.len());
+            out.ends.push((out.edges.len(), wall));
         }
     }
 
@@ -118,7 +136,7 @@ impl Cell {
     pub fn moments(&self) -> Moments {
         let mut sum = Moments::default();
         let mut from = 0;
-        for &end in &self.ends {
+        for &(end, _) in &self.ends {
             let p = self.edges[from][0];
             for &[a, b] in &self.edges[from..end] {
                 let volume = p.dot(a.cross(b)) / 6.0;
@@ -156,7 +174,7 @@ mod tests {
         near(&Cell::cube().moments(), &Moments::of_box(DVec3::ONE), 1e-14);
         // x + y + z <= −2 leaves the tetrahedron of side 1 at the corner (−1, −1, −1).
         let mut corner = Cell::default();
-        Cell::cube().cut(&Plane { gradient: DVec3::ONE, offset: 2.0 }, &mut corner);
+        Cell::cube().cut(&Plane { gradient: DVec3::ONE, offset: 2.0 }, true, &mut corner);
         let m = corner.moments().moved(DVec3::ONE);
         let expected = [1. / 6., 1. / 24., 1. / 24., 1. / 24., 1. / 60., 1. / 60., 1. / 60.];
         near(&m, &Moments(std::array::from_fn(|k| *expected.get(k).unwrap_or(&(1. / 120.)))), 1e-14);
@@ -178,8 +196,8 @@ mod tests {
                 let offset = [r.within(-1.0, 1.0), -gradient.dot(DVec3::ONE), 0.0][(r.within(0.0, 2.99)) as usize];
                 let plane = Plane { gradient, offset };
                 let (mut a, mut b) = (Cell::default(), Cell::default());
-                whole.cut(&plane, &mut a);
-                whole.cut(&plane.flipped(), &mut b);
+                whole.cut(&plane, true, &mut a);
+                whole.cut(&plane.flipped(), true, &mut b);
                 let mut sum = a.moments();
                 sum.add(&b.moments());
                 near(&sum, &whole.moments(), 1e-14);

@@ -1,7 +1,7 @@
 //! Moments in closed form: primitives, and trees in which primitives provably keep clear of each other.
 //!
-//! Of a primitive around the middle of its own frame, h its height, V its volume (standard tables, e.g. D. T. Greenwood,
-//! *Principles of Dynamics*, 1988, appendix A; the frustum by integrating discs of radius a + (b − a) s, 0 <= s <= 1):
+//! Of a primitive around the middle of its own frame, h its height, V its volume. All follow from discs across the axis: one
+//! of radius ρ has ∫ 1 = πρ² and ∫ x² = ∫ y² = πρ⁴/4; the frustum's have ρ = a + (b − a) s, 0 <= s <= 1.
 //!
 //! | primitive | V | ∫ x², ∫ y² | ∫ z² | ∫ z |
 //! |---|---|---|---|---|

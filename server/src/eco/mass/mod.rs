@@ -3,17 +3,18 @@
 //! Primitives, and trees of such that keep clear of each other, have closed forms (`closed`). Anything else is halved
 //! into boxes, the one with the largest error first. A box that the solid fills or avoids is exact; so is one in which
 //! nothing but planes is left, corners and edges included; in the others every curved face lies between two parallel planes
-//! (`slab`), and the solid between two polyhedral bodies (`voxel`), which are integrated exactly (`cell`). A box is halved
-//! across the direction along which its faces curve most: along a drill's axis nothing has to be halved at all.
+//! (`slab`), and the solid is told by them (`voxel`) from polyhedral cells, which are integrated exactly (`cell`). A box is
+//! halved across the direction along which its faces curve most: along a drill's axis nothing has to be halved at all.
 //!
-//! The distance of the planes is of the second order in the size of a box. So with N boxes the error falls as 1/N where
-//! surfaces are curved in two directions, as 1/N² where they are developable.
+//! The distance of the planes is of the second order in the size of a box. Where a single curved face passes, its curvature
+//! tells what of the gap between them is inside, and the error is of the third order, with N boxes N^−3/2; N⁻³ where the face
+//! is developable. Edges between curved faces are of the second, but they are few.
 //!
-//! *The bounds.* Let c be the centre of mass that is answered, e_b the bound of box b's volume, x_b its centre, h_b its half
-//! extents. Then
+//! *The bounds.* Let c be the centre of mass that is answered, x_b the centre of box b, h_b its half extents, d_b = |x_b − c|, and
+//! e_b <= s_b the bounds of its volume and of what is misplaced in it (`voxel`). Then
 //! - volume: δV = Σ e_b;
-//! - ∫ (x − c)ᵢ: Σ e_b (|x_b − c|ᵢ + h_bᵢ), hence the centre by that over V − δV, and never off by more than the solid's box;
-//! - ∫ (x − c)ᵢ(x − c)ⱼ: Σ e_b (|x_b − c|ᵢ + h_bᵢ)(|x_b − c|ⱼ + h_bⱼ), and for the true centre, δ away from c, another
+//! - ∫ (x − c)ᵢ: Σ e_b d_bᵢ + s_b h_bᵢ, hence the centre by that over V − δV, and never off by more than the solid's box;
+//! - ∫ (x − c)ᵢ(x − c)ⱼ: Σ e_b d_bᵢ d_bⱼ + s_b (d_bᵢ h_bⱼ + h_bᵢ d_bⱼ + h_bᵢ h_bⱼ), and for the true centre, δ away from c, another
 //!   (V + δV) δᵢ δⱼ.
 //!
 //! Rounding is part of e_b (`voxel`, `closed`); sums are compensated, what they lose is below the last digit of the bounds,
@@ -26,6 +27,8 @@ mod cell;
 mod closed;
 mod moments;
 mod slab;
+#[cfg(test)]
+mod tests;
 mod voxel;
 
 use super::Model;
@@ -204,15 +207,17 @@ impl Found {
 
         // Bounds about the centre: far from it what is uncertain counts more.
         let (mut first, mut second) = ([Sum::default(); 3], [Sum::default(); 6]);
-        let mut count = |error: f64, reach: DVec3| {
-            (0..3).for_each(|i| first[i].add(error * reach[i]));
-            (0..6).for_each(|k| second[k].add(error * reach[PAIRS[k].0] * reach[PAIRS[k].1]));
+        let mut count = |error: f64, spread: f64, d: DVec3, h: DVec3| {
+            (0..3).for_each(|i| first[i].add(error * d[i] + spread * h[i]));
+            for (sum, (i, j)) in second.iter_mut().zip(PAIRS) {
+                sum.add(error * d[i] * d[j] + spread * (d[i] * h[j] + h[i] * d[j] + h[i] * h[j]));
+            }
         };
         for voxel in self.open.iter().flatten() {
-            count(voxel.error, (voxel.region.center() - center).abs() + voxel.region.half());
+            count(voxel.error, voxel.spread, (voxel.region.center() - center).abs(), voxel.region.half());
         }
         let reach = half + offset.abs() + farthest;
-        count(self.settled_error.value(), reach);
+        count(self.settled_error.value(), 0.0, reach, DVec3::ZERO);
         let first = DVec3::from_array(first.map(|sum| sum.value())) + farthest * volume;
         let center_error = if least > 0.0 { first / least * UPWARD } else { DVec3::INFINITY };
         // Both centres lie in the solid's box.

@@ -30,9 +30,21 @@ impl Moments {
         DVec3::new(self.0[1], self.0[2], self.0[3])
     }
 
+    /// ∫ (a·x)² + (b·x)².
+    pub fn square_along(&self, [a, b]: &[DVec3; 2]) -> f64 {
+        let twice = |i: usize, j: usize| if i == j { 1.0 } else { 2.0 };
+        let terms = PAIRS.iter().zip(&self.0[4..]);
+        terms.map(|(&(i, j), x)| twice(i, j) * (a[i] * a[j] + b[i] * b[j]) * x).sum()
+    }
+
     /// Adds another body's.
     pub fn add(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
+    }
+
+    /// The body without another one.
+    pub fn less(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|k| self.0[k] - other.0[k]))
     }
 
     /// Both bodies' times a factor.

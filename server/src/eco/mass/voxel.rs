@@ -1,29 +1,43 @@
 //! Moments of what of a solid lies in one box, and how far they may be off.
 //!
-//! Literals that the box settles fold away. What is left is an and/or of faces, monotone in each of them: with every face
-//! replaced by the half-space that holds all of it, or by one that it holds (`slab`), the box is cut into convex cells over
-//! which the expression is constant. That gives an outer and an inner polyhedral body, S⁻ ⊂ S ⊂ S⁺, without an error of
-//! their own; the answer is the mean of both. Planar faces have S⁻ = S⁺ up to rounding, edges and corners included.
+//! Literals that the box settles fold away. What is left is an and/or of faces, monotone in each of them. The box is cut
+//! along its planes, one after the other, into convex cells in which curved faces alone are left, or none: corners and
+//! edges of planar faces cost nothing but rounding. In such a cell:
 //!
-//! With g = V⁺ − V⁻ the error of the volume is at most g/2, and that of ∫ φ at most |φ(c)| g/2 + osc φ · g/2: over S⁺ − S⁻
-//! the mean counts every point half, the truth 0 or 1.
+//! *One curved face.* It lies between two planes (`slab`); what is before both counts, and of the cell U between them the share
+//! w. On a line along the face's normal that crosses all of U, a length H, the face cuts off σ = ½ κ τ², so w = 1 − ½ κ m/H, m
+//! the mean of τ² over U, an integral of the second order that is known. Off are the lines that end in a wall of the cell,
+//! over a shadow of area A: those by H/4 at most each (s(1 − s) H with s = σ/H), and κ, known to ½ (κ⁺ − κ⁻):
+//!
+//! e = ¼ H A + ¼ (κ⁺ − κ⁻)(m |U|/H + A T²)
+//!
+//! A is the projection of the walls' parts between the planes, of first order in H; a wall along the normal casts none. So e is
+//! of one order more than that of half of U, |U|/2; the smaller of both counts.
+//!
+//! *Several.* Every face replaced by the half-space that holds all of it, or by one that it holds, gives an outer and an inner
+//! polyhedral body, S⁻ ⊂ S ⊂ S⁺. The mean of both is off by e = g/2 at most, g = V⁺ − V⁻.
+//!
+//! *Moments.* ∫ φ is off by |φ(c)| e + osc φ · s, where s bounds ∫ |1_S − w| over U: 2 w (1 − w) |U| + e, for the mean g/2.
 
-use super::cell::{Cell, Plane};
+use super::cell::Cell;
 use super::moments::Moments;
-use super::slab::Slab;
+use super::slab::{Curve, Slab};
 use crate::eco::span::face_span;
 use crate::math::Aabb;
-use crate::solid::Face;
 use crate::solid::local::{LiteralId, Token, Truth, literals, prune, truth_of};
+use crate::solid::{Face, Sense};
 use glam::DVec3;
 use smallvec::SmallVec;
 
-/// Cuts for one of a box' bodies at most. Beyond, halving the box is cheaper.
-const MOST_CUTS: usize = 24;
+/// Cuts of one box at most. Beyond, halving the box is cheaper.
+const MOST_CUTS: usize = 32;
 
 /// Rounding of the moments of a cell, as a fraction of its box' volume (times the extents, for the others): the signed
 /// tetrahedra of a few dozen triangles, each of a volume below that of the box and right to 8 ε.
 const CELL_ROUNDING: f64 = 512.0 * f64::EPSILON;
+
+/// Volume of the cube [−1, 1]³.
+const CUBE: f64 = 8.0;
 
 /// A box of the subdivision. Its corners are exact: neighbours share them.
 #[derive(Clone, Debug)]
@@ -36,14 +50,51 @@ pub struct Voxel {
     pub moments: Moments,
     /// Bound of the volume's error.
     pub error: f64,
+    /// Bound of the volume that is misplaced: times the oscillation of what is integrated.
+    pub spread: f64,
     /// Axis across which to halve it; `None` when that brings nothing.
     pub axis: Option<usize>,
+}
+
+/// What is known of a box in the coordinates of the cube.
+#[derive(Default)]
+struct Part {
+    moments: Moments,
+    error: f64,
+    spread: f64,
+    /// The largest error of a cell, and the axis that would make it smaller.
+    worst: Option<(f64, usize)>,
+}
+
+impl Part {
+    fn add(&mut self, moments: &Moments, error: f64, spread: f64, axis: usize) {
+        self.moments.add(moments);
+        self.error += error;
+        self.spread += spread;
+        if self.worst.is_none_or(|(largest, _)| error > largest) {
+            self.worst = Some((error, axis));
+        }
+    }
+}
+
+/// What is measured of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Body {
+    /// The solid, as well as may be.
+    Solid,
+    /// A polyhedral body that holds it, or one that it holds; no planes are left.
+    Outer,
+    Inner,
 }
 
 /// Evaluates boxes of one solid; keeps its memory.
 pub struct Evaluator<'a> {
     faces: &'a [Face],
+    /// The slabs of the box at hand by face, and those of the cell at hand.
     slabs: Vec<(u32, Slab)>,
+    closer: Vec<(u32, Slab)>,
+    half: DVec3,
+    cube: Cell,
     cells: Vec<Cell>,
     expressions: Vec<Vec<Token>>,
     cuts: usize,
@@ -53,7 +104,9 @@ pub struct Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     /// For a solid of these faces.
     pub fn new(faces: &'a [Face]) -> Self {
-        Self { faces, slabs: vec![], cells: vec![], expressions: vec![], cuts: 0, most_cuts: MOST_CUTS }
+        let (slabs, closer, cells, expressions) = Default::default();
+        let (half, cube) = (DVec3::ZERO, Cell::cube());
+        Self { faces, slabs, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS }
     }
 
     /// The same without a limit of cuts: for a solid that shall be one box.
@@ -70,10 +123,11 @@ impl<'a> Evaluator<'a> {
         let truth = prune(tokens, &mut kept, &mut |id| {
             truth_of(id.sense(), face_span(&faces[id.face() as usize], center, half), 0.0, 0.0)
         });
-        let mut voxel = Voxel { region, tokens: SmallVec::new(), moments: Moments::default(), error: 0.0, axis: None };
+        let (tokens, moments) = Default::default();
+        let mut voxel = Voxel { region, tokens, moments, error: 0.0, spread: 0.0, axis: None };
         if truth != Truth::False {
             let whole = Moments::of_box(half);
-            voxel.error = CELL_ROUNDING * whole.volume();
+            (voxel.error, voxel.spread) = (CELL_ROUNDING * whole.volume(), CELL_ROUNDING * whole.volume());
             if truth == Truth::True {
                 voxel.moments = whole;
             } else {
@@ -85,82 +139,110 @@ impl<'a> Evaluator<'a> {
     }
 
     fn cut_up(&mut self, voxel: &mut Voxel, kept: &[Token], center: DVec3, half: DVec3) {
+        let cube = std::mem::take(&mut self.cube);
+        (self.cuts, self.half) = (0, half);
         self.slabs.clear();
         for id in literals(kept) {
             if self.slabs.iter().all(|(face, _)| *face != id.face()) {
                 self.slabs.push((id.face(), Slab::new(&self.faces[id.face() as usize], center, half)));
             }
         }
-        let bodies = [true, false].map(|all| self.body(kept, all));
-        if let [Some(outer), Some(inner)] = bodies {
-            voxel.moments = outer.mean(&inner, 0.5).stretched(half);
-            let gap = (outer.volume() - inner.volume()).max(0.0);
-            voxel.error += 0.5 * gap * half.x * half.y * half.z;
-            let curved = self.slabs.iter().map(|(_, slab)| slab.bend).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
-            if self.slabs.iter().any(|(_, slab)| slab.is_rough()) {
-                voxel.axis = Some(half.max_position());
-            } else if self.slabs.iter().any(|(_, slab)| !slab.is_flat()) {
-                voxel.axis = Some(curved.max_position());
-            }
+        let mut part = Part::default();
+        let unit = half.x * half.y * half.z;
+        if self.measure(kept, &cube, Body::Solid, &mut part) {
+            // Planes are known to their rounding, a sheet of the box; and so is each of the cells.
+            let sheets: f64 = self.slabs.iter().map(|(_, slab)| slab.sheet(CUBE)).sum();
+            let rounding = sheets + CUBE * CELL_ROUNDING * self.cuts as f64;
+            voxel.moments = part.moments.stretched(half);
+            voxel.error += (part.error + rounding) * unit;
+            voxel.spread += (part.spread + rounding) * unit;
+            voxel.axis = part.worst.map(|(_, axis)| axis);
         } else {
             // Too many faces for this box: half of it, give or take a half.
             let all = Moments::of_box(half);
             voxel.moments = all.mean(&Moments::default(), 0.5);
             voxel.error += 0.5 * all.volume();
+            voxel.spread += 0.5 * all.volume();
             voxel.axis = Some(half.max_position());
         }
         // Below this the corners of its halves are rounding.
         let finest = 64.0 * f64::EPSILON * (center.abs() + half);
         voxel.axis = voxel.axis.filter(|k| half[*k] > finest[*k]);
         voxel.tokens = kept.into();
+        self.cube = cube;
     }
 
-    /// Moments of the outer (`all`) or the inner body in the coordinates of the cube; `None` when that takes too many cuts.
-    fn body(&mut self, tokens: &[Token], all: bool) -> Option<Moments> {
-        self.cuts = 0;
-        let mut sum = Moments::default();
-        self.measure(tokens, &Cell::cube(), all, &mut sum).then_some(sum)
+    fn slab(&self, id: LiteralId, body: Body) -> &Slab {
+        let slabs = if body == Body::Solid { &self.slabs } else { &self.closer };
+        let found = slabs.iter().find(|(face, _)| *face == id.face());
+        &found.expect("every literal of the box has its slab").1
     }
 
-    fn plane(&self, id: LiteralId, all: bool) -> Option<Plane> {
-        let (_, slab) = self.slabs.iter().find(|(face, _)| *face == id.face()).expect("every literal has its slab");
-        slab.plane(id.sense(), all)
+    /// What a literal is over a cell of the body.
+    fn truth(&self, id: LiteralId, cell: &Cell, body: Body) -> Truth {
+        let slab = self.slab(id, body);
+        let holds = |all: bool| slab.plane(id.sense(), all).map(|plane| cell.range(&plane));
+        let (most, least) = match body {
+            Body::Solid if slab.is_flat() => {
+                let range = cell.range(&slab.middle(id.sense()));
+                (Some(range), Some(range))
+            }
+            Body::Solid => (holds(true), holds(false)),
+            Body::Outer | Body::Inner => {
+                let all = body == Body::Outer;
+                match holds(all) {
+                    None if all => return Truth::True,
+                    None => return Truth::False,
+                    both => (both, both),
+                }
+            }
+        };
+        match (most, least) {
+            (_, Some((_, hi))) if hi <= 0.0 => Truth::True,
+            (Some((lo, _)), _) if lo >= 0.0 => Truth::False,
+            _ => Truth::Open,
+        }
     }
 
-    /// Adds the moments of what of the cell the expression holds. False when that takes too many cuts.
-    fn measure(&mut self, tokens: &[Token], cell: &Cell, all: bool, sum: &mut Moments) -> bool {
+    /// Adds what the expression holds of a cell. False when that takes too many cuts.
+    fn measure(&mut self, tokens: &[Token], cell: &Cell, body: Body, part: &mut Part) -> bool {
         let mut kept = self.expressions.pop().unwrap_or_default();
         kept.clear();
-        let truth = prune(tokens, &mut kept, &mut |id| match self.plane(id, all) {
-            None if all => Truth::True,
-            None => Truth::False,
-            Some(plane) => match cell.range(&plane) {
-                (_, hi) if hi <= 0.0 => Truth::True,
-                (lo, _) if lo >= 0.0 => Truth::False,
-                _ => Truth::Open,
-            },
-        });
+        let truth = prune(tokens, &mut kept, &mut |id| self.truth(id, cell, body));
         let done = match truth {
             Truth::False => true,
             Truth::True => {
-                sum.add(&cell.moments());
+                part.moments.add(&cell.moments());
                 true
             }
-            Truth::Open => self.split(&kept, cell, all, sum),
+            Truth::Open => {
+                let along = literals(&kept).find(|id| body != Body::Solid || self.slab(*id, body).is_flat());
+                match along {
+                    Some(id) => self.split(&kept, id, cell, body, part),
+                    None => self.curved(&kept, cell, part),
+                }
+            }
         };
         self.expressions.push(kept);
         done
     }
 
     /// The same for an expression whose literals all pass through the cell: cut by one of them, each side by itself.
-    fn split(&mut self, tokens: &[Token], cell: &Cell, all: bool, sum: &mut Moments) -> bool {
-        let Some(chosen) = literals(tokens).next() else { return true };
-        let Some(plane) = self.plane(chosen, all) else { return true };
-        let (mut rest, mut part) = (self.expressions.pop().unwrap_or_default(), self.cells.pop().unwrap_or_default());
+    fn split(&mut self, tokens: &[Token], along: LiteralId, cell: &Cell, body: Body, part: &mut Part) -> bool {
+        let slab = self.slab(along, body);
+        let plane = match body {
+            Body::Solid => slab.middle(along.sense()),
+            _ => match slab.plane(along.sense(), body == Body::Outer) {
+                Some(plane) => plane,
+                // Settled before.
+                None => return true,
+            },
+        };
+        let (mut rest, mut piece) = (self.expressions.pop().unwrap_or_default(), self.cells.pop().unwrap_or_default());
         let mut done = true;
         for (side, plane) in [(Truth::True, plane), (Truth::False, plane.flipped())] {
             rest.clear();
-            let truth = prune(tokens, &mut rest, &mut |id| if id == chosen { side } else { Truth::Open });
+            let truth = prune(tokens, &mut rest, &mut |id| if id == along { side } else { Truth::Open });
             if truth == Truth::False {
                 continue;
             }
@@ -169,18 +251,93 @@ impl<'a> Evaluator<'a> {
             if !done {
                 break;
             }
-            cell.cut(&plane, &mut part);
-            if part.is_empty() {
+            cell.cut(&plane, true, &mut piece);
+            if piece.is_empty() {
                 continue;
             }
             if truth == Truth::True {
-                sum.add(&part.moments());
+                part.moments.add(&piece.moments());
             } else {
-                done = self.measure(&rest, &part, all, sum);
+                done = self.measure(&rest, &piece, body, part);
             }
         }
         self.expressions.push(rest);
-        self.cells.push(part);
+        self.cells.push(piece);
         done
+    }
+
+    /// The same for an expression of curved faces alone.
+    fn curved(&mut self, tokens: &[Token], cell: &Cell, part: &mut Part) -> bool {
+        self.closer.clear();
+        for id in literals(tokens) {
+            if self.closer.iter().all(|(face, _)| *face != id.face()) {
+                let slab = *self.slab(id, Body::Solid);
+                let slab = self.tightened(slab, cell);
+                self.closer.push((id.face(), slab));
+            }
+        }
+        if let [_] = tokens
+            && let Some(id) = literals(tokens).next()
+            && let slab = *self.slab(id, Body::Inner)
+            && let Some(curve) = slab.curve
+        {
+            self.single(id, &slab, curve, cell, part);
+            return true;
+        }
+        let (mut outer, mut inner) = (Part::default(), Part::default());
+        if !self.measure(tokens, cell, Body::Outer, &mut outer) || !self.measure(tokens, cell, Body::Inner, &mut inner)
+        {
+            return false;
+        }
+        let error = 0.5 * (outer.moments.volume() - inner.moments.volume()).max(0.0);
+        let rough = self.closer.iter().any(|(_, slab)| slab.curve.is_none());
+        let bend = self.closer.iter().map(|(_, slab)| slab.bend()).fold(DVec3::ZERO, DVec3::max);
+        let axis = if rough { self.half.max_position() } else { bend.max_position() };
+        part.add(&outer.moments.mean(&inner.moments, 0.5), error, error, axis);
+        true
+    }
+
+    /// The slab with its planes moved closer, by what of the cell lies between them.
+    fn tightened(&mut self, slab: Slab, cell: &Cell) -> Slab {
+        if slab.curve.is_none() {
+            return slab;
+        }
+        let [mut outer, mut between] = [(); 2].map(|()| self.cells.pop().unwrap_or_default());
+        slab.between(cell, &mut outer, &mut between);
+        let closer = if between.is_empty() { slab } else { slab.tightened(&between) };
+        self.cells.extend([outer, between]);
+        closer
+    }
+
+    /// The same for one face of known curvature.
+    fn single(&mut self, id: LiteralId, slab: &Slab, curve: Curve, cell: &Cell, part: &mut Part) {
+        let [mut outer, mut between, mut inner] = [(); 3].map(|()| self.cells.pop().unwrap_or_default());
+        slab.between(cell, &mut outer, &mut between);
+        slab.inside(&outer, &mut inner);
+        let (core, gap, shadow) = (inner.moments(), between.moments(), between.shadow(slab.toward(self.half)));
+        self.cells.extend([outer, between, inner]);
+
+        let ([low, high], t) = (curve.range, curve.reach);
+        let thick = slab.bulge().unwrap_or(0.0) + 2.0 * slab.pad;
+        let volume = gap.volume().max(0.0);
+        let mean = if volume > 0.0 { (gap.square_along(&slab.tangents) / volume).clamp(0.0, t * t) } else { 0.0 };
+        let ends = 0.25 * thick * shadow;
+        let bending = 0.25 * (high - low) * (mean * volume / thick + shadow * t * t);
+        // The face itself is known to a pad, the mean to the rounding of a cell.
+        let rounding = 2.0 * slab.pad * (volume / thick + shadow) + CUBE * CELL_ROUNDING;
+        let (mut share, mut error) =
+            ((1.0 - (0.25 * (low + high) * mean + slab.pad) / thick).clamp(0.0, 1.0), ends + bending + rounding);
+        let mut spread = 2.0 * share * (1.0 - share) * volume + error;
+        if error >= 0.5 * volume {
+            (share, error, spread) = (0.5, 0.5 * volume, 0.5 * volume);
+        }
+        let mut moments = core;
+        moments.add(&gap.mean(&Moments::default(), share));
+        if id.sense() == Sense::Negative {
+            // What the face leaves of the cell.
+            moments = cell.moments().less(&moments);
+        }
+        let axis = if bending > ends && slab.along != DVec3::ZERO { slab.along.abs() } else { slab.bend() };
+        part.add(&moments, error, spread, axis.max_position());
     }
 }
