@@ -9,7 +9,7 @@ use crate::row;
 use crate::table::Cell;
 use crate::workload::{Case, Class, Truth};
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact, rounding,
+    Asked, Body, DEFAULT_CELL_LIMIT, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact, rounding,
 };
 use contactd::motion::{Placed, Relative};
 use contactd_tests::reference::{self, Effort, Moving, Verdict};
@@ -66,7 +66,7 @@ pub fn ask(case: &Case, setting: &Setting, scratch: &mut Scratch) -> Outcome {
         resolution: setting.resolution * case.size(),
         cell_limit: setting.limit,
         ideas: setting.ideas,
-        penetration: false,
+        asked: Asked::CONTACT,
     };
     earliest_contact(&query, scratch)
 }

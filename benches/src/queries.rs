@@ -1,7 +1,7 @@
 //! The engine's side of a race: models built beforehand, one scratch for all queries.
 
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Ideas, Outcome, PairQuery, Scratch, default_resolution, earliest_contact,
+    Asked, Body, DEFAULT_CELL_LIMIT, Ideas, Outcome, PairQuery, Scratch, default_resolution, earliest_contact,
 };
 use contactd::eco::Model;
 use contactd::motion::Placed;
@@ -21,7 +21,7 @@ impl<'a> Question<'a> {
             resolution: default_resolution(a, b),
             cell_limit: DEFAULT_CELL_LIMIT,
             ideas,
-            penetration: true,
+            asked: Asked::DEPTH,
         })
     }
 

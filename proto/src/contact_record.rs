@@ -35,6 +35,10 @@ pub const SENSOR: u8 = 8;
 /// `flags`: the work limit cut the search for contact regions: there may be more, and [`TOUCHING`] may be a mere caution.
 pub const REGIONS_INCOMPLETE: u8 = 16;
 
+/// `flags`: clear, but within its margin at the start or during the step; the detail slot says until when it is proven not to. With
+/// [`REGIONS_INCOMPLETE`]: it may do so.
+pub const WITHIN_MARGIN: u8 = 32;
+
 /// `valid`: time and time_lower.
 pub const VALID_TIME: u32 = 1;
 /// `valid`: point.
@@ -68,7 +72,7 @@ pub struct ContactRecord {
     pub kind: u8,
     /// Index into [`EXTENT_NAMES`].
     pub extent: u8,
-    /// [`TOUCHING`], [`NOT_CONTINUED`], [`AVERAGED_NORMAL`], [`SENSOR`], [`REGIONS_INCOMPLETE`].
+    /// [`TOUCHING`], [`NOT_CONTINUED`], [`AVERAGED_NORMAL`], [`SENSOR`], [`REGIONS_INCOMPLETE`], [`WITHIN_MARGIN`].
     pub flags: u8,
     /// A bit per field that has meaning.
     pub valid: u32,
@@ -76,11 +80,12 @@ pub struct ContactRecord {
     pub time: f64,
     /// Proven: nothing deeper than the resolution before it.
     pub time_lower: f64,
-    /// Contact point, or deepest point of an overlap.
+    /// Contact point, or a point that proves an overlap: deeper than twice the resolution in both bodies. The deepest one is
+    /// in the detail slot, where penetration is asked for.
     pub point: [f64; 3],
     /// Unit normal from a to b.
     pub normal: [f64; 3],
-    /// Positive apart, negative = penetration; length.
+    /// Positive apart, negative = penetration; length. Of an overlap what its point proves of the depth.
     pub separation: f64,
     /// Approach speed along the normal, length per step, positive = approaching.
     pub normal_speed: f64,
@@ -142,7 +147,7 @@ pub struct DetailSlot {
     pub time_upper: f64,
     /// The resolution that was used, a length.
     pub resolution: f64,
-    /// The contact point in a's object frame.
+    /// The contact point in a's object frame; of an overlap whose penetration is asked for the deepest point.
     pub point_a: [f64; 3],
     /// Lower bound of the depth at the start of an overlap; 0 otherwise.
     pub penetration: f64,
@@ -150,8 +155,11 @@ pub struct DetailSlot {
     pub direction: [f64; 3],
     /// Cells that the pair's search refined.
     pub cells: u64,
+    /// Of a pair with a margin: proven farther apart than that until then, if it is clear; 1: for the whole step. 0 without a
+    /// margin.
+    pub margin_time: f64,
     /// Zero.
-    pub spare: [u64; 5],
+    pub spare: [u64; 4],
 }
 
 /// A further slot: up to four points of a contact region.

@@ -9,6 +9,7 @@
 
 pub mod contact_record;
 pub mod control;
+pub mod effects;
 pub mod error;
 pub mod mass;
 pub mod motion;
@@ -21,6 +22,7 @@ pub mod step;
 pub mod track;
 
 pub use contact_record::{ContactRecord, DetailSlot, PatchSlot, RegionSlot};
+pub use effects::EffectCounters;
 pub use error::ErrorCode;
 pub use mass::{MassOptions, MassProperties};
 pub use motion::Motion;

@@ -1,5 +1,6 @@
 //! The one record whose layout never changes: it tells a client of any version whom it talks to.
 
+use crate::EffectCounters;
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What `contactd/status` shows. Fields may be appended in `spare`, never moved.
@@ -28,8 +29,10 @@ pub struct StatusRecord {
     pub limit_objects: u64,
     /// Most sessions.
     pub limit_sessions: u64,
+    /// How often each effect was worked out since the start, over all sessions.
+    pub effects: EffectCounters,
     /// Zero.
-    pub spare: [u64; 22],
+    pub spare: [u64; 12],
 }
 
 const _: () = assert!(size_of::<StatusRecord>() == 256);

@@ -1,5 +1,6 @@
 //! Headers of the step service: what a client asks of a step, and what the server says of it beside the records.
 
+use crate::EffectCounters;
 use iceoryx2::prelude::ZeroCopySend;
 
 /// `asked`: only the pairs whose bracket meets the scene's earliest contact.
@@ -51,19 +52,6 @@ pub const STEP_UNDECIDED: u32 = 3;
 /// The batch was refused and changed nothing; see `error` and `index`.
 pub const STEP_REFUSED: u32 = 4;
 
-/// `effects`: continuous detection ran on some pair.
-pub const EFFECT_CONTINUOUS: u32 = 1;
-/// `effects`: discrete detection ran on some pair.
-pub const EFFECT_DISCRETE: u32 = 2;
-/// `effects`: contact points and normals were reported.
-pub const EFFECT_CONTACT: u32 = 4;
-/// `effects`: contact regions were reported.
-pub const EFFECT_PATCH: u32 = 8;
-/// `effects`: penetration was measured.
-pub const EFFECT_PENETRATION: u32 = 16;
-/// `effects`: a margin was in force.
-pub const EFFECT_MARGIN: u32 = 32;
-
 /// "No record in particular" in `index`.
 pub const NO_INDEX: u32 = u32::MAX;
 
@@ -87,7 +75,7 @@ pub struct StepReply {
     pub slots: u32,
     /// 1 when `max_records` left records out.
     pub truncated: u32,
-    /// `EFFECT_…` bits of what ran.
+    /// Bits of the effects that ran (`effects::EFFECT_…`).
     pub effects: u32,
     /// Pairs whose plan was continuous or discrete and which the broad phase let through.
     pub pairs: u32,
@@ -95,6 +83,8 @@ pub struct StepReply {
     pub safe_time: f64,
     /// Work: what was done, never part of the answer's bits.
     pub counters: WorkCounters,
+    /// How often each effect was worked out; no part of the answer's bits either.
+    pub effect_counters: EffectCounters,
 }
 
 /// Counted work of a step. Never part of the bits that must agree between two ways to the same answer.
@@ -127,7 +117,8 @@ pub struct WorkCounters {
 
 const _: () = {
     assert!(size_of::<StepRequest>() == 64);
-    assert!(size_of::<StepReply>() == 144 && size_of::<WorkCounters>() == 88);
+    assert!(size_of::<StepReply>() == 224 && size_of::<WorkCounters>() == 88);
     assert!(std::mem::offset_of!(StepReply, status) == 16);
     assert!(std::mem::offset_of!(StepReply, safe_time) == 48);
+    assert!(std::mem::offset_of!(StepReply, effect_counters) == 144);
 };

@@ -8,7 +8,7 @@ use crate::eco::Model;
 use crate::import::Scene;
 use crate::motion::Placed;
 use crate::world::{ObjectSpec, PairOutcome, Part, Refusal, StepError, StepOptions, StepOutcome, World};
-use contactd_proto::{Detect, Motion, PoseRecord};
+use contactd_proto::{Detect, InitialOverlap, Motion, PoseRecord, Report};
 use std::sync::Arc;
 
 /// Why a scene that was read cannot be stepped.
@@ -43,6 +43,8 @@ pub struct Check {
     pub records: Vec<PoseRecord>,
     /// Names of the objects that the records move.
     moving: Vec<String>,
+    /// Duration of the step in seconds; 0: unknown.
+    dt: f64,
     file: String,
 }
 
@@ -72,8 +74,7 @@ impl Check {
                 part: parts[o.model].clone(),
                 is_static: o.is_static,
                 rotates: o.rotates,
-                // A speed per second needs the step's duration, which a scene file does not have.
-                max_speed: f64::INFINITY,
+                max_speed: o.max_speed.unwrap_or(f64::INFINITY),
                 place: o.place,
                 pose: o.motion.start,
             };
@@ -84,7 +85,7 @@ impl Check {
             }
         }
         world.set_rules(scene.rules.clone()).map_err(refused)?;
-        Ok(Self { world, records, moving, file })
+        Ok(Self { world, records, moving, dt: scene.dt.unwrap_or(0.0), file })
     }
 
     /// Takes the step.
@@ -92,8 +93,8 @@ impl Check {
     /// # Errors
     /// What the world refuses of a record.
     pub fn step(&mut self, first: bool) -> Result<&StepOutcome, CheckError> {
-        let Self { world, records, moving, file } = self;
-        let options = StepOptions { first, clear: true, ..StepOptions::default() };
+        let Self { world, records, moving, dt, file } = self;
+        let options = StepOptions { first, clear: true, dt: *dt, ..StepOptions::default() };
         world.step(records, &options).map_err(|error| {
             let object = error.index.and_then(|i| moving.get(i as usize)).cloned().unwrap_or_default();
             CheckError::Step { file: file.clone(), object, error }
@@ -104,10 +105,11 @@ impl Check {
     pub fn certificates(&self, outcome: &StepOutcome) -> (String, usize) {
         let (mut text, mut without) = (format!("{}\n", certificate::HEADER), 0);
         for p in &outcome.pairs {
-            let continuous = p.plan.detect != Detect::Discrete;
-            let query = self.query(p, CERTIFICATE_CELLS).filter(|_| continuous);
-            let made =
-                query.and_then(|query| certificate::certify(&PairQuery { penetration: true, ..query }, &p.outcome));
+            // One proves where the first contact of the whole step is, or that there is none.
+            let whole = p.plan.detect != Detect::Discrete && p.plan.report >= Report::Contact;
+            let past = p.outcome.touching && p.plan.initial_overlap != InitialOverlap::Report;
+            let query = self.query(p, CERTIFICATE_CELLS).filter(|_| whole && !past);
+            let made = query.and_then(|query| certificate::certify(&query, &p.outcome));
             match made {
                 Some(made) => made.write((p.a as usize, p.b as usize), &mut text),
                 None => without += 1,
@@ -143,8 +145,14 @@ impl Check {
             Some(Body { model: &body.part.model, placed: Placed { place: body.place, motion } })
         };
         let (a, b) = (side(p.a)?, side(p.b)?);
-        let (resolution, penetration) = (p.outcome.resolution, p.plan.penetration);
-        Some(PairQuery { a, b, resolution, cell_limit, ideas: Ideas::default(), penetration })
+        Some(PairQuery {
+            a,
+            b,
+            resolution: p.outcome.resolution,
+            cell_limit,
+            ideas: Ideas::default(),
+            asked: p.plan.asked(),
+        })
     }
 }
 

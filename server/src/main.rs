@@ -202,6 +202,7 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
                 names: [&a.name, &b.name],
                 solids: [&a.part.model.solid, &b.part.model.solid],
                 outcome: &p.outcome,
+                report: p.plan.report,
                 regions: outcome.regions_of(p),
                 regions_complete: p.regions_complete,
             }
@@ -211,7 +212,8 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     let answer = Answer { safe_time: outcome.safe_time, ..Answer::of_pairs(&pairs) };
     let mut text = if arguments.json { answer.json()? + "\n" } else { answer.table() };
     if arguments.explain {
-        let work = report::work_table(&pairs, &check.clocks(&outcome));
+        let work =
+            report::work_table(&pairs, &check.clocks(&outcome)) + &report::effects_line(&outcome.effect_counters);
         if arguments.json {
             eprint!("{work}");
         } else {
@@ -246,7 +248,7 @@ fn inspect_file(
     let text = if file.extension().is_some_and(|e| e == "toml") {
         let scene = import::read_scene(file)?;
         let models = prepare_scene(&scene, facets, cache)?;
-        let mut text = inspect::scene(&scene);
+        let mut text = inspect::scene(&scene) + &inspect::effects(&scene);
         for (source, p) in scene.models.iter().zip(&models) {
             text.push_str(&inspect::model(&source.path.display().to_string(), &p.model, &p.notes));
         }

@@ -6,6 +6,7 @@
 
 use crate::contact::{Clock, Counters, Outcome, Region, Stage, Status};
 use crate::solid::{Sense, Solid};
+use contactd_proto::{EffectCounters, Report};
 use glam::DVec3;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -20,6 +21,8 @@ pub struct PairReport<'a> {
     pub solids: [&'a Solid; 2],
     /// The answer.
     pub outcome: &'a Outcome,
+    /// How much of it is told.
+    pub report: Report,
     /// Its contact regions, where its rule asks for them.
     pub regions: &'a [Region],
     /// False when there may be more of them.
@@ -42,9 +45,9 @@ pub struct PairAnswer {
     pub a: String,
     pub b: String,
     pub status: &'static str,
-    pub time: f64,
-    pub time_lower: f64,
-    pub time_upper: f64,
+    pub time: Option<f64>,
+    pub time_lower: Option<f64>,
+    pub time_upper: Option<f64>,
     pub touching: bool,
     pub point: Option<[f64; 3]>,
     pub normal: Option<[f64; 3]>,
@@ -55,6 +58,12 @@ pub struct PairAnswer {
     pub resolution: f64,
     pub features: Option<Features>,
     pub cells: u64,
+    /// Told of an overlap whose rule asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub penetration: Option<Penetration>,
+    /// Told of a clear pair that comes within its margin: until when it is proven farther apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub margin_time: Option<f64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionAnswer>,
     /// Told when the work limit cut the search for regions.
@@ -65,6 +74,15 @@ pub struct PairAnswer {
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_true(b: &bool) -> bool {
     *b
+}
+
+/// How deep an overlap is: along a direction from a to b, at its deepest point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[allow(missing_docs)]
+pub struct Penetration {
+    pub depth: f64,
+    pub direction: [f64; 3],
+    pub point: [f64; 3],
 }
 
 /// A region in which a pair touches: points with the separation at each, and the faces that meet.
@@ -137,7 +155,7 @@ impl Answer {
                 p.a.clone(),
                 p.b.clone(),
                 status,
-                digits(p.time),
+                p.time.map_or_else(String::new, digits),
                 p.separation.map_or_else(String::new, digits),
                 p.normal_speed.map_or_else(String::new, digits),
                 p.kind.unwrap_or_default().into(),
@@ -148,6 +166,12 @@ impl Answer {
         }
         let mut out = aligned(&rows);
         for p in &self.pairs {
+            if let Some(x) = &p.penetration {
+                let _ = writeln!(out, "{} deep along {} at {}", digits(x.depth), vector(x.direction), vector(x.point));
+            }
+            if let Some(t) = p.margin_time {
+                let _ = writeln!(out, "{} and {} farther apart than their margin until {}", p.a, p.b, digits(t));
+            }
             if let Some(f) = &p.features {
                 let side = |f: &[Feature]| f.iter().map(Feature::to_string).collect::<Vec<_>>().join(", ");
                 let _ = writeln!(out, "{} on {}, {} on {}", side(&f.a), p.a, side(&f.b), p.b);
@@ -168,11 +192,11 @@ impl std::fmt::Display for Feature {
 impl PairAnswer {
     fn of_pair(pair: &PairReport<'_>) -> Self {
         let o = pair.outcome;
-        let meets = matches!(o.status, Status::Contact | Status::Overlap);
-        let met = o.status == Status::Contact;
+        let told = |least| pair.report >= least;
+        let meets = matches!(o.status, Status::Contact | Status::Overlap) && told(Report::Contact);
+        let met = o.status == Status::Contact && told(Report::Contact);
         // A clear pair that touches has the fields of its nearest region.
         let rests = o.status == Status::Clear && !pair.regions.is_empty();
-        let told = meets || (o.touching && o.status == Status::Clear);
         let features = |solid: &Solid, faces: &[u32; 3]| {
             faces.iter().filter_map(|f| Feature::of_face(solid, *f)).collect::<Vec<_>>()
         };
@@ -180,13 +204,13 @@ impl PairAnswer {
             a: pair.names[0].to_owned(),
             b: pair.names[1].to_owned(),
             status: o.status.name(),
-            time: o.time,
-            time_lower: o.time_lower,
-            time_upper: o.time_upper,
+            time: told(Report::Time).then_some(o.time),
+            time_lower: told(Report::Time).then_some(o.time_lower),
+            time_upper: told(Report::Time).then_some(o.time_upper),
             touching: o.touching,
             point: (meets || rests).then(|| o.point.to_array()),
             normal: (meets || rests).then(|| o.normal.to_array()),
-            separation: told.then_some(o.separation),
+            separation: (meets || rests).then_some(o.separation),
             normal_speed: (meets || rests).then_some(o.normal_speed),
             kind: (met || rests).then(|| o.kind.name()),
             extent: (met || rests).then(|| o.extent.name()),
@@ -194,6 +218,12 @@ impl PairAnswer {
             features: (meets || rests)
                 .then(|| Features { a: features(pair.solids[0], &o.faces_a), b: features(pair.solids[1], &o.faces_b) }),
             cells: o.counters.cells,
+            penetration: (o.penetration > 0.0).then(|| Penetration {
+                depth: o.penetration,
+                direction: o.direction.to_array(),
+                point: o.deepest.to_array(),
+            }),
+            margin_time: (o.margin_time < 1.0).then_some(o.margin_time),
             regions: pair
                 .regions
                 .iter()
@@ -274,6 +304,13 @@ pub fn work_table(pairs: &[PairReport<'_>], clocks: &[Option<Clock>]) -> String 
     out
 }
 
+/// What the step worked out beside whether its pairs meet: each effect that ran, and how often.
+pub fn effects_line(effects: &EffectCounters) -> String {
+    let ran: Vec<String> =
+        effects.each().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}")).collect();
+    if ran.is_empty() { "effects: none\n".into() } else { format!("effects: {}\n", ran.join(", ")) }
+}
+
 /// Microseconds, to three digits.
 fn micros(d: Duration) -> String {
     let us = 1e6 * d.as_secs_f64();
@@ -337,7 +374,14 @@ mod tests {
 
     /// What is reported of the solid and itself, without regions.
     fn report<'a>(solid: &'a Solid, outcome: &'a Outcome) -> PairReport<'a> {
-        PairReport { names: ["a", "b"], solids: [solid, solid], outcome, regions: &[], regions_complete: true }
+        PairReport {
+            names: ["a", "b"],
+            solids: [solid, solid],
+            outcome,
+            report: Report::Contact,
+            regions: &[],
+            regions_complete: true,
+        }
     }
 
     #[test]
@@ -394,6 +438,7 @@ mod tests {
             names: ["peg", "plate"],
             solids: [&solid, &solid],
             outcome: &outcome,
+            report: Report::Contact,
             regions: &[],
             regions_complete: true,
         };

@@ -7,7 +7,7 @@ use contactd_client::proto::control::{Answer, Command};
 use contactd_client::proto::names::Address;
 use contactd_client::proto::status::StatusRecord;
 use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
-use contactd_client::proto::{ErrorCode, Pose, PoseRecord, StepRequest};
+use contactd_client::proto::{Detect, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule, StepRequest};
 use contactd_client::{Error, MassOptions, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
 use harness::scene::{Bits, bits, build, fill, set_options};
@@ -139,13 +139,60 @@ fn a_killed_client_loses_its_session_and_a_stopped_server_is_told() {
     victim.kill().unwrap();
     victim.wait().unwrap();
     sessions(1);
-    step(&mut survivor, &ids, 1, 1).unwrap();
+    for k in 1..12 {
+        step(&mut survivor, &ids, k, 1).unwrap();
+    }
     let status = SharedMemory::status(&server.address).unwrap();
     assert_eq!((status.version_min, status.version_max, status.iceoryx2), (1, 1, [0, 10, 0]));
-    shows(&|s| s.steps > 0);
+    shows(&|s| s.steps > 0 && s.effects.continuous > 0);
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new(), "a client that still lives holds nothing by name");
     assert_eq!(step(&mut survivor, &ids, 2, 1), Err(Error::ServerLost));
+}
+
+/// What each effect adds to records, slots and header comes through shared memory as it is.
+#[test]
+fn every_effect_has_the_embedded_bits() {
+    let mut server = ServerProcess::start("effects", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ids = build(&mut session, PEGS);
+    build(&mut own, PEGS);
+    let between = |a: &str, b: &str| Rule::new([a.into(), b.into()]);
+    for (n, report) in [Report::Hit, Report::Time, Report::Contact, Report::Patch].into_iter().enumerate() {
+        let past = [InitialOverlap::Report, InitialOverlap::IgnoreIfSeparating][n % 2];
+        let rules = [
+            Rule { report, penetration: n > 1, margin: 0.25, initial_overlap: past, ..between("cell", "pegs") },
+            Rule { sensor: true, detect: Detect::Discrete, ..between("pegs", "pegs") },
+        ];
+        session.set_rules(&rules).unwrap();
+        own.set_rules(&rules).unwrap();
+        for k in 0..12 {
+            assert_eq!(step(&mut session, &ids, k, 9).unwrap(), step(&mut own, &ids, k, 9).unwrap(), "{report:?} {k}");
+        }
+    }
+    assert!(server.stop().success());
+}
+
+/// A batch that runs out of its cells: the same pairs stay undecided through shared memory.
+#[test]
+fn a_batch_limit_cuts_the_same_bits() {
+    let mut server = ServerProcess::start("short", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ids = build(&mut session, PEGS);
+    build(&mut own, PEGS);
+    let mut cut = 0;
+    for k in 0..40 {
+        for limit in [&mut session.options.batch_limit, &mut own.options.batch_limit] {
+            *limit = 1 + (k as u32 % 4) * 5;
+        }
+        let answer = step(&mut session, &ids, k, 5).unwrap();
+        cut += u32::from(answer.0 == contactd_client::proto::step::STEP_UNDECIDED);
+        assert_eq!(answer, step(&mut own, &ids, k, 5).unwrap(), "step {k}");
+    }
+    assert!(cut > 3, "{cut} of 40 steps were cut");
+    assert!(server.stop().success());
 }
 
 #[test]

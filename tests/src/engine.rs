@@ -2,7 +2,7 @@
 
 use crate::scenes::Scene;
 use contactd::contact::{
-    Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+    Asked, Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
 };
 use contactd::eco::Model;
 use contactd::motion::Placed;
@@ -30,7 +30,7 @@ pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64
         resolution: resolution.unwrap_or_else(|| default_resolution(a.0, b.0)),
         cell_limit: CELL_LIMIT,
         ideas,
-        penetration: true,
+        asked: Asked::DEPTH,
     };
     earliest_contact(&query, &mut Scratch::default())
 }

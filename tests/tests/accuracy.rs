@@ -3,7 +3,9 @@
 
 use contactd::cache::prepare_scene;
 use contactd::check::Check;
-use contactd::contact::{Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
+use contactd::contact::{
+    Asked, Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+};
 use contactd::eco::Model;
 use contactd::import::{self, Limits};
 use contactd::motion::Placed;
@@ -240,7 +242,7 @@ fn a_pair_stops_at_its_limit_with_what_is_proven_by_then() {
             resolution: default_resolution(&models[0], &models[1]),
             cell_limit: limit,
             ideas: Ideas::default(),
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         earliest_contact(&query, &mut Scratch::default())
     };

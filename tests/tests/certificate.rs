@@ -3,7 +3,7 @@
 #![allow(missing_docs)]
 
 use contactd::contact::certificate::certify;
-use contactd::contact::{Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
+use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd::solid::Solid;
@@ -33,7 +33,7 @@ fn certified(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>, ce
         resolution: resolution.unwrap_or_else(|| default_resolution(&model_a, &model_b)),
         cell_limit,
         ideas: Default::default(),
-        penetration: true,
+        asked: Asked::DEPTH,
     };
     let outcome = earliest_contact(&query, &mut Scratch::default());
     let text = certify(&PairQuery { cell_limit: CELLS, ..query }, &outcome).map(|c| {

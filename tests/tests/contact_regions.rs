@@ -6,7 +6,8 @@ use contactd::contact::clearance::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::separation::Within;
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+    Asked, Body, DEFAULT_CELL_LIMIT, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution,
+    earliest_contact,
 };
 use contactd::eco::Model;
 use contactd::motion::Placed;
@@ -42,7 +43,7 @@ impl Rest {
             resolution: default_resolution(&self.a, &self.b),
             cell_limit: 100_000,
             ideas: Ideas::default(),
-            penetration: true,
+            asked: Asked::DEPTH,
         }
     }
 

@@ -4,7 +4,7 @@
 //! `cell_ceilings.toml` holds twice the cells each cost when it was recorded: `CONTACTD_RECORD=1` prints new lines for it.
 #![allow(missing_docs)]
 
-use contactd::contact::{Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact};
+use contactd::contact::{Asked, Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact};
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd_proto::{Motion, Pose};
@@ -539,7 +539,7 @@ fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
             resolution: 1e-9,
             cell_limit: contactd_tests::engine::CELL_LIMIT,
             ideas: Ideas { region: false, walk: false, ..Ideas::default() },
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         let o = earliest_contact(&query, &mut Scratch::default());
         let time = (angle - 0.15f64.asin()) / spin.z;

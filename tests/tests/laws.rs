@@ -5,7 +5,7 @@
 //! `CONTACTD_LAW_SCENES=2000 cargo test --release -p contactd-tests --test laws -- --nocapture`
 #![allow(missing_docs)]
 
-use contactd::contact::{Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
+use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd::solid::primitive::HalfSpace;
@@ -493,7 +493,7 @@ fn memory_that_was_used_before_changes_no_bit() {
             resolution: scene.resolution.unwrap_or_else(|| default_resolution(&a, &b)),
             cell_limit: engine::CELL_LIMIT,
             ideas: Default::default(),
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         same_bits(o, &earliest_contact(&query, &mut scratch.borrow_mut()), "warm")
     });

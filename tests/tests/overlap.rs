@@ -19,10 +19,15 @@ fn told(scene: &Scene) -> (f64, DVec3) {
     assert_eq!(o.status, Status::Overlap, "{o:?}");
     assert!((o.normal.length() - 1.0).abs() < 1e-9 && (o.time_lower, o.time, o.time_upper) == (0.0, 0.0, 0.0), "{o:?}");
     assert!(o.counters.instant_cells > 0, "its work is counted: {o:?}");
-    let value = |r: &Recipe, m: &Motion| r.build().value(m.start.inverse().point(o.point));
-    let f = value(&scene.a, &scene.motion_a).max(value(&scene.b, &scene.motion_b));
-    assert!((2.0 * f - o.separation).abs() < 1e-9, "separation {} where f is {f}", o.separation);
-    (-0.5 * o.separation, o.point)
+    let value = |r: &Recipe, m: &Motion, x: DVec3| r.build().value(m.start.inverse().point(x));
+    let common = |x| value(&scene.a, &scene.motion_a, x).max(value(&scene.b, &scene.motion_b, x));
+    // The point that proves the overlap proves no more than it says, and no more than the deepest one.
+    assert!((2.0 * common(o.point) - o.separation).abs() < 1e-9, "{o:?}");
+    assert!(-o.separation <= o.penetration + 1e-12 && o.separation < -2.0 * o.resolution, "{o:?}");
+    let f = common(o.deepest);
+    assert!((2.0 * f + o.penetration).abs() < 1e-9, "depth {} where f is {f}", o.penetration);
+    assert!((o.direction.length() - 1.0).abs() < 1e-9, "{o:?}");
+    (0.5 * o.penetration, o.deepest)
 }
 
 /// A body on many feet stands in a slab, each foot as deep as a random number says: the deepest counts, wherever the search

@@ -9,7 +9,9 @@
 //! 20,000 stops here; `CONTACTD_STOPS=1000000 cargo test -p contactd-tests --test stopping` makes a million.
 #![allow(missing_docs)]
 
-use contactd::contact::{Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
+use contactd::contact::{
+    Asked, Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+};
 use contactd::eco::Model;
 use contactd::math::any_perpendicular;
 use contactd::motion::Placed;
@@ -51,7 +53,7 @@ impl Table {
             resolution: self.delta,
             cell_limit: CELLS,
             ideas: Ideas::default(),
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         let o = earliest_contact(&query, &mut self.scratch);
         assert!(

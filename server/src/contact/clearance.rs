@@ -6,6 +6,8 @@
 //! so bodies displaced by d_A and d_B do not meet while d_A + d_B < 2g: a common point x would lie within (d_A + d_B)/2 of
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
+use super::asked::Asked;
+use super::depth;
 use super::direct::Convex;
 use super::outcome::Counters;
 use super::pair::{Body, PairQuery, PairSearch};
@@ -60,6 +62,7 @@ pub fn room(query: &PairQuery, margin: f64) -> Option<f64> {
 /// within `lead` (fraction of the motion) of the end of that time need not be told exactly.
 pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut Scratch) -> Kept {
     let (mut task, _) = PairSearch::task(query);
+    task.asked = Asked::CONTACT;
     if let Some(pair) = Convex::new(task) {
         let (until, count) = pair.keeps(room + touch(&task, margin) + 8.0 * task.rounding);
         return Kept { until, room, counters: Counters { closed_forms: count, ..Counters::default() } };
@@ -88,6 +91,84 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
     let counters = search.counters;
     *scratch = search.into_scratch();
     Kept { until, room, counters }
+}
+
+/// Until when the bodies of a question are proven to stay farther apart than `distance` (a length), 1 when they do so over
+/// the whole step; and whether they come within 1 + `MARGIN_SLACK` of it then. Never late; where the work runs out it is
+/// early, and it is not known whether they do. Within the models' reach it is the search for a contact
+/// of that negative depth; farther, the whole trees tell how near the bodies are, and their speed how long that lasts.
+pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (f64, bool, Counters) {
+    let (mut task, _) = PairSearch::task(query);
+    task.asked = Asked::CONTACT;
+    let mut counters = Counters::default();
+    if task.a.is_empty() || task.b.is_empty() {
+        return (1.0, true, counters);
+    }
+    if let Some(pair) = Convex::new(task) {
+        let (until, nearest, count) = pair.nears(distance + 8.0 * task.rounding);
+        counters.closed_forms += count;
+        return (until, until >= 1.0 || nearest <= distance * (1.0 + MARGIN_SLACK), counters);
+    }
+    let level = 0.5 * distance + 8.0 * task.rounding;
+    if level > 0.99 * reach(&task) {
+        let work = Work::new(task.limit);
+        let (until, known) = advance(&task, level, &work);
+        counters.instant_cells += work.cells();
+        return (until, known, counters);
+    }
+    task.delta = -level;
+    task.ideas.fits &= level < task.fits_below();
+    let mut search = Search::new(task, std::mem::take(scratch));
+    search.start();
+    let (until, known) = match search.run(f64::INFINITY) {
+        Some(Ending::Clear) | None => (1.0, true),
+        Some(Ending::Contact(found)) => (found.goal.min(1.0), true),
+        Some(Ending::Rounding(t)) => (t, true),
+        Some(Ending::Limit(t)) => (t, false),
+        Some(Ending::Deep(_)) => (0.0, true),
+    };
+    counters += search.counters;
+    *scratch = search.into_scratch();
+    (until, known, counters)
+}
+
+/// Moments at which bodies far apart are looked at.
+const LOOKS: usize = 512;
+
+/// A pair that comes nearer than this much more than its margin, in parts of it, may be told as within; what proves a pair
+/// to stay away from it proves that.
+pub const MARGIN_SLACK: f64 = 1e-4;
+
+/// Conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) on F = max(f_A, f_B). A point x that is within `level` of
+/// both bodies at t + dt lies in A's box grown by that; let no point fixed there in A be faster than v against B. What of B is
+/// at x then is at x − u at t, |u| <= v·dt, so half way between the two F <= level + v·dt/2 at t. Where F is larger
+/// everywhere, there is no such x.
+fn advance(task: &Task, level: f64, work: &Work) -> (f64, bool) {
+    let part = task.model_a.bounds.root().aabb.grown(level);
+    let far = part.corners().iter().map(|c| (*c - task.relative.center_a()).length()).fold(0.0, f64::max);
+    let mut t = 0.0;
+    for _ in 0..LOOKS {
+        let rest = 1.0 - t;
+        let speed = task.relative.bounds(t, rest, far).speed;
+        let reach = level + 0.5 * speed * rest;
+        if !reach.is_finite() {
+            return (t, false);
+        }
+        let lowest = match depth::nearest(task, &task.relative.at(t), 2.0 * reach, depth::FINE, work) {
+            (None, true) => return (1.0, true),
+            (Some((_, _, depth, _)), true) => -depth - depth::slack(task, depth, depth::FINE),
+            (_, false) => return (t, false),
+        };
+        let left = lowest - level;
+        if left <= 0.5 * MARGIN_SLACK * level {
+            return (t, true);
+        }
+        t += 2.0 * left / speed;
+        if t >= 1.0 {
+            return (1.0, true);
+        }
+    }
+    (t, false)
 }
 
 /// A body that stays where its motion starts.

@@ -25,7 +25,10 @@ const ROUNDS: usize = 200;
 const GLIMPSE: usize = 2;
 
 /// A point this much deeper, relative to the depth, is worth another climb.
-const BETTER: f64 = 1e-3;
+pub const BETTER: f64 = 1e-3;
+
+/// The same where the depth itself is what is asked for.
+pub const FINE: f64 = 1e-6;
 
 /// Cells' worth of work that the search for the deepest point may cost, should the pair's limit allow more.
 pub const MOST_CELLS: u64 = 4_000;
@@ -33,23 +36,35 @@ pub const MOST_CELLS: u64 = 4_000;
 /// Point in A's frame, unit normal from a to b along A's axes, depth, deciding literals.
 pub type Deepest = (DVec3, DVec3, f64, Vec<(Side, LiteralId)>);
 
-/// The deepest common point, and whether no other is deeper by more than the tolerance (proven).
-pub fn deepest(task: &Task, at: &Instant, start: DVec3, work: &Work) -> (Deepest, bool) {
+/// The deepest common point: no other is deeper by more than the tolerance, unless the work runs out.
+pub fn deepest(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
     let mut best = climb(task, at, start, work);
-    let proven = lower(task, at, f64::NEG_INFINITY, work, |x| {
+    deepen(task, at, work, BETTER, &mut best);
+    best
+}
+
+/// Looks for common points that are deeper than `best` by more than a part of its depth, until there is none: then true.
+fn deepen(task: &Task, at: &Instant, work: &Work, part: f64, best: &mut Deepest) -> bool {
+    lower(task, at, f64::NEG_INFINITY, work, |x| {
         if let Some(x) = x {
             let other = climb(task, at, x, work);
             if other.2 > best.2 {
-                best = other;
+                *best = other;
             }
         }
-        -better(task, best.2)
-    });
-    (best, proven)
+        -better(task, best.2, part)
+    })
 }
 
-/// Where two bodies that have nothing in common are nearest to it: F at its lowest, if no more than half of `reach`.
-pub fn nearest(task: &Task, at: &Instant, reach: f64, work: &Work) -> (Option<Deepest>, bool) {
+/// A depth that no common point exceeds, and hardly more than the deepest has; `None` when the work allows no proof of it.
+pub fn at_most(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Option<f64> {
+    let mut best = climb(task, at, start, work);
+    deepen(task, at, work, FINE, &mut best).then(|| better(task, best.2, FINE))
+}
+
+/// Where two bodies that have nothing in common are nearest to it: F at its lowest, if no more than half of `reach`; no other
+/// point is nearer by more than `part` of that, once proven.
+pub fn nearest(task: &Task, at: &Instant, reach: f64, part: f64, work: &Work) -> (Option<Deepest>, bool) {
     let mut best: Option<Deepest> = None;
     let proven = lower(task, at, 0.5 * reach, work, |x| {
         if let Some(x) = x {
@@ -58,14 +73,19 @@ pub fn nearest(task: &Task, at: &Instant, reach: f64, work: &Work) -> (Option<De
                 best = Some(other);
             }
         }
-        best.as_ref().map_or(0.5 * reach, |b| -better(task, b.2))
+        best.as_ref().map_or(0.5 * reach, |b| -better(task, b.2, part))
     });
     (best, proven)
 }
 
 /// The least depth that is worth another climb.
-fn better(task: &Task, depth: f64) -> f64 {
-    depth + (BETTER * depth.abs()).max(task.delta)
+fn better(task: &Task, depth: f64, part: f64) -> f64 {
+    depth + slack(task, depth, part)
+}
+
+/// How much deeper another point may be than the one that is told.
+pub fn slack(task: &Task, depth: f64, part: f64) -> f64 {
+    (part * depth.abs()).max(task.delta)
 }
 
 /// Branch and bound: hands out points with F no more than the level that `found` gives (at first for no point), until none

@@ -2,6 +2,7 @@
 //!
 //! Floor 6: imports `eco`, `bound`, `motion`, `solid`, `math`, `proto`.
 
+pub mod asked;
 pub mod certificate;
 pub mod clause;
 pub mod clearance;
@@ -28,6 +29,7 @@ mod task;
 mod tests;
 mod work;
 
+pub use asked::Asked;
 pub use clock::{Clock, Stage};
 pub(crate) use direct::{Glance, Glancing, Hull, Stance};
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};

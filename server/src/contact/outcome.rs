@@ -90,6 +90,14 @@ pub struct Counters {
     pub closed_forms: u64,
     /// Cells' worth of work on one instant: whether a pair touches, its regions, its deepest point.
     pub instant_cells: u64,
+    /// Times of contact worked out.
+    pub times: u64,
+    /// Contact points worked out, with normal, kind and faces.
+    pub contacts: u64,
+    /// Deepest points of overlaps looked for.
+    pub penetrations: u64,
+    /// Overlaps at the start that were searched past.
+    pub past_overlaps: u64,
 }
 
 impl std::ops::AddAssign for Counters {
@@ -103,6 +111,10 @@ impl std::ops::AddAssign for Counters {
         self.newton += o.newton;
         self.closed_forms += o.closed_forms;
         self.instant_cells += o.instant_cells;
+        self.times += o.times;
+        self.contacts += o.contacts;
+        self.penetrations += o.penetrations;
+        self.past_overlaps += o.past_overlaps;
     }
 }
 
@@ -126,11 +138,12 @@ pub struct Outcome {
     pub not_continued: bool,
     /// A vertex met a vertex: the normal is the average of the adjacent normals.
     pub averaged_normal: bool,
-    /// Contact (contact) or deepest (overlap) point. Meaningful for these two only.
+    /// Contact point, or a point that proves an overlap: deeper than 2 delta in both. Meaningful for these two only.
     pub point: DVec3,
     /// Unit normal from a to b. Meaningful for contact and overlap.
     pub normal: DVec3,
-    /// Signed separation at `time`: 0 at contact, negative depth at overlap; at the start for a touching clear pair.
+    /// Signed separation at `time`: 0 at contact, at overlap minus what `point` proves of the depth; at the start for a
+    /// touching clear pair. Of an overlap that was searched past the depth at `time`, negative.
     pub separation: f64,
     /// Approach speed along the normal at `time`, length per step, positive = approaching.
     pub normal_speed: f64,
@@ -144,6 +157,17 @@ pub struct Outcome {
     pub faces_a: [u32; 3],
     /// Active faces of b.
     pub faces_b: [u32; 3],
+    /// Depth of an overlap, where it is asked for (a proven lower bound): no shorter translation takes the bodies apart.
+    pub penetration: f64,
+    /// The deepest point of that overlap.
+    pub deepest: DVec3,
+    /// Unit direction from a to b along which its depth is measured.
+    pub direction: DVec3,
+    /// Of a clear pair with a margin: proven farther apart than that until then, 0 where it is not at the start; 1: for the
+    /// whole step.
+    pub margin_time: f64,
+    /// An overlap at the start was searched past.
+    pub past: bool,
     /// Work done.
     pub counters: Counters,
 }
@@ -168,6 +192,11 @@ impl Outcome {
             resolution,
             faces_a: [NO_FACE; 3],
             faces_b: [NO_FACE; 3],
+            penetration: 0.0,
+            deepest: DVec3::ZERO,
+            direction: DVec3::ZERO,
+            margin_time: 1.0,
+            past: false,
             counters: Counters::default(),
         }
     }
@@ -175,6 +204,7 @@ impl Outcome {
     /// The same answer with a and b exchanged.
     pub(super) fn swap_sides(&mut self) {
         self.normal = -self.normal;
+        self.direction = -self.direction;
         std::mem::swap(&mut self.faces_a, &mut self.faces_b);
     }
 }

@@ -1,5 +1,6 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
+use super::asked::Asked;
 use super::clock::Stage;
 use super::depth;
 use super::direct::{self, Quick};
@@ -9,6 +10,7 @@ use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
 use super::propose::Found;
 use super::search::{Ending, Scratch, Search};
+use super::separation;
 use super::task::Task;
 use super::work::Work;
 use crate::eco::Model;
@@ -42,8 +44,8 @@ pub struct PairQuery<'a> {
     pub cell_limit: u64,
     /// Ideas of the search that are switched on: all, unless their worth is measured.
     pub ideas: Ideas,
-    /// Of an overlap at the start the deepest point is looked for; otherwise the first common point found is told.
-    pub penetration: bool,
+    /// What is worked out beside whether they meet.
+    pub asked: Asked,
 }
 
 impl PairQuery<'_> {
@@ -113,7 +115,7 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
 #[inline(never)]
 fn search(query: &PairQuery, quick: Quick, outcome: &mut Outcome, scratch: &mut Scratch) {
     let (task, swapped) = PairSearch::task(query);
-    let mut search = PairSearch::of_task(query, task, swapped, (quick, outcome.counters), std::mem::take(scratch));
+    let mut search = PairSearch::of_task(query, task, swapped, (quick, outcome), std::mem::take(scratch));
     *outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
     *scratch = search.into_scratch();
 }
@@ -167,6 +169,16 @@ pub struct PairSearch<'a> {
 /// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
 const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
 
+/// The resolution after a raise.
+fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
+    resolution + 2e-6 * resolution + more * rounding
+}
+
+/// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
+pub(super) fn most_raised(resolution: f64, rounding: f64) -> f64 {
+    RAISES.iter().fold(resolution, |r, more| raised(r, *more, rounding))
+}
+
 impl<'a> PairSearch<'a> {
     /// What is searched for a question, and whether its second body carries the cells.
     pub(super) fn task(query: &PairQuery<'a>) -> (Task<'a>, bool) {
@@ -191,9 +203,10 @@ impl<'a> PairSearch<'a> {
             model_a,
             model_b,
             ideas: query.ideas,
-            penetration: query.penetration,
+            asked: query.asked,
             relative,
             delta: resolution,
+            past: 0.0,
             rounding,
             nearly: rounding,
             scale,
@@ -235,7 +248,7 @@ impl<'a> PairSearch<'a> {
                 limit,
             };
         }
-        Self::of_task(query, task, swapped, (quick, outcome.counters), scratch)
+        Self::of_task(query, task, swapped, (quick, &outcome), scratch)
     }
 
     /// Prepares the search of a task, of which a quick look has told something.
@@ -243,36 +256,85 @@ impl<'a> PairSearch<'a> {
         query: &PairQuery<'a>,
         task: Task<'a>,
         swapped: bool,
-        (quick, before): (Quick, Counters),
+        (quick, before): (Quick, &Outcome),
         scratch: Scratch,
     ) -> Self {
         let (a, b) = (task.a, task.b);
         let resolution = task.delta;
         let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
-        outcome.counters.closed_forms = before.closed_forms;
+        outcome.counters.closed_forms = before.counters.closed_forms;
         let mut search = Search::new(task, scratch);
-        let (mut ending, mut told) = (None, None);
+        let (mut ending, mut overlap) = (None, None);
         match quick {
-            Quick::Overlap(x) => {
-                outcome.touching = true;
-                fill_overlap(&mut outcome, &task, x);
-                if swapped {
-                    outcome.swap_sides();
-                }
-                told = Some(outcome);
-            }
+            Quick::Overlap(x) => overlap = Some(x),
             Quick::Open(along) if query.ideas.direct => ending = direct::answer(&mut search, along),
             _ => {}
         }
-        if ending.is_none() && told.is_none() && query.ideas.holes {
+        if ending.is_none() && overlap.is_none() && query.ideas.holes {
             ending = hole::answer(&mut search);
         }
-        if ending.is_none() && told.is_none() && !a.is_empty() && !b.is_empty() {
+        if ending.is_none() && overlap.is_none() && !a.is_empty() && !b.is_empty() {
             search.start();
         }
-        let limit = query.cell_limit;
-        Self { task, swapped, level: 1.0, search: Some(search), ending, told, outcome, resolution, raised: 0, limit }
+        let (search, limit) = (Some(search), query.cell_limit);
+        let mut pair =
+            Self { task, swapped, level: 1.0, search, ending, told: None, outcome, resolution, raised: 0, limit };
+        if let Some(x) = overlap
+            && !pair.goes_past(x, 0)
+        {
+            pair.told = Some(pair.overlaps(x, Some(before)));
+        }
+        pair
+    }
+
+    /// The answer for an overlap at the start with the common point x, of which something may have been told.
+    fn overlaps(&self, x: DVec3, told: Option<&Outcome>) -> Outcome {
+        let (task, mut outcome) = (&self.task, self.outcome);
+        if let Some(told) = told {
+            let counters = outcome.counters;
+            outcome = Outcome { resolution: outcome.resolution, counters: told.counters, ..*told };
+            outcome.counters += Counters { primitives: 0, closed_forms: 0, ..counters };
+        } else {
+            fill_overlap(&mut outcome, task, x);
+            if self.swapped {
+                outcome.swap_sides();
+            }
+        }
+        if task.asked.penetration {
+            let at = task.relative.at(0.0);
+            let work = Work::new(task.limit.min(depth::MOST_CELLS));
+            let (deepest, direction, depth, _) = depth::deepest(task, &at, x, &work);
+            let sign = if self.swapped { -1.0 } else { 1.0 };
+            outcome.penetration = 2.0 * depth;
+            outcome.deepest = task.relative.world_point(&at, deepest);
+            outcome.direction = (at.world_from_a * direction * sign).normalize();
+            outcome.counters.instant_cells += work.cells();
+            outcome.counters.penetrations += 1;
+        }
+        outcome
+    }
+
+    /// Searches on past an overlap at the start with the common point x, where that is asked for: for a contact deeper
+    /// than the start by delta; `cells` were spent. False when it is not, or when the work allowed does not prove how deep the
+    /// start is.
+    fn goes_past(&mut self, x: DVec3, cells: u64) -> bool {
+        if !self.task.asked.past_overlap || self.task.past > 0.0 {
+            return false;
+        }
+        let work = Work::new(self.task.limit.min(depth::MOST_CELLS));
+        let deepest = depth::at_most(&self.task, &self.task.relative.at(0.0), x, &work);
+        self.outcome.counters.instant_cells += work.cells();
+        let Some(deepest) = deepest else { return false };
+        self.outcome.counters.past_overlaps += 1;
+        (self.outcome.touching, self.outcome.past) = (true, true);
+        self.task.past = deepest;
+        // What fits say holds for depths that are small against the bodies.
+        self.task.ideas.fits = false;
+        self.task.nearly = 0.0;
+        self.level = 1.0;
+        self.restart(cells + work.cells());
+        true
     }
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
@@ -314,10 +376,7 @@ impl<'a> PairSearch<'a> {
                 }
                 Ending::Rounding(t) => {
                     // A depth that the motion comes to and stays at is told apart from a slightly larger one.
-                    if let Some(more) = RAISES.get(self.raised) {
-                        self.raised += 1;
-                        self.resolution += 2e-6 * self.resolution + more * self.task.rounding;
-                        self.outcome.resolution = self.resolution;
+                    if self.raise() {
                         self.restart(cells);
                         continue;
                     }
@@ -326,14 +385,24 @@ impl<'a> PairSearch<'a> {
                 }
                 Ending::Deep(x) => {
                     self.outcome.touching = true;
-                    if self.level == 1.0 {
+                    if self.level == 1.0 && self.task.past == 0.0 {
                         // A body that was stopped at its contact starts at depth 0 ± rounding: search at twice the depth.
                         self.level = 2.0;
                         self.task.nearly = 0.0;
                         self.restart(cells);
                         continue;
                     }
-                    fill_overlap(&mut self.outcome, &self.task, x);
+                    // A step that raised the resolution may have left the bodies a little deeper than 2 delta.
+                    let most = 2.0 * most_raised(self.resolution, self.task.rounding);
+                    let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x);
+                    if self.task.past == 0.0 && depth <= most && self.raise() {
+                        self.restart(cells);
+                        continue;
+                    }
+                    if self.goes_past(x, cells) {
+                        continue;
+                    }
+                    return Some(self.overlaps(x, None));
                 }
             }
             if self.swapped {
@@ -343,9 +412,18 @@ impl<'a> PairSearch<'a> {
         }
     }
 
+    /// Raises the resolution, unless that was done often enough.
+    fn raise(&mut self) -> bool {
+        let Some(more) = RAISES.get(self.raised) else { return false };
+        self.raised += 1;
+        self.resolution = raised(self.resolution, *more, self.task.rounding);
+        self.outcome.resolution = self.resolution;
+        true
+    }
+
     /// Searches anew, at the depth that is to be searched by now; `cells` were spent.
     fn restart(&mut self, cells: u64) {
-        self.task.delta = self.level * self.resolution;
+        self.task.delta = self.task.past + self.level * self.resolution;
         self.task.limit = self.task.limit.saturating_sub(cells);
         let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
         let mut search = Search::new(self.task, scratch);
@@ -379,6 +457,11 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     o.time = found.touch.as_ref().map_or(found.upper, |s| s.t.clamp(0.0, found.upper));
     o.not_continued = found.touch.is_none();
     o.time_lower = o.time.min(found.goal.max(0.0));
+    o.counters.times += u64::from(task.asked.time());
+    if !task.asked.point() {
+        return;
+    }
+    o.counters.contacts += 1;
     let at = task.relative.at(o.time);
     let problem = Problem {
         a: Faces { solid: task.a, guards: &[] },
@@ -403,7 +486,8 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let normal = if o.averaged_normal { active.average.unwrap_or(active.normal) } else { active.normal };
     o.normal = (at.world_from_a * normal).normalize();
     o.normal_speed = at.velocity(s.x).dot(normal);
-    o.separation = 0.0;
+    // Of an overlap that is searched past: how deep the bodies then are.
+    o.separation = if task.past > 0.0 { -2.0 * task.delta } else { 0.0 };
 }
 
 /// Adds a face to those of a contact, once, where there is room.
@@ -550,19 +634,23 @@ pub(super) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Exten
     }
 }
 
-/// Overlap at the start: from a common point to the deepest one, where that is asked for.
+/// Overlap at the start: from a common point to one that tells a direction.
 fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
-    let at = task.relative.at(0.0);
-    let work = Work::new(task.limit.min(depth::MOST_CELLS));
-    let (deepest, normal, depth, faces) =
-        if task.penetration { depth::deepest(task, &at, x, &work).0 } else { depth::some(task, &at, x, &work) };
-    o.counters.instant_cells += work.cells();
     o.status = Status::Overlap;
     (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
-    o.point = task.relative.world_point(&at, deepest);
+    o.touching = true;
+    if !task.asked.point() {
+        return;
+    }
+    o.counters.contacts += 1;
+    let at = task.relative.at(0.0);
+    let work = Work::new(task.limit.min(depth::MOST_CELLS));
+    let (x, normal, depth, faces) = depth::some(task, &at, x, &work);
+    o.counters.instant_cells += work.cells();
+    o.point = task.relative.world_point(&at, x);
     o.normal = (at.world_from_a * normal).normalize();
     o.separation = -2.0 * depth;
-    o.normal_speed = at.velocity(deepest).dot(normal);
+    o.normal_speed = at.velocity(x).dot(normal);
     for (side, id) in faces {
         let list = if side == Side::A { &mut o.faces_a } else { &mut o.faces_b };
         note(list, id.face());

@@ -386,6 +386,12 @@ impl Search<'_> {
     /// Keeps a confirmed witness if it is the earliest; continues it back to the touch.
     fn accept(&mut self, deep: Solution) -> bool {
         self.hint(&deep);
+        if !self.task.asked.time() {
+            // A witness is all of a hit, once the start is known to be free: what is left to refine is what lies there.
+            let goal = self.now().max(f64::MIN_POSITIVE);
+            self.found = Some(Found { upper: deep.t, deep, touch: None, goal });
+            return true;
+        }
         let settled = deep.stationarity < SETTLED;
         if !settled {
             // A witness, but an earlier one lies beside it: everything before it is still searched.
@@ -396,16 +402,18 @@ impl Search<'_> {
             return false;
         }
         let problem = self.problem();
+        let continues = self.task.continues();
         // A whole primitive's contact is regular as a rule: a plain step or two.
-        let plain = self.stage2.all.then(|| problem.refine(&deep.active, deep.x, deep.t, deep.lambda.clone(), 0.0));
+        let plain = (continues && self.stage2.all)
+            .then(|| problem.refine(&deep.active, deep.x, deep.t, deep.lambda.clone(), 0.0));
         let touch = match plain {
             Some(Ok(s)) if (s.x - deep.x).length() <= SAME_POINT * self.task.scale => Some(s),
             Some(Err(true)) => problem.along(&deep.active, deep.x, deep.t, deep.lambda.clone(), 0.0),
             _ => None,
         };
-        let touch = touch
-            .filter(|s| s.stationarity < SETTLED)
-            .or_else(|| problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0, true));
+        let touch = touch.filter(|s| s.stationarity < SETTLED).or_else(|| {
+            if continues { problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0, true) } else { None }
+        });
         let touch = touch.and_then(|s| if self.is_touch(&s, deep.t) { Some(s) } else { self.touch_beside(s, deep.t) });
         let at = self.task.relative.at(deep.t);
         let rates = deep.active.iter().zip(&deep.lambda).map(|(c, l)| l * problem.row(c, deep.x, &at, 0.0).rate);

@@ -226,6 +226,21 @@ impl<'a> Search<'a> {
         self.scratch.heap.peek().map_or(f64::INFINITY, |c| c.t)
     }
 
+    /// The ending of a search that asks for a hit alone, once a contact is known; nothing is met before `proven`. Only where
+    /// the start is known to be free.
+    pub(super) fn hit(&mut self, proven: f64) -> Option<Ending> {
+        if self.task.asked.time() {
+            return None;
+        }
+        let found = self.found.take()?;
+        Some(Ending::Contact(Found { goal: proven.max(found.goal), ..found }))
+    }
+
+    /// Time of the item that was taken off the queue last: nothing happens before it.
+    pub(super) fn now(&self) -> f64 {
+        self.instant.t
+    }
+
     pub(super) fn goal(&self) -> f64 {
         self.found.as_ref().map_or(f64::INFINITY, |f| f.goal - self.task.lead)
     }

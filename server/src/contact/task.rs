@@ -1,5 +1,6 @@
 //! What is searched: two solids, their motion, a depth, a limit; and a cell of it as its bounds see it.
 
+use super::asked::Asked;
 use super::literal::{Faces, View};
 use super::pair::Ideas;
 use crate::eco::Model;
@@ -20,12 +21,14 @@ pub struct Task<'a> {
     pub model_b: &'a Model,
     /// Ideas of the search that are switched on.
     pub ideas: Ideas,
-    /// Of an overlap the deepest point is looked for.
-    pub penetration: bool,
+    /// What is told of what is found.
+    pub asked: Asked,
     /// Motion of the pair.
     pub relative: Relative,
     /// Depth at which a contact is decided.
     pub delta: f64,
+    /// Depth of an overlap at the start that the search goes on past; 0 otherwise.
+    pub past: f64,
     /// What rounding may do to one bound: E of docs/accuracy.md, a length.
     pub rounding: f64,
     /// What is this near to delta at the start counts as that deep: rounding, where a second search follows; else 0.
@@ -66,6 +69,12 @@ impl<'a> Task<'a> {
             multipliers: self.ideas.multipliers,
             curved: true,
         }
+    }
+
+    /// True when a witness is to be continued back to where the surfaces meet: they did so before the start if it was an
+    /// overlap, and do so later than bodies are near each other.
+    pub(super) fn continues(&self) -> bool {
+        self.asked.time() && self.past == 0.0 && self.delta > 0.0
     }
 
     /// Same-shape fits hold for distances of both bodies below this: half the smallest radius of a subtracted round face,

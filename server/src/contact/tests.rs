@@ -33,11 +33,21 @@ fn tilt(v: DVec3) -> glam::DQuat {
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
     let o = ask_with(name, a, ma, b, mb, Ideas { direct: false, holes: false, ..Ideas::default() });
     let fronted = ask_with(name, a, ma, b, mb, Ideas::default());
-    assert_eq!((o.status, o.kind, o.extent), (fronted.status, fronted.kind, fronted.extent), "{name}");
+    assert_eq!(o.status, fronted.status, "{name}");
+    if o.status != Status::Overlap {
+        assert_eq!((o.kind, o.extent), (fronted.kind, fronted.extent), "{name}");
+    }
     assert!((o.time - fronted.time).abs() < 1e-12, "{name}: {} and {}", o.time, fronted.time);
-    assert!((o.separation - fronted.separation).abs() < 1e-12, "{name}: {} and {}", o.separation, fronted.separation);
+    assert!(
+        (o.penetration - fronted.penetration).abs() < 1e-12,
+        "{name}: {} and {}",
+        o.penetration,
+        fronted.penetration
+    );
     assert!(fronted.time_lower <= fronted.time && fronted.time <= fronted.time_upper, "{name}");
-    assert!((o.normal - fronted.normal).length() < 1e-6, "{name}: {} and {}", o.normal, fronted.normal);
+    // Of an overlap any direction out of one body is a normal; the shortest is asked for.
+    let of = |o: &Outcome| if o.status == Status::Overlap { o.direction } else { o.normal };
+    assert!((of(&o) - of(&fronted)).length() < 1e-6, "{name}: {} and {}", of(&o), of(&fronted));
     o
 }
 
@@ -49,7 +59,7 @@ fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, ideas: Ide
         resolution: default_resolution(a, b),
         cell_limit: 300_000,
         ideas,
-        penetration: true,
+        asked: Asked::DEPTH,
     };
     let began = std::time::Instant::now();
     let o = earliest_contact(&q, &mut Scratch::default());
@@ -220,7 +230,7 @@ fn overlaps_and_cavities() {
     assert_eq!(o.status, Status::Overlap);
     let o = ask("pressed by a tenth", &cube, rest(), &cube, slide(v(0.0, 0.0, 0.9), v(0., 0., 1.)));
     assert_eq!(o.status, Status::Overlap);
-    assert!((o.separation + 0.1).abs() < 1e-9 && (o.normal - DVec3::Z).length() < 1e-9, "{o:?}");
+    assert!((o.penetration - 0.1).abs() < 1e-9 && (o.direction - DVec3::Z).length() < 1e-9, "{o:?}");
     let shell = pierced(Sphere { radius: 1.1 }, vec![(Sphere { radius: 1.0 }.into(), Pose::IDENTITY)]);
     let ball = simple(Sphere { radius: 0.2 });
     let o = hits("ball meets the cavity's wall", &shell, rest(), &ball, slide(v(0.1, 0., 0.), v(1., 0., 0.)), 0.7);
@@ -258,7 +268,7 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             resolution: default_resolution(&fork, &plate),
             cell_limit: 1000,
             ideas: Ideas::default(),
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         let (task, _) = PairSearch::task(&query);
         let mut search = search::Search::new(task, Scratch::default());
@@ -316,7 +326,7 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
             resolution: default_resolution(a, &block),
             cell_limit: 300_000,
             ideas,
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         earliest_contact(&query, scratch)
     };

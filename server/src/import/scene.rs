@@ -24,6 +24,8 @@ pub struct Scene {
     pub unit: String,
     /// Resolution for every pair, length; `None` for the default of each pair.
     pub resolution: Option<f64>,
+    /// Duration of the step in seconds, for objects with a declared largest speed.
+    pub dt: Option<f64>,
     /// Models in file order.
     pub models: Vec<ModelSource>,
     /// Objects in file order.
@@ -129,6 +131,7 @@ impl Scene {
             SceneError::Format { file: file.to_owned(), at, message }
         })?;
         let resolution = raw.resolution.map(|r| checker.positive("resolution", &r)).transpose()?;
+        let dt = raw.dt.map(|dt| checker.positive("dt", &dt)).transpose()?;
 
         let mut models = Vec::with_capacity(raw.model.len());
         let mut model_of: HashMap<String, usize> = HashMap::new();
@@ -145,13 +148,17 @@ impl Scene {
                 return Err(checker.wrong(&o.model, "the name of a model", &format!("\"{}\"", o.model.as_ref())));
             };
             objects.push(checker.object(o, model)?);
+            if let (Some(speed), None) = (&o.max_speed, dt) {
+                let found = "none: a speed per second says nothing without it";
+                return Err(checker.wrong(speed, "dt, the duration of the step in seconds, beside max_speed", found));
+            }
         }
         let mut rules = Vec::with_capacity(raw.rule.len());
         for r in &raw.rule {
             rules.push(checker.rule(r, &object_of)?);
         }
         let unit = raw.unit.unwrap_or_default();
-        Ok(Self { unit, resolution, models, objects, rules, file: file.to_owned() })
+        Ok(Self { unit, resolution, dt, models, objects, rules, file: file.to_owned() })
     }
 
     /// Reads every model of the scene, in order.
@@ -189,6 +196,7 @@ impl Scene {
 struct RawScene {
     unit: Option<String>,
     resolution: Option<Spanned<f64>>,
+    dt: Option<Spanned<f64>>,
     #[serde(default)]
     model: Vec<RawModel>,
     #[serde(default)]
@@ -435,6 +443,7 @@ mod tests {
     fn everything_a_scene_can_say_is_read() {
         let text = r#"
             unit = "mm"
+            dt = 0.5
             resolution = 1e-6
             [[model]]
             name = "plate"
@@ -507,7 +516,7 @@ mod tests {
         let table = [
             (
                 "colour = 1".into(),
-                "1:1: unknown field `colour`, expected one of `unit`, `resolution`, `model`, `object`, `rule`",
+                "1:1: unknown field `colour`, expected one of `unit`, `resolution`, `dt`, `model`, `object`, `rule`",
             ),
             ("unit = ".into(), "1:8: "),
             ("resolution = 0".into(), "1:14: expected a positive finite number as resolution, found 0"),
@@ -548,6 +557,10 @@ mod tests {
                 "5:8: expected an object \"o\" with rotates = false that does not turn, found one that does",
             ),
             (o("max_speed = -1"), "7:13: expected a positive finite number as max_speed, found -1"),
+            (
+                o("max_speed = 1"),
+                "7:13: expected dt, the duration of the step in seconds, beside max_speed, found none",
+            ),
             (o("speed = 1"), "7:1: unknown field `speed`, expected one of `name`, `model`, `group`, `motion`"),
             (rule("detect = \"on\""), "9:10: expected \"off\" or \"discrete\" or \"continuous\", found \"on\""),
             (rule("report = \"all\""), "9:10: expected \"hit\" or \"time\" or \"contact\" or \"patch\", found \"all\""),

@@ -17,7 +17,7 @@ use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, 
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
 use contactd_proto::status::StatusRecord;
 use contactd_proto::step::ASK_POLLING;
-use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
+use contactd_proto::{ContactRecord, EffectCounters, ErrorCode, PoseRecord, StepReply, StepRequest};
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::notifier::Notifier;
 use std::collections::BTreeMap;
@@ -96,6 +96,8 @@ pub struct Server {
     config: ServerConfig,
     last_session: u64,
     steps: u64,
+    /// What they worked out.
+    effects: EffectCounters,
     beats: u64,
     cores: usize,
     root: Root,
@@ -136,6 +138,7 @@ impl Server {
             config,
             last_session: 0,
             steps: 0,
+            effects: EffectCounters::default(),
             beats: 0,
             cores,
             root,
@@ -199,7 +202,11 @@ impl Server {
         if session.waiting {
             send_step(&call, 0, refusal(&request, ErrorCode::Busy, None), &|_| ContactRecord::default());
         } else {
-            session.scene.step(&request, call.payload(), |n, reply, slot| send_step(&call, n, reply, slot));
+            let effects = &mut self.effects;
+            session.scene.step(&request, call.payload(), |n, reply, slot| {
+                *effects += reply.effect_counters;
+                send_step(&call, n, reply, slot);
+            });
         }
         // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
         drop(call);
@@ -323,7 +330,8 @@ impl Server {
     }
 
     fn show(&mut self) {
-        self.services.show(status(&self.root, &self.config, self.sessions.len(), self.steps));
+        let status = status(&self.root, &self.config, self.sessions.len(), self.steps);
+        self.services.show(StatusRecord { effects: self.effects, ..status });
     }
 }
 

@@ -13,7 +13,7 @@
 //! that of a course is worked out in `contact::clearance` and `Course::strays`.
 
 use super::body::Body;
-use crate::contact::{Counters, Outcome, PairQuery, Region, Scratch, Status, clearance};
+use crate::contact::{Asked, Counters, Outcome, PairQuery, Region, Scratch, Status, clearance};
 use contactd_proto::Motion;
 use glam::{DQuat, DVec3};
 
@@ -59,6 +59,8 @@ struct Course {
 #[derive(Clone, Copy, Debug)]
 struct Answer {
     motions: [Motion; 2],
+    /// Of the first contact alone more is asked than of others.
+    asked: Asked,
     outcome: Outcome,
 }
 
@@ -133,6 +135,7 @@ impl Knowledge {
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
             && last.motions == motions
+            && last.asked == q.query.asked
         {
             return Some((last.outcome, None));
         }
@@ -238,12 +241,14 @@ impl Knowledge {
     /// Learns from a search.
     pub fn learn(&mut self, q: &Question, outcome: &Outcome) {
         self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
-        if outcome.status == Status::Undecided {
+        // More work might tell an overlap that was to be searched past.
+        let open = outcome.status == Status::Overlap && q.query.asked.past_overlap;
+        if outcome.status == Status::Undecided || open {
             self.answered = false;
             return;
         }
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
-        let answer = Answer { motions, outcome: *outcome };
+        let answer = Answer { motions, asked: q.query.asked, outcome: *outcome };
         put(&mut self.answer, answer);
         self.answered = true;
         self.told = None;

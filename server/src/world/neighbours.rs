@@ -39,6 +39,8 @@ struct Near {
 pub struct Entry {
     /// How it is searched.
     pub plan: PairPlan,
+    /// The same as an index.
+    pub plan_index: u32,
     /// Its resolution.
     pub resolution: f64,
     /// A direction along which its bodies were apart.
@@ -117,7 +119,7 @@ impl Neighbours {
         bodies: &[Body],
         moving: &[u32],
         touch: impl Fn(&Body) -> f64,
-        plan: impl Fn(u32, u32) -> Option<(PairPlan, f64)>,
+        plan: impl Fn(u32, u32) -> Option<(u32, PairPlan, f64)>,
     ) {
         let within = |i: &u32| self.odometers[*i as usize].end <= self.fences[*i as usize];
         if !self.stale && moving.iter().all(within) {
@@ -152,8 +154,9 @@ impl Neighbours {
                 self.pairs.push(near);
                 continue;
             }
-            let Some((plan, resolution)) = plan(a, b) else { continue };
-            let mut new = Entry { plan, resolution, along: None, met: false, knowledge: Knowledge::default() };
+            let Some((plan_index, plan, resolution)) = plan(a, b) else { continue };
+            let mut new =
+                Entry { plan, plan_index, resolution, along: None, met: false, knowledge: Knowledge::default() };
             let entry = if let Some(entry) = self.spare.pop() {
                 let place = &mut self.entries[entry as usize];
                 new.knowledge = std::mem::take(&mut place.knowledge).emptied();

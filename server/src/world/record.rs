@@ -95,7 +95,7 @@ pub fn reply(out: &StepOutcome, details: bool) -> StepReply {
         records: out.pairs.len() as u32,
         slots: (slots_of(out, details) - out.pairs.len()) as u32,
         truncated: u32::from(out.truncated),
-        effects: out.effects,
+        effects: out.effect_counters.bits(),
         pairs: out.searched,
         safe_time: out.safe_time,
         counters: WorkCounters {
@@ -111,6 +111,7 @@ pub fn reply(out: &StepOutcome, details: bool) -> StepReply {
             may_have_passed: out.may_have_passed,
             instant_cells: c.instant_cells,
         },
+        effect_counters: out.effect_counters,
         ..StepReply::default()
     }
 }
@@ -128,19 +129,25 @@ fn record(p: &PairOutcome) -> ContactRecord {
     if p.plan.report >= Report::Time {
         r.valid |= wire::VALID_TIME;
         (r.time, r.time_lower) = (o.time, o.time_lower);
-        r.flags |= if o.touching { wire::TOUCHING } else { 0 };
         r.flags |= if o.not_continued { wire::NOT_CONTINUED } else { 0 };
+    }
+    if p.plan.report >= Report::Time || p.plan.margin > 0.0 {
+        r.flags |= if o.touching { wire::TOUCHING } else { 0 };
         r.flags |= if p.regions_complete { 0 } else { wire::REGIONS_INCOMPLETE };
     }
+    r.flags |= if o.margin_time < 1.0 { wire::WITHIN_MARGIN } else { 0 };
     let meets = matches!(o.status, Status::Contact | Status::Overlap);
     // A clear pair that touches has the fields of its nearest region, where its rule asks for them.
     let rests = o.status == Status::Clear && p.regions.1 > 0;
     if p.plan.report >= Report::Contact && (meets || rests) {
         r.valid |= wire::VALID_POINT | wire::VALID_NORMAL | wire::VALID_SEPARATION | wire::VALID_NORMAL_SPEED;
-        r.valid |= wire::VALID_KIND | wire::VALID_FACES;
+        r.valid |= wire::VALID_FACES;
         r.flags |= if o.averaged_normal { wire::AVERAGED_NORMAL } else { 0 };
-        r.kind = o.kind as u8 + 1;
-        r.extent = o.extent as u8 + 1;
+        // Bodies that overlap meet in no one way.
+        if o.status != Status::Overlap {
+            r.valid |= wire::VALID_KIND;
+            (r.kind, r.extent) = (o.kind as u8 + 1, o.extent as u8 + 1);
+        }
         r.point = o.point.to_array();
         r.normal = o.normal.to_array();
         r.separation = o.separation;
@@ -153,19 +160,22 @@ fn record(p: &PairOutcome) -> ContactRecord {
 fn detail(world: &World, p: &PairOutcome) -> DetailSlot {
     let o = &p.outcome;
     let meets = matches!(o.status, Status::Contact | Status::Overlap);
-    let overlap = o.status == Status::Overlap && p.plan.penetration;
-    let point_a = world.body(p.a).filter(|_| meets).map(|body| {
+    // The point that is told: of an overlap the deepest one, where it was asked for.
+    let measured = o.penetration > 0.0;
+    let told = measured || (meets && p.plan.report >= Report::Contact);
+    let point_a = world.body(p.a).filter(|_| told).map(|body| {
         let pose = body.track.motion.at(o.time);
-        pose.rotation.conjugate() * (o.point - pose.position)
+        pose.rotation.conjugate() * (if measured { o.deepest } else { o.point } - pose.position)
     });
     DetailSlot {
         tag: wire::DETAIL_SLOT,
-        time_upper: o.time_upper,
+        time_upper: if p.plan.report >= Report::Time { o.time_upper } else { 0.0 },
         resolution: o.resolution,
         point_a: point_a.map_or([0.0; 3], |x| x.to_array()),
-        penetration: if overlap { -o.separation } else { 0.0 },
-        direction: if overlap { o.normal.to_array() } else { [0.0; 3] },
+        penetration: o.penetration,
+        direction: o.direction.to_array(),
         cells: o.counters.cells,
+        margin_time: if p.plan.margin > 0.0 { o.margin_time } else { 0.0 },
         ..DetailSlot::default()
     }
 }

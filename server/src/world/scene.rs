@@ -97,7 +97,7 @@ impl World {
         if a.id == b.id || (a.is_static && b.is_static) {
             return None;
         }
-        self.plans.of([a.group, b.group], [&a.name, &b.name])
+        self.plans.of([a.group, b.group], [&a.name, &b.name]).map(|plan| self.plans.plan(plan))
     }
 
     /// Adds an object.
@@ -209,14 +209,14 @@ impl World {
         self.state.forget(&self.bodies);
     }
 
-    /// Which of two bodies' pairs is searched and how: `None` when rules or two static bodies rule it out.
-    pub(super) fn pair_plan(&self, i: u32, j: u32) -> Option<PairPlan> {
+    /// Index of the plan by which the pair of two bodies is searched: `None` when rules or two static bodies rule it out.
+    pub(super) fn pair_plan(&self, i: u32, j: u32) -> Option<u32> {
         let (a, b) = (&self.bodies[i as usize], &self.bodies[j as usize]);
         if a.is_static && b.is_static {
             return None;
         }
-        let plan = self.plans.of([a.group, b.group], [&a.name, &b.name]).copied();
-        debug_assert!(plan.is_none_or(|p| p.detect != Detect::Off));
+        let plan = self.plans.of([a.group, b.group], [&a.name, &b.name]);
+        debug_assert!(plan.is_none_or(|p| self.plans.plan(p).detect != Detect::Off));
         plan
     }
 

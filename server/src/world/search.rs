@@ -11,10 +11,10 @@ use super::body::Body;
 use super::coherence::{Finding, Knowledge, Question};
 use super::plan::PairPlan;
 use super::step::StepOptions;
-use crate::contact::{self, Outcome, PairQuery, PairSearch, Scratch, Status};
+use crate::contact::{self, Asked, Outcome, PairQuery, PairSearch, Scratch, Status};
 use crate::math::tolerance;
 use crate::motion::Placed;
-use contactd_proto::{Detect, Motion};
+use contactd_proto::{Detect, Motion, Report};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -35,6 +35,8 @@ pub struct PairJob {
     pub b: u32,
     /// How it is searched.
     pub plan: PairPlan,
+    /// The same as an index: jobs are in its order, so those of one plan stand together.
+    pub plan_index: u32,
     /// Its resolution.
     pub resolution: f64,
     /// The swept boxes meet; otherwise they prove the pair clear.
@@ -51,7 +53,7 @@ impl PairJob {
     /// A pair that is clear unless it is asked about and turns out otherwise.
     pub fn new(
         (a, b): (u32, u32),
-        plan: PairPlan,
+        (plan_index, plan): (u32, PairPlan),
         resolution: f64,
         near: bool,
         pair: Option<usize>,
@@ -59,13 +61,13 @@ impl PairJob {
     ) -> Self {
         let known = pair.is_none();
         let found = Finding { outcome: Outcome::clear(resolution), room: 0.0, known, apart: known };
-        Self { a, b, plan, resolution, near, pair, knowledge, found }
+        Self { a, b, plan, plan_index, resolution, near, pair, knowledge, found }
     }
 
     fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
         let query = query(bodies, self, options);
         let pair = [self.a, self.b].map(|i| &bodies[i as usize]);
-        Question { bodies: pair, query, margin: self.plan.margin, clock }
+        Question { bodies: pair, query, margin: self.plan.reach(), clock }
     }
 
     fn take(&mut self, q: &Question, outcome: Outcome) {
@@ -222,8 +224,15 @@ pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions
         resolution: job.resolution,
         cell_limit: if options.cell_limit == 0 { contact::DEFAULT_CELL_LIMIT } else { options.cell_limit },
         ideas: contact::Ideas::default(),
-        penetration: job.plan.penetration,
+        asked: asked(&job.plan, options),
     }
+}
+
+/// What is asked of a search. The scene's first contact is the earliest: a mere hit needs its time, too.
+fn asked(plan: &PairPlan, options: &StepOptions) -> Asked {
+    let asked = plan.asked();
+    let report = if options.first { asked.report.max(Report::Time) } else { asked.report };
+    Asked { report, ..asked }
 }
 
 /// A discrete pair's answer is about the end of the step.

@@ -10,11 +10,10 @@ use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
 use super::touch;
-use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Stance, Status};
+use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Scratch, Stance, Status};
 use crate::math::Aabb;
 use contactd_proto::pose_record::Order;
-use contactd_proto::step::{EFFECT_CONTACT, EFFECT_CONTINUOUS, EFFECT_DISCRETE, EFFECT_MARGIN, EFFECT_PATCH};
-use contactd_proto::{Detect, ErrorCode, PoseRecord, Report, Track};
+use contactd_proto::{Detect, EffectCounters, ErrorCode, PoseRecord, Report, Track};
 use std::fmt;
 
 /// Why a batch was refused. The world is as it was.
@@ -113,8 +112,8 @@ pub struct StepOutcome {
     pub searched: u32,
     /// Those of them that what was known has answered. Pairs that their odometers prove apart are not even counted.
     pub known: u32,
-    /// `EFFECT_…` bits of what ran.
-    pub effects: u32,
+    /// How often each effect was worked out.
+    pub effect_counters: EffectCounters,
     /// Work of all searches.
     pub counters: Counters,
     /// Cells that one thread refined at most, of those that were shared out: how even the work was.
@@ -149,6 +148,8 @@ pub struct StepState {
     /// Keys of the told pairs, to be ordered.
     order: Vec<(i64, u32, u32, u32)>,
     searches: search::Memory,
+    /// Memory of what is asked beside the searches.
+    scratch: Scratch,
     outcome: StepOutcome,
 }
 
@@ -169,6 +170,7 @@ impl StepState {
             jobs: Vec::new(),
             order: Vec::new(),
             searches: search::Memory::default(),
+            scratch: Scratch::default(),
             outcome: StepOutcome::default(),
         }
     }
@@ -293,15 +295,19 @@ impl World {
         }
     }
 
-    /// Fills the jobs: the pairs to ask about, in the order of their ids; every pair when all are to be told.
+    /// Fills the jobs: the pairs to ask about, plan by plan in the order of their ids; every pair when all are to be told.
     fn find_pairs(&mut self, options: &StepOptions) {
         let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
         let mut stances = std::mem::take(&mut self.state.stances);
         let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
-        let plan = |i: u32, j: u32| Some((self.pair_plan(i, j)?, self.resolution_of(i, j)));
-        neighbours.update(&self.bodies, &self.state.moving, |body| self.touch(body), plan);
+        let plan = |i: u32, j: u32| {
+            let index = self.pair_plan(i, j)?;
+            Some((index, *self.plans.plan(index), self.resolution_of(i, j)))
+        };
+        let reach = |body: &Body| self.touch(body) + 0.5 * self.plans.margin_of(body.group);
+        neighbours.update(&self.bodies, &self.state.moving, reach, plan);
         boxes.resize(self.bodies.len(), (0, Aabb::EMPTY));
         let mut swept = |i: u32| {
             let (serial, place) = &mut boxes[i as usize];
@@ -318,21 +324,29 @@ impl World {
             // The caller wants a line for every pair: the excluded ones are listed too.
             let count = self.bodies.len() as u32;
             for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
-                let Some((plan, resolution)) = plan(i, j) else { continue };
-                let near = swept(i).meets(&swept(j));
+                let Some((index, plan, resolution)) = plan(i, j) else { continue };
+                // By the boxes' sides, as f measures: bodies whose corners are farther apart may be within it.
+                let reach = 0.5 * plan.reach();
+                let near = swept(i).grown(reach).meets(&swept(j).grown(reach));
                 let pair = neighbours.find(i, j).filter(|pair| near && !neighbours.is_apart(*pair));
                 let knowledge = pair.map(|pair| neighbours.lend(pair)).unwrap_or_default();
-                jobs.push(PairJob::new((i, j), plan, resolution, near, pair, knowledge));
+                jobs.push(PairJob::new((i, j), (index, plan), resolution, near, pair, knowledge));
+            }
+            if self.plans.count() > 1 {
+                jobs.sort_unstable_by_key(|job| (job.plan_index, job.a, job.b));
             }
         } else {
             asked.clear();
             neighbours.asked(|pair| asked.push(pair));
+            if self.plans.count() > 1 {
+                asked.sort_unstable_by_key(|pair| (neighbours.entry(*pair).plan_index, *pair));
+            }
             for &pair in &asked {
                 let (i, j) = neighbours.bodies(pair);
                 let entry = neighbours.entry(pair);
-                let (plan, resolution) = (entry.plan, entry.resolution);
+                let (plan, resolution) = ((entry.plan_index, entry.plan), entry.resolution);
                 let met = entry.met;
-                let glance = if met || plan.detect == Detect::Discrete {
+                let glance = if met || plan.1.detect == Detect::Discrete {
                     None
                 } else {
                     self.glance((i, j), entry, &mut stances)
@@ -350,10 +364,10 @@ impl World {
                     continue;
                 }
                 neighbours.box_tests += 1;
-                let gap = swept(i).distance(&swept(j));
-                if gap > 0.0 {
-                    if plan.detect != Detect::Discrete {
-                        neighbours.note(pair, gap);
+                let (reach, boxes) = (plan.1.reach(), [swept(i), swept(j)]);
+                if !boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach)) {
+                    if plan.1.detect != Detect::Discrete {
+                        neighbours.note(pair, boxes[0].distance(&boxes[1]) - reach);
                     }
                     continue;
                 }
@@ -379,16 +393,17 @@ impl World {
                 *place = (self.state.serial, Some(hull.stance(&body.track)));
             }
         }
-        let touch = entry.plan.margin.max(2.0 * entry.resolution);
+        let touch = entry.plan.reach().max(2.0 * entry.resolution);
         let stances = [stances[i as usize].1.as_ref()?, stances[j as usize].1.as_ref()?];
         let models = [&*self.bodies[i as usize].part.model, &*self.bodies[j as usize].part.model];
         Some(Glancing::new(models, stances, touch)?.look(entry.along))
     }
 
-    /// What a body's box grows by, so that boxes of bodies within their touching distance or a margin meet.
+    /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for
+    /// that pair alone.
     fn touch(&self, body: &Body) -> f64 {
         // Touching is told within twice the resolution, of which this body answers for its share.
-        0.5 * self.plans.largest_margin() + 2.0 * self.resolution.unwrap_or(body.part.resolution)
+        2.0 * self.resolution.unwrap_or(body.part.resolution)
     }
 
     /// Searches the jobs and orders what they found.
@@ -411,40 +426,51 @@ impl World {
         let mut earliest = f64::INFINITY;
         // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
         let mut left = search::batch_limit(options);
-        for (i, job) in state.jobs.iter_mut().enumerate() {
-            let mut outcome = job.found.outcome;
-            let outcome = &mut outcome;
-            let regions_complete = touch::decide(bodies, job, options, &mut left, outcome);
-            out.counters += outcome.counters;
-            out.searched += u32::from(job.near);
-            out.known += u32::from(job.near && job.found.known);
-            out.effects |= effects_of(&job.plan, job.near);
-            out.safe_time = out.safe_time.min(outcome.time_lower);
-            if job.near && job.plan.detect == Detect::Discrete && passes(job, bodies) {
-                out.may_have_passed += u64::from(outcome.status == Status::Clear);
+        let mut before = 0;
+        for jobs in state.jobs.chunk_by_mut(|p, q| p.plan_index == q.plan_index) {
+            let plan = jobs[0].plan;
+            let discrete = plan.detect == Detect::Discrete;
+            for (i, job) in (before..).zip(jobs.iter_mut()) {
+                let mut outcome = job.found.outcome;
+                let outcome = &mut outcome;
+                let (effects, scratch) = (&mut out.effect_counters, &mut state.scratch);
+                let regions_complete = touch::decide(bodies, job, options, &mut left, effects, scratch, outcome);
+                out.counters += outcome.counters;
+                out.searched += u32::from(job.near);
+                out.known += u32::from(job.near && job.found.known);
+                count_effects(job, bodies, outcome, effects);
+                out.safe_time = out.safe_time.min(outcome.time_lower);
+                if discrete && job.near && outcome.status == Status::Clear && passes(job, bodies) {
+                    out.may_have_passed += 1;
+                }
+                if matches!(outcome.status, Status::Contact | Status::Overlap) {
+                    out.contact = true;
+                    // A sensor stops nothing, and of a mere hit nobody knows when it comes.
+                    if !plan.sensor && plan.report >= Report::Time {
+                        earliest = earliest.min(outcome.time);
+                    }
+                }
+                if is_told(&plan, outcome, options) {
+                    let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
+                    out.pairs.push(PairOutcome {
+                        a,
+                        b,
+                        plan,
+                        outcome: *outcome,
+                        job: i,
+                        regions_complete,
+                        regions: (0, 0),
+                        patch_slots: (0, 0),
+                    });
+                }
             }
-            if matches!(outcome.status, Status::Contact | Status::Overlap) {
-                out.contact = true;
-                earliest = earliest.min(outcome.time);
-            }
-            if is_told(&job.plan, outcome, options) {
-                let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
-                out.pairs.push(PairOutcome {
-                    a,
-                    b,
-                    plan: job.plan,
-                    outcome: *outcome,
-                    job: i as u32,
-                    regions_complete,
-                    regions: (0, 0),
-                    patch_slots: (0, 0),
-                });
-            }
+            before += jobs.len() as u32;
         }
         out.undecided = state.jobs.iter().any(|job| is_undecided_before(&job.found.outcome, earliest));
         if options.first {
             keep_first(&mut out.pairs);
         }
+        out.effect_counters.sensors = out.pairs.iter().filter(|p| p.plan.sensor).count() as u64;
         order(&mut out.pairs, &mut state.order);
         if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
             out.pairs.truncate(options.max_records as usize);
@@ -474,15 +500,22 @@ fn check_motion(body: &Body, track: &Track, dt: f64) -> Result<(), ErrorCode> {
     if turns || fast { Err(ErrorCode::Declaration) } else { Ok(()) }
 }
 
-fn effects_of(plan: &PairPlan, near: bool) -> u32 {
-    if !near {
-        return 0;
+/// Counts what was worked out for a pair in this step; what was known of it costs nothing.
+fn count_effects(job: &PairJob, bodies: &[Body], outcome: &Outcome, counters: &mut EffectCounters) {
+    if job.near && !job.found.known {
+        let tracks = [job.a, job.b].map(|i| &bodies[i as usize].track);
+        if job.plan.detect == Detect::Discrete {
+            counters.discrete += 1;
+        } else if tracks.iter().any(|t| !t.is_rest()) {
+            counters.continuous += 1;
+            counters.turning += u64::from(tracks.iter().any(|t| t.motion.spin != glam::DVec3::ZERO));
+        }
     }
-    let detect = if plan.detect == Detect::Discrete { EFFECT_DISCRETE } else { EFFECT_CONTINUOUS };
-    let contact = if plan.report >= Report::Contact { EFFECT_CONTACT } else { 0 };
-    let patch = if plan.report >= Report::Patch { EFFECT_PATCH } else { 0 };
-    let margin = if plan.margin > 0.0 { EFFECT_MARGIN } else { 0 };
-    detect | contact | patch | margin
+    let c = &outcome.counters;
+    counters.times += c.times;
+    counters.contacts += c.contacts;
+    counters.penetrations += c.penetrations;
+    counters.past_overlaps += c.past_overlaps;
 }
 
 /// True when a discrete pair moved by more than the smaller body's smallest dimension.
@@ -501,7 +534,10 @@ impl StepOutcome {
 fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
     match o.status {
         Status::Contact | Status::Overlap | Status::Undecided => true,
-        Status::Clear => options.clear || (o.touching && (plan.margin > 0.0 || plan.report >= Report::Patch)),
+        Status::Clear => {
+            let near = o.touching && (plan.margin > 0.0 || plan.report >= Report::Patch);
+            options.clear || near || o.margin_time < 1.0
+        }
     }
 }
 
@@ -517,7 +553,10 @@ fn order(pairs: &mut [PairOutcome], keys: &mut Vec<(i64, u32, u32, u32)>) {
         let bits = time.to_bits() as i64;
         bits ^ (((bits >> 63) as u64) >> 1) as i64
     };
-    keys.extend(pairs.iter().enumerate().map(|(i, p)| (bits(p.outcome.time), p.a, p.b, i as u32)));
+    // A mere hit has no time that is told: its field is 0.
+    let told = |p: &PairOutcome| p.plan.report >= Report::Time || p.outcome.status == Status::Clear;
+    let time = |p: &PairOutcome| if told(p) { p.outcome.time } else { 0.0 };
+    keys.extend(pairs.iter().enumerate().map(|(i, p)| (bits(time(p)), p.a, p.b, i as u32)));
     keys.sort_unstable();
     // The place of each cycle's beginning is filled last.
     for i in 0..keys.len() {

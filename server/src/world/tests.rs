@@ -309,6 +309,7 @@ fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
     for (rule, details) in
         [(rule(Report::Patch, 0.0), false), (rule(Report::Patch, 0.0), true), (rule(Report::Contact, 1e-3), true)]
     {
+        let near = if rule.margin > 0.0 { wire::WITHIN_MARGIN } else { 0 };
         let mut world = resting(Some(rule));
         world.step(&[], &StepOptions::default()).unwrap();
         let out = world.outcome();
@@ -319,7 +320,8 @@ fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
         assert_eq!(total, 2 * if details { 4 } else { 3 });
         let slots: Vec<_> = (0..total).map(|i| record::slot(&world, out, details, i)).collect();
         for (r, x) in slots[..2].iter().zip([0.0, 3.0]) {
-            assert_eq!((r.status, r.flags, r.separation, r.normal_speed), (wire::CLEAR, wire::TOUCHING, 0.0, 0.0));
+            assert_eq!((r.status, r.flags), (wire::CLEAR, wire::TOUCHING | near));
+            assert_eq!((r.separation, r.normal_speed), (0.0, 0.0));
             assert_eq!(r.normal, [0.0, 0.0, 1.0]);
             assert!(r.valid & wire::VALID_POINT != 0 && r.valid & wire::VALID_KIND != 0);
             let own = &slots[r.slot as usize..][..r.slots as usize];

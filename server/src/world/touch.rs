@@ -10,13 +10,13 @@ use super::search::{self, PairJob};
 use super::step::{StepOptions, StepOutcome};
 use crate::contact::clearance;
 use crate::contact::separation::Within;
-use crate::contact::{Outcome, PairQuery, Status, region};
-use contactd_proto::Report;
+use crate::contact::{Outcome, PairQuery, Scratch, Status, region};
+use contactd_proto::{Detect, EffectCounters, Report};
 
 /// True when regions are told of a pair. A step that asks for its first contact has no use for clear pairs.
 fn is_asked(job: &PairJob, options: &StepOptions, outcome: &Outcome) -> bool {
-    let asked = job.plan.margin > 0.0 || job.plan.report >= Report::Patch;
-    job.near && asked && (outcome.status == Status::Contact || !options.first)
+    // Where bodies are in each other their surfaces cut: no place in which they touch.
+    job.near && job.plan.tells_regions() && !outcome.past && (outcome.status == Status::Contact || !options.first)
 }
 
 /// What may be spent on a pair beside its search.
@@ -27,18 +27,25 @@ fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions, outcome: 
     query
 }
 
-/// Decides whether a pair touches at the start, where its rule asks. False when the work ran out before that was known:
+/// Decides whether a pair touches at the start, where its rule asks, and when a clear one comes within its margin. False when the work ran out before that was known:
 /// such a pair is told as touching, which a loop that solves resting contacts is safe to believe.
 pub(super) fn decide(
     bodies: &[Body],
     job: &mut PairJob,
     options: &StepOptions,
     left: &mut u64,
+    effects: &mut EffectCounters,
+    scratch: &mut Scratch,
     outcome: &mut Outcome,
 ) -> bool {
-    // The flag stands beside every contact, whether regions are asked or not.
-    let is_told = outcome.status == Status::Contact || is_asked(job, options, outcome);
-    if outcome.touching || job.found.apart || !is_told {
+    // The flag stands beside every contact whose time is told, whether regions are asked or not.
+    let margin = job.near && job.plan.margin > 0.0;
+    let is_told = outcome.status == Status::Contact || margin || is_asked(job, options, outcome);
+    let clear = outcome.status == Status::Clear;
+    if outcome.touching && margin && clear {
+        outcome.margin_time = 0.0;
+    }
+    if outcome.touching || job.found.apart || !is_told || job.plan.report < Report::Time && !margin {
         return true;
     }
     if outcome.status == Status::Contact && outcome.time == 0.0 {
@@ -46,15 +53,32 @@ pub(super) fn decide(
         return true;
     }
     if let Some(told) = told(job) {
-        outcome.touching = told.outcome.touching;
+        (outcome.touching, outcome.margin_time) = (told.outcome.touching, told.outcome.margin_time);
         return true;
     }
-    let query = query(bodies, job, options, outcome, *left);
-    let (within, cells) = clearance::touching(&query, region::threshold(outcome.resolution, job.plan.margin));
+    effects.margins += u64::from(margin);
+    let threshold = region::threshold(outcome.resolution, job.plan.margin);
+    let at_start = query(bodies, job, options, outcome, *left);
+    let (within, cells) = clearance::touching(&at_start, threshold);
     outcome.touching = within != Within::Apart;
+    if outcome.touching && margin && clear {
+        outcome.margin_time = 0.0;
+    }
     outcome.counters.instant_cells += cells;
     *left = left.saturating_sub(cells);
-    if within == Within::Apart && outcome.status == Status::Clear {
+    if margin && within == Within::Apart && clear && job.plan.detect != Detect::Discrete {
+        let mut query = query(bodies, job, options, outcome, *left);
+        query.cell_limit = query.cell_limit.min(region::MOST_CELLS);
+        let (until, known, work) = clearance::apart_until(&query, threshold, scratch);
+        let cells = work.cells + work.instant_cells;
+        outcome.margin_time = until;
+        outcome.counters.instant_cells += cells;
+        *left = left.saturating_sub(cells);
+        if !known {
+            return false;
+        }
+    }
+    if within == Within::Apart && clear {
         job.knowledge.tell(Told { outcome: *outcome, regions: Vec::new() });
     }
     within != Within::Open
@@ -87,6 +111,9 @@ pub(super) fn find_regions(
             let query = query(bodies, job, options, &p.outcome, left);
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
             let found = region::complete(&query, &mut p.outcome, threshold);
+            let touches =
+                p.outcome.status == Status::Contact || (p.outcome.status == Status::Clear && p.outcome.touching);
+            out.effect_counters.patches += u64::from(touches);
             out.counters.instant_cells += found.cells;
             left = left.saturating_sub(found.cells);
             p.regions_complete &= found.complete;

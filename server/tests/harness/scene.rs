@@ -27,7 +27,8 @@ pub fn build<T: Transport>(session: &mut Session<T>, pegs: u32) -> Vec<u32> {
         ids.push(session.add_object(Object::new(&format!("peg {i}"), peg.id).group("pegs").at(at)).expect("an object"));
     }
     let rule = |a: &str, b: &str| Rule::new([a.into(), b.into()]);
-    session.set_rules(&[rule("cell", "pegs"), rule("pegs", "pegs")]).expect("rules");
+    let deep = Rule { penetration: true, ..rule("cell", "pegs") };
+    session.set_rules(&[deep, Rule { sensor: true, ..rule("pegs", "pegs") }]).expect("rules");
     ids
 }
 

@@ -4,7 +4,7 @@
 use super::{Reader, Target, sound};
 use crate::reference::{self, Effort, Moving, Verdict};
 use crate::scenes::Recipe;
-use contactd::contact::{Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
+use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd::solid::Op;
@@ -113,7 +113,7 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
         resolution,
         cell_limit: CELLS,
         ideas: Default::default(),
-        penetration: true,
+        asked: Asked::DEPTH,
     };
     let o = earliest_contact(&query, &mut Scratch::default());
     sound(&o)?;

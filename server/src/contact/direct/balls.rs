@@ -12,6 +12,7 @@
 //!
 //! Balls in the origins of their objects, the common case, need nothing else of a pair (`quick`).
 
+use super::super::asked::Asked;
 use super::super::outcome::{Outcome, Status};
 use super::super::pair::{self, INCIDENT, PairQuery};
 use super::super::rounding;
@@ -68,7 +69,7 @@ pub fn quick(query: &PairQuery, out: &mut Outcome) -> Option<()> {
         delta: query.resolution,
         rounding,
     };
-    balls.meet(out)?;
+    balls.meet(query.asked, out)?;
     if swapped && out.status != Status::Clear {
         out.swap_sides();
     }
@@ -90,7 +91,7 @@ fn centered(body: &pair::Body) -> Option<(f64, u32)> {
 
 /// Fills in the contact of two balls that do not turn, or leaves `out` clear where they miss each other; `None` leaves
 /// them to others: they start too near or come within rounding of depth delta.
-pub fn meet(pair: &Pair, radii: [f64; 2], out: &mut Outcome) -> Option<()> {
+pub fn meet(pair: &Pair, radii: [f64; 2], asked: Asked, out: &mut Outcome) -> Option<()> {
     let motion = &pair.bodies[0].placed.motion;
     let balls = Balls {
         radii,
@@ -102,12 +103,12 @@ pub fn meet(pair: &Pair, radii: [f64; 2], out: &mut Outcome) -> Option<()> {
         delta: pair.delta,
         rounding: pair.rounding,
     };
-    balls.meet(out)
+    balls.meet(asked, out)
 }
 
 impl Balls {
     #[inline(always)]
-    fn meet(&self, out: &mut Outcome) -> Option<()> {
+    fn meet(&self, asked: Asked, out: &mut Outcome) -> Option<()> {
         let (c, v) = (self.way, self.velocity);
         let (sum, least) = (self.radii[0] + self.radii[1], excluded(self.delta, self.rounding));
         let apart = c.length_squared();
@@ -143,10 +144,15 @@ impl Balls {
         if !(ordered && is_deep && gap.abs() <= INCIDENT * self.rounding && gap > least) {
             return None;
         }
-        let n = way * (each - e * each);
         out.counters.closed_forms += 1;
         out.status = Status::Contact;
         (out.time_lower, out.time, out.time_upper) = (touch, touch, deep);
+        out.counters.times += u64::from(asked.time());
+        if !asked.point() {
+            return Some(());
+        }
+        out.counters.contacts += 1;
+        let n = way * (each - e * each);
         out.point = self.center + self.own * touch + n * self.radii[0];
         out.normal = n;
         out.normal_speed = n.dot(v);

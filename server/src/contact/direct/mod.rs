@@ -50,6 +50,8 @@ const ROUNDS: usize = 24;
 const PROOF: usize = 24;
 /// Distance evaluations that a proof of a kept distance may take, and the shortest time that another one is worth.
 const KEPT: u64 = 6;
+/// The same for the time at which a distance is reached.
+const NEARED: u64 = 200;
 const SHORT: f64 = 1.0 / 32.0;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
@@ -158,7 +160,7 @@ impl<'a> Pair<'a> {
 pub(super) enum Quick {
     /// The answer.
     Told,
-    /// They overlap at the start: a point of both, in the frame of the body that carries.
+    /// They overlap at the start, as is told, and more is asked: a point of both, in the frame of the body that carries.
     Overlap(DVec3),
     /// Not the answer; perhaps a direction (world axes) that separates them at the start.
     Open(Option<DVec3>),
@@ -181,17 +183,24 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         _ => None,
     };
     let met = match balls {
-        Some(radii) if !pair.turns() => balls::meet(&pair, radii, outcome),
+        Some(radii) if !pair.turns() => balls::meet(&pair, radii, query.asked, outcome),
         _ => None,
     };
     if met.is_none() {
         let Some(start) = Start::new(&pair) else { return nothing };
         match start.look(&mut outcome.counters.closed_forms) {
-            Look::Overlap(x, _) if query.penetration => return Quick::Overlap(start.own(0, x)),
-            Look::Overlap(x, depth) => start.tell(x, depth, outcome),
+            Look::Overlap(x, depth) => {
+                start.tell(x, depth, query.asked, outcome);
+                if query.asked.penetration || query.asked.past_overlap {
+                    if swapped {
+                        outcome.swap_sides();
+                    }
+                    return Quick::Overlap(start.own(0, x));
+                }
+            }
             Look::Apart(n) => {
                 let straight = if balls.is_some() || pair.turns() { None } else { Straight::new(&pair) };
-                if straight.and_then(|straight| straight.meet(outcome)).is_none() {
+                if straight.and_then(|straight| straight.meet(query.asked, outcome)).is_none() {
                     return Quick::Open(Some(n));
                 }
             }
@@ -242,25 +251,37 @@ impl<'a> Convex<'a> {
     }
 
     /// Time until which the distance stays above `least` (a length), at least; of how many evaluations it took.
-    pub fn keeps(mut self, least: f64) -> (f64, u64) {
+    pub fn keeps(self, least: f64) -> (f64, u64) {
+        let (until, _, count) = self.advance_to(least, KEPT, SHORT);
+        (until, count)
+    }
+
+    /// The same to the end: where it stops short of 1 the distance then, a lower bound, is hardly above `least`, or what may
+    /// be spent has run out.
+    pub fn nears(self, least: f64) -> (f64, f64, u64) {
+        self.advance_to(least, NEARED, 0.0)
+    }
+
+    fn advance_to(mut self, least: f64, most: u64, shortest: f64) -> (f64, f64, u64) {
         self.advance.least = least;
         let (mut here, mut count) = (self.start, 1);
-        while here.phi > least && count < KEPT {
+        while here.phi > least && count < most {
             let m = self.advance.moment(1.0);
             let until = self.advance.proven(&here, &self.advance.gap(&m, here.n));
             if until >= 1.0 {
-                return (1.0, count);
+                return (1.0, here.phi, count);
             }
             // From where this direction gives out another one.
             let m = self.advance.moment(until);
             let Some(next) = self.advance.widest(&m, m.at.world_from_a.transpose() * here.n) else { break };
             count += 1;
-            if next.t - here.t < SHORT {
-                return (until, count);
-            }
+            let short = next.t - here.t <= shortest;
             here = next;
+            if short {
+                break;
+            }
         }
-        (here.t, count)
+        (here.t, here.phi, count)
     }
 }
 
@@ -463,6 +484,9 @@ impl<'a> Advance<'a> {
             if contact.is_none() && !near && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
                 let mend = found.distance <= MEND.0 * scale || round >= MEND.1;
                 contact = self.contact(search, &m, &found, guess.min(1.0), mend);
+                if let Some(hit) = search.hit(t) {
+                    return Some(hit);
+                }
             }
             let goal = contact.map_or(1.0, |c| c.t);
             if let Some(c) = contact {

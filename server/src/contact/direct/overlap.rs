@@ -10,7 +10,9 @@
 //! The direction is the one of three along which the bodies overlap least: the normals of the two faces that the point is
 //! nearest to, and the way between the centres.
 
+use super::super::asked::Asked;
 use super::super::outcome::{Outcome, Status};
+use super::super::pair::most_raised;
 use super::Pair;
 use super::gjk::{self, Meeting};
 use super::support::Body;
@@ -58,13 +60,13 @@ impl<'a> Start<'a> {
         Some(Self { pair, axes, bodies, centers: [bodies[0].center(), bodies[1].center()] })
     }
 
-    /// Looks for a common point of both bodies that is deeper than 2 delta, or else for a direction that separates them.
+    /// Looks for a common point of both bodies that is deeper than 2 delta, however the search may raise that, or else for a direction that separates them.
     pub fn look(&self, count: &mut u64) -> Look {
         let way = self.centers[1] - self.centers[0];
         if self.gap(way) > 0.0 {
             return Look::Apart(way);
         }
-        let least = 2.0 * self.pair.delta + self.pair.rounding;
+        let least = 2.0 * most_raised(self.pair.delta, self.pair.rounding) + self.pair.rounding;
         let (mut x, mut depth) = self.deepest(self.centers[0], self.centers[1]);
         if depth < least {
             *count += 1;
@@ -82,8 +84,15 @@ impl<'a> Start<'a> {
     }
 
     /// Tells an overlap by a point of both.
-    pub fn tell(&self, x: DVec3, depth: f64, out: &mut Outcome) {
+    pub fn tell(&self, x: DVec3, depth: f64, asked: Asked, out: &mut Outcome) {
         let pair = self.pair;
+        out.status = Status::Overlap;
+        out.touching = true;
+        (out.time_lower, out.time, out.time_upper) = (0.0, 0.0, 0.0);
+        if !asked.point() {
+            return;
+        }
+        out.counters.contacts += 1;
         let faces = [0, 1].map(|k| nearest_face(pair.primitives[k], self.own(k, x)));
         let way = (self.centers[1] - self.centers[0]).try_normalize();
         let of_faces = [self.axes[0] * faces[0].1, -(self.axes[1] * faces[1].1)];
@@ -94,9 +103,6 @@ impl<'a> Start<'a> {
                 normal = (gap, n);
             }
         }
-        out.status = Status::Overlap;
-        out.touching = true;
-        (out.time_lower, out.time, out.time_upper) = (0.0, 0.0, 0.0);
         out.point = pair.point(x, 0.0);
         out.normal = normal.1.normalize();
         out.separation = -2.0 * depth;

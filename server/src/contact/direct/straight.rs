@@ -20,6 +20,7 @@
 //! The point follows from the features, the witness of depth delta from one linear step or a few, and both trees confirm it. What
 //! does not settle, starts near, or meets in more than its faces tell is left to the advance.
 
+use super::super::asked::Asked;
 use super::super::literal::Side;
 use super::super::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
 use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
@@ -272,7 +273,7 @@ impl<'a> Straight<'a> {
     }
 
     /// Fills in the earliest contact, or leaves `out` clear; `None` leaves the pair to others. Tries are counted.
-    pub fn meet(&self, out: &mut Outcome) -> Option<()> {
+    pub fn meet(&self, asked: Asked, out: &mut Outcome) -> Option<()> {
         let (c, w) = (self.pair.way, self.pair.velocity);
         let free = excluded(self.pair.delta, self.pair.rounding).max(0.0);
         let [a, b] = &self.bodies;
@@ -322,7 +323,7 @@ impl<'a> Straight<'a> {
                 }
                 out.counters.closed_forms += 1;
                 if let Some((n, shown)) = self.settle(n / length, TRIES[next - 1].1)
-                    && self.contact(n, &shown, out).is_some()
+                    && self.contact(n, &shown, asked, out).is_some()
                 {
                     return Some(());
                 }
@@ -440,7 +441,7 @@ impl<'a> Straight<'a> {
     }
 
     /// Tells the contact along n if both trees confirm it, or leaves `out` clear if it comes after the step.
-    fn contact(&self, n: DVec3, shown: &[Shown; 2], out: &mut Outcome) -> Option<()> {
+    fn contact(&self, n: DVec3, shown: &[Shown; 2], asked: Asked, out: &mut Outcome) -> Option<()> {
         let pair = self.pair;
         let [a, b] = &self.bodies;
         let phi = -b.reach(-n) - a.reach(n);
@@ -519,6 +520,14 @@ impl<'a> Straight<'a> {
         }
         out.status = Status::Contact;
         (out.time_lower, out.time, out.time_upper) = (t, t, deep_t);
+        out.counters.times += u64::from(asked.time());
+        if !asked.point() {
+            // The faces were needed to trust the time.
+            (out.faces_a, out.faces_b) = ([NO_FACE; 3], [NO_FACE; 3]);
+            (out.kind, out.extent) = (Kind::FaceFace, Extent::Point);
+            return Some(());
+        }
+        out.counters.contacts += 1;
         out.point = pair.point(x, t);
         out.normal = n;
         out.normal_speed = speed;

@@ -5,7 +5,7 @@ use super::proof::{Verdict, Wall};
 use super::{Pair, parts};
 use crate::contact::literal::Side;
 use crate::contact::{
-    Body, Ideas, Outcome, PairQuery, PairSearch, Scratch, Status, default_resolution, earliest_contact,
+    Asked, Body, Ideas, Outcome, PairQuery, PairSearch, Scratch, Status, default_resolution, earliest_contact,
 };
 use crate::eco::Model;
 use crate::eco::testing::{pierced, simple};
@@ -31,7 +31,7 @@ fn ask(a: (&Model, Motion), b: (&Model, Motion), ideas: Ideas) -> Outcome {
         resolution: default_resolution(a.0, b.0),
         cell_limit: 100_000,
         ideas,
-        penetration: true,
+        asked: Asked::DEPTH,
     };
     earliest_contact(&query, &mut Scratch::default())
 }
@@ -289,7 +289,7 @@ fn a_proof_does_not_jump_over_an_arc() {
             resolution: default_resolution(&pipe, &ball),
             cell_limit: 1000,
             ideas: Ideas::default(),
-            penetration: true,
+            asked: Asked::DEPTH,
         };
         let (task, swapped) = PairSearch::task(&query);
         let (placed_a, placed_b) = task.relative.placed();

@@ -73,7 +73,7 @@ pub struct Regions {
 }
 
 /// Cells' worth of work that one pair's regions may cost, should its cell limit allow more.
-pub(super) const MOST_CELLS: u64 = 20_000;
+pub const MOST_CELLS: u64 = 20_000;
 /// A box with no more faces than this, of both sides together, is not halved for their number: 132 sets of them may balance.
 const FEW_FACES: usize = 8;
 /// Boxes in which curved faces may touch at several points are halved down to this part of the smaller body's radius …
@@ -107,7 +107,7 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
     found.cells = work.cells();
     if found.regions.is_empty() {
         let rest = Work::new(limit.saturating_sub(found.cells));
-        let (nearest, proven) = depth::nearest(&task, &at, threshold, &rest);
+        let (nearest, proven) = depth::nearest(&task, &at, threshold, depth::BETTER, &rest);
         found.regions.extend(nearest.map(|lowest| point_region(&bodies, &point::nearest(&bodies, &lowest))));
         found.complete &= proven;
         found.cells += rest.cells();

@@ -35,6 +35,9 @@ const FORMULA_ROUNDING: f64 = 128.0 * f64::EPSILON;
 /// Operands beyond which nobody looks whether they are apart: the test is quadratic.
 const MOST_OPERANDS: usize = 256;
 
+/// Planes beyond which a polyhedron is not cut out of one box.
+const MOST_PLANES: usize = 128;
+
 /// Polyhedra are given to nine digits or more; the box that they are cut from is so much larger.
 const LOOSE: f64 = 1e-6;
 
@@ -119,7 +122,7 @@ fn of_primitive(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> Op
         Shape::Polyhedron(_) => return of_polyhedron(solid, node, p, origin),
         Shape::HalfSpace(_) => return None,
     };
-    Some((placed(&own, &p.frame).moved(-origin), FORMULA_ROUNDING * own.volume()))
+    Some((placed(&own, &p.frame, origin), FORMULA_ROUNDING * own.volume()))
 }
 
 /// Moments of a body with ∫ z = `first` and a diagonal ∫ xxᵀ.
@@ -127,8 +130,8 @@ fn diagonal(volume: f64, first: f64, squares: DVec3) -> Moments {
     Moments([volume, 0.0, 0.0, first, squares.x, squares.y, squares.z, 0.0, 0.0, 0.0])
 }
 
-/// A body's moments in the parent of `frame`.
-fn placed(own: &Moments, frame: &Pose) -> Moments {
+/// A body's moments about a point of the parent of `frame`. One shift: there and back again would cancel.
+fn placed(own: &Moments, frame: &Pose, origin: DVec3) -> Moments {
     let turn = frame.matrix();
     let mut second = [[0.0; 3]; 3];
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
@@ -140,11 +143,15 @@ fn placed(own: &Moments, frame: &Pose) -> Moments {
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
         out.0[4 + k] = turned[i][j];
     }
-    out.moved(frame.position)
+    out.moved(frame.position - origin)
 }
 
-/// Its planes cut out of a box around it: they are what the polyhedron is, its corners follow from them.
+/// Its planes cut out of a box around it: they are what the polyhedron is, its corners follow from them. One of very many
+/// faces is left to the subdivision, whose boxes have few of them each.
 fn of_polyhedron(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> Option<(Moments, f64)> {
+    if p.faces.len() > MOST_PLANES {
+        return None;
+    }
     let region = p.aabb.grown(LOOSE * p.aabb.half().length());
     let mut tokens = vec![];
     write_node(solid, node, Sense::Positive, &|_| true, &mut tokens);

@@ -89,7 +89,7 @@ pub fn mass_properties(model: &Model, options: &MassOptions) -> Result<MassPrope
     }
     let mut found = Found::new(around);
     match closed::moments(solid, solid.root, around.center()) {
-        Some((moments, error)) => found.settle(&moments, error),
+        Some((moments, error)) => found.settle(&moments, error, 0.0),
         None => found.subdivide(model, &options),
     }
     Ok(found.answer())
@@ -122,6 +122,7 @@ struct Found {
     origin: DVec3,
     settled: MomentSums,
     settled_error: Sum,
+    settled_spread: Sum,
     /// Boxes that could be halved further; nothing in the places of those that were.
     open: Vec<Option<Voxel>>,
     boxes: u64,
@@ -129,13 +130,14 @@ struct Found {
 
 impl Found {
     fn new(around: Aabb) -> Self {
-        let (settled, settled_error) = Default::default();
-        Self { around, origin: around.center(), settled, settled_error, open: vec![], boxes: 0 }
+        let (settled, settled_error, settled_spread) = Default::default();
+        Self { around, origin: around.center(), settled, settled_error, settled_spread, open: vec![], boxes: 0 }
     }
 
-    fn settle(&mut self, moments: &Moments, error: f64) {
+    fn settle(&mut self, moments: &Moments, error: f64, spread: f64) {
         self.settled.add(moments);
         self.settled_error.add(error);
+        self.settled_spread.add(spread);
     }
 
     /// Moments of a box about the origin.
@@ -157,7 +159,7 @@ impl Found {
                 volume.add(voxel.moments.volume());
                 error.add(voxel.error);
                 if voxel.axis.is_none() {
-                    self.settle(&self.moved(&voxel), voxel.error);
+                    self.settle(&self.moved(&voxel), voxel.error, voxel.spread);
                     continue;
                 }
                 let at = free.pop().unwrap_or(self.open.len());
@@ -217,7 +219,7 @@ impl Found {
             count(voxel.error, voxel.spread, (voxel.region.center() - center).abs(), voxel.region.half());
         }
         let reach = half + offset.abs() + farthest;
-        count(self.settled_error.value(), 0.0, reach, DVec3::ZERO);
+        count(self.settled_error.value(), self.settled_spread.value(), reach, half);
         let first = DVec3::from_array(first.map(|sum| sum.value())) + farthest * volume;
         let center_error = if least > 0.0 { first / least * UPWARD } else { DVec3::INFINITY };
         // Both centres lie in the solid's box.

@@ -1,5 +1,9 @@
 //! What was imported and how, as text: kinds, bounds, mass, notes, tree.
 
+mod effects;
+
+pub use effects::effects;
+
 use crate::eco::Model;
 use crate::eco::mass::mass_properties;
 use crate::import::{Note, Scene};
