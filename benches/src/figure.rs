@@ -19,6 +19,8 @@ pub enum Stroke {
     Rings,
     /// By twos, from a dot to a ring: a median and its tail.
     Whiskers,
+    /// A bar from the lower end of x to each point; of rows only.
+    Bars,
 }
 
 /// A series of points.
@@ -65,6 +67,8 @@ const TOP: f64 = 76.0;
 const LINE: f64 = 22.0;
 /// Pixels between the series of one row.
 const APART: f64 = 7.0;
+/// Pixels of a bar.
+const THICK: f64 = 5.0;
 
 impl Axis {
     fn shows(&self, v: f64) -> bool {
@@ -186,8 +190,12 @@ impl Figure {
                 match s.stroke {
                     Stroke::Solid => d.line(w[0], w[1], color, 2.5),
                     Stroke::Dashed => d.dashed(w[0], w[1], color, 2.0, 6.0),
-                    Stroke::Rings | Stroke::Whiskers => {}
+                    Stroke::Rings | Stroke::Whiskers | Stroke::Bars => {}
                 }
+            }
+            if s.stroke == Stroke::Bars {
+                let bar = |p: &[f64; 2]| ([left, p[1] - 0.5 * THICK], [p[0] - left, THICK]);
+                points.iter().map(bar).for_each(|(at, size)| d.rectangle(at, size, Some(color), None));
             }
             if s.stroke == Stroke::Whiskers {
                 points.chunks_exact(2).for_each(|w| d.line(w[0], w[1], color.alpha(0.5), 2.0));
@@ -200,6 +208,7 @@ impl Figure {
                 Stroke::Solid => d.line([x, y], [x + 32.0, y], color, 2.5),
                 Stroke::Dashed => d.dashed([x, y], [x + 32.0, y], color, 2.0, 6.0),
                 Stroke::Whiskers => d.line([x + 2.0, y], [x + 28.0, y], color.alpha(0.5), 2.0),
+                Stroke::Bars => d.rectangle([x, y - 0.5 * THICK], [32.0, THICK], Some(color), None),
                 Stroke::Rings => {}
             }
             match s.stroke {
@@ -257,6 +266,7 @@ fn mark(d: &mut Drawing, p: [f64; 2], stroke: Stroke, k: usize, color: Color) {
     match stroke {
         Stroke::Solid => d.circle(p, 4.0, Some(color), None),
         Stroke::Dashed => d.circle(p, 2.5, Some(color), None),
+        Stroke::Bars => {}
         Stroke::Whiskers if k.is_multiple_of(2) => d.circle(p, 4.5, Some(color), None),
         Stroke::Rings | Stroke::Whiskers => d.circle(p, 4.0, None, Some((color, 1.5))),
     }
@@ -264,7 +274,14 @@ fn mark(d: &mut Drawing, p: [f64; 2], stroke: Stroke, k: usize, color: Color) {
 
 /// Places along an axis that are labelled, `most` at the most; none of rows.
 fn ticks(axis: &Axis, [low, high]: [f64; 2], most: f64) -> Vec<(f64, String)> {
-    let step = (((high - low) / most).ceil() as usize).max(1);
+    let least = ((high - low) / most).max(1.0);
+    // Of whole numbers 1, 2 or 5 times a power of ten.
+    let decade = 10f64.powf(least.log10().floor());
+    let round = [1.0, 2.0, 5.0, 10.0].map(|k| k * decade).into_iter().find(|s| *s >= least);
+    let step = match axis {
+        Axis::Linear(_) => round.unwrap_or(least) as usize,
+        _ => least.ceil() as usize,
+    };
     let label = |e: i32| match axis {
         Axis::Linear(_) => format!("{e}"),
         _ if (-2..=3).contains(&e) => format!("{}", 10f64.powi(e)),
@@ -272,7 +289,7 @@ fn ticks(axis: &Axis, [low, high]: [f64; 2], most: f64) -> Vec<(f64, String)> {
     };
     match axis {
         Axis::Rows(_) => Vec::new(),
-        _ => (low as i32..=high as i32).step_by(step).map(|e| (f64::from(e), label(e))).collect(),
+        _ => (low as i32..=high as i32).step_by(step.max(1)).map(|e| (f64::from(e), label(e))).collect(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the benchmarks share: options, races of contestants in interleaved blocks, tables with CSV, the peers' shapes.
 //!
 //! `cargo run --release -p contactd-benches --bin NAME [-- --quick] [--csv DIR]`. Each prints a table and writes it as CSV,
-//! counts beside times; `accuracy` makes a report of figures, tables and a page. Every time stands beside that of a peer
+//! counts beside times; `accuracy` and `effects` make reports of figures, tables and a page. Every time stands beside that of a peer
 //! measured in the same run, in blocks that alternate with its own; what is compared is the ratio. Nothing depends on a time
 //! but what is printed.
 //!
@@ -9,6 +9,7 @@
 //! outside the timer.
 #![forbid(unsafe_code)]
 
+pub mod effects;
 pub mod facets;
 pub mod figure;
 pub mod measure;

@@ -2,7 +2,9 @@
 
 use crate::figure::Figure;
 use crate::table::{Table, escaped};
+use std::error::Error;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// A part of a report.
 #[derive(Debug)]
@@ -69,6 +71,48 @@ const SCRIPT: &str = "const t=document.getElementById('tip');for(const c of docu
 const n=c.querySelector('title');c.addEventListener('pointerenter',()=>{if(n)n.remove();t.textContent=c.dataset.tip;t.hidden=false});\
 c.addEventListener('pointermove',e=>{t.style.left=Math.min(e.clientX+14,innerWidth-t.offsetWidth-8)+'px';t.style.top=(e.clientY+16)+'px'});\
 c.addEventListener('pointerleave',()=>{t.hidden=true})}";
+
+/// By which command a report was made, and of what build.
+pub fn made_by(bin: &str, quick: bool) -> String {
+    let build = if cfg!(debug_assertions) {
+        "debug assertions on: times are not those of a release build"
+    } else {
+        "release build"
+    };
+    let quick = if quick { " -- --quick" } else { "" };
+    format!("Made by cargo run --release -p contactd-benches --bin {bin}{quick} ({build}).")
+}
+
+/// Prints the tables of sections and writes them, their figures and their page into a folder; and the summaries between
+/// the marks of a text, if there is one.
+///
+/// # Errors
+/// The folder or the text cannot be written, or a mark is not there.
+pub fn publish(
+    (title, text): (&str, &str),
+    sections: &[Section],
+    folder: &Path,
+    words: Option<&Path>,
+) -> Result<(), Box<dyn Error>> {
+    for section in sections {
+        section.table.publish(section.name, folder)?;
+        for figure in &section.figures {
+            figure.write(folder)?;
+        }
+    }
+    let page = folder.join("index.html");
+    std::fs::write(&page, html(title, text, sections))?;
+    println!("written: {}", page.display());
+    if let Some(path) = words {
+        let mut words = std::fs::read_to_string(path)?;
+        for section in sections {
+            words = between_marks(&words, section.name, &section.summary.markdown())?;
+        }
+        std::fs::write(path, words)?;
+        println!("written: {}", path.display());
+    }
+    Ok(())
+}
 
 /// A text with what stands between the marks `<!-- NAME -->` and `<!-- /NAME -->` replaced.
 ///

@@ -4,6 +4,7 @@
 pub mod engine;
 pub mod fuzz;
 pub mod judge;
+pub mod lanes;
 pub mod openscad;
 pub mod primitive_pairs;
 pub mod random_solids;

@@ -7,7 +7,7 @@
 use clap::Parser;
 use contactd_benches::measure::Known;
 use contactd_benches::options::Options;
-use contactd_benches::page::{between_marks, html};
+use contactd_benches::page::{made_by, publish};
 use contactd_benches::race::Plan;
 use contactd_benches::report::{Context, ideas, octree, resolution, today, volumes};
 use contactd_benches::workload::classes;
@@ -31,35 +31,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     sections.push(ideas(&context)?);
     sections.push(volumes(&context));
     sections.push(octree(&context));
-    let build = if cfg!(debug_assertions) {
-        "debug assertions on: times are not those of a release build"
-    } else {
-        "release build"
-    };
     let text = format!(
-        "Made by cargo run --release -p contactd-benches --bin accuracy{} ({build}). Times are of one thread of one machine; what \
+        "{} Times are of one thread of one machine; what \
          carries over are ratios, measured in blocks that alternate. Medians stand beside the 99th percentile and the slowest: a \
          mean over easy questions hides the one that takes a second.",
-        if options.quick { " -- --quick" } else { "" }
+        made_by("accuracy", options.quick)
     );
-    for section in &sections {
-        section.table.publish(section.name, &folder)?;
-        for figure in &section.figures {
-            figure.write(&folder)?;
-        }
-    }
-    let page = folder.join("index.html");
-    std::fs::write(&page, html("contactd: what accuracy costs", &text, &sections))?;
-    println!("written: {}", page.display());
-    if in_repository {
-        let path = docs.join("accuracy.md");
-        let mut words = std::fs::read_to_string(&path)?;
-        for section in &sections {
-            words = between_marks(&words, section.name, &section.summary.markdown())?;
-        }
-        std::fs::write(&path, words)?;
-        println!("written: {}", path.display());
-    }
+    let words = in_repository.then(|| docs.join("accuracy.md"));
+    publish(("contactd: what accuracy costs", &text), &sections, &folder, words.as_deref())?;
     eprintln!("accuracy: {:.0} s", from.elapsed().as_secs_f64());
     Ok(())
 }

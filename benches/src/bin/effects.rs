@@ -1,0 +1,57 @@
+//! `effects`: what each effect costs when it is on, and that it costs nothing when it is off, as a report of figures, tables
+//! and a page.
+//!
+//! The full form takes some minutes. It writes CSV, SVG, PNG and `index.html` into `docs/effects` of the repository and the
+//! tables between the marks of `docs/effects.md`; with `--csv DIR`, or `--quick`, all of it into that folder (by default
+//! `benches/effects` in cargo's target folder) and nothing else is touched. `effects probe` is what callgrind is given to
+//! run: one scene, stepped.
+
+use clap::{Parser, Subcommand};
+use contactd_benches::effects::{Context, Probe, instructions, ladder, share, single};
+use contactd_benches::options::Options;
+use contactd_benches::page::{made_by, publish};
+use contactd_benches::race::Plan;
+use std::error::Error;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// The command line.
+#[derive(Debug, Parser)]
+struct Arguments {
+    #[command(flatten)]
+    options: Options,
+    #[command(subcommand)]
+    task: Option<Task>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Steps one scene: what instructions are counted of.
+    Probe(Probe),
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let Arguments { options, task } = Arguments::parse();
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
+    if let Some(Task::Probe(probe)) = task {
+        probe.run();
+        return Ok(());
+    }
+    let from = Instant::now();
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let in_repository = !options.quick && options.csv.is_none();
+    let folder = if in_repository { docs.join("effects") } else { options.folder().join("effects") };
+    let plan = Plan { blocks: options.pick(9, 2), least: Duration::from_millis(options.pick(5, 1)) };
+    let context = Context::new(options.pick(6, 3), plan, options.quick)?;
+    let mut sections = vec![ladder(&context), single(&context), share(&context)];
+    sections.extend(instructions(&context)?);
+    let text = format!(
+        "{} Times are of one thread of one machine, of steps that are made anew; what carries over are ratios, measured in blocks \
+         that alternate, and counts, which are the same everywhere.",
+        made_by("effects", options.quick)
+    );
+    let words = in_repository.then(|| docs.join("effects.md"));
+    publish(("contactd: what effects cost", &text), &sections, &folder, words.as_deref())?;
+    eprintln!("effects: {:.0} s", from.elapsed().as_secs_f64());
+    Ok(())
+}
