@@ -2,8 +2,8 @@
 #![allow(missing_docs)]
 
 use contactd::ipc::Embedded;
-use contactd_client::Object;
 use contactd_client::dynamics::{Body, Damping, Effects, Inertia, Penalty, Rest, Restitution, Settings, Sleep, World};
+use contactd_client::{MassOptions, Object};
 use contactd_proto::Pose;
 use contactd_proto::motion::quat_of_rotation_vector;
 use glam::{DVec3, dvec3};
@@ -35,6 +35,40 @@ fn ordinary(dt: f64) -> Settings {
         ..Effects::default()
     };
     s
+}
+
+/// A block with a hole beside its middle, as the engine weighs it: the same as by hand, and it stands on a post under its
+/// centre of mass, which is where it would tip over if the centre were that of the block.
+#[test]
+fn a_drilled_part_has_the_mass_that_its_model_has() {
+    let text = "difference() { cube(size = [4, 2, 1], center = true);
+        multmatrix([[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) { cylinder(h = 2, r1 = 0.75, r2 = 0.75, center = true); } }";
+    let mut s = ordinary(1.0 / 120.0);
+    s.effects.sleep = None;
+    let mut w = world(s);
+    let part = model(&mut w, text);
+    let properties = w.session().mass_properties(part, &MassOptions::default()).unwrap().with_density(2.0);
+    let (inertia, place) = Inertia::of_model(&properties);
+    let hole = std::f64::consts::PI * 0.75 * 0.75;
+    let center = -hole / (8.0 - hole);
+    let (mass_off, center_off) = (inertia.mass - 2.0 * (8.0 - hole), place.position.x + center);
+    assert!(mass_off.abs() <= 2.0 * properties.volume_error && center_off.abs() <= properties.center_error.x);
+    assert!(properties.volume_error < 1e-5 && properties.center_error.x < 1e-4, "{properties:?}");
+    let (block, plug) = (Inertia::cuboid(16.0, dvec3(4.0, 2.0, 1.0)), Inertia::cylinder(2.0 * hole, 0.75, 1.0));
+    let (again, at) = inertia.and(dvec3(center, 0.0, 0.0), &plug, DVec3::X);
+    let off = (again.tensor - block.tensor).to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    assert!(at.length() < 1e-5 && off < 1e-4, "hole and part are the block: off by {off}");
+    // A post of half a unit, wholly on one side of the block's middle.
+    let post = model(&mut w, &cuboid(dvec3(0.5, 1.0, 2.0)));
+    w.add(Body::fixed(Object::new("post", post)).at(Pose::at(dvec3(center, 0.0, -1.0)))).unwrap();
+    let part = Body::new(Object::new("part", part).place(place), inertia).friction(0.5);
+    let part = w.add(part.at(Pose::at(dvec3(center, 0.0, 0.5 + 1e-6)))).unwrap();
+    for _ in 0..240 {
+        w.frame().unwrap();
+    }
+    let state = w.state(part);
+    assert!((state.pose.position - dvec3(center, 0.0, 0.5)).length() < 1e-5, "{state:?}");
+    assert!(center < -0.25, "the block's middle is off the post: {center}");
 }
 
 #[test]

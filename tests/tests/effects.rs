@@ -13,12 +13,12 @@ use contactd_proto::contact_record::{
     CLEAR, CONTACT, OVERLAP, SENSOR, TOUCHING, VALID_NORMAL, VALID_POINT, VALID_TIME, WITHIN_MARGIN,
 };
 use contactd_proto::{
-    ContactRecord, DetailSlot, Detect, EffectCounters, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule,
-    StepReply,
+    ContactRecord, DetailSlot, Detect, EffectCounters, ErrorCode, InitialOverlap, Motion, Pose, PoseRecord, Report,
+    Rule, StepReply,
 };
 use contactd_tests::random_solids::Random;
 use contactd_tests::reference::{Moving, deepest};
-use contactd_tests::scenes;
+use contactd_tests::scenes::{self, Recipe};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -423,6 +423,38 @@ fn asking_for_less_changes_no_bit_of_what_remains() {
     }
     assert!(contacts > 60 && overlaps > 5 && clear > 40, "{contacts} contacts, {overlaps} overlaps, {clear} clear");
     println!("{contacts} contacts, {overlaps} overlaps, {clear} clear");
+}
+
+/// Bodies on many feet, one of which starts inside the slab that the others are about to meet: the search may come upon a
+/// contact of those first, but what starts in overlap is told so, whatever is asked.
+#[test]
+fn a_hit_is_told_only_once_the_start_is_free() {
+    let mut r = Random::new(517);
+    for i in 0..24 {
+        let inside = r.below(9);
+        let foot = |k: usize| {
+            let height = if k == inside { -r.within(1e-6, 1e-3) } else { r.within(1e-4, 2e-3) };
+            Recipe::sphere(0.7).at(2.0 * k as f64 - 8.0, r.within(-1.0, 1.0), 0.7 + height)
+        };
+        let feet = (0..9).map(foot).reduce(Recipe::union).expect("nine feet");
+        let slab = Recipe::cuboid(12.0, 3.0, 2.0).at(0.0, 0.0, -2.0);
+        let down = Motion { start: Pose::IDENTITY, velocity: DVec3::new(0.0, 0.0, -0.5), spin: DVec3::ZERO };
+        let scene = scenes::Scene::new("feet", slab, Motion::resting(Pose::IDENTITY), feet, down);
+        let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
+        let body = |model, motion| Body { model, placed: Placed { place: Pose::IDENTITY, motion } };
+        for report in [Report::Hit, Report::Time] {
+            let query = PairQuery {
+                a: body(&a, scene.motion_a),
+                b: body(&b, scene.motion_b),
+                resolution: default_resolution(&a, &b),
+                cell_limit: contactd_tests::engine::CELL_LIMIT,
+                ideas: Ideas::default(),
+                asked: Asked { report, ..Asked::CONTACT },
+            };
+            let o = earliest_contact(&query, &mut Scratch::default());
+            assert_eq!(o.status, Status::Overlap, "{i}, {report:?}: {o:?}");
+        }
+    }
 }
 
 /// Random pairs that pass each other: before the margin's time the slow reference finds them farther apart than the margin,

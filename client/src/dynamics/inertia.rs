@@ -1,5 +1,6 @@
 //! Mass and inertia of a body about its centre of mass, in the body's own frame.
 
+use contactd_proto::{MassProperties, Pose};
 use glam::{DMat3, DVec3};
 
 /// Mass properties. The body's origin is its centre of mass: where the model's is elsewhere, `Object::place` moves it.
@@ -32,6 +33,13 @@ impl Inertia {
     pub fn cylinder(mass: f64, radius: f64, height: f64) -> Self {
         let across = mass * (3.0 * radius * radius + height * height) / 12.0;
         Self::principal(mass, DVec3::new(across, across, 0.5 * mass * radius * radius))
+    }
+
+    /// A body of what a model's mass properties say, and where the model sits in its frame (`Object::place`): the centre of
+    /// mass in the origin, axes alike. `properties` are in the model's frame, of the body's density.
+    pub fn of_model(properties: &MassProperties) -> (Self, Pose) {
+        let body = Self { mass: properties.mass(), tensor: properties.inertia_matrix() };
+        (body, Pose::at(-properties.center))
     }
 
     /// The same body seen from a frame turned and moved: its centre of mass stays its own. Steiner's theorem is used by
