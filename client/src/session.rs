@@ -214,7 +214,7 @@ impl<T: Transport> Session<T> {
         match self.command(command)? {
             Answer::Loaded { faces, warnings } => {
                 self.last_model = model;
-                if T::MAY_LOSE_SERVER {
+                if self.transport.may_lose_server() {
                     self.journal.model(model, name, text, facets);
                 }
                 Ok(ModelInfo { id: model, faces, warnings })
@@ -247,7 +247,7 @@ impl<T: Transport> Session<T> {
         let spec = ObjectSpec { id, ..object.spec };
         self.done(Command::AddObject(spec.clone()))?;
         self.last_object = id;
-        if T::MAY_LOSE_SERVER {
+        if self.transport.may_lose_server() {
             self.journal.object(spec);
         }
         Ok(id)
@@ -379,7 +379,7 @@ impl<T: Transport> Session<T> {
             }
             return Err(Error::Refused { code, index, detail });
         }
-        if T::MAY_LOSE_SERVER {
+        if self.transport.may_lose_server() {
             self.journal.accepted(self.transport.loaned(), advance);
         }
         self.options.advance = 1.0;

@@ -19,7 +19,7 @@ pub struct Opened {
 /// A way to a server. One request is under way at a time.
 pub trait Transport {
     /// True when the other side can die while this one lives: then the session keeps a journal for its replay.
-    const MAY_LOSE_SERVER: bool;
+    fn may_lose_server(&self) -> bool;
 
     /// Opens a session, on the server of now.
     ///
@@ -56,4 +56,39 @@ pub trait Transport {
 
     /// The reply that was received, in place: header and slots.
     fn reply(&self) -> Option<(&StepReply, &[ContactRecord])>;
+}
+
+/// Whatever carries a session chosen at run time: one type of session for callers that cannot be generic (C, Python).
+impl<T: Transport + ?Sized> Transport for Box<T> {
+    fn may_lose_server(&self) -> bool {
+        (**self).may_lose_server()
+    }
+
+    fn open(&mut self) -> Result<Opened, Error> {
+        (**self).open()
+    }
+
+    fn command(&mut self, command: Command, timeout: Duration) -> Result<Answer, Error> {
+        (**self).command(command, timeout)
+    }
+
+    fn loan(&mut self, records: usize) -> Result<&mut [PoseRecord], Error> {
+        (**self).loan(records)
+    }
+
+    fn loaned(&self) -> &[PoseRecord] {
+        (**self).loaned()
+    }
+
+    fn send(&mut self, request: StepRequest) -> Result<(), Error> {
+        (**self).send(request)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<(), Error> {
+        (**self).receive(timeout)
+    }
+
+    fn reply(&self) -> Option<(&StepReply, &[ContactRecord])> {
+        (**self).reply()
+    }
 }

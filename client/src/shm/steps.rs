@@ -252,7 +252,9 @@ impl Link {
 }
 
 impl Transport for SharedMemory {
-    const MAY_LOSE_SERVER: bool = true;
+    fn may_lose_server(&self) -> bool {
+        true
+    }
 
     fn open(&mut self) -> Result<Opened, Error> {
         // The old link goes first: it may hold segments of a predecessor.

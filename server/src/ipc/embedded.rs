@@ -27,17 +27,22 @@ pub struct Embedded {
 /// # Errors
 /// None today; the signature is that of every session.
 pub fn embedded(config: &ServerConfig) -> Result<Session<Embedded>, Error> {
-    Session::new(Embedded {
-        models: Arc::new(Models::new(config)),
-        scene: Scene::new(config),
-        max_batch: config.batch as u32,
-        records: Vec::new(),
-        slots: Vec::new(),
-        reply: None,
-    })
+    Session::new(Embedded::new(config))
 }
 
 impl Embedded {
+    /// An engine without a session; for callers that choose the transport at run time.
+    pub fn new(config: &ServerConfig) -> Self {
+        Self {
+            models: Arc::new(Models::new(config)),
+            scene: Scene::new(config),
+            max_batch: config.batch as u32,
+            records: Vec::new(),
+            slots: Vec::new(),
+            reply: None,
+        }
+    }
+
     fn import(&mut self, import: Import) -> Answer {
         let loaded = self.models.load(&import.name, &import.text, import.facets);
         self.scene.loaded(import.model, loaded)
@@ -45,7 +50,9 @@ impl Embedded {
 }
 
 impl Transport for Embedded {
-    const MAY_LOSE_SERVER: bool = false;
+    fn may_lose_server(&self) -> bool {
+        false
+    }
 
     fn open(&mut self) -> Result<Opened, Error> {
         Ok(Opened { session: 1, epoch: 0, max_batch: self.max_batch })
