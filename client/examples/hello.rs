@@ -25,7 +25,7 @@ fn main() -> Result<(), Error> {
 }
 
 /// What is printed: a line for each record.
-pub fn hello(mut session: Session<Box<dyn Transport>>) -> Result<String, Error> {
+pub fn hello<T: Transport>(mut session: Session<T>) -> Result<String, Error> {
     let plate = session.load_model("plate.csg", PLATE)?;
     let ball = session.load_model("ball.csg", BALL)?;
     session.add_object(Object::new("plate", plate.id).fixed())?;

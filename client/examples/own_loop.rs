@@ -8,11 +8,13 @@ use contactd_client::{Error, Object};
 use glam::DVec3;
 use std::time::Duration;
 
-const ROOM: &str = "union() {
+/// A hollow cube with a pillar in it.
+pub const ROOM: &str = "union() {
     difference() { cube(size = [12, 12, 12], center = true); cube(size = [10, 10, 10], center = true); }
     cylinder(h = 11, r1 = 1.5, r2 = 1.5, center = true);
 }";
-const STEP: f64 = 0.25;
+/// Seconds of a step.
+pub const STEP: f64 = 0.25;
 
 fn main() -> Result<(), Error> {
     print!("{}", bounces()?);
