@@ -10,7 +10,7 @@
 //! range, calls out of order, from another thread, or from within a call. What cannot be seen from here is promised by the
 //! caller, and every `unsafe` below rests on it:
 //! 1. a pointer is NULL or points to as many valid elements of its type as the function says; nobody else writes to them
-//!    during the call;
+//!    during the call, and no two out parameters are the same variable;
 //! 2. strings end with a zero byte;
 //! 3. a session's handle came from `contactd_connect` or `contactd_embedded` and was not closed since (closing sets the
 //!    caller's variable to NULL; copies of it are the caller's business);

@@ -100,7 +100,7 @@ fn compare<T: Transport>(session: &Open, own: &mut Session<T>, ball: u32, steps:
 fn a_server_answers_c_with_the_bits_of_an_embedded_rust_session() {
     let runtime = tempfile::Builder::new().prefix("ctd").tempdir_in("/tmp").expect("a temporary folder");
     let base = runtime.path().join("contactd");
-    // SAFETY: no other thread runs yet.
+    // SAFETY: no other thread of this process looks at the environment.
     unsafe { std::env::set_var("XDG_RUNTIME_DIR", runtime.path()) };
     let name = CString::new("c").expect("a name");
     let mut session = Open(null_mut());
