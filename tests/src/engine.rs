@@ -25,14 +25,29 @@ pub fn ask_models(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f
 /// Asks about two placed models with some ideas of the search switched off.
 pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64>, ideas: Ideas) -> Outcome {
     let query = PairQuery {
-        a: Body { model: a.0, placed: a.1 },
-        b: Body { model: b.0, placed: b.1 },
         resolution: resolution.unwrap_or_else(|| default_resolution(a.0, b.0)),
-        cell_limit: CELL_LIMIT,
         ideas,
-        asked: Asked::DEPTH,
+        ..question(a, b, Asked::DEPTH)
     };
     earliest_contact(&query, &mut Scratch::default())
+}
+
+/// A question about two placed models, at the default resolution, all ideas on.
+pub fn question<'a>(a: (&'a Model, Placed), b: (&'a Model, Placed), asked: Asked) -> PairQuery<'a> {
+    PairQuery {
+        a: Body { model: a.0, placed: a.1 },
+        b: Body { model: b.0, placed: b.1 },
+        resolution: default_resolution(a.0, b.0),
+        cell_limit: CELL_LIMIT,
+        ideas: Ideas::default(),
+        asked,
+    }
+}
+
+/// A scene's question about its models, as `question`; its own resolution is not looked at.
+pub fn question_of<'a>(scene: &Scene, models: [&'a Model; 2], asked: Asked) -> PairQuery<'a> {
+    let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+    question((models[0], placed(scene.motion_a)), (models[1], placed(scene.motion_b)), asked)
 }
 
 /// Asks about a scene.

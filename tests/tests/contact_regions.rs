@@ -58,7 +58,7 @@ impl Rest {
         let query = self.moving(velocity);
         let mut o = earliest_contact(&query, &mut Scratch::default());
         let threshold = threshold(query.resolution, margin);
-        o.touching |= touching(&query, threshold).0 != Within::Apart;
+        o.touching |= touching(&query, threshold, &mut Scratch::default()).0 != Within::Apart;
         let found = complete(&query, &mut o, threshold);
         (o, found)
     }
@@ -329,8 +329,8 @@ fn touching_is_decided_by_the_margin() {
     assert_eq!(found.regions[0].points.len(), 4);
     // A curved pair that comes near only at one point is proven apart just above the threshold.
     let ball = rest(floor(), Recipe::sphere(0.5), Pose::at(dvec3(0.1, 0.2, 0.501)));
-    assert_eq!(touching(&ball.query(), 0.999e-3).0, Within::Apart);
-    assert!(matches!(touching(&ball.query(), 1.001e-3).0, Within::Witness(_)));
+    assert_eq!(touching(&ball.query(), 0.999e-3, &mut Scratch::default()).0, Within::Apart);
+    assert!(matches!(touching(&ball.query(), 1.001e-3, &mut Scratch::default()).0, Within::Witness(_)));
 }
 
 /// A body of about 20 mm that moves by 0.2 µm keeps its regions, and no point of them goes further than that.
@@ -436,7 +436,7 @@ fn any_margin_has_its_answer_within_bounded_work() {
             let mut query = s.query();
             for limit in [DEFAULT_CELL_LIMIT, 60] {
                 query.cell_limit = limit;
-                let (within, cells) = touching(&query, margin);
+                let (within, cells) = touching(&query, margin, &mut Scratch::default());
                 let found = regions(&query, 0.0, margin);
                 let says = format!("{name}, margin {margin}: {within:?} for {cells} cells, {found:?}");
                 // The last step of it may go beyond.

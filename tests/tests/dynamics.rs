@@ -26,15 +26,7 @@ fn cuboid(size: DVec3) -> String {
 
 /// Settings with the effects of an ordinary scene.
 fn ordinary(dt: f64) -> Settings {
-    let mut s = Settings::new(dt, 1.0);
-    s.effects = Effects {
-        gravity: Some(DOWN),
-        friction: true,
-        rest: Some(Rest { speed: 1e-7 }),
-        sleep: Some(Sleep { speed: 1e-3, frames: 60 }),
-        ..Effects::default()
-    };
-    s
+    Settings { effects: Effects::on_the_ground(DOWN), ..Settings::new(dt, 1.0) }
 }
 
 /// A block with a hole beside its middle, as the engine weighs it: the same as by hand, and it stands on a post under its
@@ -376,18 +368,24 @@ fn counters_are_those_worked_out_by_hand() {
     assert!((w.state(0).velocity.z - v).abs() < 1e-12);
 }
 
-#[test]
-fn springs_part_an_overlap_and_hold_a_ball_at_the_depth_of_its_weight() {
-    let mut s = Settings::new(0.005, 1.0);
-    s.effects.gravity = Some(DOWN);
-    s.effects.penalty = Some(Penalty { stiffness: 2000.0, damping: 60.0, instead_of_impulses: true });
-    let mut w = world(s);
+/// A ball of mass 2 and radius 0.5, a tenth deep in the floor.
+fn ball_in_the_floor(settings: Settings) -> (World<Embedded>, usize) {
+    let mut w = world(settings);
     let floor = model(&mut w, &cuboid(dvec3(4.0, 4.0, 1.0)));
     let ball = model(&mut w, "sphere(r = 0.5);");
     w.add(Body::fixed(Object::new("floor", floor)).at(Pose::at(dvec3(0.0, 0.0, -0.5)))).unwrap();
     let ball = w
         .add(Body::new(Object::new("ball", ball), Inertia::sphere(2.0, 0.5)).at(Pose::at(dvec3(0.0, 0.0, 0.4))))
         .unwrap();
+    (w, ball)
+}
+
+#[test]
+fn springs_part_an_overlap_and_hold_a_ball_at_the_depth_of_its_weight() {
+    let mut s = Settings::new(0.005, 1.0);
+    s.effects.gravity = Some(DOWN);
+    s.effects.penalty = Some(Penalty { stiffness: 2000.0, damping: 60.0, instead_of_impulses: true });
+    let (mut w, ball) = ball_in_the_floor(s);
     let total = w.run(4.0).unwrap();
     let depth = 0.5 - w.pose(ball).position.z;
     println!("depth {depth}, expected {}; {total:?}", 2.0 * G / 2000.0);
@@ -395,13 +393,7 @@ fn springs_part_an_overlap_and_hold_a_ball_at_the_depth_of_its_weight() {
     assert!(total.counters.penalty > 0 && total.counters.penalty == total.overlaps);
     // Beside impulses: springs push the pair apart, impulses hold it from then on.
     s.effects.penalty = Some(Penalty { stiffness: 2000.0, damping: 60.0, instead_of_impulses: false });
-    let mut w = world(s);
-    let floor = model(&mut w, &cuboid(dvec3(4.0, 4.0, 1.0)));
-    let ball = model(&mut w, "sphere(r = 0.5);");
-    w.add(Body::fixed(Object::new("floor", floor)).at(Pose::at(dvec3(0.0, 0.0, -0.5)))).unwrap();
-    let ball = w
-        .add(Body::new(Object::new("ball", ball), Inertia::sphere(2.0, 0.5)).at(Pose::at(dvec3(0.0, 0.0, 0.4))))
-        .unwrap();
+    let (mut w, ball) = ball_in_the_floor(s);
     let total = w.run(4.0).unwrap();
     println!("{} {total:?}", w.pose(ball).position.z);
     assert!((w.pose(ball).position.z - 0.5).abs() < 1e-6 && total.overlaps > 0);

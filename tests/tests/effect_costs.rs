@@ -3,11 +3,12 @@
 #![allow(missing_docs)]
 
 use contactd::contact::separation::Within;
-use contactd::contact::{Body, Counters, DEFAULT_CELL_LIMIT, Ideas, PairQuery, Scratch, Status};
-use contactd::contact::{clearance, default_resolution, earliest_contact, region};
+use contactd::contact::{Counters, DEFAULT_CELL_LIMIT, PairQuery, Scratch, Status};
+use contactd::contact::{clearance, earliest_contact, region};
 use contactd::motion::Placed;
 use contactd::world::{self, PairPlan};
 use contactd_proto::{Detect, EffectCounters, Report, Rule};
+use contactd_tests::engine::question;
 use contactd_tests::lanes::{Class, EFFECTS, Lane, Lanes, NARROW, PLAIN, WIDE, counts, rule};
 use contactd_tests::scenes::{Recipe, Scene};
 use glam::DVec3;
@@ -88,24 +89,16 @@ fn effects_of_bystanders_cost_the_others_nothing() {
 /// What a plan's own functions count for a pair of bodies when nothing else is there to be asked: the search, and for a
 /// contact whose time is told whether the pair touches at the start.
 fn alone(bodies: &[world::body::Body], plan: &PairPlan) -> Counters {
-    let side = |k: usize| Body {
-        model: &bodies[k].part.model,
-        placed: Placed { place: bodies[k].place, motion: bodies[k].track.motion },
+    let side = |k: usize| {
+        let placed = Placed { place: bodies[k].place, motion: bodies[k].track.motion };
+        (&*bodies[k].part.model, placed)
     };
-    let (a, b) = (side(0), side(1));
-    let query = PairQuery {
-        a,
-        b,
-        resolution: default_resolution(a.model, b.model),
-        cell_limit: DEFAULT_CELL_LIMIT,
-        ideas: Ideas::default(),
-        asked: plan.asked(),
-    };
+    let query = PairQuery { cell_limit: DEFAULT_CELL_LIMIT, ..question(side(0), side(1), plan.asked()) };
     let mut outcome = earliest_contact(&query, &mut Scratch::default());
     let flagged = outcome.status == Status::Contact && plan.report >= Report::Time || plan.margin > 0.0;
     if flagged && !outcome.touching && (outcome.status != Status::Contact || outcome.time > 0.0) {
         let threshold = region::threshold(outcome.resolution, plan.margin);
-        let (within, cells) = clearance::touching(&query, threshold);
+        let (within, cells) = clearance::touching(&query, threshold, &mut Scratch::default());
         outcome.counters.instant_cells += cells;
         if plan.margin > 0.0 && within == Within::Apart && outcome.status == Status::Clear {
             let query = PairQuery { cell_limit: region::MOST_CELLS, ..query };

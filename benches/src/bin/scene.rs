@@ -315,8 +315,8 @@ fn run(kind: Kind, n: usize, steps: usize) -> Result<Run, Error> {
 }
 
 /// Steps ours alone, and tells what was asked and what it cost in each tenth of the steps.
-fn profile(n: usize, steps: usize) -> Result<(), Error> {
-    let twins = Kind::Primitives.twins();
+fn profile(kind: Kind, n: usize, steps: usize) -> Result<(), Error> {
+    let twins = kind.twins();
     let paths = paths(&twins, n);
     let (mut session, ids) = session(&twins, &paths)?;
     let (mut times, mut count) = (Vec::new(), [0usize; 4]);
@@ -382,16 +382,16 @@ struct Arguments {
     #[arg(long, value_name = "NUMBER")]
     steps: Option<usize>,
     /// Ours alone, for a profiler.
-    #[arg(long)]
-    alone: bool,
+    #[arg(long, value_name = "KIND")]
+    alone: Option<Kind>,
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let Arguments { options, objects, steps, alone } = Arguments::parse();
     // Rapier's collision step runs on one thread here: so does ours.
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
-    if alone {
-        return Ok(profile(objects.unwrap_or(1_000), steps.unwrap_or(30))?);
+    if let Some(kind) = alone {
+        return Ok(profile(kind, objects.unwrap_or(1_000), steps.unwrap_or(30))?);
     }
     let mut table = Table::new(&[
         "scene",

@@ -83,15 +83,7 @@ fn moved(by: DVec3, text: &str) -> String {
 
 /// What lies and slides on the ground calls for.
 fn ordinary(dt: f64) -> Settings {
-    let mut s = Settings::new(dt, 1.0);
-    s.effects = Effects {
-        gravity: Some(DOWN),
-        friction: true,
-        rest: Some(Rest { speed: 1e-7 }),
-        sleep: Some(Sleep { speed: 1e-3, frames: 60 }),
-        ..Effects::default()
-    };
-    s
+    Settings { effects: Effects::on_the_ground(DOWN), ..Settings::new(dt, 1.0) }
 }
 
 fn bounce() -> Scene {

@@ -6,7 +6,8 @@ use contactd::import::{Facets, Limits, import_csg};
 use contactd::math::Aabb;
 use contactd::picture::drawing::{Anchor, Drawing, GREY, INK, Size};
 use contactd::picture::ray::Traced;
-use contactd::picture::view::{Camera, Rgb, Thing, View};
+use contactd::picture::scene::COLORS;
+use contactd::picture::view::{Camera, Thing, View};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
@@ -15,15 +16,6 @@ const GAP: usize = 12;
 /// Space above for the title, below for the times.
 const HEAD: usize = 52;
 const FOOT: usize = 40;
-
-const COLORS: [Rgb; 6] = [
-    [0.40, 0.44, 0.49],
-    [0.72, 0.43, 0.10],
-    [0.08, 0.22, 0.42],
-    [0.52, 0.09, 0.06],
-    [0.10, 0.31, 0.20],
-    [0.30, 0.13, 0.36],
-];
 
 /// Writes the strip as SVG and PNG; their paths.
 pub fn write(scene: &Scene, run: &Run, folder: &Path) -> Result<Vec<PathBuf>, Box<dyn std::error::Error>> {

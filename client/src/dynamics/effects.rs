@@ -22,6 +22,20 @@ pub struct Effects {
     pub penalty: Option<Penalty>,
 }
 
+impl Effects {
+    /// What lies, slides and topples on the ground calls for: gravity, friction, rest below 1e-7 and sleep below 1e-3
+    /// length/s for 60 frames.
+    pub fn on_the_ground(gravity: DVec3) -> Self {
+        Self {
+            gravity: Some(gravity),
+            friction: true,
+            rest: Some(Rest { speed: 1e-7 }),
+            sleep: Some(Sleep { speed: 1e-3, frames: 60 }),
+            ..Self::default()
+        }
+    }
+}
+
 /// Rebound: a point that meets faster than the threshold leaves at the larger coefficient of its two bodies times that speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restitution {

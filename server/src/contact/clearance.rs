@@ -50,6 +50,21 @@ fn reach(task: &Task) -> f64 {
     }
 }
 
+/// The search for a point within `level` of both bodies, which is one for a contact of that negative depth.
+fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>, Counters) {
+    task.delta = -level;
+    task.ideas.fits &= level < task.fits_below();
+    let is_empty = task.a.is_empty() || task.b.is_empty();
+    let mut search = Search::new(task, std::mem::take(scratch));
+    if !is_empty {
+        search.start();
+    }
+    let ending = search.run(f64::INFINITY);
+    let counters = search.counters;
+    *scratch = search.into_scratch();
+    (ending, counters)
+}
+
 /// A lower bound of the distance of two whole convex primitives at the start of the motion, less their touching
 /// distance (`margin`, at least 2 delta); `None` for anything else. A length; negative when they may touch.
 pub fn room(query: &PairQuery, margin: f64) -> Option<f64> {
@@ -74,22 +89,14 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
     if !(room > 0.0 && level.is_finite()) {
         return Kept { until: 0.0, room, counters: Counters::default() };
     }
-    task.delta = -level;
     task.lead = lead;
-    task.ideas.fits &= level < task.fits_below();
-    let (a, b) = (task.a, task.b);
-    let mut search = Search::new(task, std::mem::take(scratch));
-    if !a.is_empty() && !b.is_empty() {
-        search.start();
-    }
-    let until = match search.run(f64::INFINITY) {
+    let (ending, counters) = nearing(task, level, scratch);
+    let until = match ending {
         Some(Ending::Clear) | None => 1.0,
         Some(Ending::Contact(found)) => (found.goal - lead).max(0.0),
         Some(Ending::Limit(t) | Ending::Rounding(t)) => t,
         Some(Ending::Deep(_)) => 0.0,
     };
-    let counters = search.counters;
-    *scratch = search.into_scratch();
     Kept { until, room, counters }
 }
 
@@ -100,35 +107,28 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
 pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (f64, bool, Counters) {
     let (mut task, _) = PairSearch::task(query);
     task.asked = Asked::CONTACT;
-    let mut counters = Counters::default();
     if task.a.is_empty() || task.b.is_empty() {
-        return (1.0, true, counters);
+        return (1.0, true, Counters::default());
     }
     if let Some(pair) = Convex::new(task) {
         let (until, nearest, count) = pair.nears(distance + 8.0 * task.rounding);
-        counters.closed_forms += count;
+        let counters = Counters { closed_forms: count, ..Counters::default() };
         return (until, until >= 1.0 || nearest <= distance * (1.0 + MARGIN_SLACK), counters);
     }
     let level = 0.5 * distance + 8.0 * task.rounding;
     if level > 0.99 * reach(&task) {
         let work = Work::new(task.limit);
         let (until, known) = advance(&task, level, &work);
-        counters.instant_cells += work.cells();
-        return (until, known, counters);
+        return (until, known, Counters { instant_cells: work.cells(), ..Counters::default() });
     }
-    task.delta = -level;
-    task.ideas.fits &= level < task.fits_below();
-    let mut search = Search::new(task, std::mem::take(scratch));
-    search.start();
-    let (until, known) = match search.run(f64::INFINITY) {
+    let (ending, counters) = nearing(task, level, scratch);
+    let (until, known) = match ending {
         Some(Ending::Clear) | None => (1.0, true),
         Some(Ending::Contact(found)) => (found.goal.min(1.0), true),
         Some(Ending::Rounding(t)) => (t, true),
         Some(Ending::Limit(t)) => (t, false),
         Some(Ending::Deep(_)) => (0.0, true),
     };
-    counters += search.counters;
-    *scratch = search.into_scratch();
     (until, known, counters)
 }
 
@@ -180,7 +180,7 @@ fn standing(body: Body<'_>) -> Body<'_> {
 /// Whether the bodies of a question are within `distance` (a length) of each other at the start, proven or witnessed, and
 /// the cells' worth of work that it took. Within the models' reach it is the search for a contact of that negative depth, of
 /// bodies that stand still there; farther it covers the whole trees.
-pub fn touching(query: &PairQuery, distance: f64) -> (Within, u64) {
+pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Within, u64) {
     let still = PairQuery { a: standing(query.a), b: standing(query.b), ..*query };
     let (mut task, _) = PairSearch::task(&still);
     if task.a.is_empty() || task.b.is_empty() {
@@ -197,14 +197,11 @@ pub fn touching(query: &PairQuery, distance: f64) -> (Within, u64) {
         let within = separation::within(&task, &task.relative.at(0.0), level, &work);
         return (within, work.cells());
     }
-    task.delta = -level;
-    task.ideas.fits &= level < task.fits_below();
-    let mut search = Search::new(task, Scratch::default());
-    search.start();
-    let within = match search.run(f64::INFINITY) {
+    let (ending, counters) = nearing(task, level, scratch);
+    let within = match ending {
         Some(Ending::Clear) | None => Within::Apart,
         Some(Ending::Deep(x)) => Within::Witness(x),
         Some(Ending::Contact(_) | Ending::Limit(_) | Ending::Rounding(_)) => Within::Open,
     };
-    (within, search.counters.cells)
+    (within, counters.cells)
 }

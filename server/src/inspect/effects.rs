@@ -70,12 +70,11 @@ pub fn effects(scene: &Scene) -> String {
     let sum = |wanted: bool| -> u64 { lines.iter().filter(|((_, f), _)| off(f) == wanted).map(|(_, n)| n).sum() };
     let _ = writeln!(out, "  {} pairs are searched when they are near, {} never", sum(false), sum(true));
     for (([g, h], fate), count) in &lines {
-        let (Fate::Searched(words), pairs) = (fate, if *count == 1 { "pair" } else { "pairs" }) else {
-            let Fate::Off(words) = fate else { continue };
-            let _ = writeln!(out, "    {g} - {h}: {count} {}: {words}", if *count == 1 { "pair" } else { "pairs" });
-            continue;
+        let words = match fate {
+            Fate::Searched(words) => words,
+            Fate::Off(why) => *why,
         };
-        let _ = writeln!(out, "    {g} - {h}: {count} {pairs}: {words}");
+        let _ = writeln!(out, "    {g} - {h}: {count} {}: {words}", if *count == 1 { "pair" } else { "pairs" });
     }
     let not: Vec<&str> = EFFECTS.iter().filter(|(_, on)| !used.iter().any(on)).map(|(name, _)| *name).collect();
     if !(used.is_empty() || not.is_empty()) {
@@ -91,14 +90,14 @@ pub fn effects(scene: &Scene) -> String {
     }
     let _ = writeln!(
         out,
-        "  in this step {rest} objects rest (two of them: asked about the start alone), {slide} translate (no bounds of \
-         rotation), {turn} turn"
+        "  of the objects, in this step: at rest {rest} (two of them: asked about the start alone), translating {slide} (no \
+         bounds of rotation), turning {turn}"
     );
     out
 }
 
 /// Each effect's word, and whether a plan asks for it.
-const EFFECTS: [(&str, fn(&PairPlan) -> bool); 10] = [
+const EFFECTS: [(&str, fn(&PairPlan) -> bool); 9] = [
     ("continuous", |p| p.detect == Detect::Continuous),
     ("discrete", |p| p.detect == Detect::Discrete),
     ("time", |p| p.report >= Report::Time),
@@ -108,7 +107,6 @@ const EFFECTS: [(&str, fn(&PairPlan) -> bool); 10] = [
     ("margin", |p| p.margin > 0.0),
     ("ignore_if_separating", |p| p.initial_overlap == InitialOverlap::IgnoreIfSeparating),
     ("sensor", |p| p.sensor),
-    ("hit alone", |p| p.report == Report::Hit),
 ];
 
 fn words(plan: &PairPlan) -> String {
@@ -194,8 +192,8 @@ mod tests {
         assert!(text.contains("cell - robot: 4 pairs: the whole motion; time, point, normal, kind\n"), "{text}");
         assert!(text.contains("cell - cell: 1 pair: never searched: both are static"), "{text}");
         assert!(text.contains("for no pair: discrete, patch, penetration, margin"), "{text}");
-        assert!(text.contains("3 objects rest"), "{text}");
-        assert!(text.contains("1 translate (no bounds of rotation), 1 turn"), "{text}");
+        assert!(text.contains("at rest 3 (two of them"), "{text}");
+        assert!(text.contains("translating 1 (no bounds of rotation), turning 1"), "{text}");
     }
 
     #[test]

@@ -49,7 +49,8 @@ pub struct Quality {
 /// For files: a few seconds.
 pub const FINE: Quality = Quality { size: (1280, 720), samples: 4 };
 
-const COLORS: [Rgb; 8] = [
+/// Linear colours of the models of a scene, in their order.
+pub const COLORS: [Rgb; 8] = [
     [0.40, 0.44, 0.49],
     [0.72, 0.43, 0.10],
     [0.08, 0.22, 0.42],

@@ -102,7 +102,7 @@ pub struct Body {
     corners: Vec<DVec3>,
     /// Largest distance of a corner from the object's origin.
     reach: f64,
-    /// The body as one convex primitive, where it is one.
+    /// The body as one convex primitive, or one around it; `None` for a body without bounds.
     pub(super) hull: Option<Hull>,
     /// Step in which a record named it with a start, and with a motion.
     pub(super) named: [u64; 2],

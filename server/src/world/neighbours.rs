@@ -75,6 +75,8 @@ pub struct Neighbours {
     boxes: Vec<Aabb>,
     broad: BroadPhase,
     found: Vec<(u32, u32)>,
+    sorted: Vec<(u32, u32)>,
+    counts: Vec<u32>,
     stale: bool,
     /// Pairs of boxes compared in this step.
     pub box_tests: u64,
@@ -83,6 +85,27 @@ pub struct Neighbours {
 /// The sum, rounded up.
 fn up(x: f64, y: f64) -> f64 {
     if y == 0.0 { x } else { (x + y).next_up() }
+}
+
+/// Sorts pairs of numbers below `count`: by the first one through counting, and each of these few by the second.
+fn by_ids(pairs: &mut Vec<(u32, u32)>, sorted: &mut Vec<(u32, u32)>, counts: &mut Vec<u32>, count: usize) {
+    counts.clear();
+    counts.resize(count + 1, 0);
+    for (a, _) in pairs.iter() {
+        counts[*a as usize + 1] += 1;
+    }
+    for a in 0..count {
+        counts[a + 1] += counts[a];
+    }
+    sorted.clear();
+    sorted.resize(pairs.len(), (0, 0));
+    for pair in pairs.iter() {
+        let place = &mut counts[pair.0 as usize];
+        sorted[*place as usize] = *pair;
+        *place += 1;
+    }
+    sorted.chunk_by_mut(|p, q| p.0 == q.0).for_each(|of_one| of_one.sort_unstable_by_key(|p| p.1));
+    std::mem::swap(pairs, sorted);
 }
 
 impl Neighbours {
@@ -141,7 +164,7 @@ impl Neighbours {
         found.clear();
         self.broad.run(boxes, |i| bodies[i].is_static, |i, j| found.push((i.min(j), i.max(j))));
         self.box_tests += self.broad.tests;
-        found.sort_unstable();
+        by_ids(found, &mut self.sorted, &mut self.counts, bodies.len());
         // The old list beside the new one.
         std::mem::swap(&mut self.pairs, &mut self.old_pairs);
         self.pairs.clear();

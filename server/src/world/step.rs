@@ -395,8 +395,9 @@ impl World {
         }
         let touch = entry.plan.reach().max(2.0 * entry.resolution);
         let stances = [stances[i as usize].1.as_ref()?, stances[j as usize].1.as_ref()?];
-        let models = [&*self.bodies[i as usize].part.model, &*self.bodies[j as usize].part.model];
-        Some(Glancing::new(models, stances, touch)?.look(entry.along))
+        let bodies = [&self.bodies[i as usize], &self.bodies[j as usize]];
+        let hulls = [bodies[0].hull.as_ref()?, bodies[1].hull.as_ref()?];
+        Some(Glancing::new(bodies.map(|b| &*b.part.model), hulls, stances, touch)?.look(entry.along))
     }
 
     /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for

@@ -27,8 +27,9 @@ fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions, outcome: 
     query
 }
 
-/// Decides whether a pair touches at the start, where its rule asks, and when a clear one comes within its margin. False when the work ran out before that was known:
-/// such a pair is told as touching, which a loop that solves resting contacts is safe to believe.
+/// Decides whether a pair touches at the start, where its rule asks, and when a clear one comes within its margin. False when
+/// the work ran out before that was known: such a pair is told as touching, which a loop that solves resting contacts is safe
+/// to believe.
 pub(super) fn decide(
     bodies: &[Body],
     job: &mut PairJob,
@@ -59,7 +60,7 @@ pub(super) fn decide(
     effects.margins += u64::from(margin);
     let threshold = region::threshold(outcome.resolution, job.plan.margin);
     let at_start = query(bodies, job, options, outcome, *left);
-    let (within, cells) = clearance::touching(&at_start, threshold);
+    let (within, cells) = clearance::touching(&at_start, threshold, scratch);
     outcome.touching = within != Within::Apart;
     if outcome.touching && margin && clear {
         outcome.margin_time = 0.0;

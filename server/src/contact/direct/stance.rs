@@ -1,5 +1,5 @@
-//! A body of one convex primitive over one step, prepared once for all of its pairs, and what a direction proves of a pair
-//! at a glance.
+//! A body over one step as one convex primitive, prepared once for all of its pairs, and what a direction proves of a pair at
+//! a glance. The primitive is the body itself, or one around it: what stays apart of what encloses them stays apart.
 //!
 //! A direction n that leaves a gap φ₀ at the start and φ₁ at the end leaves, in between, no less than
 //!
@@ -12,12 +12,15 @@
 //! the direction is remembered; where it fails, nearest points give another one, at the start and then at the end.
 //!
 //! It only ever says "apart", with a margin far above all rounding: what is nearer is asked in the ordinary way, so that no
-//! bit of an answer depends on which directions were remembered.
+//! bit of an answer depends on which directions were remembered. How near trees are is told by f, whose levels reach out
+//! farther at corners than their distance: so what encloses a tree encloses all of its {f <= level}, and a pair that is
+//! asked about beyond that level has no glance.
 
 use super::support::Body;
 use super::{body_of, gjk, whole};
 use crate::eco::Model;
-use crate::solid::Shape;
+use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
+use crate::solid::{Node, Op, Primitive, Shape};
 use contactd_proto::{Pose, Track};
 use glam::{DMat3, DQuat, DVec3};
 
@@ -27,8 +30,11 @@ const CRUDE: f64 = 1e-11;
 const ROUGH: f64 = 0.03;
 
 /// What does not change from step to step.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Hull {
+    /// What encloses the body, where it is no primitive itself, and the level of its f up to which it does.
+    around: Option<Shape>,
+    level: f64,
     /// The primitive's frame in the object's.
     turned: DQuat,
     center: DVec3,
@@ -65,19 +71,32 @@ pub struct Glance {
 }
 
 impl Hull {
-    /// Of a model placed in its object; `None` unless it is one bounded convex primitive.
+    /// Of a model placed in its object; `None` for one without bounds.
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
-        let primitive = whole(&model.solid)?;
-        body_of(primitive)?;
-        let ball = &primitive.ball;
+        let (around, level, frame, ball) = if let Some(p) = whole(&model.solid) {
+            body_of(p)?;
+            (None, f64::INFINITY, p.frame, p.ball)
+        } else {
+            let (shape, frame) = enclosing(model)?;
+            let mut ball = shape.geometry().ball();
+            ball.center = frame.point(ball.center);
+            (Some(shape), model.bounds.margin(), frame, ball)
+        };
         let rho = (place.point(ball.center).length() + ball.radius) * (1.0 + 1e-14);
         let [reach, radius] = model.extents;
         Some(Self {
-            turned: place.rotation * primitive.frame.rotation,
-            center: place.point(primitive.frame.position),
+            around,
+            level,
+            turned: place.rotation * frame.rotation,
+            center: place.point(frame.position),
             rho,
             size: 2.0 * (reach + radius + model.face_reach + place.position.length()) + rho,
         })
+    }
+
+    /// The shape that is looked at.
+    fn shape<'a>(&'a self, model: &'a Model) -> Option<&'a Shape> {
+        self.around.as_ref().or_else(|| whole(&model.solid).map(|p| &p.shape))
     }
 
     /// Over the step that a track tells.
@@ -98,6 +117,42 @@ impl Hull {
             size: self.size * (1.0 + omega),
         }
     }
+}
+
+/// A primitive, in the model's frame, around all points at which f of a tree is no more than the margin of its bounds: the
+/// one that others are subtracted from or cut away of, or a box.
+fn enclosing(model: &Model) -> Option<(Shape, Pose)> {
+    let (solid, bounds) = (&model.solid, &model.bounds);
+    let margin = bounds.margin();
+    let mut n = solid.root;
+    loop {
+        let radius = |n: u32| bounds.node(n).ball.radius;
+        match &solid.nodes[n as usize] {
+            // f of a difference or an intersection is no less than that of its first or any operand.
+            Node::Op(Op::Difference, children) => n = *children.first()?,
+            Node::Op(Op::Intersection, children) => {
+                n = *children.iter().min_by(|p, q| radius(**p).total_cmp(&radius(**q)))?;
+            }
+            Node::Op(Op::Union, children) if children.len() == 1 => n = children[0],
+            Node::Primitive(p) => {
+                let Primitive { shape, frame, .. } = &solid.primitives[*p as usize];
+                let grown = match shape {
+                    Shape::Sphere(s) => Sphere { radius: s.radius + margin }.into(),
+                    Shape::Cylinder(c) => {
+                        Cylinder { radius: c.radius + margin, half_height: c.half_height + margin }.into()
+                    }
+                    Shape::Cuboid(c) => Cuboid { half: c.half + margin }.into(),
+                    // Sharp edges reach out farther: the box of the bounds knows how far.
+                    Shape::Cone(_) | Shape::Polyhedron(_) | Shape::HalfSpace(_) => break,
+                };
+                return Some((grown, *frame));
+            }
+            Node::Op(Op::Union, _) | Node::Empty => break,
+        }
+    }
+    let aabb = bounds.node(n).aabb;
+    let is_box = aabb.is_finite() && !aabb.is_empty();
+    is_box.then(|| (Cuboid { half: aabb.half() }.into(), Pose::at(aabb.center())))
 }
 
 /// Largest n·x over a shape that stands with these axes.
@@ -129,10 +184,13 @@ pub struct Glancing<'a> {
 }
 
 impl<'a> Glancing<'a> {
-    /// Two bodies by their models and stances, asked whether they stay farther apart than `touch` (a length). `None` if one
-    /// of them is no convex primitive.
-    pub fn new(models: [&'a Model; 2], stances: [&'a Stance; 2], touch: f64) -> Option<Self> {
-        let shapes = [&whole(&models[0].solid)?.shape, &whole(&models[1].solid)?.shape];
+    /// Two bodies by their models, hulls and stances, asked whether they stay farther apart than `touch` (a length). `None`
+    /// where one's hull does not enclose it that far.
+    pub fn new(models: [&'a Model; 2], hulls: [&'a Hull; 2], stances: [&'a Stance; 2], touch: f64) -> Option<Self> {
+        if 0.5 * touch > hulls[0].level.min(hulls[1].level) {
+            return None;
+        }
+        let shapes = [hulls[0].shape(models[0])?, hulls[1].shape(models[1])?];
         let [a, b] = stances;
         let difference = b.position - a.position;
         let velocity = b.velocity - a.velocity;
@@ -194,9 +252,10 @@ impl<'a> Glancing<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eco::testing::simple;
+    use crate::eco::testing::{pierced, simple};
     use crate::math::random::Random;
     use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
+    use crate::solid::{Label, SolidBuilder};
     use contactd_proto::Motion;
 
     fn track(start: DVec3, end: DVec3, spin: DVec3) -> Track {
@@ -205,8 +264,9 @@ mod tests {
     }
 
     fn glance(models: [&Model; 2], tracks: [&Track; 2], touch: f64) -> Glance {
-        let stances = [0, 1].map(|k| Hull::new(models[k], &Pose::IDENTITY).expect("convex").stance(tracks[k]));
-        Glancing::new(models, [&stances[0], &stances[1]], touch).expect("convex").look(None)
+        let hulls = [0, 1].map(|k| Hull::new(models[k], &Pose::IDENTITY).expect("bounded"));
+        let stances = [0, 1].map(|k| hulls[k].stance(tracks[k]));
+        Glancing::new(models, hulls.each_ref(), [&stances[0], &stances[1]], touch).expect("within").look(None)
     }
 
     #[test]
@@ -226,6 +286,81 @@ mod tests {
         let close = at_rest(DVec3::new(0.0, 0.2, 0.0));
         assert!(glance([&bar, &ball], [&still, &close], 0.07).apart);
         assert!(!glance([&bar, &ball], [&still, &close], 0.09).apart);
+    }
+
+    /// A ring, a drilled ball, a drilled block that is cut by a ball, two rods crossed, and a rod less a cone.
+    fn trees() -> Vec<Model> {
+        let rod = |radius, half_height| Cylinder { radius, half_height };
+        let crossed = |op: Op, shapes: [Shape; 2]| {
+            let mut b = SolidBuilder::new();
+            let parts = shapes.map(|shape| b.primitive(shape, Pose::at(DVec3::new(0.3, -0.1, 0.2)), Label::default()));
+            let root = b.operation(op, &parts);
+            Model::new(b.finish(root))
+        };
+        let hole: Shape = rod(0.2, 2.0).into();
+        let tip = crate::solid::primitive::Cone { bottom: 0.5, top: 0.0, half_height: 0.4 };
+        vec![
+            pierced(rod(0.5, 0.2), vec![(hole.clone(), Pose::IDENTITY)]),
+            pierced(Sphere { radius: 0.6 }, vec![(hole.clone(), Pose::IDENTITY)]),
+            crossed(
+                Op::Intersection,
+                [Cuboid { half: DVec3::new(0.7, 0.4, 0.3) }.into(), Sphere { radius: 0.6 }.into()],
+            ),
+            crossed(Op::Union, [rod(0.1, 0.9).into(), Cuboid { half: DVec3::new(0.5, 0.1, 0.1) }.into()]),
+            pierced(tip, vec![(hole, Pose::IDENTITY)]),
+        ]
+    }
+
+    #[test]
+    fn what_encloses_a_tree_holds_its_level() {
+        let mut numbers = Random(5);
+        for (k, model) in trees().iter().enumerate() {
+            let (shape, frame) = enclosing(model).expect("bounded");
+            let level = model.bounds.margin();
+            assert!(level > 0.0, "tree {k}");
+            let outer = Primitive::new(shape, frame, Label::default(), 0);
+            let (mut inside, mut near) = (0, 0);
+            for _ in 0..200_000 {
+                let mut n = || numbers.within(-1.0, 1.0);
+                let x = outer.aabb.center() + DVec3::new(n(), n(), n()) * outer.aabb.half() * 1.01;
+                let f = model.solid.value(x);
+                assert!(f > level || outer.value(x) <= 1e-15, "tree {k}: f = {f} at {x}");
+                (inside, near) = (inside + u32::from(f < 0.0), near + u32::from(f.abs() <= level));
+            }
+            assert!(inside > 1000, "tree {k}: {inside} inside, {near} within the level");
+        }
+    }
+
+    #[test]
+    fn trees_that_a_glance_calls_apart_have_no_point_in_common() {
+        let models = trees();
+        let mut numbers = Random(9);
+        let mut n = || numbers.within(-1.0, 1.0);
+        let mut v = |size: f64| DVec3::new(n(), n(), n()) * size;
+        let (mut apart, mut meet) = (0, 0);
+        for i in 0..800 {
+            let (a, b) = (&models[i % 5], &models[i / 5 % 5]);
+            let at = v(1.4);
+            let tracks = [track(DVec3::ZERO, v(0.3), v(1.5)), track(at, at + v(0.3), v(1.5))];
+            let seen = glance([a, b], [&tracks[0], &tracks[1]], 0.0);
+            let common = (0..=10).any(|k| {
+                let poses = tracks.each_ref().map(|t| t.motion.at(f64::from(k) / 10.0));
+                (0..150).any(|_| {
+                    let x = poses[0].point(v(1.0));
+                    a.solid.value(poses[0].inverse().point(x)) < 0.0 && b.solid.value(poses[1].inverse().point(x)) < 0.0
+                })
+            });
+            assert!(!(seen.apart && common), "{i}: {tracks:?}");
+            (apart, meet) = (apart + u32::from(seen.apart), meet + u32::from(common));
+        }
+        assert!(apart > 60 && meet > 60, "{apart} apart, {meet} meet");
+        // Beyond the level nothing is told.
+        let far = track(DVec3::X * 9.0, DVec3::X * 9.0, DVec3::ZERO);
+        let near = track(DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let hulls = [0, 1].map(|k| Hull::new(&models[k], &Pose::IDENTITY).expect("bounded"));
+        let stances = [hulls[0].stance(&near), hulls[1].stance(&far)];
+        let asked = |touch| Glancing::new([&models[0], &models[1]], hulls.each_ref(), stances.each_ref(), touch);
+        assert!(asked(0.0).is_some_and(|g| g.look(None).apart) && asked(0.1).is_none());
     }
 
     #[test]
