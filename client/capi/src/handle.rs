@@ -3,7 +3,6 @@
 use crate::error::Failure;
 use crate::model::Models;
 use contactd_client::{Error, Transport};
-use contactd_proto::StepReply;
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,8 +23,8 @@ pub struct Session {
 pub(crate) struct State {
     pub(crate) session: Inner,
     pub(crate) models: Models,
-    /// The header of the reply whose slots lie in the transport.
-    pub(crate) reply: Option<StepReply>,
+    /// Records of the reply whose slots lie in the transport.
+    pub(crate) records: Option<usize>,
     /// A step was sent and not yet answered.
     pub(crate) in_flight: bool,
     /// A call panicked: what it left half done is not looked at again.
@@ -46,7 +45,7 @@ fn here() -> ThreadId {
 /// Those of [`Transport::open`].
 pub fn hand_over(transport: Box<dyn Transport>) -> Result<*mut Session, Error> {
     let session = Inner::new(transport)?;
-    let state = State { session, models: Models::default(), reply: None, in_flight: false, panicked: false };
+    let state = State { session, models: Models::default(), records: None, in_flight: false, panicked: false };
     Ok(Box::into_raw(Box::new(Session { owner: here(), busy: Cell::new(false), state: UnsafeCell::new(state) })))
 }
 

@@ -127,7 +127,7 @@ pub unsafe extern "C" fn contactd_reconnect(session: *mut Session, timeout: f64)
         if !state.session.transport_mut().may_lose_server() {
             return Err(Failure::misuse("an embedded session has no server that could be lost"));
         }
-        state.reply = None;
+        state.records = None;
         Ok(state.session.reconnect(timeout)?)
     };
     // SAFETY: the caller's handle (3).

@@ -74,7 +74,7 @@ pub unsafe extern "C" fn contactd_begin_step(session: *mut Session, count: usize
         // SAFETY: the caller's variable (1).
         let poses = unsafe { place(poses, "poses")? };
         let slots = state.session.begin_step(count)?;
-        state.reply = None;
+        state.records = None;
         poses.write(slots.as_mut_ptr());
         Ok(())
     };
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn contactd_finish(session: *mut Session, timeout: f64, re
         state.in_flight = matches!(answered, Err(Error::Timeout));
         let reply = answered?;
         let (records, slots) = (reply.records(), reply.slots());
-        state.reply = Some(*reply.header());
+        state.records = Some(records.len());
         place.write(Reply {
             header: *reply.header(),
             records: records.as_ptr(),
@@ -126,7 +126,7 @@ pub unsafe extern "C" fn contactd_resend(session: *mut Session, poses: *mut *mut
         // SAFETY: the caller's variables (1).
         let (poses, count) = unsafe { (place(poses, "poses")?, place(count, "count")?) };
         let slots = state.session.resend()?;
-        state.reply = None;
+        state.records = None;
         count.write(slots.len());
         poses.write(slots.as_mut_ptr());
         Ok(())
@@ -205,9 +205,8 @@ impl State {
     /// The further slots of a record of the last reply.
     fn further(&mut self, record: usize) -> Result<&[ContactRecord], Failure> {
         let gone = || Failure::misuse("there is no reply whose records could be read: finish a step first");
-        let header = self.reply.ok_or_else(gone)?;
+        let n = self.records.ok_or_else(gone)?;
         let (_, slots) = self.session.transport_mut().reply().ok_or_else(gone)?;
-        let n = header.records as usize;
         let Some(found) = slots.get(record).filter(|_| record < n) else {
             return Err(Failure::argument(format!("record {record}: there are {n}")));
         };
