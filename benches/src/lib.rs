@@ -9,6 +9,7 @@
 //! outside the timer.
 #![forbid(unsafe_code)]
 
+pub mod callgrind;
 pub mod effects;
 pub mod facets;
 pub mod figure;

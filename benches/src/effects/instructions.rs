@@ -4,6 +4,7 @@
 //! and many times; the difference is of steps alone, without what set-up took.
 
 use super::Context;
+use crate::callgrind;
 use crate::page::Section;
 use crate::row;
 use crate::table::Table;
@@ -11,7 +12,6 @@ use clap::{Args, ValueEnum};
 use contactd_proto::Rule;
 use contactd_tests::lanes::{Class, EFFECTS, Lanes, PLAIN, rule};
 use std::error::Error;
-use std::process::Command;
 
 /// What rules there are beside the plain one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -70,17 +70,10 @@ impl Probe {
 
     /// Instructions of the whole run.
     fn instructions(&self) -> Result<u64, Box<dyn Error>> {
-        let mut command = Command::new("valgrind");
-        command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(std::env::current_exe()?).arg("probe");
         let declared = self.declared.to_possible_value().expect("a word");
-        command.args([&self.class.to_string(), declared.get_name(), &self.steps.to_string()]);
-        if self.warm {
-            command.arg("--warm");
-        }
-        let output = command.output()?;
-        let text = String::from_utf8_lossy(&output.stderr);
-        let collected = text.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok());
-        collected.filter(|_| output.status.success()).ok_or_else(|| format!("callgrind said: {text}").into())
+        let (class, steps) = (self.class.to_string(), self.steps.to_string());
+        let arguments = ["probe", &class, declared.get_name(), &steps, "--warm"];
+        callgrind::instructions(&arguments[..arguments.len() - usize::from(!self.warm)])
     }
 }
 
@@ -96,8 +89,7 @@ fn of_a_step(class: usize, declared: Declared, warm: bool) -> Result<f64, Box<dy
 /// # Errors
 /// Callgrind is there and fails.
 pub fn instructions(context: &Context) -> Result<Option<Section>, Box<dyn Error>> {
-    let is_there = Command::new("valgrind").arg("--version").output().is_ok_and(|o| o.status.success());
-    if context.quick || !is_there {
+    if context.quick || !callgrind::is_there() {
         let why = if context.quick { "the short form leaves them out" } else { "valgrind is not on the PATH" };
         println!("instructions of a step: not measured, {why}");
         return Ok(None);

@@ -1,0 +1,933 @@
+// contactd: earliest contact of moving solids modelled by constructive solid geometry, from C and C++.
+//
+// Lengths are in the models' unit, times within a step a fraction 0..1, axes right-handed, quaternions x y z w, angles in
+// radians. Every function that can fail returns CONTACTD_OK or another code; contactd_error_message() says what was wrong.
+// A session belongs to the thread that opened it.
+//
+// Not to be edited: made of the Rust sources by client/capi/tests/header.rs.
+
+#ifndef CONTACTD_H
+#define CONTACTD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define CONTACTD_VERSION "0.1.0"
+#define CONTACTD_PROTOCOL_VERSION 1
+
+// Why the server refused: numbers that never change, each with its sentence.
+
+// the server speaks another version of the protocol.
+#define CONTACTD_ERROR_VERSION 1
+
+// the session does not exist on this server (any more).
+#define CONTACTD_ERROR_SESSION_GONE 2
+
+// there is no object of this id in the session.
+#define CONTACTD_ERROR_UNKNOWN_OBJECT 3
+
+// the object is named twice.
+#define CONTACTD_ERROR_DUPLICATE_OBJECT 4
+
+// the object is static and cannot be moved.
+#define CONTACTD_ERROR_STATIC_OBJECT 5
+
+// a position or rotation is not a finite number.
+#define CONTACTD_ERROR_NOT_FINITE 6
+
+// the quaternion is not of unit length (its squared norm is off by more than 0.001).
+#define CONTACTD_ERROR_BAD_QUATERNION 7
+
+// the batch is malformed: its record count or its flags are not of the protocol.
+#define CONTACTD_ERROR_BAD_COUNT 8
+
+// the batch has more records than the server's limit.
+#define CONTACTD_ERROR_TOO_MANY 9
+
+// the motion breaks what was declared of the object (no rotation, or a largest speed).
+#define CONTACTD_ERROR_DECLARATION 10
+
+// the resolution is not a positive length well below the smallest dimension of the primitives.
+#define CONTACTD_ERROR_RESOLUTION 11
+
+// the model's text is longer than the server's limit.
+#define CONTACTD_ERROR_LIMIT_TEXT 12
+
+// the model's tree has more nodes than the server's limit.
+#define CONTACTD_ERROR_LIMIT_NODES 13
+
+// the model's tree is deeper than the server's limit.
+#define CONTACTD_ERROR_LIMIT_DEPTH 14
+
+// the model has more faces than the server's limit.
+#define CONTACTD_ERROR_LIMIT_FACES 15
+
+// the session has as many objects as the server allows.
+#define CONTACTD_ERROR_LIMIT_OBJECTS 16
+
+// the server has as many sessions as it allows.
+#define CONTACTD_ERROR_LIMIT_SESSIONS 17
+
+// the request needs more memory than the server's limit.
+#define CONTACTD_ERROR_LIMIT_MEMORY 18
+
+// the server is busy with an earlier request of this session.
+#define CONTACTD_ERROR_BUSY 19
+
+// the server failed internally.
+#define CONTACTD_ERROR_INTERNAL 20
+
+// there is no model of this id in the session.
+#define CONTACTD_ERROR_UNKNOWN_MODEL 21
+
+// the model cannot be imported.
+#define CONTACTD_ERROR_MODEL 22
+
+// the rule is not valid.
+#define CONTACTD_ERROR_BAD_RULE 23
+
+// the command cannot be decoded.
+#define CONTACTD_ERROR_BAD_COMMAND 24
+
+// an option of the request is out of its range.
+#define CONTACTD_ERROR_BAD_NUMBER 25
+
+// the model reaches to infinity.
+#define CONTACTD_ERROR_UNBOUNDED 26
+
+// Done.
+#define CONTACTD_OK 0
+
+// No server of this name is running.
+#define CONTACTD_ERROR_NO_SERVER 1001
+
+// The server died or was stopped: contactd_reconnect finds its successor and replays the session.
+#define CONTACTD_ERROR_SERVER_LOST 1002
+
+// The server could not deliver its reply; the step was taken, or refused: contactd_reconnect settles it.
+#define CONTACTD_ERROR_REPLY_LOST 1003
+
+// The time ran out. A step stays in flight: contactd_finish may be called again.
+#define CONTACTD_ERROR_TIMEOUT 1004
+
+// The server's name or the runtime folder is not usable.
+#define CONTACTD_ERROR_ADDRESS 1005
+
+// Calls came in an order that makes no sense, from another thread, or from within a call.
+#define CONTACTD_ERROR_MISUSE 1006
+
+// The system or the shared memory layer failed.
+#define CONTACTD_ERROR_SYSTEM 1007
+
+// A pointer is NULL that must not be.
+#define CONTACTD_ERROR_NULL 1008
+
+// An argument is out of its range, a string not UTF-8, a pointer not aligned.
+#define CONTACTD_ERROR_ARGUMENT 1009
+
+// The settings of an embedded engine cannot be read.
+#define CONTACTD_ERROR_CONFIG 1010
+
+// contactd itself failed within this session. Nothing but contactd_close works on it any more.
+#define CONTACTD_ERROR_PANIC 1011
+
+// Position and rotation are the pose at the end of the step, reached the shortest way.
+#define CONTACTD_END 1
+
+// Position is where the origin ends, rotation[0..3] the rotation vector over the step (world axes, radians).
+#define CONTACTD_TURN 2
+
+// The pose is set before the step starts, without motion. May stand beside an END or TURN of the same object.
+#define CONTACTD_START 4
+
+// `status`: the surfaces meet within the step.
+#define CONTACTD_CONTACT 1
+
+// `status`: they don't.
+#define CONTACTD_CLEAR 2
+
+// `status`: deeper than twice the resolution at the start already.
+#define CONTACTD_OVERLAP 3
+
+// `status`: the work limit ran out; `time_lower` is proven.
+#define CONTACTD_UNDECIDED 4
+
+// `flags`: separation at the start within the touching threshold.
+#define CONTACTD_TOUCHING 1
+
+// `flags`: the time could not be continued back from its witness and equals the upper end of its bracket.
+#define CONTACTD_NOT_CONTINUED 2
+
+// `flags`: a vertex met a vertex, the normal is an average.
+#define CONTACTD_AVERAGED_NORMAL 4
+
+// `flags`: a sensor pair, which never stops a search for the scene's first contact.
+#define CONTACTD_SENSOR 8
+
+// `flags`: the work limit cut the search for contact regions: there may be more, and CONTACTD_TOUCHING may be a mere caution.
+#define CONTACTD_REGIONS_INCOMPLETE 16
+
+// `flags`: clear, but within its margin at the start or during the step; the detail slot says until when it is proven not to. With
+// CONTACTD_REGIONS_INCOMPLETE: it may do so.
+#define CONTACTD_WITHIN_MARGIN 32
+
+// `valid`: time and time_lower.
+#define CONTACTD_VALID_TIME 1
+
+// `valid`: point.
+#define CONTACTD_VALID_POINT 2
+
+// `valid`: normal.
+#define CONTACTD_VALID_NORMAL 4
+
+// `valid`: separation.
+#define CONTACTD_VALID_SEPARATION 8
+
+// `valid`: normal_speed.
+#define CONTACTD_VALID_NORMAL_SPEED 16
+
+// `valid`: kind and extent.
+#define CONTACTD_VALID_KIND 32
+
+// `valid`: faces_a and faces_b.
+#define CONTACTD_VALID_FACES 64
+
+// "No face" in `faces_a` and `faces_b`.
+#define CONTACTD_NO_FACE UINT32_MAX
+
+// First word of a contactd_detail_slot.
+#define CONTACTD_DETAIL_SLOT 1
+
+// First word of a contactd_patch_slot.
+#define CONTACTD_PATCH_SLOT 2
+
+// First word of a contactd_region_slot.
+#define CONTACTD_REGION_SLOT 3
+
+// Outcome of a step's search over all its pairs: nothing met.
+#define CONTACTD_STEP_CLEAR 1
+
+// Some pair meets or overlaps.
+#define CONTACTD_STEP_CONTACT 2
+
+// A pair was left undecided before the earliest contact.
+#define CONTACTD_STEP_UNDECIDED 3
+
+// "No record in particular" in `index`.
+#define CONTACTD_NO_INDEX UINT32_MAX
+
+// `effects`: pairs were searched over the whole step.
+#define CONTACTD_EFFECT_CONTINUOUS 1
+
+// `effects`: pairs were tested at the end of the step.
+#define CONTACTD_EFFECT_DISCRETE 2
+
+// `effects`: a body of a pair turned.
+#define CONTACTD_EFFECT_TURNING 4
+
+// `effects`: times of contact were worked out.
+#define CONTACTD_EFFECT_TIME 8
+
+// `effects`: contact points were worked out.
+#define CONTACTD_EFFECT_CONTACT 16
+
+// `effects`: contact regions were looked for.
+#define CONTACTD_EFFECT_PATCH 32
+
+// `effects`: deepest points were looked for.
+#define CONTACTD_EFFECT_PENETRATION 64
+
+// `effects`: separations were tested against a margin.
+#define CONTACTD_EFFECT_MARGIN 128
+
+// `effects`: overlaps at the start were searched past.
+#define CONTACTD_EFFECT_PAST_OVERLAP 256
+
+// `effects`: sensor pairs were told.
+#define CONTACTD_EFFECT_SENSOR 512
+
+// Curved primitives are exact when `$fn` is 0 or at least 9, as written below that.
+#define CONTACTD_FACETS_AUTO 0
+
+// Always exact.
+#define CONTACTD_FACETS_EXACT 1
+
+// Always the prism or polyhedron that `$fn` asks for.
+#define CONTACTD_FACETS_AS_WRITTEN 2
+
+// Not searched at all.
+#define CONTACTD_DETECT_OFF 0
+
+// The end pose only.
+#define CONTACTD_DETECT_DISCRETE 1
+
+// The whole motion.
+#define CONTACTD_DETECT_CONTINUOUS 2
+
+// Yes or no.
+#define CONTACTD_REPORT_HIT 0
+
+// The time too.
+#define CONTACTD_REPORT_TIME 1
+
+// Point, normal and kind too.
+#define CONTACTD_REPORT_CONTACT 2
+
+// The points of all contact regions too.
+#define CONTACTD_REPORT_PATCH 3
+
+// The overlap is the answer.
+#define CONTACTD_INITIAL_OVERLAP_REPORT 0
+
+// The search goes on for the starting depth + the resolution.
+#define CONTACTD_INITIAL_OVERLAP_IGNORE_IF_SEPARATING 1
+
+// One client's scene on a server, or in this process. It belongs to the thread that opened it.
+typedef struct contactd_session contactd_session;
+
+// What the server said when it opened the session.
+typedef struct contactd_opened {
+    // Session id.
+    uint64_t session;
+    // Epoch of the server; changes with its every start.
+    uint64_t epoch;
+    // Most records in a batch.
+    uint32_t max_batch;
+    // Zero.
+    uint32_t reserved;
+} contactd_opened;
+
+// A face of a model. Its strings are valid until the session is closed.
+typedef struct contactd_face {
+    // Index of its primitive in file order.
+    uint32_t primitive;
+    // 1: the primitive is subtracted.
+    uint32_t subtracted;
+    // The primitive's name in the format: "sphere", "cylinder" …
+    const char *name;
+    // The face's name: "side", "top" …
+    const char *face;
+} contactd_face;
+
+// Volume, centre of mass and inertia of a solid of even density. Every true value lies within its error of the one given.
+typedef struct contactd_mass {
+    // Volume, length³.
+    double volume;
+    // Bound of its error, length³.
+    double volume_error;
+    // Centre of mass.
+    double center[3];
+    // Bounds of its error, a length along each axis.
+    double center_error[3];
+    // Mass per volume; 1 unless contactd_mass_with_density changed it.
+    double density;
+    // Inertia tensor about the centre of mass: xx, yy, zz, xy, xz, yz (xx = ∫ y² + z² dm, xy = −∫ x y dm), density · length⁵.
+    double inertia[6];
+    // Bounds of its error, in the same order and unit.
+    double inertia_error[6];
+    // Boxes that were looked at; 0 where a closed formula answers.
+    uint64_t boxes;
+} contactd_mass;
+
+// A rigid placement: `parent = rotation * local + position`.
+typedef struct contactd_pose {
+    // Position x, y, z.
+    double position[3];
+    // Unit quaternion x, y, z, w.
+    double rotation[4];
+} contactd_pose;
+
+// An object to be added: a model, where it stands, and what is declared of it. contactd_object_new sets the defaults.
+typedef struct contactd_object {
+    // Its name, for the exceptions of rules.
+    const char *name;
+    // Its group, for rules.
+    const char *group;
+    // Its model's id.
+    uint32_t model;
+    // 1: it never moves.
+    uint32_t is_static;
+    // 0: it never turns; a motion that turns it will be refused.
+    uint32_t rotates;
+    // Zero.
+    uint32_t reserved;
+    // No point of it is ever faster than this, length per second; steps then need `dt`. Infinite: nothing is declared.
+    double max_speed;
+    // Where the model sits in the object's frame.
+    struct contactd_pose place;
+    // Where the object stands.
+    struct contactd_pose pose;
+} contactd_object;
+
+// Two names.
+typedef struct contactd_names {
+    // The first one.
+    const char *a;
+    // The second one.
+    const char *b;
+} contactd_names;
+
+// What happens between two groups of objects. contactd_rule_new sets the defaults.
+typedef struct contactd_rule {
+    // The two groups; both may be the same.
+    struct contactd_names between;
+    // Single pairs, by object name, that this rule leaves out; NULL when there are none.
+    const struct contactd_names *except;
+    // Number of them.
+    size_t except_count;
+    // CONTACTD_DETECT_…: how the pair is searched.
+    uint32_t detect;
+    // CONTACTD_REPORT_…: what is told of it.
+    uint32_t report;
+    // CONTACTD_INITIAL_OVERLAP_…: what a pair that starts in overlap does.
+    uint32_t initial_overlap;
+    // 1: depth and direction where a step starts in overlap.
+    uint32_t penetration;
+    // 1: record only; never stops a search for the scene's first contact.
+    uint32_t sensor;
+    // Zero.
+    uint32_t reserved;
+    // Report at this separation too (length, >= 0): never late, early at sharp features.
+    double margin;
+} contactd_rule;
+
+// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
+typedef struct contactd_options {
+    // Fraction 0..1 of its previous step at which every object stands before the next one.
+    double advance;
+    // Duration of a step in seconds, for objects with a declared largest speed; 0: unknown.
+    double dt;
+    // 1: only the pairs whose bracket meets the scene's earliest contact.
+    uint32_t first;
+    // 1: a detail slot with each record (contactd_get_detail).
+    uint32_t details;
+    // 1: records of clear pairs too.
+    uint32_t clear;
+    // 1: this client polls while it waits; the server then need not wake it.
+    uint32_t polling;
+    // Most records, the earliest first; 0: all.
+    uint32_t max_records;
+    // Most cells that one pair's search may refine; 0: the server's default.
+    uint32_t cell_limit;
+    // Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
+    // undecided, the latest first.
+    uint32_t batch_limit;
+    // Zero.
+    uint32_t reserved;
+} contactd_options;
+
+// One object's motion, as it lies in shared memory.
+typedef struct contactd_pose_record {
+    // Object id of the session.
+    uint32_t object;
+    // Exactly one of CONTACTD_END, CONTACTD_TURN, CONTACTD_START.
+    uint32_t flags;
+    // Position x, y, z of the object's origin in the world.
+    double position[3];
+    // Quaternion x, y, z, w; for CONTACTD_TURN the rotation vector and a zero.
+    double rotation[4];
+} contactd_pose_record;
+
+// Counted work of a step. Never part of the bits that must agree between two ways to the same answer.
+typedef struct contactd_work_counters {
+    // Pairs of boxes that the broad phase compared.
+    uint64_t box_tests;
+    // Primitives of both trees before stage 1, summed over the pairs.
+    uint64_t primitives;
+    // Primitives left after stage 1.
+    uint64_t after_stage1;
+    // Pairs of octree nodes visited.
+    uint64_t node_pairs;
+    // Candidate primitive pairs handed to stage 3.
+    uint64_t candidates;
+    // Cells refined.
+    uint64_t cells;
+    // Clauses bounded.
+    uint64_t clauses;
+    // Newton attempts.
+    uint64_t newton;
+    // Closed forms used.
+    uint64_t closed_forms;
+    // Discrete tests of pairs that moved far enough to have passed through each other.
+    uint64_t may_have_passed;
+    // Cells' worth of work on one instant of a pair: whether it touches, its contact regions, its deepest point.
+    uint64_t instant_cells;
+} contactd_work_counters;
+
+// How often each effect was worked out: in a step. What an earlier step has proven need not be worked out again, so counters
+// are no part of the answer's bits.
+typedef struct contactd_effect_counters {
+    // Pairs searched over the whole step.
+    uint64_t continuous;
+    // Pairs tested at the end of the step only.
+    uint64_t discrete;
+    // Of the pairs searched over the step those of which a body turns.
+    uint64_t turning;
+    // Times of contact worked out.
+    uint64_t times;
+    // Contact points with their normal, kind and faces.
+    uint64_t contacts;
+    // Pairs whose contact regions were looked for.
+    uint64_t patches;
+    // Deepest points of overlaps at the start.
+    uint64_t penetrations;
+    // Separations tested against a margin.
+    uint64_t margins;
+    // Overlaps at the start that were searched past.
+    uint64_t past_overlaps;
+    // Sensor pairs told.
+    uint64_t sensors;
+} contactd_effect_counters;
+
+// Header of a step's reply.
+typedef struct contactd_step_reply {
+    // The request's step number.
+    uint64_t step;
+    // Epoch of the server.
+    uint64_t epoch;
+    // `STEP_…`.
+    uint32_t status;
+    // Number of an error code, 0 for none.
+    uint32_t error;
+    // Index of the offending record, or CONTACTD_NO_INDEX.
+    uint32_t index;
+    // Contact records at the head of the slice.
+    uint32_t records;
+    // Further slots behind them.
+    uint32_t slots;
+    // 1 when `max_records` left records out.
+    uint32_t truncated;
+    // Bits of the effects that ran (`effects::EFFECT_…`).
+    uint32_t effects;
+    // Pairs whose plan was continuous or discrete and which the broad phase let through.
+    uint32_t pairs;
+    // Smallest time_lower over all pairs: safe to advance to.
+    double safe_time;
+    // Work: what was done, never part of the answer's bits.
+    struct contactd_work_counters counters;
+    // How often each effect was worked out; no part of the answer's bits either.
+    struct contactd_effect_counters effect_counters;
+} contactd_step_reply;
+
+// The answer for a pair. World frame; times are fractions of the step; the normal points from `a` to `b`; a field
+// whose `valid` bit is clear is zero.
+typedef struct contactd_record {
+    // The object with the smaller id.
+    uint32_t a;
+    // The other one.
+    uint32_t b;
+    // CONTACTD_CONTACT, CONTACTD_CLEAR, CONTACTD_OVERLAP or CONTACTD_UNDECIDED.
+    uint8_t status;
+    // Index into CONTACTD_KIND_NAMES.
+    uint8_t kind;
+    // Index into CONTACTD_EXTENT_NAMES.
+    uint8_t extent;
+    // CONTACTD_TOUCHING, CONTACTD_NOT_CONTINUED, CONTACTD_AVERAGED_NORMAL, CONTACTD_SENSOR, CONTACTD_REGIONS_INCOMPLETE, CONTACTD_WITHIN_MARGIN.
+    uint8_t flags;
+    // A bit per field that has meaning.
+    uint32_t valid;
+    // Where the surfaces meet.
+    double time;
+    // Proven: nothing deeper than the resolution before it.
+    double time_lower;
+    // Contact point, or a point that proves an overlap: deeper than twice the resolution in both bodies. The deepest one is
+    // in the detail slot, where penetration is asked for.
+    double point[3];
+    // Unit normal from a to b.
+    double normal[3];
+    // Positive apart, negative = penetration; length. Of an overlap what its point proves of the depth.
+    double separation;
+    // Approach speed along the normal, length per step, positive = approaching.
+    double normal_speed;
+    // Active faces of a, by id within its model; CONTACTD_NO_FACE fills.
+    uint32_t faces_a[3];
+    // Active faces of b.
+    uint32_t faces_b[3];
+    // Index of its first further slot within the reply.
+    uint32_t slot;
+    // Number of its further slots.
+    uint32_t slots;
+} contactd_record;
+
+// The answer to a step. The header is a copy; records and slots are read in place and valid until the session's next
+// contactd_begin_step, contactd_resend, contactd_reconnect or contactd_close.
+typedef struct contactd_reply {
+    // Status, safe time, effects, work.
+    struct contactd_step_reply header;
+    // The contact records in the order (time, a, b).
+    const struct contactd_record *records;
+    // Number of them.
+    size_t record_count;
+    // All slots as they lie in memory: the records, then their further slots.
+    const struct contactd_record *slots;
+    // Number of them.
+    size_t slot_count;
+} contactd_reply;
+
+// A further slot: what few callers need of every pair.
+typedef struct contactd_detail_slot {
+    // CONTACTD_DETAIL_SLOT.
+    uint32_t tag;
+    // Zero.
+    uint32_t reserved;
+    // A verified witness of the resolution's depth exists then.
+    double time_upper;
+    // The resolution that was used, a length.
+    double resolution;
+    // The contact point in a's object frame; of an overlap whose penetration is asked for the deepest point.
+    double point_a[3];
+    // Lower bound of the depth at the start of an overlap; 0 otherwise.
+    double penetration;
+    // Unit direction from a to b along which it was measured.
+    double direction[3];
+    // Cells that the pair's search refined.
+    uint64_t cells;
+    // Of a pair with a margin: proven farther apart than that until then, if it is clear; 1: for the whole step. 0 without a
+    // margin.
+    double margin_time;
+    // Zero.
+    uint64_t spare[4];
+} contactd_detail_slot;
+
+// A further slot: a contact region; the contactd_patch_slots with its points follow it.
+typedef struct contactd_region_slot {
+    // CONTACTD_REGION_SLOT.
+    uint32_t tag;
+    // Which region of the pair it is, from 0.
+    uint32_t region;
+    // Index into CONTACTD_KIND_NAMES.
+    uint8_t kind;
+    // Index into CONTACTD_EXTENT_NAMES.
+    uint8_t extent;
+    // Zero.
+    uint8_t reserved[2];
+    // Number of points that bound it.
+    uint32_t points;
+    // Unit normal from a to b, world frame; the mean one of a curved patch.
+    double normal[3];
+    // Faces of a that meet there, by id within its model; CONTACTD_NO_FACE fills.
+    uint32_t faces_a[3];
+    // Faces of b.
+    uint32_t faces_b[3];
+    // Smallest separation of its points, length.
+    double separation;
+    // Zero.
+    uint64_t spare[7];
+} contactd_region_slot;
+
+// A further slot: up to four points of a contact region.
+typedef struct contactd_patch_slot {
+    // CONTACTD_PATCH_SLOT.
+    uint32_t tag;
+    // Number of points that are set.
+    uint32_t count;
+    // The points, world frame.
+    double points[4][3];
+    // Separation at each point.
+    float separations[4];
+    // Which region of the pair the points belong to, and a zero.
+    uint32_t region[2];
+} contactd_patch_slot;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// What was wrong with the last call that failed on this thread, in one sentence; "" if none did. Valid until the next call
+// that fails on this thread.
+const char *contactd_error_message(void);
+
+// Index of the record of a batch, or of the rule, that the last call that failed on this thread was refused for;
+// CONTACTD_NO_INDEX: none in particular.
+uint32_t contactd_error_index(void);
+
+// Version of the library, as CONTACTD_VERSION was when it was built.
+const char *contactd_version(void);
+
+// Version of the protocol that the library speaks; a server of another one is refused.
+uint32_t contactd_protocol_version(void);
+
+// A session on the server called `name` of this user; NULL: "default". `*session` is NULL unless the code is CONTACTD_OK.
+int32_t contactd_connect(const char *name, struct contactd_session **session);
+
+// A session on an engine of its own in this process: the same calls and the same bits, no server. `config` is a server's
+// configuration file (TOML), or NULL for its defaults. `*session` is NULL unless the code is CONTACTD_OK.
+int32_t contactd_embedded(const char *config, struct contactd_session **session);
+
+// Ends the session, frees all that belongs to it and sets `*session` to NULL; a step in flight is waited for, a second
+// at most. What the code says changes nothing about that, except CONTACTD_ERROR_MISUSE from another thread or from within a call: then nothing happened. A
+// `*session` that is NULL already is done.
+int32_t contactd_close(struct contactd_session **session);
+
+// The session's id, its server's epoch (0 embedded) and the most records of a batch.
+int32_t contactd_get_opened(struct contactd_session *session, struct contactd_opened *opened);
+
+// How long a command (everything but steps) may take, in seconds; 600 unless set. Imports of large models are commands.
+int32_t contactd_set_command_timeout(struct contactd_session *session, double timeout);
+
+// After CONTACTD_ERROR_SERVER_LOST, CONTACTD_ERROR_REPLY_LOST or a session that is gone: waits up to `timeout` seconds until a
+// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. On
+// an embedded session there is nothing to find again: CONTACTD_ERROR_MISUSE.
+int32_t contactd_reconnect(struct contactd_session *session, double timeout);
+
+// Loads a model from OpenSCAD CSG text; `name` stands in error sentences; `facets` is CONTACTD_FACETS_…, how curved
+// primitives are taken. `*model` is its id.
+int32_t contactd_load_model(struct contactd_session *session,
+                            const char *name,
+                            const char *csg,
+                            uint32_t facets,
+                            uint32_t *model);
+
+// Number of a model's faces, and of the warnings of its import: what it snapped or dropped.
+int32_t contactd_count_faces(struct contactd_session *session, uint32_t model, uint32_t *faces, uint32_t *warnings);
+
+// A face of a model, by its id: what a record's `faces_a` and `faces_b` name.
+int32_t contactd_get_face(struct contactd_session *session, uint32_t model, uint32_t face, struct contactd_face *out);
+
+// A warning of a model's import, by its number from 0. The string is valid until the session is closed.
+int32_t contactd_get_warning(struct contactd_session *session, uint32_t model, uint32_t warning, const char **out);
+
+// Volume, centre of mass and inertia of a model, in the model's own frame and unit, density 1. `tolerance`: error of the
+// volume that is good enough, as a fraction of it (0: 1e-6). `boxes`: most boxes that may be looked at (0: a million); where
+// they do not suffice the answer carries the larger bounds that were reached. A model that reaches to infinity is refused.
+int32_t contactd_mass_properties(struct contactd_session *session,
+                                 uint32_t model,
+                                 double tolerance,
+                                 uint64_t boxes,
+                                 struct contactd_mass *mass);
+
+// The same solid seen from the parent of `pose`: with an object's place, the model's properties become the object's. `out` may
+// be `mass`.
+int32_t contactd_mass_placed(const struct contactd_mass *mass, const struct contactd_pose *pose, struct contactd_mass *out);
+
+// The same solid of another density, mass per volume, which is taken as exact. `out` may be `mass`.
+int32_t contactd_mass_with_density(const struct contactd_mass *mass, double density, struct contactd_mass *out);
+
+// A moving object of group "default" at the origin. Name and group are copied when it is added.
+struct contactd_object contactd_object_new(const char *name, uint32_t model);
+
+// The rule of two groups with every other field at its default: continuous, report contact, an overlap is the answer.
+struct contactd_rule contactd_rule_new(const char *a, const char *b);
+
+// Adds an object; `*id` is its id, which stays the same over restarts of the server and is never used again.
+int32_t contactd_add_object(struct contactd_session *session, const struct contactd_object *object, uint32_t *id);
+
+// Removes an object; its id is not used again.
+int32_t contactd_remove_object(struct contactd_session *session, uint32_t id);
+
+// Replaces the session's rules. The first rule that names a pair decides; a pair that no rule names is off once there are
+// rules; without rules every pair is continuous, report contact. contactd_error_index names the rule that was refused.
+int32_t contactd_set_rules(struct contactd_session *session, const struct contactd_rule *rules, size_t count);
+
+// Sets the resolution of every pair, a length; 0: each its default (1e-9 of the larger bounding radius).
+int32_t contactd_set_resolution(struct contactd_session *session, double resolution);
+
+// What is asked of the steps to come, as it is set.
+int32_t contactd_get_options(struct contactd_session *session, struct contactd_options *options);
+
+// Sets what is asked of the steps to come: get it, change it, set it.
+int32_t contactd_set_options(struct contactd_session *session, const struct contactd_options *options);
+
+// Sets the option `advance` alone: the fraction 0..1 of its previous step at which every object stands before the next one.
+int32_t contactd_set_advance(struct contactd_session *session, double advance);
+
+// `*poses` are slots for `count` poses, all zero, to be filled in place; objects that are not named rest. A batch that was begun
+// and not sent is dropped, and so are the records of the last reply.
+int32_t contactd_begin_step(struct contactd_session *session,
+                            size_t count,
+                            struct contactd_pose_record **poses);
+
+// Sends the batch without waiting; contactd_finish does it too.
+int32_t contactd_send(struct contactd_session *session);
+
+// Sends the batch if it was not yet, and waits up to `timeout` seconds for its answer. A batch that is refused has changed
+// nothing; contactd_error_index names its offending record. After CONTACTD_ERROR_TIMEOUT the step stays in flight: call again.
+int32_t contactd_finish(struct contactd_session *session, double timeout, struct contactd_reply *reply);
+
+// After contactd_reconnect: the batch that was in flight when the server died, begun again with the same poses.
+int32_t contactd_resend(struct contactd_session *session, struct contactd_pose_record **poses, size_t *count);
+
+// The detail slot of record number `record` of the last reply, in place; `*slot` is NULL when details were not asked for.
+int32_t contactd_get_detail(struct contactd_session *session, size_t record, const struct contactd_detail_slot **slot);
+
+// Number of contact regions of record number `record` of the last reply: told when its rule reports patches or has a margin.
+int32_t contactd_count_regions(struct contactd_session *session, size_t record, uint32_t *count);
+
+// A contact region of record number `record` of the last reply, by its number from 0, and the `*patch_count` slots with the
+// points that bound it, in place.
+int32_t contactd_get_region(struct contactd_session *session,
+                            size_t record,
+                            uint32_t region,
+                            const struct contactd_region_slot **slot,
+                            const struct contactd_patch_slot **patches,
+                            size_t *patch_count);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* CONTACTD_H */
+
+// Sizes and offsets as the library was built with them.
+#ifdef __cplusplus
+#define CONTACTD_ASSERT static_assert
+#else
+#define CONTACTD_ASSERT _Static_assert
+#endif
+#define CONTACTD_SIZE(type, n) CONTACTD_ASSERT(sizeof(type) == n, "size of " #type)
+#define CONTACTD_AT(type, field, n) CONTACTD_ASSERT(offsetof(type, field) == n, "place of " #type "." #field)
+CONTACTD_SIZE(contactd_pose_record, 64);
+CONTACTD_AT(contactd_pose_record, object, 0);
+CONTACTD_AT(contactd_pose_record, flags, 4);
+CONTACTD_AT(contactd_pose_record, position, 8);
+CONTACTD_AT(contactd_pose_record, rotation, 32);
+CONTACTD_SIZE(contactd_record, 128);
+CONTACTD_AT(contactd_record, a, 0);
+CONTACTD_AT(contactd_record, b, 4);
+CONTACTD_AT(contactd_record, status, 8);
+CONTACTD_AT(contactd_record, kind, 9);
+CONTACTD_AT(contactd_record, extent, 10);
+CONTACTD_AT(contactd_record, flags, 11);
+CONTACTD_AT(contactd_record, valid, 12);
+CONTACTD_AT(contactd_record, time, 16);
+CONTACTD_AT(contactd_record, time_lower, 24);
+CONTACTD_AT(contactd_record, point, 32);
+CONTACTD_AT(contactd_record, normal, 56);
+CONTACTD_AT(contactd_record, separation, 80);
+CONTACTD_AT(contactd_record, normal_speed, 88);
+CONTACTD_AT(contactd_record, faces_a, 96);
+CONTACTD_AT(contactd_record, faces_b, 108);
+CONTACTD_AT(contactd_record, slot, 120);
+CONTACTD_AT(contactd_record, slots, 124);
+CONTACTD_SIZE(contactd_detail_slot, 128);
+CONTACTD_AT(contactd_detail_slot, tag, 0);
+CONTACTD_AT(contactd_detail_slot, reserved, 4);
+CONTACTD_AT(contactd_detail_slot, time_upper, 8);
+CONTACTD_AT(contactd_detail_slot, resolution, 16);
+CONTACTD_AT(contactd_detail_slot, point_a, 24);
+CONTACTD_AT(contactd_detail_slot, penetration, 48);
+CONTACTD_AT(contactd_detail_slot, direction, 56);
+CONTACTD_AT(contactd_detail_slot, cells, 80);
+CONTACTD_AT(contactd_detail_slot, margin_time, 88);
+CONTACTD_AT(contactd_detail_slot, spare, 96);
+CONTACTD_SIZE(contactd_region_slot, 128);
+CONTACTD_AT(contactd_region_slot, tag, 0);
+CONTACTD_AT(contactd_region_slot, region, 4);
+CONTACTD_AT(contactd_region_slot, kind, 8);
+CONTACTD_AT(contactd_region_slot, extent, 9);
+CONTACTD_AT(contactd_region_slot, reserved, 10);
+CONTACTD_AT(contactd_region_slot, points, 12);
+CONTACTD_AT(contactd_region_slot, normal, 16);
+CONTACTD_AT(contactd_region_slot, faces_a, 40);
+CONTACTD_AT(contactd_region_slot, faces_b, 52);
+CONTACTD_AT(contactd_region_slot, separation, 64);
+CONTACTD_AT(contactd_region_slot, spare, 72);
+CONTACTD_SIZE(contactd_patch_slot, 128);
+CONTACTD_AT(contactd_patch_slot, tag, 0);
+CONTACTD_AT(contactd_patch_slot, count, 4);
+CONTACTD_AT(contactd_patch_slot, points, 8);
+CONTACTD_AT(contactd_patch_slot, separations, 104);
+CONTACTD_AT(contactd_patch_slot, region, 120);
+CONTACTD_SIZE(contactd_step_reply, 224);
+CONTACTD_AT(contactd_step_reply, step, 0);
+CONTACTD_AT(contactd_step_reply, epoch, 8);
+CONTACTD_AT(contactd_step_reply, status, 16);
+CONTACTD_AT(contactd_step_reply, error, 20);
+CONTACTD_AT(contactd_step_reply, index, 24);
+CONTACTD_AT(contactd_step_reply, records, 28);
+CONTACTD_AT(contactd_step_reply, slots, 32);
+CONTACTD_AT(contactd_step_reply, truncated, 36);
+CONTACTD_AT(contactd_step_reply, effects, 40);
+CONTACTD_AT(contactd_step_reply, pairs, 44);
+CONTACTD_AT(contactd_step_reply, safe_time, 48);
+CONTACTD_AT(contactd_step_reply, counters, 56);
+CONTACTD_AT(contactd_step_reply, effect_counters, 144);
+CONTACTD_SIZE(contactd_work_counters, 88);
+CONTACTD_AT(contactd_work_counters, box_tests, 0);
+CONTACTD_AT(contactd_work_counters, primitives, 8);
+CONTACTD_AT(contactd_work_counters, after_stage1, 16);
+CONTACTD_AT(contactd_work_counters, node_pairs, 24);
+CONTACTD_AT(contactd_work_counters, candidates, 32);
+CONTACTD_AT(contactd_work_counters, cells, 40);
+CONTACTD_AT(contactd_work_counters, clauses, 48);
+CONTACTD_AT(contactd_work_counters, newton, 56);
+CONTACTD_AT(contactd_work_counters, closed_forms, 64);
+CONTACTD_AT(contactd_work_counters, may_have_passed, 72);
+CONTACTD_AT(contactd_work_counters, instant_cells, 80);
+CONTACTD_SIZE(contactd_effect_counters, 80);
+CONTACTD_AT(contactd_effect_counters, continuous, 0);
+CONTACTD_AT(contactd_effect_counters, discrete, 8);
+CONTACTD_AT(contactd_effect_counters, turning, 16);
+CONTACTD_AT(contactd_effect_counters, times, 24);
+CONTACTD_AT(contactd_effect_counters, contacts, 32);
+CONTACTD_AT(contactd_effect_counters, patches, 40);
+CONTACTD_AT(contactd_effect_counters, penetrations, 48);
+CONTACTD_AT(contactd_effect_counters, margins, 56);
+CONTACTD_AT(contactd_effect_counters, past_overlaps, 64);
+CONTACTD_AT(contactd_effect_counters, sensors, 72);
+CONTACTD_SIZE(contactd_pose, 56);
+CONTACTD_AT(contactd_pose, position, 0);
+CONTACTD_AT(contactd_pose, rotation, 24);
+CONTACTD_SIZE(contactd_opened, 24);
+CONTACTD_AT(contactd_opened, session, 0);
+CONTACTD_AT(contactd_opened, epoch, 8);
+CONTACTD_AT(contactd_opened, max_batch, 16);
+CONTACTD_AT(contactd_opened, reserved, 20);
+CONTACTD_SIZE(contactd_face, 24);
+CONTACTD_AT(contactd_face, primitive, 0);
+CONTACTD_AT(contactd_face, subtracted, 4);
+CONTACTD_AT(contactd_face, name, 8);
+CONTACTD_AT(contactd_face, face, 16);
+CONTACTD_SIZE(contactd_mass, 176);
+CONTACTD_AT(contactd_mass, volume, 0);
+CONTACTD_AT(contactd_mass, volume_error, 8);
+CONTACTD_AT(contactd_mass, center, 16);
+CONTACTD_AT(contactd_mass, center_error, 40);
+CONTACTD_AT(contactd_mass, density, 64);
+CONTACTD_AT(contactd_mass, inertia, 72);
+CONTACTD_AT(contactd_mass, inertia_error, 120);
+CONTACTD_AT(contactd_mass, boxes, 168);
+CONTACTD_SIZE(contactd_names, 16);
+CONTACTD_AT(contactd_names, a, 0);
+CONTACTD_AT(contactd_names, b, 8);
+CONTACTD_SIZE(contactd_object, 152);
+CONTACTD_AT(contactd_object, name, 0);
+CONTACTD_AT(contactd_object, group, 8);
+CONTACTD_AT(contactd_object, model, 16);
+CONTACTD_AT(contactd_object, is_static, 20);
+CONTACTD_AT(contactd_object, rotates, 24);
+CONTACTD_AT(contactd_object, reserved, 28);
+CONTACTD_AT(contactd_object, max_speed, 32);
+CONTACTD_AT(contactd_object, place, 40);
+CONTACTD_AT(contactd_object, pose, 96);
+CONTACTD_SIZE(contactd_rule, 64);
+CONTACTD_AT(contactd_rule, between, 0);
+CONTACTD_AT(contactd_rule, except, 16);
+CONTACTD_AT(contactd_rule, except_count, 24);
+CONTACTD_AT(contactd_rule, detect, 32);
+CONTACTD_AT(contactd_rule, report, 36);
+CONTACTD_AT(contactd_rule, initial_overlap, 40);
+CONTACTD_AT(contactd_rule, penetration, 44);
+CONTACTD_AT(contactd_rule, sensor, 48);
+CONTACTD_AT(contactd_rule, reserved, 52);
+CONTACTD_AT(contactd_rule, margin, 56);
+CONTACTD_SIZE(contactd_options, 48);
+CONTACTD_AT(contactd_options, advance, 0);
+CONTACTD_AT(contactd_options, dt, 8);
+CONTACTD_AT(contactd_options, first, 16);
+CONTACTD_AT(contactd_options, details, 20);
+CONTACTD_AT(contactd_options, clear, 24);
+CONTACTD_AT(contactd_options, polling, 28);
+CONTACTD_AT(contactd_options, max_records, 32);
+CONTACTD_AT(contactd_options, cell_limit, 36);
+CONTACTD_AT(contactd_options, batch_limit, 40);
+CONTACTD_AT(contactd_options, reserved, 44);
+CONTACTD_SIZE(contactd_reply, 256);
+CONTACTD_AT(contactd_reply, header, 0);
+CONTACTD_AT(contactd_reply, records, 224);
+CONTACTD_AT(contactd_reply, record_count, 232);
+CONTACTD_AT(contactd_reply, slots, 240);
+CONTACTD_AT(contactd_reply, slot_count, 248);
+#undef CONTACTD_AT
+#undef CONTACTD_SIZE
+#undef CONTACTD_ASSERT

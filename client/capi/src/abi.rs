@@ -1,0 +1,261 @@
+//! The plain structures of this interface beside the wire records of `proto`, which are exported as they are.
+
+use contactd_client::transport::Opened as Session;
+use contactd_proto::control::WirePose;
+use contactd_proto::{ContactRecord, ErrorCode, StepReply, effects};
+use std::ffi::c_char;
+
+/// A rigid placement: `parent = rotation * local + position`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Pose {
+    /// Position x, y, z.
+    pub position: [f64; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation: [f64; 4],
+}
+
+impl Pose {
+    /// The frame that coincides with its parent.
+    pub const IDENTITY: Self = Self { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
+
+    /// The pose, if its numbers are finite and its quaternion is of unit length.
+    pub(crate) fn checked(&self) -> Result<contactd_proto::Pose, ErrorCode> {
+        WirePose { position: self.position, rotation: self.rotation }.checked()
+    }
+}
+
+/// What the server said when it opened the session.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Opened {
+    /// Session id.
+    pub session: u64,
+    /// Epoch of the server; changes with its every start.
+    pub epoch: u64,
+    /// Most records in a batch.
+    pub max_batch: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+impl From<Session> for Opened {
+    fn from(o: Session) -> Self {
+        Self { session: o.session, epoch: o.epoch, max_batch: o.max_batch, reserved: 0 }
+    }
+}
+
+/// A face of a model. Its strings are valid until the session is closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Face {
+    /// Index of its primitive in file order.
+    pub primitive: u32,
+    /// 1: the primitive is subtracted.
+    pub subtracted: u32,
+    /// The primitive's name in the format: "sphere", "cylinder" …
+    pub name: *const c_char,
+    /// The face's name: "side", "top" …
+    pub face: *const c_char,
+}
+
+/// Volume, centre of mass and inertia of a solid of even density. Every true value lies within its error of the one given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Mass {
+    /// Volume, length³.
+    pub volume: f64,
+    /// Bound of its error, length³.
+    pub volume_error: f64,
+    /// Centre of mass.
+    pub center: [f64; 3],
+    /// Bounds of its error, a length along each axis.
+    pub center_error: [f64; 3],
+    /// Mass per volume; 1 unless contactd_mass_with_density changed it.
+    pub density: f64,
+    /// Inertia tensor about the centre of mass: xx, yy, zz, xy, xz, yz (xx = ∫ y² + z² dm, xy = −∫ x y dm), density · length⁵.
+    pub inertia: [f64; 6],
+    /// Bounds of its error, in the same order and unit.
+    pub inertia_error: [f64; 6],
+    /// Boxes that were looked at; 0 where a closed formula answers.
+    pub boxes: u64,
+}
+
+/// Two names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Names {
+    /// The first one.
+    pub a: *const c_char,
+    /// The second one.
+    pub b: *const c_char,
+}
+
+/// An object to be added: a model, where it stands, and what is declared of it. contactd_object_new sets the defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Object {
+    /// Its name, for the exceptions of rules.
+    pub name: *const c_char,
+    /// Its group, for rules.
+    pub group: *const c_char,
+    /// Its model's id.
+    pub model: u32,
+    /// 1: it never moves.
+    pub is_static: u32,
+    /// 0: it never turns; a motion that turns it will be refused.
+    pub rotates: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// No point of it is ever faster than this, length per second; steps then need `dt`. Infinite: nothing is declared.
+    pub max_speed: f64,
+    /// Where the model sits in the object's frame.
+    pub place: Pose,
+    /// Where the object stands.
+    pub pose: Pose,
+}
+
+/// What happens between two groups of objects. contactd_rule_new sets the defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Rule {
+    /// The two groups; both may be the same.
+    pub between: Names,
+    /// Single pairs, by object name, that this rule leaves out; NULL when there are none.
+    pub except: *const Names,
+    /// Number of them.
+    pub except_count: usize,
+    /// CONTACTD_DETECT_…: how the pair is searched.
+    pub detect: u32,
+    /// CONTACTD_REPORT_…: what is told of it.
+    pub report: u32,
+    /// CONTACTD_INITIAL_OVERLAP_…: what a pair that starts in overlap does.
+    pub initial_overlap: u32,
+    /// 1: depth and direction where a step starts in overlap.
+    pub penetration: u32,
+    /// 1: record only; never stops a search for the scene's first contact.
+    pub sensor: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Report at this separation too (length, >= 0): never late, early at sharp features.
+    pub margin: f64,
+}
+
+/// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Options {
+    /// Fraction 0..1 of its previous step at which every object stands before the next one.
+    pub advance: f64,
+    /// Duration of a step in seconds, for objects with a declared largest speed; 0: unknown.
+    pub dt: f64,
+    /// 1: only the pairs whose bracket meets the scene's earliest contact.
+    pub first: u32,
+    /// 1: a detail slot with each record (contactd_get_detail).
+    pub details: u32,
+    /// 1: records of clear pairs too.
+    pub clear: u32,
+    /// 1: this client polls while it waits; the server then need not wake it.
+    pub polling: u32,
+    /// Most records, the earliest first; 0: all.
+    pub max_records: u32,
+    /// Most cells that one pair's search may refine; 0: the server's default.
+    pub cell_limit: u32,
+    /// Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
+    /// undecided, the latest first.
+    pub batch_limit: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// The answer to a step. The header is a copy; records and slots are read in place and valid until the session's next
+/// contactd_begin_step, contactd_resend, contactd_reconnect or contactd_close.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Reply {
+    /// Status, safe time, effects, work.
+    pub header: StepReply,
+    /// The contact records in the order (time, a, b).
+    pub records: *const ContactRecord,
+    /// Number of them.
+    pub record_count: usize,
+    /// All slots as they lie in memory: the records, then their further slots.
+    pub slots: *const ContactRecord,
+    /// Number of them.
+    pub slot_count: usize,
+}
+
+/// How often each effect was worked out: in a step. What an earlier step has proven need not be worked out again, so counters
+/// are no part of the answer's bits.
+// The header's form of proto's structure, which a macro makes; the conversion below fails to build when they differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct EffectCounters {
+    /// Pairs searched over the whole step.
+    pub continuous: u64,
+    /// Pairs tested at the end of the step only.
+    pub discrete: u64,
+    /// Of the pairs searched over the step those of which a body turns.
+    pub turning: u64,
+    /// Times of contact worked out.
+    pub times: u64,
+    /// Contact points with their normal, kind and faces.
+    pub contacts: u64,
+    /// Pairs whose contact regions were looked for.
+    pub patches: u64,
+    /// Deepest points of overlaps at the start.
+    pub penetrations: u64,
+    /// Separations tested against a margin.
+    pub margins: u64,
+    /// Overlaps at the start that were searched past.
+    pub past_overlaps: u64,
+    /// Sensor pairs told.
+    pub sensors: u64,
+}
+
+/// `effects`: pairs were searched over the whole step.
+pub const EFFECT_CONTINUOUS: u32 = 1;
+/// `effects`: pairs were tested at the end of the step.
+pub const EFFECT_DISCRETE: u32 = 2;
+/// `effects`: a body of a pair turned.
+pub const EFFECT_TURNING: u32 = 4;
+/// `effects`: times of contact were worked out.
+pub const EFFECT_TIME: u32 = 8;
+/// `effects`: contact points were worked out.
+pub const EFFECT_CONTACT: u32 = 16;
+/// `effects`: contact regions were looked for.
+pub const EFFECT_PATCH: u32 = 32;
+/// `effects`: deepest points were looked for.
+pub const EFFECT_PENETRATION: u32 = 64;
+/// `effects`: separations were tested against a margin.
+pub const EFFECT_MARGIN: u32 = 128;
+/// `effects`: overlaps at the start were searched past.
+pub const EFFECT_PAST_OVERLAP: u32 = 256;
+/// `effects`: sensor pairs were told.
+pub const EFFECT_SENSOR: u32 = 512;
+
+macro_rules! same_counters {
+    ($($field:ident),+) => {
+        impl From<effects::EffectCounters> for EffectCounters {
+            fn from(counters: effects::EffectCounters) -> Self {
+                let effects::EffectCounters { $($field),+ } = counters;
+                Self { $($field),+ }
+            }
+        }
+        const _: () = {
+            assert!(size_of::<EffectCounters>() == size_of::<effects::EffectCounters>());
+            $(assert!(
+                std::mem::offset_of!(EffectCounters, $field) == std::mem::offset_of!(effects::EffectCounters, $field)
+            );)+
+        };
+    };
+}
+same_counters!(continuous, discrete, turning, times, contacts, patches, penetrations, margins, past_overlaps, sensors);
+
+const _: () = {
+    assert!(EFFECT_CONTINUOUS == effects::EFFECT_CONTINUOUS && EFFECT_DISCRETE == effects::EFFECT_DISCRETE);
+    assert!(EFFECT_TURNING == effects::EFFECT_TURNING && EFFECT_TIME == effects::EFFECT_TIME);
+    assert!(EFFECT_CONTACT == effects::EFFECT_CONTACT && EFFECT_PATCH == effects::EFFECT_PATCH);
+    assert!(EFFECT_PENETRATION == effects::EFFECT_PENETRATION && EFFECT_MARGIN == effects::EFFECT_MARGIN);
+    assert!(EFFECT_PAST_OVERLAP == effects::EFFECT_PAST_OVERLAP && EFFECT_SENSOR == effects::EFFECT_SENSOR);
+};

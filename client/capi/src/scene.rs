@@ -1,0 +1,151 @@
+//! Objects, rules and resolution.
+
+use crate::abi::{Names, Object, Pose, Rule};
+use crate::error::Failure;
+use crate::handle::{Session, State, on};
+use crate::raw::{flag, given, place, row, text, word};
+use contactd_proto::{Detect, InitialOverlap, Report};
+use std::ffi::c_char;
+
+/// Not searched at all.
+pub const DETECT_OFF: u32 = 0;
+/// The end pose only.
+pub const DETECT_DISCRETE: u32 = 1;
+/// The whole motion.
+pub const DETECT_CONTINUOUS: u32 = 2;
+
+/// Yes or no.
+pub const REPORT_HIT: u32 = 0;
+/// The time too.
+pub const REPORT_TIME: u32 = 1;
+/// Point, normal and kind too.
+pub const REPORT_CONTACT: u32 = 2;
+/// The points of all contact regions too.
+pub const REPORT_PATCH: u32 = 3;
+
+/// The overlap is the answer.
+pub const INITIAL_OVERLAP_REPORT: u32 = 0;
+/// The search goes on for the starting depth + the resolution.
+pub const INITIAL_OVERLAP_IGNORE_IF_SEPARATING: u32 = 1;
+
+const _: () = {
+    assert!(Detect::Off as u32 == DETECT_OFF && Detect::Discrete as u32 == DETECT_DISCRETE);
+    assert!(Detect::Continuous as u32 == DETECT_CONTINUOUS && Detect::ALL.len() == 3);
+    assert!(Report::Hit as u32 == REPORT_HIT && Report::Time as u32 == REPORT_TIME);
+    assert!(Report::Contact as u32 == REPORT_CONTACT && Report::Patch as u32 == REPORT_PATCH);
+    assert!(InitialOverlap::Report as u32 == INITIAL_OVERLAP_REPORT && Report::ALL.len() == 4);
+    assert!(InitialOverlap::IgnoreIfSeparating as u32 == INITIAL_OVERLAP_IGNORE_IF_SEPARATING);
+    assert!(InitialOverlap::ALL.len() == 2);
+};
+
+/// A moving object of group "default" at the origin. Name and group are copied when it is added.
+#[unsafe(no_mangle)]
+pub extern "C" fn contactd_object_new(name: *const c_char, model: u32) -> Object {
+    Object {
+        name,
+        group: c"default".as_ptr(),
+        model,
+        is_static: 0,
+        rotates: 1,
+        reserved: 0,
+        max_speed: f64::INFINITY,
+        place: Pose::IDENTITY,
+        pose: Pose::IDENTITY,
+    }
+}
+
+/// The rule of two groups with every other field at its default: continuous, report contact, an overlap is the answer.
+#[unsafe(no_mangle)]
+pub extern "C" fn contactd_rule_new(a: *const c_char, b: *const c_char) -> Rule {
+    Rule {
+        between: Names { a, b },
+        except: std::ptr::null(),
+        except_count: 0,
+        detect: DETECT_CONTINUOUS,
+        report: REPORT_CONTACT,
+        initial_overlap: INITIAL_OVERLAP_REPORT,
+        penetration: 0,
+        sensor: 0,
+        reserved: 0,
+        margin: 0.0,
+    }
+}
+
+/// Adds an object; `*id` is its id, which stays the same over restarts of the server and is never used again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_add_object(session: *mut Session, object: *const Object, id: *mut u32) -> i32 {
+    let call = |state: &mut State| {
+        // SAFETY: the caller's structure and variable (1).
+        let (object, id) = unsafe { (given(object, "object")?, place(id, "id")?) };
+        // SAFETY: the caller's strings (2).
+        let (name, group) = unsafe { (text(object.name, "object.name")?, text(object.group, "object.group")?) };
+        let mut spec = contactd_client::Object::new(name, object.model).group(group).max_speed(object.max_speed);
+        if flag(object.is_static, "object.is_static")? {
+            spec = spec.fixed();
+        }
+        if !flag(object.rotates, "object.rotates")? {
+            spec = spec.without_rotation();
+        }
+        let spec = spec.place(object.place.checked()?).at(object.pose.checked()?);
+        id.write(state.session.add_object(spec)?);
+        Ok(())
+    };
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, call) }
+}
+
+/// Removes an object; its id is not used again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_remove_object(session: *mut Session, id: u32) -> i32 {
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, |state| Ok(state.session.remove_object(id)?)) }
+}
+
+/// Replaces the session's rules. The first rule that names a pair decides; a pair that no rule names is off once there are
+/// rules; without rules every pair is continuous, report contact. contactd_error_index names the rule that was refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_set_rules(session: *mut Session, rules: *const Rule, count: usize) -> i32 {
+    let call = |state: &mut State| {
+        // SAFETY: the caller's structures (1).
+        let rules = unsafe { row(rules, count, "rules")? };
+        let rules = rules.iter().enumerate();
+        // SAFETY: the caller's structures and strings (1, 2).
+        let rules = rules.map(|(i, rule)| unsafe { checked(rule) }.map_err(|e| e.at(i)));
+        let rules: Vec<contactd_proto::Rule> = rules.collect::<Result<_, _>>()?;
+        Ok(state.session.set_rules(&rules)?)
+    };
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, call) }
+}
+
+/// Sets the resolution of every pair, a length; 0: each its default (1e-9 of the larger bounding radius).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_set_resolution(session: *mut Session, resolution: f64) -> i32 {
+    let resolution = (resolution != 0.0).then_some(resolution);
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, |state| Ok(state.session.set_resolution(resolution)?)) }
+}
+
+/// A rule.
+///
+/// # Safety
+/// Points 1 and 2 of the contract, for all that the rule points to.
+unsafe fn checked(rule: &Rule) -> Result<contactd_proto::Rule, Failure> {
+    let pair = |names: &Names, what: &str| {
+        // SAFETY: the caller's strings (2).
+        let (a, b) = unsafe { (text(names.a, what)?, text(names.b, what)?) };
+        Ok([a.to_owned(), b.to_owned()])
+    };
+    // SAFETY: the caller's structures (1).
+    let except = unsafe { row(rule.except, rule.except_count, "rule.except")? };
+    Ok(contactd_proto::Rule {
+        between: pair(&rule.between, "rule.between")?,
+        except: except.iter().map(|names| pair(names, "rule.except")).collect::<Result<_, Failure>>()?,
+        detect: word(Detect::ALL, rule.detect, "rule.detect")?,
+        report: word(Report::ALL, rule.report, "rule.report")?,
+        penetration: flag(rule.penetration, "rule.penetration")?,
+        margin: rule.margin,
+        initial_overlap: word(InitialOverlap::ALL, rule.initial_overlap, "rule.initial_overlap")?,
+        sensor: flag(rule.sensor, "rule.sensor")?,
+    })
+}

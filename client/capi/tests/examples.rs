@@ -1,0 +1,69 @@
+//! What the examples print: the same in Rust and through the C functions. The programs in C themselves are compared by
+//! `client/capi/check`, which needs a C compiler.
+
+#[allow(dead_code)]
+#[path = "../../examples/hello.rs"]
+mod hello;
+#[allow(dead_code)]
+#[path = "../../examples/own_loop.rs"]
+mod own_loop;
+mod support;
+
+use contactd::ipc::ServerConfig;
+use contactd_capi::step::{contactd_get_options, contactd_set_advance, contactd_set_options};
+use contactd_proto::contact_record::CONTACT;
+use support::{Open, done, end, out, records};
+
+#[test]
+fn hello_prints_the_same_through_c() {
+    let of_rust = hello::hello(contactd::embedded(&ServerConfig::default()).unwrap()).unwrap();
+    let session = Open::embedded();
+    let (_, ball) = session.scene();
+    let reply = session.step(&[end(ball, [1.0, 0.0, 0.0])]);
+    let mut lines = String::new();
+    for c in records(&reply) {
+        let (p, n) = (c.point, c.normal);
+        lines += &format!("{}-{}: contact at t = {:.15}, ", c.a, c.b, c.time);
+        lines += &format!("point {:.12} {:.12} {:.12}, ", p[0], p[1], p[2]);
+        lines += &format!("normal {:.12} {:.12} {:.12}\n", n[0], n[1], n[2]);
+    }
+    assert_eq!(lines, of_rust);
+    assert_eq!(lines.lines().count(), 1);
+    assert!(lines.starts_with("1-2: contact at t = 0.67087121525220"), "{lines}");
+}
+
+/// The arithmetic of `loop.c`, line by line.
+#[test]
+fn a_loop_of_one_s_own_bounces_the_same_through_c() {
+    let session = Open::embedded();
+    // SAFETY: an open session and variables.
+    let mut options = out(|o| unsafe { contactd_get_options(session.0, o) });
+    options.first = 1;
+    // SAFETY: an open session and a structure.
+    done(unsafe { contactd_set_options(session.0, &options) });
+    let text = std::ffi::CString::new(own_loop::ROOM).unwrap();
+    let (room, ball) = (session.model("room.csg", &text), session.model("ball.csg", c"sphere(r = 1);"));
+    let (mut x, mut v) = ([-3.0, -2.5, 1.0], [2.0, 1.25, 0.75]);
+    session.object(c"room", room, |o| o.is_static = 1);
+    let ball = session.object(c"ball", ball, |o| o.pose.position = x);
+    let (mut time, mut taken, mut lines) = (0.0, 1.0, String::new());
+    while time < 20.0 {
+        // SAFETY: an open session.
+        done(unsafe { contactd_set_advance(session.0, taken) });
+        let reply = session.step(&[end(ball, [0, 1, 2].map(|k| x[k] + v[k] * own_loop::STEP))]);
+        let hit = records(&reply).first().filter(|c| c.status == CONTACT);
+        taken = hit.map_or(reply.header.safe_time, |c| c.time);
+        time += taken * own_loop::STEP;
+        (0..3).for_each(|k| x[k] += v[k] * (taken * own_loop::STEP));
+        if let Some(c) = hit {
+            let n = c.normal;
+            let twice = 2.0 * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2]);
+            (0..3).for_each(|k| v[k] -= n[k] * twice);
+            lines += &format!("t = {time:.12}: at {:.12} {:.12} {:.12}\n", x[0], x[1], x[2]);
+        }
+    }
+    assert_eq!(lines, own_loop::bounces().unwrap());
+    assert!(lines.lines().count() > 10, "{lines}");
+    // Reflections keep the speed.
+    assert!((v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 6.125).abs() < 1e-12, "{v:?}");
+}

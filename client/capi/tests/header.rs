@@ -1,0 +1,188 @@
+//! The committed header is the one that the sources make, and its sizes and offsets are Rust's.
+//!
+//! `CONTACTD_WRITE_HEADER=1 cargo test -p contactd-capi --test header` writes it anew after a change of the interface.
+
+use cbindgen::{Builder, Config};
+use contactd_capi::abi::{EffectCounters, Face, Mass, Names, Object, Opened, Options, Pose, Reply, Rule};
+use contactd_proto::step::WorkCounters;
+use contactd_proto::{ContactRecord, DetailSlot, ErrorCode, PatchSlot, PoseRecord, RegionSlot, StepReply};
+use std::fmt::Write as _;
+use std::mem::offset_of;
+use std::path::Path;
+
+/// Sources of the header, in its order.
+const SOURCES: [&str; 10] = [
+    "src/error.rs",
+    "../../proto/src/pose_record.rs",
+    "../../proto/src/contact_record.rs",
+    "../../proto/src/step.rs",
+    "src/abi.rs",
+    "src/handle.rs",
+    "src/session.rs",
+    "src/model.rs",
+    "src/scene.rs",
+    "src/step.rs",
+];
+
+const HEAD: &str = "\
+// contactd: earliest contact of moving solids modelled by constructive solid geometry, from C and C++.
+//
+// Lengths are in the models' unit, times within a step a fraction 0..1, axes right-handed, quaternions x y z w, angles in
+// radians. Every function that can fail returns CONTACTD_OK or another code; contactd_error_message() says what was wrong.
+// A session belongs to the thread that opened it.
+//
+// Not to be edited: made of the Rust sources by client/capi/tests/header.rs.";
+
+/// Lines that state size and offsets of a structure to the C compiler.
+macro_rules! asserts {
+    ($out:ident, $($name:literal $type:ident { $($field:ident),+ $(,)? })+) => {$(
+        let _ = writeln!($out, "CONTACTD_SIZE({}, {});", $name, size_of::<$type>());
+        $(let _ = writeln!($out, "CONTACTD_AT({}, {}, {});", $name, stringify!($field), offset_of!($type, $field));)+
+        // A field that the list leaves out does not build.
+        #[allow(clippy::unneeded_field_pattern)]
+        let _ = |it: $type| { let $type { $($field: _),+ } = it; };
+    )+};
+}
+
+fn offsets() -> String {
+    let mut text = String::from(
+        "// Sizes and offsets as the library was built with them.\n\
+         #ifdef __cplusplus\n\
+         #define CONTACTD_ASSERT static_assert\n\
+         #else\n\
+         #define CONTACTD_ASSERT _Static_assert\n\
+         #endif\n\
+         #define CONTACTD_SIZE(type, n) CONTACTD_ASSERT(sizeof(type) == n, \"size of \" #type)\n\
+         #define CONTACTD_AT(type, field, n) CONTACTD_ASSERT(offsetof(type, field) == n, \"place of \" #type \".\" #field)\n",
+    );
+    let out = &mut text;
+    asserts! { out,
+        "contactd_pose_record" PoseRecord { object, flags, position, rotation }
+        "contactd_record" ContactRecord {
+            a, b, status, kind, extent, flags, valid, time, time_lower, point, normal, separation, normal_speed, faces_a,
+            faces_b, slot, slots,
+        }
+        "contactd_detail_slot" DetailSlot {
+            tag, reserved, time_upper, resolution, point_a, penetration, direction, cells, margin_time, spare,
+        }
+        "contactd_region_slot" RegionSlot {
+            tag, region, kind, extent, reserved, points, normal, faces_a, faces_b, separation, spare,
+        }
+        "contactd_patch_slot" PatchSlot { tag, count, points, separations, region }
+        "contactd_step_reply" StepReply {
+            step, epoch, status, error, index, records, slots, truncated, effects, pairs, safe_time, counters,
+            effect_counters,
+        }
+        "contactd_work_counters" WorkCounters {
+            box_tests, primitives, after_stage1, node_pairs, candidates, cells, clauses, newton, closed_forms,
+            may_have_passed, instant_cells,
+        }
+        "contactd_effect_counters" EffectCounters {
+            continuous, discrete, turning, times, contacts, patches, penetrations, margins, past_overlaps, sensors,
+        }
+        "contactd_pose" Pose { position, rotation }
+        "contactd_opened" Opened { session, epoch, max_batch, reserved }
+        "contactd_face" Face { primitive, subtracted, name, face }
+        "contactd_mass" Mass {
+            volume, volume_error, center, center_error, density, inertia, inertia_error, boxes,
+        }
+        "contactd_names" Names { a, b }
+        "contactd_object" Object { name, group, model, is_static, rotates, reserved, max_speed, place, pose }
+        "contactd_rule" Rule {
+            between, except, except_count, detect, report, initial_overlap, penetration, sensor, reserved, margin,
+        }
+        "contactd_options" Options {
+            advance, dt, first, details, clear, polling, max_records, cell_limit, batch_limit, reserved,
+        }
+        "contactd_reply" Reply { header, records, record_count, slots, slot_count }
+    }
+    text + "#undef CONTACTD_AT\n#undef CONTACTD_SIZE\n#undef CONTACTD_ASSERT"
+}
+
+/// `UnknownObject` → `UNKNOWN_OBJECT`.
+fn screaming(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !out.is_empty() {
+            out.push('_');
+        }
+        out.push(c.to_ascii_uppercase());
+    }
+    out
+}
+
+fn codes() -> String {
+    let mut text = format!(
+        "\n#define CONTACTD_VERSION \"{}\"\n#define CONTACTD_PROTOCOL_VERSION {}\n\n// Why the server refused: numbers that \
+         never change, each with its sentence.\n",
+        env!("CARGO_PKG_VERSION"),
+        contactd_proto::names::PROTOCOL_VERSION
+    );
+    for code in ErrorCode::ALL {
+        let name = screaming(&format!("{code:?}"));
+        let _ = writeln!(text, "\n// {}.\n#define CONTACTD_ERROR_{name} {}", code.sentence(), code.number());
+    }
+    text.trim_end().into()
+}
+
+/// Rust's links in comments, as C names: [`STEP_SLOT`] → CONTACTD_STEP_SLOT, [`PatchSlot`]s → contactd_patch_slot.
+fn without_links(text: &str, config: &Config) -> String {
+    let mut pieces = text.split("[`");
+    let mut out = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let (path, rest) = piece.split_once("`]").expect("the end of a link");
+        let name = path.rsplit("::").next().unwrap_or(path);
+        match config.export.rename.get(name) {
+            Some(renamed) => out += renamed,
+            None if name.chars().all(|c| !c.is_ascii_lowercase()) => out += &format!("CONTACTD_{name}"),
+            None => out += name,
+        }
+        out += rest;
+    }
+    out
+}
+
+fn made() -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut config = Config::from_file(folder.join("cbindgen.toml")).expect("settings");
+    config.header = Some(HEAD.into());
+    config.after_includes = Some(codes());
+    config.trailer = Some(offsets());
+    let builder = SOURCES.iter().fold(Builder::new(), |builder, source| builder.with_src(folder.join(source)));
+    let mut bytes = Vec::new();
+    builder.with_config(config.clone()).generate().expect("sources that cbindgen reads").write(&mut bytes);
+    without_links(&String::from_utf8(bytes).expect("text"), &config)
+}
+
+#[test]
+fn the_committed_header_is_the_one_that_the_sources_make() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/contactd.h");
+    let made = made();
+    if std::env::var_os("CONTACTD_WRITE_HEADER").is_some() {
+        std::fs::write(&file, &made).expect("a file that can be written");
+    }
+    let committed = std::fs::read_to_string(&file).expect("include/contactd.h");
+    let first = made.lines().zip(committed.lines()).position(|(a, b)| a != b);
+    let first = first.unwrap_or(made.lines().count().min(committed.lines().count()));
+    assert!(
+        made == committed,
+        "include/contactd.h is not what the sources make, from line {}: write it anew with \
+         CONTACTD_WRITE_HEADER=1 cargo test -p contactd-capi --test header",
+        first + 1
+    );
+}
+
+#[test]
+fn every_function_of_the_sources_is_declared() {
+    let header = made();
+    let mut functions = 0;
+    for source in SOURCES.iter().filter(|s| s.starts_with("src")) {
+        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(source)).expect("a source");
+        for (at, _) in text.match_indices("extern \"C\" fn ") {
+            let name = text[at..].split([' ', '(']).nth(3).expect("a name");
+            assert!(header.contains(&format!("{name}(")), "{name} of {source} is not in the header");
+            functions += 1;
+        }
+    }
+    assert!(functions > 25, "{functions}");
+}
