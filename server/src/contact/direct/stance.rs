@@ -15,7 +15,7 @@
 //! bit of an answer depends on which directions were remembered.
 
 use super::support::Body;
-use super::{body_of, gjk, whole};
+use super::{body_of, gjk};
 use crate::eco::Model;
 use crate::solid::Shape;
 use contactd_proto::{Pose, Track};
@@ -67,7 +67,7 @@ pub struct Glance {
 impl Hull {
     /// Of a model placed in its object; `None` unless it is one bounded convex primitive.
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
-        let primitive = whole(&model.solid)?;
+        let primitive = model.solid.whole()?;
         body_of(primitive)?;
         let ball = &primitive.ball;
         let rho = (place.point(ball.center).length() + ball.radius) * (1.0 + 1e-14);
@@ -102,7 +102,7 @@ impl Hull {
 
 /// Largest n·x over a shape that stands with these axes.
 #[inline]
-fn reach(shape: &Shape, axes: &DMat3, n: DVec3) -> f64 {
+pub fn reach(shape: &Shape, axes: &DMat3, n: DVec3) -> f64 {
     let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
     let across = || (m.x * m.x + m.y * m.y).sqrt();
     match shape {
@@ -132,7 +132,7 @@ impl<'a> Glancing<'a> {
     /// Two bodies by their models and stances, asked whether they stay farther apart than `touch` (a length). `None` if one
     /// of them is no convex primitive.
     pub fn new(models: [&'a Model; 2], stances: [&'a Stance; 2], touch: f64) -> Option<Self> {
-        let shapes = [&whole(&models[0].solid)?.shape, &whole(&models[1].solid)?.shape];
+        let shapes = [&models[0].solid.whole()?.shape, &models[1].solid.whole()?.shape];
         let [a, b] = stances;
         let difference = b.position - a.position;
         let velocity = b.velocity - a.velocity;
