@@ -490,6 +490,7 @@ pub(super) fn damped_step(
 }
 
 /// Solves a symmetric positive definite system in place.
+#[inline]
 pub(super) fn cholesky_solve<const N: usize>(a: &mut [[f64; N]; N], mut b: [f64; N], n: usize) -> Option<[f64; N]> {
     for j in 0..n {
         for k in 0..j {

@@ -102,16 +102,26 @@ pub fn resolution_of(query: &PairQuery) -> f64 {
 /// Searches a pair to its end.
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
     scratch.enter(Stage::Front);
-    let mut outcome = Outcome::clear(query.resolution);
-    let quick = quick(query, &mut outcome);
-    if !matches!(quick, Quick::Told) {
-        search(query, quick, &mut outcome, scratch);
-    }
+    let outcome = match direct::balls(query) {
+        Some(passage) => passage.outcome(query),
+        None => earliest(query, scratch),
+    };
     scratch.enter(None);
     outcome
 }
 
-/// Answers what is not told without a search. A function of its own, so that what is told stays where it was written.
+/// The same for what is no pair of balls. A function of its own, so that what is told stays where it was written.
+#[inline(never)]
+fn earliest(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
+    let mut outcome = clear(query);
+    let quick = direct::quick(query, &mut outcome);
+    if !matches!(quick, Quick::Told) {
+        search(query, quick, &mut outcome, scratch);
+    }
+    outcome
+}
+
+/// Answers what is not told without a search.
 #[inline(never)]
 fn search(query: &PairQuery, quick: Quick, outcome: &mut Outcome, scratch: &mut Scratch) {
     let (task, swapped) = PairSearch::task(query);
@@ -120,11 +130,20 @@ fn search(query: &PairQuery, quick: Quick, outcome: &mut Outcome, scratch: &mut 
     *scratch = search.into_scratch();
 }
 
+/// What is told of two bodies that do not meet, so far.
+fn clear(query: &PairQuery) -> Outcome {
+    let mut outcome = Outcome::clear(query.resolution);
+    outcome.counters.primitives = 2;
+    outcome
+}
+
 /// What is told of two whole primitives without a search; `outcome` is clear before.
 fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
-    outcome.counters.primitives = 2;
-    match direct::balls(query, outcome) {
-        Some(()) => Quick::Told,
+    match direct::balls(query) {
+        Some(passage) => {
+            *outcome = passage.outcome(query);
+            Quick::Told
+        }
         None => direct::quick(query, outcome),
     }
 }
@@ -230,7 +249,7 @@ impl<'a> PairSearch<'a> {
     /// Prepares the search of a pair.
     pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
         let (task, swapped) = Self::task(query);
-        let mut outcome = Outcome::clear(query.resolution);
+        let mut outcome = clear(query);
         let quick = quick(query, &mut outcome);
         if let Quick::Told = quick {
             let (resolution, limit) = (task.delta, query.cell_limit);

@@ -26,7 +26,7 @@ pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 use crate::bound::{SBounds, Volumes};
 use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};
 use crate::solid::local::{Token, Truth};
-use crate::solid::{Face, Solid};
+use crate::solid::{Face, Primitive, Shape, Solid};
 use glam::DVec3;
 use std::sync::OnceLock;
 
@@ -45,6 +45,8 @@ pub struct Model {
     pub extents: [f64; 2],
     /// Largest `Face::reach` of its faces: a cone's apex may lie far outside.
     pub face_reach: f64,
+    /// Of a solid that is one ball about its origin and nothing else: the radius and the face.
+    pub ball: Option<(f64, u32)>,
     /// S-bounds for clearances, with a margin of `WIDE_MARGIN` times the radius; taken when first asked for.
     wide: OnceLock<SBounds>,
 }
@@ -78,7 +80,13 @@ impl Model {
         } else {
             [aabb.min.abs().max(aabb.max.abs()), aabb.half()].map(DVec3::length)
         };
-        Self { solid, bounds, eco, radius, extents, face_reach, wide: OnceLock::new() }
+        let ball = match solid.whole() {
+            Some(Primitive { shape: Shape::Sphere(ball), frame, first_face, .. }) if frame.position == DVec3::ZERO => {
+                Some((ball.radius, *first_face))
+            }
+            _ => None,
+        };
+        Self { solid, bounds, eco, radius, extents, face_reach, ball, wide: OnceLock::new() }
     }
 
     /// S-bounds that tell the truth about f up to a depth or distance of `level` (a length), the closest there are; those

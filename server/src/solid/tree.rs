@@ -80,6 +80,14 @@ pub struct Solid {
 }
 
 impl Solid {
+    /// The one primitive of a solid that is nothing else.
+    pub fn whole(&self) -> Option<&Primitive> {
+        match self.nodes[self.root as usize] {
+            Node::Primitive(p) if self.senses[p as usize] == Sense::Positive => Some(&self.primitives[p as usize]),
+            _ => None,
+        }
+    }
+
     /// A solid of primitives in file order and of nodes, children before their parents; each primitive stands at one leaf and
     /// each node below one other. The rest follows from them.
     pub(crate) fn of_parts(primitives: Vec<Primitive>, nodes: Vec<Node>, root: NodeId) -> Self {

@@ -11,63 +11,45 @@
 //!
 //! since φ is a minimum over pairs of points of functions whose second derivative is at most Q. A body eroded by delta
 //! leaves room for a ball of that radius, so its support is less by delta: a contact of depth delta needs φ ≤ −2 delta, and
-//! φ > −2 delta excludes it. So: (1) nearest points at t by `gjk` give n; (2) the faces at the witnesses are solved for a
-//! contact, as the search does it, and both trees confirm it or it is none; (3) the time up to it is proven with its normal;
-//! (4) otherwise the time that n proves is taken, and again from there. No contact by the end: clear.
+//! φ > −2 delta excludes it. So: (1) nearest points at t by `gjk` give n; (2) the features that meet along it are solved for
+//! a contact (`turning`; where that fails, the faces at the witnesses as the search does it, `advance`), and both trees
+//! confirm it or it is none; (3) the time up to it is proven with its normal; (4) otherwise the time that n proves is taken,
+//! and again from there. No contact by the end: clear. What only moves along needs no advance (`straight`, `slabs`, `balls`).
 //! What overlaps, does not settle, or meets after it has started nearer than a few resolutions is left to the search;
 //! nothing is guessed.
 //! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) with the second-order bound above.
 
+mod advance;
 mod balls;
 mod gjk;
 mod overlap;
+mod part;
+mod proof;
+mod slabs;
 mod stance;
+mod steer;
 mod straight;
 mod support;
+mod touch;
+mod turning;
 
-use super::literal::Side;
-use super::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
 use super::outcome::{Outcome, Status};
 use super::pair::{self, PairQuery};
-use super::search::{Ending, Search};
-use super::task::{Task, witness_level};
-use crate::math::{any_perpendicular, tolerance};
-use crate::motion::{Instant, Rounding};
-use crate::solid::local::LiteralId;
-use crate::solid::{Face, Node, Primitive, Sense, Shape, Solid};
+use super::task::witness_level;
+use crate::math::tolerance;
+use crate::motion::Rounding;
+use crate::solid::{Primitive, Shape};
+pub(super) use advance::{Convex, answer, faces_at};
 pub(super) use balls::quick as balls;
-use gjk::{GOOD, Nearest, nearest};
 use glam::{DMat3, DQuat, DVec3};
 use overlap::{Look, Start};
-use smallvec::SmallVec;
 pub use stance::{Glance, Glancing, Hull, Stance};
 use straight::Straight;
 use support::Body;
+use turning::Turning;
 
-/// Distance evaluations before a pair is left to the search.
-const ROUNDS: usize = 24;
-/// Evaluations of φ that one proof may take.
-const PROOF: usize = 24;
-/// Distance evaluations that a proof of a kept distance may take, and the shortest time that another one is worth.
-const KEPT: u64 = 6;
-/// The same for the time at which a distance is reached.
-const NEARED: u64 = 200;
-const SHORT: f64 = 1.0 / 32.0;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
-/// Resolutions by which bodies that lie in each other are set apart to find what separates them.
-const OFF: f64 = 64.0;
-/// Gap, relative to the pair's scale, below which a contact is looked for.
-const NEAR: f64 = 0.3;
-/// A contact that the closing speed puts later than this is not looked for: speeds grow, but not by that much.
-const LATEST: f64 = 1.25;
-/// Imbalance of the multiplied unit normals that rounding leaves at a contact.
-const BALANCED: f64 = 1e-12;
-/// Gap, relative to the pair's scale, or rounds, from which faces that do not hold the contact are mended one by one:
-/// farther off the next round's faces are the cheaper try.
-const MEND: (f64, usize) = (0.01, 4);
-/// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
-const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
 /// Two whole primitives at the start and as they move along; world axes.
 struct Pair<'a> {
@@ -126,10 +108,11 @@ impl<'a> Pair<'a> {
         Some(Self { bodies, primitives, offsets, way, velocity, delta: resolution, rounding, scale })
     }
 
-    /// True when one of them turns, about another axis than its own.
-    fn turns(&self) -> bool {
-        self.bodies.iter().any(|body| {
-            body.placed.motion.spin != DVec3::ZERO && pair::without_own_spin(body).motion.spin != DVec3::ZERO
+    /// How they turn, spins about their own axes left out.
+    fn spins(&self) -> [DVec3; 2] {
+        self.bodies.map(|body| {
+            let spin = body.placed.motion.spin;
+            if spin == DVec3::ZERO { spin } else { pair::without_own_spin(body).motion.spin }
         })
     }
 
@@ -145,10 +128,10 @@ impl<'a> Pair<'a> {
         self.way - self.velocity * t
     }
 
-    /// A point seen from A's centre in the world.
-    fn point(&self, x: DVec3, t: f64) -> DVec3 {
+    /// A point seen from A's centre, which is `offset` from its centre of rotation by then, in the world.
+    fn point(&self, offset: DVec3, x: DVec3, t: f64) -> DVec3 {
         let motion = &self.bodies[0].placed.motion;
-        motion.start.position + motion.velocity * t + (self.offsets[0] + x)
+        motion.start.position + motion.velocity * t + (offset + x)
     }
 
     fn witness_level(&self) -> f64 {
@@ -166,11 +149,10 @@ pub(super) enum Quick {
     Open(Option<DVec3>),
 }
 
-/// Fills in the answer for two whole primitives that overlap at the start or only move along, from the stack alone;
-/// `outcome` is clear before.
+/// Fills in the answer for two whole primitives, from the stack alone; `outcome` is clear before.
 pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     let nothing = Quick::Open(None);
-    let (Some(a), Some(b)) = (whole(&query.a.model.solid), whole(&query.b.model.solid)) else { return nothing };
+    let (Some(a), Some(b)) = (query.a.model.solid.whole(), query.b.model.solid.whole()) else { return nothing };
     if !query.ideas.direct {
         return nothing;
     }
@@ -182,8 +164,10 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         (Shape::Sphere(p), Shape::Sphere(q)) => Some([p.radius, q.radius]),
         _ => None,
     };
+    let spins = pair.spins();
+    let turns = spins != [DVec3::ZERO; 2];
     let met = match balls {
-        Some(radii) if !pair.turns() => balls::meet(&pair, radii, query.asked, outcome),
+        Some(radii) if !turns => balls::meet(&pair, radii, query.asked, outcome),
         _ => None,
     };
     if met.is_none() {
@@ -199,8 +183,14 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
                 }
             }
             Look::Apart(n) => {
-                let straight = if balls.is_some() || pair.turns() { None } else { Straight::new(&pair) };
-                if straight.and_then(|straight| straight.meet(query.asked, outcome)).is_none() {
+                let told = if turns {
+                    Turning::new(&start, spins).and_then(|turning| turning.meet(n, query.asked, outcome))
+                } else if balls.is_none() {
+                    Straight::new(&start).and_then(|straight| straight.meet(query.asked, outcome))
+                } else {
+                    None
+                };
+                if told.is_none() {
                     return Quick::Open(Some(n));
                 }
             }
@@ -218,430 +208,6 @@ fn excluded(delta: f64, rounding: f64) -> f64 {
     -2.0 * delta + 4.0 * rounding
 }
 
-/// The answer for two solids that are one convex primitive each; `None` leaves them to the search. The distance at the
-/// start is looked for along a direction of the world first, if one is given.
-pub(super) fn answer(search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
-    let task = search.task;
-    let (a, b) = (whole(task.a)?, whole(task.b)?);
-    let (body_a, body_b) = (body_of(a)?, body_of(b)?);
-    let advance = Advance::new(task, (a, body_a), (b, body_b));
-    if advance.never_near() { Some(Ending::Clear) } else { advance.run(search, along) }
-}
-
-/// Two solids that are one convex primitive each, to be asked how far apart they are.
-pub(super) struct Convex<'a> {
-    advance: Advance<'a>,
-    /// The distance at the start, in its direction.
-    start: Gap,
-}
-
-impl<'a> Convex<'a> {
-    /// `None` for other solids, and where no direction is found that separates them.
-    pub fn new(task: Task<'a>) -> Option<Self> {
-        let (a, b) = (whole(task.a)?, whole(task.b)?);
-        let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
-        let m = advance.moment(0.0);
-        let start = advance.widest(&m, m.b.support(DVec3::ZERO) - a.ball.center)?;
-        Some(Self { advance, start })
-    }
-
-    /// A lower bound of the distance at the start, but for rounding.
-    pub fn distance(&self) -> f64 {
-        self.start.phi
-    }
-
-    /// Time until which the distance stays above `least` (a length), at least; of how many evaluations it took.
-    pub fn keeps(self, least: f64) -> (f64, u64) {
-        let (until, _, count) = self.advance_to(least, KEPT, SHORT);
-        (until, count)
-    }
-
-    /// The same to the end: where it stops short of 1 the distance then, a lower bound, is hardly above `least`, or what may
-    /// be spent has run out.
-    pub fn nears(self, least: f64) -> (f64, f64, u64) {
-        self.advance_to(least, NEARED, 0.0)
-    }
-
-    fn advance_to(mut self, least: f64, most: u64, shortest: f64) -> (f64, f64, u64) {
-        self.advance.least = least;
-        let (mut here, mut count) = (self.start, 1);
-        while here.phi > least && count < most {
-            let m = self.advance.moment(1.0);
-            let until = self.advance.proven(&here, &self.advance.gap(&m, here.n));
-            if until >= 1.0 {
-                return (1.0, here.phi, count);
-            }
-            // From where this direction gives out another one.
-            let m = self.advance.moment(until);
-            let Some(next) = self.advance.widest(&m, m.at.world_from_a.transpose() * here.n) else { break };
-            count += 1;
-            let short = next.t - here.t <= shortest;
-            here = next;
-            if short {
-                break;
-            }
-        }
-        (here.t, here.phi, count)
-    }
-}
-
 fn body_of(p: &Primitive) -> Option<Body<'_>> {
     Body::new(&p.shape, p.frame.matrix(), p.frame.position)
-}
-
-/// The one primitive of a solid that is nothing else.
-fn whole(solid: &Solid) -> Option<&Primitive> {
-    match solid.nodes[solid.root as usize] {
-        Node::Primitive(p) if solid.senses[p as usize] == Sense::Positive => Some(&solid.primitives[p as usize]),
-        _ => None,
-    }
-}
-
-/// An instant with B as A sees it.
-struct Moment<'a> {
-    at: Instant,
-    b: Body<'a>,
-}
-
-/// The gap along a direction at a time.
-#[derive(Clone, Copy)]
-struct Gap {
-    t: f64,
-    /// World axes.
-    n: DVec3,
-    phi: f64,
-}
-
-struct Advance<'a> {
-    task: Task<'a>,
-    a: (&'a Primitive, Body<'a>),
-    b: (&'a Primitive, Body<'a>),
-    /// |v₀| + ω_A ρ_A + ω_B ρ_B.
-    speed: f64,
-    /// ω_A² ρ_A + ω_B² ρ_B.
-    pull: f64,
-    /// ρ_A + ρ_B.
-    reach: f64,
-    /// φ above this excludes a contact of depth delta.
-    least: f64,
-}
-
-impl<'a> Advance<'a> {
-    fn new(task: Task<'a>, a: (&'a Primitive, Body<'a>), b: (&'a Primitive, Body<'a>)) -> Self {
-        let (pa, pb) = task.relative.placed();
-        let far = |p: &Primitive, center: DVec3| (p.ball.center - center).length() + p.ball.radius;
-        let rho_a = far(a.0, task.relative.center_a());
-        let rho_b = far(b.0, pb.place.inverse().position);
-        let (wa, wb) = (pa.motion.spin.length(), pb.motion.spin.length());
-        let v0 = (pa.motion.velocity - pb.motion.velocity).length();
-        Self {
-            task,
-            a,
-            b,
-            speed: v0 + wa * rho_a + wb * rho_b,
-            pull: wa * wa * rho_a + wb * wb * rho_b,
-            reach: rho_a + rho_b,
-            least: excluded(task.delta, task.rounding),
-        }
-    }
-
-    /// True when the balls about the two centres of rotation that hold the bodies stay apart: these centres move straight.
-    fn never_near(&self) -> bool {
-        let d = self.task.relative.difference(0.0);
-        let v = self.task.relative.difference(1.0) - d;
-        let square = v.length_squared();
-        let s = if square > 0.0 { (-d.dot(v) / square).clamp(0.0, 1.0) } else { 0.0 };
-        (d + v * s).length() > self.reach + APART * self.task.delta
-    }
-
-    fn moment(&self, t: f64) -> Moment<'a> {
-        let at = self.task.relative.at(t);
-        let axes = at.b_from_a.transpose();
-        Moment { at, b: self.b.1.seen(&axes, at.a_point(DVec3::ZERO)) }
-    }
-
-    /// B a few resolutions off: of bodies that lie in each other by less a direction is found that separates them, but for
-    /// that much.
-    fn set_off(&self, m: &Moment<'a>) -> Body<'a> {
-        let way = m.b.support(DVec3::ZERO) - self.a.0.ball.center;
-        m.b.seen(&DMat3::IDENTITY, way.normalize_or(DVec3::X) * (OFF * self.task.delta))
-    }
-
-    /// The gap along the line of nearest points, looked for from a direction along A's axes.
-    fn widest(&self, m: &Moment, first: DVec3) -> Option<Gap> {
-        let found = nearest(&self.a.1, &m.b, first, GOOD)?;
-        Some(self.gap(m, (m.at.world_from_a * found.normal).normalize()))
-    }
-
-    /// φ along a world direction.
-    fn gap(&self, m: &Moment, n: DVec3) -> Gap {
-        let along = m.at.world_from_a.transpose() * n;
-        Gap { t: m.at.t, n, phi: -m.b.reach(-along) - self.a.1.reach(along) }
-    }
-
-    /// Up to where between two gaps a contact of depth delta is excluded; the end if all of it is.
-    fn proven(&self, p: &Gap, q: &Gap) -> f64 {
-        let h = q.t - p.t;
-        if h <= 0.0 {
-            return if p.phi > self.least { q.t } else { p.t };
-        }
-        let turn = (q.n - p.n).length() / h;
-        let longest = p.n.length().max(q.n.length());
-        let curve = 0.5 * h * h * (2.0 * turn * self.speed + longest * self.pull);
-        // In s: c s² + (φ₂ − φ₁ − c) s + φ₁ − least > 0; a unit direction's least, so the longest is 1.
-        let (f1, f2) = (p.phi - self.least, q.phi - self.least);
-        if f1 <= 0.0 {
-            return p.t;
-        }
-        let slope = f2 - f1 - curve;
-        let root = slope * slope - 4.0 * curve * f1;
-        if f2 > 0.0 && (root < 0.0 || slope >= 0.0 || -slope >= 2.0 * curve) {
-            return q.t;
-        }
-        if root < 0.0 {
-            // Cannot be: f2 <= 0 has a root in [0, 1].
-            return p.t;
-        }
-        // The smaller root, without cancellation.
-        let s = 2.0 * f1 / (-slope + root.sqrt());
-        p.t + (0.999_999 * s).min(1.0) * h
-    }
-
-    /// How far from `p` towards `q` a contact is excluded, the direction going over linearly, in halves where need be.
-    fn prove(&self, p: Gap, q: Gap) -> f64 {
-        let mut stack: SmallVec<[Gap; PROOF]> = SmallVec::new();
-        stack.push(q);
-        let mut p = p;
-        for _ in 0..PROOF {
-            let Some(q) = stack.last().copied() else { break };
-            let until = self.proven(&p, &q);
-            if until >= q.t {
-                p = q;
-                stack.pop();
-                continue;
-            }
-            let middle = 0.5 * (p.t + q.t);
-            if stack.len() == PROOF || middle <= p.t {
-                return until;
-            }
-            let n = 0.5 * (p.n + q.n);
-            let Some(n) = n.try_normalize() else { return until };
-            let gap = self.gap(&self.moment(middle), n);
-            if gap.phi <= self.least {
-                return until;
-            }
-            stack.push(gap);
-        }
-        p.t
-    }
-
-    /// True when the way between the centres, without a distance, keeps the bodies apart for the whole step.
-    fn frees_all(&self, m: &Moment, end: &Moment) -> bool {
-        let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.a.0.ball.center);
-        let Some(n) = way.try_normalize() else { return false };
-        let here = self.gap(m, n);
-        here.phi > APART * self.task.delta && self.proven(&here, &self.gap(end, n)) >= 1.0
-    }
-
-    fn run(&self, search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
-        let scale = self.task.scale;
-        let mut t = 0.0;
-        let mut near = false;
-        let mut contact: Option<Gap> = None;
-        let end_of_step = self.moment(1.0);
-        let mut along = along;
-        for round in 0..ROUNDS {
-            let m = self.moment(t);
-            if round == 0 && self.frees_all(&m, &end_of_step) {
-                return Some(Ending::Clear);
-            }
-            let first = along
-                .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
-            search.counters.closed_forms += 1;
-            let seen = |b: &Body| {
-                let found = nearest(&self.a.1, b, first, GOOD)?;
-                let n = (m.at.world_from_a * found.normal).normalize();
-                Some((found, self.gap(&m, n))).filter(|(_, gap)| gap.phi > self.least)
-            };
-            let (found, here) = match seen(&m.b) {
-                Some(seen) => seen,
-                None if round == 0 || near => {
-                    near = true;
-                    seen(&self.set_off(&m))?
-                }
-                None => return None,
-            };
-            // What may be touching is told by the search; that nothing comes of it, here.
-            near |= round == 0 && found.distance <= APART * self.task.delta;
-            let n = here.n;
-            along = Some(n);
-            let last = self.gap(&end_of_step, n);
-            if contact.is_none() && self.proven(&here, &last) >= 1.0 {
-                return Some(Ending::Clear);
-            }
-            let closing = found.normal.dot(m.at.velocity(found.a));
-            let guess = t + found.distance.max(0.0) / closing;
-            if contact.is_none() && !near && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
-                let mend = found.distance <= MEND.0 * scale || round >= MEND.1;
-                contact = self.contact(search, &m, &found, guess.min(1.0), mend);
-                if let Some(hit) = search.hit(t) {
-                    return Some(hit);
-                }
-            }
-            let goal = contact.map_or(1.0, |c| c.t);
-            if let Some(c) = contact {
-                // With the contact's own normal: of what does not turn it proves all there is, at once.
-                let fixed = self.gap(&m, c.n);
-                let proven = fixed.phi > self.least && c.phi > self.least && self.proven(&fixed, &c) >= c.t;
-                if proven || self.prove(here, c) >= c.t {
-                    return search.found.take().map(Ending::Contact);
-                }
-            }
-            // As far as this direction proves; a nearer end tightens the bound.
-            let mut end = goal;
-            let mut until = t;
-            for _ in 0..6 {
-                let there = if end == 1.0 { last } else { self.gap(&self.moment(end), n) };
-                let proven = self.proven(&here, &there);
-                until = until.max(proven);
-                if proven >= end {
-                    break;
-                }
-                if proven - t > 0.25 * (end - t) {
-                    break;
-                }
-                end = (t + 2.0 * (proven - t)).min(end);
-                if end <= t {
-                    break;
-                }
-            }
-            if until >= 1.0 {
-                return if contact.is_none() { Some(Ending::Clear) } else { None };
-            }
-            if until <= t {
-                return None;
-            }
-            t = until;
-        }
-        None
-    }
-
-    /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees
-    /// confirm it.
-    fn contact(&self, search: &mut Search, m: &Moment, found: &Nearest, guess: f64, mend: bool) -> Option<Gap> {
-        let b = m.at.b_point(found.b);
-        let normal_b = m.at.b_from_a * -found.normal;
-        let x = 0.5 * (found.a + found.b);
-        let mut tried = Actives::new();
-        for tolerance in ACTIVE {
-            let tol = tolerance * self.task.scale + found.distance.abs() * 1e-3;
-            let mut active: SmallVec<[(Constraint, f64); 8]> = SmallVec::new();
-            faces_at(Side::A, self.a.0, found.a, found.normal, tol, &mut active);
-            let of_a = active.len();
-            faces_at(Side::B, self.b.0, b, normal_b, tol, &mut active);
-            let of_b = active.len() - of_a;
-            // A corner that two faces hold against n, as two opposite ones of four may: they alone leave a line open.
-            let loose = of_a < self.a.1.corner(found.normal) || of_b < self.b.1.corner(normal_b);
-            if loose || active.len() > MAX_ACTIVE {
-                continue;
-            }
-            let (constraints, lambda): (Actives, Weights) = active.iter().map(|(c, l)| (*c, 0.5 * l)).unzip();
-            if constraints == tried {
-                break;
-            }
-            tried.clone_from(&constraints);
-            if search.confirm(constraints, x, guess, lambda, mend) {
-                if search.found.as_ref().is_some_and(|f| f.deep.stationarity > BALANCED) {
-                    // Balanced but for a slight tilt: which end of the line comes first is not told.
-                    search.found = None;
-                    continue;
-                }
-                let f = search.found.as_ref()?;
-                let s = f.touch.as_ref().filter(|s| s.t >= 0.0)?;
-                let normal = search.normal(s)?;
-                let at = self.task.relative.at(s.t);
-                let n = (at.world_from_a * normal).normalize();
-                return Some(self.gap(&self.moment(s.t), n));
-            }
-        }
-        None
-    }
-}
-
-/// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
-pub(super) fn faces_at(
-    side: Side,
-    p: &Primitive,
-    x: DVec3,
-    n: DVec3,
-    tol: f64,
-    out: &mut SmallVec<[(Constraint, f64); 8]>,
-) {
-    let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
-    for (i, face) in p.faces.iter().enumerate() {
-        let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
-        if let Face::Cone { apex, axis, .. } = *face
-            && (x - apex).length() <= tol
-        {
-            // An apex holds every direction of its normal cone.
-            let u = any_perpendicular(axis);
-            let along = [axis, u, axis.cross(u)];
-            out.extend((0..3).map(|k| (Constraint::Apex(side, id, k), n.dot(along[usize::from(k)]))));
-            return;
-        }
-        let f = face.at(x);
-        if f.value.abs() <= tol && f.normal.dot(n) > -0.99 {
-            near.push((id, f.normal));
-        }
-    }
-    // The least set of them whose normals hold n between them: one, two, then three.
-    let mut best: (f64, SmallVec<[(usize, f64); 3]>) = (f64::INFINITY, SmallVec::new());
-    let mut offer = |set: &[usize]| {
-        let Some(weights) = weights(set, &near, n) else { return };
-        let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| near[*i].1 * *w).sum();
-        // A larger set must be better by more than rounding.
-        let off = (sum - n).length() + 1e-7 * set.len() as f64;
-        if off < 0.5 * best.0 || (off < best.0 && set.len() == best.1.len()) {
-            best = (off, set.iter().copied().zip(weights).collect());
-        }
-    };
-    for i in 0..near.len() {
-        offer(&[i]);
-    }
-    for i in 0..near.len() {
-        for j in i + 1..near.len() {
-            offer(&[i, j]);
-        }
-    }
-    for i in 0..near.len() {
-        for j in i + 1..near.len() {
-            for k in j + 1..near.len() {
-                offer(&[i, j, k]);
-            }
-        }
-    }
-    out.extend(best.1.iter().map(|(i, w)| (Constraint::Literal(side, near[*i].0), *w)));
-}
-
-/// Least-squares weights of some unit vectors for n; `None` if one is negative or they are dependent.
-fn weights(set: &[usize], near: &[(LiteralId, DVec3)], n: DVec3) -> Option<SmallVec<[f64; 3]>> {
-    let g = |i: usize| near[set[i]].1;
-    let w: SmallVec<[f64; 3]> = match set.len() {
-        1 => SmallVec::from_slice(&[g(0).dot(n)]),
-        2 => {
-            let c = g(0).dot(g(1));
-            let det = 1.0 - c * c;
-            let (p, q) = (g(0).dot(n), g(1).dot(n));
-            SmallVec::from_slice(&[(p - c * q) / det, (q - c * p) / det])
-        }
-        _ => {
-            let m = glam::DMat3::from_cols(g(0), g(1), g(2));
-            let det = m.determinant();
-            if det.abs() < 1e-9 {
-                return None;
-            }
-            SmallVec::from_slice(&(m.inverse() * n).to_array())
-        }
-    };
-    w.iter().all(|w| w.is_finite() && *w > 0.0).then_some(w)
 }

@@ -39,10 +39,13 @@ pub enum Look {
 
 /// Two bodies at the start, along the world's axes and seen from A's centre.
 pub struct Start<'a> {
-    pair: &'a Pair<'a>,
+    pub pair: &'a Pair<'a>,
     /// World from model.
-    axes: [DMat3; 2],
-    bodies: [Body<'a>; 2],
+    pub axes: [DMat3; 2],
+    /// World from primitive.
+    pub frames: [DMat3; 2],
+    /// The primitives.
+    pub bodies: [Body<'a>; 2],
     centers: [DVec3; 2],
 }
 
@@ -50,14 +53,13 @@ impl<'a> Start<'a> {
     /// The start of a pair; `None` for bodies without bounds.
     pub fn new(pair: &'a Pair<'a>) -> Option<Self> {
         let axes = [pair.axes(0), pair.axes(1)];
-        let body = |k: usize, origin: DVec3| {
-            let p = pair.primitives[k];
-            let frame = p.frame.rotation;
-            let own = if frame == DQuat::IDENTITY { axes[k] } else { axes[k] * DMat3::from_quat(frame) };
-            Body::new(&p.shape, own, origin)
-        };
+        let frames = [0, 1].map(|k| {
+            let frame = pair.primitives[k].frame.rotation;
+            if frame == DQuat::IDENTITY { axes[k] } else { axes[k] * DMat3::from_quat(frame) }
+        });
+        let body = |k: usize, origin: DVec3| Body::new(&pair.primitives[k].shape, frames[k], origin);
         let bodies = [body(0, DVec3::ZERO)?, body(1, pair.way)?];
-        Some(Self { pair, axes, bodies, centers: [bodies[0].center(), bodies[1].center()] })
+        Some(Self { pair, axes, frames, bodies, centers: [bodies[0].center(), bodies[1].center()] })
     }
 
     /// Looks for a common point of both bodies that is deeper than 2 delta, however the search may raise that, or else for a direction that separates them.
@@ -103,7 +105,7 @@ impl<'a> Start<'a> {
                 normal = (gap, n);
             }
         }
-        out.point = pair.point(x, 0.0);
+        out.point = pair.point(pair.offsets[0], x, 0.0);
         out.normal = normal.1.normalize();
         out.separation = -2.0 * depth;
         // From the centres of rotation.

@@ -17,7 +17,7 @@
 //! asked about beyond that level has no glance.
 
 use super::support::Body;
-use super::{body_of, gjk, whole};
+use super::{body_of, gjk};
 use crate::eco::Model;
 use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
 use crate::solid::{Node, Op, Primitive, Shape};
@@ -73,7 +73,7 @@ pub struct Glance {
 impl Hull {
     /// Of a model placed in its object; `None` for one without bounds.
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
-        let (around, level, frame, ball) = if let Some(p) = whole(&model.solid) {
+        let (around, level, frame, ball) = if let Some(p) = model.solid.whole() {
             body_of(p)?;
             (None, f64::INFINITY, p.frame, p.ball)
         } else {
@@ -96,7 +96,7 @@ impl Hull {
 
     /// The shape that is looked at.
     fn shape<'a>(&'a self, model: &'a Model) -> Option<&'a Shape> {
-        self.around.as_ref().or_else(|| whole(&model.solid).map(|p| &p.shape))
+        self.around.as_ref().or_else(|| model.solid.whole().map(|p| &p.shape))
     }
 
     /// Over the step that a track tells.
@@ -157,7 +157,7 @@ fn enclosing(model: &Model) -> Option<(Shape, Pose)> {
 
 /// Largest n·x over a shape that stands with these axes.
 #[inline]
-fn reach(shape: &Shape, axes: &DMat3, n: DVec3) -> f64 {
+pub fn reach(shape: &Shape, axes: &DMat3, n: DVec3) -> f64 {
     let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
     let across = || (m.x * m.x + m.y * m.y).sqrt();
     match shape {
