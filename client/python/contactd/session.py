@@ -14,7 +14,7 @@ from ._native import MassProperties, Options
 from .errors import Error
 from .pose import PoseLike, pose
 from .records import CONTACT, DETAIL, PATCH, POSE, REGION, Effect, StepStatus, Tag
-from .view import View
+from .view import Slots, View
 
 
 class Face(NamedTuple):
@@ -81,29 +81,33 @@ class Reply:
     (``safe_time``, ``status`` …) stays.
     """
 
-    __slots__ = ("_native", "_lease", "_slots", "_count")
+    __slots__ = ("_native", "_lease", "_records", "_slots")
 
     def __init__(self, native: _native.Reply) -> None:
-        lease = native.lease
         self._native = native
-        self._lease = lease
-        self._count = native.n_records
-        self._slots = np.ndarray((lease.bytes // CONTACT.itemsize,), CONTACT, lease)
+        self._lease = native.lease
+        self._records = self._slots = None
 
     @property
     def records(self) -> View:
         """The contact records (dtype ``CONTACT``) in the order (time, a, b)."""
         self._lease.check()
-        return View(self._slots[: self._count], self._lease)
+        records = self._records
+        if records is None:
+            records = self._records = Slots(self._lease, CONTACT, self._native.n_records)
+        return records
 
     @property
     def slots(self) -> View:
         """All slots as they lie in memory: the records, then their further slots."""
         self._lease.check()
-        return View(self._slots, self._lease)
+        slots = self._slots
+        if slots is None:
+            slots = self._slots = Slots(self._lease, CONTACT, self._lease.bytes // CONTACT.itemsize)
+        return slots
 
     def __len__(self) -> int:
-        return self._count
+        return self._native.n_records
 
     def __iter__(self) -> Iterator[View]:
         return iter(self.records)
@@ -139,29 +143,22 @@ class Reply:
     def details(self) -> View:
         """The detail slots of all records in order. A view where they stand alone, as they do unless regions were asked for;
         otherwise a copy."""
-        self._lease.check()
-        return self._chosen(self._slots[self._count :], Tag.DETAIL, DETAIL)
+        return self._chosen(self.slots._array[self._native.n_records :], Tag.DETAIL, DETAIL)
 
     @property
     def all_regions(self) -> View:
         """The region slots of all records in order; a copy unless they stand alone."""
-        self._lease.check()
-        return self._chosen(self._slots[self._count :], Tag.REGION, REGION)
+        return self._chosen(self.slots._array[self._native.n_records :], Tag.REGION, REGION)
 
     @property
     def all_patches(self) -> View:
         """The patch slots of all records in order; a copy unless they stand alone."""
-        self._lease.check()
-        return self._chosen(self._slots[self._count :], Tag.PATCH, PATCH)
+        return self._chosen(self.slots._array[self._native.n_records :], Tag.PATCH, PATCH)
 
     def _further(self, record: int | View) -> np.ndarray:
-        self._lease.check()
-        if isinstance(record, View):
-            first, n = int(record["slot"]), int(record["slots"])
-        else:
-            own = self._slots[: self._count][record]
-            first, n = int(own["slot"]), int(own["slots"])
-        return self._slots[first : first + n]
+        own = record if isinstance(record, View) else self.records[record]
+        first, n = int(own["slot"]), int(own["slots"])
+        return self.slots._array[first : first + n]
 
     def _chosen(self, further: np.ndarray, tag: Tag, dtype: np.dtype) -> View:
         at = np.flatnonzero(further["a"] == tag)
@@ -210,7 +207,7 @@ class Reply:
         return dict(self._native.effect_counters)
 
     def __repr__(self) -> str:
-        return f"Reply(step={self.step}, status={self.status.name}, records={self._count}, safe_time={self.safe_time})"
+        return f"Reply(step={self.step}, status={self.status.name}, records={len(self)}, safe_time={self.safe_time})"
 
 
 class Session:
@@ -221,6 +218,8 @@ class Session:
 
     def __init__(self, native: _native.Session) -> None:
         self._native = native
+        # Looked up once: a small step takes a few microseconds.
+        self._begin, self._finish = native.begin_step, native.finish
         #: What is asked of the steps to come.
         self.options: Options = native.options
 
@@ -304,8 +303,7 @@ class Session:
 
         A batch that was begun and not sent is dropped. The views of the step before are over.
         """
-        lease = self._native.begin_step(n)
-        return View(np.ndarray((n,), POSE, lease), lease)
+        return Slots(self._begin(n), POSE, n)
 
     def send(self) -> None:
         """Sends the batch without waiting; ``finish`` does it too."""
@@ -318,7 +316,7 @@ class Session:
         for a server. ``Refused`` has the index of the offending record, and nothing has changed; after ``Timeout`` the step is
         still in flight: call again; after ``ServerLost`` see ``reconnect`` and ``resend``.
         """
-        return Reply(self._native.finish(timeout))
+        return Reply(self._finish(timeout))
 
     def reconnect(self, timeout: float = 10.0) -> None:
         """After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
@@ -328,7 +326,7 @@ class Session:
     def resend(self) -> View:
         """After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses."""
         lease = self._native.resend()
-        return View(np.ndarray((lease.bytes // POSE.itemsize,), POSE, lease), lease)
+        return Slots(lease, POSE, lease.bytes // POSE.itemsize)
 
     def close(self) -> None:
         """Ends the session. Again does nothing; a server that is gone has ended it already."""

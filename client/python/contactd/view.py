@@ -23,6 +23,10 @@ from ._native import Lease
 _CLOSED = frozenset({"base", "ctypes", "data", "flat", "getfield", "resize", "setfield", "setflags", "view"})
 
 
+_ALL = slice(None)
+_MOST = {n: 256**n - 1 for n in (1, 2, 4, 8)}
+
+
 class View(NDArrayOperatorsMixin):
     """An array in the memory of one step, valid until that step is over."""
 
@@ -141,10 +145,12 @@ class View(NDArrayOperatorsMixin):
         self._lease.check()
         array = self._array
         dtype = array.dtype
-        if dtype.names is not None and isinstance(key, str):
-            dtype = dtype[key].base
-        if type(value) is not np.ndarray or value.dtype != dtype:
-            value = _fit(value, dtype, key)
+        name = key
+        if type(key) is str and dtype.names is not None:
+            array, key = array[key], ...
+            dtype = array.dtype
+        if type(value) is not np.ndarray or (value.dtype is not dtype and value.dtype != dtype):
+            value = _fit(value, dtype, name)
         array[key] = value
 
     # What numpy asks for
@@ -184,6 +190,37 @@ class View(NDArrayOperatorsMixin):
         return _own_of(found, [self._lease])
 
 
+class Slots(View):
+    """The first ``count`` slots of a lease, of one dtype. Their array is made when it is needed: a batch that is assigned as a whole
+    needs none, nor does an empty reply."""
+
+    __slots__ = ("_count", "_made", "_type")
+
+    def __init__(self, lease: Lease, dtype: np.dtype, count: int) -> None:
+        self._lease = lease
+        self._type = dtype
+        self._count = count
+        self._made: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        self._lease.check()
+        return self._count
+
+    @property
+    def _array(self) -> np.ndarray:  # type: ignore[override]
+        made = self._made
+        if made is None:
+            made = self._made = np.ndarray((self._count,), self._type, self._lease)
+        return made
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if type(key) is slice and key == _ALL and type(value) is np.ndarray and value.ndim == 1:
+            dtype = value.dtype
+            if (dtype is self._type or dtype == self._type) and self._lease.write(value):
+                return
+        super().__setitem__(key, value)
+
+
 def _inner(value: Any) -> Any:
     return value._checked() if isinstance(value, View) else value
 
@@ -220,6 +257,8 @@ def _own_of(found: Any, leases: list[Lease]) -> Any:
 def _fit(value: Any, dtype: np.dtype, key: Any) -> Any:
     """A value that can be written as ``dtype`` without a surprise, where numpy would convert whatever it gets."""
     value = _inner(value)
+    if isinstance(value, int) and dtype.kind == "u" and 0 <= value <= _MOST[dtype.itemsize]:
+        return int(value)
     if dtype.names is not None:
         if isinstance(value, tuple):
             return np.array(value, dtype)  # made beside: a bad field leaves the slot as it is

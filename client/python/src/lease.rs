@@ -12,6 +12,7 @@ use pyo3::exceptions::PyBufferError;
 use pyo3::ffi;
 use pyo3::prelude::*;
 use std::ffi::c_int;
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::thread::ThreadId;
@@ -116,6 +117,30 @@ impl Lease {
         lease.span.check(slf.py())?;
         lease.span.exports.fetch_add(1, Relaxed);
         Ok(Export { lease: slf.clone().unbind() })
+    }
+
+    /// Copies the bytes of `value` over all of the memory, if it has as many in one piece; says whether it had. numpy copies records
+    /// field by field, which takes longer than a small step.
+    fn write(&self, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let py = value.py();
+        self.span.check(py)?;
+        let mut buffer = MaybeUninit::<ffi::Py_buffer>::uninit();
+        // SAFETY: `buffer` may be written; it is read and released only where the call says that it was filled in.
+        if unsafe { ffi::PyObject_GetBuffer(value.as_ptr(), buffer.as_mut_ptr(), ffi::PyBUF_SIMPLE) } != 0 {
+            let _ = PyErr::take(py);
+            return Ok(false);
+        }
+        // SAFETY: filled in, as the call said.
+        let buffer = unsafe { buffer.assume_init_mut() };
+        let fits = self.writable && buffer.len == self.bytes as ffi::Py_ssize_t;
+        if fits {
+            // SAFETY: `buf` holds `len` bytes until the buffer is released; the lease's memory is as long, its step is not over
+            // and it may be written. The two may overlap.
+            unsafe { std::ptr::copy(buffer.buf as *const u8, self.address as *mut u8, self.bytes) }
+        }
+        // SAFETY: filled in above and released once.
+        unsafe { ffi::PyBuffer_Release(buffer) }
+        Ok(fits)
     }
 
     /// For the array inside of a view: that array is never touched without `check`.
