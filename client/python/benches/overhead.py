@@ -55,10 +55,10 @@ def fields(session, both, steps):
 
 
 def main(quick):
-    blocks = 30 if quick else 200
     print(f"{'poses':>6} {'rust us':>9} {'python us':>10} {'more us':>8} {'by fields us':>13} {'more us':>8}")
     worst = 0.0
-    for n, steps in ((1, 100), (16, 100), (256, 40), (4096, 6)):
+    for n, steps, blocks in ((1, 100, 30), (16, 100, 30), (256, 40, 30), (4096, 4, 120)):
+        blocks *= 1 if quick else 6
         with contactd.embedded() as session:
             ball = session.load_model("ball.csg", "sphere(r = 1);")
             ids = [session.add_object(f"ball {i}", ball, at=(10.0 * i, 0, 0)) for i in range(n)]

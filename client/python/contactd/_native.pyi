@@ -3,11 +3,13 @@
 import os
 from typing import Sequence, TypeAlias
 
+from numpy.typing import ArrayLike
+
 __version__: str
 PROTOCOL_VERSION: int
 
 _Layout: TypeAlias = tuple[list[str], list[str], list[int], int]
-_Pose: TypeAlias = tuple[Sequence[float], Sequence[float]]
+_Pose: TypeAlias = tuple[ArrayLike, ArrayLike]
 
 def layouts() -> list[tuple[str, _Layout]]: ...
 def constants() -> list[tuple[str, str, int]]: ...

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Sequence, Union
+from typing import NamedTuple, Union
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from .records import Order
 
-#: Three numbers: a list, a tuple, an array.
-Vector = Sequence[float]
+#: Numbers in a row: a list, a tuple, an array.
+Vector = ArrayLike
 
 
 class Pose(NamedTuple):
@@ -18,7 +21,7 @@ class Pose(NamedTuple):
 
 
 #: A pose, a pair of position and rotation, or a position alone.
-PoseLike = Union[Pose, Sequence[Vector], Vector]
+PoseLike = Union[Pose, tuple[Vector, Vector], Vector]
 
 
 def pose(value: PoseLike | None) -> Pose:
@@ -28,29 +31,27 @@ def pose(value: PoseLike | None) -> Pose:
     """
     if value is None:
         return Pose()
-    if isinstance(value, Pose):
-        position, rotation = value
-    elif len(value) == 2:
-        position, rotation = value
-    else:
-        position, rotation = value, (0.0, 0.0, 0.0, 1.0)
-    numbers = Pose(tuple(map(float, position)), tuple(map(float, rotation)))
-    if len(numbers.position) != 3 or len(numbers.rotation) != 4:
+    pair = value if isinstance(value, tuple) and len(value) == 2 else (value, (0.0, 0.0, 0.0, 1.0))
+    position, rotation = _numbers(pair[0]), _numbers(pair[1])
+    if len(position) != 3 or len(rotation) != 4:
         raise ValueError(f"expected a position of 3 numbers and a quaternion x y z w, found {position} and {rotation}")
-    return numbers
+    return Pose(position, rotation)
+
+
+def _numbers(vector: Vector) -> tuple[float, ...]:
+    return tuple(np.asarray(vector, dtype=float).ravel().tolist())
 
 
 def end(object: int, position: Vector, rotation: Vector = (0.0, 0.0, 0.0, 1.0)) -> tuple:
     """The record by which an object moves to a pose the shortest way: ``poses[i] = end(object, position, rotation)``."""
-    return (object, Order.END, tuple(position), tuple(rotation))
+    return (object, Order.END, _numbers(position), _numbers(rotation))
 
 
 def start(object: int, position: Vector, rotation: Vector = (0.0, 0.0, 0.0, 1.0)) -> tuple:
     """The record that puts an object at a pose before the step, without motion."""
-    return (object, Order.START, tuple(position), tuple(rotation))
+    return (object, Order.START, _numbers(position), _numbers(rotation))
 
 
 def turn(object: int, position: Vector, rotation_vector: Vector) -> tuple:
     """The record by which an object's origin moves to ``position`` while it turns by a rotation vector (world axes, radians)."""
-    x, y, z = rotation_vector
-    return (object, Order.TURN, tuple(position), (x, y, z, 0.0))
+    return (object, Order.TURN, _numbers(position), (*_numbers(rotation_vector), 0.0))

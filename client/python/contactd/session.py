@@ -86,7 +86,8 @@ class Reply:
     def __init__(self, native: _native.Reply) -> None:
         self._native = native
         self._lease = native.lease
-        self._records = self._slots = None
+        self._records: Slots | None = None
+        self._slots: Slots | None = None
 
     @property
     def records(self) -> View:

@@ -24,6 +24,7 @@ _CLOSED = frozenset({"base", "ctypes", "data", "flat", "getfield", "resize", "se
 
 
 _ALL = slice(None)
+_ndarray = np.ndarray
 _MOST = {n: 256**n - 1 for n in (1, 2, 4, 8)}
 
 
@@ -164,7 +165,8 @@ class View(NDArrayOperatorsMixin):
         offset = array.__array_interface__["data"][0] - self._lease.address if array.size else 0
         if not 0 <= offset <= self._lease.bytes:
             return array  # slots that were gathered: memory of its own
-        return np.ndarray(array.shape, array.dtype, self._lease.export(), offset, array.strides)
+        memory: Any = self._lease.export()
+        return np.ndarray(array.shape, array.dtype, memory, offset, array.strides)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         out = kwargs.get("out")
@@ -210,11 +212,12 @@ class Slots(View):
     def _array(self) -> np.ndarray:  # type: ignore[override]
         made = self._made
         if made is None:
-            made = self._made = np.ndarray((self._count,), self._type, self._lease)
+            memory: Any = self._lease  # a buffer, which numpy's stubs know by its name alone
+            made = self._made = np.ndarray((self._count,), self._type, memory)
         return made
 
     def __setitem__(self, key: Any, value: Any) -> None:
-        if type(key) is slice and key == _ALL and type(value) is np.ndarray and value.ndim == 1:
+        if type(key) is slice and key == _ALL and type(value) is _ndarray and value.ndim == 1:
             dtype = value.dtype
             if (dtype is self._type or dtype == self._type) and self._lease.write(value):
                 return

@@ -1,6 +1,7 @@
 """Every misuse gets an exception that names it, and loses nothing."""
 
 import gc
+import signal
 import threading
 
 import numpy as np
@@ -424,3 +425,30 @@ def test_every_error_is_an_error():
                  contactd.SystemFailure):
         assert issubclass(kind, contactd.Error)
     assert issubclass(contactd.Timeout, TimeoutError) and issubclass(contactd.StillExported, BufferError)
+
+
+def test_a_step_outlives_its_timeout_and_ctrl_c(own_server):
+    with contactd.connect("own") as session:
+        ball, _ = fill(session)
+        session.options.advance = 0.25
+        session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+        own_server.process.send_signal(signal.SIGSTOP)
+        try:
+            session.send()
+            with pytest.raises(contactd.Timeout) as out:
+                session.finish(timeout=0.05)
+            assert isinstance(out.value, TimeoutError) and "in flight" in str(out.value)
+            assert session.options.advance == 0.25, "not yet accepted"
+
+            def interrupt(*_):
+                raise KeyboardInterrupt
+
+            before = signal.signal(signal.SIGALRM, interrupt)
+            signal.setitimer(signal.ITIMER_REAL, 0.15)
+            with pytest.raises(KeyboardInterrupt):
+                session.finish()
+            signal.signal(signal.SIGALRM, before)
+        finally:
+            own_server.process.send_signal(signal.SIGCONT)
+        reply = session.finish(timeout=20)
+        assert reply[0].time == 0.5 and session.options.advance == 1.0
