@@ -10,11 +10,14 @@ from typing import Any, Iterable, Iterator, NamedTuple, Sequence
 import numpy as np
 
 from . import _native
-from ._native import MassProperties, Options
+from ._native import Lease, MassProperties, Options
 from .errors import Error
 from .pose import PoseLike, pose
 from .records import CONTACT, DETAIL, PATCH, POSE, REGION, Effect, StepStatus, Tag
 from .view import Slots, View
+
+_slots = Slots.of
+_new = object.__new__
 
 
 class Face(NamedTuple):
@@ -83,11 +86,10 @@ class Reply:
 
     __slots__ = ("_native", "_lease", "_records", "_slots")
 
-    def __init__(self, native: _native.Reply) -> None:
-        self._native = native
-        self._lease = native.lease
-        self._records: Slots | None = None
-        self._slots: Slots | None = None
+    _native: _native.Reply
+    _lease: Lease
+    _records: Slots | None
+    _slots: Slots | None
 
     @property
     def records(self) -> View:
@@ -95,7 +97,7 @@ class Reply:
         self._lease.check()
         records = self._records
         if records is None:
-            records = self._records = Slots(self._lease, CONTACT, self._native.n_records)
+            records = self._records = _slots(self._lease, CONTACT, self._native.n_records)
         return records
 
     @property
@@ -104,7 +106,7 @@ class Reply:
         self._lease.check()
         slots = self._slots
         if slots is None:
-            slots = self._slots = Slots(self._lease, CONTACT, self._lease.bytes // CONTACT.itemsize)
+            slots = self._slots = _slots(self._lease, CONTACT, self._lease.bytes // CONTACT.itemsize)
         return slots
 
     def __len__(self) -> int:
@@ -304,7 +306,7 @@ class Session:
 
         A batch that was begun and not sent is dropped. The views of the step before are over.
         """
-        return Slots(self._begin(n), POSE, n)
+        return _slots(self._begin(n), POSE, n)
 
     def send(self) -> None:
         """Sends the batch without waiting; ``finish`` does it too."""
@@ -317,7 +319,12 @@ class Session:
         for a server. ``Refused`` has the index of the offending record, and nothing has changed; after ``Timeout`` the step is
         still in flight: call again; after ``ServerLost`` see ``reconnect`` and ``resend``.
         """
-        return Reply(self._finish(timeout))
+        native = self._finish(timeout)
+        reply = _new(Reply)
+        reply._native = native
+        reply._lease = native.lease
+        reply._records = reply._slots = None
+        return reply
 
     def reconnect(self, timeout: float = 10.0) -> None:
         """After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
@@ -327,7 +334,7 @@ class Session:
     def resend(self) -> View:
         """After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses."""
         lease = self._native.resend()
-        return Slots(lease, POSE, lease.bytes // POSE.itemsize)
+        return _slots(lease, POSE, lease.bytes // POSE.itemsize)
 
     def close(self) -> None:
         """Ends the session. Again does nothing; a server that is gone has ended it already."""

@@ -5,7 +5,7 @@
 //! cannot be asked; it holds an [`Export`], and while one lives the session refuses to give the memory away. So neither can
 //! ever see memory that is unmapped or of another step.
 
-use crate::confined::check_thread;
+use crate::confined::{Thread, check_thread};
 use crate::errors;
 use crate::session::Session;
 use pyo3::exceptions::PyBufferError;
@@ -15,7 +15,6 @@ use std::ffi::c_int;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
-use std::thread::ThreadId;
 
 /// What a session and its leases know of one piece of memory.
 #[derive(Debug)]
@@ -23,12 +22,12 @@ pub struct Span {
     what: &'static str,
     alive: AtomicBool,
     exports: AtomicUsize,
-    thread: ThreadId,
+    thread: Thread,
 }
 
 impl Span {
     /// Memory of `what` ("poses", "reply"), which may be looked at.
-    pub fn new(what: &'static str, thread: ThreadId) -> Arc<Self> {
+    pub fn new(what: &'static str, thread: Thread) -> Arc<Self> {
         Arc::new(Self { what, alive: AtomicBool::new(true), exports: AtomicUsize::new(0), thread })
     }
 
