@@ -8,6 +8,7 @@
 //! processes of one user.
 #![forbid(unsafe_code)]
 
+pub mod convention;
 pub mod dynamics;
 pub mod error;
 mod journal;

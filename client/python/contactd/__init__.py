@@ -1,0 +1,53 @@
+"""contactd: certified earliest contact of moving solids modelled by constructive solid geometry.
+
+>>> import contactd
+>>> with contactd.embedded() as session:
+...     ball = session.load_model("ball.csg", "sphere(r = 1);")
+...     wall = session.load_model("wall.csg", "cube(size = [2, 20, 20], center = true);")
+...     wall = session.add_object("wall", wall, fixed=True, at=(10, 0, 0))
+...     ball = session.add_object("ball", ball)
+...     session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+...     [record] = session.finish()
+...     print(record.time, record.a == wall, record.separation)
+0.5 True 0.0
+"""
+
+from ._native import PROTOCOL_VERSION, MassProperties, Options, __version__
+from .errors import (
+    BadAddress,
+    Error,
+    ErrorCode,
+    Misuse,
+    NoServer,
+    Refused,
+    ReplyLost,
+    ServerLost,
+    Stale,
+    StillExported,
+    SystemFailure,
+    Timeout,
+    VersionMismatch,
+)
+from .pose import Pose, end, start, turn
+from .records import (
+    CONTACT,
+    DETAIL,
+    EXTENT_NAMES,
+    KIND_NAMES,
+    NO_FACE,
+    PATCH,
+    POSE,
+    REGION,
+    STATUS_NAMES,
+    Effect,
+    Flag,
+    Order,
+    Status,
+    StepStatus,
+    Tag,
+    Valid,
+)
+from .session import Face, Model, Region, Reply, Rule, Session, connect, embedded
+from .view import View
+
+__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "session", "view")]

@@ -1,0 +1,231 @@
+"""MuJoCo with contactd's contacts: exact solids with real holes, drawn and integrated by MuJoCo.
+
+    model = mujoco.MjModel.from_xml_string(scene)
+    data = mujoco.MjData(model)
+    with contactd.mujoco.Coupling(model, {"plate": "difference() {…}", "peg": "union() {…}"}) as coupling:
+        for _ in range(1000):
+            coupling.step(data)
+
+Bodies that have a solid meet as these solids do; their geoms are still drawn and still give them mass, but no longer
+collide. Other bodies keep MuJoCo's own collisions among themselves. A step is MuJoCo's staged step: ``mj_step1``, one batched
+request to contactd, ``mj_addContact`` for each point of the answer, the constraints anew, ``mj_step2``.
+
+MuJoCo's contacts are soft: bodies at rest sink into each other a little, and solids that overlap touch nowhere. So each contact
+acts from ``skin`` on (its ``includemargin``) while its ``dist`` is the true gap: bodies rest a fraction of the skin apart, where contactd
+knows all their regions. A pair that was driven into overlap is asked about once more, moved back by its depth, so that its
+points are those of the face it came through; this second request happens in the steps after a hard impact alone.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Mapping
+
+import mujoco as mj
+import numpy as np
+
+from . import session as sessions
+from .convention import contact_to_mujoco, quaternion_from_wxyz
+from .manifold import Point, manifold
+from .records import Order, Status
+from .session import Rule, Session, embedded
+
+_GROUP = "mujoco"
+
+
+class Coupling:
+    """contactd's contacts for the bodies of an ``MjModel``.
+
+    ``solids``: for each body by name, its solid as OpenSCAD CSG text in the body's frame; the text's unit is ``unit`` lengths
+    of MuJoCo (0.001: models in millimetres in a scene in metres). Bodies welded to the world are fixed. ``skin``: the gap, in MuJoCo's
+    unit, at which contacts begin to act. ``session``: to use one that is open (by default an embedded one is opened, and closed
+    with the coupling); its rules are replaced.
+
+    Geoms of these bodies get ``contype`` and ``conaffinity`` 0. Friction, ``solref``, ``solimp``, ``condim`` are those of the bodies' first geoms,
+    combined as MuJoCo does.
+    """
+
+    def __init__(
+        self,
+        model: mj.MjModel,
+        solids: Mapping[str, str],
+        *,
+        skin: float = 2e-4,
+        unit: float = 1.0,
+        session: Session | None = None,
+    ) -> None:
+        if model.opt.integrator == mj.mjtIntegrator.mjINT_RK4:
+            raise ValueError("the staged step has no Runge-Kutta: choose Euler, implicit or implicitfast")
+        if not skin > 0.0 or not unit > 0.0:
+            raise ValueError(f"expected a skin and a unit above 0, found {skin} and {unit}")
+        self.model = model
+        self.skin = skin
+        self.unit = unit
+        #: Second requests so far, for pairs in overlap.
+        self.retracted = 0
+        self._own = session is None
+        self.session = embedded() if session is None else session
+        try:
+            self._add(solids)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Coupling:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the session, if the coupling opened it."""
+        if self._own:
+            self.session.close()
+
+    def _add(self, solids: Mapping[str, str]) -> None:
+        model, session = self.model, self.session
+        self._bodies: dict[int, int] = {}
+        self._geoms: dict[int, int] = {}
+        loaded: dict[str, sessions.Model] = {}
+        moving = []
+        for name, text in solids.items():
+            body = mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, name)
+            if body < 0:
+                raise ValueError(f"the model has no body called {name!r}")
+            if model.body_geomnum[body] == 0:
+                raise ValueError(f"body {name!r} has no geom: contacts need one, for friction and to be told by")
+            geoms = slice(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+            model.geom_contype[geoms] = model.geom_conaffinity[geoms] = 0
+            if text not in loaded:
+                loaded[text] = session.load_model(f"{name}.csg", text)
+            fixed = bool(model.body_weldid[body] == 0)
+            position, rotation = self._rest(body)
+            object = session.add_object(
+                name, loaded[text], group=_GROUP, fixed=fixed, at=(position / self.unit, rotation)
+            )
+            self._bodies[object] = body
+            self._geoms[object] = geoms.start
+            if not fixed:
+                moving.append(object)
+        self._moving = np.array(moving, dtype=np.uint32)
+        self._moving_bodies = np.array([self._bodies[o] for o in moving], dtype=int)
+        # MuJoCo's own rule: a body does not meet its parent, unless that is welded to the world.
+        names = {body: name for name, body in zip(solids, self._bodies.values())}
+        parents = [(names[b], names.get(int(model.body_parentid[b]))) for b in self._moving_bodies]
+        kin = [(a, b) for a, b in parents if b is not None and model.body_weldid[mj.mj_name2id(model, 1, b)] != 0]
+        margin = self.skin / self.unit
+        session.set_rules([Rule((_GROUP, _GROUP), except_=kin, report="patch", margin=margin, penetration=True)])
+        session.options.details = True
+
+    def _rest(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        data = mj.MjData(self.model)
+        mj.mj_kinematics(self.model, data)
+        return data.xpos[body].copy(), quaternion_from_wxyz(data.xquat[body])
+
+    def step(self, data: mj.MjData) -> int:
+        """One step of MuJoCo with contactd's contacts; returns how many there were."""
+        model = self.model
+        mj.mj_step1(model, data)
+        n = self.add_contacts(data)
+        if n:
+            # What mj_step1 made of the contacts that it knew is made again with all of them.
+            mj.mj_makeConstraint(model, data)
+            mj.mj_island(model, data)
+            mj.mj_projectConstraint(model, data)
+            mj.mj_referenceConstraint(model, data)
+        mj.mj_step2(model, data)
+        return n
+
+    def add_contacts(self, data: mj.MjData) -> int:
+        """Asks contactd about the bodies as they stand in ``data`` and adds its contacts; for loops that stage their own steps."""
+        positions = data.xpos[self._moving_bodies] / self.unit
+        rotations = quaternion_from_wxyz(data.xquat[self._moving_bodies])
+        added = 0
+        for a, b, point in self._points(positions, rotations):
+            contact = self._contact(a, b, point)
+            if mj.mj_addContact(self.model, data, contact) != 0:
+                raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")
+            added += 1
+        return added
+
+    def _points(self, positions: np.ndarray, rotations: np.ndarray) -> list[tuple[int, int, Point]]:
+        """Objects and points of all contacts, in contactd's unit."""
+        found: list[tuple[int, int, Point]] = []
+        deep: list[tuple[int, int, Point]] = []
+        for a, b, status, points in self._ask(positions, rotations):
+            (deep if status == Status.OVERLAP else found).extend((a, b, p) for p in points)
+        if not deep:
+            return found
+        self.retracted += 1
+        # Each pair in overlap is moved apart along its direction, the moving body alone, to half a skin's gap.
+        index = {int(o): i for i, o in enumerate(self._moving)}
+        back = np.zeros_like(positions)
+        for a, b, p in deep:
+            way = p.normal * (0.5 * self.skin / self.unit - p.separation)
+            # The normal points from a to b: b goes along, a against; where both move b does.
+            body, way = (index[b], way) if b in index else (index[a], -way)
+            # What an earlier pair has asked for already need not be gone again.
+            length = np.linalg.norm(way)
+            back[body] += way * max(0.0, 1.0 - float(back[body] @ way) / float(length * length))
+        overlapping = {(a, b): p for a, b, p in deep}
+        for a, b, status, points in self._ask(positions + back, rotations):
+            if (a, b) not in overlapping:
+                continue
+            deepest = overlapping.pop((a, b))
+            if status == Status.OVERLAP or not points:
+                found.append((a, b, deepest))
+                continue
+            gone = (back[index[b]] if b in index else 0.0) - (back[index[a]] if a in index else 0.0)
+            # The gap that the pair has where it really is.
+            found.extend((a, b, p._replace(separation=p.separation - float(p.normal @ gone))) for p in points)
+        found.extend((a, b, p) for (a, b), p in overlapping.items())
+        return found
+
+    def _ask(self, positions: np.ndarray, rotations: np.ndarray) -> list[tuple[int, int, int, list[Point]]]:
+        poses = self.session.begin_step(len(self._moving))
+        poses["object"] = self._moving
+        poses["flags"] = Order.START
+        poses["position"] = positions
+        poses["rotation"] = rotations
+        reply = self.session.finish()
+        return [(int(r["a"]), int(r["b"]), int(r["status"]), manifold(reply, r)) for r in reply]
+
+    def _contact(self, a: int, b: int, point: Point) -> mj.MjContact:
+        model = self.model
+        g1, g2 = self._geoms[a], self._geoms[b]
+        contact = mj.MjContact()
+        contact.pos, contact.frame, contact.dist = contact_to_mujoco(
+            point.point * self.unit, point.normal, point.separation * self.unit
+        )
+        contact.includemargin = self.skin
+        contact.geom = [g1, g2]
+        contact.flex = contact.elem = contact.vert = [-1, -1]
+        contact.exclude = 0
+        contact.efc_address = -1
+        # As mj_contactParam: the geom of higher priority, else the larger condim and friction, and solver parameters mixed.
+        p1, p2 = model.geom_priority[g1], model.geom_priority[g2]
+        if p1 != p2:
+            g = g1 if p1 > p2 else g2
+            dim, friction = model.geom_condim[g], model.geom_friction[g]
+            solref, solimp = model.geom_solref[g], model.geom_solimp[g]
+        else:
+            dim = max(model.geom_condim[g1], model.geom_condim[g2])
+            friction = np.maximum(model.geom_friction[g1], model.geom_friction[g2])
+            mix = _mix(model.geom_solmix[g1], model.geom_solmix[g2])
+            r1, r2 = model.geom_solref[g1], model.geom_solref[g2]
+            solref = mix * r1 + (1 - mix) * r2 if r1[0] > 0 and r2[0] > 0 else np.minimum(r1, r2)
+            solimp = mix * model.geom_solimp[g1] + (1 - mix) * model.geom_solimp[g2]
+        contact.dim = int(dim)
+        slide, spin, roll = friction
+        contact.friction = [slide, slide, spin, roll, roll]
+        contact.solref, contact.solimp = solref, solimp
+        return contact
+
+
+def _mix(first: float, second: float) -> float:
+    """Weight of the first geom's solver parameters (engine_collision_driver.c, mj_contactParam)."""
+    least = mj.mjMINVAL
+    if first >= least and second >= least:
+        return float(first / (first + second))
+    if first < least and second < least:
+        return 0.5
+    return 0.0 if first < least else 1.0

@@ -1,0 +1,95 @@
+"""Servers that are not there, no longer there, or not answering: an exception, and the session goes on after it."""
+
+import signal
+
+import numpy as np
+import pytest
+from conftest import fill
+
+import contactd
+
+
+def test_no_server_is_named(runtime):
+    with pytest.raises(contactd.NoServer, match="nobody"):
+        contactd.connect("nobody")
+    with pytest.raises(contactd.BadAddress):
+        contactd.connect("No/Name")
+    with pytest.raises(ValueError, match="nothing.toml"):
+        contactd.embedded("/nowhere/nothing.toml")
+
+
+def test_a_killed_server_is_noticed_and_its_successor_told(own_server):
+    with contactd.connect("own") as session:
+        ball, _ = fill(session)
+        session.begin_step(1)[0] = contactd.end(ball, (4, 0, 0))
+        session.finish(timeout=10)
+        epoch = session.epoch
+        own_server.kill()
+        session.begin_step(1)[0] = contactd.end(ball, (12, 0, 0))
+        with pytest.raises(contactd.ServerLost) as lost:
+            session.finish(timeout=10)
+        assert lost.value.code is None and "reconnect" in str(lost.value)
+        with pytest.raises(contactd.ServerLost):
+            session.begin_step(1)
+        with pytest.raises(contactd.NoServer):
+            session.reconnect(timeout=0.2)
+        own_server.start()
+        session.reconnect(timeout=20)
+        assert session.epoch != epoch
+        poses = session.resend()
+        assert poses[0].position.tolist() == [12, 0, 0]
+        # From x = 4, where the last accepted step ended: the ball's surface meets the wall's after 4 of 8.
+        assert session.finish(timeout=10)[0].time == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_server_killed_while_its_reply_is_read(own_server):
+    session = contactd.connect("own")
+    ball, _ = fill(session)
+    session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+    records = session.finish(timeout=10).records
+    plain = np.asarray(records)
+    own_server.kill()
+    assert records["time"][0] == 0.5 and plain["time"][0] == 0.5, "the memory stays"
+    with pytest.raises(contactd.ServerLost):
+        session.load_model("m", "sphere(r = 1);")
+    with pytest.raises(BufferError):
+        session.reconnect(timeout=0)
+    del plain
+    own_server.start()
+    session.reconnect(timeout=20)
+    with pytest.raises(contactd.Stale):
+        records["time"]
+    session.close()
+
+
+def test_a_server_killed_in_a_with_block_lets_it_end(own_server):
+    with contactd.connect("own") as session:
+        own_server.kill()
+    assert session.closed
+
+
+def test_a_step_outlives_its_timeout_and_ctrl_c(own_server):
+    with contactd.connect("own") as session:
+        ball, _ = fill(session)
+        session.options.advance = 0.25
+        session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+        own_server.process.send_signal(signal.SIGSTOP)
+        try:
+            session.send()
+            with pytest.raises(contactd.Timeout) as out:
+                session.finish(timeout=0.05)
+            assert isinstance(out.value, TimeoutError) and "in flight" in str(out.value)
+            assert session.options.advance == 0.25, "not yet accepted"
+
+            def interrupt(*_):
+                raise KeyboardInterrupt
+
+            before = signal.signal(signal.SIGALRM, interrupt)
+            signal.setitimer(signal.ITIMER_REAL, 0.15)
+            with pytest.raises(KeyboardInterrupt):
+                session.finish()
+            signal.signal(signal.SIGALRM, before)
+        finally:
+            own_server.process.send_signal(signal.SIGCONT)
+        reply = session.finish(timeout=20)
+        assert reply[0].time == 0.5 and session.options.advance == 1.0
