@@ -1,6 +1,6 @@
 //! The scenes: metres, seconds, kilograms, z upwards.
 
-use contactd_client::dynamics::{Damping, Effects, Inertia, Penalty, Rest, Restitution, Settings, Sleep};
+use contactd_client::dynamics::{Damping, Effects, Inertia, Penalty, Restitution, Settings};
 use contactd_client::proto::motion::quat_of_rotation_vector;
 use contactd_client::proto::{Detect, Pose, Report, Rule};
 use glam::{DVec3, dvec3};
