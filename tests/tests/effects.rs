@@ -7,7 +7,6 @@ use contactd::contact::clearance::{MARGIN_SLACK, apart_until};
 use contactd::contact::{Asked, Scratch, Status, earliest_contact};
 use contactd::eco::Model;
 use contactd::ipc::{Embedded, ServerConfig};
-use contactd::motion::Placed;
 use contactd_client::{Error, Object, Session};
 use contactd_proto::contact_record::{
     CLEAR, CONTACT, OVERLAP, SENSOR, TOUCHING, VALID_NORMAL, VALID_POINT, VALID_TIME, WITHIN_MARGIN,
