@@ -62,7 +62,8 @@ impl<'a> Start<'a> {
         Some(Self { pair, axes, frames, bodies, centers: [bodies[0].center(), bodies[1].center()] })
     }
 
-    /// Looks for a common point of both bodies that is deeper than 2 delta, however the search may raise that, or else for a direction that separates them.
+    /// Looks for a common point of both bodies that is deeper than 2 delta, however the search may raise that, or else for a
+    /// direction that separates them.
     pub fn look(&self, count: &mut u64) -> Look {
         let way = self.centers[1] - self.centers[0];
         if self.gap(way) > 0.0 {
@@ -129,9 +130,10 @@ impl<'a> Start<'a> {
 
     /// f of both bodies.
     fn values(&self, x: DVec3) -> [f64; 2] {
-        let [a, b] = self.pair.primitives;
-        [a.value(self.own(0, x)), b.value(self.own(1, x))]
+        let of_faces = |k: usize| self.pair.primitives[k].value(self.own(k, x));
+        [0, 1].map(|k| self.bodies[k].value(x).unwrap_or_else(|| of_faces(k)))
     }
+
     /// A common point, or where it lies on a surface the deepest of some points on ways that lead inwards from it; and how
     /// deep that lies in both.
     fn inwards(&self, p: DVec3, least: f64) -> (DVec3, f64) {

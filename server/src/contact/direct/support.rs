@@ -78,6 +78,29 @@ impl<'s> Body<'s> {
         n.dot(self.support(n)) + margin
     }
 
+    /// f of the body, the largest of its faces' values, negative inside: the same as `Primitive::value` but for rounding, in a
+    /// fraction of the time. `None` for a polyhedron.
+    #[inline]
+    pub fn value(&self, x: DVec3) -> Option<f64> {
+        let from = x - self.origin;
+        let l = DVec3::new(self.axes.x_axis.dot(from), self.axes.y_axis.dot(from), self.axes.z_axis.dot(from));
+        let rho = || (l.x * l.x + l.y * l.y).sqrt();
+        Some(match self.shape {
+            Shape::Sphere(s) => from.length() - s.radius,
+            Shape::Cuboid(c) => (l.abs() - c.half).max_element(),
+            Shape::Cylinder(c) => (rho() - c.radius).max(l.z.abs() - c.half_height),
+            Shape::Cone(c) => {
+                let half = c.half_height;
+                let slope = (c.bottom - c.top) / (2.0 * half);
+                let side = (rho() - 0.5 * (c.bottom + c.top) + slope * l.z) / (1.0 + slope * slope).sqrt();
+                // An end without a disc has no face there.
+                let disc = |radius: f64, beyond: f64| if radius > 0.0 { beyond } else { f64::NEG_INFINITY };
+                side.max(disc(c.top, l.z - half)).max(disc(c.bottom, -l.z - half))
+            }
+            Shape::Polyhedron(_) | Shape::HalfSpace(_) => return None,
+        })
+    }
+
     /// How many faces it takes to hold what a polyhedron shows along the unit direction n: 3 for a corner, 2 for an edge, 1
     /// for a face. 0 for round bodies.
     pub fn corner(&self, n: DVec3) -> usize {
@@ -95,6 +118,46 @@ impl<'s> Body<'s> {
                 }
             }
             _ => 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+    use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
+    use crate::solid::{Label, Primitive};
+    use contactd_proto::Pose;
+    use contactd_proto::motion::quat_of_rotation_vector;
+
+    #[test]
+    fn the_value_of_a_body_is_the_largest_of_its_faces() {
+        let shapes: [Shape; 6] = [
+            Sphere { radius: 0.7 }.into(),
+            Cuboid { half: DVec3::new(0.5, 0.9, 0.2) }.into(),
+            Cylinder { radius: 0.4, half_height: 0.8 }.into(),
+            Cone { bottom: 0.6, top: 0.0, half_height: 0.5 }.into(),
+            Cone { bottom: 0.0, top: 0.3, half_height: 0.9 }.into(),
+            Cone { bottom: 0.2, top: 0.8, half_height: 0.3 }.into(),
+        ];
+        let mut numbers = Random(11);
+        let mut v = |size: f64| {
+            let mut n = || numbers.within(-size, size);
+            DVec3::new(n(), n(), n())
+        };
+        for shape in &shapes {
+            let frame = Pose::new(v(2.0), quat_of_rotation_vector(v(3.0)));
+            let primitive = Primitive::new(shape.clone(), frame, Label::default(), 0);
+            let body = Body::new(shape, frame.matrix(), frame.position).expect("bounded");
+            let mut inside = 0;
+            for _ in 0..20_000 {
+                let x = frame.position + v(1.2);
+                let (faces, own) = (primitive.value(x), body.value(x).expect("no polyhedron"));
+                assert!((faces - own).abs() <= 1e-14, "{shape:?} at {x}: {faces}, {own}");
+                inside += u32::from(own < 0.0);
+            }
+            assert!(inside > 200, "{shape:?}: {inside}");
         }
     }
 }
