@@ -4,10 +4,9 @@
 //! program anew with the subcommand `probe`: scenes stepped few and many times, the difference is of steps alone. Times are of
 //! blocks that alternate. The run fails where C takes more than 2 % more instructions than Rust.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 use contactd::ipc::ServerConfig;
 use contactd_benches::callgrind;
-use contactd_benches::options::Options;
 use contactd_benches::race::{Plan, race};
 use contactd_benches::row;
 use contactd_benches::table::Table;
@@ -21,20 +20,6 @@ use std::time::Duration;
 const MOST_PERCENT: f64 = 2.0;
 /// A step that takes longer has hung.
 const PATIENCE: f64 = 60.0;
-
-#[derive(Debug, Parser)]
-struct Arguments {
-    #[command(flatten)]
-    options: Options,
-    #[command(subcommand)]
-    task: Option<Task>,
-}
-
-#[derive(Debug, Subcommand)]
-enum Task {
-    /// Steps one scene: what instructions are counted of.
-    Probe(Probe),
-}
 
 #[derive(Clone, Debug, Args)]
 struct Probe {
@@ -171,17 +156,10 @@ impl Probe {
     }
 }
 
-/// Instructions of a step: what the longer run takes more than the shorter one.
-fn instructions(way: Way, poses: usize, steps: [usize; 2]) -> Result<f64, Box<dyn Error>> {
-    let run = |n: usize| callgrind::instructions(&["probe", &way.name(), &poses.to_string(), &n.to_string()]);
-    let [few, many] = [run(steps[0])?, run(steps[1])?];
-    Ok(many.saturating_sub(few) as f64 / (steps[1] - steps[0]) as f64)
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
-    let Arguments { options, task } = Arguments::parse();
+    let callgrind::Arguments { options, task } = callgrind::Arguments::<Probe>::parse();
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
-    if let Some(Task::Probe(probe)) = task {
+    if let Some(callgrind::Task::Probe(probe)) = task {
         probe.run();
         return Ok(());
     }
@@ -195,7 +173,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut most = f64::NEG_INFINITY;
     // Small steps many times: what a hash table happens to do in one of them must not show.
     for (poses, steps) in [(16, [50, 1050]), (4096, options.pick([10, 50], [4, 12]))] {
-        let count = |way| if counted { instructions(way, poses, steps) } else { Ok(f64::NAN) };
+        let count = |way: Way| {
+            let run = |n: usize| vec!["probe".into(), way.name(), poses.to_string(), n.to_string()];
+            if counted { callgrind::of_a_step(steps, run) } else { Ok(f64::NAN) }
+        };
         let [of_rust, of_c] = [count(Way::Rust)?, count(Way::C)?];
         let (mut c, mut rust) = (Way::C.scene(poses), Way::Rust.scene(poses));
         let lap = race(plan, 1, |_| c(), |_| rust())[0];

@@ -6,34 +6,19 @@
 //! `benches/effects` in cargo's target folder) and nothing else is touched. `effects probe` is what callgrind is given to
 //! run: one scene, stepped.
 
-use clap::{Parser, Subcommand};
+use clap::Parser;
+use contactd_benches::callgrind;
 use contactd_benches::effects::{Context, Probe, instructions, ladder, share, single};
-use contactd_benches::options::Options;
 use contactd_benches::page::{made_by, publish};
 use contactd_benches::race::Plan;
 use std::error::Error;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// The command line.
-#[derive(Debug, Parser)]
-struct Arguments {
-    #[command(flatten)]
-    options: Options,
-    #[command(subcommand)]
-    task: Option<Task>,
-}
-
-#[derive(Debug, Subcommand)]
-enum Task {
-    /// Steps one scene: what instructions are counted of.
-    Probe(Probe),
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
-    let Arguments { options, task } = Arguments::parse();
+    let callgrind::Arguments { options, task } = callgrind::Arguments::<Probe>::parse();
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
-    if let Some(Task::Probe(probe)) = task {
+    if let Some(callgrind::Task::Probe(probe)) = task {
         probe.run();
         return Ok(());
     }

@@ -4,9 +4,8 @@
 //! a step. Then the instructions (callgrind's) that a pair costs a step while its bodies are within their clearance: couples of
 //! balls and couples of drilled blocks far from all others, stepped with the pair and with a rule that drops it.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 use contactd_benches::callgrind;
-use contactd_benches::options::Options;
 use contactd_benches::race::median;
 use contactd_benches::row;
 use contactd_benches::stepped::{scenes, walk};
@@ -16,20 +15,6 @@ use contactd_proto::{Detect, Pose, PoseRecord, Rule};
 use glam::DVec3;
 use std::error::Error;
 use std::time::Duration;
-
-#[derive(Debug, Parser)]
-struct Arguments {
-    #[command(flatten)]
-    options: Options,
-    #[command(subcommand)]
-    task: Option<Task>,
-}
-
-#[derive(Debug, Subcommand)]
-enum Task {
-    /// Steps couples: what instructions are counted of.
-    Probe(Probe),
-}
 
 #[derive(Clone, Debug, Args)]
 struct Probe {
@@ -103,23 +88,18 @@ impl Probe {
     }
 }
 
-/// Instructions of a step: what the longer run takes more than the shorter one.
+/// Instructions of a step.
 fn instructions(kind: Kind, dropped: bool) -> Result<f64, Box<dyn Error>> {
-    let run = |steps: usize| {
-        let (name, steps) = (kind.name(), steps.to_string());
-        let mut arguments = vec!["probe", &name, &steps];
-        if dropped {
-            arguments.push("--dropped");
-        }
-        callgrind::instructions(&arguments)
-    };
-    let [few, many] = [run(STEPS[0])?, run(STEPS[1])?];
-    Ok(many.saturating_sub(few) as f64 / (STEPS[1] - STEPS[0]) as f64)
+    callgrind::of_a_step(STEPS, |steps| {
+        let mut arguments = vec!["probe".into(), kind.name(), steps.to_string()];
+        arguments.extend(dropped.then(|| "--dropped".into()));
+        arguments
+    })
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let Arguments { options, task } = Arguments::parse();
-    if let Some(Task::Probe(probe)) = task {
+    let callgrind::Arguments { options, task } = callgrind::Arguments::<Probe>::parse();
+    if let Some(callgrind::Task::Probe(probe)) = task {
         return probe.run();
     }
     let steps = options.pick(400, 100);

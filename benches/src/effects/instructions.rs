@@ -67,21 +67,16 @@ impl Probe {
             };
         }
     }
-
-    /// Instructions of the whole run.
-    fn instructions(&self) -> Result<u64, Box<dyn Error>> {
-        let declared = self.declared.to_possible_value().expect("a word");
-        let (class, steps) = (self.class.to_string(), self.steps.to_string());
-        let arguments = ["probe", &class, declared.get_name(), &steps, "--warm"];
-        callgrind::instructions(&arguments[..arguments.len() - usize::from(!self.warm)])
-    }
 }
 
 /// Instructions of a step.
 fn of_a_step(class: usize, declared: Declared, warm: bool) -> Result<f64, Box<dyn Error>> {
-    let run = |steps: usize| Probe { class, declared, steps, warm }.instructions();
-    let [few, many] = [run(STEPS[0])?, run(STEPS[1])?];
-    Ok(many.saturating_sub(few) as f64 / (STEPS[1] - STEPS[0]) as f64)
+    let declared = declared.to_possible_value().expect("a word");
+    callgrind::of_a_step(STEPS, |steps| {
+        let mut arguments = vec!["probe".into(), class.to_string(), declared.get_name().into(), steps.to_string()];
+        arguments.extend(warm.then(|| "--warm".into()));
+        arguments
+    })
 }
 
 /// The section; `None` in the short form, and where there is no callgrind.
