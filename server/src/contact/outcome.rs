@@ -134,6 +134,8 @@ pub struct Outcome {
     pub time_upper: f64,
     /// Separation at the start lies within the touching threshold.
     pub touching: bool,
+    /// Of a contact a lower bound of the separation at the start, where one was found on the way, but for rounding; else negative.
+    pub apart: f64,
     /// `time` could not be continued back from the witness and equals `time_upper`.
     pub not_continued: bool,
     /// A vertex met a vertex: the normal is the average of the adjacent normals.
@@ -181,6 +183,7 @@ impl Outcome {
             time: 1.0,
             time_upper: 1.0,
             touching: false,
+            apart: f64::NEG_INFINITY,
             not_continued: false,
             averaged_normal: false,
             point: DVec3::ZERO,

@@ -153,7 +153,7 @@ pub(super) fn without_own_spin(body: &Body) -> Placed {
     let mut placed = body.placed;
     let spin = placed.motion.spin;
     if spin != DVec3::ZERO {
-        let model_from_world = (placed.motion.start.compose(&placed.place)).rotation.conjugate();
+        let model_from_world = (placed.motion.start.rotation * placed.place.rotation).conjugate();
         let along = model_from_world * spin;
         let center = placed.place.inverse().position;
         let axis = body.model.solid.axis_of_revolution(along, body.model.radius);

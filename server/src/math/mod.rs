@@ -8,10 +8,12 @@ pub mod oriented;
 #[cfg(test)]
 pub(crate) mod random;
 pub mod tolerance;
+pub mod twin;
 
 pub use aabb::Aabb;
 pub use ball::Ball;
 pub use oriented::Oriented;
+pub use twin::{Lanes, Twin};
 
 use glam::DVec3;
 

@@ -8,6 +8,7 @@
 //! order.
 
 use crate::math::Aabb;
+use glam::DVec3;
 
 /// Boxes in a leaf.
 const LEAF: usize = 6;
@@ -34,6 +35,8 @@ pub struct BroadPhase {
     branches: Vec<Branch>,
     stack: Vec<(u32, u32)>,
     endless: Vec<u32>,
+    centers: Vec<DVec3>,
+    keys: Vec<(f64, u32)>,
     /// How many boxes there were, and the tests a pair found, when the tree was built; 0: build it anew.
     boxes: usize,
     fresh: f64,
@@ -63,29 +66,39 @@ impl BroadPhase {
 
     /// A new tree.
     fn build(&mut self, boxes: &[Aabb], is_static: &impl Fn(usize) -> bool) {
-        let Self { order, branches, endless, .. } = self;
+        let Self { order, branches, endless, centers, keys, .. } = self;
         branches.clear();
         order.clear();
         endless.clear();
         for (i, b) in boxes.iter().enumerate().filter(|(_, b)| !b.is_empty()) {
             if is_in_tree(b) { order.push(i as u32) } else { endless.push(i as u32) }
         }
+        centers.clear();
+        centers.extend(boxes.iter().map(Aabb::center));
+        keys.resize(order.len(), (0.0, 0));
         if !order.is_empty() {
-            grow(branches, order, 0, boxes, is_static);
+            grow(branches, order, keys, 0, centers);
         }
+        self.fit(boxes, is_static);
         self.boxes = boxes.len();
     }
 
     /// Fits the tree to where its boxes are now; false when it has to be built anew.
     fn refit(&mut self, boxes: &[Aabb], is_static: &impl Fn(usize) -> bool) -> bool {
-        let Self { order, branches, endless, .. } = self;
+        let Self { order, endless, .. } = self;
         let same = self.boxes == boxes.len()
             && order.iter().all(|i| is_in_tree(&boxes[*i as usize]))
             && endless.iter().all(|i| !(boxes[*i as usize].is_empty() || is_in_tree(&boxes[*i as usize])))
             && order.len() + endless.len() == boxes.iter().filter(|b| !b.is_empty()).count();
-        if !same {
-            return false;
+        if same {
+            self.fit(boxes, is_static);
         }
+        same
+    }
+
+    /// The boxes around the branches, and whether they move.
+    fn fit(&mut self, boxes: &[Aabb], is_static: &impl Fn(usize) -> bool) {
+        let Self { order, branches, .. } = self;
         // Children stand behind their branch.
         for at in (0..branches.len()).rev() {
             let Branch { start, end, second, .. } = branches[at];
@@ -97,7 +110,6 @@ impl BroadPhase {
             };
             (branches[at].aabb, branches[at].moves) = (aabb, moves);
         }
-        true
     }
 
     /// Walks the tree against itself.
@@ -167,31 +179,29 @@ fn around(order: &[u32], boxes: &[Aabb], is_static: &impl Fn(usize) -> bool) -> 
     each.fold((Aabb::EMPTY, false), |(aabb, moves), (b, moving)| (aabb.union(b), moves || moving))
 }
 
-/// Appends the branch of `order`, which begins at `start` of the whole order.
-fn grow(branches: &mut Vec<Branch>, order: &mut [u32], start: u32, boxes: &[Aabb], is_static: &impl Fn(usize) -> bool) {
+/// Appends the branch of `order`, which begins at `start` of the whole order. `keys` is memory of the same length.
+fn grow(branches: &mut Vec<Branch>, order: &mut [u32], keys: &mut [(f64, u32)], start: u32, centers: &[DVec3]) {
     let at = branches.len();
-    let (aabb, moves) = around(order, boxes, is_static);
-    branches.push(Branch { aabb, start, end: start + order.len() as u32, second: 0, moves });
+    branches.push(Branch { aabb: Aabb::EMPTY, start, end: start + order.len() as u32, second: 0, moves: false });
     if order.len() <= LEAF {
         return;
     }
-    let centers = Aabb::of_points(order.iter().map(|i| boxes[*i as usize].center()));
-    let spread = centers.max - centers.min;
-    let axis = spread.max_position();
+    let around = Aabb::of_points(order.iter().map(|i| centers[*i as usize]));
+    let axis = (around.max - around.min).max_position();
+    keys.iter_mut().zip(&*order).for_each(|(key, i)| *key = (centers[*i as usize][axis], *i));
     let middle = order.len() / 2;
-    let along = |i: &u32| boxes[*i as usize].center()[axis];
-    order.select_nth_unstable_by(middle, |i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
-    let (first, second) = order.split_at_mut(middle);
-    grow(branches, first, start, boxes, is_static);
+    keys.select_nth_unstable_by(middle, |p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
+    order.iter_mut().zip(&*keys).for_each(|(i, key)| *i = key.1);
+    let ((first, second), (keys_first, keys_second)) = (order.split_at_mut(middle), keys.split_at_mut(middle));
+    grow(branches, first, keys_first, start, centers);
     branches[at].second = branches.len() as u32;
-    grow(branches, second, start + middle as u32, boxes, is_static);
+    grow(branches, second, keys_second, start + middle as u32, centers);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::random::Random;
-    use glam::DVec3;
 
     #[test]
     fn it_finds_what_comparing_all_finds() {

@@ -120,9 +120,9 @@ pub struct Question<'a> {
 }
 
 impl Knowledge {
-    /// Nothing known, in the memory of what was known of another pair.
-    pub fn emptied(self) -> Self {
-        Self { course: self.course, answer: self.answer, ..Self::default() }
+    /// Forgets everything but the memory it took.
+    pub fn empty(&mut self) {
+        *self = Self { course: self.course.take(), answer: self.answer.take(), ..Self::default() };
     }
 
     /// Answers from what is known, or from what little work makes known; `None`: search. `counters` counts the work.

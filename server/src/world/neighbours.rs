@@ -15,6 +15,7 @@ use super::coherence::Knowledge;
 use super::plan::PairPlan;
 use crate::contact::Glance;
 use crate::math::Aabb;
+use contactd_proto::Detect;
 use glam::DVec3;
 
 /// A body's box grows by the way of this many steps like the last one …
@@ -30,25 +31,30 @@ struct Near {
     a: u32,
     b: u32,
     limit: f64,
-    /// Place of what belongs to it.
+}
+
+/// What a glance at a pair needs of it. There are many pairs of which no more is ever asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    /// A direction along which its bodies were apart; 0 where none is known.
+    pub along: DVec3,
+    /// Up to this distance they may touch, or matter to each other otherwise.
+    pub touch: f64,
+    /// Its bodies are looked at where they stand at the end of the step alone.
+    pub discrete: bool,
+    /// They met when they were last asked about.
+    pub met: bool,
+    /// Place of what else belongs to it.
     entry: u32,
 }
 
-/// What belongs to a pair.
+/// What else belongs to a pair.
 #[derive(Debug)]
-pub struct Entry {
-    /// How it is searched.
-    pub plan: PairPlan,
-    /// The same as an index.
-    pub plan_index: u32,
-    /// Its resolution.
-    pub resolution: f64,
-    /// A direction along which its bodies were apart.
-    pub along: Option<DVec3>,
-    /// They met when they were last asked about.
-    pub met: bool,
-    /// What earlier steps have proven.
-    pub knowledge: Knowledge,
+struct Entry {
+    plan_index: u32,
+    resolution: f64,
+    /// What earlier steps have proven, if it has been asked about at all.
+    knowledge: Option<Box<Knowledge>>,
 }
 
 /// How far a body may have gone: before the step, and with it.
@@ -64,11 +70,14 @@ pub struct Odometer {
 #[derive(Debug, Default)]
 pub struct Neighbours {
     pairs: Vec<Near>,
-    /// What belongs to pairs stays in its place while the list changes …
+    /// One for each of them.
+    sights: Vec<Sight>,
+    /// What else belongs to pairs stays in its place while the list changes …
     entries: Vec<Entry>,
     /// … and these places are of pairs that have left it.
     spare: Vec<u32>,
     old_pairs: Vec<Near>,
+    old_sights: Vec<Sight>,
     odometers: Vec<Odometer>,
     /// Odometer up to which a body stays in its grown box.
     fences: Vec<f64>,
@@ -112,6 +121,7 @@ impl Neighbours {
     /// Forgets the list and what is known of its pairs: bodies or rules have changed.
     pub fn forget(&mut self) {
         self.pairs.clear();
+        self.sights.clear();
         self.entries.clear();
         self.spare.clear();
         self.stale = true;
@@ -167,31 +177,41 @@ impl Neighbours {
         by_ids(found, &mut self.sorted, &mut self.counts, bodies.len());
         // The old list beside the new one.
         std::mem::swap(&mut self.pairs, &mut self.old_pairs);
+        std::mem::swap(&mut self.sights, &mut self.old_sights);
         self.pairs.clear();
-        let mut old = self.old_pairs.iter().copied().peekable();
+        self.sights.clear();
+        let mut old = self.old_pairs.iter().zip(&self.old_sights).peekable();
         for &(a, b) in found.iter() {
-            while let Some(gone) = old.next_if(|n| (n.a, n.b) < (a, b)) {
+            while let Some((_, gone)) = old.next_if(|(n, _)| (n.a, n.b) < (a, b)) {
                 self.spare.push(gone.entry);
             }
-            if let Some(near) = old.next_if(|n| (n.a, n.b) == (a, b)) {
-                self.pairs.push(near);
+            if let Some((near, sight)) = old.next_if(|(n, _)| (n.a, n.b) == (a, b)) {
+                self.pairs.push(*near);
+                self.sights.push(*sight);
                 continue;
             }
             let Some((plan_index, plan, resolution)) = plan(a, b) else { continue };
-            let mut new =
-                Entry { plan, plan_index, resolution, along: None, met: false, knowledge: Knowledge::default() };
             let entry = if let Some(entry) = self.spare.pop() {
                 let place = &mut self.entries[entry as usize];
-                new.knowledge = std::mem::take(&mut place.knowledge).emptied();
-                *place = new;
+                (place.plan_index, place.resolution) = (plan_index, resolution);
+                if let Some(known) = &mut place.knowledge {
+                    known.empty();
+                }
                 entry
             } else {
-                self.entries.push(new);
+                self.entries.push(Entry { plan_index, resolution, knowledge: None });
                 self.entries.len() as u32 - 1
             };
-            self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY, entry });
+            self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
+            self.sights.push(Sight {
+                along: DVec3::ZERO,
+                touch: plan.reach().max(2.0 * resolution),
+                discrete: plan.detect == Detect::Discrete,
+                met: false,
+                entry,
+            });
         }
-        self.spare.extend(old.map(|gone| gone.entry));
+        self.spare.extend(old.map(|(_, gone)| gone.entry));
     }
 
     /// The two bodies of a pair.
@@ -204,33 +224,35 @@ impl Neighbours {
         self.pairs.binary_search_by_key(&(a, b), |n| (n.a, n.b)).ok()
     }
 
-    /// What belongs to a pair.
-    pub fn entry(&self, pair: usize) -> &Entry {
-        &self.entries[self.pairs[pair].entry as usize]
+    /// What a glance needs of a pair.
+    pub fn sight(&self, pair: usize) -> &Sight {
+        &self.sights[pair]
     }
 
-    fn entry_mut(&mut self, pair: usize) -> &mut Entry {
-        &mut self.entries[self.pairs[pair].entry as usize]
+    /// Index of the plan of a pair, and its resolution.
+    pub fn plan(&self, pair: usize) -> (u32, f64) {
+        let entry = &self.entries[self.sights[pair].entry as usize];
+        (entry.plan_index, entry.resolution)
     }
 
     /// Notes what was seen of a pair at the start of this step.
+    #[inline]
     pub fn noticed(&mut self, pair: usize, glance: &Glance) {
-        self.entry_mut(pair).along = Some(glance.along);
+        self.sights[pair].along = glance.along;
         if glance.room > 0.0 {
             self.note(pair, glance.room);
         }
     }
 
     /// Gives what is known of a pair away, until `learned`.
-    pub fn lend(&mut self, pair: usize) -> Knowledge {
-        std::mem::take(&mut self.entry_mut(pair).knowledge)
+    pub fn lend(&mut self, pair: usize) -> Box<Knowledge> {
+        self.entries[self.sights[pair].entry as usize].knowledge.take().unwrap_or_default()
     }
 
     /// Takes it back; with the room found at the start of this step, if it is positive, and whether the bodies met.
-    pub fn learned(&mut self, pair: usize, knowledge: Knowledge, room: f64, met: bool) {
-        let entry = self.entry_mut(pair);
-        entry.knowledge = knowledge;
-        entry.met = met;
+    pub fn learned(&mut self, pair: usize, knowledge: Box<Knowledge>, room: f64, met: bool) {
+        self.entries[self.sights[pair].entry as usize].knowledge = Some(knowledge);
+        self.sights[pair].met = met;
         if room > 0.0 {
             self.note(pair, room);
         }
@@ -255,10 +277,12 @@ impl Neighbours {
     }
 
     /// Notes that a pair is `room` farther apart than its touching distance at the start of this step.
+    #[inline]
     pub fn note(&mut self, pair: usize, room: f64) {
         let near = &mut self.pairs[pair];
         let sum = self.odometers[near.a as usize].start + self.odometers[near.b as usize].start;
-        near.limit =
-            if (sum + room).is_finite() { (sum.next_down() + room).next_down().next_down() } else { f64::NEG_INFINITY };
+        // More than the roundings of both sums, of this product and of the sum that it is compared with.
+        let limit = (sum + room) * (1.0 - 4.0 * f64::EPSILON);
+        near.limit = if limit.is_finite() { limit } else { f64::NEG_INFINITY };
     }
 }

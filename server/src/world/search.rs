@@ -44,7 +44,7 @@ pub struct PairJob {
     /// Its place in the list of neighbours; `None`: proven clear without being asked about.
     pub pair: Option<usize>,
     /// What earlier steps have proven; lent by the list of neighbours.
-    pub knowledge: Knowledge,
+    pub knowledge: Box<Knowledge>,
     /// The answer.
     pub found: Finding,
 }
@@ -57,7 +57,7 @@ impl PairJob {
         resolution: f64,
         near: bool,
         pair: Option<usize>,
-        knowledge: Knowledge,
+        knowledge: Box<Knowledge>,
     ) -> Self {
         let known = pair.is_none();
         let found = Finding { outcome: Outcome::clear(resolution), room: 0.0, known, apart: known };
@@ -70,9 +70,12 @@ impl PairJob {
         Question { bodies: pair, query, margin: self.plan.reach(), clock }
     }
 
-    fn take(&mut self, q: &Question, outcome: Outcome) {
-        self.knowledge.learn(q, &outcome);
-        self.found = Finding { outcome: finished(self, outcome), room: 0.0, known: false, apart: false };
+    fn take(&mut self, q: &Question, outcome: &Outcome) {
+        self.knowledge.learn(q, outcome);
+        let found = &mut self.found;
+        found.outcome = *outcome;
+        (found.room, found.known, found.apart) = (0.0, false, false);
+        finish(&self.plan, &mut found.outcome);
     }
 }
 
@@ -126,7 +129,8 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
         let cells = memory.with(|seat| {
             let (known, counters) = job.knowledge.ask(&q, &mut seat.scratch);
             if let Some(finding) = known {
-                job.found = Finding { outcome: finished(job, finding.outcome), ..finding };
+                job.found = finding;
+                finish(&job.plan, &mut job.found.outcome);
                 seat.cells += job.found.outcome.counters.cells;
                 return 0;
             }
@@ -143,7 +147,7 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
             }
             outcome.counters += counters;
             seat.cells += outcome.counters.cells;
-            job.take(&q, outcome);
+            job.take(&q, &outcome);
             cells
         });
         if spent.fetch_add(cells, Relaxed) + cells > most {
@@ -199,10 +203,10 @@ fn run_queue(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, first
         match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
+                open[i].take(&questions[i], &outcome);
                 if first && !open[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
-                    horizon = horizon.min(finished(open[i], outcome).time_upper + tolerance::FIRST_SLACK);
+                    horizon = horizon.min(open[i].found.outcome.time_upper + tolerance::FIRST_SLACK);
                 }
-                open[i].take(&questions[i], outcome);
             }
         }
     }
@@ -236,9 +240,8 @@ fn asked(plan: &PairPlan, options: &StepOptions) -> Asked {
 }
 
 /// A discrete pair's answer is about the end of the step.
-fn finished(job: &PairJob, mut outcome: Outcome) -> Outcome {
-    if job.plan.detect == Detect::Discrete && outcome.status != Status::Undecided {
+fn finish(plan: &PairPlan, outcome: &mut Outcome) {
+    if plan.detect == Detect::Discrete && outcome.status != Status::Undecided {
         (outcome.time_lower, outcome.time, outcome.time_upper) = (1.0, 1.0, 1.0);
     }
-    outcome
 }

@@ -5,7 +5,7 @@
 //! a, b); nothing in them depends on the order of records or of searches.
 
 use super::body::Body;
-use super::neighbours::{Entry, Neighbours};
+use super::neighbours::{Neighbours, Sight};
 use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
@@ -145,8 +145,8 @@ pub struct StepState {
     /// How many of them a direction proved apart.
     glanced: u32,
     jobs: Vec<PairJob>,
-    /// Keys of the told pairs, to be ordered.
-    order: Vec<(i64, u32, u32, u32)>,
+    /// Time (as a key), ids and job of each told pair, to be ordered, and whether its regions are complete.
+    order: Vec<(i64, u32, u32, u32, bool)>,
     searches: search::Memory,
     /// Memory of what is asked beside the searches.
     scratch: Scratch,
@@ -339,18 +339,16 @@ impl World {
             asked.clear();
             neighbours.asked(|pair| asked.push(pair));
             if self.plans.count() > 1 {
-                asked.sort_unstable_by_key(|pair| (neighbours.entry(*pair).plan_index, *pair));
+                asked.sort_unstable_by_key(|pair| (neighbours.plan(*pair).0, *pair));
             }
+            let plan = |pair, neighbours: &Neighbours| {
+                let (index, resolution) = neighbours.plan(pair);
+                ((index, *self.plans.plan(index)), resolution)
+            };
             for &pair in &asked {
                 let (i, j) = neighbours.bodies(pair);
-                let entry = neighbours.entry(pair);
-                let (plan, resolution) = ((entry.plan_index, entry.plan), entry.resolution);
-                let met = entry.met;
-                let glance = if met || plan.1.detect == Detect::Discrete {
-                    None
-                } else {
-                    self.glance((i, j), entry, &mut stances)
-                };
+                let sight = *neighbours.sight(pair);
+                let glance = if sight.met || sight.discrete { None } else { self.glance((i, j), &sight, &mut stances) };
                 if let Some(glance) = glance {
                     neighbours.noticed(pair, &glance);
                     if glance.apart {
@@ -358,18 +356,16 @@ impl World {
                         continue;
                     }
                 }
-                if met || glance.is_some() {
-                    let knowledge = neighbours.lend(pair);
-                    jobs.push(PairJob::new((i, j), plan, resolution, true, Some(pair), knowledge));
-                    continue;
-                }
-                neighbours.box_tests += 1;
-                let (reach, boxes) = (plan.1.reach(), [swept(i), swept(j)]);
-                if !boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach)) {
-                    if plan.1.detect != Detect::Discrete {
-                        neighbours.note(pair, boxes[0].distance(&boxes[1]) - reach);
+                let (plan, resolution) = plan(pair, &neighbours);
+                if !sight.met && glance.is_none() {
+                    neighbours.box_tests += 1;
+                    let (reach, boxes) = (plan.1.reach(), [swept(i), swept(j)]);
+                    if !boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach)) {
+                        if !sight.discrete {
+                            neighbours.note(pair, boxes[0].distance(&boxes[1]) - reach);
+                        }
+                        continue;
                     }
-                    continue;
                 }
                 let knowledge = neighbours.lend(pair);
                 jobs.push(PairJob::new((i, j), plan, resolution, true, Some(pair), knowledge));
@@ -384,20 +380,21 @@ impl World {
     }
 
     /// What a direction tells of a pair of convex bodies.
-    fn glance(&self, (i, j): (u32, u32), entry: &Entry, stances: &mut [(u64, Option<Stance>)]) -> Option<Glance> {
+    #[inline]
+    fn glance(&self, (i, j): (u32, u32), sight: &Sight, stances: &mut [(u64, Option<Stance>)]) -> Option<Glance> {
         for k in [i, j] {
-            let body = &self.bodies[k as usize];
-            let hull = body.hull.as_ref()?;
             let place = &mut stances[k as usize];
             if place.0 != self.state.serial {
-                *place = (self.state.serial, Some(hull.stance(&body.track)));
+                let body = &self.bodies[k as usize];
+                *place = (self.state.serial, body.hull.as_ref().map(|hull| hull.stance(&body.track)));
             }
         }
-        let touch = entry.plan.reach().max(2.0 * entry.resolution);
         let stances = [stances[i as usize].1.as_ref()?, stances[j as usize].1.as_ref()?];
-        let bodies = [&self.bodies[i as usize], &self.bodies[j as usize]];
-        let hulls = [bodies[0].hull.as_ref()?, bodies[1].hull.as_ref()?];
-        Some(Glancing::new(bodies.map(|b| &*b.part.model), hulls, stances, touch)?.look(entry.along))
+        let shapes = |k: usize| {
+            let body = &self.bodies[[i, j][k] as usize];
+            body.hull.as_ref()?.shape(&body.part.model)
+        };
+        Some(Glancing::new(stances, shapes, sight.touch)?.look(sight.along))
     }
 
     /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for
@@ -424,6 +421,7 @@ impl World {
         };
         out.pairs.clear();
         out.regions.clear();
+        state.order.clear();
         let mut earliest = f64::INFINITY;
         // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
         let mut left = search::batch_limit(options);
@@ -432,14 +430,13 @@ impl World {
             let plan = jobs[0].plan;
             let discrete = plan.detect == Detect::Discrete;
             for (i, job) in (before..).zip(jobs.iter_mut()) {
-                let mut outcome = job.found.outcome;
-                let outcome = &mut outcome;
                 let (effects, scratch) = (&mut out.effect_counters, &mut state.scratch);
-                let regions_complete = touch::decide(bodies, job, options, &mut left, effects, scratch, outcome);
+                let complete = touch::decide(bodies, job, options, &mut left, effects, scratch);
+                count_effects(job, bodies, effects);
+                let outcome = &job.found.outcome;
                 out.counters += outcome.counters;
                 out.searched += u32::from(job.near);
                 out.known += u32::from(job.near && job.found.known);
-                count_effects(job, bodies, outcome, effects);
                 out.safe_time = out.safe_time.min(outcome.time_lower);
                 if discrete && job.near && outcome.status == Status::Clear && passes(job, bodies) {
                     out.may_have_passed += 1;
@@ -453,26 +450,23 @@ impl World {
                 }
                 if is_told(&plan, outcome, options) {
                     let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
-                    out.pairs.push(PairOutcome {
-                        a,
-                        b,
-                        plan,
-                        outcome: *outcome,
-                        job: i,
-                        regions_complete,
-                        regions: (0, 0),
-                        patch_slots: (0, 0),
-                    });
+                    state.order.push((key_of(&plan, outcome), a, b, i, complete));
                 }
             }
             before += jobs.len() as u32;
         }
         out.undecided = state.jobs.iter().any(|job| is_undecided_before(&job.found.outcome, earliest));
+        // Outcomes are large: their keys are sorted, and each is moved once.
+        state.order.sort_unstable();
+        out.pairs.extend(state.order.iter().map(|&(_, a, b, i, regions_complete)| {
+            let PairJob { plan, found, .. } = &state.jobs[i as usize];
+            let (regions, patch_slots) = ((0, 0), (0, 0));
+            PairOutcome { a, b, plan: *plan, outcome: found.outcome, job: i, regions_complete, regions, patch_slots }
+        }));
         if options.first {
             keep_first(&mut out.pairs);
         }
         out.effect_counters.sensors = out.pairs.iter().filter(|p| p.plan.sensor).count() as u64;
-        order(&mut out.pairs, &mut state.order);
         if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
             out.pairs.truncate(options.max_records as usize);
             out.truncated = true;
@@ -502,7 +496,7 @@ fn check_motion(body: &Body, track: &Track, dt: f64) -> Result<(), ErrorCode> {
 }
 
 /// Counts what was worked out for a pair in this step; what was known of it costs nothing.
-fn count_effects(job: &PairJob, bodies: &[Body], outcome: &Outcome, counters: &mut EffectCounters) {
+fn count_effects(job: &PairJob, bodies: &[Body], counters: &mut EffectCounters) {
     if job.near && !job.found.known {
         let tracks = [job.a, job.b].map(|i| &bodies[i as usize].track);
         if job.plan.detect == Detect::Discrete {
@@ -512,7 +506,7 @@ fn count_effects(job: &PairJob, bodies: &[Body], outcome: &Outcome, counters: &m
             counters.turning += u64::from(tracks.iter().any(|t| t.motion.spin != glam::DVec3::ZERO));
         }
     }
-    let c = &outcome.counters;
+    let c = &job.found.outcome.counters;
     counters.times += c.times;
     counters.contacts += c.contacts;
     counters.penetrations += c.penetrations;
@@ -546,30 +540,12 @@ fn is_undecided_before(o: &Outcome, earliest: f64) -> bool {
     o.status == Status::Undecided && o.time_lower < earliest
 }
 
-/// Puts the pairs in the order (time, a, b). They are large: keys are sorted, and each pair is moved once.
-fn order(pairs: &mut [PairOutcome], keys: &mut Vec<(i64, u32, u32, u32)>) {
-    keys.clear();
-    // The bits of a number as `f64::total_cmp` orders them.
-    let bits = |time: f64| {
-        let bits = time.to_bits() as i64;
-        bits ^ (((bits >> 63) as u64) >> 1) as i64
-    };
+/// The time that is told of a pair, ordered as `f64::total_cmp` does.
+fn key_of(plan: &PairPlan, o: &Outcome) -> i64 {
     // A mere hit has no time that is told: its field is 0.
-    let told = |p: &PairOutcome| p.plan.report >= Report::Time || p.outcome.status == Status::Clear;
-    let time = |p: &PairOutcome| if told(p) { p.outcome.time } else { 0.0 };
-    keys.extend(pairs.iter().enumerate().map(|(i, p)| (bits(time(p)), p.a, p.b, i as u32)));
-    keys.sort_unstable();
-    // The place of each cycle's beginning is filled last.
-    for i in 0..keys.len() {
-        let mut at = i;
-        while keys[at].3 as usize != i {
-            let from = keys[at].3 as usize;
-            pairs.swap(at, from);
-            keys[at].3 = at as u32;
-            at = from;
-        }
-        keys[at].3 = at as u32;
-    }
+    let is_told = plan.report >= Report::Time || o.status == Status::Clear;
+    let bits = if is_told { o.time.to_bits() as i64 } else { 0 };
+    bits ^ (((bits >> 63) as u64) >> 1) as i64
 }
 
 /// Keeps the pairs whose bracket meets that of the earliest contact; sensors stop nothing.

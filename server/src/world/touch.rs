@@ -37,30 +37,38 @@ pub(super) fn decide(
     left: &mut u64,
     effects: &mut EffectCounters,
     scratch: &mut Scratch,
-    outcome: &mut Outcome,
 ) -> bool {
     // The flag stands beside every contact whose time is told, whether regions are asked or not.
     let margin = job.near && job.plan.margin > 0.0;
-    let is_told = outcome.status == Status::Contact || margin || is_asked(job, options, outcome);
-    let clear = outcome.status == Status::Clear;
+    let outcome = &mut job.found.outcome;
+    let (status, resolution) = (outcome.status, outcome.resolution);
+    let clear = status == Status::Clear;
     if outcome.touching && margin && clear {
         outcome.margin_time = 0.0;
     }
-    if outcome.touching || job.found.apart || !is_told || job.plan.report < Report::Time && !margin {
+    if outcome.touching || job.found.apart || job.plan.report < Report::Time && !margin {
         return true;
     }
-    if outcome.status == Status::Contact && outcome.time == 0.0 {
+    if !(status == Status::Contact || margin || is_asked(job, options, &job.found.outcome)) {
+        return true;
+    }
+    let outcome = &mut job.found.outcome;
+    if status == Status::Contact && outcome.time == 0.0 {
         outcome.touching = true;
         return true;
     }
-    if let Some(told) = told(job) {
-        (outcome.touching, outcome.margin_time) = (told.outcome.touching, told.outcome.margin_time);
+    if let Some((touching, margin_time)) = told(job).map(|told| (told.outcome.touching, told.outcome.margin_time)) {
+        (job.found.outcome.touching, job.found.outcome.margin_time) = (touching, margin_time);
         return true;
     }
     effects.margins += u64::from(margin);
-    let threshold = region::threshold(outcome.resolution, job.plan.margin);
-    let at_start = query(bodies, job, options, outcome, *left);
-    let (within, cells) = clearance::touching(&at_start, threshold, scratch);
+    let threshold = region::threshold(resolution, job.plan.margin);
+    let (within, cells) = if job.found.outcome.apart > threshold + resolution {
+        (Within::Apart, 0)
+    } else {
+        clearance::touching(&query(bodies, job, options, &job.found.outcome, *left), threshold, scratch)
+    };
+    let outcome = &mut job.found.outcome;
     outcome.touching = within != Within::Apart;
     if outcome.touching && margin && clear {
         outcome.margin_time = 0.0;
@@ -68,10 +76,11 @@ pub(super) fn decide(
     outcome.counters.instant_cells += cells;
     *left = left.saturating_sub(cells);
     if margin && within == Within::Apart && clear && job.plan.detect != Detect::Discrete {
-        let mut query = query(bodies, job, options, outcome, *left);
+        let mut query = query(bodies, job, options, &job.found.outcome, *left);
         query.cell_limit = query.cell_limit.min(region::MOST_CELLS);
         let (until, known, work) = clearance::apart_until(&query, threshold, scratch);
         let cells = work.cells + work.instant_cells;
+        let outcome = &mut job.found.outcome;
         outcome.margin_time = until;
         outcome.counters.instant_cells += cells;
         *left = left.saturating_sub(cells);
@@ -80,7 +89,7 @@ pub(super) fn decide(
         }
     }
     if within == Within::Apart && clear {
-        job.knowledge.tell(Told { outcome: *outcome, regions: Vec::new() });
+        job.knowledge.tell(Told { outcome: job.found.outcome, regions: Vec::new() });
     }
     within != Within::Open
 }

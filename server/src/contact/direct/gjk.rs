@@ -128,7 +128,10 @@ fn reduce(s: &mut [Corner; 4], count: usize) -> Option<usize> {
     let mut kept = 0;
     for (i, weight) in weights.into_iter().enumerate() {
         if weight > 0.0 {
-            s[kept] = Corner { weight, ..s[i] };
+            if kept < i {
+                s[kept] = s[i];
+            }
+            s[kept].weight = weight;
             kept += 1;
         }
     }
@@ -182,9 +185,10 @@ fn triangle([a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [va / sum, vb / sum, vc / sum]
 }
 
-/// The same of a tetrahedron; `None` if 0 lies inside.
+/// The same of a tetrahedron whose last corner was added to the triangle of the others, on the side of it where 0 is, so that
+/// 0 is nearest to one of the other faces; `None` if it lies inside.
 fn tetrahedron(w: [DVec3; 4]) -> Option<[f64; 4]> {
-    const FACES: [[usize; 4]; 4] = [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]];
+    const FACES: [[usize; 4]; 3] = [[0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]];
     let mut best = None;
     let mut least = f64::INFINITY;
     for [i, j, k, l] in FACES {

@@ -21,6 +21,7 @@
 
 mod advance;
 mod balls;
+mod form;
 mod gjk;
 mod overlap;
 mod part;
@@ -77,19 +78,15 @@ impl<'a> Pair<'a> {
         let difference = from.start.position - to.start.position;
         let velocity = from.velocity - to.velocity;
         let apart = difference.length_squared().max((difference + velocity).length_squared()).sqrt();
-        let places = bodies.map(|body| {
-            let place = body.placed.place.position;
-            if place == DVec3::ZERO { 0.0 } else { place.length() }
-        });
-        let turns = bodies.map(|body| {
-            let spin = body.placed.motion.spin;
-            if spin == DVec3::ZERO { 0.0 } else { spin.length() }
-        });
+        let length = |v: DVec3| if v == DVec3::ZERO { 0.0 } else { v.length() };
+        let places = [length(a.placed.place.position), length(b.placed.place.position)];
+        let turns = [length(from.spin), length(to.spin)];
         let motion = Rounding::with(turns[0] + turns[1], apart, places[0] + places[1]);
         let rounding = super::rounding::of_motion(a.model, b.model, places, apart, &motion);
         let scale = a.model.radius.max(b.model.radius);
         // Sums of components: no less than lengths, and no roots.
-        let centers = bodies.map(|body| body.model.bounds.root().ball.center.abs().element_sum());
+        let center = |body: &pair::Body| body.model.bounds.root().ball.center.abs().element_sum();
+        let centers = [center(a), center(b)];
         let extent = centers[0] + centers[1] + 2.0 * scale + places[0] + apart;
         let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
         if resolution.is_nan() || resolution < least {
@@ -110,10 +107,11 @@ impl<'a> Pair<'a> {
 
     /// How they turn, spins about their own axes left out.
     fn spins(&self) -> [DVec3; 2] {
-        self.bodies.map(|body| {
+        let spin = |body: &pair::Body| {
             let spin = body.placed.motion.spin;
             if spin == DVec3::ZERO { spin } else { pair::without_own_spin(body).motion.spin }
-        })
+        };
+        [spin(self.bodies[0]), spin(self.bodies[1])]
     }
 
     /// World from model: the rotation.
@@ -164,26 +162,26 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         (Shape::Sphere(p), Shape::Sphere(q)) => Some([p.radius, q.radius]),
         _ => None,
     };
-    let spins = pair.spins();
-    let turns = spins != [DVec3::ZERO; 2];
+    let turns = |spins: &[DVec3; 2]| *spins != [DVec3::ZERO; 2];
     let met = match balls {
-        Some(radii) if !turns => balls::meet(&pair, radii, query.asked, outcome),
+        Some(radii) if !turns(&pair.spins()) => balls::meet(&pair, radii, query.asked, outcome),
         _ => None,
     };
     if met.is_none() {
         let Some(start) = Start::new(&pair) else { return nothing };
         match start.look(&mut outcome.counters.closed_forms) {
-            Look::Overlap(x, depth) => {
-                start.tell(x, depth, query.asked, outcome);
+            Look::Overlap(common) => {
+                start.tell(&common, query.asked, outcome);
                 if query.asked.penetration || query.asked.past_overlap {
                     if swapped {
                         outcome.swap_sides();
                     }
-                    return Quick::Overlap(start.own(0, x));
+                    return Quick::Overlap(start.own(0, common.x));
                 }
             }
             Look::Apart(n) => {
-                let told = if turns {
+                let spins = pair.spins();
+                let told = if turns(&spins) {
                     Turning::new(&start, spins).and_then(|turning| turning.meet(n, query.asked, outcome))
                 } else if balls.is_none() {
                     Straight::new(&start).and_then(|straight| straight.meet(query.asked, outcome))
@@ -192,6 +190,9 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
                 };
                 if told.is_none() {
                     return Quick::Open(Some(n));
+                }
+                if outcome.status == Status::Contact {
+                    outcome.apart = start.gap(n) / n.length();
                 }
             }
             Look::Open => return nothing,

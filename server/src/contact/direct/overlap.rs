@@ -1,11 +1,12 @@
-//! Two convex primitives that overlap at the start, told from one line between them.
+//! Two convex primitives that overlap at the start, told from a few points between them.
 //!
-//! F = max(f_A, f_B) is convex where both bodies are: along a line it falls to one lowest stretch and rises again. The line
-//! between the centres starts deep inside the one and ends deep inside the other, so its lowest point is where both are
-//! equally deep, found by false position. Where it misses, as corners that just reach into each other are missed, a common
-//! point of the two cores, mostly where an edge of the one pierces a face of the other, begins another line: the shortest
-//! combination of the normals around it leads away from all of them at once. A point that is 2 delta deep in both is the
-//! proof of an overlap; without one, others decide.
+//! The middle of what they share along the way between the centres is mostly deep in both. Where it is not, as corners that
+//! just reach into each other miss it, the shortest way below the tangent planes of both bodies leads on from there
+//! (J. E. Kelley's cutting planes, J. SIAM 8(4), 1960, the two that are met at a time). Where that does not arrive, a common
+//! point of the two cores, mostly where an edge of the one pierces a face of the other, begins a line: the shortest
+//! combination of the normals around it leads away from all of them at once. F = max(f_A, f_B) is convex where both bodies
+//! are: along a line it falls to one lowest stretch and rises again; where both are equally deep is found by false position.
+//! A point that is 2 delta deep in both is the proof of an overlap; without one, others decide.
 //!
 //! The direction is the one of three along which the bodies overlap least: the normals of the two faces that the point is
 //! nearest to, and the way between the centres.
@@ -15,13 +16,17 @@ use super::super::outcome::{Outcome, Status};
 use super::super::pair::most_raised;
 use super::Pair;
 use super::gjk::{self, Meeting};
-use super::support::Body;
-use crate::solid::Primitive;
+use super::support::{Body, Slope};
 use glam::{DMat3, DQuat, DVec3};
 use smallvec::SmallVec;
 
 /// Steps of false position.
 const STEPS: usize = 4;
+/// Steps below tangent planes, the first one as deep as this part of what overlaps along the line between the centres.
+const DESCENTS: usize = 6;
+const WANTED: f64 = 0.25;
+/// Planes whose normals have this square of the sine between them are one.
+const PARALLEL: f64 = 1e-4;
 /// Halves of the pair's scale that are tried as the length of a way.
 const HALVES: usize = 30;
 /// How near to a point, in scales of the pair, the faces pass that a way has to lead away from.
@@ -29,12 +34,22 @@ const NEAR: f64 = 1e-6;
 
 /// What the first look at a pair found.
 pub enum Look {
-    /// A point of both bodies that is deeper than 2 delta, seen from A's centre, and how deep it is.
-    Overlap(DVec3, f64),
+    /// They overlap.
+    Overlap(Common),
     /// Apart, along a direction.
     Apart(DVec3),
     /// Neither was found.
     Open,
+}
+
+/// A point of both bodies.
+pub struct Common {
+    /// Seen from A's centre.
+    pub x: DVec3,
+    /// How deep it lies in each.
+    slopes: [Slope; 2],
+    /// How far the bodies overlap along the way between their centres, times its length.
+    shared: f64,
 }
 
 /// Two bodies at the start, along the world's axes and seen from A's centre.
@@ -53,10 +68,12 @@ impl<'a> Start<'a> {
     /// The start of a pair; `None` for bodies without bounds.
     pub fn new(pair: &'a Pair<'a>) -> Option<Self> {
         let axes = [pair.axes(0), pair.axes(1)];
-        let frames = [0, 1].map(|k| {
+        let frame = |k: usize| {
             let frame = pair.primitives[k].frame.rotation;
             if frame == DQuat::IDENTITY { axes[k] } else { axes[k] * DMat3::from_quat(frame) }
-        });
+        };
+        // (Arrays of two are written out where they are hot: a map over them stays a call.)
+        let frames = [frame(0), frame(1)];
         let body = |k: usize, origin: DVec3| Body::new(&pair.primitives[k].shape, frames[k], origin);
         let bodies = [body(0, DVec3::ZERO)?, body(1, pair.way)?];
         Some(Self { pair, axes, frames, bodies, centers: [bodies[0].center(), bodies[1].center()] })
@@ -66,14 +83,19 @@ impl<'a> Start<'a> {
     /// direction that separates them.
     pub fn look(&self, count: &mut u64) -> Look {
         let way = self.centers[1] - self.centers[0];
-        if self.gap(way) > 0.0 {
+        let (far, near) = (self.bodies[0].reach(way), -self.bodies[1].reach(-way));
+        if near > far {
             return Look::Apart(way);
         }
         let least = 2.0 * most_raised(self.pair.delta, self.pair.rounding) + self.pair.rounding;
-        let (mut x, mut depth) = self.deepest(self.centers[0], self.centers[1]);
-        if depth < least {
+        // The middle of what they share along the way, between the centres.
+        let square = way.length_squared();
+        let middle = ((0.5 * (near + far) - way.dot(self.centers[0])) / square).clamp(0.0, 1.0);
+        let middle = if middle.is_nan() { self.centers[0] } else { self.centers[0] + way * middle };
+        let (mut x, mut slopes) = self.descend(middle, (far - near) / square.sqrt(), least);
+        if depth(&slopes) < least {
             *count += 1;
-            (x, depth) = match gjk::meeting(&self.bodies[0], &self.bodies[1], way, gjk::GOOD) {
+            x = match gjk::meeting(&self.bodies[0], &self.bodies[1], way, gjk::GOOD) {
                 // Cores that are apart, in balls that are not: halfway between the nearest points.
                 Meeting::Apart(found) if found.distance < -2.0 * least => {
                     self.inwards(0.5 * (found.a + found.b), least)
@@ -82,12 +104,13 @@ impl<'a> Start<'a> {
                 Meeting::Common(p) => self.inwards(p, least),
                 Meeting::Open => return Look::Open,
             };
+            slopes = self.slopes(x);
         }
-        if depth < least { Look::Open } else { Look::Overlap(x, depth) }
+        if depth(&slopes) < least { Look::Open } else { Look::Overlap(Common { x, slopes, shared: far - near }) }
     }
 
-    /// Tells an overlap by a point of both.
-    pub fn tell(&self, x: DVec3, depth: f64, asked: Asked, out: &mut Outcome) {
+    /// Tells an overlap as it was found.
+    pub fn tell(&self, common: &Common, asked: Asked, out: &mut Outcome) {
         let pair = self.pair;
         out.status = Status::Overlap;
         out.touching = true;
@@ -96,28 +119,30 @@ impl<'a> Start<'a> {
             return;
         }
         out.counters.contacts += 1;
-        let faces = [0, 1].map(|k| nearest_face(pair.primitives[k], self.own(k, x)));
-        let way = (self.centers[1] - self.centers[0]).try_normalize();
-        let of_faces = [self.axes[0] * faces[0].1, -(self.axes[1] * faces[1].1)];
-        let mut normal = (f64::NEG_INFINITY, of_faces[0]);
-        for n in of_faces.into_iter().chain(way) {
+        let Common { x, slopes: [of_a, of_b], shared } = common;
+        let way = self.centers[1] - self.centers[0];
+        let length = way.length();
+        let mut normal = (if length > 0.0 { -shared / length } else { f64::NEG_INFINITY }, way);
+        for n in [of_a.normal, -of_b.normal] {
             let gap = self.gap(n);
             if gap > normal.0 {
                 normal = (gap, n);
             }
         }
-        out.point = pair.point(pair.offsets[0], x, 0.0);
+        out.point = pair.point(pair.offsets[0], *x, 0.0);
         out.normal = normal.1.normalize();
-        out.separation = -2.0 * depth;
+        out.separation = -2.0 * depth(&common.slopes);
         // From the centres of rotation.
         let arms = [pair.offsets[0] + x, pair.offsets[1] + (x - pair.way)];
-        let [a, b] = [0, 1].map(|k| pair.bodies[k].placed.motion.spin.cross(arms[k]));
+        let swing = |k: usize| pair.bodies[k].placed.motion.spin.cross(arms[k]);
+        let (a, b) = (swing(0), swing(1));
         out.normal_speed = (pair.velocity + a - b).dot(out.normal);
-        (out.faces_a[0], out.faces_b[0]) = (faces[0].0, faces[1].0);
+        let [p, q] = pair.primitives;
+        (out.faces_a[0], out.faces_b[0]) = (p.first_face + of_a.face, q.first_face + of_b.face);
     }
 
     /// The gap along a direction, times its length; negative: how far they overlap along it.
-    fn gap(&self, n: DVec3) -> f64 {
+    pub fn gap(&self, n: DVec3) -> f64 {
         -self.bodies[1].reach(-n) - self.bodies[0].reach(n)
     }
 
@@ -131,16 +156,63 @@ impl<'a> Start<'a> {
     /// f of both bodies.
     fn values(&self, x: DVec3) -> [f64; 2] {
         let of_faces = |k: usize| self.pair.primitives[k].value(self.own(k, x));
-        [0, 1].map(|k| self.bodies[k].value(x).unwrap_or_else(|| of_faces(k)))
+        let of = |k: usize| self.bodies[k].value(x).unwrap_or_else(|| of_faces(k));
+        [of(0), of(1)]
     }
 
-    /// A common point, or where it lies on a surface the deepest of some points on ways that lead inwards from it; and how
-    /// deep that lies in both.
-    fn inwards(&self, p: DVec3, least: f64) -> (DVec3, f64) {
+    /// How deep a point lies in both bodies.
+    #[inline]
+    fn slopes(&self, x: DVec3) -> [Slope; 2] {
+        let of = |k: usize| self.bodies[k].slope(x).unwrap_or_else(|| self.slope_of_faces(k, x));
+        [of(0), of(1)]
+    }
+
+    /// The same in one, by all of its faces.
+    #[cold]
+    fn slope_of_faces(&self, k: usize, x: DVec3) -> Slope {
+        let (own, p) = (self.own(k, x), self.pair.primitives[k]);
+        let values = p.faces.iter().map(|face| face.value(own));
+        let first = (0, f64::NEG_INFINITY);
+        let (face, f) = values.enumerate().fold(first, |best, (i, f)| if f > best.1 { (i, f) } else { best });
+        Slope { f, normal: self.axes[k] * p.faces[face].at(own).normal, face: face as u32 }
+    }
+
+    /// The first of some points that is `least` deep in both bodies, or the last: each is the nearest to the one before that
+    /// lies below the planes of both there.
+    /// `along` is how much they overlap along some direction.
+    fn descend(&self, from: DVec3, along: f64, least: f64) -> (DVec3, [Slope; 2]) {
+        let mut x = from;
+        let mut wanted = if along.is_finite() { (WANTED * along).max(2.0 * least) } else { 2.0 * least };
+        let mut best = (x, self.slopes(x));
+        for _ in 0..DESCENTS {
+            if depth(&best.1) >= least {
+                break;
+            }
+            let [Slope { f: a, normal: m, .. }, Slope { f: b, normal: n, .. }] = best.1;
+            let (a, b, cosine) = (a + wanted, b + wanted, m.dot(n));
+            let square = 1.0 - cosine * cosine;
+            let (of_m, of_n) = (a - cosine * b, b - cosine * a);
+            x -= if of_m <= 0.0 {
+                n * b.max(0.0)
+            } else if of_n <= 0.0 {
+                m * a
+            } else if square > PARALLEL {
+                (m * of_m + n * of_n) / square
+            } else {
+                break;
+            };
+            wanted *= 0.5;
+            best = (x, self.slopes(x));
+        }
+        best
+    }
+
+    /// A common point, or where it lies on a surface the deepest of some points on ways that lead inwards from it.
+    fn inwards(&self, p: DVec3, least: f64) -> DVec3 {
         let [of_a, of_b] = self.values(p);
         let mut best = (p, -of_a.max(of_b));
         if best.1 >= least {
-            return best;
+            return p;
         }
         if let Some(way) = self.way_inwards(p) {
             let mut step = 0.5 * self.pair.scale;
@@ -156,7 +228,7 @@ impl<'a> Start<'a> {
                 step *= 0.5;
             }
         }
-        if best.1 >= least { best } else { self.deepest(p, self.centers[usize::from(of_b > of_a)]) }
+        if best.1 >= least { best.0 } else { self.deepest(p, self.centers[usize::from(of_b > of_a)]) }
     }
 
     /// A unit direction that leads away from all faces around a point of both bodies, if there is one.
@@ -171,8 +243,8 @@ impl<'a> Start<'a> {
         Some(-gjk::least_of(&outward)?.try_normalize()?)
     }
 
-    /// The deepest of some points of a line, and how deep it lies in both.
-    fn deepest(&self, from: DVec3, to: DVec3) -> (DVec3, f64) {
+    /// The deepest of some points of a line.
+    fn deepest(&self, from: DVec3, to: DVec3) -> DVec3 {
         let mut best = (from, f64::NEG_INFINITY);
         let mut excess = |s: f64| {
             let x = from + (to - from) * s;
@@ -199,18 +271,11 @@ impl<'a> Start<'a> {
             }
             high = (s, value);
         }
-        best
+        best.0
     }
 }
 
-/// The face that a point inside is nearest to, by its id, and its normal there; the primitive's model frame.
-fn nearest_face(p: &Primitive, x: DVec3) -> (u32, DVec3) {
-    let mut best = (f64::NEG_INFINITY, 0);
-    for (i, face) in p.faces.iter().enumerate() {
-        let value = face.value(x);
-        if value > best.0 {
-            best = (value, i);
-        }
-    }
-    (p.first_face + best.1 as u32, p.faces[best.1].at(x).normal)
+/// How deep a point lies in both bodies, negative outside.
+fn depth([a, b]: &[Slope; 2]) -> f64 {
+    -a.f.max(b.f)
 }

@@ -16,9 +16,11 @@
 //! farther at corners than their distance: so what encloses a tree encloses all of its {f <= level}, and a pair that is
 //! asked about beyond that level has no glance.
 
+use super::form::Form;
 use super::support::Body;
 use super::{body_of, gjk};
 use crate::eco::Model;
+use crate::math::Twin;
 use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
 use crate::solid::{Node, Op, Primitive, Shape};
 use contactd_proto::{Pose, Track};
@@ -27,7 +29,7 @@ use glam::{DMat3, DQuat, DVec3};
 /// Relative to the numbers at hand: far above what rounding does to a gap, and above the least resolution of any pair.
 const CRUDE: f64 = 1e-11;
 /// How near to the distance a glance looks for its direction.
-const ROUGH: f64 = 0.03;
+const ROUGH: f64 = 0.3;
 
 /// What does not change from step to step.
 #[derive(Clone, Debug)]
@@ -35,6 +37,8 @@ pub struct Hull {
     /// What encloses the body, where it is no primitive itself, and the level of its f up to which it does.
     around: Option<Shape>,
     level: f64,
+    /// How far the primitive reaches; `None` for a polyhedron.
+    form: Option<Form<'static>>,
     /// The primitive's frame in the object's.
     turned: DQuat,
     center: DVec3,
@@ -47,16 +51,31 @@ pub struct Hull {
 /// One body in one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Stance {
-    /// World from primitive, at both ends.
-    axes: [DMat3; 2],
+    /// How far it reaches, but for a polyhedron, whose corners are many.
+    form: Option<Form<'static>>,
+    /// The level of f up to which the primitive encloses the body.
+    level: f64,
+    /// The primitive's axes in the world, component by component, at both ends.
+    axes: [[Twin; 3]; 3],
     /// From the object's origin to the primitive's centre, at both ends.
-    offsets: [DVec3; 2],
+    offsets: [Twin; 3],
     position: DVec3,
     velocity: DVec3,
     /// ω ρ and ω² ρ.
     swing: f64,
     pull: f64,
     size: f64,
+}
+
+/// Two vectors, component by component.
+fn twins(start: DVec3, end: DVec3) -> [Twin; 3] {
+    [Twin([start.x, end.x]), Twin([start.y, end.y]), Twin([start.z, end.z])]
+}
+
+/// The products with one vector.
+#[inline]
+fn dot(v: &[Twin; 3], n: DVec3) -> Twin {
+    v[0] * n.x + v[1] * n.y + v[2] * n.z
 }
 
 /// What was seen of a pair.
@@ -73,20 +92,22 @@ pub struct Glance {
 impl Hull {
     /// Of a model placed in its object; `None` for one without bounds.
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
-        let (around, level, frame, ball) = if let Some(p) = model.solid.whole() {
+        let (around, level, form, frame, ball) = if let Some(p) = model.solid.whole() {
             body_of(p)?;
-            (None, f64::INFINITY, p.frame, p.ball)
+            (None, f64::INFINITY, Form::of(&p.shape).of_few(), p.frame, p.ball)
         } else {
             let (shape, frame) = enclosing(model)?;
             let mut ball = shape.geometry().ball();
             ball.center = frame.point(ball.center);
-            (Some(shape), model.bounds.margin(), frame, ball)
+            let form = Form::of(&shape).of_few();
+            (Some(shape), model.bounds.margin(), form, frame, ball)
         };
         let rho = (place.point(ball.center).length() + ball.radius) * (1.0 + 1e-14);
         let [reach, radius] = model.extents;
         Some(Self {
             around,
             level,
+            form,
             turned: place.rotation * frame.rotation,
             center: place.point(frame.position),
             rho,
@@ -95,7 +116,7 @@ impl Hull {
     }
 
     /// The shape that is looked at.
-    fn shape<'a>(&'a self, model: &'a Model) -> Option<&'a Shape> {
+    pub fn shape<'a>(&'a self, model: &'a Model) -> Option<&'a Shape> {
         self.around.as_ref().or_else(|| model.solid.whole().map(|p| &p.shape))
     }
 
@@ -103,11 +124,17 @@ impl Hull {
     pub fn stance(&self, track: &Track) -> Stance {
         let motion = &track.motion;
         let (first, last) = (motion.start.rotation, track.end.rotation);
-        let axes = [DMat3::from_quat(first * self.turned), DMat3::from_quat(last * self.turned)];
-        let offsets =
-            if self.center == DVec3::ZERO { [DVec3::ZERO; 2] } else { [first * self.center, last * self.center] };
+        let [start, end] = [DMat3::from_quat(first * self.turned), DMat3::from_quat(last * self.turned)];
+        let axes = [twins(start.x_axis, end.x_axis), twins(start.y_axis, end.y_axis), twins(start.z_axis, end.z_axis)];
+        let offsets = if self.center == DVec3::ZERO {
+            twins(DVec3::ZERO, DVec3::ZERO)
+        } else {
+            twins(first * self.center, last * self.center)
+        };
         let omega = motion.spin.length();
         Stance {
+            form: self.form,
+            level: self.level,
             axes,
             offsets,
             position: motion.start.position,
@@ -155,62 +182,54 @@ fn enclosing(model: &Model) -> Option<(Shape, Pose)> {
     is_box.then(|| (Cuboid { half: aabb.half() }.into(), Pose::at(aabb.center())))
 }
 
-/// Largest n·x over a shape that stands with these axes.
-#[inline]
-pub fn reach(shape: &Shape, axes: &DMat3, n: DVec3) -> f64 {
-    let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
-    let across = || (m.x * m.x + m.y * m.y).sqrt();
-    match shape {
-        Shape::Sphere(s) => s.radius,
-        Shape::Cuboid(c) => c.half.dot(m.abs()),
-        Shape::Cylinder(c) => c.radius * across() + c.half_height * m.z.abs(),
-        Shape::Cone(c) => {
-            let (across, up) = (across(), c.half_height * m.z);
-            (c.top * across + up).max(c.bottom * across - up)
-        }
-        Shape::Polyhedron(p) => p.vertices.iter().fold(f64::NEG_INFINITY, |far, v| far.max(m.dot(*v))),
-        Shape::HalfSpace(_) => f64::INFINITY,
-    }
-}
-
-/// Two bodies in one step.
-pub struct Glancing<'a> {
-    shapes: [&'a Shape; 2],
+/// Two bodies in one step; `S` gives the shape of each.
+pub struct Glancing<'a, S> {
+    forms: [Form<'a>; 2],
     stances: [&'a Stance; 2],
+    shapes: S,
     /// From A's centre to B's at both ends.
-    ways: [DVec3; 2],
+    ways: [Twin; 3],
     /// What the gap has to stay above.
     least: f64,
 }
 
-impl<'a> Glancing<'a> {
-    /// Two bodies by their models, hulls and stances, asked whether they stay farther apart than `touch` (a length). `None`
-    /// where one's hull does not enclose it that far.
-    pub fn new(models: [&'a Model; 2], hulls: [&'a Hull; 2], stances: [&'a Stance; 2], touch: f64) -> Option<Self> {
-        if 0.5 * touch > hulls[0].level.min(hulls[1].level) {
+impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
+    /// Two bodies by their stances and shapes (of their hulls), asked whether they stay farther apart than `touch` (a length).
+    /// `None` where one's hull does not enclose it that far.
+    #[inline]
+    pub fn new(stances: [&'a Stance; 2], shapes: S, touch: f64) -> Option<Self> {
+        let [a, b] = stances;
+        if 0.5 * touch > a.level.min(b.level) {
             return None;
         }
-        let shapes = [hulls[0].shape(models[0])?, hulls[1].shape(models[1])?];
-        let [a, b] = stances;
+        let form = |k: usize| stances[k].form.or_else(|| shapes(k).map(Form::of));
+        let forms = [form(0)?, form(1)?];
         let difference = b.position - a.position;
         let velocity = b.velocity - a.velocity;
         let extent = difference.abs().element_sum() + velocity.abs().element_sum() + a.size + b.size;
-        let ways = [difference + (b.offsets[0] - a.offsets[0]), difference + velocity + (b.offsets[1] - a.offsets[1])];
-        Some(Self { shapes, stances, ways, least: touch + CRUDE * extent })
+        let centers = twins(difference, difference + velocity);
+        let ways = [0, 1, 2].map(|i| centers[i] + (b.offsets[i] - a.offsets[i]));
+        Some(Self { forms, stances, shapes, ways, least: touch + CRUDE * extent })
     }
 
-    /// The gap along a unit direction at one end.
-    fn gap(&self, end: usize, n: DVec3) -> f64 {
-        let [a, b] = self.stances;
-        let reach_a = reach(self.shapes[0], &a.axes[end], n);
-        n.dot(self.ways[end]) - reach_a - reach(self.shapes[1], &b.axes[end], -n)
+    /// The gap along a unit direction at both ends.
+    #[inline]
+    fn gap(&self, n: DVec3) -> [f64; 2] {
+        let ([a, b], [of_a, of_b]) = (self.stances, &self.forms);
+        let own_a = of_a.extent([dot(&a.axes[0], n), dot(&a.axes[1], n), dot(&a.axes[2], n)]);
+        let back = -n;
+        let own_b = of_b.extent([dot(&b.axes[0], back), dot(&b.axes[1], back), dot(&b.axes[2], back)]);
+        (dot(&self.ways, n) - own_a - own_b).0
     }
 
     /// A direction from nearest points at one end.
     fn find(&self, end: usize, from: DVec3) -> Option<DVec3> {
-        let [a, b] = self.stances;
-        let a = Body::new(self.shapes[0], a.axes[end], DVec3::ZERO)?;
-        let b = Body::new(self.shapes[1], b.axes[end], self.ways[end])?;
+        let at = |v: &[Twin; 3]| DVec3::new(v[0].0[end], v[1].0[end], v[2].0[end]);
+        let body = |k: usize, origin: DVec3| {
+            let [x, y, z] = &self.stances[k].axes;
+            Body::new((self.shapes)(k)?, DMat3::from_cols(at(x), at(y), at(z)), origin)
+        };
+        let (a, b) = (body(0, DVec3::ZERO)?, body(1, at(&self.ways))?);
         Some(gjk::nearest(&a, &b, from, ROUGH)?.normal)
     }
 
@@ -222,30 +241,66 @@ impl<'a> Glancing<'a> {
         gap0.min(gap1) - 0.125 * (1.0 + 1e-12) * (2.0 * turned * speed + a.pull + b.pull) > self.least
     }
 
-    /// Looks along the direction that was remembered, or else from centre to centre, and then along others.
-    pub fn look(&self, along: Option<DVec3>) -> Glance {
-        let along = along.unwrap_or_else(|| self.ways[0].normalize_or(DVec3::X));
-        let gaps = [self.gap(0, along), self.gap(1, along)];
-        let seen = |along, gap: f64, apart| Glance { along, room: gap - self.least, apart };
+    /// Looks along the direction that was remembered (0: none was), or else from centre to centre, and then along others.
+    #[inline]
+    pub fn look(&self, along: DVec3) -> Glance {
+        let along = if along == DVec3::ZERO { self.way().normalize_or(DVec3::X) } else { along };
+        let gaps = self.gap(along);
         if self.proves((along, gaps[0]), (along, gaps[1])) {
-            return seen(along, gaps[0], true);
+            return self.seen(along, gaps[0], true);
         }
-        let Some(n0) = self.find(0, along) else { return seen(along, gaps[0], false) };
-        let gap0 = self.gap(0, n0);
-        let fixed = (n0, self.gap(1, n0));
-        if gap0 <= self.least || self.proves((n0, gap0), fixed) {
-            return seen(n0, gap0, gap0 > self.least);
+        self.look_around(along, gaps[0])
+    }
+
+    /// Looks along the directions of nearest points, where `along` does not keep the bodies apart.
+    #[inline(never)]
+    fn look_around(&self, along: DVec3, gap: f64) -> Glance {
+        for k in 0..2 {
+            for n in self.sides(k) {
+                let gaps = self.gap(n);
+                if self.proves((n, gaps[0]), (n, gaps[1])) {
+                    return self.seen(n, gaps[0], true);
+                }
+            }
         }
-        let Some(n1) = self.find(1, n0) else { return seen(n0, gap0, false) };
-        let gap1 = self.gap(1, n1);
-        if gap1 <= self.least {
-            return seen(n0, gap0, false);
+        let Some(n0) = self.find(0, along) else { return self.seen(along, gap, false) };
+        let gaps = self.gap(n0);
+        if gaps[0] <= self.least || self.proves((n0, gaps[0]), (n0, gaps[1])) {
+            return self.seen(n0, gaps[0], gaps[0] > self.least);
         }
-        let later = (n1, self.gap(0, n1));
-        if self.proves((n1, later.1), (n1, gap1)) {
-            return seen(n1, later.1, true);
+        let Some(n1) = self.find(1, n0) else { return self.seen(n0, gaps[0], false) };
+        let later = self.gap(n1);
+        if later[1] <= self.least {
+            return self.seen(n0, gaps[0], false);
         }
-        seen(n0, gap0, self.proves((n0, gap0), (n1, gap1)))
+        if self.proves((n1, later[0]), (n1, later[1])) {
+            return self.seen(n1, later[0], true);
+        }
+        self.seen(n0, gaps[0], self.proves((n0, gaps[0]), (n1, later[1])))
+    }
+
+    /// Normals of a body's sides at the start, towards the other body's centre: of bodies that are near each other one of them
+    /// mostly keeps them apart, and is cheaper to try than nearest points are to find.
+    fn sides(&self, k: usize) -> impl Iterator<Item = DVec3> + use<S> {
+        let at = |v: &[Twin; 3]| DVec3::from_array(v.map(|x| x.0[0]));
+        let way = self.way();
+        let [x, y, z] = self.stances[k].axes.each_ref().map(at);
+        let sides = match self.forms[k] {
+            Form::Cuboid(_) => [x, y, z],
+            Form::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
+            Form::Ball(_) | Form::Corners(_) => [DVec3::ZERO; 3],
+        };
+        let towards = move |n: DVec3| if n.dot(way) < 0.0 { -n } else { n };
+        sides.into_iter().filter(|n| *n != DVec3::ZERO).map(towards)
+    }
+
+    fn seen(&self, along: DVec3, gap: f64, apart: bool) -> Glance {
+        Glance { along, room: gap - self.least, apart }
+    }
+
+    /// From centre to centre at the start.
+    fn way(&self) -> DVec3 {
+        DVec3::from_array(self.ways.map(|w| w.0[0]))
     }
 }
 
@@ -266,7 +321,8 @@ mod tests {
     fn glance(models: [&Model; 2], tracks: [&Track; 2], touch: f64) -> Glance {
         let hulls = [0, 1].map(|k| Hull::new(models[k], &Pose::IDENTITY).expect("bounded"));
         let stances = [0, 1].map(|k| hulls[k].stance(tracks[k]));
-        Glancing::new(models, hulls.each_ref(), [&stances[0], &stances[1]], touch).expect("within").look(None)
+        let shapes = |k: usize| hulls[k].shape(models[k]);
+        Glancing::new(stances.each_ref(), shapes, touch).expect("within").look(DVec3::ZERO)
     }
 
     #[test]
@@ -359,8 +415,8 @@ mod tests {
         let near = track(DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         let hulls = [0, 1].map(|k| Hull::new(&models[k], &Pose::IDENTITY).expect("bounded"));
         let stances = [hulls[0].stance(&near), hulls[1].stance(&far)];
-        let asked = |touch| Glancing::new([&models[0], &models[1]], hulls.each_ref(), stances.each_ref(), touch);
-        assert!(asked(0.0).is_some_and(|g| g.look(None).apart) && asked(0.1).is_none());
+        let asked = |touch| Glancing::new(stances.each_ref(), |k| hulls[k].shape(&models[k]), touch);
+        assert!(asked(0.0).is_some_and(|g| g.look(DVec3::ZERO).apart) && asked(0.1).is_none());
     }
 
     #[test]

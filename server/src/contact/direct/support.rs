@@ -7,6 +7,17 @@ use crate::solid::Shape;
 use crate::solid::primitive::Geometry;
 use glam::{DMat3, DVec3};
 
+/// How deep a point is.
+#[derive(Clone, Copy, Debug)]
+pub struct Slope {
+    /// f, the largest of the faces' values; negative inside.
+    pub f: f64,
+    /// The unit normal of the face that tells it, outwards; f lies nowhere below the plane that they make.
+    pub normal: DVec3,
+    /// Which face that is, of those of the primitive.
+    pub face: u32,
+}
+
 /// A bounded convex primitive in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Body<'s> {
@@ -82,20 +93,60 @@ impl<'s> Body<'s> {
     /// fraction of the time. `None` for a polyhedron.
     #[inline]
     pub fn value(&self, x: DVec3) -> Option<f64> {
+        Some(self.slope(x)?.f)
+    }
+
+    /// The same with its face; `None` for a polyhedron.
+    #[inline]
+    pub fn slope(&self, x: DVec3) -> Option<Slope> {
         let from = x - self.origin;
-        let l = DVec3::new(self.axes.x_axis.dot(from), self.axes.y_axis.dot(from), self.axes.z_axis.dot(from));
-        let rho = || (l.x * l.x + l.y * l.y).sqrt();
+        let own = || DVec3::new(self.axes.x_axis.dot(from), self.axes.y_axis.dot(from), self.axes.z_axis.dot(from));
+        let across = |l: DVec3| (l.x * l.x + l.y * l.y).sqrt();
+        // Away from the axis of revolution; on it any direction will do.
+        let radial = |l: DVec3, rho: f64| {
+            if rho > 0.0 { self.axes.x_axis * (l.x / rho) + self.axes.y_axis * (l.y / rho) } else { self.axes.x_axis }
+        };
+        let told = |f, normal, face: usize| Slope { f, normal, face: face as u32 };
         Some(match self.shape {
-            Shape::Sphere(s) => from.length() - s.radius,
-            Shape::Cuboid(c) => (l.abs() - c.half).max_element(),
-            Shape::Cylinder(c) => (rho() - c.radius).max(l.z.abs() - c.half_height),
+            Shape::Sphere(s) => {
+                let length = from.length();
+                told(length - s.radius, if length > 0.0 { from / length } else { DVec3::X }, 0)
+            }
+            Shape::Cuboid(c) => {
+                let l = own();
+                let beyond = l.abs() - c.half;
+                let axis = beyond.max_position();
+                let below = l[axis].is_sign_negative();
+                let normal = self.axes.col(axis);
+                told(beyond[axis], if below { -normal } else { normal }, 2 * axis + usize::from(below))
+            }
+            Shape::Cylinder(c) => {
+                let l = own();
+                let rho = across(l);
+                let (side, end) = (rho - c.radius, l.z.abs() - c.half_height);
+                let below = l.z.is_sign_negative();
+                if side >= end {
+                    told(side, radial(l, rho), 0)
+                } else {
+                    told(end, if below { -self.axes.z_axis } else { self.axes.z_axis }, 1 + usize::from(below))
+                }
+            }
             Shape::Cone(c) => {
-                let half = c.half_height;
+                let l = own();
+                let (rho, half) = (across(l), c.half_height);
                 let slope = (c.bottom - c.top) / (2.0 * half);
-                let side = (rho() - 0.5 * (c.bottom + c.top) + slope * l.z) / (1.0 + slope * slope).sqrt();
+                let tilt = (1.0 + slope * slope).sqrt();
+                let side = (rho - 0.5 * (c.bottom + c.top) + slope * l.z) / tilt;
                 // An end without a disc has no face there.
                 let disc = |radius: f64, beyond: f64| if radius > 0.0 { beyond } else { f64::NEG_INFINITY };
-                side.max(disc(c.top, l.z - half)).max(disc(c.bottom, -l.z - half))
+                let (top, bottom) = (disc(c.top, l.z - half), disc(c.bottom, -l.z - half));
+                if side >= top.max(bottom) {
+                    told(side, (radial(l, rho) + self.axes.z_axis * slope) / tilt, 0)
+                } else if top > bottom {
+                    told(top, self.axes.z_axis, 1)
+                } else {
+                    told(bottom, -self.axes.z_axis, 1 + usize::from(c.top > 0.0))
+                }
             }
             Shape::Polyhedron(_) | Shape::HalfSpace(_) => return None,
         })
@@ -155,6 +206,16 @@ mod tests {
                 let x = frame.position + v(1.2);
                 let (faces, own) = (primitive.value(x), body.value(x).expect("no polyhedron"));
                 assert!((faces - own).abs() <= 1e-14, "{shape:?} at {x}: {faces}, {own}");
+                // The plane of its face lies below f everywhere.
+                let Slope { normal, face, .. } = body.slope(x).expect("no polyhedron");
+                assert!(
+                    (primitive.faces[face as usize].value(x) - own).abs() <= 1e-14,
+                    "{shape:?} at {x}: face {face}"
+                );
+                let other = frame.position + v(1.2);
+                let plane = own + normal.dot(other - x);
+                let f = body.value(other).expect("no polyhedron");
+                assert!((normal.length() - 1.0).abs() < 1e-15 && plane <= f + 1e-14, "{shape:?} at {x}, {other}");
                 inside += u32::from(own < 0.0);
             }
             assert!(inside > 200, "{shape:?}: {inside}");

@@ -17,11 +17,11 @@
 
 use super::super::asked::Asked;
 use super::super::outcome::Outcome;
+use super::form::Form;
 use super::gjk::nearest;
 use super::overlap::Start;
 use super::part::{Part, Shown};
 use super::proof::{Gap, Pace};
-use super::stance::reach;
 use super::steer::steer;
 use super::support::Body;
 use super::touch::{Stand, Touch};
@@ -150,8 +150,8 @@ impl<'a> Turning<'a> {
 
     /// φ along a unit direction.
     fn gap(&self, m: &Posed, n: DVec3) -> Gap {
-        let [a, b] = [0, 1].map(|k| &self.parts[k].primitive.shape);
-        Gap { t: m.t, n, phi: n.dot(m.way) - reach(a, &m.axes[0], n) - reach(b, &m.axes[1], -n) }
+        let [a, b] = [0, 1].map(|k| Form::of(&self.parts[k].primitive.shape));
+        Gap { t: m.t, n, phi: n.dot(m.way) - a.reach(&m.axes[0], n) - b.reach(&m.axes[1], -n) }
     }
 
     /// When the line from `way` on, passed at `velocity`, is nearest.
