@@ -170,7 +170,7 @@ impl Manifolds {
         self.finish();
     }
 
-    /// Begins an update that is made record by record: then `add` for each pair at most once, then `finish`.
+    /// Begins an update that is made record by record: then `add` for each, then `finish`.
     pub fn start(&mut self) {
         std::mem::swap(&mut self.now, &mut self.before);
         self.now.pairs.clear();
@@ -178,7 +178,8 @@ impl Manifolds {
         self.now.points.clear();
     }
 
-    /// Takes one record of a reply, whose bodies stood at these poses at the moment that it tells of.
+    /// Takes one record of a reply, whose bodies stood at these poses at the moment that it tells of. A pair that is added again
+    /// in the same update gets the points of the last time that told any; between the two lies a `finish`, or none.
     pub fn add(&mut self, reply: &Reply, record: &ContactRecord, pose_a: &Pose, pose_b: &Pose) {
         if record.flags & SENSOR != 0 {
             return;
@@ -210,7 +211,14 @@ impl Manifolds {
 
     /// Ends an update: pairs that were not added are forgotten.
     pub fn finish(&mut self) {
-        self.now.pairs.sort_unstable_by_key(|p| p.objects);
+        self.now.pairs.sort_unstable_by_key(|p| (p.objects, p.points[0]));
+        self.now.pairs.dedup_by(|later, kept| {
+            let again = later.objects == kept.objects;
+            if again {
+                *kept = *later;
+            }
+            again
+        });
     }
 
     /// All pairs that have points, in the order (a, b).
