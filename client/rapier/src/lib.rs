@@ -107,6 +107,7 @@ pub struct Coupling<T: Transport> {
     objects: Vec<Placed>,
     batch: Vec<u32>,
     deep: Vec<(u32, u32, Point)>,
+    requests: u64,
     retracted: u64,
 }
 
@@ -152,6 +153,7 @@ impl<T: Transport> Coupling<T> {
             objects: Vec::new(),
             batch: Vec::new(),
             deep: Vec::new(),
+            requests: 0,
             retracted: 0,
         })
     }
@@ -170,7 +172,12 @@ impl<T: Transport> Coupling<T> {
 
     /// A narrow phase that asks this coupling, for worlds put together by hand.
     pub fn narrow_phase(&self) -> NarrowPhase {
-        NarrowPhase::with_query_dispatcher(Dispatcher { table: self.table.clone() })
+        NarrowPhase::with_query_dispatcher(self.dispatcher())
+    }
+
+    /// What answers rapier, from the table that each `prefetch` fills; for chains of dispatchers.
+    pub fn dispatcher(&self) -> Dispatcher {
+        Dispatcher { table: self.table.clone() }
     }
 
     /// Loads a model from OpenSCAD CSG text, with its mass properties; `name` stands in error sentences.
@@ -227,6 +234,7 @@ impl<T: Transport> Coupling<T> {
     /// Those of [`Session::finish`]; the table stays as it was.
     pub fn prefetch(&mut self, bodies: &RigidBodySet, colliders: &ColliderSet) -> Result<(), Error> {
         self.batch.clear();
+        let mut any = false;
         for (_, collider) in colliders.iter() {
             let Some(solid) = collider.shape().as_shape::<Solid>() else { continue };
             let Some(placed) = self.objects.get_mut(solid.object as usize) else { continue };
@@ -236,12 +244,14 @@ impl<T: Transport> Coupling<T> {
             let body = collider.parent().and_then(|handle| bodies.get(handle));
             let local = collider.position_wrt_parent().copied().unwrap_or(Pose::IDENTITY);
             let pose = world_pose(&body.map_or(*collider.position(), |b| *b.position() * local));
-            if pose != placed.pose || placed.is_stale || !body.is_some_and(|b| b.is_sleeping()) {
+            let is_active = pose != placed.pose || !body.is_some_and(|b| b.is_sleeping());
+            if is_active || placed.is_stale {
                 (placed.pose, placed.back) = (pose, DVec3::ZERO);
                 self.batch.push(solid.object);
             }
+            any |= is_active;
         }
-        if self.batch.is_empty() {
+        if !any {
             return Ok(());
         }
         self.manifolds.start();
@@ -263,6 +273,11 @@ impl<T: Transport> Coupling<T> {
     /// The points of the last `prefetch`, with their ids.
     pub fn manifolds(&self) -> &Manifolds {
         &self.manifolds
+    }
+
+    /// How many requests there were, second ones included.
+    pub fn requests(&self) -> u64 {
+        self.requests
     }
 
     /// How many second requests there were, for pairs in overlap.
@@ -294,6 +309,7 @@ impl<T: Transport> Coupling<T> {
             *slot = PoseRecord::start(*object, &placed.asked());
             placed.is_stale = true;
         }
+        self.requests += 1;
         let reply = self.session.finish(TIMEOUT)?;
         for object in &self.batch {
             self.objects[*object as usize].is_stale = again;

@@ -3,6 +3,7 @@
 
 use contactd::ipc::Embedded;
 use contactd_rapier::{Coupling, Settings};
+use parry3d_f64::query::{ContactManifold as Manifold, PersistentQueryDispatcher, QueryDispatcher};
 use rapier3d_f64::prelude::*;
 
 const GRAVITY: Vector = Vector::new(0.0, 0.0, -9.81);
@@ -29,7 +30,7 @@ impl Scene {
     fn add(&mut self, text: &str, body: RigidBodyBuilder) -> RigidBodyHandle {
         let model = self.coupling.load("body.csg", text).unwrap();
         let collider = self.coupling.moving("body", &model).unwrap().friction(0.6);
-        self.world.insert(body.can_sleep(false), collider).0
+        self.world.insert(body, collider).0
     }
 
     fn step(&mut self) {
@@ -42,7 +43,7 @@ impl Scene {
 }
 
 fn at(x: f64, y: f64, z: f64) -> RigidBodyBuilder {
-    RigidBodyBuilder::dynamic().translation(Vector::new(x, y, z))
+    RigidBodyBuilder::dynamic().translation(Vector::new(x, y, z)).can_sleep(false)
 }
 
 #[test]
@@ -141,6 +142,89 @@ fn an_impact_that_goes_deep_is_taken_back_to_its_face() {
     println!("{pose:?} after {} second requests", s.coupling.retracted());
     assert!(s.coupling.retracted() > 0);
     assert!((pose.translation.z - 0.25).abs() < 2e-3 && pose.rotation.angle_between(Pose::IDENTITY.rotation) < 1e-3);
+}
+
+/// A table is asked for its pairs in either order, and by whoever moves its bodies on.
+#[test]
+fn either_order_of_a_pair_is_the_same_contact() {
+    let mut s = Scene::new(DRILLED);
+    let body = s.add("cube(size = [1.5, 1.5, 0.5], center = true);", at(0.1, 0.15, 0.252));
+    s.coupling.prefetch(&s.world.bodies, &s.world.colliders).unwrap();
+    let dispatcher = s.coupling.dispatcher();
+    let shapes: Vec<SharedShape> = s.world.colliders.iter().map(|(_, c)| c.shared_shape().clone()).collect();
+    let [plate, cube] = &shapes[..] else { panic!("two colliders") };
+    let pos12 = Pose::translation(0.0, 0.0, -0.5).inv_mul(&s.pose(body));
+    // Moved on by 1e-4: the distances are those of now.
+    let pos12 = Pose::translation(0.0, 0.0, -1e-4) * pos12;
+    let ask = |pos: &Pose, g1: &SharedShape, g2: &SharedShape, found: &mut Vec<Manifold<(), u32>>| {
+        dispatcher.contact_manifolds(pos, &**g1, &**g2, 0.1, found, &mut None).unwrap();
+    };
+    let (mut there, mut back) = (Vec::new(), Vec::new());
+    ask(&pos12, plate, cube, &mut there);
+    ask(&pos12.inverse(), cube, plate, &mut back);
+    assert_eq!((there.len(), back.len(), there[0].points.len()), (1, 1, 4));
+    let near = |p: Vector, q: Vector| (p - q).length() < 1e-12;
+    assert!(near(there[0].local_n1, Vector::Z) && near(there[0].local_n2, -Vector::Z));
+    assert!(near(there[0].local_n1, back[0].local_n2) && near(there[0].local_n2, back[0].local_n1));
+    for (p, q) in there[0].points.iter().zip(&back[0].points) {
+        assert!(near(p.local_p1, q.local_p2) && near(p.local_p2, q.local_p1) && p.fid1 == q.fid1);
+        assert!((p.dist - 1.9e-3).abs() < 1e-9 && (q.dist - p.dist).abs() < 1e-12, "{} {}", p.dist, q.dist);
+    }
+    // What a point holds goes on with its id, even from another manifold.
+    for (k, p) in there[0].points.iter_mut().enumerate() {
+        p.data = 7 + k as u32;
+    }
+    there.insert(0, Manifold::new());
+    ask(&pos12, plate, cube, &mut there);
+    assert_eq!(there.len(), 2);
+    assert_eq!(there[0].points.iter().map(|p| p.data).collect::<Vec<_>>(), [7, 8, 9, 10]);
+    assert!(there[1].points.is_empty());
+    // Out of reach, sensors, and what is not served.
+    dispatcher.contact_manifolds(&pos12, &**plate, &**cube, 1e-3, &mut there, &mut None).unwrap();
+    assert!(there.iter().all(|m| m.points.is_empty()));
+    let meets = |pos: &Pose| dispatcher.intersection_test(pos, &**plate, &**cube).unwrap().intersecting;
+    assert!(!meets(&pos12) && meets(&(Pose::translation(0.0, 0.0, -3e-3) * pos12)));
+    assert!(dispatcher.distance(&pos12, &**plate, &**cube).is_err());
+    assert!(dispatcher.intersection_test(&pos12, &**plate, &Ball::new(1.0)).is_err());
+}
+
+/// rapier's contacts yield under load, here by more than the gap: boxes of its own and solids do so alike, with regions or
+/// retracted, until all sleep.
+#[test]
+fn a_stack_stands_as_rapiers_own_does_and_then_asks_nothing() {
+    let mut s = Scene::new(DRILLED);
+    let mut stock = PhysicsWorld { gravity: GRAVITY, ..PhysicsWorld::default() };
+    stock.integration_parameters = s.world.integration_parameters;
+    let skin = 0.5 * Settings::default().gap;
+    let cuboid = |x: f64, y: f64, z: f64| ColliderBuilder::cuboid(x, y, z).contact_skin(skin).friction(0.6);
+    stock.insert_collider(cuboid(3.0, 3.0, 0.5).translation(Vector::new(0.0, 0.0, -0.5)), None);
+    let heights = [0, 1, 2].map(|k| 0.251 + 0.501 * f64::from(k));
+    let own = heights.map(|z| stock.insert(at(0.1, 0.15, z), cuboid(0.75, 0.75, 0.25)).0);
+    let text = "cube(size = [1.5, 1.5, 0.5], center = true);";
+    let bodies = heights.map(|z| s.add(text, at(0.1, 0.15, z).can_sleep(true)));
+    for body in bodies {
+        s.world.bodies[body].activation_mut().time_until_sleep = 0.5;
+    }
+    for _ in 0..28 {
+        s.step();
+        stock.step();
+    }
+    let under = |z: [f64; 3]| [z[0] - 0.25, z[1] - z[0] - 0.5, z[2] - z[1] - 0.5];
+    let found = under(bodies.map(|b| s.pose(b).translation.z));
+    let theirs = under(own.map(|b| stock.bodies[b].translation().z));
+    println!("gaps {found:?}, rapier's own {theirs:?}, {} second requests", s.coupling.retracted());
+    for (p, q) in found.iter().zip(&theirs) {
+        assert!((p - q).abs() < 3e-5, "{found:?}, rapier's own {theirs:?}");
+    }
+    for _ in 0..60 {
+        s.step();
+    }
+    assert!(bodies.iter().all(|b| s.world.bodies[*b].is_sleeping()));
+    let asked = s.coupling.requests();
+    for _ in 0..10 {
+        s.step();
+    }
+    assert_eq!(s.coupling.requests(), asked, "all sleep");
 }
 
 #[test]
