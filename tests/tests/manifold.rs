@@ -110,12 +110,16 @@ fn moved(from: &Pose, to: &Pose) -> f64 {
 /// 600 steps of jiggle, its size from 1e-9 to 1e-4: the same `count` points under the same ids, none of which moves by more
 /// than `factor` times what the body does. (Slack: what Newton's method leaves of a point.) Returns the points at rest.
 fn rests(scene: &mut Scene, pose: &Pose, count: usize, factor: f64) -> Vec<Point> {
+    rests_for(600, scene, pose, count, factor)
+}
+
+fn rests_for(steps: u32, scene: &mut Scene, pose: &Pose, count: usize, factor: f64) -> Vec<Point> {
     let mut noise = Noise(0x9e37_79b9_7f4a_7c15);
     let first = scene.at(*pose);
     assert_eq!(first.len(), count, "{first:#?}");
     let (mut before, mut pose_before) = (first.clone(), *pose);
     let mut worst = 0.0f64;
-    for step in 0..600 {
+    for step in 0..steps {
         let by = 10f64.powf(-9.0 + 5.0 * f64::from(step % 120) / 119.0);
         let pose = noise.jiggled(pose, by);
         let points = scene.at(pose);
@@ -163,9 +167,9 @@ fn a_standing_cylinder_keeps_four_marks_of_its_rim() {
     let mut s = Scene::new(PLATE, CYLINDER);
     let points = rests(&mut s, &Pose::at(dvec3(0.2, 0.1, 1.0 + 1e-3)), 4, 1.0);
     assert!((area(&positions(&points)) - 0.5).abs() < 1e-8, "the square of radius .5");
-    // Turning about its axis it takes them along.
-    for k in 1..=600 {
-        let turn = turned(DVec3::Z, 0.02 * f64::from(k));
+    // Turning about its axis it takes them along, also by most of the way from mark to mark in a step.
+    for k in 1..=200 {
+        let turn = turned(DVec3::Z, 0.01 * f64::from(k) + 0.6 * f64::from(k / 10));
         let now = s.at(Pose::new(dvec3(0.2, 0.1, 1.0 + 1e-3), turn));
         assert_eq!(ids(&now), ids(&points), "step {k}");
         for (p, q) in now.iter().zip(&points) {
@@ -193,6 +197,25 @@ fn a_lying_cylinder_keeps_both_ends_of_its_line() {
 }
 
 #[test]
+fn a_wheel_keeps_both_ends_however_fast_it_rolls() {
+    let mut s = Scene::new(PLATE, "cylinder(h = 0.2, r1 = 0.5, r2 = 0.5, center = true);");
+    let lying = turned(DVec3::Y, FRAC_PI_2);
+    let mut first = Vec::new();
+    for k in 0..30 {
+        // Half its own width in a step.
+        let way = 0.1 * f64::from(k) - 1.5;
+        let now = s.at(Pose::new(dvec3(0.0, way, 0.5 + 1e-3), turned(DVec3::X, -way / 0.5) * lying));
+        if k == 0 {
+            first = now.clone();
+        }
+        assert_eq!((now.len(), ids(&now)), (2, ids(&first)), "step {k}: {now:#?}");
+        for (p, q) in now.iter().zip(&first) {
+            assert!((p.position - q.position).distance(DVec3::Y * (way + 1.5)) < 1e-7, "step {k}: {p:?}, before {q:?}");
+        }
+    }
+}
+
+#[test]
 fn a_cylinder_leaning_on_its_rim_keeps_its_point() {
     let mut s = Scene::new(PLATE, CYLINDER);
     let tilt = turned(DVec3::Y, 0.3);
@@ -215,14 +238,14 @@ fn each_of_two_regions_has_its_points() {
     let bridge = "difference() { cube(size = [1, 0.5, 0.5], center = true);
         multmatrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -0.25], [0, 0, 0, 1]]) { cube(size = [0.4, 2, 0.4], center = true); } }";
     let mut s = Scene::new(PLATE, bridge);
-    let points = rests(&mut s, &Pose::new(dvec3(0.1, 0.2, 0.25 + 1e-3), turned(DVec3::Z, 1.0)), 4, 1.0);
+    let points = rests_for(240, &mut s, &Pose::new(dvec3(0.1, 0.2, 0.25 + 1e-3), turned(DVec3::Z, 1.0)), 4, 1.0);
     assert!((area(&positions(&points)) - 0.5).abs() < 1e-8, "{points:?}");
     // A box in a corner touches floor and wall. (The corner is relieved, as real ones are: its edge meets nothing.)
     let corner = "difference() { cube(size = [8, 8, 2], center = true);
         multmatrix([[1, 0, 0, 4], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]) { cube(size = [8, 9, 0.4], center = true); }
         multmatrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]]) { cube(size = [0.1, 9, 0.1], center = true); } }";
     let mut s = Scene::new(corner, CUBE);
-    let points = rests(&mut s, &Pose::at(dvec3(0.5 + 1e-3, 0.0, 0.3 + 1e-3)), 8, 1.0);
+    let points = rests_for(240, &mut s, &Pose::at(dvec3(0.5 + 1e-3, 0.0, 0.3 + 1e-3)), 8, 1.0);
     let of = |n: DVec3| points.iter().filter(|p| p.normal.distance(n) < 1e-9).count();
     assert_eq!((of(DVec3::Z), of(DVec3::X)), (4, 4), "{points:#?}");
 }
