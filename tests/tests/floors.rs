@@ -118,7 +118,8 @@ fn imports_are_read_from_lists_and_paths() {
 
 #[test]
 fn only_the_transports_name_iceoryx2_and_no_crate_allows_unsafe() {
-    for (folder, head) in [("proto", "lib.rs"), ("server", "lib.rs"), ("client", "lib.rs")] {
+    for (folder, head) in [("proto", "lib.rs"), ("server", "lib.rs"), ("client", "lib.rs"), ("client/rapier", "lib.rs")]
+    {
         let text = std::fs::read_to_string(root().join(folder).join("src").join(head)).unwrap();
         assert!(text.contains("#![forbid(unsafe_code)]"), "{folder}");
     }
