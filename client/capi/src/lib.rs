@@ -18,6 +18,7 @@
 //!    `contactd_begin_step`, `contactd_reconnect`, `contactd_resend` or `contactd_close`.
 
 pub mod abi;
+pub mod convention;
 pub mod error;
 pub mod handle;
 pub mod model;
