@@ -12,6 +12,7 @@ pub mod convention;
 pub mod dynamics;
 pub mod error;
 mod journal;
+pub mod manifold;
 pub mod session;
 pub mod shm;
 pub mod transport;
