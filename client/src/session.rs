@@ -504,6 +504,11 @@ pub struct Reply<'s> {
 }
 
 impl<'s> Reply<'s> {
+    /// A reply of slots and their header that were kept, or came by another way than [`Session::finish`].
+    pub fn of(header: StepReply, slots: &'s [ContactRecord]) -> Self {
+        Self { header, slots }
+    }
+
     /// The header: status, safe time, effects, work.
     pub fn header(&self) -> &StepReply {
         &self.header

@@ -4,6 +4,7 @@
 
 use cbindgen::{Builder, Config};
 use contactd_capi::abi::{EffectCounters, Face, Mass, Names, Object, Opened, Options, Pose, Reply, Rule};
+use contactd_capi::manifold::{Manifold, ManifoldPoint};
 use contactd_proto::step::WorkCounters;
 use contactd_proto::{ContactRecord, DetailSlot, ErrorCode, PatchSlot, PoseRecord, RegionSlot, StepReply};
 use std::fmt::Write as _;
@@ -11,7 +12,7 @@ use std::mem::offset_of;
 use std::path::Path;
 
 /// Sources of the header, in its order.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 13] = [
     "src/error.rs",
     "../../proto/src/pose_record.rs",
     "../../proto/src/contact_record.rs",
@@ -22,6 +23,7 @@ const SOURCES: [&str; 12] = [
     "src/model.rs",
     "src/scene.rs",
     "src/step.rs",
+    "src/manifold.rs",
     "src/convention/pose.rs",
     "src/convention/contact.rs",
 ];
@@ -101,6 +103,8 @@ fn offsets() -> String {
             advance, dt, first, details, clear, polling, max_records, cell_limit, batch_limit, reserved,
         }
         "contactd_reply" Reply { header, records, record_count, slots, slot_count }
+        "contactd_manifold_point" ManifoldPoint { id, group, position, normal, separation, on_a, on_b }
+        "contactd_manifold" Manifold { a, b, status, is_complete, points, point_count }
     }
     text + "#undef CONTACTD_AT\n#undef CONTACTD_SIZE\n#undef CONTACTD_ASSERT"
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::undocumented_unsafe_blocks)] // Each is a call of the interface with pointers to the test's own variables.
 
 mod convention;
+mod manifold;
 mod misuse;
 mod stub;
 #[path = "../support/mod.rs"]
