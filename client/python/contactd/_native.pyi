@@ -1,7 +1,7 @@
 """The native part of contactd; use the package, not this module."""
 
 import os
-from typing import Any, Self, Sequence, TypeAlias
+from typing import Any, Callable, Self, Sequence, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,8 @@ PROTOCOL_VERSION: int
 
 _Layout: TypeAlias = tuple[list[str], list[str], list[int], int]
 _Pose: TypeAlias = tuple[ArrayLike, ArrayLike]
+_Vector: TypeAlias = list[float]
+_Point: TypeAlias = tuple[int, int, _Vector, _Vector, float, _Vector, _Vector]
 
 def layouts() -> list[tuple[str, _Layout]]: ...
 def constants() -> list[tuple[str, str, int]]: ...
@@ -200,3 +202,15 @@ class Reply:
     @property
     def effect_counters(self) -> dict[str, int]:
         """How often each effect was worked out, by its word."""
+
+class Manifolds:
+    """The points of all pairs, from step to step: ``contactd.manifold.Manifolds``."""
+
+    def __new__(cls) -> Self: ...
+    def _update(self, reply: Reply, placed: Callable[[int, float], _Pose]) -> None: ...
+    def start(self) -> None:
+        """Begins an update that is made record by record."""
+    def _add(self, reply: Reply, record: int, a: _Pose, b: _Pose) -> None: ...
+    def finish(self) -> None:
+        """Ends an update: pairs that were not added are forgotten."""
+    def _pairs(self) -> list[tuple[int, int, int, bool, list[_Point]]]: ...

@@ -3,13 +3,14 @@
 //! It holds what needs Rust, and what every step does: the session, the memory of its poses and replies, the records' layouts.
 //! Views, rules, poses and exceptions are Python (`contactd/*.py`), which is what users see.
 //!
-//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`) and where the interpreter's lock is released
+//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`) and where the interpreter's lock is released
 //! around a session that belongs to one thread (`confined.rs`).
 
 mod confined;
 mod errors;
 mod layout;
 mod lease;
+mod manifold;
 mod mass;
 mod options;
 mod reply;
@@ -29,6 +30,8 @@ mod _native {
     use crate::layout::{constants, layouts, words};
     #[pymodule_export]
     use crate::lease::{Export, Lease};
+    #[pymodule_export]
+    use crate::manifold::Manifolds;
     #[pymodule_export]
     use crate::mass::MassProperties;
     #[pymodule_export]

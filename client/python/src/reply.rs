@@ -2,6 +2,7 @@
 
 use crate::lease::Lease;
 use crate::slots::{Slots, known, references};
+use contactd_client::Reply as Answer;
 use contactd_proto::{ContactRecord, StepReply};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -56,6 +57,17 @@ impl Reply {
         this.lease.get().renew(start, slots);
         this.header = *header;
         true
+    }
+
+    /// Runs `work` on what Rust would read, while the step is not over.
+    pub fn read<R>(reply: &Bound<'_, Self>, work: impl FnOnce(&Answer<'_>) -> R) -> PyResult<R> {
+        let this = reply.try_borrow()?;
+        let lease = this.lease.get();
+        lease.check(reply.py())?;
+        // SAFETY: so many slots lie there until the step is over, which it is not; nobody writes to them, and `work` runs none of
+        // Python's code, which could end the step.
+        let slots = unsafe { std::slice::from_raw_parts(lease.start().cast::<ContactRecord>(), this.all()) };
+        Ok(work(&Answer::of(this.header, slots)))
     }
 
     /// Its lease.
