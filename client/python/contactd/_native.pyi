@@ -157,7 +157,7 @@ class Session:
         """
     def reconnect(self, timeout: float = 10.0) -> None:
         """After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
-        models, objects, rules and last poses. Ids stay the same."""
+        models, objects, rules and last poses. Ids stay the same. An embedded session has nothing to find again: ``Misuse``."""
     def resend(self) -> View:
         """After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses."""
     def close(self) -> None:

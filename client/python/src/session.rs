@@ -355,13 +355,14 @@ impl Session {
     }
 
     /// After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
-    /// models, objects, rules and last poses. Ids stay the same.
+    /// models, objects, rules and last poses. Ids stay the same. An embedded session has nothing to find again: ``Misuse``.
     #[pyo3(signature = (timeout = 10.0))]
     fn reconnect(slf: &Bound<'_, Self>, timeout: f64) -> PyResult<()> {
         let (py, timeout) = (slf.py(), duration(Some(timeout))?);
         let mut this = Self::enter(slf)?;
-        this.with(py, |_| ())?;
-        this.revoke(py)?;
+        if this.with(py, |s| s.transport_mut().may_lose_server())? {
+            this.revoke(py)?;
+        }
         this.detached(py, |s| s.reconnect(timeout))
     }
 
