@@ -374,7 +374,7 @@ impl Told {
     }
 }
 
-/// The fraction of the step that a record tells of.
-fn told_at(record: &ContactRecord) -> f64 {
+/// The fraction of the step that a record tells of: its time where the bodies meet, else the start.
+pub fn told_at(record: &ContactRecord) -> f64 {
     if matches!(record.status, CONTACT | OVERLAP) { record.time } else { 0.0 }
 }

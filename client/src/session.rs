@@ -135,7 +135,8 @@ enum Stage {
     Lost,
 }
 
-/// One client's scene on a server. One thread at a time.
+/// One client's scene on a server. One thread at a time. Dropped without [`close`](Self::close) it still says goodbye, and waits a
+/// fifth of a second at most until that was heard; a server that does not hear it ends the session with this process.
 #[derive(Debug)]
 pub struct Session<T: Transport> {
     transport: T,
@@ -148,6 +149,8 @@ pub struct Session<T: Transport> {
     last_model: u32,
     last_object: u32,
     lost_batch: Option<Vec<PoseRecord>>,
+    /// The server was told of the end, and said so.
+    is_over: bool,
     /// How long a command may take (imports of large models included).
     pub command_timeout: Duration,
 }
@@ -187,6 +190,7 @@ impl<T: Transport> Session<T> {
             last_model: 0,
             last_object: 0,
             lost_batch: None,
+            is_over: false,
             command_timeout: Duration::from_secs(600),
         })
     }
@@ -393,12 +397,14 @@ impl<T: Transport> Session<T> {
     /// session there and replays models, objects, rules and last poses. Ids stay the same.
     ///
     /// # Errors
-    /// `NoServer` when none came up within `timeout`; otherwise what the replay met.
+    /// `NoServer` when none came up within `timeout`; `Misuse`, and nothing has changed, where there is no server that could be
+    /// lost; otherwise what the replay met.
     pub fn reconnect(&mut self, timeout: Duration) -> Result<(), Error> {
-        let until = Instant::now() + timeout;
-        if self.stage != Stage::Lost {
-            self.stage = Stage::Lost;
+        if !self.transport.may_lose_server() {
+            return Err(Error::Misuse("an embedded session has no server that could be lost"));
         }
+        let until = Instant::now() + timeout;
+        self.stage = Stage::Lost;
         loop {
             match self.replay() {
                 Err(Error::NoServer(_) | Error::ServerLost | Error::Timeout) if Instant::now() < until => {
@@ -427,7 +433,9 @@ impl<T: Transport> Session<T> {
     /// # Errors
     /// `ServerLost`, `Timeout`, `System`; the session is over in any case.
     pub fn close(mut self) -> Result<(), Error> {
-        self.done(Command::Close)
+        self.done(Command::Close)?;
+        self.is_over = true;
+        Ok(())
     }
 
     /// The transport, for what a session does not offer.
@@ -487,6 +495,14 @@ impl<T: Transport> Session<T> {
     }
 }
 
+impl<T: Transport> Drop for Session<T> {
+    fn drop(&mut self) {
+        if !self.is_over {
+            self.transport.leave();
+        }
+    }
+}
+
 fn refused(code: u32, index: u32, detail: String) -> Error {
     let code = ErrorCode::of_number(code).unwrap_or(ErrorCode::Internal);
     Error::Refused { code, index: (index != NO_INDEX).then_some(index), detail }
@@ -504,6 +520,11 @@ pub struct Reply<'s> {
 }
 
 impl<'s> Reply<'s> {
+    /// A reply of slots and their header that were kept, or came by another way than [`Session::finish`].
+    pub fn of(header: StepReply, slots: &'s [ContactRecord]) -> Self {
+        Self { header, slots }
+    }
+
     /// The header: status, safe time, effects, work.
     pub fn header(&self) -> &StepReply {
         &self.header

@@ -56,6 +56,9 @@ pub trait Transport {
 
     /// The reply that was received, in place: header and slots.
     fn reply(&self) -> Option<(&StepReply, &[ContactRecord])>;
+
+    /// The session was dropped: tells the other side, if there is one, without waiting long.
+    fn leave(&mut self) {}
 }
 
 /// Whatever carries a session chosen at run time: one type of session for callers that cannot be generic (C, Python).
@@ -90,5 +93,9 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
 
     fn reply(&self) -> Option<(&StepReply, &[ContactRecord])> {
         (**self).reply()
+    }
+
+    fn leave(&mut self) {
+        (**self).leave();
     }
 }

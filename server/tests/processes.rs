@@ -136,6 +136,22 @@ fn a_killed_client_loses_its_session_and_a_stopped_server_is_told() {
     };
     let sessions = |n: u64| shows(&|s| s.sessions == n);
     sessions(2);
+    // Sessions that are dropped and never closed: idle, with poses begun, with a step in flight, with a reply.
+    for stage in 0..4 {
+        let mut dropped = Session::connect_to(server.address.clone()).unwrap();
+        let ids = build(&mut dropped, 1);
+        sessions(3);
+        if stage > 0 {
+            dropped.begin_step(1).unwrap()[0] = PoseRecord::end(ids[0], &Pose::IDENTITY);
+        }
+        match stage {
+            2 => dropped.send().unwrap(),
+            3 => drop(dropped.finish(PATIENCE).unwrap()),
+            _ => {}
+        }
+        drop(dropped);
+        sessions(2);
+    }
     victim.kill().unwrap();
     victim.wait().unwrap();
     sessions(1);

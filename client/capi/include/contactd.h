@@ -4,6 +4,10 @@
 // radians. Every function that can fail returns CONTACTD_OK or another code; contactd_error_message() says what was wrong.
 // A session belongs to the thread that opened it.
 //
+// Converters (contactd_from_…, contactd_to_…, contactd_contact_…) take and give arrays: `position`, `point`, `normal` and other
+// vectors of 3 numbers, `rotation` of 4, as they are in contactd_pose_record and contactd_record. What goes in is read before
+// anything is written. In an engine's contact its body 1 (A, first) is a.
+//
 // Not to be edited: made of the Rust sources by client/capi/tests/header.rs.
 
 #ifndef CONTACTD_H
@@ -281,6 +285,9 @@
 
 // The search goes on for the starting depth + the resolution.
 #define CONTACTD_INITIAL_OVERLAP_IGNORE_IF_SEPARATING 1
+
+// The points of all pairs, from step to step.
+typedef struct contactd_manifolds contactd_manifolds;
 
 // One client's scene on a server, or in this process. It belongs to the thread that opened it.
 typedef struct contactd_session contactd_session;
@@ -629,6 +636,40 @@ typedef struct contactd_patch_slot {
     uint32_t region[2];
 } contactd_patch_slot;
 
+// A contact point of a pair.
+typedef struct contactd_manifold_point {
+    // Names the point within its pair, for as long as it lasts.
+    uint32_t id;
+    // Which of the pair's groups of one normal it belongs to, from 0.
+    uint32_t group;
+    // Half way between the surfaces, world frame.
+    double position[3];
+    // Unit normal from a to b, world frame.
+    double normal[3];
+    // Distance of the surfaces along the normal: positive apart, negative in penetration.
+    double separation;
+    // The point on a's surface, in a's object frame.
+    double on_a[3];
+    // The point on b's surface, in b's object frame.
+    double on_b[3];
+} contactd_manifold_point;
+
+// The points of a pair, valid until the next call of contactd_manifolds_update or contactd_manifolds_free.
+typedef struct contactd_manifold {
+    // The object with the smaller id.
+    uint32_t a;
+    // The other one.
+    uint32_t b;
+    // The record's status: contact, clear or overlap.
+    uint32_t status;
+    // 0: the work limit cut the search for regions, there may be more points.
+    uint32_t is_complete;
+    // Groups in the order in which they were told, the points of each by id.
+    const struct contactd_manifold_point *points;
+    // Number of them.
+    size_t point_count;
+} contactd_manifold;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -761,6 +802,191 @@ int32_t contactd_get_region(struct contactd_session *session,
                             const struct contactd_region_slot **slot,
                             const struct contactd_patch_slot **patches,
                             size_t *patch_count);
+
+// Makes manifolds, without points. Not bound to a session or thread, but used by one thread at a time.
+int32_t contactd_manifolds_new(struct contactd_manifolds **manifolds);
+
+// Frees manifolds and sets `*manifolds` to NULL; one that is NULL already is done.
+int32_t contactd_manifolds_free(struct contactd_manifolds **manifolds);
+
+// Takes the answer to a step, once after each step. `poses` are two for each of the reply's records in their order, `count` in all: where
+// a and b stood at the moment that the record tells of: at its time for contact and overlap, at the start of the step for pairs
+// that are clear. (For pairs of detect = "discrete", which are told at their end: there.) Points of the step before keep their ids
+// where they are told again; pairs that are not told are forgotten. The rules need report = patch. When anything is wrong nothing has
+// changed.
+int32_t contactd_manifolds_update(struct contactd_manifolds *manifolds,
+                                  const struct contactd_reply *reply,
+                                  const struct contactd_pose *poses,
+                                  size_t count);
+
+// Number of pairs that have points.
+int32_t contactd_manifolds_count(struct contactd_manifolds *manifolds, size_t *count);
+
+// A pair by its number from 0, in the order (a, b).
+int32_t contactd_manifolds_get(struct contactd_manifolds *manifolds, size_t index, struct contactd_manifold *out);
+
+// The pair of objects `a` < `b`; with no points (NULL, 0) when they have none.
+int32_t contactd_manifolds_find(struct contactd_manifolds *manifolds, uint32_t a, uint32_t b, struct contactd_manifold *out);
+
+// x y z w from w x y z (MuJoCo, Drake, Isaac Sim, SAPIEN, the constructors of Eigen): four numbers to four.
+int32_t contactd_quaternion_from_wxyz(const double *wxyz, double *rotation);
+
+// w x y z from x y z w: four numbers to four.
+int32_t contactd_quaternion_to_wxyz(const double *rotation, double *wxyz);
+
+// A pose from MuJoCo's `xpos` (3 numbers) and `xquat` (4, w x y z).
+int32_t contactd_from_mujoco(const double *xpos, const double *xquat, double *position, double *rotation);
+
+// MuJoCo's `xpos` (3 numbers) and `xquat` (4, w x y z) of a pose.
+int32_t contactd_to_mujoco(const double *position, const double *rotation, double *xpos, double *xquat);
+
+// A pose from the seven positions of a floating body in Drake's plant: quaternion w x y z, then x y z.
+int32_t contactd_from_drake(const double *state, double *position, double *rotation);
+
+// The seven positions of a floating body in Drake's plant: quaternion w x y z, then x y z.
+int32_t contactd_to_drake(const double *position, const double *rotation, double *state);
+
+// A pose from [R | p], three rows of four: 12 numbers row by row. CONTACTD_ERROR_ARGUMENT when R is no rotation: scaled,
+// skewed, mirrored, by more than 1e-6 in an element of RᵀR − I.
+int32_t contactd_from_mat3x4(const double *matrix, double *position, double *rotation);
+
+// [R | p] of a pose, three rows of four: 12 numbers row by row.
+int32_t contactd_to_mat3x4(const double *position, const double *rotation, double *matrix);
+
+// A pose from a homogeneous matrix, 16 numbers row by row, with the position in the last column (Drake, pinocchio,
+// trimesh). Refused as by contactd_from_mat3x4, and when the last row is not 0 0 0 1.
+int32_t contactd_from_mat4(const double *matrix, double *position, double *rotation);
+
+// A homogeneous matrix of a pose, 16 numbers row by row, with the position in the last column.
+int32_t contactd_to_mat4(const double *position, const double *rotation, double *matrix);
+
+// A pose from 16 numbers column by column (OpenGL, three.js, Bullet's getOpenGLMatrix). Refused as by contactd_from_mat4.
+int32_t contactd_from_opengl(const double *columns, double *position, double *rotation);
+
+// 16 numbers column by column of a pose.
+int32_t contactd_to_opengl(const double *position, const double *rotation, double *columns);
+
+// From MuJoCo's `mjContact`: `pos` half way, `frame` of 9 numbers whose first three point from geom 1 to geom 2, `dist` <
+// 0 in penetration.
+int32_t contactd_contact_from_mujoco(const double *pos,
+                                     const double *frame,
+                                     double dist,
+                                     double *point,
+                                     double *normal,
+                                     double *separation);
+
+// `pos`, `frame` (the normal, then the two tangents that MuJoCo itself chooses: 9 numbers) and `dist` of `mjContact`.
+int32_t contactd_contact_to_mujoco(const double *point,
+                                   const double *normal,
+                                   double separation,
+                                   double *pos,
+                                   double *frame,
+                                   double *dist);
+
+// From Drake's `PenetrationAsPointPair`: `p_WCa`, `p_WCb` a point of each surface, `nhat_BA_W` from B into A, `depth` > 0
+// in penetration.
+int32_t contactd_contact_from_drake(const double *p_wca,
+                                    const double *p_wcb,
+                                    const double *nhat_ba_w,
+                                    double depth,
+                                    double *point,
+                                    double *normal,
+                                    double *separation);
+
+// `p_WCa`, `p_WCb`, `nhat_BA_W`, `depth` of Drake's `PenetrationAsPointPair`.
+int32_t contactd_contact_to_drake(const double *point,
+                                  const double *normal,
+                                  double separation,
+                                  double *p_wca,
+                                  double *p_wcb,
+                                  double *nhat_ba_w,
+                                  double *depth);
+
+// From Bullet's `btManifoldPoint`: a point of each surface, the normal on B towards A, `distance` < 0 in penetration.
+int32_t contactd_contact_from_bullet(const double *on_a,
+                                     const double *on_b,
+                                     const double *normal_on_b,
+                                     double distance,
+                                     double *point,
+                                     double *normal,
+                                     double *separation);
+
+// The points on A and on B, the normal on B and the distance of Bullet's `btManifoldPoint`.
+int32_t contactd_contact_to_bullet(const double *point,
+                                   const double *normal,
+                                   double separation,
+                                   double *on_a,
+                                   double *on_b,
+                                   double *normal_on_b,
+                                   double *distance);
+
+// From PhysX's `PxContactPairPoint`: its `position`, its `normal` (here `from_second`: from the second shape to the first)
+// and its `separation` (here `gap`), < 0 in penetration.
+int32_t contactd_contact_from_physx(const double *position,
+                                    const double *from_second,
+                                    double gap,
+                                    double *point,
+                                    double *normal,
+                                    double *separation);
+
+// `position`, `normal` and `separation` of PhysX's `PxContactPairPoint`.
+int32_t contactd_contact_to_physx(const double *point,
+                                  const double *normal,
+                                  double separation,
+                                  double *position,
+                                  double *from_second,
+                                  double *gap);
+
+// From ODE's `dContactGeom`: `pos`, its `normal` (here `into_first`: into body 1) and `depth` > 0 in penetration.
+int32_t contactd_contact_from_ode(const double *pos,
+                                  const double *into_first,
+                                  double depth,
+                                  double *point,
+                                  double *normal,
+                                  double *separation);
+
+// `pos`, `normal` and `depth` of ODE's `dContactGeom`.
+int32_t contactd_contact_to_ode(const double *point,
+                                const double *normal,
+                                double separation,
+                                double *pos,
+                                double *into_first,
+                                double *depth);
+
+// From Coal's `Contact`: `pos` half way, its `normal` (here `to_second`: from object 1 to object 2) and
+// `penetration_depth` < 0 in penetration.
+int32_t contactd_contact_from_coal(const double *pos,
+                                   const double *to_second,
+                                   double penetration_depth,
+                                   double *point,
+                                   double *normal,
+                                   double *separation);
+
+// `pos`, `normal` and `penetration_depth` of Coal's `Contact`.
+int32_t contactd_contact_to_coal(const double *point,
+                                 const double *normal,
+                                 double separation,
+                                 double *pos,
+                                 double *to_second,
+                                 double *penetration_depth);
+
+// From parry's `Contact` in the world frame: a point of each shape, the normal out of shape 1, `dist` < 0 in penetration.
+int32_t contactd_contact_from_rapier(const double *point1,
+                                     const double *point2,
+                                     const double *normal1,
+                                     double dist,
+                                     double *point,
+                                     double *normal,
+                                     double *separation);
+
+// `point1`, `point2`, `normal1` and `dist` of parry's `Contact`, world frame; its `normal2` is the opposite of `normal1`.
+int32_t contactd_contact_to_rapier(const double *point,
+                                   const double *normal,
+                                   double separation,
+                                   double *point1,
+                                   double *point2,
+                                   double *normal1,
+                                   double *dist);
 
 #ifdef __cplusplus
 }  // extern "C"
@@ -928,6 +1154,21 @@ CONTACTD_AT(contactd_reply, records, 224);
 CONTACTD_AT(contactd_reply, record_count, 232);
 CONTACTD_AT(contactd_reply, slots, 240);
 CONTACTD_AT(contactd_reply, slot_count, 248);
+CONTACTD_SIZE(contactd_manifold_point, 112);
+CONTACTD_AT(contactd_manifold_point, id, 0);
+CONTACTD_AT(contactd_manifold_point, group, 4);
+CONTACTD_AT(contactd_manifold_point, position, 8);
+CONTACTD_AT(contactd_manifold_point, normal, 32);
+CONTACTD_AT(contactd_manifold_point, separation, 56);
+CONTACTD_AT(contactd_manifold_point, on_a, 64);
+CONTACTD_AT(contactd_manifold_point, on_b, 88);
+CONTACTD_SIZE(contactd_manifold, 32);
+CONTACTD_AT(contactd_manifold, a, 0);
+CONTACTD_AT(contactd_manifold, b, 4);
+CONTACTD_AT(contactd_manifold, status, 8);
+CONTACTD_AT(contactd_manifold, is_complete, 12);
+CONTACTD_AT(contactd_manifold, points, 16);
+CONTACTD_AT(contactd_manifold, point_count, 24);
 #undef CONTACTD_AT
 #undef CONTACTD_SIZE
 #undef CONTACTD_ASSERT

@@ -15,11 +15,15 @@
 //! 3. a session's handle came from `contactd_connect` or `contactd_embedded` and was not closed since (closing sets the
 //!    caller's variable to NULL; copies of it are the caller's business);
 //! 4. slots of poses are not used after `contactd_send` or `contactd_finish`, records not after the next
-//!    `contactd_begin_step`, `contactd_reconnect`, `contactd_resend` or `contactd_close`.
+//!    `contactd_begin_step`, `contactd_reconnect`, `contactd_resend` or `contactd_close`;
+//! 5. manifolds came from `contactd_manifolds_new`, were not freed since (freeing sets the caller's variable to NULL), and are in one
+//!    call at a time.
 
 pub mod abi;
+pub mod convention;
 pub mod error;
 pub mod handle;
+pub mod manifold;
 pub mod model;
 pub mod scene;
 pub mod session;

@@ -6,7 +6,7 @@ use crate::handle::{Session, State, free, hand_over, on, take_back};
 use crate::raw::{place, seconds, text};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::names::{Address, DEFAULT_NAME, PROTOCOL_VERSION};
-use contactd_client::{Error, SharedMemory, Transport as _};
+use contactd_client::{Error, SharedMemory};
 use std::ffi::{CStr, c_char};
 use std::path::Path;
 use std::ptr::null_mut;
@@ -124,11 +124,11 @@ pub unsafe extern "C" fn contactd_set_command_timeout(session: *mut Session, tim
 pub unsafe extern "C" fn contactd_reconnect(session: *mut Session, timeout: f64) -> i32 {
     let call = |state: &mut State| {
         let timeout = seconds(timeout, "a timeout")?;
-        if !state.session.transport_mut().may_lose_server() {
-            return Err(Failure::misuse("an embedded session has no server that could be lost"));
+        let done = state.session.reconnect(timeout);
+        if !matches!(done, Err(Error::Misuse(_))) {
+            state.records = None;
         }
-        state.records = None;
-        Ok(state.session.reconnect(timeout)?)
+        Ok(done?)
     };
     // SAFETY: the caller's handle (3).
     unsafe { on(session, call) }

@@ -67,3 +67,44 @@ fn a_loop_of_one_s_own_bounces_the_same_through_c() {
     // Reflections keep the speed.
     assert!((v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 6.125).abs() < 1e-12, "{v:?}");
 }
+
+/// `lines` without the blanks that all of them begin with.
+fn flush_left(lines: &[&str]) -> Vec<String> {
+    let indents = lines.iter().filter(|l| !l.trim().is_empty()).map(|l| l.len() - l.trim_start().len());
+    let indent = indents.min().unwrap_or(0);
+    lines.iter().map(|l| l.get(indent..).unwrap_or_default().trim_end().to_owned()).collect()
+}
+
+/// The blocks of code in a text, with the word that names their language.
+fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
+    let mut found = Vec::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if let Some(language) = line.strip_prefix("```") {
+            found.push((language, lines.by_ref().take_while(|l| *l != "```").collect()));
+        }
+    }
+    found
+}
+
+#[test]
+fn the_loops_of_the_documentation_are_those_that_run() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let read = |path: &str| std::fs::read_to_string(root.join(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
+    let text = read("docs/coupling.md");
+    let chapter = text.split("\n## ").find(|c| c.starts_with("A loop of one's own")).expect("the chapter of the loops");
+    let quoted = blocks(chapter);
+    let files = [
+        ("rust", "client/examples/own_loop.rs"),
+        ("c", "client/capi/examples/loop.c"),
+        ("python", "client/python/examples/own_loop.py"),
+    ];
+    assert_eq!(quoted.iter().map(|q| q.0).collect::<Vec<_>>(), files.map(|f| f.0));
+    for ((_, block), (_, path)) in quoted.iter().zip(files) {
+        assert!(block.len() > 10 && block.iter().any(|l| l.starts_with("while")), "{path}: {block:?}");
+        let (block, file) = (flush_left(block), read(path));
+        let lines: Vec<&str> = file.lines().collect();
+        let there = lines.windows(block.len()).any(|window| flush_left(window) == block);
+        assert!(there, "docs/coupling.md quotes a loop that is not that of {path}:\n{}", block.join("\n"));
+    }
+}

@@ -4,6 +4,7 @@
 
 use cbindgen::{Builder, Config};
 use contactd_capi::abi::{EffectCounters, Face, Mass, Names, Object, Opened, Options, Pose, Reply, Rule};
+use contactd_capi::manifold::{Manifold, ManifoldPoint};
 use contactd_proto::step::WorkCounters;
 use contactd_proto::{ContactRecord, DetailSlot, ErrorCode, PatchSlot, PoseRecord, RegionSlot, StepReply};
 use std::fmt::Write as _;
@@ -11,7 +12,7 @@ use std::mem::offset_of;
 use std::path::Path;
 
 /// Sources of the header, in its order.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 13] = [
     "src/error.rs",
     "../../proto/src/pose_record.rs",
     "../../proto/src/contact_record.rs",
@@ -22,6 +23,9 @@ const SOURCES: [&str; 10] = [
     "src/model.rs",
     "src/scene.rs",
     "src/step.rs",
+    "src/manifold.rs",
+    "src/convention/pose.rs",
+    "src/convention/contact.rs",
 ];
 
 const HEAD: &str = "\
@@ -30,6 +34,10 @@ const HEAD: &str = "\
 // Lengths are in the models' unit, times within a step a fraction 0..1, axes right-handed, quaternions x y z w, angles in
 // radians. Every function that can fail returns CONTACTD_OK or another code; contactd_error_message() says what was wrong.
 // A session belongs to the thread that opened it.
+//
+// Converters (contactd_from_…, contactd_to_…, contactd_contact_…) take and give arrays: `position`, `point`, `normal` and other
+// vectors of 3 numbers, `rotation` of 4, as they are in contactd_pose_record and contactd_record. What goes in is read before
+// anything is written. In an engine's contact its body 1 (A, first) is a.
 //
 // Not to be edited: made of the Rust sources by client/capi/tests/header.rs.";
 
@@ -95,6 +103,8 @@ fn offsets() -> String {
             advance, dt, first, details, clear, polling, max_records, cell_limit, batch_limit, reserved,
         }
         "contactd_reply" Reply { header, records, record_count, slots, slot_count }
+        "contactd_manifold_point" ManifoldPoint { id, group, position, normal, separation, on_a, on_b }
+        "contactd_manifold" Manifold { a, b, status, is_complete, points, point_count }
     }
     text + "#undef CONTACTD_AT\n#undef CONTACTD_SIZE\n#undef CONTACTD_ASSERT"
 }
@@ -184,5 +194,5 @@ fn every_function_of_the_sources_is_declared() {
             functions += 1;
         }
     }
-    assert!(functions > 25, "{functions}");
+    assert!(functions > 50, "{functions}");
 }

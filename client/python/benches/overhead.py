@@ -1,8 +1,12 @@
-"""What a step costs in Python beyond the same step in Rust: the same embedded session, the same batches, blocks taking turns.
+"""What a step costs in Python beyond the same step in Rust: the same embedded session, the same batches, steps taking turns.
 
-overhead.py [--quick]. A step: slots loaned, filled with a batch of poses, sent, the answer's records looked at. Rust copies the batch
-into the slots; Python does so by one assignment, or field by field from arrays of its own. Microseconds: the tenth part of the steps
-was faster, which other load on the machine moves less than a median.
+overhead.py [--quick]. A step: slots loaned, filled with poses, sent, the answer's records looked at. Rust and Python fill them from
+the same arrays, in two ways: a batch of records copied as a whole, or field by field from arrays of objects, positions and
+rotations. Filling is the caller's own work and is done on both sides.
+
+Steps come in fours, Rust, Python, Python, Rust, so that other load on the machine and a drift of its clock meet both alike: the
+difference of a four is that of its two pairs' means. Microseconds: medians, and of the differences the middle half beside the
+median, and the error of the median (half of a 95 % interval, by its binomial order statistics).
 """
 
 import sys
@@ -24,60 +28,93 @@ def batches(n, ids):
     return both
 
 
-def whole(session, both, steps):
-    """Python's steps, the batch assigned as a whole; nanoseconds each."""
-    n, times, now = both.shape[1], [], time.perf_counter_ns
-    for k in range(steps):
-        batch = both[k % 2]
+def whole(session, both):
+    """A step of Rust's and one of Python's, of a batch that is copied as a whole; nanoseconds."""
+    now, n, k = time.perf_counter_ns, both.shape[1], 0
+    batch = list(both)
+
+    def rust():
+        nonlocal k
+        k ^= 1
+        return session._whole_in_rust(batch[k])
+
+    def python():
+        nonlocal k
+        k ^= 1
+        records = batch[k]
         start = now()
-        session.begin_step(n)[:] = batch
+        session.begin_step(n)[:] = records
         session.finish(60.0).records
-        times.append(now() - start)
-    return times
+        return now() - start
+
+    return rust, python
 
 
-def fields(session, both, steps):
-    """Python's steps, each field assigned from an array of its own."""
-    n, times, now = both.shape[1], [], time.perf_counter_ns
+def fields(session, both):
+    """The same, filled in field by field from arrays."""
+    now, n, k = time.perf_counter_ns, both.shape[1], 0
     objects = both["object"][0].copy()
-    positions, rotations = ([np.ascontiguousarray(b[f]) for b in both] for f in ("position", "rotation"))
-    for k in range(steps):
-        position, rotation = positions[k % 2], rotations[k % 2]
+    position, rotation = ([np.ascontiguousarray(b[f]) for b in both] for f in ("position", "rotation"))
+
+    def rust():
+        nonlocal k
+        k ^= 1
+        return session._fields_in_rust(objects, Order.END, position[k], rotation[k])
+
+    def python():
+        nonlocal k
+        k ^= 1
+        positions, rotations = position[k], rotation[k]
         start = now()
         poses = session.begin_step(n)
         poses["object"] = objects
         poses["flags"] = Order.END
-        poses["position"] = position
-        poses["rotation"] = rotation
+        poses["position"] = positions
+        poses["rotation"] = rotations
         session.finish(60.0).records
-        times.append(now() - start)
-    return times
+        return now() - start
+
+    return rust, python
+
+
+def fours(rust, python, count):
+    """Nanoseconds of steps in fours: (count, 4), Rust's first and last."""
+    for _ in range(8):
+        rust(), python()
+    return np.array([(rust(), python(), python(), rust()) for _ in range(count)])
+
+
+def told(times):
+    """Medians of Rust's and Python's steps, the median difference, its error, the middle half of the differences; microseconds."""
+    times = times / 1000.0
+    more = np.sort(0.5 * (times[:, 1] + times[:, 2] - times[:, 0] - times[:, 3]))
+    n = len(more)
+    # Ranks between which the median lies 95 times in 100: n/2 ± 0.98 √n.
+    reach = int(0.98 * np.sqrt(n)) + 1
+    error = 0.5 * (more[min(n // 2 + reach, n - 1)] - more[max(n // 2 - reach, 0)])
+    rust, python = np.median(times[:, [0, 3]]), np.median(times[:, [1, 2]])
+    return rust, python, more[n // 2], error, more[n // 4], more[3 * n // 4]
 
 
 def main(quick):
-    print(f"{'poses':>6} {'rust us':>9} {'python us':>10} {'more us':>8} {'by fields us':>13} {'more us':>8}")
-    worst = 0.0
-    for n, steps, blocks in ((1, 100, 30), (16, 100, 30), (256, 40, 30), (4096, 4, 120)):
-        blocks *= 1 if quick else 6
+    print(f"{'poses':>6} {'filled':>7} {'rust us':>9} {'python us':>10} {'more us':>8} {'+-':>5} {'middle half':>16}")
+    worst = {}
+    for n, count in ((1, 2000), (16, 2000), (256, 600), (4096, 300)):
+        count *= 1 if quick else 5
         with contactd.embedded() as session:
             ball = session.load_model("ball.csg", "sphere(r = 1);")
             ids = [session.add_object(f"ball {i}", ball, at=(10.0 * i, 0, 0)) for i in range(n)]
             both = batches(n, ids)
-            raw = [b.tobytes() for b in both]
-            ways = {
-                "rust": lambda: session._native._steps_in_rust(raw, steps),
-                "whole": lambda: whole(session, both, steps),
-                "fields": lambda: fields(session, both, steps),
-            }
-            times = {name: [] for name in ways}
-            for block in range(blocks + 1):
-                for name, run in ways.items():
-                    # The first round, and the first two steps of each block, warm up.
-                    times[name] += run()[2:] if block else []
-            rust, python, by_field = (np.percentile(t, 10) / 1000 for t in times.values())
-            print(f"{n:6} {rust:9.2f} {python:10.2f} {python - rust:8.2f} {by_field:13.2f} {by_field - rust:8.2f}")
-            worst = max(worst, python - rust) if n in (16, 4096) else worst
-    print(f"a step in Python: at most {worst:.2f} us more than in Rust, for 16 and 4,096 poses")
+            for way in (whole, fields):
+                rust, python, more, error, low, high = told(fours(*way(session, both), count))
+                print(
+                    f"{n:6} {way.__name__:>7} {rust:9.2f} {python:10.2f} {more:8.2f} {error:5.2f} {low:7.2f} {high:8.2f}"
+                )
+                if n in (16, 4096):
+                    worst[way] = max(worst.get(way, 0.0), more)
+    print(
+        f"a step of 16 or 4,096 poses in Python: at most {worst[whole]:.2f} us more than in Rust, field by field {worst[fields]:.2f}"
+    )
 
 
 if __name__ == "__main__":

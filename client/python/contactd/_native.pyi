@@ -1,22 +1,26 @@
 """The native part of contactd; use the package, not this module."""
 
 import os
-from typing import Sequence, TypeAlias
+from typing import Any, Callable, Self, Sequence, TypeAlias
 
+import numpy as np
 from numpy.typing import ArrayLike
+
+from .session import Reply as PublicReply
+from .view import View
 
 __version__: str
 PROTOCOL_VERSION: int
 
 _Layout: TypeAlias = tuple[list[str], list[str], list[int], int]
 _Pose: TypeAlias = tuple[ArrayLike, ArrayLike]
+_Vector: TypeAlias = list[float]
+_Point: TypeAlias = tuple[int, int, _Vector, _Vector, float, _Vector, _Vector]
 
 def layouts() -> list[tuple[str, _Layout]]: ...
 def constants() -> list[tuple[str, str, int]]: ...
 def words() -> list[tuple[str, list[str]]]: ...
 def error_codes() -> list[tuple[str, int, str]]: ...
-def connect(name: str) -> Session: ...
-def embedded(config: str | os.PathLike[str] | None = None) -> Session: ...
 
 class Options:
     """What is asked of the steps to come. Stays as it is set, but for ``advance``, which each accepted step puts back to 1."""
@@ -80,7 +84,6 @@ class Lease:
     def bytes(self) -> int: ...
     def check(self) -> None: ...
     def export(self) -> Export: ...
-    def write(self, value: object) -> bool: ...
     def __buffer__(self, flags: int, /) -> memoryview: ...
 
 class Export:
@@ -88,19 +91,41 @@ class Export:
 
     def __buffer__(self, flags: int, /) -> memoryview: ...
 
-class Session:
-    """One client's scene."""
+class Slots:
+    """The first slots of a lease: ``contactd.view.Slots``."""
 
+    def __new__(cls, lease: Lease, count: int) -> Self: ...
     @property
-    def options(self) -> Options: ...
+    def _lease(self) -> Lease: ...
     @property
-    def closed(self) -> bool: ...
-    def opened(self) -> tuple[int, int, int]: ...
-    def load_model(
+    def _array(self) -> np.ndarray: ...
+    def __len__(self) -> int: ...
+    def __setitem__(self, key: Any, value: Any) -> None: ...
+
+class Session:
+    """One client's scene: ``contactd.Session``."""
+
+    def __new__(cls, server: str | None = None, config: str | os.PathLike[str] | None = None) -> Self: ...
+    @property
+    def options(self) -> Options:
+        """What is asked of the steps to come."""
+    @property
+    def id(self) -> int:
+        """The session's id on its server."""
+    @property
+    def epoch(self) -> int:
+        """Changes with every start of the server."""
+    @property
+    def max_batch(self) -> int:
+        """Most records of a batch."""
+    @property
+    def closed(self) -> bool:
+        """True after ``close``."""
+    def _load_model(
         self, name: str, text: str, facets: str
     ) -> tuple[int, list[tuple[int, str, str, bool]], list[str]]: ...
-    def mass_properties(self, model: int, tolerance: float, boxes: int) -> MassProperties: ...
-    def add_object(
+    def _mass_properties(self, model: int, tolerance: float, boxes: int) -> MassProperties: ...
+    def _add_object(
         self,
         name: str,
         model: int,
@@ -111,37 +136,81 @@ class Session:
         place: _Pose,
         at: _Pose,
     ) -> int: ...
-    def remove_object(self, object: int) -> None: ...
-    def set_rules(self, rules: list) -> None: ...
-    def set_resolution(self, resolution: float | None) -> None: ...
-    def begin_step(self, n: int) -> Lease: ...
-    def resend(self) -> Lease: ...
-    def send(self) -> None: ...
-    def finish(self, timeout: float | None = None) -> Reply: ...
-    def reconnect(self, timeout: float) -> None: ...
-    def close(self) -> None: ...
-    def _steps_in_rust(self, batches: list[bytes], steps: int) -> list[int]: ...
+    def _set_rules(self, rules: list) -> None: ...
+    def remove_object(self, object: int) -> None:
+        """Removes an object; its id is not used again."""
+    def set_resolution(self, resolution: float | None) -> None:
+        """Sets the resolution of every pair, a length; None: each pair its default."""
+    def begin_step(self, n: int) -> View:
+        """Slots for ``n`` poses (dtype ``POSE``), all zero, to be filled in place until the step is sent.
+
+        A batch that was begun and not sent is dropped. The views of the step before are over.
+        """
+    def send(self) -> None:
+        """Sends the batch without waiting; ``finish`` does it too."""
+    def finish(self, timeout: float | None = None) -> PublicReply:
+        """Sends the batch if it was not yet, and waits for its answer, which is read in place.
+
+        ``timeout`` in seconds; None waits for as long as the server lives. Other threads run meanwhile, and Ctrl-C ends the wait
+        for a server. ``Refused`` has the index of the offending record, and nothing has changed; after ``Timeout`` the step is
+        still in flight: call again; after ``ServerLost`` see ``reconnect`` and ``resend``.
+        """
+    def reconnect(self, timeout: float = 10.0) -> None:
+        """After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
+        models, objects, rules and last poses. Ids stay the same. An embedded session has nothing to find again: ``Misuse``."""
+    def resend(self) -> View:
+        """After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses."""
+    def close(self) -> None:
+        """Ends the session. Again does nothing; a server that is gone has ended it already."""
+    def _whole_in_rust(self, batch: np.ndarray) -> int: ...
+    def _fields_in_rust(
+        self, objects: np.ndarray, flags: int, positions: np.ndarray, rotations: np.ndarray
+    ) -> int: ...
 
 class Reply:
-    """The answer to a step: its header, and the lease of its slots."""
+    """The answer to a step: ``contactd.Reply``."""
 
+    def __new__(cls, lease: Lease) -> Self: ...
+    def __len__(self) -> int: ...
     @property
-    def lease(self) -> Lease: ...
+    def records(self) -> View:
+        """The contact records (dtype ``CONTACT``) in the order (time, a, b)."""
     @property
-    def step(self) -> int: ...
+    def slots(self) -> View:
+        """All slots as they lie in memory: the records, then their further slots."""
     @property
-    def status(self) -> int: ...
+    def _lease(self) -> Lease: ...
     @property
-    def n_records(self) -> int: ...
+    def step(self) -> int:
+        """The step's number."""
     @property
-    def safe_time(self) -> float: ...
+    def _status(self) -> int: ...
     @property
-    def truncated(self) -> bool: ...
+    def safe_time(self) -> float:
+        """Smallest time_lower over all pairs: safe to advance to."""
     @property
-    def effects(self) -> int: ...
+    def truncated(self) -> bool:
+        """True when ``max_records`` left records out."""
     @property
-    def pairs(self) -> int: ...
+    def _effects(self) -> int: ...
     @property
-    def counters(self) -> list[tuple[str, int]]: ...
+    def pairs(self) -> int:
+        """Pairs that the broad phase let through."""
     @property
-    def effect_counters(self) -> list[tuple[str, int]]: ...
+    def counters(self) -> dict[str, int]:
+        """Counted work by name; no part of the answer's bits."""
+    @property
+    def effect_counters(self) -> dict[str, int]:
+        """How often each effect was worked out, by its word."""
+
+class Manifolds:
+    """The points of all pairs, from step to step: ``contactd.manifold.Manifolds``."""
+
+    def __new__(cls) -> Self: ...
+    def _update(self, reply: Reply, placed: Callable[[int, float], _Pose]) -> None: ...
+    def start(self) -> None:
+        """Begins an update that is made record by record."""
+    def _add(self, reply: Reply, record: int, a: _Pose, b: _Pose) -> None: ...
+    def finish(self) -> None:
+        """Ends an update: pairs that were not added are forgotten."""
+    def _pairs(self) -> list[tuple[int, int, int, bool, list[_Point]]]: ...

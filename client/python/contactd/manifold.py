@@ -1,92 +1,91 @@
-"""Few points for many: what a solver needs of a contact region.
+"""Few points for many: what a solver needs of contact regions, with ids that stay from step to step.
 
-``manifold`` is the one way by which couplings get their contacts, so that how points are chosen can change in one place.
+    manifolds = contactd.manifold.Manifolds()
+    …                                                    # after each step
+    manifolds.update(reply, lambda object, time: poses[object])
+    for pair in manifolds:
+        for p in pair.points:
+            print(pair.a, pair.b, p.id, p.position, p.normal, p.separation)
+
+At most four points of each direction of contact. The rule of a pair needs ``report="patch"``; with a margin it tells points before
+they touch. An overlap has one point, with its depth where the rule asks for the penetration and the options for
+details. How points are chosen, and which ids they get, is told in ``client/src/manifold.rs``: this is the same code.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Callable, Iterator, NamedTuple
 
 import numpy as np
 
-from .records import Flag, Status, Valid
+from . import _native
+from .pose import PoseLike
+from .pose import pose as as_pose
 from .session import Reply
-from .view import View
-
-#: Points kept of a region: two bodies that lie on each other are held by three, and a rectangle by its corners.
-KEPT = 4
 
 
 class Point(NamedTuple):
     """A point of a manifold, in contactd's convention."""
 
+    #: Names the point within its pair, for as long as it lasts.
+    id: int
+    #: Which of the pair's groups of one normal it belongs to, from 0.
+    group: int
     #: Half way between the surfaces, world frame.
-    point: np.ndarray
-    #: Unit normal from a to b.
+    position: np.ndarray
+    #: Unit normal from a to b, world frame.
     normal: np.ndarray
-    #: Positive apart, negative in penetration.
+    #: Distance of the surfaces along the normal: positive apart, negative in penetration.
     separation: float
+    #: The point on a's surface, in a's object frame.
+    on_a: np.ndarray
+    #: The point on b's surface, in b's object frame.
+    on_b: np.ndarray
 
 
-def chosen(points: np.ndarray, separations: np.ndarray, normal: np.ndarray, keep: int = KEPT) -> np.ndarray:
-    """Indices, in order, of at most ``keep`` ≤ 4 points that span a region.
+class Manifold(NamedTuple):
+    """The points of a pair."""
 
-    The farthest from the middle; the farthest from that; the farthest from the line of both; and the one that adds most
-    area on the line's other side. Near ties go to the smaller index: contactd tells a region's points in an order fixed in the
-    bodies, so a body that lies still keeps its points. Separations decide nothing but that the nearest point is among them.
-    """
-    n = len(points)
-    if n <= keep:
-        return np.arange(n)
-    flat = points - points.mean(axis=0)
-    flat = flat - np.outer(flat @ normal, normal)
-    size = np.max(np.linalg.norm(flat, axis=1))
-    if size == 0.0:
-        return np.array([int(np.argmin(separations))])
-
-    def best(values: np.ndarray) -> int:
-        # The first of those that are as good as the best but for rounding.
-        return int(np.argmax(values >= values.max() - 1e-6 * size))
-
-    first = best(np.linalg.norm(flat, axis=1))
-    second = best(np.linalg.norm(flat - flat[first], axis=1))
-    along = flat[second] - flat[first]
-    length = float(np.linalg.norm(along))
-    if length <= 1e-6 * size:
-        return np.array([first])
-    side = (flat - flat[first]) @ np.cross(normal, along / length)
-    picks = [first, second]
-    for sign in (1.0, -1.0):
-        extreme = best(sign * side)
-        if sign * side[extreme] > 1e-3 * size:
-            picks.append(extreme)
-    nearest = int(np.argmin(separations))
-    if separations[nearest] < separations[picks].min() - 1e-3 * size and nearest not in picks:
-        # A corner that hangs lower than all that span the region bears first.
-        picks[min(range(len(picks)), key=lambda k: np.linalg.norm(flat[picks[k]] - flat[nearest]))] = nearest
-    return np.sort(np.array(picks[:keep]))
+    #: The object with the smaller id.
+    a: int
+    #: The other one.
+    b: int
+    #: The record's ``Status``: contact, clear or overlap.
+    status: int
+    #: False when the work limit cut the search for regions: there may be more points.
+    is_complete: bool
+    #: Groups in the order in which they were told, the points of each by id.
+    points: list[Point]
 
 
-def manifold(reply: Reply, record: View, keep: int = KEPT) -> list[Point]:
-    """The points by which a pair holds itself up: at most ``keep`` of each of its contact regions.
+class Manifolds(_native.Manifolds):
+    """The points of all pairs, from step to step."""
 
-    Of an overlap, which has no regions, the one point that the record proves; with details of a rule that asks for the
-    penetration, its depth and direction.
-    """
-    found = []
-    for region in reply.regions(record):
-        normal = region.slot["normal"].copy()
-        for i in chosen(region.points, region.separations, normal, keep):
-            found.append(Point(region.points[i], normal, float(region.separations[i])))
-    if not found and record["valid"] & Valid.POINT:
-        normal, separation = record["normal"].copy(), float(record["separation"])
-        detail = reply.detail(record) if record["status"] == Status.OVERLAP else None
-        if detail is not None and detail["penetration"] > 0.0:
-            normal, separation = detail["direction"].copy(), -float(detail["penetration"])
-        found.append(Point(record["point"].copy(), normal, separation))
-    return found
+    def update(self, reply: Reply, pose: Callable[[int, float], PoseLike]) -> None:
+        """Takes the answer to a step, once after each.
 
+        ``pose(object, time)``: where an object stood at that fraction of the step, fixed ones too: 0, its start, for pairs told
+        where they begin; the time of contact for those that meet. (For the pairs of ``detect="discrete"``, which are told
+        at their end, answer 0 with that; steps of ``Order.START`` have one pose.) Pairs that are not told are forgotten.
+        """
+        self._update(reply, lambda object, time: as_pose(pose(object, time)))
 
-def is_cut(record: View) -> bool:
-    """True when the work limit cut the search for a record's regions: there may be more points."""
-    return bool(record["flags"] & Flag.REGIONS_INCOMPLETE)
+    def add(self, reply: Reply, record: int, a: PoseLike, b: PoseLike) -> None:
+        """Takes one record of a reply, whose bodies stood at these poses at the moment that it tells of: between ``start()`` and
+        ``finish()``, for each pair at most once."""
+        self._add(reply, record, as_pose(a), as_pose(b))
+
+    @property
+    def pairs(self) -> list[Manifold]:
+        """All pairs that have points, in the order (a, b)."""
+        found = []
+        for a, b, status, is_complete, points in self._pairs():
+            told = [
+                Point(id, group, np.array(position), np.array(normal), separation, np.array(on_a), np.array(on_b))
+                for id, group, position, normal, separation, on_a, on_b in points
+            ]
+            found.append(Manifold(a, b, status, is_complete, told))
+        return found
+
+    def __iter__(self) -> Iterator[Manifold]:
+        return iter(self.pairs)

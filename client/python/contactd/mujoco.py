@@ -25,9 +25,10 @@ import numpy as np
 
 from . import session as sessions
 from .convention import contact_to_mujoco, quaternion_from_wxyz
-from .manifold import Point, manifold
+from .manifold import Manifolds, Point
+from .pose import Pose
 from .records import Order, Status
-from .session import Rule, Session, embedded
+from .session import Reply, Rule, Session, embedded
 
 _GROUP = "mujoco"
 
@@ -62,6 +63,10 @@ class Coupling:
         self.unit = unit
         #: Second requests so far, for pairs in overlap.
         self.retracted = 0
+        #: The contacts of the last step in the order in which MuJoCo got them: the bodies' ids in MuJoCo, and the point in contactd's
+        #: unit. Its ``id`` names it within the pair for as long as it lasts; -1: the depth alone of an overlap.
+        self.contacts: list[tuple[int, int, Point]] = []
+        self._manifolds, self._depths = Manifolds(), Manifolds()
         self._own = session is None
         self.session = embedded() if session is None else session
         try:
@@ -85,6 +90,7 @@ class Coupling:
         model, session = self.model, self.session
         self._bodies: dict[int, int] = {}
         self._geoms: dict[int, int] = {}
+        self._fixed: dict[int, Pose] = {}
         loaded: dict[str, sessions.Model] = {}
         moving = []
         for name, text in solids.items():
@@ -99,14 +105,16 @@ class Coupling:
                 loaded[text] = session.load_model(f"{name}.csg", text)
             fixed = bool(model.body_weldid[body] == 0)
             position, rotation = self._rest(body)
-            object = session.add_object(
-                name, loaded[text], group=_GROUP, fixed=fixed, at=(position / self.unit, rotation)
-            )
+            at = Pose(position / self.unit, rotation)
+            object = session.add_object(name, loaded[text], group=_GROUP, fixed=fixed, at=at)
             self._bodies[object] = body
             self._geoms[object] = geoms.start
-            if not fixed:
+            if fixed:
+                self._fixed[object] = at
+            else:
                 moving.append(object)
         self._moving = np.array(moving, dtype=np.uint32)
+        self._index = {object: i for i, object in enumerate(moving)}
         self._moving_bodies = np.array([self._bodies[o] for o in moving], dtype=int)
         # MuJoCo's own rule: a body does not meet its parent, unless that is welded to the world.
         names = {body: name for name, body in zip(solids, self._bodies.values())}
@@ -140,7 +148,9 @@ class Coupling:
         positions = data.xpos[self._moving_bodies] / self.unit
         rotations = quaternion_from_wxyz(data.xquat[self._moving_bodies])
         added = 0
+        self.contacts = []
         for a, b, point in self._points(positions, rotations):
+            self.contacts.append((self._bodies[a], self._bodies[b], point))
             contact = self._contact(a, b, point)
             if mj.mj_addContact(self.model, data, contact) != 0:
                 raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")
@@ -149,52 +159,71 @@ class Coupling:
 
     def _points(self, positions: np.ndarray, rotations: np.ndarray) -> list[tuple[int, int, Point]]:
         """Objects and points of all contacts, in contactd's unit."""
-        found: list[tuple[int, int, Point]] = []
-        deep: list[tuple[int, int, Point]] = []
-        for a, b, status, points in self._ask(positions, rotations):
-            (deep if status == Status.OVERLAP else found).extend((a, b, p) for p in points)
-        if not deep:
-            return found
-        self.retracted += 1
-        # Each pair in overlap is moved apart along its direction, the moving body alone, to half a skin's gap.
-        index = {int(o): i for i, o in enumerate(self._moving)}
+        kept, depths = self._manifolds, self._depths
+        kept.start(), depths.start()
+        reply = self._ask(positions, rotations)
+        for i, record in enumerate(reply):
+            a, b = int(record["a"]), int(record["b"])
+            told = depths if record["status"] == Status.OVERLAP else kept
+            told.add(reply, i, self._place(a, positions, rotations), self._place(b, positions, rotations))
+        depths.finish()
+        deep = {(pair.a, pair.b): point for pair in depths for point in pair.points}
         back = np.zeros_like(positions)
-        for a, b, p in deep:
+        if deep:
+            self._retract(deep, back, rotations, positions)
+        kept.finish()
+        found = []
+        for pair in kept:
+            away = self._gone(pair.a, pair.b, back) if deep.pop((pair.a, pair.b), None) else 0.0
+            # The gap that a pair has where it really is.
+            gaps = [p._replace(separation=p.separation - float(np.sum(p.normal * away))) for p in pair.points]
+            found.extend((pair.a, pair.b, p) for p in gaps)
+        found.extend((a, b, p._replace(id=-1)) for (a, b), p in deep.items())
+        return found
+
+    def _retract(
+        self, deep: dict[tuple[int, int], Point], back: np.ndarray, rotations: np.ndarray, positions: np.ndarray
+    ) -> None:
+        """Asks about the pairs in overlap once more, each moved apart along its direction, the moving body alone, to half a skin's gap;
+        how far each body went is added to ``back``, the points that the pairs have there to those that are kept."""
+        self.retracted += 1
+        for (a, b), p in deep.items():
             way = p.normal * (0.5 * self.skin / self.unit - p.separation)
             # The normal points from a to b: b goes along, a against; where both move b does.
-            body, way = (index[b], way) if b in index else (index[a], -way)
+            body, way = (self._index[b], way) if b in self._index else (self._index[a], -way)
             # What an earlier pair has asked for already need not be gone again.
             length = np.linalg.norm(way)
             back[body] += way * max(0.0, 1.0 - float(back[body] @ way) / float(length * length))
-        overlapping = {(a, b): p for a, b, p in deep}
-        for a, b, status, points in self._ask(positions + back, rotations):
-            if (a, b) not in overlapping:
-                continue
-            deepest = overlapping.pop((a, b))
-            if status == Status.OVERLAP or not points:
-                found.append((a, b, deepest))
-                continue
-            gone = (back[index[b]] if b in index else 0.0) - (back[index[a]] if a in index else 0.0)
-            # The gap that the pair has where it really is.
-            found.extend((a, b, p._replace(separation=p.separation - float(p.normal @ gone))) for p in points)
-        found.extend((a, b, p) for (a, b), p in overlapping.items())
-        return found
+        moved = positions + back
+        reply = self._ask(moved, rotations)
+        for i, record in enumerate(reply):
+            a, b = int(record["a"]), int(record["b"])
+            if (a, b) in deep and record["status"] != Status.OVERLAP:
+                self._manifolds.add(reply, i, self._place(a, moved, rotations), self._place(b, moved, rotations))
 
-    def _ask(self, positions: np.ndarray, rotations: np.ndarray) -> list[tuple[int, int, int, list[Point]]]:
+    def _gone(self, a: int, b: int, back: np.ndarray) -> np.ndarray | float:
+        """How far b went from a."""
+        return (back[self._index[b]] if b in self._index else 0.0) - (back[self._index[a]] if a in self._index else 0.0)
+
+    def _place(self, object: int, positions: np.ndarray, rotations: np.ndarray) -> Pose:
+        """Where an object stands."""
+        at = self._index.get(object)
+        return self._fixed[object] if at is None else Pose(positions[at], rotations[at])
+
+    def _ask(self, positions: np.ndarray, rotations: np.ndarray) -> Reply:
         poses = self.session.begin_step(len(self._moving))
         poses["object"] = self._moving
         poses["flags"] = Order.START
         poses["position"] = positions
         poses["rotation"] = rotations
-        reply = self.session.finish()
-        return [(int(r["a"]), int(r["b"]), int(r["status"]), manifold(reply, r)) for r in reply]
+        return self.session.finish()
 
     def _contact(self, a: int, b: int, point: Point) -> mj.MjContact:
         model = self.model
         g1, g2 = self._geoms[a], self._geoms[b]
         contact = mj.MjContact()
         contact.pos, contact.frame, contact.dist = contact_to_mujoco(
-            point.point * self.unit, point.normal, point.separation * self.unit
+            point.position * self.unit, point.normal, point.separation * self.unit
         )
         contact.includemargin = self.skin
         contact.geom = [g1, g2]

@@ -10,14 +10,11 @@ from typing import Any, Iterable, Iterator, NamedTuple, Sequence
 import numpy as np
 
 from . import _native
-from ._native import Lease, MassProperties, Options
+from ._native import MassProperties
 from .errors import Error
 from .pose import PoseLike, pose
-from .records import CONTACT, DETAIL, PATCH, POSE, REGION, Effect, StepStatus, Tag
-from .view import Slots, View
-
-_slots = Slots.of
-_new = object.__new__
+from .records import DETAIL, PATCH, REGION, Effect, StepStatus, Tag
+from .view import Part, View
 
 
 class Face(NamedTuple):
@@ -77,40 +74,14 @@ class Region(NamedTuple):
     separations: np.ndarray
 
 
-class Reply:
+class Reply(_native.Reply):
     """The answer to a step, read in place.
 
     ``records`` and all further slots are views: they raise once the session begins another step, reconnects or closes. The header
     (``safe_time``, ``status`` …) stays.
     """
 
-    __slots__ = ("_native", "_lease", "_records", "_slots")
-
-    _native: _native.Reply
-    _lease: Lease
-    _records: Slots | None
-    _slots: Slots | None
-
-    @property
-    def records(self) -> View:
-        """The contact records (dtype ``CONTACT``) in the order (time, a, b)."""
-        self._lease.check()
-        records = self._records
-        if records is None:
-            records = self._records = _slots(self._lease, CONTACT, self._native.n_records)
-        return records
-
-    @property
-    def slots(self) -> View:
-        """All slots as they lie in memory: the records, then their further slots."""
-        self._lease.check()
-        slots = self._slots
-        if slots is None:
-            slots = self._slots = _slots(self._lease, CONTACT, self._lease.bytes // CONTACT.itemsize)
-        return slots
-
-    def __len__(self) -> int:
-        return self._native.n_records
+    __slots__ = ()
 
     def __iter__(self) -> Iterator[View]:
         return iter(self.records)
@@ -122,7 +93,7 @@ class Reply:
         """The detail slot (dtype ``DETAIL``) of a record, when details were asked for."""
         for slot in self._further(record):
             if slot["a"] == Tag.DETAIL:
-                return View(slot.view(DETAIL), self._lease)
+                return Part(slot.view(DETAIL), self._lease)
         return None
 
     def regions(self, record: int | View) -> list[Region]:
@@ -134,7 +105,7 @@ class Reply:
             n = int(slot["points"])
             patches = further[i + 1 : i + 1 + -(-n // 4)].view(PATCH)
             points = patches["points"].reshape(-1, 3)[:n]
-            found.append(Region(View(slot, self._lease), points.copy(), patches["separations"].ravel()[:n].astype(float)))
+            found.append(Region(Part(slot, self._lease), points.copy(), patches["separations"].ravel()[:n].astype(float)))
         return found
 
     def patches(self, record: int | View) -> View:
@@ -146,17 +117,17 @@ class Reply:
     def details(self) -> View:
         """The detail slots of all records in order. A view where they stand alone, as they do unless regions were asked for;
         otherwise a copy."""
-        return self._chosen(self.slots._array[self._native.n_records :], Tag.DETAIL, DETAIL)
+        return self._chosen(self.slots._array[len(self) :], Tag.DETAIL, DETAIL)
 
     @property
     def all_regions(self) -> View:
         """The region slots of all records in order; a copy unless they stand alone."""
-        return self._chosen(self.slots._array[self._native.n_records :], Tag.REGION, REGION)
+        return self._chosen(self.slots._array[len(self) :], Tag.REGION, REGION)
 
     @property
     def all_patches(self) -> View:
         """The patch slots of all records in order; a copy unless they stand alone."""
-        return self._chosen(self.slots._array[self._native.n_records :], Tag.PATCH, PATCH)
+        return self._chosen(self.slots._array[len(self) :], Tag.PATCH, PATCH)
 
     def _further(self, record: int | View) -> np.ndarray:
         own = record if isinstance(record, View) else self.records[record]
@@ -166,65 +137,28 @@ class Reply:
     def _chosen(self, further: np.ndarray, tag: Tag, dtype: np.dtype) -> View:
         at = np.flatnonzero(further["a"] == tag)
         if len(at) and at[-1] - at[0] == len(at) - 1:
-            return View(further[at[0] : at[-1] + 1].view(dtype), self._lease)
-        return View(further[at].view(dtype), self._lease)
-
-    @property
-    def safe_time(self) -> float:
-        """Smallest time_lower over all pairs: safe to advance to."""
-        return self._native.safe_time
+            return Part(further[at[0] : at[-1] + 1].view(dtype), self._lease)
+        return Part(further[at].view(dtype), self._lease)
 
     @property
     def status(self) -> StepStatus:
         """Whether any pair meets, or was left undecided."""
-        return StepStatus(self._native.status)
-
-    @property
-    def truncated(self) -> bool:
-        """True when ``max_records`` left records out."""
-        return self._native.truncated
-
-    @property
-    def step(self) -> int:
-        """The step's number."""
-        return self._native.step
-
-    @property
-    def pairs(self) -> int:
-        """Pairs that the broad phase let through."""
-        return self._native.pairs
+        return StepStatus(self._status)
 
     @property
     def effects(self) -> Effect:
         """Effects that ran."""
-        return Effect(self._native.effects)
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Counted work; no part of the answer's bits."""
-        return dict(self._native.counters)
-
-    @property
-    def effect_counters(self) -> dict[str, int]:
-        """How often each effect was worked out."""
-        return dict(self._native.effect_counters)
+        return Effect(self._effects)
 
     def __repr__(self) -> str:
         return f"Reply(step={self.step}, status={self.status.name}, records={len(self)}, safe_time={self.safe_time})"
 
 
-class Session:
+class Session(_native.Session):
     """One client's scene. One thread: the one that opened it. A context manager that closes it.
 
     Errors are ``contactd.Error`` and its subclasses.
     """
-
-    def __init__(self, native: _native.Session) -> None:
-        self._native = native
-        # Looked up once: a small step takes a few microseconds.
-        self._begin, self._finish = native.begin_step, native.finish
-        #: What is asked of the steps to come.
-        self.options: Options = native.options
 
     def __enter__(self) -> Session:
         return self
@@ -237,37 +171,17 @@ class Session:
             if error is None:
                 raise
 
-    @property
-    def id(self) -> int:
-        """The session's id on its server."""
-        return self._native.opened()[0]
-
-    @property
-    def epoch(self) -> int:
-        """Changes with every start of the server."""
-        return self._native.opened()[1]
-
-    @property
-    def max_batch(self) -> int:
-        """Most records of a batch."""
-        return self._native.opened()[2]
-
-    @property
-    def closed(self) -> bool:
-        """True after ``close``."""
-        return self._native.closed
-
     def load_model(self, name: str, text: str, facets: str = "auto") -> Model:
         """Loads a model from OpenSCAD CSG text; ``name`` stands in error sentences.
 
         ``facets``: how curved primitives are taken, "auto", "exact" or "as-written".
         """
-        id, faces, warnings = self._native.load_model(name, text, facets)
+        id, faces, warnings = self._load_model(name, text, facets)
         return Model(id, [Face(*face) for face in faces], warnings)
 
     def mass_properties(self, model: Model | int, tolerance: float = 1e-6, boxes: int = 1_000_000) -> MassProperties:
         """Volume, centre of mass and inertia of a model, in its own frame and unit, density 1, each with a proven bound."""
-        return self._native.mass_properties(_id(model), tolerance, boxes)
+        return self._mass_properties(_id(model), tolerance, boxes)
 
     def add_object(
         self,
@@ -287,58 +201,11 @@ class Session:
         point of it is ever faster, length per second; steps then need ``options.dt``. ``place``: the model in the object's
         frame. ``at``: where the object stands. Poses are a ``Pose``, a pair of position and quaternion x y z w, or a position.
         """
-        return self._native.add_object(name, _id(model), group, fixed, rotates, max_speed, pose(place), pose(at))
-
-    def remove_object(self, object: int) -> None:
-        """Removes an object; its id is not used again."""
-        self._native.remove_object(object)
+        return self._add_object(name, _id(model), group, fixed, rotates, max_speed, pose(place), pose(at))
 
     def set_rules(self, rules: Iterable[Rule]) -> None:
         """Replaces the session's rules; ``Refused`` with the index of a bad one."""
-        self._native.set_rules(list(rules))
-
-    def set_resolution(self, resolution: float | None) -> None:
-        """Sets the resolution of every pair, a length; None: each pair its default."""
-        self._native.set_resolution(resolution)
-
-    def begin_step(self, n: int) -> View:
-        """Slots for ``n`` poses (dtype ``POSE``), all zero, to be filled in place until the step is sent.
-
-        A batch that was begun and not sent is dropped. The views of the step before are over.
-        """
-        return _slots(self._begin(n), POSE, n)
-
-    def send(self) -> None:
-        """Sends the batch without waiting; ``finish`` does it too."""
-        self._native.send()
-
-    def finish(self, timeout: float | None = None) -> Reply:
-        """Sends the batch if it was not yet, and waits for its answer, which is read in place.
-
-        ``timeout`` in seconds; None waits for as long as the server lives. Other threads run meanwhile, and Ctrl-C ends the wait
-        for a server. ``Refused`` has the index of the offending record, and nothing has changed; after ``Timeout`` the step is
-        still in flight: call again; after ``ServerLost`` see ``reconnect`` and ``resend``.
-        """
-        native = self._finish(timeout)
-        reply = _new(Reply)
-        reply._native = native
-        reply._lease = native.lease
-        reply._records = reply._slots = None
-        return reply
-
-    def reconnect(self, timeout: float = 10.0) -> None:
-        """After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
-        models, objects, rules and last poses. Ids stay the same."""
-        self._native.reconnect(timeout)
-
-    def resend(self) -> View:
-        """After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses."""
-        lease = self._native.resend()
-        return _slots(lease, POSE, lease.bytes // POSE.itemsize)
-
-    def close(self) -> None:
-        """Ends the session. Again does nothing; a server that is gone has ended it already."""
-        self._native.close()
+        self._set_rules(list(rules))
 
 
 def _id(model: Model | int) -> int:
@@ -347,9 +214,9 @@ def _id(model: Model | int) -> int:
 
 def connect(name: str = "default") -> Session:
     """A session on the server called ``name`` of this user (``contactd serve --name NAME``)."""
-    return Session(_native.connect(name))
+    return Session(name)
 
 
 def embedded(config: str | os.PathLike[str] | None = None) -> Session:
     """A session on an engine in this process: no server, the same bits. ``config``: a server's configuration file."""
-    return Session(_native.embedded(config))
+    return Session(config=config)

@@ -17,27 +17,25 @@ from typing import Any, Iterator
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from . import _native
 from ._native import Lease
 
 # Ways to the memory that neither a check nor a count would see.
 _CLOSED = frozenset({"base", "ctypes", "data", "flat", "getfield", "resize", "setfield", "setflags", "view"})
 
 
-_ALL = slice(None)
-_ndarray = np.ndarray
-_new = object.__new__
 _MOST = {n: 256**n - 1 for n in (1, 2, 4, 8)}
 
 
 class View(NDArrayOperatorsMixin):
     """An array in the memory of one step, valid until that step is over."""
 
-    __slots__ = ("_array", "_lease")
+    __slots__ = ()
     __hash__ = None  # type: ignore[assignment]
 
-    def __init__(self, array: np.ndarray, lease: Lease) -> None:
-        self._array = array
-        self._lease = lease
+    #: The array it stands for, never touched but after its lease was asked.
+    _array: np.ndarray
+    _lease: Lease
 
     # What is read
 
@@ -50,12 +48,12 @@ class View(NDArrayOperatorsMixin):
                 return found[()]
             base = found.base
             if base is array or base is array.base:
-                return View(found, self._lease)
+                return Part(found, self._lease)
             return found  # chosen by a list or a mask: a copy
         if type(found) is np.void:
             # A record: numpy's own would look at the memory without asking.
             key = key if type(key) is tuple else (key,)
-            return View(array[(*key, ...)], self._lease)
+            return Part(array[(*key, ...)], self._lease)
         return found
 
     def __getattr__(self, name: str) -> Any:
@@ -144,6 +142,9 @@ class View(NDArrayOperatorsMixin):
     # What is written
 
     def __setitem__(self, key: Any, value: Any) -> None:
+        self._assign(key, value)
+
+    def _assign(self, key: Any, value: Any) -> None:
         self._lease.check()
         array = self._array
         dtype = array.dtype
@@ -193,43 +194,21 @@ class View(NDArrayOperatorsMixin):
         return _own_of(found, [self._lease])
 
 
-class Slots(View):
-    """The first ``count`` slots of a lease, of one dtype. Their array is made when it is needed: a batch that is assigned as a whole
-    needs none, nor does an empty reply."""
+class Part(View):
+    """What was taken of a view: a field, some slots, one of them."""
 
-    __slots__ = ("_count", "_made", "_type")
-    _count: int
-    _made: np.ndarray | None
-    _type: np.dtype
+    __slots__ = ("_array", "_lease")
 
-    @staticmethod
-    def of(lease: Lease, dtype: np.dtype, count: int) -> Slots:
-        """Those of a lease. Two are made in every step: without ``__init__``, which Python enters anew, they cost half."""
-        slots = _new(Slots)
-        slots._lease = lease
-        slots._type = dtype
-        slots._count = count
-        slots._made = None
-        return slots
+    def __init__(self, array: np.ndarray, lease: Lease) -> None:
+        self._array = array
+        self._lease = lease
 
-    def __len__(self) -> int:
-        self._lease.check()
-        return self._count
 
-    @property
-    def _array(self) -> np.ndarray:  # type: ignore[override]
-        made = self._made
-        if made is None:
-            memory: Any = self._lease  # a buffer, which numpy's stubs know by its name alone
-            made = self._made = np.ndarray((self._count,), self._type, memory)
-        return made
+class Slots(_native.Slots, View):  # type: ignore[misc]
+    """The first slots of a lease, of one dtype. What every step does of it is native: it is made without its array, and a batch or a
+    field that numpy would copy as it is, is copied there; the rest comes to ``View._assign``."""
 
-    def __setitem__(self, key: Any, value: Any) -> None:
-        if type(key) is slice and key == _ALL and type(value) is _ndarray and value.ndim == 1:
-            dtype = value.dtype
-            if (dtype is self._type or dtype == self._type) and self._lease.write(value):
-                return
-        super().__setitem__(key, value)
+    __slots__ = ()
 
 
 def _inner(value: Any) -> Any:
@@ -259,7 +238,7 @@ def _own_of(found: Any, leases: list[Lease]) -> Any:
         at = found.__array_interface__["data"][0]
         for lease in leases:
             if lease.address <= at < lease.address + max(lease.bytes, 1):
-                return View(found, lease)
+                return Part(found, lease)
     if type(found) is np.void:
         return found.copy()
     return found

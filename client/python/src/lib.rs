@@ -1,24 +1,28 @@
 //! Native module of the Python package `contactd`: one session type over shared memory or an engine in this process.
 //!
-//! It holds what needs Rust: the session, the memory of its poses and replies, the records' layouts. Views, rules, poses and
-//! exceptions are Python (`contactd/*.py`), which is what users see.
+//! It holds what needs Rust, and what every step does: the session, the memory of its poses and replies, the records' layouts.
+//! Views, rules, poses and exceptions are Python (`contactd/*.py`), which is what users see.
 //!
-//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`) and where the interpreter's lock is released
+//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`) and where the interpreter's lock is released
 //! around a session that belongs to one thread (`confined.rs`).
 
 mod confined;
 mod errors;
 mod layout;
 mod lease;
+mod manifold;
 mod mass;
 mod options;
+mod reply;
 mod rules;
 mod session;
+mod slots;
 
 use pyo3::prelude::*;
 
 /// The native part of `contactd`.
-#[pymodule]
+// References are counted to see what nobody else has (`session.rs`); without the interpreter's lock their number is no proof.
+#[pymodule(gil_used = true)]
 mod _native {
     #[pymodule_export]
     use crate::errors::error_codes;
@@ -27,11 +31,17 @@ mod _native {
     #[pymodule_export]
     use crate::lease::{Export, Lease};
     #[pymodule_export]
+    use crate::manifold::Manifolds;
+    #[pymodule_export]
     use crate::mass::MassProperties;
     #[pymodule_export]
     use crate::options::Options;
     #[pymodule_export]
-    use crate::session::{Reply, Session, connect, embedded};
+    use crate::reply::Reply;
+    #[pymodule_export]
+    use crate::session::Session;
+    #[pymodule_export]
+    use crate::slots::Slots;
 
     /// Version of the package.
     #[pymodule_export]

@@ -1,20 +1,24 @@
-//! The session, and the reply of a step. Everything that may take time runs with the interpreter's lock released.
+//! The session. Everything that may take time runs with the interpreter's lock released.
 
-use crate::confined::{Confined, detached};
+use crate::confined::{Confined, Thread, detached};
 use crate::errors;
-use crate::lease::{Lease, Span};
+use crate::lease::{Lease, What};
 use crate::mass::MassProperties;
 use crate::options::Options;
+use crate::reply::Reply;
 use crate::rules::RuleFields;
+use crate::slots::{Held, Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::control::Facets;
+use contactd_client::transport::Opened;
 use contactd_client::{Error, MassOptions, Object, SharedMemory, StepOptions, Transport};
 use contactd_proto::names::Address;
 use contactd_proto::{ContactRecord, Pose, PoseRecord, StepReply};
 use glam::{DQuat, DVec3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::sync::Arc;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 type Inner = contactd_client::Session<Box<dyn Transport>>;
@@ -30,34 +34,35 @@ pub fn pose(position: [f64; 3], rotation: [f64; 4]) -> Pose {
     Pose::new(DVec3::from_array(position), DQuat::from_array(rotation))
 }
 
-/// One client's scene.
-#[pyclass(module = "contactd._native")]
+/// One client's scene; `contactd.Session` inherits from it.
+#[pyclass(subclass, module = "contactd._native")]
 pub struct Session {
-    inner: Confined<Option<Inner>>,
+    /// Held by all leases too: memory stays while anyone can point to it. Locked by calls alone, one at a time.
+    inner: Arc<Mutex<Confined<Option<Inner>>>>,
+    thread: Thread,
     options: Py<Options>,
-    poses: Option<Arc<Span>>,
-    reply: Option<Arc<Span>>,
-}
-
-/// A session on the server called `name` of this user.
-#[pyfunction]
-pub fn connect(py: Python<'_>, name: &str) -> PyResult<Session> {
-    open(py, || Ok(Box::new(SharedMemory::new(Address::of(name)?))))
-}
-
-/// A session on an engine in this process; `config` is a server's configuration file.
-#[pyfunction]
-#[pyo3(signature = (config = None))]
-pub fn embedded(py: Python<'_>, config: Option<std::path::PathBuf>) -> PyResult<Session> {
-    let config = config.map_or_else(|| Ok(ServerConfig::default()), |path| ServerConfig::read(&path));
-    let config = config.map_err(PyValueError::new_err)?;
-    open(py, move || Ok(Box::new(Embedded::new(&config))))
+    /// Those whose memory may be looked at.
+    poses: Option<Py<Lease>>,
+    reply: Option<Py<Lease>>,
+    /// What the last two steps were handed out in. A loop holds those of one step until it has those of the next: then the ones before
+    /// are nobody's, and become the next one's. Making them anew takes several times as long.
+    spare_poses: [Option<Py<Slots>>; 2],
+    spare_replies: [Option<Py<Reply>>; 2],
 }
 
 fn open(py: Python<'_>, make: impl FnOnce() -> Result<Box<dyn Transport>, Error> + Send) -> PyResult<Session> {
     let opened = py.detach(|| make().and_then(Inner::new).map(|inner| Confined::new(Some(inner))));
     let inner = opened.map_err(|e| errors::of(py, &e))?;
-    Ok(Session { inner, options: Py::new(py, Options::default())?, poses: None, reply: None })
+    let thread = inner.thread();
+    Ok(Session {
+        inner: Arc::new(Mutex::new(inner)),
+        thread,
+        options: Py::new(py, Options::default())?,
+        poses: None,
+        reply: None,
+        spare_poses: [None, None],
+        spare_replies: [None, None],
+    })
 }
 
 impl Session {
@@ -66,50 +71,126 @@ impl Session {
         slf.try_borrow_mut().map_err(|_| errors::misuse(slf.py(), "the session is in use by another call"))
     }
 
-    fn open_inner(&mut self, py: Python<'_>) -> PyResult<&mut Inner> {
-        self.inner.get_mut(py)?.as_mut().ok_or_else(|| errors::misuse(py, "the session is closed"))
+    fn opened(slf: &Bound<'_, Self>) -> PyResult<Opened> {
+        let py = slf.py();
+        Self::enter(slf)?.with(py, |s| s.opened())
     }
 
-    /// Runs a call of the session with the interpreter's lock released.
+    /// Runs `work` on what is behind the session, closed or not.
+    fn with_any<R>(&self, py: Python<'_>, work: impl FnOnce(&mut Option<Inner>) -> R) -> PyResult<R> {
+        // A panic of the engine leaves the session as it is: it must still be possible to close it.
+        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(work(inner.get_mut(py)?))
+    }
+
+    /// Runs `work` on the session while it is open.
+    fn with<R>(&self, py: Python<'_>, work: impl FnOnce(&mut Inner) -> R) -> PyResult<R> {
+        match self.with_any(py, |inner| inner.as_mut().map(work))? {
+            Some(result) => Ok(result),
+            None => Err(errors::misuse(py, "the session is closed")),
+        }
+    }
+
+    /// The same with the interpreter's lock released, of work that may fail.
+    fn detached<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Inner) -> Result<R, Error> + Send,
+    ) -> PyResult<R> {
+        self.with(py, |s| detached(py, s, work))?.map_err(|e| errors::of(py, &e))
+    }
+
+    /// A call of the session with the interpreter's lock released.
     fn call<R: Send>(slf: &Bound<'_, Self>, work: impl FnOnce(&mut Inner) -> Result<R, Error> + Send) -> PyResult<R> {
-        let py = slf.py();
-        let mut this = Self::enter(slf)?;
-        detached(py, this.open_inner(py)?, work).map_err(|e| errors::of(py, &e))
+        Self::enter(slf)?.detached(slf.py(), work)
     }
 
     /// Takes the memory of poses and reply back.
     fn revoke(&mut self, py: Python<'_>) -> PyResult<()> {
-        let spans = [&mut self.poses, &mut self.reply];
-        spans.iter().filter_map(|s| s.as_ref()).try_for_each(|s| s.check_unexported(py))?;
-        spans.into_iter().filter_map(Option::take).for_each(|s| s.end());
+        let leases = [&mut self.poses, &mut self.reply];
+        leases.iter().filter_map(|l| l.as_ref()).try_for_each(|l| l.get().check_unexported(py))?;
+        leases.into_iter().filter_map(Option::take).for_each(|l| l.get().end());
         Ok(())
     }
 
-    /// Slots for poses from `loan`, as a lease.
+    /// Slots for poses from `loan`.
     fn loan(
         slf: &Bound<'_, Self>,
         loan: impl FnOnce(&mut Inner) -> Result<&mut [PoseRecord], Error>,
-    ) -> PyResult<Lease> {
+    ) -> PyResult<Py<Slots>> {
         let py = slf.py();
         let mut this = Self::enter(slf)?;
-        this.open_inner(py)?;
+        this.with(py, |_| ())?;
         this.revoke(py)?;
-        let slots = loan(this.open_inner(py)?).map_err(|e| errors::of(py, &e))?;
-        let (start, n) = (slots.as_mut_ptr(), slots.len());
-        let span = Span::new("poses", this.inner.thread());
-        this.poses = Some(span.clone());
-        Ok(Lease::new(span, start, n, true, slf.clone().unbind()))
+        let loaned = this.with(py, |s| loan(s).map(|slots| (slots.as_mut_ptr().cast_const(), slots.len())))?;
+        let (start, n) = loaned.map_err(|e| errors::of(py, &e))?;
+        let spare = this.spare_poses.iter().flatten().find(|slots| {
+            let lease = slots.get().lease();
+            Slots::alone(py, slots) == Some(references(py, lease)) && slots.get().renew(py, start.cast(), n)
+        });
+        let slots = match spare {
+            Some(slots) => {
+                slots.get().lease().get().renew(start, n);
+                slots.clone_ref(py)
+            }
+            None => {
+                let slots = Slots::of_poses(py, Lease::new(What::Poses, start, n, this.thread, this.inner.clone()))?;
+                this.spare_poses.rotate_right(1);
+                this.spare_poses[0] = Some(slots.clone_ref(py));
+                slots
+            }
+        };
+        this.poses = Some(slots.get().lease().clone_ref(py));
+        Ok(slots)
+    }
+
+    /// The reply whose slots lie in memory from `start` on.
+    fn reply(
+        &mut self,
+        py: Python<'_>,
+        header: &StepReply,
+        start: *const ContactRecord,
+        slots: usize,
+    ) -> PyResult<Py<Reply>> {
+        let spare = self.spare_replies.iter().flatten().find(|r| Reply::renew(py, r, start, slots, header));
+        let reply = match spare {
+            Some(reply) => reply.clone_ref(py),
+            None => {
+                let lease = Lease::new(What::Reply, start, slots, self.thread, self.inner.clone());
+                let reply = Reply::of(py, lease, *header)?;
+                self.spare_replies.rotate_right(1);
+                self.spare_replies[0] = Some(reply.clone_ref(py));
+                reply
+            }
+        };
+        self.reply = Some(reply.bind(py).try_borrow()?.lease().clone_ref(py));
+        Ok(reply)
+    }
+
+    /// Nanoseconds of a step whose slots `fill` fills in.
+    fn timed(slf: &Bound<'_, Self>, n: usize, fill: impl FnOnce(&mut [PoseRecord])) -> PyResult<u64> {
+        let py = slf.py();
+        let mut this = Self::enter(slf)?;
+        this.with(py, |_| ())?;
+        this.revoke(py)?;
+        let time = this.with(py, |session| {
+            let start = Instant::now();
+            fill(session.begin_step(n)?);
+            session.finish(Duration::from_secs(60))?;
+            Ok(start.elapsed().as_nanos() as u64)
+        })?;
+        time.map_err(|e| errors::of(py, &e))
     }
 
     /// Sends the poses if they were not yet: their memory is the server's from now on.
     fn send_loaned(&mut self, py: Python<'_>) -> PyResult<()> {
-        self.open_inner(py)?;
-        if let Some(span) = &self.poses {
-            span.check_unexported(py)?;
-            span.end();
+        self.with(py, |_| ())?;
+        if let Some(lease) = &self.poses {
+            lease.get().check_unexported(py)?;
+            lease.get().end();
             self.poses = None;
             let options = StepOptions::from(&*self.options.try_borrow(py)?);
-            self.open_inner(py)?.options = options;
+            self.with(py, |s| s.options = options)?;
         }
         Ok(())
     }
@@ -126,26 +207,50 @@ fn duration(seconds: Option<f64>) -> PyResult<Duration> {
 
 #[pymethods]
 impl Session {
+    /// On the server called `server` of this user; without one, on an engine in this process, whose configuration file (a server's) may
+    /// be given.
+    #[new]
+    #[pyo3(signature = (server = None, config = None))]
+    fn new(py: Python<'_>, server: Option<&str>, config: Option<PathBuf>) -> PyResult<Self> {
+        if let Some(name) = server {
+            return open(py, || Ok(Box::new(SharedMemory::new(Address::of(name)?))));
+        }
+        let config = config.map_or_else(|| Ok(ServerConfig::default()), |path| ServerConfig::read(&path));
+        let config = config.map_err(PyValueError::new_err)?;
+        open(py, move || Ok(Box::new(Embedded::new(&config))))
+    }
+
     /// What is asked of the steps to come.
     #[getter]
     fn options(&self, py: Python<'_>) -> Py<Options> {
         self.options.clone_ref(py)
     }
 
-    /// The session's id, its server's epoch, most records of a batch.
-    fn opened(slf: &Bound<'_, Self>) -> PyResult<(u64, u64, u32)> {
-        let mut this = Self::enter(slf)?;
-        let opened = this.open_inner(slf.py())?.opened();
-        Ok((opened.session, opened.epoch, opened.max_batch))
+    /// The session's id on its server.
+    #[getter]
+    fn id(slf: &Bound<'_, Self>) -> PyResult<u64> {
+        Self::opened(slf).map(|opened| opened.session)
+    }
+
+    /// Changes with every start of the server.
+    #[getter]
+    fn epoch(slf: &Bound<'_, Self>) -> PyResult<u64> {
+        Self::opened(slf).map(|opened| opened.epoch)
+    }
+
+    /// Most records of a batch.
+    #[getter]
+    fn max_batch(slf: &Bound<'_, Self>) -> PyResult<u32> {
+        Self::opened(slf).map(|opened| opened.max_batch)
     }
 
     /// True after `close`.
     #[getter]
     fn closed(slf: &Bound<'_, Self>) -> PyResult<bool> {
-        Ok(Self::enter(slf)?.inner.get_mut(slf.py())?.is_none())
+        Self::enter(slf)?.with_any(slf.py(), |inner| inner.is_none())
     }
 
-    fn load_model(slf: &Bound<'_, Self>, name: String, text: String, facets: &str) -> PyResult<Loaded> {
+    fn _load_model(slf: &Bound<'_, Self>, name: String, text: String, facets: &str) -> PyResult<Loaded> {
         let facets = match facets {
             "auto" => Facets::Auto,
             "exact" => Facets::Exact,
@@ -160,12 +265,12 @@ impl Session {
         Ok((info.id, faces, info.warnings))
     }
 
-    fn mass_properties(slf: &Bound<'_, Self>, model: u32, tolerance: f64, boxes: u64) -> PyResult<MassProperties> {
+    fn _mass_properties(slf: &Bound<'_, Self>, model: u32, tolerance: f64, boxes: u64) -> PyResult<MassProperties> {
         let options = MassOptions { tolerance, boxes };
         Self::call(slf, move |s| s.mass_properties(model, &options)).map(MassProperties)
     }
 
-    fn add_object(
+    fn _add_object(
         slf: &Bound<'_, Self>,
         name: &str,
         model: u32,
@@ -183,199 +288,120 @@ impl Session {
         Self::call(slf, move |s| s.add_object(object))
     }
 
+    /// Removes an object; its id is not used again.
     fn remove_object(slf: &Bound<'_, Self>, object: u32) -> PyResult<()> {
         Self::call(slf, move |s| s.remove_object(object))
     }
 
-    fn set_rules(slf: &Bound<'_, Self>, rules: Vec<RuleFields>) -> PyResult<()> {
+    fn _set_rules(slf: &Bound<'_, Self>, rules: Vec<RuleFields>) -> PyResult<()> {
         let rules = rules.into_iter().enumerate().map(|(i, r)| r.rule(slf.py(), i)).collect::<PyResult<Vec<_>>>()?;
         Self::call(slf, move |s| s.set_rules(&rules))
     }
 
+    /// Sets the resolution of every pair, a length; None: each pair its default.
+    #[pyo3(signature = (resolution))]
     fn set_resolution(slf: &Bound<'_, Self>, resolution: Option<f64>) -> PyResult<()> {
         Self::call(slf, move |s| s.set_resolution(resolution))
     }
 
-    /// Slots for `n` poses.
-    fn begin_step(slf: &Bound<'_, Self>, n: usize) -> PyResult<Lease> {
+    /// Slots for `n` poses (dtype ``POSE``), all zero, to be filled in place until the step is sent.
+    ///
+    /// A batch that was begun and not sent is dropped. The views of the step before are over.
+    fn begin_step(slf: &Bound<'_, Self>, n: usize) -> PyResult<Py<Slots>> {
         Self::loan(slf, |s| s.begin_step(n))
     }
 
-    /// The batch that was in flight when the server died, loaned again.
-    fn resend(slf: &Bound<'_, Self>) -> PyResult<Lease> {
+    /// After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses.
+    fn resend(slf: &Bound<'_, Self>) -> PyResult<Py<Slots>> {
         Self::loan(slf, |s| s.resend())
     }
 
+    /// Sends the batch without waiting; ``finish`` does it too.
     fn send(slf: &Bound<'_, Self>) -> PyResult<()> {
         let py = slf.py();
         let mut this = Self::enter(slf)?;
         this.send_loaned(py)?;
-        detached(py, this.open_inner(py)?, |s| s.send()).map_err(|e| errors::of(py, &e))
+        this.detached(py, |s| s.send())
     }
 
+    /// Sends the batch if it was not yet, and waits for its answer, which is read in place.
+    ///
+    /// ``timeout`` in seconds; None waits for as long as the server lives. Other threads run meanwhile, and Ctrl-C ends the wait
+    /// for a server. ``Refused`` has the index of the offending record, and nothing has changed; after ``Timeout`` the step is
+    /// still in flight: call again; after ``ServerLost`` see ``reconnect`` and ``resend``.
     #[pyo3(signature = (timeout = None))]
-    fn finish(slf: &Bound<'_, Self>, timeout: Option<f64>) -> PyResult<Reply> {
+    fn finish(slf: &Bound<'_, Self>, timeout: Option<f64>) -> PyResult<Py<Reply>> {
         let py = slf.py();
         let timeout = duration(timeout)?;
         let mut this = Self::enter(slf)?;
         this.send_loaned(py)?;
-        let start = Instant::now();
+        let mut left = timeout;
         let (header, address, slots) = loop {
-            let left = timeout.saturating_sub(start.elapsed());
-            let answer = detached(py, this.open_inner(py)?, |s| {
-                s.finish(left.min(SLICE)).map(|r| (*r.header(), r.slots().as_ptr() as usize, r.slots().len()))
-            });
+            let wait = left.min(SLICE);
+            let answer = this.with(py, |s| {
+                detached(py, s, |s| s.finish(wait).map(|r| (*r.header(), r.slots().as_ptr() as usize, r.slots().len())))
+            })?;
             match answer {
                 Ok(answer) => break answer,
-                Err(Error::Timeout) if left > SLICE => py.check_signals()?,
+                Err(Error::Timeout) if left > wait => {
+                    py.check_signals()?;
+                    left -= wait;
+                }
                 Err(e) => return Err(errors::of(py, &e)),
             }
         };
         this.options.try_borrow_mut(py)?.advance = 1.0;
-        let span = Span::new("reply", this.inner.thread());
-        this.reply = Some(span.clone());
-        let start = address as *const ContactRecord;
-        Ok(Reply { header, lease: Py::new(py, Lease::new(span, start, slots, false, slf.clone().unbind()))? })
+        this.reply(py, &header, address as *const ContactRecord, slots)
     }
 
+    /// After ``ServerLost`` or ``ReplyLost``: waits until a server of the same name runs, opens a session there and replays
+    /// models, objects, rules and last poses. Ids stay the same. An embedded session has nothing to find again: ``Misuse``.
+    #[pyo3(signature = (timeout = 10.0))]
     fn reconnect(slf: &Bound<'_, Self>, timeout: f64) -> PyResult<()> {
-        let timeout = duration(Some(timeout))?;
+        let (py, timeout) = (slf.py(), duration(Some(timeout))?);
         let mut this = Self::enter(slf)?;
-        this.open_inner(slf.py())?;
-        this.revoke(slf.py())?;
-        detached(slf.py(), this.open_inner(slf.py())?, |s| s.reconnect(timeout)).map_err(|e| errors::of(slf.py(), &e))
+        if this.with(py, |s| s.transport_mut().may_lose_server())? {
+            this.revoke(py)?;
+        }
+        this.detached(py, |s| s.reconnect(timeout))
     }
 
-    /// Ends the session. One whose server is gone has ended already.
+    /// Ends the session. Again does nothing; a server that is gone has ended it already.
     fn close(slf: &Bound<'_, Self>) -> PyResult<()> {
         let py = slf.py();
         let mut this = Self::enter(slf)?;
-        if this.inner.get_mut(py)?.is_none() {
+        if this.with_any(py, |inner| inner.is_none())? {
             return Ok(());
         }
         this.revoke(py)?;
-        match detached(py, this.inner.get_mut(py)?, |s| s.take().map_or(Ok(()), Inner::close)) {
+        match this.with_any(py, |inner| detached(py, inner, |s| s.take().map_or(Ok(()), Inner::close)))? {
             Ok(()) | Err(Error::ServerLost | Error::Misuse(_)) => Ok(()),
             Err(e) => Err(errors::of(py, &e)),
         }
     }
 
-    /// Nanoseconds of each of `steps` steps made by Rust alone, with the batches of pose records in `batches` taking turns: what
-    /// Python's own steps are compared with.
-    fn _steps_in_rust(slf: &Bound<'_, Self>, batches: Vec<Vec<u8>>, steps: usize) -> PyResult<Vec<u64>> {
-        let size = size_of::<PoseRecord>();
-        if batches.is_empty() || batches.iter().any(|b| b.len() % size != 0) {
-            return Err(PyValueError::new_err("expected batches of whole pose records"));
-        }
-        let batches: Vec<Vec<PoseRecord>> =
-            batches.iter().map(|b| b.chunks_exact(size).map(record).collect()).collect();
-        Self::enter(slf)?.revoke(slf.py())?;
-        Self::call(slf, move |s| {
-            let mut times = Vec::with_capacity(steps);
-            for k in 0..steps {
-                let batch = &batches[k % batches.len()];
-                let start = Instant::now();
-                s.begin_step(batch.len())?.copy_from_slice(batch);
-                s.finish(Duration::from_secs(60))?;
-                times.push(start.elapsed().as_nanos() as u64);
+    /// Nanoseconds of a step made by Rust alone, which copies a whole batch of pose records: what the same of Python's is compared with.
+    fn _whole_in_rust(slf: &Bound<'_, Self>, batch: &Bound<'_, PyAny>) -> PyResult<u64> {
+        let batch = Held::of(batch)?;
+        let batch: &[PoseRecord] = batch.all()?;
+        Self::timed(slf, batch.len(), |slots| slots.copy_from_slice(batch))
+    }
+
+    /// The same, of a batch that is filled in field by field from arrays.
+    fn _fields_in_rust(
+        slf: &Bound<'_, Self>,
+        objects: &Bound<'_, PyAny>,
+        flags: u32,
+        positions: &Bound<'_, PyAny>,
+        rotations: &Bound<'_, PyAny>,
+    ) -> PyResult<u64> {
+        let held = [Held::of(objects)?, Held::of(positions)?, Held::of(rotations)?];
+        let (objects, positions): (&[u32], &[[f64; 3]]) = (held[0].all()?, held[1].all()?);
+        let rotations: &[[f64; 4]] = held[2].all()?;
+        Self::timed(slf, objects.len(), |slots| {
+            for (((slot, object), position), rotation) in slots.iter_mut().zip(objects).zip(positions).zip(rotations) {
+                *slot = PoseRecord { object: *object, flags, position: *position, rotation: *rotation };
             }
-            Ok(times)
         })
-    }
-}
-
-/// A pose record from its 64 bytes.
-fn record(bytes: &[u8]) -> PoseRecord {
-    let word = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| bytes[at + i]));
-    let float = |at: usize| f64::from_le_bytes(std::array::from_fn(|i| bytes[at + i]));
-    PoseRecord {
-        object: word(0),
-        flags: word(4),
-        position: std::array::from_fn(|i| float(8 + 8 * i)),
-        rotation: std::array::from_fn(|i| float(32 + 8 * i)),
-    }
-}
-
-/// The answer to a step: its header, and the lease of its slots.
-#[pyclass(frozen, module = "contactd._native")]
-#[derive(Debug)]
-pub struct Reply {
-    header: StepReply,
-    lease: Py<Lease>,
-}
-
-#[pymethods]
-impl Reply {
-    /// The slots' memory.
-    #[getter]
-    fn lease(&self, py: Python<'_>) -> Py<Lease> {
-        self.lease.clone_ref(py)
-    }
-
-    /// The step's number.
-    #[getter]
-    fn step(&self) -> u64 {
-        self.header.step
-    }
-
-    /// `STEP_…`.
-    #[getter]
-    fn status(&self) -> u32 {
-        self.header.status
-    }
-
-    /// Contact records.
-    #[getter]
-    fn n_records(&self) -> u32 {
-        self.header.records
-    }
-
-    /// Smallest time_lower over all pairs.
-    #[getter]
-    fn safe_time(&self) -> f64 {
-        self.header.safe_time
-    }
-
-    /// Records were left out.
-    #[getter]
-    fn truncated(&self) -> bool {
-        self.header.truncated != 0
-    }
-
-    /// Bits of the effects that ran.
-    #[getter]
-    fn effects(&self) -> u32 {
-        self.header.effects
-    }
-
-    /// Pairs that the broad phase let through.
-    #[getter]
-    fn pairs(&self) -> u32 {
-        self.header.pairs
-    }
-
-    /// Counted work by name.
-    #[getter]
-    fn counters(&self) -> Vec<(&'static str, u64)> {
-        let c = &self.header.counters;
-        vec![
-            ("box_tests", c.box_tests),
-            ("primitives", c.primitives),
-            ("after_stage1", c.after_stage1),
-            ("node_pairs", c.node_pairs),
-            ("candidates", c.candidates),
-            ("cells", c.cells),
-            ("clauses", c.clauses),
-            ("newton", c.newton),
-            ("closed_forms", c.closed_forms),
-            ("may_have_passed", c.may_have_passed),
-            ("instant_cells", c.instant_cells),
-        ]
-    }
-
-    /// How often each effect was worked out, by its word.
-    #[getter]
-    fn effect_counters(&self) -> Vec<(&'static str, u64)> {
-        self.header.effect_counters.each().collect()
     }
 }

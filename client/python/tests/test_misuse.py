@@ -115,7 +115,7 @@ def test_a_plain_array_taken_of_a_view_holds_the_session_up(ball_and_wall):
     assert not times.flags.writeable and times[0] == 0.5
     with pytest.raises(BufferError, match="taken of the step's reply"):
         session.begin_step(1)
-    with pytest.raises(BufferError):
+    with pytest.raises(contactd.Misuse):  # embedded there is no server to find again
         session.reconnect(timeout=0)
     assert reply[0].time == 0.5 and times[0] == 0.5
     del times
@@ -281,6 +281,19 @@ def test_calls_out_of_order_are_misuse(ball_and_wall):
         with pytest.raises(ValueError, match="timeout"):
             session.finish(timeout=timeout)
     assert session.finish(timeout=float("inf"))[0].time == 0.5
+
+
+def test_an_embedded_session_has_nothing_to_find_again():
+    with contactd.embedded() as session:
+        ball, _ = fill(session)
+        session.set_rules([contactd.Rule(("default", "default"), sensor=True)])
+        session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+        reply = session.finish()
+        with pytest.raises(contactd.Misuse, match="no server that could be lost"):
+            session.reconnect(timeout=0)
+        assert reply[0].time == 0.5 and reply[0].flags & contactd.Flag.SENSOR, "the reply is still there"
+        session.begin_step(1)[0] = contactd.end(ball, (0, 0, 0))
+        assert session.finish()[0].flags & contactd.Flag.SENSOR, "rules stay"
 
 
 def test_a_closed_session_says_so(ball_and_wall):

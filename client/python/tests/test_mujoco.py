@@ -110,6 +110,21 @@ def test_a_ball_falls_through_a_real_hole():
         assert data.qpos[2] == pytest.approx(0.03, abs=coupling.skin)
 
 
+def test_contacts_of_a_body_at_rest_keep_their_ids():
+    model = scene(box(), '<geom type="box" size="1 1 .1" pos="0 0 -.1"/>')
+    data = mujoco.MjData(model)
+    with Coupling(model, {"table": TABLE, "body": BOX}, unit=1e-3) as coupling:
+        data.qpos[2] = 0.0501
+        for _ in range(200):
+            coupling.step(data)
+        first = {point.id: point.on_b for _, _, point in coupling.contacts}
+        assert len(first) == 4
+        for _ in range(100):
+            assert coupling.step(data) == 4 and data.ncon == 4
+            for a, b, point in coupling.contacts:
+                assert model.body(b).name == "body" and np.allclose(point.on_b, first[point.id], atol=1e-6)
+
+
 def test_bodies_without_a_solid_keep_mujocos_collisions():
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><option timestep="0.001"/><worldbody><geom type="plane" size="1 1 .1"/>

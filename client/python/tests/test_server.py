@@ -1,6 +1,8 @@
 """Servers that are not there, no longer there, or not answering: an exception, and the session goes on after it."""
 
+import gc
 import signal
+import subprocess
 
 import numpy as np
 import pytest
@@ -93,3 +95,28 @@ def test_a_step_outlives_its_timeout_and_ctrl_c(own_server):
             own_server.process.send_signal(signal.SIGCONT)
         reply = session.finish(timeout=20)
         assert reply[0].time == 0.5 and session.options.advance == 1.0
+
+
+def test_sessions_that_are_dropped_end_on_the_server(binary, runtime, tmp_path):
+    config = tmp_path / "few.toml"
+    config.write_text("sessions = 2\n")
+    command = [str(binary), "serve", "--name", "few", "--cache", "off", "--config", str(config)]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        assert "few" in server.stdout.readline()
+        for k in range(12):
+            # Never closed: in turn idle, with poses begun, with a step in flight, with a reply.
+            session = contactd.connect("few")
+            ball, _ = fill(session)
+            if k % 4:
+                session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+            if k % 4 == 2:
+                session.send()
+            if k % 4 == 3:
+                session.finish(timeout=10)
+            del session
+            gc.collect()
+    finally:
+        server.terminate()
+        server.wait(timeout=20)
+        server.stdout.close()

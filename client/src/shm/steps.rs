@@ -27,6 +27,8 @@ type Arrived = Response<Variant, [ContactRecord], StepReply>;
 const SLICE: Duration = Duration::from_millis(50);
 /// The same for a client that polls.
 const POLLED: Duration = Duration::from_millis(1);
+/// How long a session that is dropped waits until its server has heard of it: a request dies with the port that sent it.
+const GOODBYE: Duration = Duration::from_millis(200);
 
 /// The way to a server through shared memory.
 pub struct SharedMemory {
@@ -375,5 +377,12 @@ impl Transport for SharedMemory {
     fn reply(&self) -> Option<(&StepReply, &[ContactRecord])> {
         let reply = self.link.as_ref()?.reply.as_ref()?;
         Some((reply.user_header(), reply.payload()))
+    }
+
+    fn leave(&mut self) {
+        // Where it does not arrive the server ends the session with this process.
+        if let Some(link) = self.link.as_mut().filter(|link| !link.life.is_over()) {
+            let _ = link.command(Command::Close, GOODBYE);
+        }
     }
 }
