@@ -272,6 +272,22 @@ mod tests {
     }
 
     #[test]
+    fn a_tree_whose_boxes_have_dispersed_is_built_anew() {
+        let mut numbers = Random(2);
+        let mut scatter =
+            || -> Vec<Aabb> { (0..2000).map(|_| Aabb::around(numbers.vector(6.0) + 6.0, DVec3::splat(0.5))).collect() };
+        let mut broad = BroadPhase::default();
+        broad.run(&scatter(), |_| false, |_, _| {});
+        let fresh = broad.tests;
+        let boxes = scatter();
+        // The order of before holds no longer: all branches are everywhere.
+        broad.run(&boxes, |_| false, |_, _| {});
+        let worn = broad.tests;
+        broad.run(&boxes, |_| false, |_, _| {});
+        assert!(worn > 5 * fresh && broad.tests < fresh + fresh / 4, "{fresh}, {worn}, {} tests", broad.tests);
+    }
+
+    #[test]
     fn tests_a_pair_hardly_grow_with_the_number_of_boxes() {
         let tests = |count: usize| {
             let mut numbers = Random(count as u64);

@@ -14,13 +14,14 @@
 //! φ > −2 delta excludes it. So: (1) nearest points at t by `gjk` give n; (2) the features that meet along it are solved for
 //! a contact (`turning`; where that fails, the faces at the witnesses as the search does it, `advance`), and both trees
 //! confirm it or it is none; (3) the time up to it is proven with its normal; (4) otherwise the time that n proves is taken,
-//! and again from there. No contact by the end: clear. What only moves along needs no advance (`straight`, `slabs`, `balls`).
+//! and again from there. No contact by the end: clear. What only moves along needs no advance (`straight`, `boxes`, `balls`).
 //! What overlaps, does not settle, or meets after it has started nearer than a few resolutions is left to the search;
 //! nothing is guessed.
 //! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) with the second-order bound above.
 
 mod advance;
 mod balls;
+mod boxes;
 mod form;
 mod gjk;
 mod overlap;
@@ -31,6 +32,8 @@ mod stance;
 mod steer;
 mod straight;
 mod support;
+#[cfg(test)]
+mod tests;
 mod touch;
 mod turning;
 
@@ -121,6 +124,12 @@ impl<'a> Pair<'a> {
         DMat3::from_quat(if place == DQuat::IDENTITY { start } else { start * place })
     }
 
+    /// World from primitive: the rotation, from that of the model.
+    fn frame(&self, k: usize, axes: &DMat3) -> DMat3 {
+        let frame = self.primitives[k].frame.rotation;
+        if frame == DQuat::IDENTITY { *axes } else { *axes * DMat3::from_quat(frame) }
+    }
+
     /// From A's centre to B's at a time.
     fn at(&self, t: f64) -> DVec3 {
         self.way - self.velocity * t
@@ -158,13 +167,15 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     let swapped = query.b.model.radius < query.a.model.radius;
     let (bodies, primitives) = if swapped { ([&query.b, &query.a], [b, a]) } else { ([&query.a, &query.b], [a, b]) };
     let Some(pair) = Pair::new(bodies, primitives, query.resolution) else { return nothing };
-    let balls = match (&primitives[0].shape, &primitives[1].shape) {
-        (Shape::Sphere(p), Shape::Sphere(q)) => Some([p.radius, q.radius]),
-        _ => None,
-    };
     let turns = |spins: &[DVec3; 2]| *spins != [DVec3::ZERO; 2];
-    let met = match balls {
-        Some(radii) if !turns(&pair.spins()) => balls::meet(&pair, radii, query.asked, outcome),
+    let balls = matches!([&a.shape, &b.shape], [Shape::Sphere(_), Shape::Sphere(_)]);
+    let met = match (&primitives[0].shape, &primitives[1].shape) {
+        (Shape::Sphere(p), Shape::Sphere(q)) if !turns(&pair.spins()) => {
+            balls::meet(&pair, [p.radius, q.radius], query.asked, outcome)
+        }
+        (Shape::Cuboid(p), Shape::Cuboid(q)) if !turns(&pair.spins()) => {
+            boxes::meet(&pair, [p.half, q.half], query.asked, outcome)
+        }
         _ => None,
     };
     if met.is_none() {
@@ -183,7 +194,7 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
                 let spins = pair.spins();
                 let told = if turns(&spins) {
                     Turning::new(&start, spins).and_then(|turning| turning.meet(n, query.asked, outcome))
-                } else if balls.is_none() {
+                } else if !balls {
                     Straight::new(&start).and_then(|straight| straight.meet(query.asked, outcome))
                 } else {
                     None

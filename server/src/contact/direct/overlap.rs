@@ -17,7 +17,7 @@ use super::super::pair::most_raised;
 use super::Pair;
 use super::gjk::{self, Meeting};
 use super::support::{Body, Slope};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
 /// Steps of false position.
@@ -68,12 +68,8 @@ impl<'a> Start<'a> {
     /// The start of a pair; `None` for bodies without bounds.
     pub fn new(pair: &'a Pair<'a>) -> Option<Self> {
         let axes = [pair.axes(0), pair.axes(1)];
-        let frame = |k: usize| {
-            let frame = pair.primitives[k].frame.rotation;
-            if frame == DQuat::IDENTITY { axes[k] } else { axes[k] * DMat3::from_quat(frame) }
-        };
         // (Arrays of two are written out where they are hot: a map over them stays a call.)
-        let frames = [frame(0), frame(1)];
+        let frames = [pair.frame(0, &axes[0]), pair.frame(1, &axes[1])];
         let body = |k: usize, origin: DVec3| Body::new(&pair.primitives[k].shape, frames[k], origin);
         let bodies = [body(0, DVec3::ZERO)?, body(1, pair.way)?];
         Some(Self { pair, axes, frames, bodies, centers: [bodies[0].center(), bodies[1].center()] })

@@ -11,75 +11,123 @@
 
 use glam::{DMat3, DVec3};
 
-/// Edges whose directions differ by less than this, squared, make no direction: its gap would be rounding.
-const PARALLEL: f64 = 1e-6;
+/// Edges whose directions differ by less than this, squared, make no direction. Products are no unit vectors: what rounding
+/// does to a gap, some ten half units of the numbers at hand, counts this much more along the unit vector, squared, and has to
+/// stay below the pair's own rounding, some hundreds.
+const PARALLEL: f64 = 1e-3;
+
+/// Two boxes along the axes of the first one.
+pub struct Boxes {
+    /// Half extents.
+    pub half: [DVec3; 2],
+    /// The axes of the second one.
+    pub turned: DMat3,
+    /// From the first one's centre to the second one's at the start.
+    pub way: DVec3,
+    /// Of the first one against the second one.
+    pub velocity: DVec3,
+}
 
 /// What the slabs tell.
 pub enum Passage {
     /// The boxes miss each other, by a gap that is larger than asked for.
     Miss,
-    /// They meet first across this direction, a unit vector; which of A's and B's axes lie across it.
-    Across(DVec3, [u8; 2]),
+    /// They meet first across this direction.
+    Across(Across),
     /// Neither is told.
     Open,
 }
 
-/// Two boxes by their axes in the world and half extents; `free` is a gap that excludes a contact.
-pub fn pass(axes: [&DMat3; 2], half: [DVec3; 2], way: DVec3, velocity: DVec3, free: f64) -> Passage {
-    let [a, b] = axes;
-    let turned = a.transpose() * *b;
-    let r: [[f64; 3]; 3] = turned.transpose().to_cols_array_2d();
-    let s = r.map(|row| row.map(f64::abs));
-    let (p, q) = (half[0].to_array(), half[1].to_array());
-    let (c, w) = ((a.transpose() * way).to_array(), (a.transpose() * velocity).to_array());
-    let (d, v) = ((b.transpose() * way).to_array(), (b.transpose() * velocity).to_array());
-    // Along each direction: way, velocity, what both boxes reach.
-    let mut slabs = [(0.0, 0.0, 0.0); 15];
-    for i in 0..3 {
-        slabs[i] = (c[i], w[i], p[i] + q[0] * s[i][0] + q[1] * s[i][1] + q[2] * s[i][2]);
-        slabs[3 + i] = (d[i], v[i], q[i] + p[0] * s[0][i] + p[1] * s[1][i] + p[2] * s[2][i]);
-        let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
-        for j in 0..3 {
-            let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
-            let reach = p[i1] * s[i2][j] + p[i2] * s[i1][j] + q[j1] * s[i][j2] + q[j2] * s[i][j1];
-            // Of edges along each other a slab that holds everything.
-            let reach = if 1.0 - r[i][j] * r[i][j] > PARALLEL { reach } else { f64::INFINITY };
-            let across = |x: &[f64; 3]| x[i2] * r[i1][j] - x[i1] * r[i2][j];
-            slabs[6 + 3 * i + j] = (across(&c), across(&w), reach);
+/// A direction across which two boxes may meet, and whether it is turned.
+#[derive(Clone, Copy)]
+pub struct Across {
+    /// What lies across it.
+    pub features: Features,
+    /// 1, or −1 for the opposite direction.
+    pub sign: f64,
+}
+
+/// What lies across a direction: a face, or an edge of each box, by the indices of their axes.
+#[derive(Clone, Copy)]
+pub enum Features {
+    FaceOfA(usize),
+    FaceOfB(usize),
+    Edges(usize, usize),
+}
+
+impl Features {
+    /// The slabs in order: A's axes, B's axes, their products.
+    fn of(slab: usize) -> Self {
+        match slab {
+            0..3 => Self::FaceOfA(slab),
+            3..6 => Self::FaceOfB(slab - 3),
+            _ => Self::Edges((slab - 6) / 3, (slab - 6) % 3),
         }
     }
-    let times = slabs.map(|(along, speed, reach)| {
-        let each = 1.0 / speed.abs();
-        let along = along * 1f64.copysign(speed);
-        ((along - reach) * each, (along + reach) * each)
-    });
-    let (mut k, mut last) = (0, 0);
-    for i in 1..15 {
-        k = if times[i].0 > times[k].0 { i } else { k };
-        last = if times[i].1 < times[last].1 { i } else { last };
-    }
-    let (entry, exit) = (times[k].0, times[last].1);
-    let (closing, leaving) = (slabs[k].1.abs(), slabs[last].1.abs());
-    // A direction that is free to the end, one that is free from the start, or two that take turns. They are no longer than
-    // unit vectors.
-    let beyond = |time: f64, speed: f64| time * speed > free;
-    let halfway = 0.5 * (entry - exit);
-    if beyond(entry - 1.0, closing) || beyond(-exit, leaving) || (beyond(halfway, closing) && beyond(halfway, leaving))
-    {
-        return Passage::Miss;
-    }
-    if entry > exit || !entry.is_finite() {
-        return Passage::Open;
-    }
-    let others = |k: usize| 0b111 & !(1 << k);
-    let (n, held) = match k {
-        0..3 => (a.col(k), [others(k), 0]),
-        3..6 => (b.col(k - 3), [0, others(k - 3)]),
-        _ => {
-            let (i, j) = ((k - 6) / 3, (k - 6) % 3);
-            (a.col(i).cross(b.col(j)), [1 << i, 1 << j])
+}
+
+impl Boxes {
+    /// Whether the boxes meet in the course of time; `free` is a gap that excludes a contact, not negative.
+    #[inline]
+    pub fn pass(&self, free: f64) -> Passage {
+        let b = &self.turned;
+        let r = b.transpose().to_cols_array_2d();
+        let s = r.map(|row| row.map(f64::abs));
+        let (p, q) = (self.half[0].to_array(), self.half[1].to_array());
+        let (c, w) = (self.way.to_array(), self.velocity.to_array());
+        let (d, v) = ((b.transpose() * self.way).to_array(), (b.transpose() * self.velocity).to_array());
+        // Along each direction: way, velocity, what both boxes reach. Three arrays, which are worked on side by side.
+        let (mut along, mut speed, mut reach) = ([0.0; 15], [0.0; 15], [0.0; 15]);
+        for i in 0..3 {
+            (along[i], speed[i]) = (c[i], w[i]);
+            reach[i] = p[i] + (q[0] * s[i][0] + q[1] * s[i][1] + q[2] * s[i][2]);
+            (along[3 + i], speed[3 + i]) = (d[i], v[i]);
+            reach[3 + i] = q[i] + (p[0] * s[0][i] + p[1] * s[1][i] + p[2] * s[2][i]);
+            let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
+            for j in 0..3 {
+                let (j1, j2, k) = ((j + 1) % 3, (j + 2) % 3, 6 + 3 * i + j);
+                let sum = (p[i1] * s[i2][j] + p[i2] * s[i1][j]) + (q[j1] * s[i][j2] + q[j2] * s[i][j1]);
+                // Of edges along each other a slab that holds everything.
+                reach[k] = if 1.0 - r[i][j] * r[i][j] > PARALLEL { sum } else { f64::INFINITY };
+                along[k] = c[i2] * r[i1][j] - c[i1] * r[i2][j];
+                speed[k] = w[i2] * r[i1][j] - w[i1] * r[i2][j];
+            }
         }
-    };
-    let n = if n.dot(velocity) < 0.0 { -n } else { n };
-    n.try_normalize().map_or(Passage::Open, |n| Passage::Across(n, held))
+        let (mut enter, mut leave) = ([0.0; 15], [0.0; 15]);
+        for k in 0..15 {
+            let each = 1.0 / speed[k].abs();
+            let ahead = along[k] * 1f64.copysign(speed[k]);
+            (enter[k], leave[k]) = ((ahead - reach[k]) * each, (ahead + reach[k]) * each);
+        }
+        // What is not a number, a slab entered and left by rest alone, is passed over.
+        let (first, last) = (latest(&enter), latest(&leave.map(|t| -t)));
+        let (entry, exit) = (enter[first], leave[last]);
+        let (closing, leaving) = (speed[first].abs(), speed[last].abs());
+        let sides = [first, last].map(|k| along[k] * 1f64.copysign(speed[k]));
+        // A direction that is free to the end, one that is free from the start, or two that take turns.
+        let halfway = 0.5 * (entry - exit);
+        if sides[0] - reach[first] - closing > free
+            || -sides[1] - reach[last] > free
+            || (halfway * closing > free && halfway * leaving > free)
+        {
+            return Passage::Miss;
+        }
+        if entry > exit || !entry.is_finite() {
+            return Passage::Open;
+        }
+        Passage::Across(Across { features: Features::of(first), sign: 1f64.copysign(speed[first]) })
+    }
+}
+
+/// Where the largest of some numbers is: the first of those. No step waits for the one before it.
+#[inline(always)]
+fn latest(times: &[f64; 15]) -> usize {
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    let mut best = [f64::NEG_INFINITY; 4];
+    for (k, t) in times.iter().enumerate() {
+        best[k % 4] = larger(*t, best[k % 4]);
+    }
+    let most = larger(larger(best[0], best[1]), larger(best[2], best[3]));
+    let equal = times.iter().enumerate().fold(1 << 14, |equal: u32, (k, t)| equal | u32::from(*t == most) << k);
+    equal.trailing_zeros() as usize
 }

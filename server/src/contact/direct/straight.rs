@@ -22,8 +22,7 @@
 use super::super::asked::Asked;
 use super::super::outcome::Outcome;
 use super::overlap::Start;
-use super::part::{Core, Part, Shown};
-use super::slabs::{self, Passage};
+use super::part::{Part, Shown};
 use super::steer::steer;
 use super::touch::Stand;
 use super::{APART, Pair, excluded};
@@ -89,19 +88,6 @@ impl<'a> Straight<'a> {
         if speed <= f64::MIN_POSITIVE {
             return None;
         }
-        if let (Core::Cuboid(p), Core::Cuboid(q)) = (self.parts[0].core, self.parts[1].core) {
-            match slabs::pass([&self.parts[0].axes, &self.parts[1].axes], [p, q], c, w, free) {
-                Passage::Miss => return Some(()),
-                Passage::Across(n, held) => {
-                    out.counters.closed_forms += 1;
-                    let told = self.contact(n, &self.shown_across(n, held), asked, out);
-                    if told.is_some() {
-                        return told;
-                    }
-                }
-                Passage::Open => {}
-            }
-        }
         let size = self.size();
         let way = w / speed;
         let e = any_perpendicular(way);
@@ -164,15 +150,6 @@ impl<'a> Straight<'a> {
             cuts[leaving.1] = cut;
         }
         None
-    }
-
-    /// What two boxes show along n, across which these of their axes lie at least.
-    fn shown_across(&self, n: DVec3, held: [u8; 2]) -> [Shown; 2] {
-        [n, -n].map(|m| {
-            let k = usize::from(m != n);
-            let axes = held[k] | self.parts[k].held(m, FLAT).0;
-            self.parts[k].shown(m, (axes, axes.count_ones() == 2))
-        })
     }
 
     /// The direction of the maximum near n, with the features that meet; a unit vector.

@@ -357,3 +357,6 @@ impl<'a> Turning<'a> {
         None
     }
 }
+
+#[cfg(test)]
+mod tests;
