@@ -115,6 +115,25 @@ pub struct WorkCounters {
     pub instant_cells: u64,
 }
 
+impl WorkCounters {
+    /// Each counter with its name, in the order of the fields.
+    pub fn each(&self) -> [(&'static str, u64); size_of::<Self>() / size_of::<u64>()] {
+        [
+            ("box_tests", self.box_tests),
+            ("primitives", self.primitives),
+            ("after_stage1", self.after_stage1),
+            ("node_pairs", self.node_pairs),
+            ("candidates", self.candidates),
+            ("cells", self.cells),
+            ("clauses", self.clauses),
+            ("newton", self.newton),
+            ("closed_forms", self.closed_forms),
+            ("may_have_passed", self.may_have_passed),
+            ("instant_cells", self.instant_cells),
+        ]
+    }
+}
+
 const _: () = {
     assert!(size_of::<StepRequest>() == 64);
     assert!(size_of::<StepReply>() == 224 && size_of::<WorkCounters>() == 88);

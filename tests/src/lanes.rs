@@ -10,7 +10,7 @@ use crate::random_solids::Random;
 use crate::scenes::{self, Recipe, Scene};
 use contactd::contact::Status;
 use contactd::eco::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World};
+use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World, record};
 use contactd_proto::{Detect, EffectCounters, InitialOverlap, Motion, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::TAU;
@@ -162,23 +162,12 @@ impl Lanes {
 
 /// All that a step counts, by name: its work, and how often each effect was worked out.
 pub fn counts(out: &StepOutcome) -> Vec<(&'static str, u64)> {
-    let c = &out.counters;
     let mut all = vec![
-        ("box_tests", out.box_tests),
         ("searched", u64::from(out.searched)),
-        ("primitives", c.primitives),
-        ("after_stage1", c.after_stage1),
-        ("node_pairs", c.node_pairs),
-        ("candidates", c.candidates),
-        ("cells", c.cells),
-        ("clauses", c.clauses),
-        ("newton", c.newton),
-        ("closed_forms", c.closed_forms),
-        ("instant_cells", c.instant_cells),
-        ("may_have_passed", out.may_have_passed),
         ("records", out.pairs.len() as u64),
         ("regions", out.regions.len() as u64),
     ];
+    all.extend(record::reply(out, false).counters.each());
     all.extend(out.effect_counters.each());
     all
 }

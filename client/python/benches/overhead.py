@@ -7,6 +7,10 @@ rotations. Filling is the caller's own work and is done on both sides.
 Steps come in fours, Rust, Python, Python, Rust, so that other load on the machine and a drift of its clock meet both alike: the
 difference of a four is that of its two pairs' means. Microseconds: medians, and of the differences the middle half beside the
 median, and the error of the median (half of a 95 % interval, by its binomial order statistics).
+
+"one call" is what stands between Rust's step and who asks for it from Python: one call of a compiled function, there and back,
+whose step lies in between. After a step that has gone through megabytes the interpreter comes back to cold caches; two such calls
+are the least that a step in Python makes.
 """
 
 import sys
@@ -78,14 +82,23 @@ def fields(session, both):
 
 
 def fours(rust, python, count):
-    """Nanoseconds of steps in fours: (count, 4), Rust's first and last."""
+    """Nanoseconds of steps in fours: (count, 4), Rust's first and last; and of one call around each of Rust's."""
+    now, calls = time.perf_counter_ns, []
+
+    def around():
+        start = now()
+        inside = rust()
+        calls.append(now() - start - inside)
+        return inside
+
     for _ in range(8):
         rust(), python()
-    return np.array([(rust(), python(), python(), rust()) for _ in range(count)])
+    return np.array([(around(), python(), python(), around()) for _ in range(count)]), np.array(calls)
 
 
-def told(times):
-    """Medians of Rust's and Python's steps, the median difference, its error, the middle half of the differences; microseconds."""
+def told(times, calls):
+    """Medians of Rust's and Python's steps, the median difference, its error, the middle half of the differences, the median of one
+    call; microseconds."""
     times = times / 1000.0
     more = np.sort(0.5 * (times[:, 1] + times[:, 2] - times[:, 0] - times[:, 3]))
     n = len(more)
@@ -93,11 +106,11 @@ def told(times):
     reach = int(0.98 * np.sqrt(n)) + 1
     error = 0.5 * (more[min(n // 2 + reach, n - 1)] - more[max(n // 2 - reach, 0)])
     rust, python = np.median(times[:, [0, 3]]), np.median(times[:, [1, 2]])
-    return rust, python, more[n // 2], error, more[n // 4], more[3 * n // 4]
+    return rust, python, more[n // 2], error, more[n // 4], more[3 * n // 4], np.median(calls) / 1000.0
 
 
 def main(quick):
-    print(f"{'poses':>6} {'filled':>7} {'rust us':>9} {'python us':>10} {'more us':>8} {'+-':>5} {'middle half':>16}")
+    print(f"{'poses':>6} {'filled':>7} {'rust us':>9} {'python us':>10} {'more us':>8} {'+-':>5} {'middle half':>16} {'one call':>9}")
     worst = {}
     for n, count in ((1, 2000), (16, 2000), (256, 600), (4096, 300)):
         count *= 1 if quick else 5
@@ -106,10 +119,9 @@ def main(quick):
             ids = [session.add_object(f"ball {i}", ball, at=(10.0 * i, 0, 0)) for i in range(n)]
             both = batches(n, ids)
             for way in (whole, fields):
-                rust, python, more, error, low, high = told(fours(*way(session, both), count))
-                print(
-                    f"{n:6} {way.__name__:>7} {rust:9.2f} {python:10.2f} {more:8.2f} {error:5.2f} {low:7.2f} {high:8.2f}"
-                )
+                rust, python, more, error, low, high, call = told(*fours(*way(session, both), count))
+                row = f"{n:6} {way.__name__:>7} {rust:9.2f} {python:10.2f} {more:8.2f} {error:5.2f} {low:7.2f} {high:8.2f}"
+                print(f"{row} {call:9.2f}")
                 if n in (16, 4096):
                     worst[way] = max(worst.get(way, 0.0), more)
     print(

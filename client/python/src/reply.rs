@@ -160,21 +160,7 @@ impl Reply {
     /// Counted work by name; no part of the answer's bits.
     #[getter]
     fn counters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let c = &self.header.counters;
-        let named = [
-            ("box_tests", c.box_tests),
-            ("primitives", c.primitives),
-            ("after_stage1", c.after_stage1),
-            ("node_pairs", c.node_pairs),
-            ("candidates", c.candidates),
-            ("cells", c.cells),
-            ("clauses", c.clauses),
-            ("newton", c.newton),
-            ("closed_forms", c.closed_forms),
-            ("may_have_passed", c.may_have_passed),
-            ("instant_cells", c.instant_cells),
-        ];
-        named.into_py_dict(py)
+        self.header.counters.each().into_py_dict(py)
     }
 
     /// How often each effect was worked out, by its word.

@@ -7,68 +7,85 @@ use crate::raw::place;
 use contactd_client::convention::Contact;
 use glam::DVec3;
 
-/// A contact.
-///
-/// # Safety
-/// As of `numbers`.
-unsafe fn contact(point: *const f64, normal: *const f64, separation: f64) -> Result<Contact, Failure> {
-    // SAFETY: as promised by the caller.
-    let (point, normal) = unsafe { (vector(point, "point")?, vector(normal, "normal")?) };
-    Ok(Contact { point, normal, separation })
+/// Vectors and a number with the names of their arrays: what an engine calls a contact.
+struct Own<P, const N: usize> {
+    vectors: [(P, &'static str); N],
+    number: (P, &'static str),
 }
 
-/// Writes a contact.
-///
-/// # Safety
-/// As of `room`.
-unsafe fn put_contact(c: Contact, point: *mut f64, normal: *mut f64, separation: *mut f64) -> Result<(), Failure> {
-    // SAFETY: as promised by the caller.
-    let (p, n) = unsafe { (room(point, "point")?, room(normal, "normal")?) };
-    // SAFETY: as promised by the caller.
-    let s = unsafe { place(separation, "separation")? };
-    p.write(c.point.to_array());
-    n.write(c.normal.to_array());
-    s.write(c.separation);
-    Ok(())
+/// contactd's contact.
+fn ours<P>(point: P, normal: P, separation: P) -> Own<P, 2> {
+    Own { vectors: [(point, "point"), (normal, "normal")], number: (separation, "separation") }
 }
 
-/// Writes an engine's contact of one point and a normal.
-///
-/// # Safety
-/// As of `room`.
-unsafe fn put_single(
-    (point, normal, number): (DVec3, DVec3, f64),
-    out: [*mut f64; 3],
-    names: [&str; 3],
-) -> Result<(), Failure> {
-    // SAFETY: as promised by the caller.
-    let (p, n) = unsafe { (room(out[0], names[0])?, room(out[1], names[1])?) };
-    // SAFETY: as promised by the caller.
-    let s = unsafe { place(out[2], names[2])? };
-    p.write(point.to_array());
-    n.write(normal.to_array());
-    s.write(number);
-    Ok(())
+impl<const N: usize> Own<*mut f64, N> {
+    /// Writes one.
+    ///
+    /// # Safety
+    /// As of `room`, for each array.
+    unsafe fn put(self, vectors: [DVec3; N], number: f64) -> Result<(), Failure> {
+        // SAFETY: as promised by the caller.
+        let last = unsafe { place(self.number.0, self.number.1)? };
+        let mut rooms = [const { None }; N];
+        for (room_of, (pointer, name)) in rooms.iter_mut().zip(self.vectors) {
+            // SAFETY: as promised by the caller.
+            *room_of = Some(unsafe { room(pointer, name)? });
+        }
+        for (room_of, vector) in rooms.into_iter().flatten().zip(vectors) {
+            room_of.write(vector.to_array());
+        }
+        last.write(number);
+        Ok(())
+    }
 }
 
-/// Writes an engine's contact of a point of each surface and a normal.
+/// Vectors with the names of their arrays.
 ///
 /// # Safety
-/// As of `room`.
-unsafe fn put_pair(
-    (first, second, normal, number): (DVec3, DVec3, DVec3, f64),
-    out: [*mut f64; 4],
-    names: [&str; 4],
-) -> Result<(), Failure> {
-    // SAFETY: as promised by the caller.
-    let (a, b) = unsafe { (room(out[0], names[0])?, room(out[1], names[1])?) };
-    // SAFETY: as promised by the caller.
-    let (n, s) = unsafe { (room(out[2], names[2])?, place(out[3], names[3])?) };
-    a.write(first.to_array());
-    b.write(second.to_array());
-    n.write(normal.to_array());
-    s.write(number);
-    Ok(())
+/// As of `numbers`, for each array.
+unsafe fn read<const N: usize>(arrays: [(*const f64, &'static str); N]) -> Result<[DVec3; N], Failure> {
+    let mut read = [DVec3::ZERO; N];
+    for (vector_of, (pointer, name)) in read.iter_mut().zip(arrays) {
+        // SAFETY: as promised by the caller.
+        *vector_of = unsafe { vector(pointer, name)? };
+    }
+    Ok(read)
+}
+
+/// From an engine's vectors to contactd's contact.
+///
+/// # Safety
+/// The caller's arrays (1).
+unsafe fn from<const N: usize>(
+    vectors: [(*const f64, &'static str); N],
+    contact: impl FnOnce([DVec3; N]) -> Contact,
+    out: Own<*mut f64, 2>,
+) -> i32 {
+    free(|| {
+        // SAFETY: as promised by the caller.
+        let c = contact(unsafe { read(vectors)? });
+        // SAFETY: as promised by the caller.
+        unsafe { out.put([c.point, c.normal], c.separation) }
+    })
+}
+
+/// From contactd's contact to an engine's vectors and its number.
+///
+/// # Safety
+/// The caller's arrays (1).
+unsafe fn to<const N: usize>(
+    [point, normal]: [*const f64; 2],
+    separation: f64,
+    own: impl FnOnce(Contact) -> ([DVec3; N], f64),
+    out: Own<*mut f64, N>,
+) -> i32 {
+    free(|| {
+        // SAFETY: as promised by the caller.
+        let [point, normal] = unsafe { read([(point, "point"), (normal, "normal")])? };
+        let (vectors, number) = own(Contact { point, normal, separation });
+        // SAFETY: as promised by the caller.
+        unsafe { out.put(vectors, number) }
+    })
 }
 
 /// From MuJoCo's `mjContact`: `pos` half way, `frame` of 9 numbers whose first three point from geom 1 to geom 2, `dist` <
@@ -85,9 +102,9 @@ pub unsafe extern "C" fn contactd_contact_from_mujoco(
     free(|| {
         // SAFETY: the caller's arrays (1).
         let (pos, frame) = unsafe { (vector(pos, "pos")?, numbers(frame, "frame")?) };
-        let contact = Contact::from_mujoco(pos, frame, dist);
+        let c = Contact::from_mujoco(pos, frame, dist);
         // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
+        unsafe { ours(point, normal, separation).put([c.point, c.normal], c.separation) }
     })
 }
 
@@ -103,15 +120,13 @@ pub unsafe extern "C" fn contactd_contact_to_mujoco(
 ) -> i32 {
     free(|| {
         // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
+        let [point, normal] = unsafe { read([(point, "point"), (normal, "normal")])? };
+        let (centre, axes, distance) = Contact { point, normal, separation }.to_mujoco();
         // SAFETY: the caller's arrays (1).
-        let (p, f) = unsafe { (room(pos, "pos")?, room(frame, "frame")?) };
+        let rows = unsafe { room(frame, "frame")? };
         // SAFETY: the caller's arrays (1).
-        let d = unsafe { place(dist, "dist")? };
-        let (pos, frame, dist) = contact.to_mujoco();
-        p.write(pos.to_array());
-        f.write(frame);
-        d.write(dist);
+        unsafe { Own { vectors: [(pos, "pos")], number: (dist, "dist") }.put([centre], distance)? };
+        rows.write(axes);
         Ok(())
     })
 }
@@ -128,14 +143,14 @@ pub unsafe extern "C" fn contactd_contact_from_drake(
     normal: *mut f64,
     separation: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let (p_wca, p_wcb, nhat_ba_w) =
-            unsafe { (vector(p_wca, "p_wca")?, vector(p_wcb, "p_wcb")?, vector(nhat_ba_w, "nhat_ba_w")?) };
-        let contact = Contact::from_drake(p_wca, p_wcb, nhat_ba_w, depth);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe {
+        from(
+            [(p_wca, "p_wca"), (p_wcb, "p_wcb"), (nhat_ba_w, "nhat_ba_w")],
+            |[p_wca, p_wcb, nhat_ba_w]| Contact::from_drake(p_wca, p_wcb, nhat_ba_w, depth),
+            ours(point, normal, separation),
+        )
+    }
 }
 
 /// `p_WCa`, `p_WCb`, `nhat_BA_W`, `depth` of Drake's `PenetrationAsPointPair`.
@@ -149,14 +164,13 @@ pub unsafe extern "C" fn contactd_contact_to_drake(
     nhat_ba_w: *mut f64,
     depth: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe {
-            put_pair(contact.to_drake(), [p_wca, p_wcb, nhat_ba_w, depth], ["p_wca", "p_wcb", "nhat_ba_w", "depth"])
-        }
-    })
+    let own = |contact: Contact| {
+        let (p_wca, p_wcb, nhat_ba_w, depth) = contact.to_drake();
+        ([p_wca, p_wcb, nhat_ba_w], depth)
+    };
+    let out = Own { vectors: [(p_wca, "p_wca"), (p_wcb, "p_wcb"), (nhat_ba_w, "nhat_ba_w")], number: (depth, "depth") };
+    // SAFETY: the caller's arrays (1).
+    unsafe { to([point, normal], separation, own, out) }
 }
 
 /// From Bullet's `btManifoldPoint`: a point of each surface, the normal on B towards A, `distance` < 0 in penetration.
@@ -170,14 +184,14 @@ pub unsafe extern "C" fn contactd_contact_from_bullet(
     normal: *mut f64,
     separation: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let (on_a, on_b, normal_on_b) =
-            unsafe { (vector(on_a, "on_a")?, vector(on_b, "on_b")?, vector(normal_on_b, "normal_on_b")?) };
-        let contact = Contact::from_bullet(on_a, on_b, normal_on_b, distance);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe {
+        from(
+            [(on_a, "on_a"), (on_b, "on_b"), (normal_on_b, "normal_on_b")],
+            |[on_a, on_b, normal_on_b]| Contact::from_bullet(on_a, on_b, normal_on_b, distance),
+            ours(point, normal, separation),
+        )
+    }
 }
 
 /// The points on A and on B, the normal on B and the distance of Bullet's `btManifoldPoint`.
@@ -191,18 +205,14 @@ pub unsafe extern "C" fn contactd_contact_to_bullet(
     normal_on_b: *mut f64,
     distance: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe {
-            put_pair(
-                contact.to_bullet(),
-                [on_a, on_b, normal_on_b, distance],
-                ["on_a", "on_b", "normal_on_b", "distance"],
-            )
-        }
-    })
+    let own = |contact: Contact| {
+        let (on_a, on_b, normal_on_b, distance) = contact.to_bullet();
+        ([on_a, on_b, normal_on_b], distance)
+    };
+    let out =
+        Own { vectors: [(on_a, "on_a"), (on_b, "on_b"), (normal_on_b, "normal_on_b")], number: (distance, "distance") };
+    // SAFETY: the caller's arrays (1).
+    unsafe { to([point, normal], separation, own, out) }
 }
 
 /// From PhysX's `PxContactPairPoint`: its `position`, its `normal` (here `from_second`: from the second shape to the first)
@@ -216,13 +226,14 @@ pub unsafe extern "C" fn contactd_contact_from_physx(
     normal: *mut f64,
     separation: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let (position, from_second) = unsafe { (vector(position, "position")?, vector(from_second, "from_second")?) };
-        let contact = Contact::from_physx(position, from_second, gap);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe {
+        from(
+            [(position, "position"), (from_second, "from_second")],
+            |[position, from_second]| Contact::from_physx(position, from_second, gap),
+            ours(point, normal, separation),
+        )
+    }
 }
 
 /// `position`, `normal` and `separation` of PhysX's `PxContactPairPoint`.
@@ -235,12 +246,13 @@ pub unsafe extern "C" fn contactd_contact_to_physx(
     from_second: *mut f64,
     gap: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_single(contact.to_physx(), [position, from_second, gap], ["position", "from_second", "gap"]) }
-    })
+    let own = |contact: Contact| {
+        let (position, from_second, gap) = contact.to_physx();
+        ([position, from_second], gap)
+    };
+    let out = Own { vectors: [(position, "position"), (from_second, "from_second")], number: (gap, "gap") };
+    // SAFETY: the caller's arrays (1).
+    unsafe { to([point, normal], separation, own, out) }
 }
 
 /// From ODE's `dContactGeom`: `pos`, its `normal` (here `into_first`: into body 1) and `depth` > 0 in penetration.
@@ -253,13 +265,14 @@ pub unsafe extern "C" fn contactd_contact_from_ode(
     normal: *mut f64,
     separation: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let (pos, into_first) = unsafe { (vector(pos, "pos")?, vector(into_first, "into_first")?) };
-        let contact = Contact::from_ode(pos, into_first, depth);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe {
+        from(
+            [(pos, "pos"), (into_first, "into_first")],
+            |[pos, into_first]| Contact::from_ode(pos, into_first, depth),
+            ours(point, normal, separation),
+        )
+    }
 }
 
 /// `pos`, `normal` and `depth` of ODE's `dContactGeom`.
@@ -272,12 +285,13 @@ pub unsafe extern "C" fn contactd_contact_to_ode(
     into_first: *mut f64,
     depth: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_single(contact.to_ode(), [pos, into_first, depth], ["pos", "into_first", "depth"]) }
-    })
+    let own = |contact: Contact| {
+        let (pos, into_first, depth) = contact.to_ode();
+        ([pos, into_first], depth)
+    };
+    let out = Own { vectors: [(pos, "pos"), (into_first, "into_first")], number: (depth, "depth") };
+    // SAFETY: the caller's arrays (1).
+    unsafe { to([point, normal], separation, own, out) }
 }
 
 /// From Coal's `Contact`: `pos` half way, its `normal` (here `to_second`: from object 1 to object 2) and
@@ -291,13 +305,14 @@ pub unsafe extern "C" fn contactd_contact_from_coal(
     normal: *mut f64,
     separation: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let (pos, to_second) = unsafe { (vector(pos, "pos")?, vector(to_second, "to_second")?) };
-        let contact = Contact::from_coal(pos, to_second, penetration_depth);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe {
+        from(
+            [(pos, "pos"), (to_second, "to_second")],
+            |[pos, to_second]| Contact::from_coal(pos, to_second, penetration_depth),
+            ours(point, normal, separation),
+        )
+    }
 }
 
 /// `pos`, `normal` and `penetration_depth` of Coal's `Contact`.
@@ -310,18 +325,14 @@ pub unsafe extern "C" fn contactd_contact_to_coal(
     to_second: *mut f64,
     penetration_depth: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe {
-            put_single(
-                contact.to_coal(),
-                [pos, to_second, penetration_depth],
-                ["pos", "to_second", "penetration_depth"],
-            )
-        }
-    })
+    let own = |contact: Contact| {
+        let (pos, to_second, penetration_depth) = contact.to_coal();
+        ([pos, to_second], penetration_depth)
+    };
+    let out =
+        Own { vectors: [(pos, "pos"), (to_second, "to_second")], number: (penetration_depth, "penetration_depth") };
+    // SAFETY: the caller's arrays (1).
+    unsafe { to([point, normal], separation, own, out) }
 }
 
 /// From parry's `Contact` in the world frame: a point of each shape, the normal out of shape 1, `dist` < 0 in penetration.
@@ -335,14 +346,14 @@ pub unsafe extern "C" fn contactd_contact_from_rapier(
     normal: *mut f64,
     separation: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let (point1, point2, normal1) =
-            unsafe { (vector(point1, "point1")?, vector(point2, "point2")?, vector(normal1, "normal1")?) };
-        let contact = Contact::from_rapier(point1, point2, normal1, dist);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_contact(contact, point, normal, separation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe {
+        from(
+            [(point1, "point1"), (point2, "point2"), (normal1, "normal1")],
+            |[point1, point2, normal1]| Contact::from_rapier(point1, point2, normal1, dist),
+            ours(point, normal, separation),
+        )
+    }
 }
 
 /// `point1`, `point2`, `normal1` and `dist` of parry's `Contact`, world frame; its `normal2` is the opposite of `normal1`.
@@ -356,17 +367,11 @@ pub unsafe extern "C" fn contactd_contact_to_rapier(
     normal1: *mut f64,
     dist: *mut f64,
 ) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let contact = unsafe { contact(point, normal, separation)? };
-        let (first, second, out, _, distance) = contact.to_rapier();
-        // SAFETY: the caller's arrays (1).
-        unsafe {
-            put_pair(
-                (first, second, out, distance),
-                [point1, point2, normal1, dist],
-                ["point1", "point2", "normal1", "dist"],
-            )
-        }
-    })
+    let own = |contact: Contact| {
+        let (point1, point2, normal1, _, dist) = contact.to_rapier();
+        ([point1, point2, normal1], dist)
+    };
+    let out = Own { vectors: [(point1, "point1"), (point2, "point2"), (normal1, "normal1")], number: (dist, "dist") };
+    // SAFETY: the caller's arrays (1).
+    unsafe { to([point, normal], separation, own, out) }
 }

@@ -27,12 +27,59 @@ unsafe fn pose(position: *const f64, rotation: *const f64) -> Result<Pose, Failu
 ///
 /// # Safety
 /// As of `room`.
-unsafe fn put_pose(pose: Pose, position: *mut f64, rotation: *mut f64) -> Result<(), Failure> {
+unsafe fn put(pose: Pose, position: *mut f64, rotation: *mut f64) -> Result<(), Failure> {
     // SAFETY: as promised by the caller.
     let (p, r) = unsafe { (room(position, "position")?, room(rotation, "rotation")?) };
     p.write(pose.position.to_array());
     r.write(pose.rotation.to_array());
     Ok(())
+}
+
+/// From `N` numbers of an engine to a pose.
+///
+/// # Safety
+/// The caller's arrays (1).
+unsafe fn from<const N: usize>(
+    (given, name): (*const f64, &str),
+    pose: impl FnOnce([f64; N]) -> Result<Pose, NotRigid>,
+    position: *mut f64,
+    rotation: *mut f64,
+) -> i32 {
+    free(|| {
+        // SAFETY: as promised by the caller.
+        let pose = pose(unsafe { numbers(given, name)? })?;
+        // SAFETY: as promised by the caller.
+        unsafe { put(pose, position, rotation) }
+    })
+}
+
+/// From a pose to `N` numbers of an engine.
+///
+/// # Safety
+/// The caller's arrays (1).
+unsafe fn to<const N: usize>(
+    position: *const f64,
+    rotation: *const f64,
+    numbers: impl FnOnce(&Pose) -> [f64; N],
+    (out, name): (*mut f64, &str),
+) -> i32 {
+    free(|| {
+        // SAFETY: as promised by the caller.
+        let pose = unsafe { pose(position, rotation)? };
+        // SAFETY: as promised by the caller.
+        unsafe { room(out, name)? }.write(numbers(&pose));
+        Ok(())
+    })
+}
+
+/// Rows of four, one after the other.
+fn rows<const N: usize, const R: usize>(matrix: [[f64; 4]; R]) -> [f64; N] {
+    std::array::from_fn(|k| matrix[k / 4][k % 4])
+}
+
+/// The same back.
+fn by_rows<const N: usize, const R: usize>(rows: [f64; N]) -> [[f64; 4]; R] {
+    std::array::from_fn(|i| std::array::from_fn(|j| rows[4 * i + j]))
 }
 
 /// x y z w from w x y z (MuJoCo, Drake, Isaac Sim, SAPIEN, the constructors of Eigen): four numbers to four.
@@ -71,7 +118,7 @@ pub unsafe extern "C" fn contactd_from_mujoco(
         // SAFETY: the caller's arrays (1).
         let (xpos, xquat) = unsafe { (numbers(xpos, "xpos")?, numbers(xquat, "xquat")?) };
         // SAFETY: the caller's arrays (1).
-        unsafe { put_pose(to_and_from::from_mujoco(xpos, xquat), position, rotation) }
+        unsafe { put(to_and_from::from_mujoco(xpos, xquat), position, rotation) }
     })
 }
 
@@ -98,99 +145,57 @@ pub unsafe extern "C" fn contactd_to_mujoco(
 /// A pose from the seven positions of a floating body in Drake's plant: quaternion w x y z, then x y z.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_from_drake(state: *const f64, position: *mut f64, rotation: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let given = unsafe { numbers(state, "state")? };
-        let pose = to_and_from::from_drake(given);
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_pose(pose, position, rotation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { from((state, "state"), |state| Ok(to_and_from::from_drake(state)), position, rotation) }
 }
 
 /// The seven positions of a floating body in Drake's plant: quaternion w x y z, then x y z.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_to_drake(position: *const f64, rotation: *const f64, state: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let pose = unsafe { pose(position, rotation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe { room(state, "state")? }.write(to_and_from::to_drake(&pose));
-        Ok(())
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { to(position, rotation, to_and_from::to_drake, (state, "state")) }
 }
 
 /// A pose from [R | p], three rows of four: 12 numbers row by row. CONTACTD_ERROR_ARGUMENT when R is no rotation: scaled,
 /// skewed, mirrored, by more than 1e-6 in an element of RᵀR − I.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_from_mat3x4(matrix: *const f64, position: *mut f64, rotation: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let given: [f64; 12] = unsafe { numbers(matrix, "matrix")? };
-        let pose = to_and_from::from_mat3x4(std::array::from_fn(|i| std::array::from_fn(|j| given[4 * i + j])))?;
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_pose(pose, position, rotation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { from((matrix, "matrix"), |rows: [f64; 12]| to_and_from::from_mat3x4(by_rows(rows)), position, rotation) }
 }
 
 /// [R | p] of a pose, three rows of four: 12 numbers row by row.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_to_mat3x4(position: *const f64, rotation: *const f64, matrix: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let pose = unsafe { pose(position, rotation)? };
-        let rows = to_and_from::to_mat3x4(&pose);
-        // SAFETY: the caller's arrays (1).
-        unsafe { room(matrix, "matrix")? }.write(std::array::from_fn::<f64, 12, _>(|k| rows[k / 4][k % 4]));
-        Ok(())
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { to::<12>(position, rotation, |pose| rows(to_and_from::to_mat3x4(pose)), (matrix, "matrix")) }
 }
 
 /// A pose from a homogeneous matrix, 16 numbers row by row, with the position in the last column (Drake, pinocchio,
 /// trimesh). Refused as by contactd_from_mat3x4, and when the last row is not 0 0 0 1.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_from_mat4(matrix: *const f64, position: *mut f64, rotation: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let given: [f64; 16] = unsafe { numbers(matrix, "matrix")? };
-        let pose = to_and_from::from_mat4(std::array::from_fn(|i| std::array::from_fn(|j| given[4 * i + j])))?;
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_pose(pose, position, rotation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { from((matrix, "matrix"), |rows: [f64; 16]| to_and_from::from_mat4(by_rows(rows)), position, rotation) }
 }
 
 /// A homogeneous matrix of a pose, 16 numbers row by row, with the position in the last column.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_to_mat4(position: *const f64, rotation: *const f64, matrix: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let pose = unsafe { pose(position, rotation)? };
-        let rows = to_and_from::to_mat4(&pose);
-        // SAFETY: the caller's arrays (1).
-        unsafe { room(matrix, "matrix")? }.write(std::array::from_fn::<f64, 16, _>(|k| rows[k / 4][k % 4]));
-        Ok(())
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { to::<16>(position, rotation, |pose| rows(to_and_from::to_mat4(pose)), (matrix, "matrix")) }
 }
 
 /// A pose from 16 numbers column by column (OpenGL, three.js, Bullet's getOpenGLMatrix). Refused as by contactd_from_mat4.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_from_opengl(columns: *const f64, position: *mut f64, rotation: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let given = unsafe { numbers(columns, "columns")? };
-        let pose = to_and_from::from_opengl(given)?;
-        // SAFETY: the caller's arrays (1).
-        unsafe { put_pose(pose, position, rotation) }
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { from((columns, "columns"), to_and_from::from_opengl, position, rotation) }
 }
 
 /// 16 numbers column by column of a pose.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_to_opengl(position: *const f64, rotation: *const f64, columns: *mut f64) -> i32 {
-    free(|| {
-        // SAFETY: the caller's arrays (1).
-        let pose = unsafe { pose(position, rotation)? };
-        // SAFETY: the caller's arrays (1).
-        unsafe { room(columns, "columns")? }.write(to_and_from::to_opengl(&pose));
-        Ok(())
-    })
+    // SAFETY: the caller's arrays (1).
+    unsafe { to(position, rotation, to_and_from::to_opengl, (columns, "columns")) }
 }
