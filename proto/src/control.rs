@@ -111,9 +111,7 @@ impl WirePose {
     /// `NotFinite`, `BadQuaternion`.
     pub fn checked(&self) -> Result<Pose, ErrorCode> {
         let position = DVec3::from_array(self.position);
-        if !position.is_finite() {
-            return Err(ErrorCode::NotFinite);
-        }
+        crate::pose::check_position(position)?;
         let unit = crate::pose_record::unit_quaternion(self.rotation)?;
         let given = DQuat::from_array(self.rotation);
         // A quaternion that a session once normalised must come back with the same bits.

@@ -1,5 +1,6 @@
 //! A rigid placement: rotation first, then translation.
 
+use crate::ErrorCode;
 use glam::{DMat3, DQuat, DVec3};
 
 /// A rigid placement of a frame in its parent: `parent = rotation · local + position`.
@@ -9,6 +10,19 @@ pub struct Pose {
     pub position: DVec3,
     /// Unit quaternion (x, y, z, w).
     pub rotation: DQuat,
+}
+
+/// Farthest from the origin that anything may stand, in any unit: squares and sums of lengths stay numbers.
+pub const FARTHEST: f64 = 1e150;
+
+/// Checks where something is to stand.
+///
+/// # Errors
+/// `NotFinite` for what is no finite number, or farther from the origin than [`FARTHEST`].
+pub fn check_position(position: DVec3) -> Result<(), ErrorCode> {
+    // Also false for what is not a number.
+    let within = position.length_squared() <= FARTHEST * FARTHEST;
+    if within { Ok(()) } else { Err(ErrorCode::NotFinite) }
 }
 
 impl Pose {

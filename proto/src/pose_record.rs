@@ -3,6 +3,7 @@
 //! Invariant: a record that decodes holds finite numbers and a unit quaternion. It does not promise that the object
 //! exists: that is the session's to know.
 
+use crate::pose::check_position;
 use crate::{ErrorCode, Pose};
 use glam::{DQuat, DVec3};
 use iceoryx2::prelude::ZeroCopySend;
@@ -70,10 +71,12 @@ impl PoseRecord {
     /// Checks the numbers of a record (pass a copy when it lies in shared memory).
     ///
     /// # Errors
-    /// `BadCount` for flags out of the protocol, `NotFinite`, `BadQuaternion`.
+    /// `BadCount` for flags out of the protocol, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
+    /// `BadQuaternion`.
     pub fn decode(&self) -> Result<Order, ErrorCode> {
         let position = DVec3::from_array(self.position);
-        if !position.is_finite() || self.rotation.iter().any(|c| !c.is_finite()) {
+        check_position(position)?;
+        if self.rotation.iter().any(|c| !c.is_finite()) {
             return Err(ErrorCode::NotFinite);
         }
         match self.flags {
@@ -118,6 +121,8 @@ mod tests {
         let table = [
             (PoseRecord { position: [f64::NAN, 0.0, 0.0], ..good }, ErrorCode::NotFinite),
             (PoseRecord { position: [0.0, f64::INFINITY, 0.0], ..good }, ErrorCode::NotFinite),
+            (PoseRecord { position: [0.0, 0.0, -2e150], ..good }, ErrorCode::NotFinite),
+            (PoseRecord { flags: START, position: [1e200, 0.0, 0.0], ..good }, ErrorCode::NotFinite),
             (PoseRecord { rotation: [f64::NAN, 0.0, 0.0, 1.0], ..good }, ErrorCode::NotFinite),
             (PoseRecord { rotation: [0.0; 4], ..good }, ErrorCode::BadQuaternion),
             (PoseRecord { rotation: [0.0, 0.0, 0.0, 1.001], ..good }, ErrorCode::BadQuaternion),

@@ -89,7 +89,7 @@ fn run(seed: u64) -> Work {
     };
     let stops = r.chance(0.3);
     if r.chance(0.3) {
-        let margin = if r.chance(0.5) { 0.0 } else { 1e-3 };
+        let margin = if r.chance(0.5) { 0.0 } else { 10f64.powf(r.within(-3.0, -0.7)) };
         let rule = Rule { report: Report::Patch, margin, ..Rule::new(["default".into(), "default".into()]) };
         for world in &mut worlds {
             world.set_rules(vec![rule.clone()]).expect("a rule");
@@ -203,5 +203,122 @@ fn an_approaching_peg_costs_next_to_nothing_a_step() {
             sum(&cold)
         );
         assert!(warm[50] <= 8 && 2 * sum(&warm) < sum(&cold));
+    }
+}
+
+/// Two worlds of the same objects and rules, one of which forgets before every step: what each of them tells.
+struct Twins([World; 2]);
+
+impl Twins {
+    fn new(parts: [&Recipe; 2], at: [Pose; 2], rule: Option<Rule>) -> Self {
+        let parts = parts.map(part);
+        Self([0, 1].map(|_| {
+            let mut world = World::new(2, 8);
+            for (id, (part, pose)) in (1..).zip(parts.iter().zip(at)) {
+                world.add_object(ObjectSpec::new(id, part, pose)).expect("an object");
+            }
+            world.set_rules(rule.clone().into_iter().collect()).expect("a rule");
+            world
+        }))
+    }
+
+    /// The records of a step, the same in both.
+    fn step(&mut self, records: &[PoseRecord], options: &StepOptions) -> Vec<PairOutcome> {
+        let [warm, cold] = &mut self.0;
+        cold.forget();
+        let expected = cold.step(records, options).expect("a step");
+        let answer = warm.step(records, options).expect("a step");
+        assert_eq!(told(answer), told(expected), "what is remembered, and forgetting");
+        answer.pairs.clone()
+    }
+}
+
+fn to(id: u32, at: DVec3) -> PoseRecord {
+    PoseRecord::end(id, &Pose::at(at))
+}
+
+fn put(id: u32, at: DVec3) -> PoseRecord {
+    PoseRecord::start(id, &Pose::at(at))
+}
+
+/// A cube of side 1 with a thin hole through its middle: no primitive.
+fn drilled() -> Recipe {
+    Recipe::cuboid(0.5, 0.5, 0.5).minus(Recipe::cylinder(0.05, 2.0))
+}
+
+/// Where it has stood, a body that is parked as far away as may be and comes back is asked about as before.
+#[test]
+fn a_body_comes_back_from_as_far_as_may_be() {
+    let cube = Recipe::cuboid(0.5, 0.5, 0.5);
+    let mut twins = Twins::new([&cube, &cube], [0.0, 3.0].map(|x| Pose::at(DVec3::X * x)), None);
+    let options = StepOptions::default();
+    for far in [1e150, 1e100, 1e20] {
+        assert!(twins.step(&[put(2, DVec3::X * far)], &options).is_empty());
+        assert!(twins.step(&[put(2, DVec3::Y * -far)], &options).is_empty());
+        let back = twins.step(&[put(2, DVec3::X * 0.9)], &options);
+        assert_eq!(back.iter().map(|p| p.outcome.status).collect::<Vec<_>>(), [Status::Overlap], "from {far:e}");
+    }
+}
+
+/// A step of which .64 is taken moves a body by one unit in the last place of its coordinate, every time: more than the
+/// motion says.
+#[test]
+fn what_rounding_does_to_a_step_that_is_taken_in_part_is_counted() {
+    let cube = Recipe::cuboid(0.5, 0.5, 0.5);
+    let x = 1e7;
+    let ulp = f64::EPSILON * 2f64.powi(23);
+    let start = x + 1.0 + 2000.0 * ulp;
+    let mut twins = Twins::new([&cube, &cube], [x, start].map(|x| Pose::at(DVec3::X * x)), None);
+    let options = StepOptions { advance: 0.64, ..StepOptions::default() };
+    let mut met = 0;
+    for k in 1..=2400 {
+        let at = start - f64::from(k) * ulp;
+        met += u32::from(!twins.step(&[to(2, DVec3::X * at)], &options).is_empty());
+        assert!((twins.0[0].body(2).expect("a body").track.end.position.x - at).abs() < 0.1 * ulp);
+    }
+    assert!(met > 300, "{met}: they meet, and sink in");
+}
+
+/// Trees are near each other by f, side by side: cubes that pass corner to corner are within their margin before their
+/// distance is.
+#[test]
+fn what_is_told_of_a_margin_does_not_depend_on_what_is_remembered() {
+    let rule = || Some(Rule { margin: 0.1, ..Rule::new(["default".into(), "default".into()]) });
+    let options = StepOptions::default();
+    let along = |d: f64| DVec3::new(d, d, 0.0);
+    let mut twins = Twins::new([&drilled(), &drilled()], [DVec3::ZERO, along(1.105)].map(Pose::at), rule());
+    assert!(twins.step(&[], &options).is_empty());
+    assert_eq!(twins.step(&[to(2, along(1.095))], &options).len(), 1, "it comes within its margin");
+    for d in [1.095, 1.097, 1.05, 1.2, 1.099, 1.1001, 1.09] {
+        twins.step(&[to(2, along(d))], &options);
+    }
+    // Edge to edge, after a contact and without one before.
+    let turned = Pose::new(DVec3::ZERO, glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_4));
+    let edge = |d: f64| Pose { position: DVec3::X * (2f64.sqrt() + d), ..turned };
+    let mut twins = Twins::new([&drilled(), &drilled()], [turned, edge(0.3)], rule());
+    let met = twins.step(&[PoseRecord::end(2, &edge(-0.01))], &options);
+    assert_eq!(met[0].outcome.status, Status::Contact);
+    for d in [0.12, 0.11, 0.1, 0.09, 0.07, 0.12, 0.2, 0.13] {
+        twins.step(&[PoseRecord::start(2, &edge(d))], &options);
+        twins.step(&[PoseRecord::end(2, &edge(d - 0.01))], &options);
+    }
+}
+
+/// A question that is repeated with less work allowed is answered as one that was never asked.
+#[test]
+fn an_answer_that_took_more_work_than_is_allowed_is_not_repeated() {
+    let at = [Pose::IDENTITY, Pose::at(DVec3::new(0.1, 0.2, 1.5))];
+    let mut twins = Twins::new([&drilled(), &drilled()], at, None);
+    let [warm, _] = &mut twins.0;
+    let down = [PoseRecord::turn(2, DVec3::new(0.1, 0.2, 0.9), DVec3::new(0.3, 0.2, 0.1))];
+    let cells = warm.step(&down, &StepOptions::default()).expect("a step").counters.cells;
+    assert!(cells > 1, "{cells}: a search");
+    for cell_limit in [cells, cells / 2, 1] {
+        let again = StepOptions { advance: 0.0, cell_limit, ..StepOptions::default() };
+        let [warm, _] = &mut twins.0;
+        warm.step(&down, &StepOptions { advance: 0.0, ..StepOptions::default() }).expect("a step");
+        let answer = told(warm.step(&down, &again).expect("a step"));
+        warm.forget();
+        assert_eq!(answer, told(warm.step(&down, &again).expect("a step")), "{cell_limit} of {cells} cells");
     }
 }

@@ -304,8 +304,9 @@ fn an_overlap_has_its_deepest_point_and_ids_end_with_the_touch() {
     assert_eq!(s.manifolds.pairs().len(), 0);
     // Elsewhere it is another touch; ids begin anew with a pair.
     assert_eq!(s.at(Pose::at(DVec3::Z * 0.501))[0].id, 0);
-    // A ball that jumps while the pair lasts has another point.
+    // A ball that turns in its place keeps its point on the plate; one that jumps while the pair lasts has another.
     assert_eq!(s.at(Pose::new(dvec3(0.0, 0.0, 0.501), turned(DVec3::X, 3.0)))[0].id, 0);
+    assert_eq!(s.at(Pose::new(dvec3(2.0, 0.0, 0.501), turned(DVec3::Y, 2.0)))[0].id, 1);
 }
 
 #[test]

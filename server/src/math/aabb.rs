@@ -74,9 +74,10 @@ impl Aabb {
         !self.intersection(other).is_empty()
     }
 
-    /// Distance of two boxes; 0 where they share a point, infinite from an empty one.
-    pub fn distance(&self, other: &Self) -> f64 {
-        (self.min - other.max).max(other.min - self.max).max(DVec3::ZERO).length()
+    /// Largest of the gaps along the three axes: by how much either has to grow on every side until they share a point. 0 where
+    /// they do, infinite from an empty one.
+    pub fn gap(&self, other: &Self) -> f64 {
+        (self.min - other.max).max(other.min - self.max).max_element().max(0.0)
     }
 
     /// The box moved outwards by `margin` on every side.

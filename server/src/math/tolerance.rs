@@ -1,4 +1,5 @@
-//! Every numerical constant of the engine, each with its reason. Tolerances are arguments elsewhere, never literals.
+//! Numerical constants that more than one part of the engine goes by, each with its reason. Those of one method stand at the
+//! head of its file.
 
 /// Default resolution as a fraction of the larger bounding radius of a pair: nine digits.
 pub const DEFAULT_RESOLUTION: f64 = 1e-9;

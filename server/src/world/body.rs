@@ -1,8 +1,9 @@
 //! Bodies: a model at a place in an object's frame, the object's track, and the box it sweeps in a step.
 //!
-//! The swept box rests on two facts. A point c fixed in a frame that turns by θ over the step runs on an arc, and the arc
+//! The swept box rests on three facts. A point c fixed in a frame that turns by θ over the step runs on an arc, and the arc
 //! leaves its chord by at most |c|·θ²/8 (interpolation error of a function with |f''| <= |c|·θ²). And the point never
-//! leaves the ball of radius |c| around the origin's path. The smaller of the two bounds is taken, side by side.
+//! leaves the ball of radius |c| around the origin's path, nor goes farther from its start than `travel` tells. The smallest of
+//! these bounds is taken, side by side.
 
 use crate::contact::Hull;
 use crate::eco::Model;
@@ -154,13 +155,32 @@ impl Body {
         (m.velocity.length() * s + turning) * (1.0 + 1e-15)
     }
 
+    /// How far the farthest of its points is from where it was once the first part `s` of its motion is taken, at most: the
+    /// way, and what rounding does to the pose in which that is kept. An end that is taken whole is kept as it was given.
+    pub fn taken(&self, s: f64) -> f64 {
+        let (start, end) = (&self.track.motion.start, self.track.at(s));
+        let rounding = if s < 1.0 {
+            self.rounding(start, &end)
+        } else if end.rotation == start.rotation {
+            0.0
+        } else {
+            self.reach * tolerance::BOX_ROUNDING
+        };
+        self.travel(s) + rounding
+    }
+
     /// How far the farthest of its points is displaced from one pose to another, at most.
     pub fn displacement(&self, from: &Pose, to: &Pose) -> f64 {
         let r = to.rotation * from.rotation.conjugate();
         let half = DVec3::new(r.x, r.y, r.z).length();
         let turning = if half == 0.0 { 0.0 } else { 2.0 * half * self.reach };
+        (to.position - from.position).length() + turning + self.rounding(from, to)
+    }
+
+    /// What rounding does to its points in two poses.
+    fn rounding(&self, from: &Pose, to: &Pose) -> f64 {
         let size = from.position.abs().max_element() + to.position.abs().max_element();
-        (to.position - from.position).length() + turning + (size + self.reach) * tolerance::BOX_ROUNDING
+        (size + self.reach) * tolerance::BOX_ROUNDING
     }
 
     /// A box that holds the body at the start of its motion.
@@ -186,10 +206,13 @@ impl Body {
         let m = &self.track.motion;
         let (first, last) = (m.at(0.0), m.at(1.0));
         let theta = m.spin.length();
-        let ends = Aabb::of_points(self.corners.iter().flat_map(|c| [first.point(*c), last.point(*c)]));
+        let still = Aabb::of_points(self.corners.iter().map(|c| first.point(*c)));
+        let ends = still.union(&Aabb::of_points(self.corners.iter().map(|c| last.point(*c))));
         let arcs = ends.grown(self.reach * theta * theta / 8.0);
         let balls = Aabb::of_points([first.position, last.position]).grown(self.reach);
-        self.around(if theta == 0.0 { ends } else { arcs.intersection(&balls) })
+        // No farther than the odometer counts, so that what it has excluded once it need not be asked about again.
+        let near = still.grown(self.travel(1.0));
+        self.around(if theta == 0.0 { ends } else { arcs.intersection(&balls).intersection(&near) })
     }
 }
 

@@ -132,17 +132,17 @@ impl Knowledge {
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> Option<(Outcome, Option<f64>)> {
-        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
-            && last.motions == motions
+            && last.motions == q.motions()
             && last.asked == q.query.asked
+            && last.outcome.counters.cells <= q.query.cell_limit
         {
             return Some((last.outcome, None));
         }
-        let clear = Outcome::clear(q.query.resolution);
+        let clear = || Outcome::clear(q.query.resolution);
         if let Some(course) = self.course.as_ref().filter(|_| self.on_course) {
             match course.strays(q) {
-                Some(way) if way < course.room => return Some((clear, Some(0.0))),
+                Some(way) if way < course.room => return Some((clear(), Some(0.0))),
                 Some(_) if !course.is_over(q) => {
                     // They stray: less far ahead, with more room.
                     self.steps = (0.5 * self.steps).max(1.0);
@@ -159,16 +159,16 @@ impl Knowledge {
             let travel = q.travel();
             if room > LONG * travel || room > travel && self.wait > 0 {
                 self.wait = self.wait.saturating_sub(1);
-                return Some((clear, Some(room)));
+                return Some((clear(), Some(room)));
             }
             // They will be near soon: how they go on is worth more than how far apart they are.
             self.room = HALF * room;
             if room > 0.0 && self.try_course(q, cells, scratch, counters) {
-                return Some((clear, Some(0.0)));
+                return Some((clear(), Some(0.0)));
             }
-            return (room > travel).then_some((clear, Some(room)));
+            return (room > travel).then(|| (clear(), Some(room)));
         }
-        self.try_course(q, cells, scratch, counters).then_some((clear, Some(0.0)))
+        self.try_course(q, cells, scratch, counters).then(|| (clear(), Some(0.0)))
     }
 
     /// What was told of the answer that was recalled.
@@ -190,18 +190,12 @@ impl Knowledge {
         self.plan_course(q, cells, scratch, counters)
     }
 
-    /// The answer to a question: what is known, or what little work makes known; and that work. `None`: it takes a search,
-    /// whose outcome is to be learned.
-    pub fn ask(&mut self, q: &Question, scratch: &mut Scratch) -> (Option<Finding>, Counters) {
-        let mut counters = Counters::default();
-        let found = self.recall(q, scratch, &mut counters);
-        let finding = found.map(|(outcome, room)| Finding {
-            outcome: Outcome { counters, ..outcome },
-            room: room.unwrap_or(0.0),
-            known: true,
-            apart: room.is_some(),
-        });
-        (finding, counters)
+    /// The answer to a question: what is known, or what little work makes known; `counters` (0 before) counts that work. `None`:
+    /// it takes a search, whose outcome is to be learned.
+    pub fn ask(&mut self, q: &Question, scratch: &mut Scratch, counters: &mut Counters) -> Option<Finding> {
+        let (outcome, room) = self.recall(q, scratch, counters)?;
+        let outcome = Outcome { counters: *counters, ..outcome };
+        Some(Finding { outcome, room: room.unwrap_or(0.0), known: true, apart: room.is_some() })
     }
 
     /// Tries to prove a course from here; true when it holds over this step at least.
@@ -231,7 +225,7 @@ impl Knowledge {
             return false;
         }
         self.failures = 0;
-        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
+        let motions = q.motions();
         let course = Course { motions, begin: q.clock, steps: self.steps, until, room: kept.room };
         put(&mut self.course, course);
         self.on_course = true;
@@ -243,15 +237,14 @@ impl Knowledge {
         self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
         // More work might tell an overlap that was to be searched past.
         let open = outcome.status == Status::Overlap && q.query.asked.past_overlap;
-        if outcome.status == Status::Undecided || open {
-            self.answered = false;
-            return;
+        // What moves is hardly ever asked the same again, and what took no search is found as quickly as it is kept.
+        let cheap = outcome.counters.cells + outcome.counters.instant_cells == 0;
+        let moves = || [&q.query.a, &q.query.b].iter().any(|body| !body.placed.motion.is_rest());
+        self.answered = outcome.status != Status::Undecided && !open && !(cheap && moves());
+        if self.answered {
+            put(&mut self.answer, Answer { motions: q.motions(), asked: q.query.asked, outcome: *outcome });
+            self.told = None;
         }
-        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
-        let answer = Answer { motions, asked: q.query.asked, outcome: *outcome };
-        put(&mut self.answer, answer);
-        self.answered = true;
-        self.told = None;
     }
 }
 
@@ -264,6 +257,10 @@ fn put<T>(place: &mut Option<Box<T>>, value: T) {
 }
 
 impl Question<'_> {
+    fn motions(&self) -> [Motion; 2] {
+        [self.query.a.placed.motion, self.query.b.placed.motion]
+    }
+
     /// The smaller of both radii.
     fn size(&self) -> f64 {
         self.query.a.model.radius.min(self.query.b.model.radius)
@@ -291,7 +288,7 @@ impl Course {
             return None;
         }
         let mut sum = 0.0;
-        let now = [q.query.a.placed.motion, q.query.b.placed.motion];
+        let now = q.motions();
         for ((expected, motion), body) in self.motions.iter().zip(&now).zip(q.bodies) {
             let time = begin.min(self.steps);
             let (velocity, spin) = if stands { (DVec3::ZERO, DVec3::ZERO) } else { (expected.velocity, expected.spin) };

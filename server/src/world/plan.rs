@@ -52,6 +52,11 @@ impl PairPlan {
         self.margin * (1.0 + 2.0 * clearance::MARGIN_SLACK)
     }
 
+    /// True when it is told of a clear pair that it is near.
+    pub fn tells_nearness(&self) -> bool {
+        self.margin > 0.0 || self.report >= Report::Patch
+    }
+
     /// True when contact regions are told: for patches, and of pairs within a margin whose contacts are told.
     pub fn tells_regions(&self) -> bool {
         self.report >= Report::Patch || (self.margin > 0.0 && self.report >= Report::Contact)

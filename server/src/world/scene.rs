@@ -229,9 +229,7 @@ impl World {
 }
 
 fn check_pose(pose: &Pose) -> Result<(), ErrorCode> {
-    if !pose.position.is_finite() {
-        return Err(ErrorCode::NotFinite);
-    }
+    contactd_proto::pose::check_position(pose.position)?;
     contactd_proto::pose_record::unit_quaternion(pose.rotation.to_array()).map(|_| ())
 }
 

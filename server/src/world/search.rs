@@ -11,7 +11,7 @@ use super::body::Body;
 use super::coherence::{Finding, Knowledge, Question};
 use super::plan::PairPlan;
 use super::step::StepOptions;
-use crate::contact::{self, Asked, Outcome, PairQuery, PairSearch, Scratch, Status};
+use crate::contact::{self, Asked, Counters, Outcome, PairQuery, PairSearch, Scratch, Status};
 use crate::math::tolerance;
 use crate::motion::Placed;
 use contactd_proto::{Detect, Motion, Report};
@@ -127,8 +127,8 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
         }
         let mut q = job.question(bodies, options, clock);
         let cells = memory.with(|seat| {
-            let (known, counters) = job.knowledge.ask(&q, &mut seat.scratch);
-            if let Some(finding) = known {
+            let mut counters = Counters::default();
+            if let Some(finding) = job.knowledge.ask(&q, &mut seat.scratch, &mut counters) {
                 job.found = finding;
                 finish(&job.plan, &mut job.found.outcome);
                 seat.cells += job.found.outcome.counters.cells;

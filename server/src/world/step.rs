@@ -280,7 +280,7 @@ impl World {
             let body = &mut bodies[index as usize];
             let mut way = 0.0;
             if !body.track.is_rest() {
-                way = body.travel(options.advance);
+                way = body.taken(options.advance);
                 body.track = Track::resting(body.track.at(options.advance));
             }
             state.neighbours.moved(index, way, 0.0);
@@ -325,7 +325,7 @@ impl World {
             let count = self.bodies.len() as u32;
             for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
                 let Some((index, plan, resolution)) = plan(i, j) else { continue };
-                // By the boxes' sides, as f measures: bodies whose corners are farther apart may be within it.
+                // Side by side: bodies whose corners are farther apart may be within it.
                 let reach = 0.5 * plan.reach();
                 let near = swept(i).grown(reach).meets(&swept(j).grown(reach));
                 let pair = neighbours.find(i, j).filter(|pair| near && !neighbours.is_apart(*pair));
@@ -348,6 +348,7 @@ impl World {
             for &pair in &asked {
                 let (i, j) = neighbours.bodies(pair);
                 let sight = *neighbours.sight(pair);
+                // What met mostly does so again: no look is worth its while.
                 let glance = if sight.met || sight.discrete { None } else { self.glance((i, j), &sight, &mut stances) };
                 if let Some(glance) = glance {
                     neighbours.noticed(pair, &glance);
@@ -357,12 +358,18 @@ impl World {
                     }
                 }
                 let (plan, resolution) = plan(pair, &neighbours);
-                if !sight.met && glance.is_none() {
+                // Where nothing is glanced at the swept boxes decide what is asked about, whether the bodies have met or not:
+                // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
+                // depend on what is remembered. Without a margin or regions nothing is.
+                let boxed =
+                    if sight.met { plan.1.tells_nearness() && !self.is_seen((i, j), &sight) } else { glance.is_none() };
+                if boxed {
                     neighbours.box_tests += 1;
                     let (reach, boxes) = (plan.1.reach(), [swept(i), swept(j)]);
                     if !boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach)) {
                         if !sight.discrete {
-                            neighbours.note(pair, boxes[0].distance(&boxes[1]) - reach);
+                            // Side by side, as they are compared: boxes whose corners are farther apart may meet sooner.
+                            neighbours.note(pair, boxes[0].gap(&boxes[1]) - reach);
                         }
                         continue;
                     }
@@ -377,6 +384,12 @@ impl World {
         self.state.glanced = glanced;
         self.state.asked = asked;
         self.state.jobs = jobs;
+    }
+
+    /// True when a pair is one that is glanced at: both bodies have hulls, out as far as they matter to each other.
+    fn is_seen(&self, (i, j): (u32, u32), sight: &Sight) -> bool {
+        let holds = |k: u32| self.bodies[k as usize].hull.as_ref().is_some_and(|hull| hull.holds(sight.touch));
+        !sight.discrete && holds(i) && holds(j)
     }
 
     /// What a direction tells of a pair of convex bodies.
@@ -530,7 +543,7 @@ fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
     match o.status {
         Status::Contact | Status::Overlap | Status::Undecided => true,
         Status::Clear => {
-            let near = o.touching && (plan.margin > 0.0 || plan.report >= Report::Patch);
+            let near = o.touching && plan.tells_nearness();
             options.clear || near || o.margin_time < 1.0
         }
     }

@@ -19,10 +19,11 @@ use smallvec::SmallVec;
 
 /// Distance evaluations before a pair is left to the search.
 const ROUNDS: usize = 24;
-/// Distance evaluations that a proof of a kept distance may take, and the shortest time that another one is worth.
+/// Distance evaluations that a proof of a kept distance may take.
 const KEPT: u64 = 6;
 /// The same for the time at which a distance is reached.
 const NEARED: u64 = 200;
+/// The shortest time that another one is worth.
 const SHORT: f64 = 1.0 / 32.0;
 /// Resolutions by which bodies that lie in each other are set apart to find what separates them.
 const OFF: f64 = 64.0;
@@ -175,7 +176,6 @@ impl<'a> Advance<'a> {
         Gap { t: m.at.t, n, phi: -m.b.reach(-along) - self.a.1.reach(along) }
     }
 
-    /// Up to where between two gaps a contact of depth delta is excluded; the end if all of it is.
     /// True when the way between the centres, without a distance, keeps the bodies apart for the whole step.
     fn frees_all(&self, m: &Moment, end: &Moment) -> bool {
         let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.a.0.ball.center);

@@ -56,6 +56,8 @@ struct Met {
     normal: DVec3,
     speed: f64,
     faces: [u32; 2],
+    /// Separation at the start.
+    apart: f64,
 }
 
 impl Passage {
@@ -79,6 +81,7 @@ impl Passage {
             time_lower: met.touch,
             time: met.touch,
             time_upper: met.deep,
+            apart: met.apart,
             point,
             normal,
             normal_speed: speed,
@@ -174,6 +177,7 @@ pub fn meet(pair: &Pair, radii: [f64; 2], asked: Asked, out: &mut Outcome) -> Op
     if let Some(met) = balls.meet()? {
         out.status = Status::Contact;
         (out.time_lower, out.time, out.time_upper) = (met.touch, met.touch, met.deep);
+        out.apart = met.apart;
         out.counters = met.counters(asked, out.counters);
         if asked.point() {
             (out.point, out.normal, out.normal_speed) = (met.point, met.normal, met.speed);
@@ -231,6 +235,7 @@ impl Balls {
             normal: n,
             speed: n.dot(v),
             faces: self.faces,
+            apart: apart.sqrt() - sum,
         }))
     }
 }

@@ -29,8 +29,7 @@ pub fn meet(pair: &Pair, half: [DVec3; 2], asked: Asked, out: &mut Outcome) -> O
     let [a, b] = [0, 1].map(|k| pair.frame(k, &pair.axes(k)));
     let own = a.transpose();
     let boxes = Boxes { half, turned: own * b, way: own * pair.way, velocity: own * pair.velocity };
-    let free = excluded(pair.delta, pair.rounding).max(0.0);
-    match boxes.pass(free) {
+    match boxes.pass() {
         Passage::Miss => Some(()),
         Passage::Open => None,
         Passage::Across(across) => {
@@ -113,7 +112,7 @@ impl<'a> Met<'a> {
         if phi <= APART * pair.delta || speed <= 0.0 {
             return None;
         }
-        if phi - speed > least.max(0.0) {
+        if phi - speed > 0.0 {
             return Some(());
         }
         let (each, level) = (1.0 / speed, pair.witness_level());

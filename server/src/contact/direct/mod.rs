@@ -168,12 +168,13 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     let (bodies, primitives) = if swapped { ([&query.b, &query.a], [b, a]) } else { ([&query.a, &query.b], [a, b]) };
     let Some(pair) = Pair::new(bodies, primitives, query.resolution) else { return nothing };
     let turns = |spins: &[DVec3; 2]| *spins != [DVec3::ZERO; 2];
+    let moves_along = || bodies.iter().all(|body| body.placed.motion.spin == DVec3::ZERO);
     let balls = matches!([&a.shape, &b.shape], [Shape::Sphere(_), Shape::Sphere(_)]);
     let met = match (&primitives[0].shape, &primitives[1].shape) {
         (Shape::Sphere(p), Shape::Sphere(q)) if !turns(&pair.spins()) => {
             balls::meet(&pair, [p.radius, q.radius], query.asked, outcome)
         }
-        (Shape::Cuboid(p), Shape::Cuboid(q)) if !turns(&pair.spins()) => {
+        (Shape::Cuboid(p), Shape::Cuboid(q)) if moves_along() => {
             boxes::meet(&pair, [p.half, q.half], query.asked, outcome)
         }
         _ => None,

@@ -4,9 +4,8 @@
 //! just reach into each other miss it, the shortest way below the tangent planes of both bodies leads on from there
 //! (J. E. Kelley's cutting planes, J. SIAM 8(4), 1960, the two that are met at a time). Where that does not arrive, a common
 //! point of the two cores, mostly where an edge of the one pierces a face of the other, begins a line: the shortest
-//! combination of the normals around it leads away from all of them at once. F = max(f_A, f_B) is convex where both bodies
-//! are: along a line it falls to one lowest stretch and rises again; where both are equally deep is found by false position.
-//! A point that is 2 delta deep in both is the proof of an overlap; without one, others decide.
+//! combination of the normals around it leads away from all of them at once. A point that is 2 delta deep in both is the proof
+//! of an overlap; without one, others decide.
 //!
 //! The direction is the one of three along which the bodies overlap least: the normals of the two faces that the point is
 //! nearest to, and the way between the centres.
@@ -20,8 +19,6 @@ use super::support::{Body, Slope};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
-/// Steps of false position.
-const STEPS: usize = 4;
 /// Steps below tangent planes, the first one as deep as this part of what overlaps along the line between the centres.
 const DESCENTS: usize = 6;
 const WANTED: f64 = 0.25;
@@ -29,6 +26,9 @@ const WANTED: f64 = 0.25;
 const PARALLEL: f64 = 1e-4;
 /// Halves of the pair's scale that are tried as the length of a way.
 const HALVES: usize = 30;
+/// Relative gap between the distance and its lower bound from which a direction separates as well as any, and from which the
+/// point halfway between balls that reach into each other is looked for again.
+const ROUGH: f64 = 1e-2;
 /// How near to a point, in scales of the pair, the faces pass that a way has to lead away from.
 const NEAR: f64 = 1e-6;
 
@@ -91,16 +91,19 @@ impl<'a> Start<'a> {
         let (mut x, mut slopes) = self.descend(middle, (far - near) / square.sqrt(), least);
         if depth(&slopes) < least {
             *count += 1;
-            x = match gjk::meeting(&self.bodies[0], &self.bodies[1], way, gjk::GOOD) {
-                // Cores that are apart, in balls that are not: halfway between the nearest points.
-                Meeting::Apart(found) if found.distance < -2.0 * least => {
-                    self.inwards(0.5 * (found.a + found.b), least)
+            for good in [ROUGH, gjk::GOOD] {
+                let p = match gjk::meeting(&self.bodies[0], &self.bodies[1], way, good) {
+                    // Cores that are apart, in balls that are not: halfway between the nearest points.
+                    Meeting::Apart(found) if found.distance < -2.0 * least => 0.5 * (found.a + found.b),
+                    Meeting::Apart(found) => return Look::Apart(found.normal),
+                    Meeting::Common(p) => p,
+                    Meeting::Open => return Look::Open,
+                };
+                (x, slopes) = self.inwards(p, least);
+                if depth(&slopes) >= least {
+                    break;
                 }
-                Meeting::Apart(found) => return Look::Apart(found.normal),
-                Meeting::Common(p) => self.inwards(p, least),
-                Meeting::Open => return Look::Open,
-            };
-            slopes = self.slopes(x);
+            }
         }
         if depth(&slopes) < least { Look::Open } else { Look::Overlap(Common { x, slopes, shared: far - near }) }
     }
@@ -149,13 +152,6 @@ impl<'a> Start<'a> {
         self.axes[k].transpose() * x + self.pair.primitives[k].frame.position
     }
 
-    /// f of both bodies.
-    fn values(&self, x: DVec3) -> [f64; 2] {
-        let of_faces = |k: usize| self.pair.primitives[k].value(self.own(k, x));
-        let of = |k: usize| self.bodies[k].value(x).unwrap_or_else(|| of_faces(k));
-        [of(0), of(1)]
-    }
-
     /// How deep a point lies in both bodies.
     #[inline]
     fn slopes(&self, x: DVec3) -> [Slope; 2] {
@@ -179,12 +175,12 @@ impl<'a> Start<'a> {
     fn descend(&self, from: DVec3, along: f64, least: f64) -> (DVec3, [Slope; 2]) {
         let mut x = from;
         let mut wanted = if along.is_finite() { (WANTED * along).max(2.0 * least) } else { 2.0 * least };
-        let mut best = (x, self.slopes(x));
+        let mut slopes = self.slopes(x);
         for _ in 0..DESCENTS {
-            if depth(&best.1) >= least {
+            if depth(&slopes) >= least {
                 break;
             }
-            let [Slope { f: a, normal: m, .. }, Slope { f: b, normal: n, .. }] = best.1;
+            let [Slope { f: a, normal: m, .. }, Slope { f: b, normal: n, .. }] = slopes;
             let (a, b, cosine) = (a + wanted, b + wanted, m.dot(n));
             let square = 1.0 - cosine * cosine;
             let (of_m, of_n) = (a - cosine * b, b - cosine * a);
@@ -197,34 +193,31 @@ impl<'a> Start<'a> {
             } else {
                 break;
             };
-            wanted *= 0.5;
-            best = (x, self.slopes(x));
+            wanted = (0.5 * wanted).max(2.0 * least);
+            slopes = self.slopes(x);
         }
-        best
+        (x, slopes)
     }
 
-    /// A common point, or where it lies on a surface the deepest of some points on ways that lead inwards from it.
-    fn inwards(&self, p: DVec3, least: f64) -> DVec3 {
-        let [of_a, of_b] = self.values(p);
-        let mut best = (p, -of_a.max(of_b));
-        if best.1 >= least {
-            return p;
+    /// A common point, or where it lies on a surface the deepest of some points on a way that leads inwards from it.
+    fn inwards(&self, p: DVec3, least: f64) -> (DVec3, [Slope; 2]) {
+        let mut best = (p, self.slopes(p));
+        if depth(&best.1) >= least {
+            return best;
         }
-        if let Some(way) = self.way_inwards(p) {
-            let mut step = 0.5 * self.pair.scale;
-            for _ in 0..HALVES {
-                let x = p + way * step;
-                let [a, b] = self.values(x);
-                let depth = -a.max(b);
-                if depth > best.1 {
-                    best = (x, depth);
-                } else if best.1 >= least {
-                    break;
-                }
-                step *= 0.5;
+        let Some(way) = self.way_inwards(p) else { return best };
+        let mut step = 0.5 * self.pair.scale;
+        for _ in 0..HALVES {
+            let x = p + way * step;
+            let slopes = self.slopes(x);
+            if depth(&slopes) > depth(&best.1) {
+                best = (x, slopes);
+            } else if depth(&best.1) >= least {
+                break;
             }
+            step *= 0.5;
         }
-        if best.1 >= least { best.0 } else { self.deepest(p, self.centers[usize::from(of_b > of_a)]) }
+        best
     }
 
     /// A unit direction that leads away from all faces around a point of both bodies, if there is one.
@@ -237,37 +230,6 @@ impl<'a> Start<'a> {
             outward.extend(faces.map(|f| self.axes[k] * f.at(own).normal));
         }
         Some(-gjk::least_of(&outward)?.try_normalize()?)
-    }
-
-    /// The deepest of some points of a line.
-    fn deepest(&self, from: DVec3, to: DVec3) -> DVec3 {
-        let mut best = (from, f64::NEG_INFINITY);
-        let mut excess = |s: f64| {
-            let x = from + (to - from) * s;
-            let [a, b] = self.values(x);
-            let depth = -a.max(b);
-            if depth > best.1 {
-                best = (x, depth);
-            }
-            a - b
-        };
-        // How much deeper in B than in A, at both ends of what is left of the line.
-        let (mut low, mut high) = ((0.0, excess(0.0)), (1.0, excess(1.0)));
-        for _ in 0..STEPS {
-            if low.1 * high.1 >= 0.0 {
-                break;
-            }
-            let s = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let value = excess(s);
-            if value * high.1 < 0.0 {
-                low = high;
-            } else {
-                // The end that stays counts half, lest it stay for ever (the Illinois rule).
-                low.1 *= 0.5;
-            }
-            high = (s, value);
-        }
-        best.0
     }
 }
 

@@ -12,8 +12,8 @@
 use glam::{DMat3, DVec3};
 
 /// Edges whose directions differ by less than this, squared, make no direction. Products are no unit vectors: what rounding
-/// does to a gap, some ten half units of the numbers at hand, counts this much more along the unit vector, squared, and has to
-/// stay below the pair's own rounding, some hundreds.
+/// does to a gap, some ten half units of the numbers at hand, is up to 32 times that along the unit vector. It has to stay below
+/// 2 delta, which is no less than eight roundings of the pair of 66 half units each.
 const PARALLEL: f64 = 1e-3;
 
 /// Two boxes along the axes of the first one.
@@ -30,7 +30,7 @@ pub struct Boxes {
 
 /// What the slabs tell.
 pub enum Passage {
-    /// The boxes miss each other, by a gap that is larger than asked for.
+    /// The boxes miss each other.
     Miss,
     /// They meet first across this direction.
     Across(Across),
@@ -67,9 +67,9 @@ impl Features {
 }
 
 impl Boxes {
-    /// Whether the boxes meet in the course of time; `free` is a gap that excludes a contact, not negative.
+    /// Whether the boxes meet in the course of time. A gap excludes a contact.
     #[inline]
-    pub fn pass(&self, free: f64) -> Passage {
+    pub fn pass(&self) -> Passage {
         let b = &self.turned;
         let r = b.transpose().to_cols_array_2d();
         let s = r.map(|row| row.map(f64::abs));
@@ -106,9 +106,9 @@ impl Boxes {
         let sides = [first, last].map(|k| along[k] * 1f64.copysign(speed[k]));
         // A direction that is free to the end, one that is free from the start, or two that take turns.
         let halfway = 0.5 * (entry - exit);
-        if sides[0] - reach[first] - closing > free
-            || -sides[1] - reach[last] > free
-            || (halfway * closing > free && halfway * leaving > free)
+        if sides[0] - reach[first] - closing > 0.0
+            || -sides[1] - reach[last] > 0.0
+            || (halfway * closing > 0.0 && halfway * leaving > 0.0)
         {
             return Passage::Miss;
         }

@@ -120,6 +120,11 @@ impl Hull {
         self.around.as_ref().or_else(|| model.solid.whole().map(|p| &p.shape))
     }
 
+    /// True when it holds all points at which f of the body is up to half of `touch`.
+    pub fn holds(&self, touch: f64) -> bool {
+        0.5 * touch <= self.level
+    }
+
     /// Over the step that a track tells.
     pub fn stance(&self, track: &Track) -> Stance {
         let motion = &track.motion;

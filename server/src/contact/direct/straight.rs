@@ -74,15 +74,13 @@ impl<'a> Straight<'a> {
     /// Fills in the earliest contact, or leaves `out` clear; `None` leaves the pair to others. Tries are counted.
     pub fn meet(&self, asked: Asked, out: &mut Outcome) -> Option<()> {
         let (c, w) = (self.pair.way, self.pair.velocity);
-        let free = excluded(self.pair.delta, self.pair.rounding).max(0.0);
         let [a, b] = &self.start.bodies;
         let phi = |n: DVec3| -b.reach(-n) - a.reach(n);
         let speed = w.length();
         // Along the centres: most pairs that stay apart are told at once.
         let first = phi(c);
         let rate = c.dot(w);
-        let long = c.length();
-        if first.min(first - rate) > free * long {
+        if first.min(first - rate) > 0.0 {
             return Some(());
         }
         if speed <= f64::MIN_POSITIVE {
@@ -113,7 +111,7 @@ impl<'a> Straight<'a> {
             let d = b.support(-n) - a.support(n) - n * (margin / length);
             let below = n.dot(d);
             // Free from the start to the end.
-            if below.min(below - speed) > free * length {
+            if below.min(below - speed) > 0.0 {
                 return Some(());
             }
             if next < TRIES.len() && above - below <= TRIES[next].0 * size {
@@ -200,7 +198,7 @@ impl<'a> Straight<'a> {
         if phi <= APART * pair.delta || speed <= 0.0 {
             return None;
         }
-        if phi - speed > least.max(0.0) {
+        if phi - speed > 0.0 {
             return Some(());
         }
         let touch = Stand::new(pair, self.parts, self.start.axes, None).confirm(n, phi / speed, shown)?;

@@ -89,14 +89,8 @@ impl<'s> Body<'s> {
         n.dot(self.support(n)) + margin
     }
 
-    /// f of the body, the largest of its faces' values, negative inside: the same as `Primitive::value` but for rounding, in a
-    /// fraction of the time. `None` for a polyhedron.
-    #[inline]
-    pub fn value(&self, x: DVec3) -> Option<f64> {
-        Some(self.slope(x)?.f)
-    }
-
-    /// The same with its face; `None` for a polyhedron.
+    /// How deep a point is in the body by f, the largest of its faces' values: the same as `Primitive::value` but for rounding,
+    /// in a fraction of the time. `None` for a polyhedron.
     #[inline]
     pub fn slope(&self, x: DVec3) -> Option<Slope> {
         let from = x - self.origin;
@@ -204,7 +198,7 @@ mod tests {
             let mut inside = 0;
             for _ in 0..20_000 {
                 let x = frame.position + v(1.2);
-                let (faces, own) = (primitive.value(x), body.value(x).expect("no polyhedron"));
+                let (faces, own) = (primitive.value(x), body.slope(x).expect("no polyhedron").f);
                 assert!((faces - own).abs() <= 1e-14, "{shape:?} at {x}: {faces}, {own}");
                 // The plane of its face lies below f everywhere.
                 let Slope { normal, face, .. } = body.slope(x).expect("no polyhedron");
@@ -214,7 +208,7 @@ mod tests {
                 );
                 let other = frame.position + v(1.2);
                 let plane = own + normal.dot(other - x);
-                let f = body.value(other).expect("no polyhedron");
+                let f = body.slope(other).expect("no polyhedron").f;
                 assert!((normal.length() - 1.0).abs() < 1e-15 && plane <= f + 1e-14, "{shape:?} at {x}, {other}");
                 inside += u32::from(own < 0.0);
             }
