@@ -19,11 +19,11 @@ fn is_asked(job: &PairJob, options: &StepOptions, outcome: &Outcome) -> bool {
     job.near && job.plan.tells_regions() && !outcome.past && (outcome.status == Status::Contact || !options.first)
 }
 
-/// What may be spent on a pair beside its search.
-fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions, outcome: &Outcome, left: u64) -> PairQuery<'a> {
+/// A question about a pair beside its search, and what may be spent on it: the pair's limit once more, whatever its search has
+/// cost, so that what is told does not depend on what was remembered.
+fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions, left: u64) -> PairQuery<'a> {
     let mut query = search::query(bodies, job, options);
-    let spent = outcome.counters.cells + outcome.counters.instant_cells;
-    query.cell_limit = query.cell_limit.saturating_sub(spent).min(left);
+    query.cell_limit = query.cell_limit.min(left);
     query
 }
 
@@ -66,7 +66,7 @@ pub(super) fn decide(
     let (within, cells) = if job.found.outcome.apart > threshold + resolution {
         (Within::Apart, 0)
     } else {
-        clearance::touching(&query(bodies, job, options, &job.found.outcome, *left), threshold, scratch)
+        clearance::touching(&query(bodies, job, options, *left), threshold, scratch)
     };
     let outcome = &mut job.found.outcome;
     outcome.touching = within != Within::Apart;
@@ -76,7 +76,7 @@ pub(super) fn decide(
     outcome.counters.instant_cells += cells;
     *left = left.saturating_sub(cells);
     if margin && within == Within::Apart && clear && job.plan.detect != Detect::Discrete {
-        let mut query = query(bodies, job, options, &job.found.outcome, *left);
+        let mut query = query(bodies, job, options, *left);
         query.cell_limit = query.cell_limit.min(region::MOST_CELLS);
         let (until, known, work) = clearance::apart_until(&query, threshold, scratch);
         let cells = work.cells + work.instant_cells;
@@ -118,7 +118,7 @@ pub(super) fn find_regions(
             p.regions.1 = told.regions.len() as u32;
             out.regions.extend_from_slice(&told.regions);
         } else {
-            let query = query(bodies, job, options, &p.outcome, left);
+            let query = query(bodies, job, options, left);
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
             let found = region::complete(&query, &mut p.outcome, threshold);
             let touches =
