@@ -35,7 +35,7 @@ impl Lanes for f64 {
 }
 
 /// A number at the start and at the end of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(16))]
 pub struct Twin(pub [f64; 2]);
 

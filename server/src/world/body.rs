@@ -78,35 +78,36 @@ impl ObjectSpec {
     }
 }
 
-/// An object of the world.
+/// An object of the world. What every step looks at comes first and stays together: there are many bodies.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Body {
     /// Its id.
     pub id: u32,
-    /// Its name.
-    pub name: String,
     /// Index of its group in the plans.
     pub group: u32,
-    /// Its model.
-    pub part: Arc<Part>,
     /// It never moves.
     pub is_static: bool,
     /// It may turn.
     pub rotates: bool,
-    /// Largest declared speed.
-    pub max_speed: f64,
-    /// The model in the object's frame.
-    pub place: Pose,
-    /// Where it stands and how it came there.
-    pub track: Track,
-    /// Corners of the model's box in the object's frame; empty for an unbounded model.
-    corners: Vec<DVec3>,
-    /// Largest distance of a corner from the object's origin.
-    reach: f64,
-    /// The body as one convex primitive, or one around it; `None` for a body without bounds.
-    pub(super) hull: Option<Hull>,
     /// Step in which a record named it with a start, and with a motion.
     pub(super) named: [u64; 2],
+    /// Largest declared speed.
+    pub max_speed: f64,
+    /// Largest distance of a corner from the object's origin.
+    reach: f64,
+    /// Where it stands and how it came there.
+    pub track: Track,
+    /// The body as one convex primitive, or one around it; `None` for a body without bounds.
+    pub(super) hull: Option<Hull>,
+    /// Its model.
+    pub part: Arc<Part>,
+    /// The model in the object's frame.
+    pub place: Pose,
+    /// Corners of the model's box in the object's frame; empty for an unbounded model.
+    corners: Vec<DVec3>,
+    /// Its name.
+    pub name: String,
 }
 
 impl Body {
@@ -139,6 +140,19 @@ impl Body {
     pub fn speed(&self, motion: &Motion) -> f64 {
         let turning = if motion.spin == DVec3::ZERO { 0.0 } else { motion.spin.length() * self.reach };
         motion.velocity.length() + turning
+    }
+
+    /// True when something is declared of its motions.
+    pub fn is_declared(&self) -> bool {
+        !self.rotates || self.max_speed.is_finite()
+    }
+
+    /// True when a motion in `dt` seconds (0: unknown) keeps what was declared.
+    pub fn keeps(&self, motion: &Motion, dt: f64) -> bool {
+        let turns = !self.rotates && motion.spin != DVec3::ZERO;
+        // Without a duration a speed per second says nothing: a declared one needs it.
+        let fast = self.max_speed.is_finite() && (dt == 0.0 || self.speed(motion) > self.max_speed * dt);
+        !(turns || fast)
     }
 
     /// Distance of its farthest corner from the object's origin; infinite for an unbounded model.

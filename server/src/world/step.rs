@@ -13,7 +13,7 @@ use super::touch;
 use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Scratch, Stance, Status};
 use crate::math::Aabb;
 use contactd_proto::pose_record::Order;
-use contactd_proto::{Detect, EffectCounters, ErrorCode, PoseRecord, Report, Track};
+use contactd_proto::{Detect, EffectCounters, ErrorCode, Pose, PoseRecord, Report, Track};
 use std::fmt;
 
 /// Why a batch was refused. The world is as it was.
@@ -130,7 +130,8 @@ pub struct StepState {
     max_batch: usize,
     serial: u64,
     orders: Vec<(u32, Order)>,
-    staged: Vec<(u32, Track)>,
+    /// Where bodies are put at the start of the step, by their indices.
+    put: Vec<(u32, Pose)>,
     /// Bodies that moved in the last step.
     moving: Vec<u32>,
     /// When the step begins, in steps taken.
@@ -138,8 +139,9 @@ pub struct StepState {
     neighbours: Neighbours,
     /// Swept boxes, each with the serial of the step it was taken for.
     boxes: Vec<(u64, Aabb)>,
-    /// Convex bodies in this step, each with the serial of the step that it was taken for.
-    stances: Vec<(u64, Option<Stance>)>,
+    /// Convex bodies in the step whose serial stands beside them.
+    stances: Vec<Stance>,
+    stand_in: Vec<u64>,
     /// Neighbours that their odometers don't prove apart.
     asked: Vec<usize>,
     /// How many of them a direction proved apart.
@@ -159,12 +161,13 @@ impl StepState {
             max_batch,
             serial: 0,
             orders: Vec::new(),
-            staged: Vec::new(),
+            put: Vec::new(),
             moving: Vec::new(),
             clock: 0.0,
             neighbours: Neighbours::default(),
             boxes: Vec::new(),
             stances: Vec::new(),
+            stand_in: Vec::new(),
             asked: Vec::new(),
             glanced: 0,
             jobs: Vec::new(),
@@ -195,7 +198,7 @@ impl World {
     /// What is wrong with the batch, and the index of the record; the world has not changed.
     pub fn step(&mut self, records: &[PoseRecord], options: &StepOptions) -> Result<&StepOutcome, StepError> {
         self.check(records, options)?;
-        self.stage(options).inspect_err(|_| self.state.staged.clear())?;
+        self.stage(options)?;
         self.take(options);
         self.find_pairs(options);
         self.search(options);
@@ -245,28 +248,28 @@ impl World {
         Ok(())
     }
 
-    /// Works out the new tracks of the named objects: starts first, then motions.
+    /// Checks the motions of the named objects, from where they start.
     fn stage(&mut self, options: &StepOptions) -> Result<(), StepError> {
         let Self { bodies, state, .. } = self;
-        state.staged.clear();
+        state.put.clear();
         for (index, order) in &state.orders {
-            if matches!(order, Order::Start(_)) {
-                state.staged.push((*index, Track::ordered(bodies[*index as usize].track.end, *order)));
+            if let Order::Start(pose) = order {
+                state.put.push((*index, *pose));
             }
         }
-        let starts = state.staged.len();
-        // Where a body that was put somewhere stands: binary search over the starts.
-        state.staged.sort_unstable_by_key(|(index, _)| *index);
+        state.put.sort_unstable_by_key(|(index, _)| *index);
         for (i, (index, order)) in state.orders.iter().enumerate() {
-            if matches!(order, Order::Start(_)) {
-                continue;
-            }
             let body = &bodies[*index as usize];
-            let put = state.staged[..starts].binary_search_by_key(index, |(k, _)| *k);
-            let start = put.map_or_else(|_| body.track.at(options.advance), |k| state.staged[k].1.end);
-            let track = Track::ordered(start, *order);
-            check_motion(body, &track, options.dt).map_err(|code| StepError { code, index: Some(i as u32) })?;
-            state.staged.push((*index, track));
+            let (Order::End(Pose { position, .. }) | Order::Turn(position, _)) = order else { continue };
+            let start = place_of(&state.put, *index).unwrap_or_else(|| body.track.at(options.advance));
+            let refuse = |code| Err(StepError { code, index: Some(i as u32) });
+            if !(*position - start.position).length_squared().is_finite() {
+                return refuse(ErrorCode::NotFinite);
+            }
+            // Of most bodies nothing is declared, and their motion is worked out once.
+            if body.is_declared() && !body.keeps(&Track::ordered(start, *order).motion, options.dt) {
+                return refuse(ErrorCode::Declaration);
+            }
         }
         Ok(())
     }
@@ -274,24 +277,33 @@ impl World {
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
         let Self { bodies, state, .. } = self;
+        let StepState { neighbours, moving, orders, put, serial, .. } = state;
         state.clock += options.advance;
-        state.neighbours.count(bodies.len());
-        for index in state.moving.drain(..) {
-            let body = &mut bodies[index as usize];
-            let mut way = 0.0;
-            if !body.track.is_rest() {
-                way = body.taken(options.advance);
+        neighbours.count(bodies.len());
+        // What moved and is not named comes to rest.
+        moving.retain(|index| {
+            let body = &mut bodies[*index as usize];
+            if !body.named.contains(serial) && !body.track.is_rest() {
+                neighbours.moved(*index, body.taken(options.advance), 0.0);
                 body.track = Track::resting(body.track.at(options.advance));
             }
-            state.neighbours.moved(index, way, 0.0);
-        }
-        for (index, track) in state.staged.drain(..) {
+            false
+        });
+        for &(index, order) in orders.iter() {
             let body = &mut bodies[index as usize];
-            let (was, start) = (body.track.end, track.motion.start);
-            let jump = if was == start { 0.0 } else { body.displacement(&was, &start) };
-            body.track = track;
-            state.neighbours.moved(index, jump, body.travel(1.0));
-            state.moving.push(index);
+            if matches!(order, Order::Start(_)) && body.named[1] == *serial {
+                // Its motion begins there.
+                continue;
+            }
+            let was = body.track.at(options.advance);
+            if !body.track.is_rest() {
+                neighbours.moved(index, body.taken(options.advance), 0.0);
+            }
+            let start = place_of(put, index);
+            body.track = Track::ordered(start.unwrap_or(was), order);
+            let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
+            neighbours.moved(index, jump, body.travel(1.0));
+            moving.push(index);
         }
     }
 
@@ -300,6 +312,7 @@ impl World {
         let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
         let mut stances = std::mem::take(&mut self.state.stances);
+        let mut stand_in = std::mem::take(&mut self.state.stand_in);
         let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
         let plan = |i: u32, j: u32| {
@@ -317,7 +330,8 @@ impl World {
             }
             *place
         };
-        stances.resize(self.bodies.len(), (0, None));
+        stances.resize(self.bodies.len(), Stance::default());
+        stand_in.resize(self.bodies.len(), 0);
         let mut glanced = 0;
         jobs.clear();
         if options.clear {
@@ -349,7 +363,8 @@ impl World {
                 let (i, j) = neighbours.bodies(pair);
                 let sight = *neighbours.sight(pair);
                 // What met mostly does so again: no look is worth its while.
-                let glance = if sight.met || sight.discrete { None } else { self.glance((i, j), &sight, &mut stances) };
+                let look = !sight.met && !sight.discrete;
+                let glance = if look { self.glance((i, j), &sight, &mut stances, &mut stand_in) } else { None };
                 if let Some(glance) = glance {
                     neighbours.noticed(pair, &glance);
                     if glance.apart {
@@ -381,6 +396,7 @@ impl World {
         self.state.neighbours = neighbours;
         self.state.boxes = boxes;
         self.state.stances = stances;
+        self.state.stand_in = stand_in;
         self.state.glanced = glanced;
         self.state.asked = asked;
         self.state.jobs = jobs;
@@ -394,20 +410,26 @@ impl World {
 
     /// What a direction tells of a pair of convex bodies.
     #[inline]
-    fn glance(&self, (i, j): (u32, u32), sight: &Sight, stances: &mut [(u64, Option<Stance>)]) -> Option<Glance> {
+    fn glance(
+        &self,
+        (i, j): (u32, u32),
+        sight: &Sight,
+        stances: &mut [Stance],
+        stand_in: &mut [u64],
+    ) -> Option<Glance> {
         for k in [i, j] {
-            let place = &mut stances[k as usize];
-            if place.0 != self.state.serial {
-                let body = &self.bodies[k as usize];
-                *place = (self.state.serial, body.hull.as_ref().map(|hull| hull.stance(&body.track)));
+            let k = k as usize;
+            if stand_in[k] != self.state.serial {
+                let body = &self.bodies[k];
+                stances[k] = body.hull.as_ref()?.stance(&body.track);
+                stand_in[k] = self.state.serial;
             }
         }
-        let stances = [stances[i as usize].1.as_ref()?, stances[j as usize].1.as_ref()?];
         let shapes = |k: usize| {
             let body = &self.bodies[[i, j][k] as usize];
             body.hull.as_ref()?.shape(&body.part.model)
         };
-        Some(Glancing::new(stances, shapes, sight.touch)?.look(sight.along))
+        Some(Glancing::new([&stances[i as usize], &stances[j as usize]], shapes, sight.touch)?.look(sight.along))
     }
 
     /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for
@@ -496,16 +518,12 @@ impl World {
     }
 }
 
-/// Refuses a motion that leaves the finite numbers or breaks what was declared of the body.
-fn check_motion(body: &Body, track: &Track, dt: f64) -> Result<(), ErrorCode> {
-    let m = &track.motion;
-    if !m.velocity.length_squared().is_finite() {
-        return Err(ErrorCode::NotFinite);
+/// Where a body is put at the start of the step: binary search over those that are.
+fn place_of(put: &[(u32, Pose)], index: u32) -> Option<Pose> {
+    if put.is_empty() {
+        return None;
     }
-    let turns = !body.rotates && m.spin != glam::DVec3::ZERO;
-    // Without a duration a speed per second says nothing: a declared one needs it.
-    let fast = body.max_speed.is_finite() && (dt == 0.0 || body.speed(m) > body.max_speed * dt);
-    if turns || fast { Err(ErrorCode::Declaration) } else { Ok(()) }
+    put.binary_search_by_key(&index, |(k, _)| *k).ok().map(|k| put[k].1)
 }
 
 /// Counts what was worked out for a pair in this step; what was known of it costs nothing.

@@ -41,7 +41,7 @@ impl<'a> Form<'a> {
         }
     }
 
-    /// Largest m·x over the shape, in its own frame; m is a unit vector, or two of them.
+    /// Largest m·x over the shape, in its own frame; m is a unit vector, or two of them. Of any length but for a ball.
     #[inline]
     pub fn extent<T: Lanes>(&self, m: [T; 3]) -> T {
         match self {

@@ -110,23 +110,10 @@ fn common(s: &[Corner; 4]) -> Option<DVec3> {
     x.is_finite().then_some(x)
 }
 
-/// Keeps the corners that hold the point of the simplex nearest to 0, with their weights; `None` if 0 lies inside.
-fn reduce(s: &mut [Corner; 4], count: usize) -> Option<usize> {
-    let w = [s[0].w, s[1].w, s[2].w, s[3].w];
-    let weights = match count {
-        1 => [1.0, 0.0, 0.0, 0.0],
-        2 => {
-            let [a, b] = segment([w[0], w[1]]);
-            [a, b, 0.0, 0.0]
-        }
-        3 => {
-            let [a, b, c] = triangle([w[0], w[1], w[2]]);
-            [a, b, c, 0.0]
-        }
-        _ => tetrahedron(w)?,
-    };
+/// Keeps the corners whose weights are positive.
+fn keep<const N: usize>(s: &mut [Corner; 4], weights: [(usize, f64); N]) -> usize {
     let mut kept = 0;
-    for (i, weight) in weights.into_iter().enumerate() {
+    for (i, weight) in weights {
         if weight > 0.0 {
             if kept < i {
                 s[kept] = s[i];
@@ -135,7 +122,26 @@ fn reduce(s: &mut [Corner; 4], count: usize) -> Option<usize> {
             kept += 1;
         }
     }
-    Some(kept)
+    kept
+}
+
+/// Keeps the corners that hold the point of the simplex nearest to 0, with their weights; `None` if 0 lies inside.
+fn reduce(s: &mut [Corner; 4], count: usize) -> Option<usize> {
+    Some(match count {
+        1 => keep(s, [(0, 1.0)]),
+        2 => {
+            let [a, b] = segment([s[0].w, s[1].w]);
+            keep(s, [(0, a), (1, b)])
+        }
+        3 => {
+            let [a, b, c] = triangle([s[0].w, s[1].w, s[2].w]);
+            keep(s, [(0, a), (1, b), (2, c)])
+        }
+        _ => {
+            let ([i, j], [a, b, d]) = tetrahedron([s[0].w, s[1].w, s[2].w, s[3].w])?;
+            keep(s, [(i, a), (j, b), (3, d)])
+        }
+    })
 }
 
 /// The weights of the corners in the point nearest to 0; 0 for those that do not hold it.
@@ -186,22 +192,21 @@ fn triangle([a, b, c]: [DVec3; 3]) -> [f64; 3] {
 }
 
 /// The same of a tetrahedron whose last corner was added to the triangle of the others, on the side of it where 0 is, so that
-/// 0 is nearest to one of the other faces; `None` if it lies inside.
-fn tetrahedron(w: [DVec3; 4]) -> Option<[f64; 4]> {
-    const FACES: [[usize; 4]; 3] = [[0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]];
+/// 0 is nearest to one of the other faces: its first two corners, and the weights of these and the last; `None` if it lies inside.
+fn tetrahedron([a, b, c, d]: [DVec3; 4]) -> Option<([usize; 2], [f64; 3])> {
     let mut best = None;
     let mut least = f64::INFINITY;
-    for [i, j, k, l] in FACES {
-        let (a, b, c, d) = (w[i], w[j], w[k], w[l]);
-        let n = (b - a).cross(c - a);
-        // 0 on the other side of the face than the fourth corner, or the tetrahedron flat.
-        if -a.dot(n) * (d - a).dot(n) <= 0.0 {
-            let t = triangle([a, b, c]);
-            let square = (a * t[0] + b * t[1] + c * t[2]).length_squared();
+    // Normals of the faces at the last corner, and on which side of each the corner is that it misses.
+    let (da, db, dc) = (a - d, b - d, c - d);
+    let (bc, ca, ab) = (db.cross(dc), dc.cross(da), da.cross(db));
+    let side = da.dot(bc);
+    for (n, (p, q), corners) in [(ab, (a, b), [0, 1]), (ca, (a, c), [0, 2]), (bc, (b, c), [1, 2])] {
+        // 0 on the other side of the face than the corner that it misses, or the tetrahedron flat.
+        if -d.dot(n) * side <= 0.0 {
+            let t = triangle([p, q, d]);
+            let square = (p * t[0] + q * t[1] + d * t[2]).length_squared();
             if best.is_none() || square < least {
-                let mut weights = [0.0; 4];
-                (weights[i], weights[j], weights[k]) = (t[0], t[1], t[2]);
-                (best, least) = (Some(weights), square);
+                (best, least) = (Some((corners, t)), square);
             }
         }
     }

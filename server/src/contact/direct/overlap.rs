@@ -95,6 +95,8 @@ impl<'a> Start<'a> {
                 let p = match gjk::meeting(&self.bodies[0], &self.bodies[1], way, good) {
                     // Cores that are apart, in balls that are not: halfway between the nearest points.
                     Meeting::Apart(found) if found.distance < -2.0 * least => 0.5 * (found.a + found.b),
+                    // Nearly the direction of nearest points does not separate balls that are near.
+                    Meeting::Apart(found) if good == ROUGH && self.gap(found.normal) <= 0.0 => continue,
                     Meeting::Apart(found) => return Look::Apart(found.normal),
                     Meeting::Common(p) => p,
                     Meeting::Open => return Look::Open,
@@ -199,23 +201,31 @@ impl<'a> Start<'a> {
         (x, slopes)
     }
 
-    /// A common point, or where it lies on a surface the deepest of some points on a way that leads inwards from it.
+    /// A common point, or where it lies on a surface the deepest of some points on a way that leads inwards from it: away from
+    /// all faces there, or, as from the apex of a cone, to the centre.
     fn inwards(&self, p: DVec3, least: f64) -> (DVec3, [Slope; 2]) {
         let mut best = (p, self.slopes(p));
         if depth(&best.1) >= least {
             return best;
         }
-        let Some(way) = self.way_inwards(p) else { return best };
-        let mut step = 0.5 * self.pair.scale;
-        for _ in 0..HALVES {
-            let x = p + way * step;
-            let slopes = self.slopes(x);
-            if depth(&slopes) > depth(&best.1) {
-                best = (x, slopes);
-            } else if depth(&best.1) >= least {
+        let outer = usize::from(best.1[1].f > best.1[0].f);
+        let to_center = || (self.centers[outer] - p).try_normalize();
+        for way in [&|| self.way_inwards(p), &to_center as &dyn Fn() -> Option<DVec3>] {
+            let Some(way) = way() else { continue };
+            let mut step = 0.5 * self.pair.scale;
+            for _ in 0..HALVES {
+                let x = p + way * step;
+                let slopes = self.slopes(x);
+                if depth(&slopes) > depth(&best.1) {
+                    best = (x, slopes);
+                } else if depth(&best.1) >= least {
+                    break;
+                }
+                step *= 0.5;
+            }
+            if depth(&best.1) >= least {
                 break;
             }
-            step *= 0.5;
         }
         best
     }

@@ -20,7 +20,7 @@ use super::form::Form;
 use super::support::Body;
 use super::{body_of, gjk};
 use crate::eco::Model;
-use crate::math::Twin;
+use crate::math::{Lanes, Twin};
 use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
 use crate::solid::{Node, Op, Primitive, Shape};
 use contactd_proto::{Pose, Track};
@@ -28,14 +28,16 @@ use glam::{DMat3, DQuat, DVec3};
 
 /// Relative to the numbers at hand: far above what rounding does to a gap, and above the least resolution of any pair.
 const CRUDE: f64 = 1e-11;
+/// The part of that which the place of a body counts: sums of three numbers are rounded there, and no more.
+const PLACE: f64 = 1e-4;
 /// How near to the distance a glance looks for its direction.
 const ROUGH: f64 = 0.3;
 
 /// What does not change from step to step.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Hull {
-    /// What encloses the body, where it is no primitive itself, and the level of its f up to which it does.
-    around: Option<Shape>,
+    /// The level of the body's f up to which it is enclosed.
     level: f64,
     /// How far the primitive reaches; `None` for a polyhedron.
     form: Option<Form<'static>>,
@@ -46,26 +48,30 @@ pub struct Hull {
     rho: f64,
     /// The numbers that rounding depends on: the model's extents and those of its place.
     size: f64,
+    /// What encloses the body, where it is no primitive itself. Seldom looked at: last.
+    around: Option<Shape>,
 }
 
-/// One body in one step.
-#[derive(Clone, Copy, Debug)]
+/// One body in one step. Four lines of a cache: there are many, and each is looked at from all around.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
 pub struct Stance {
+    /// The primitive's axes in the world, component by component, at both ends.
+    axes: [[Twin; 3]; 3],
+    /// Its centre.
+    center: [Twin; 3],
     /// How far it reaches, but for a polyhedron, whose corners are many.
     form: Option<Form<'static>>,
     /// The level of f up to which the primitive encloses the body.
     level: f64,
-    /// The primitive's axes in the world, component by component, at both ends.
-    axes: [[Twin; 3]; 3],
-    /// From the object's origin to the primitive's centre, at both ends.
-    offsets: [Twin; 3],
-    position: DVec3,
-    velocity: DVec3,
     /// ω ρ and ω² ρ.
     swing: f64,
     pull: f64,
+    /// The numbers that rounding depends on.
     size: f64,
 }
+
+const _: () = assert!(size_of::<Stance>() == 256);
 
 /// Two vectors, component by component.
 fn twins(start: DVec3, end: DVec3) -> [Twin; 3] {
@@ -131,22 +137,22 @@ impl Hull {
         let (first, last) = (motion.start.rotation, track.end.rotation);
         let [start, end] = [DMat3::from_quat(first * self.turned), DMat3::from_quat(last * self.turned)];
         let axes = [twins(start.x_axis, end.x_axis), twins(start.y_axis, end.y_axis), twins(start.z_axis, end.z_axis)];
-        let offsets = if self.center == DVec3::ZERO {
-            twins(DVec3::ZERO, DVec3::ZERO)
+        let (from, to) = (motion.start.position, motion.start.position + motion.velocity);
+        let center = if self.center == DVec3::ZERO {
+            twins(from, to)
         } else {
-            twins(first * self.center, last * self.center)
+            twins(from + first * self.center, to + last * self.center)
         };
+        let far = from.abs().max_element().max(to.abs().max_element());
         let omega = motion.spin.length();
         Stance {
+            axes,
+            center,
             form: self.form,
             level: self.level,
-            axes,
-            offsets,
-            position: motion.start.position,
-            velocity: motion.velocity,
             swing: omega * self.rho,
             pull: omega * omega * self.rho,
-            size: self.size * (1.0 + omega),
+            size: self.size * (1.0 + omega) + PLACE * far,
         }
     }
 }
@@ -209,11 +215,9 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
         }
         let form = |k: usize| stances[k].form.or_else(|| shapes(k).map(Form::of));
         let forms = [form(0)?, form(1)?];
-        let difference = b.position - a.position;
-        let velocity = b.velocity - a.velocity;
-        let extent = difference.abs().element_sum() + velocity.abs().element_sum() + a.size + b.size;
-        let centers = twins(difference, difference + velocity);
-        let ways = [0, 1, 2].map(|i| centers[i] + (b.offsets[i] - a.offsets[i]));
+        let ways = [b.center[0] - a.center[0], b.center[1] - a.center[1], b.center[2] - a.center[2]];
+        let [first, last] = (ways[0].abs() + ways[1].abs() + ways[2].abs()).0;
+        let extent = first + last + a.size + b.size;
         Some(Self { forms, stances, shapes, ways, least: touch + CRUDE * extent })
     }
 
@@ -242,7 +246,9 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
     fn proves(&self, (n0, gap0): (DVec3, f64), (n1, gap1): (DVec3, f64)) -> bool {
         let [a, b] = self.stances;
         let turned = (n1 - n0).length();
-        let speed = if turned == 0.0 { 0.0 } else { (b.velocity - a.velocity).length() + a.swing + b.swing };
+        // Of the centres of rotation, which go what the centres go but for their swing.
+        let way = || DVec3::from_array(self.ways.map(|w| w.0[1] - w.0[0])).length();
+        let speed = if turned == 0.0 { 0.0 } else { way() + 2.0 * (a.swing + b.swing) };
         gap0.min(gap1) - 0.125 * (1.0 + 1e-12) * (2.0 * turned * speed + a.pull + b.pull) > self.least
     }
 

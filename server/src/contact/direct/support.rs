@@ -3,6 +3,7 @@
 //! Static dispatch on the shape, nothing allocated: this is the innermost loop of the advance.
 //! A ball is its centre and a margin: then the distance of two balls is that of two points, found at once.
 
+use super::form::Form;
 use crate::solid::Shape;
 use crate::solid::primitive::Geometry;
 use glam::{DMat3, DVec3};
@@ -85,8 +86,13 @@ impl<'s> Body<'s> {
     /// Largest n·x over the body.
     #[inline]
     pub fn reach(&self, n: DVec3) -> f64 {
-        let margin = if self.margin > 0.0 { self.margin * n.length() } else { 0.0 };
-        n.dot(self.support(n)) + margin
+        let form = Form::of(self.shape);
+        let own = if let Form::Ball(radius) = form {
+            radius * n.length()
+        } else {
+            form.extent([self.axes.x_axis.dot(n), self.axes.y_axis.dot(n), self.axes.z_axis.dot(n)])
+        };
+        n.dot(self.origin) + own
     }
 
     /// How deep a point is in the body by f, the largest of its faces' values: the same as `Primitive::value` but for rounding,

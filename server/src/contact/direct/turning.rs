@@ -32,7 +32,7 @@ use glam::{DMat3, DVec3};
 const ROUNDS: usize = 12;
 /// How near to the distance the direction of nearest points is looked for, and how near to a circle of directions one is
 /// held by it: first and second try.
-const TRIES: [(f64, f64); 2] = [(1e-2, 0.1), (1e-7, 1e-3)];
+const TRIES: [(f64, f64); 2] = [(5e-2, 0.1), (1e-7, 1e-3)];
 /// Newton steps.
 const STEPS: usize = 10;
 /// A step this small (radians) leaves an error of its square.
