@@ -29,7 +29,8 @@ pub struct Session<T: Transport> {
     step: u64,
     last_model: u32,
     last_object: u32,
-    lost_batch: Option<Vec<PoseRecord>>,
+    /// The batch that was under way when the server was lost, until the next one is accepted.
+    unanswered: Option<Vec<PoseRecord>>,
     /// The server was told of the end, and said so.
     is_over: bool,
     /// How long a command may take (imports of large models included).
@@ -70,7 +71,7 @@ impl<T: Transport> Session<T> {
             step: 0,
             last_model: 0,
             last_object: 0,
-            lost_batch: None,
+            unanswered: None,
             is_over: false,
             command_timeout: Duration::from_secs(600),
         })
@@ -179,7 +180,7 @@ impl<T: Transport> Session<T> {
             return Err(Error::Misuse("an embedded session has no server that could be lost"));
         }
         let until = Instant::now() + timeout;
-        self.stage = Stage::Lost;
+        self.lose();
         loop {
             match self.replay() {
                 Err(Error::NoServer(_) | Error::ServerLost | Error::Timeout) if Instant::now() < until => {
@@ -218,19 +219,9 @@ impl<T: Transport> Session<T> {
     }
 
     fn command(&mut self, command: Command) -> Result<Answer, Error> {
-        match self.stage {
-            Stage::Lost => return Err(Error::ServerLost),
-            Stage::Sent { .. } => return Err(Error::Misuse("a step is in flight: finish it first")),
-            Stage::Idle | Stage::Loaned => {}
-        }
+        self.check_idle()?;
         match self.transport.command(command, self.command_timeout) {
-            Ok(Answer::Refused { code, index, detail }) => {
-                let error = refused(code, index, detail);
-                if error.code() == Some(ErrorCode::SessionGone) {
-                    self.stage = Stage::Lost;
-                }
-                Err(error)
-            }
+            Ok(Answer::Refused { code, index, detail }) => Err(self.failed(refused(code, index, detail))),
             Ok(answer) => Ok(answer),
             Err(e) => Err(self.failed(e)),
         }

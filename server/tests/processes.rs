@@ -310,10 +310,12 @@ fn bad_input_is_refused_each_with_its_sentence() {
 
     // A session that is gone: the batch is refused, and a reconnect brings it back.
     session.transport_mut().command(Command::Close, PATIENCE).unwrap();
-    session.begin_step(0).unwrap();
+    set_options(&mut session, 3);
+    fill(session.begin_step(ids.len()).unwrap(), &ids, 3, 5);
     refused(session.finish(PATIENCE), ErrorCode::SessionGone, &[]);
     session.reconnect(PATIENCE).unwrap();
-    assert_eq!(step(&mut session, &ids, 3, 5).unwrap(), step(&mut own, &ids, 3, 5).unwrap());
+    session.resend().unwrap();
+    assert_eq!(session.finish(PATIENCE).map(|r| bits(&r)).unwrap(), step(&mut own, &ids, 3, 5).unwrap());
     assert!(server.stop().success());
 }
 

@@ -105,10 +105,11 @@
 // No server of this name is running.
 #define CONTACTD_ERROR_NO_SERVER 1001
 
-// The server died or was stopped: contactd_reconnect finds its successor and replays the session.
+// The server died or was stopped, or the session on it was lost: contactd_reconnect finds a server and replays the session.
 #define CONTACTD_ERROR_SERVER_LOST 1002
 
-// The server could not deliver its reply; the step was taken, or refused: contactd_reconnect settles it.
+// The server could not deliver its reply; what was asked was done, or refused: contactd_reconnect goes back to before it, then it is
+// to be sent again (contactd_resend, for a step).
 #define CONTACTD_ERROR_REPLY_LOST 1003
 
 // The time ran out. A step stays in flight: contactd_finish may be called again.
@@ -785,8 +786,11 @@ int32_t contactd_send(struct contactd_session *session);
 // nothing; contactd_error_index names its offending record. After CONTACTD_ERROR_TIMEOUT the step stays in flight: call again.
 int32_t contactd_finish(struct contactd_session *session, double timeout, struct contactd_reply *reply);
 
-// After contactd_reconnect: the batch that was in flight when the server died, begun again with the same poses.
-int32_t contactd_resend(struct contactd_session *session, struct contactd_pose_record **poses, size_t *count);
+// After contactd_reconnect: the batch that was in flight when the server was lost, begun again with the same poses. It can be had
+// until a batch is accepted.
+int32_t contactd_resend(struct contactd_session *session,
+                        struct contactd_pose_record **poses,
+                        size_t *count);
 
 // The detail slot of record number `record` of the last reply, in place; `*slot` is NULL when details were not asked for.
 int32_t contactd_get_detail(struct contactd_session *session, size_t record, const struct contactd_detail_slot **slot);

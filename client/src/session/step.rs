@@ -55,7 +55,7 @@ pub(super) enum Stage {
     Sent {
         advance: f64,
     },
-    /// The server died: reconnect first. Says whether a batch can be sent again.
+    /// The server is gone, or does not have the session that this client knows: reconnect first.
     Lost,
 }
 
@@ -65,19 +65,29 @@ impl<T: Transport> Session<T> {
     /// # Errors
     /// `Refused` (`TooMany`), `Misuse` while a step is in flight, `ServerLost`, `System`.
     pub fn begin_step(&mut self, n: usize) -> Result<&mut [PoseRecord], Error> {
-        match self.stage {
-            Stage::Sent { .. } => return Err(Error::Misuse("a step is in flight: finish it first")),
-            Stage::Lost => return Err(Error::ServerLost),
-            Stage::Idle | Stage::Loaned => {}
-        }
-        if n > self.opened.max_batch as usize {
-            let detail = format!("{n} records, the limit is {}", self.opened.max_batch);
-            return Err(Error::Refused { code: ErrorCode::TooMany, index: None, detail });
-        }
+        self.check_idle()?;
+        self.check_count(n)?;
         self.stage = Stage::Idle;
         let slots = self.transport.loan(n)?;
         self.stage = Stage::Loaned;
         Ok(slots)
+    }
+
+    /// Whether something else may begin.
+    pub(super) fn check_idle(&self) -> Result<(), Error> {
+        match self.stage {
+            Stage::Sent { .. } => Err(Error::Misuse("a step is in flight: finish it first")),
+            Stage::Lost => Err(Error::ServerLost),
+            Stage::Idle | Stage::Loaned => Ok(()),
+        }
+    }
+
+    fn check_count(&self, n: usize) -> Result<(), Error> {
+        if n <= self.opened.max_batch as usize {
+            return Ok(());
+        }
+        let detail = format!("{n} records, the limit is {}", self.opened.max_batch);
+        Err(Error::Refused { code: ErrorCode::TooMany, index: None, detail })
     }
 
     /// Sends the batch without waiting; `finish` does it too.
@@ -119,7 +129,8 @@ impl<T: Transport> Session<T> {
     ///
     /// # Errors
     /// `Refused` with the index of the offending record (nothing has changed); `Timeout` (the step stays in flight:
-    /// call again); `ServerLost` (see `reconnect` and `resend`); `ReplyLost`; `Misuse`; `System`.
+    /// call again); `ServerLost`, `ReplyLost` and `Refused` because the session is gone (see `reconnect` and `resend`);
+    /// `Misuse`; `System`.
     pub fn finish(&mut self, timeout: Duration) -> Result<Reply<'_>, Error> {
         if self.stage == Stage::Loaned {
             self.send()?;
@@ -132,18 +143,10 @@ impl<T: Transport> Session<T> {
         match self.transport.receive(timeout) {
             Ok(()) => {}
             Err(Error::Timeout) => return Err(Error::Timeout),
-            Err(Error::ReplyLost) => {
-                // The step was taken, or it was refused: the journal cannot tell, the server can no longer be trusted
-                // to stand where the journal does. A replay settles it.
-                self.stage = Stage::Lost;
-                return Err(Error::ReplyLost);
-            }
             Err(e) => return Err(self.failed(e)),
         }
-        self.stage = Stage::Idle;
-        let Some((header, _)) = self.transport.reply() else {
-            return Err(Error::System("a reply was announced that is not there".into()));
-        };
+        let absent = || Error::System("a reply was announced that is not there".into());
+        let Some((header, _)) = self.transport.reply() else { return Err(self.failed(absent())) };
         // Branched on once, so copied once.
         let (status, error, index) = (header.status, header.error, header.index);
         if status == STEP_REFUSED || error != 0 {
@@ -151,44 +154,58 @@ impl<T: Transport> Session<T> {
             let index = (index != NO_INDEX).then_some(index);
             let record = index.and_then(|i| self.transport.loaned().get(i as usize));
             let detail = record.map_or_else(String::new, |r| format!("object id {}", r.object));
-            if code == ErrorCode::SessionGone {
-                self.stage = Stage::Lost;
-            }
-            return Err(Error::Refused { code, index, detail });
+            return Err(self.failed(Error::Refused { code, index, detail }));
         }
+        (self.stage, self.unanswered) = (Stage::Idle, None);
         if self.transport.may_lose_server() {
             self.journal.accepted(self.transport.loaned(), advance);
         }
         self.options.advance = 1.0;
         match self.transport.reply() {
             Some((header, slots)) => Ok(Reply::of(*header, slots)),
-            None => Err(Error::ReplyLost),
+            None => Err(absent()),
         }
     }
 
-    /// After `reconnect`: the batch that was in flight when the server died, loaned again with the same poses.
+    /// After `reconnect`: the batch that was in flight when the server was lost, loaned again with the same poses. It can be had
+    /// until a batch is accepted.
     ///
     /// # Errors
-    /// `Misuse` when there was none; otherwise as `begin_step`.
+    /// `Misuse` when there is none; otherwise as `begin_step`.
     pub fn resend(&mut self) -> Result<&mut [PoseRecord], Error> {
-        let Some(batch) = self.lost_batch.take() else {
-            return Err(Error::Misuse("no step was in flight when the server died"));
+        self.check_idle()?;
+        let Some(n) = self.unanswered.as_ref().map(Vec::len) else {
+            return Err(Error::Misuse("no step was in flight when the server was lost"));
         };
-        let slots = self.begin_step(batch.len())?;
-        slots.copy_from_slice(&batch);
+        self.check_count(n)?;
+        self.stage = Stage::Idle;
+        let slots = self.transport.loan(n)?;
+        if let Some(batch) = &self.unanswered {
+            slots.copy_from_slice(batch);
+        }
+        self.stage = Stage::Loaned;
         Ok(slots)
     }
 
-    /// Notes a failure of the transport; keeps the batch when the server is lost.
+    /// Notes why a step or a command failed.
     pub(super) fn failed(&mut self, error: Error) -> Error {
-        if error == Error::ServerLost {
-            if matches!(self.stage, Stage::Loaned | Stage::Sent { .. }) {
-                self.lost_batch = Some(self.transport.loaned().to_vec());
-            }
-            self.stage = Stage::Lost;
+        // Where the reply is lost the server did what was asked, or refused it: the journal cannot tell, so the server can no
+        // longer be trusted to stand where the journal does. A replay settles it.
+        let lost = matches!(error, Error::ServerLost | Error::ReplyLost);
+        if lost || error.code() == Some(ErrorCode::SessionGone) {
+            self.lose();
         } else if matches!(self.stage, Stage::Sent { .. }) {
             self.stage = Stage::Idle;
         }
         error
+    }
+
+    /// The session is no longer what the server has. The journal stands before a batch that has no answer: it is kept. One that
+    /// was kept before still has none, unless another is under way.
+    pub(super) fn lose(&mut self) {
+        if matches!(self.stage, Stage::Loaned | Stage::Sent { .. }) {
+            self.unanswered = Some(self.transport.loaned().to_vec());
+        }
+        self.stage = Stage::Lost;
     }
 }
