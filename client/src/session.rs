@@ -16,8 +16,11 @@ use contactd_proto::{ErrorCode, MassOptions, MassProperties, PoseRecord, Rule};
 use std::time::{Duration, Instant};
 use step::Stage;
 
+/// How long closing waits for a step in flight.
+const PATIENCE: Duration = Duration::from_secs(1);
+
 /// One client's scene on a server. One thread at a time. Dropped without [`close`](Self::close) it still says goodbye, and waits a
-/// fifth of a second at most until that was heard; a server that does not hear it ends the session with this process.
+/// fifth of a second at most until that was heard; a server that does not hear it ends the session when it finds that nobody listens.
 #[derive(Debug)]
 pub struct Session<T: Transport> {
     transport: T,
@@ -179,11 +182,11 @@ impl<T: Transport> Session<T> {
         if !self.transport.may_lose_server() {
             return Err(Error::Misuse("an embedded session has no server that could be lost"));
         }
-        let until = Instant::now() + timeout;
+        let start = Instant::now();
         self.lose();
         loop {
             match self.replay() {
-                Err(Error::NoServer(_) | Error::ServerLost | Error::Timeout) if Instant::now() < until => {
+                Err(Error::NoServer(_) | Error::ServerLost | Error::Timeout) if start.elapsed() < timeout => {
                     std::thread::sleep(Duration::from_millis(5));
                 }
                 other => return other,
@@ -191,11 +194,16 @@ impl<T: Transport> Session<T> {
         }
     }
 
-    /// Ends the session.
+    /// Ends the session; a step in flight is waited for, a second at most.
     ///
     /// # Errors
     /// `ServerLost`, `Timeout`, `System`; the session is over in any case.
     pub fn close(mut self) -> Result<(), Error> {
+        // Commands wait for steps. A server that does not answer its step has gone, or ends the session when it is done with it.
+        let is_in_flight = matches!(self.stage, Stage::Sent { .. });
+        if is_in_flight && matches!(self.finish(PATIENCE), Err(Error::Timeout | Error::ServerLost | Error::ReplyLost)) {
+            return Ok(());
+        }
         self.done(Command::Close)?;
         self.is_over = true;
         Ok(())

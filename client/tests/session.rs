@@ -203,3 +203,42 @@ fn the_sentences_of_a_loss_say_what_to_do() {
     let said = Error::ServerLost.to_string();
     assert!(said.contains("or the session on it") && said.contains("reconnect"), "{said}");
 }
+
+#[test]
+fn a_wait_without_an_end_is_no_overflow() {
+    let (mut session, script) = scripted();
+    script.borrow_mut().opens.extend([Error::NoServer("x".into()), Error::ServerLost, Error::Timeout]);
+    assert_eq!(session.reconnect(Duration::MAX), Ok(()));
+    assert_eq!(script.borrow().log.iter().filter(|said| **said == Said::Opened).count(), 4);
+    // And one of no length is one attempt.
+    script.borrow_mut().opens.push_back(Error::NoServer("x".into()));
+    assert_eq!(session.reconnect(Duration::ZERO), Err(Error::NoServer("x".into())));
+}
+
+/// A step in flight is waited for before the server is told; where it does not come the session is only left.
+#[test]
+fn closing_waits_for_the_step_in_flight() {
+    let waited = Said::Waited(Duration::from_secs(1));
+    let close = Said::Command(Command::Close);
+    let refusal = Error::refused(ErrorCode::Busy);
+    for (answer, told) in [
+        (Ok(()), vec![waited.clone(), close.clone()]),
+        (Err(refusal), vec![waited.clone(), close.clone()]),
+        (Err(Error::System("no room".into())), vec![waited.clone(), close.clone()]),
+        (Err(Error::Timeout), vec![waited.clone(), Said::Left]),
+        (Err(Error::ReplyLost), vec![waited.clone(), Said::Left]),
+        (Err(Error::ServerLost), vec![waited, Said::Left]),
+    ] {
+        let (mut session, script) = scripted();
+        session.begin_step(1).unwrap()[0] = pose(1);
+        session.send().unwrap();
+        script.borrow_mut().answers.push_back(answer);
+        assert_eq!(session.close(), Ok(()));
+        assert_eq!(script.borrow().log[1..], told);
+    }
+    // Without one the server is told at once.
+    let (mut session, script) = scripted();
+    session.begin_step(1).unwrap();
+    assert_eq!(session.close(), Ok(()));
+    assert_eq!(script.borrow().log, [close]);
+}
