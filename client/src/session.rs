@@ -88,7 +88,7 @@ impl<T: Transport> Session<T> {
     /// Loads a model from OpenSCAD CSG text; `name` stands in error sentences.
     ///
     /// # Errors
-    /// `Refused` with line and column of what is not supported; `ServerLost`, `Timeout`, `System`.
+    /// `Refused` with line and column of what is not supported; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn load_model(&mut self, name: &str, text: &str) -> Result<ModelInfo, Error> {
         self.load_model_with(name, text, Facets::Auto)
     }
@@ -118,7 +118,7 @@ impl<T: Transport> Session<T> {
     ///
     /// # Errors
     /// `Refused`: unknown model (`UnknownModel`), an option out of its range (`BadNumber`), a model that reaches to infinity
-    /// (`Unbounded`); `ServerLost`, `Timeout`, `System`. Boxes that do not suffice are no error: the bounds tell.
+    /// (`Unbounded`); `ServerLost`, `ReplyLost`, `Timeout`, `System`. Boxes that do not suffice are no error: the bounds tell.
     pub fn mass_properties(&mut self, model: u32, options: &MassOptions) -> Result<MassProperties, Error> {
         let MassOptions { tolerance, boxes } = *options;
         match self.command(Command::MassProperties { model, tolerance, boxes })? {
@@ -130,7 +130,7 @@ impl<T: Transport> Session<T> {
     /// Adds an object; returns its id.
     ///
     /// # Errors
-    /// `Refused`: unknown model, bad pose or speed, too many objects, resolution; `ServerLost`, `Timeout`, `System`.
+    /// `Refused`: unknown model, bad pose or speed, too many objects, resolution; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn add_object(&mut self, object: Object) -> Result<u32, Error> {
         let id = self.last_object + 1;
         let spec = object.spec(id);
@@ -145,7 +145,7 @@ impl<T: Transport> Session<T> {
     /// Removes an object; its id is not used again.
     ///
     /// # Errors
-    /// `Refused`: unknown object; `ServerLost`, `Timeout`, `System`.
+    /// `Refused`: unknown object; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn remove_object(&mut self, object: u32) -> Result<(), Error> {
         self.done(Command::RemoveObject(object))?;
         self.journal.removed(object);
@@ -155,7 +155,7 @@ impl<T: Transport> Session<T> {
     /// Replaces the session's rules.
     ///
     /// # Errors
-    /// `Refused` at the index of a bad rule; `ServerLost`, `Timeout`, `System`.
+    /// `Refused` at the index of a bad rule; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn set_rules(&mut self, rules: &[Rule]) -> Result<(), Error> {
         self.done(Command::SetRules(rules.iter().map(WireRule::from).collect()))?;
         self.journal.rules(rules);
@@ -165,7 +165,7 @@ impl<T: Transport> Session<T> {
     /// Sets the resolution of every pair; `None`: each its default.
     ///
     /// # Errors
-    /// `Refused`: not a positive length well below the primitives' size; `ServerLost`, `Timeout`, `System`.
+    /// `Refused`: not a positive length well below the primitives' size; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn set_resolution(&mut self, resolution: Option<f64>) -> Result<(), Error> {
         self.done(Command::SetResolution(resolution))?;
         self.journal.resolution(resolution);
@@ -173,7 +173,8 @@ impl<T: Transport> Session<T> {
     }
 
     /// After `ServerLost`, `ReplyLost` or a session that is gone: waits until a server of the same name runs, opens a
-    /// session there and replays models, objects, rules and last poses. Ids stay the same.
+    /// session there and replays models, objects, rules and last poses. Ids stay the same. A step that has no answer is kept for
+    /// `resend`.
     ///
     /// # Errors
     /// `NoServer` when none came up within `timeout`; `Misuse`, and nothing has changed, where there is no server that could be
@@ -197,7 +198,7 @@ impl<T: Transport> Session<T> {
     /// Ends the session; a step in flight is waited for, a second at most.
     ///
     /// # Errors
-    /// `ServerLost`, `Timeout`, `System`; the session is over in any case.
+    /// `ServerLost`, `ReplyLost`, `Timeout`, `System`; the session is over in any case.
     pub fn close(mut self) -> Result<(), Error> {
         // Commands wait for steps. A server that does not answer its step has gone, or ends the session when it is done with it.
         let is_in_flight = matches!(self.stage, Stage::Sent { .. });

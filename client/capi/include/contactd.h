@@ -708,9 +708,10 @@ int32_t contactd_get_opened(struct contactd_session *session, struct contactd_op
 int32_t contactd_set_command_timeout(struct contactd_session *session, double timeout);
 
 // After CONTACTD_ERROR_SERVER_LOST, CONTACTD_ERROR_REPLY_LOST or a session that is gone: waits up to `timeout` seconds until a
-// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. On
-// an embedded session there is nothing to find again: CONTACTD_ERROR_MISUSE.
-int32_t contactd_reconnect(struct contactd_session *session, double timeout);
+// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. A step that
+// has no answer is kept for contactd_resend. On an embedded session there is nothing to find again: CONTACTD_ERROR_MISUSE.
+int32_t contactd_reconnect(struct contactd_session *session,
+                           double timeout);
 
 // Loads a model from OpenSCAD CSG text; `name` stands in error sentences; `facets` is CONTACTD_FACETS_…, how curved
 // primitives are taken. `*model` is its id.
