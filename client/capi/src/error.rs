@@ -14,8 +14,8 @@ pub const OK: i32 = 0;
 pub const ERROR_NO_SERVER: i32 = 1001;
 /// The server died or was stopped, or the session on it was lost: contactd_reconnect finds a server and replays the session.
 pub const ERROR_SERVER_LOST: i32 = 1002;
-/// The server could not deliver its reply; what was asked was done, or refused: contactd_reconnect goes back to before it, then it is
-/// to be sent again (contactd_resend, for a step).
+/// The server could not deliver its reply; what was asked was done, or refused: contactd_reconnect goes back to before it,
+/// then it is to be sent again (contactd_resend, for a step).
 pub const ERROR_REPLY_LOST: i32 = 1003;
 /// The time ran out. A step stays in flight: contactd_finish may be called again.
 pub const ERROR_TIMEOUT: i32 = 1004;

@@ -110,8 +110,9 @@ pub unsafe extern "C" fn contactd_set_command_timeout(session: *mut Session, tim
 }
 
 /// After CONTACTD_ERROR_SERVER_LOST, CONTACTD_ERROR_REPLY_LOST or a session that is gone: waits up to `timeout` seconds until a
-/// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. A step that
-/// has no answer is kept for contactd_resend. On an embedded session there is nothing to find again: CONTACTD_ERROR_MISUSE.
+/// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. A
+/// step that has no answer is kept for contactd_resend. On an embedded session there is nothing to find again:
+/// CONTACTD_ERROR_MISUSE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_reconnect(session: *mut Session, timeout: f64) -> i32 {
     let call = |state: &mut State| {

@@ -113,8 +113,8 @@ pub unsafe extern "C" fn contactd_finish(session: *mut Session, timeout: f64, re
     unsafe { on(session, call) }
 }
 
-/// After contactd_reconnect: the batch that was in flight when the server was lost, begun again with the same poses. It can be had
-/// until a batch is accepted.
+/// After contactd_reconnect: the batch that was in flight when the server was lost, begun again with the same poses. It can be
+/// had until a batch is accepted.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_resend(session: *mut Session, poses: *mut *mut PoseRecord, count: *mut usize) -> i32 {
     let call = |state: &mut State| {
