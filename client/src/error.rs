@@ -18,9 +18,10 @@ pub enum Error {
     },
     /// No server of this name is running.
     NoServer(String),
-    /// The server died or was stopped. `reconnect` finds its successor and replays the session.
+    /// The server died or was stopped, or the session on it was lost. `reconnect` finds a server and replays the session.
     ServerLost,
-    /// The server could not deliver its reply, since this client did not take earlier ones. The step was taken.
+    /// The server could not deliver its reply, since this client did not take earlier ones. What was asked was done, or refused:
+    /// `reconnect` goes back to before it, then it is to be sent again (`resend`, for a step).
     ReplyLost,
     /// The time ran out. A step stays in flight: `finish` may be called again.
     Timeout,
@@ -68,8 +69,10 @@ impl fmt::Display for Error {
             Self::NoServer(name) => {
                 write!(f, "no server called \"{name}\" is running: start it with `contactd serve --name {name}`")
             }
-            Self::ServerLost => f.write_str("the server is gone; reconnect to replay the session on its successor"),
-            Self::ReplyLost => f.write_str("the server could not deliver its reply"),
+            Self::ServerLost => f.write_str("the server is gone, or the session on it; reconnect to replay it"),
+            Self::ReplyLost => {
+                f.write_str("the server could not deliver its reply; reconnect, and send the step or command again")
+            }
             Self::Timeout => f.write_str("the server has not answered in time; the request is still in flight"),
             Self::Address(e) => write!(f, "{e}"),
             Self::Version { min, max } => write!(

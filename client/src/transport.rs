@@ -30,7 +30,7 @@ pub trait Transport {
     /// Sends a command and waits for its answer.
     ///
     /// # Errors
-    /// `ServerLost`, `Timeout`, `System`; a refusal is an answer, not an error.
+    /// `ServerLost`, `ReplyLost`, `Timeout`, `System`; a refusal is an answer, not an error.
     fn command(&mut self, command: Command, timeout: Duration) -> Result<Answer, Error>;
 
     /// Slots for the poses of the next step, all zero.
@@ -57,7 +57,7 @@ pub trait Transport {
     /// The reply that was received, in place: header and slots.
     fn reply(&self) -> Option<(&StepReply, &[ContactRecord])>;
 
-    /// The session was dropped: tells the other side, if there is one, without waiting long.
+    /// The session is over without having been closed: tells the other side, if there is one, without waiting long.
     fn leave(&mut self) {}
 }
 

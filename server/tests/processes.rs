@@ -4,7 +4,7 @@ mod harness;
 
 use contactd::ipc::ServerConfig;
 use contactd_client::proto::control::{Answer, Command};
-use contactd_client::proto::names::Address;
+use contactd_client::proto::names::{self, Address};
 use contactd_client::proto::status::StatusRecord;
 use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
 use contactd_client::proto::{Detect, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule, StepRequest};
@@ -166,6 +166,106 @@ fn a_killed_client_loses_its_session_and_a_stopped_server_is_told() {
     assert_eq!(step(&mut survivor, &ids, 2, 1), Err(Error::ServerLost));
 }
 
+/// Waits until the server shows `n` sessions; what it shows of itself follows its beat.
+fn wait_for_sessions(server: &ServerProcess, n: u64) {
+    let until = Instant::now() + PATIENCE;
+    while SharedMemory::status(&server.address).unwrap().sessions != n {
+        assert!(Instant::now() < until, "the server never came to {n} sessions");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_session_that_reconnects_to_a_server_that_lives_takes_no_second_place() {
+    let mut server = ServerProcess::start("again", "sessions = 2\n");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let _other = Session::connect_to(server.address.clone()).unwrap();
+    let ids = build(&mut session, 1);
+    for k in 0..4 {
+        step(&mut session, &ids, k, 1).unwrap();
+        session.reconnect(PATIENCE).unwrap();
+        assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 2);
+    }
+    // With a step in flight on a server that is busy: the goodbye is not heard, and its place is found to be free.
+    for k in 4..7 {
+        rustix::process::kill_process(server.pid(), rustix::process::Signal::STOP).unwrap();
+        set_options(&mut session, k);
+        fill(session.begin_step(ids.len()).unwrap(), &ids, k, 1);
+        session.send().unwrap();
+        let pid = server.pid();
+        let goes_on = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(400));
+            rustix::process::kill_process(pid, rustix::process::Signal::CONT).unwrap();
+        });
+        session.reconnect(PATIENCE).unwrap();
+        goes_on.join().unwrap();
+        assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 2);
+        session.resend().unwrap();
+        session.finish(PATIENCE).unwrap();
+    }
+    assert!(server.stop().success());
+}
+
+#[test]
+fn a_session_that_is_closed_ends_whatever_is_under_way() {
+    let mut server = ServerProcess::start("closing", "");
+    let connect = || Session::connect_to(server.address.clone()).unwrap();
+    let begun = || {
+        let mut session = connect();
+        let ids = build(&mut session, 1);
+        session.begin_step(1).unwrap()[0] = PoseRecord::end(ids[0], &Pose::IDENTITY);
+        session.send().unwrap();
+        session
+    };
+    // A step in flight: waited for.
+    begun().close().unwrap();
+    wait_for_sessions(&server, 0);
+    // One that takes longer than anybody waits: the server finds that nobody listens, whether the session was closed or dropped.
+    for closes in [true, false] {
+        let mut session = connect();
+        rustix::process::kill_process(server.pid(), rustix::process::Signal::STOP).unwrap();
+        session.begin_step(0).unwrap();
+        session.send().unwrap();
+        if closes {
+            session.close().unwrap();
+        } else {
+            drop(session);
+        }
+        rustix::process::kill_process(server.pid(), rustix::process::Signal::CONT).unwrap();
+        wait_for_sessions(&server, 0);
+    }
+    // An import that nobody waits for any more.
+    let mut session = connect();
+    session.command_timeout = Duration::from_millis(100);
+    assert_eq!(session.load_model("large.csg", &spheres(15_000)).map(|m| m.id), Err(Error::Timeout));
+    session.command_timeout = PATIENCE;
+    session.close().unwrap();
+    assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 0);
+    // A session whose client never came, as one that gave up waiting for the answer.
+    let mut session = connect();
+    let process = (std::process::id(), names::start_of_process(std::process::id()).unwrap());
+    let open = Command::Open { version: names::PROTOCOL_VERSION, process };
+    assert!(matches!(session.transport_mut().command(open, PATIENCE), Ok(Answer::Opened { .. })));
+    assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 2);
+    wait_for_sessions(&server, 1);
+    session.set_resolution(None).unwrap();
+    drop(session);
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+/// A model of many spheres in a grid.
+fn spheres(n: u32) -> String {
+    let sphere = |i: u32| {
+        format!(
+            "multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n",
+            i % 150,
+            i / 150
+        )
+    };
+    format!("union() {{ {} }}", (0..n).map(sphere).collect::<String>())
+}
+
 /// What each effect adds to records, slots and header comes through shared memory as it is.
 #[test]
 fn every_effect_has_the_embedded_bits() {
@@ -310,10 +410,12 @@ fn bad_input_is_refused_each_with_its_sentence() {
 
     // A session that is gone: the batch is refused, and a reconnect brings it back.
     session.transport_mut().command(Command::Close, PATIENCE).unwrap();
-    session.begin_step(0).unwrap();
+    set_options(&mut session, 3);
+    fill(session.begin_step(ids.len()).unwrap(), &ids, 3, 5);
     refused(session.finish(PATIENCE), ErrorCode::SessionGone, &[]);
     session.reconnect(PATIENCE).unwrap();
-    assert_eq!(step(&mut session, &ids, 3, 5).unwrap(), step(&mut own, &ids, 3, 5).unwrap());
+    session.resend().unwrap();
+    assert_eq!(session.finish(PATIENCE).map(|r| bits(&r)).unwrap(), step(&mut own, &ids, 3, 5).unwrap());
     assert!(server.stop().success());
 }
 
@@ -389,16 +491,8 @@ fn a_large_model_delays_only_the_session_that_loads_it() {
     let mut session = Session::connect_to(address.clone()).unwrap();
     let ids = build(&mut session, 1);
     let loading = std::thread::spawn(move || {
-        let sphere = |i: u32| {
-            format!(
-                "multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n",
-                i % 150,
-                i / 150
-            )
-        };
-        let text = format!("union() {{ {} }}", (0..15_000).map(sphere).collect::<String>());
         let mut other = Session::connect_to(address).unwrap();
-        other.load_model("large.csg", &text).map(|m| m.faces.len())
+        other.load_model("large.csg", &spheres(15_000)).map(|m| m.faces.len())
     });
     let mut steps = 0;
     while !loading.is_finished() {

@@ -105,10 +105,11 @@
 // No server of this name is running.
 #define CONTACTD_ERROR_NO_SERVER 1001
 
-// The server died or was stopped: contactd_reconnect finds its successor and replays the session.
+// The server died or was stopped, or the session on it was lost: contactd_reconnect finds a server and replays the session.
 #define CONTACTD_ERROR_SERVER_LOST 1002
 
-// The server could not deliver its reply; the step was taken, or refused: contactd_reconnect settles it.
+// The server could not deliver its reply; what was asked was done, or refused: contactd_reconnect goes back to before it,
+// then it is to be sent again (contactd_resend, for a step).
 #define CONTACTD_ERROR_REPLY_LOST 1003
 
 // The time ran out. A step stays in flight: contactd_finish may be called again.
@@ -707,8 +708,9 @@ int32_t contactd_get_opened(struct contactd_session *session, struct contactd_op
 int32_t contactd_set_command_timeout(struct contactd_session *session, double timeout);
 
 // After CONTACTD_ERROR_SERVER_LOST, CONTACTD_ERROR_REPLY_LOST or a session that is gone: waits up to `timeout` seconds until a
-// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. On
-// an embedded session there is nothing to find again: CONTACTD_ERROR_MISUSE.
+// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. A
+// step that has no answer is kept for contactd_resend. On an embedded session there is nothing to find again:
+// CONTACTD_ERROR_MISUSE.
 int32_t contactd_reconnect(struct contactd_session *session, double timeout);
 
 // Loads a model from OpenSCAD CSG text; `name` stands in error sentences; `facets` is CONTACTD_FACETS_…, how curved
@@ -785,7 +787,8 @@ int32_t contactd_send(struct contactd_session *session);
 // nothing; contactd_error_index names its offending record. After CONTACTD_ERROR_TIMEOUT the step stays in flight: call again.
 int32_t contactd_finish(struct contactd_session *session, double timeout, struct contactd_reply *reply);
 
-// After contactd_reconnect: the batch that was in flight when the server died, begun again with the same poses.
+// After contactd_reconnect: the batch that was in flight when the server was lost, begun again with the same poses. It can be
+// had until a batch is accepted.
 int32_t contactd_resend(struct contactd_session *session, struct contactd_pose_record **poses, size_t *count);
 
 // The detail slot of record number `record` of the last reply, in place; `*slot` is NULL when details were not asked for.

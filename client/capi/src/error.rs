@@ -12,9 +12,10 @@ use std::ffi::{CString, c_char};
 pub const OK: i32 = 0;
 /// No server of this name is running.
 pub const ERROR_NO_SERVER: i32 = 1001;
-/// The server died or was stopped: contactd_reconnect finds its successor and replays the session.
+/// The server died or was stopped, or the session on it was lost: contactd_reconnect finds a server and replays the session.
 pub const ERROR_SERVER_LOST: i32 = 1002;
-/// The server could not deliver its reply; the step was taken, or refused: contactd_reconnect settles it.
+/// The server could not deliver its reply; what was asked was done, or refused: contactd_reconnect goes back to before it,
+/// then it is to be sent again (contactd_resend, for a step).
 pub const ERROR_REPLY_LOST: i32 = 1003;
 /// The time ran out. A step stays in flight: contactd_finish may be called again.
 pub const ERROR_TIMEOUT: i32 = 1004;

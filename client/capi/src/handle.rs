@@ -25,8 +25,6 @@ pub(crate) struct State {
     pub(crate) models: Models,
     /// Records of the reply whose slots lie in the transport.
     pub(crate) records: Option<usize>,
-    /// A step was sent and not yet answered.
-    pub(crate) in_flight: bool,
     /// A call panicked: what it left half done is not looked at again.
     pub(crate) panicked: bool,
 }
@@ -45,7 +43,7 @@ fn here() -> ThreadId {
 /// Those of [`Transport::open`].
 pub fn hand_over(transport: Box<dyn Transport>) -> Result<*mut Session, Error> {
     let session = Inner::new(transport)?;
-    let state = State { session, models: Models::default(), records: None, in_flight: false, panicked: false };
+    let state = State { session, models: Models::default(), records: None, panicked: false };
     Ok(Box::into_raw(Box::new(Session { owner: here(), busy: Cell::new(false), state: UnsafeCell::new(state) })))
 }
 
@@ -112,7 +110,7 @@ impl State {
             Ok(Ok(())) => crate::error::OK,
             Ok(Err(failure)) => failure.told(),
             Err(payload) => {
-                (self.panicked, self.in_flight) = (true, false);
+                self.panicked = true;
                 panicked(payload).told()
             }
         }

@@ -10,10 +10,6 @@ use contactd_client::{Error, SharedMemory};
 use std::ffi::{CStr, c_char};
 use std::path::Path;
 use std::ptr::null_mut;
-use std::time::Duration;
-
-/// How long closing waits for a step in flight.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
     Ok(version) => version,
@@ -80,13 +76,9 @@ pub unsafe extern "C" fn contactd_close(session: *mut *mut Session) -> i32 {
             return Ok(());
         }
         // SAFETY: not NULL, so a handle that was not closed (3).
-        let State { mut session, in_flight, panicked, .. } = unsafe { take_back(handle)? };
+        let State { session, panicked, .. } = unsafe { take_back(handle)? };
         variable.write(null_mut());
         if panicked {
-            return Ok(());
-        }
-        // A server that does not answer its step cannot be told of the end either; it ends the session with this process.
-        if in_flight && matches!(session.finish(PATIENCE), Err(Error::Timeout | Error::ServerLost | Error::ReplyLost)) {
             return Ok(());
         }
         Ok(session.close()?)
@@ -118,8 +110,9 @@ pub unsafe extern "C" fn contactd_set_command_timeout(session: *mut Session, tim
 }
 
 /// After CONTACTD_ERROR_SERVER_LOST, CONTACTD_ERROR_REPLY_LOST or a session that is gone: waits up to `timeout` seconds until a
-/// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. On
-/// an embedded session there is nothing to find again: CONTACTD_ERROR_MISUSE.
+/// server of the same name runs, opens a session there and replays models, objects, rules and last poses. Ids stay the same. A
+/// step that has no answer is kept for contactd_resend. On an embedded session there is nothing to find again:
+/// CONTACTD_ERROR_MISUSE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_reconnect(session: *mut Session, timeout: f64) -> i32 {
     let call = |state: &mut State| {

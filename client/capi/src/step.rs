@@ -4,7 +4,7 @@ use crate::abi::{Options, Reply};
 use crate::error::Failure;
 use crate::handle::{Session, State, on};
 use crate::raw::{flag, given, place, seconds};
-use contactd_client::{Error, StepOptions, Transport as _};
+use contactd_client::{StepOptions, Transport as _};
 use contactd_proto::{ContactRecord, DetailSlot, PatchSlot, PoseRecord, RegionSlot};
 
 /// What is asked of the steps to come, as it is set.
@@ -85,11 +85,7 @@ pub unsafe extern "C" fn contactd_begin_step(session: *mut Session, count: usize
 /// Sends the batch without waiting; contactd_finish does it too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_send(session: *mut Session) -> i32 {
-    let call = |state: &mut State| {
-        state.session.send()?;
-        state.in_flight = true;
-        Ok(())
-    };
+    let call = |state: &mut State| Ok(state.session.send()?);
     // SAFETY: the caller's handle (3).
     unsafe { on(session, call) }
 }
@@ -101,9 +97,7 @@ pub unsafe extern "C" fn contactd_finish(session: *mut Session, timeout: f64, re
     let call = |state: &mut State| {
         // SAFETY: the caller's variable (1).
         let place = unsafe { place(reply, "reply")? };
-        let answered = state.session.finish(seconds(timeout, "a timeout")?);
-        state.in_flight = matches!(answered, Err(Error::Timeout));
-        let reply = answered?;
+        let reply = state.session.finish(seconds(timeout, "a timeout")?)?;
         let (records, slots) = (reply.records(), reply.slots());
         state.records = Some(records.len());
         place.write(Reply {
@@ -119,7 +113,8 @@ pub unsafe extern "C" fn contactd_finish(session: *mut Session, timeout: f64, re
     unsafe { on(session, call) }
 }
 
-/// After contactd_reconnect: the batch that was in flight when the server died, begun again with the same poses.
+/// After contactd_reconnect: the batch that was in flight when the server was lost, begun again with the same poses. It can be
+/// had until a batch is accepted.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_resend(session: *mut Session, poses: *mut *mut PoseRecord, count: *mut usize) -> i32 {
     let call = |state: &mut State| {

@@ -5,6 +5,9 @@
 #[path = "../../examples/hello.rs"]
 mod hello;
 #[allow(dead_code)]
+#[path = "../../examples/manifold.rs"]
+mod manifold;
+#[allow(dead_code)]
 #[path = "../../examples/own_loop.rs"]
 mod own_loop;
 mod support;
@@ -66,6 +69,29 @@ fn a_loop_of_one_s_own_bounces_the_same_through_c() {
     assert!(lines.lines().count() > 10, "{lines}");
     // Reflections keep the speed.
     assert!((v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 6.125).abs() < 1e-12, "{v:?}");
+}
+
+/// The corners of the cube under the same ids at both steps, half way between it and the floor. (Through the C functions: `calls`.)
+#[test]
+fn the_points_of_the_manifold_slide_with_the_cube() {
+    let lines = manifold::points().unwrap();
+    // Step, id, then position, normal and distance.
+    let numbers =
+        |line: &str| -> Vec<f64> { line.split([' ', ',', ':']).filter_map(|word| word.parse().ok()).collect() };
+    let told: Vec<Vec<f64>> = lines.lines().map(numbers).collect();
+    assert_eq!(
+        told.iter().map(|n| (n[0], n[1])).collect::<Vec<_>>(),
+        [0.0, 1.0].map(|step| [0.0, 1.0, 2.0, 3.0].map(|id| (step, id))).concat()
+    );
+    let mut corners = std::collections::BTreeSet::new();
+    for (first, second) in told[..4].iter().zip(&told[4..]) {
+        let [x, y, z] = [first[2], first[3] - 0.25, first[4]];
+        assert!(x.abs() == 2.0 && y.abs() == 2.0 && z == 2.0005, "{lines}");
+        corners.insert((x > 0.0, y > 0.0));
+        assert_eq!(second[2..5], [x + 0.5, first[3], z], "{lines}");
+        assert!([first, second].iter().all(|n| n[5..8] == [0.0, 0.0, 1.0] && (n[8] - 1e-3).abs() < 1e-9), "{lines}");
+    }
+    assert_eq!(corners.len(), 4, "{lines}");
 }
 
 /// `lines` without the blanks that all of them begin with.

@@ -55,11 +55,12 @@ class NoServer(Error):
 
 
 class ServerLost(Error):
-    """The server died or was stopped: ``Session.reconnect`` finds its successor and replays the session."""
+    """The server died or was stopped, or the session on it was lost: ``Session.reconnect`` finds a server and replays the session."""
 
 
 class ReplyLost(Error):
-    """The server could not deliver its reply; the step was taken."""
+    """The server could not deliver its reply; what was asked was done, or refused: ``Session.reconnect`` goes back to before it, then it
+    is to be sent again (``Session.resend``, for a step)."""
 
 
 class Timeout(Error, TimeoutError):

@@ -235,6 +235,18 @@ impl Link {
         }
     }
 
+    /// Makes the port on which the server wakes this session's client.
+    fn listen(&mut self) -> Result<(), Error> {
+        let service = self
+            .node
+            .service_builder(&link::service_name(&names::wake_service_of(self.session))?)
+            .event()
+            .open()
+            .map_err(|e| system("the session's wake service", e))?;
+        self.wake = Some(service.listener_builder().create().map_err(|e| system("the session's wake port", e))?);
+        Ok(())
+    }
+
     /// Blocks until the server calls or the time is over.
     fn wait(&self, time: Duration) {
         let waited = match &self.wake {
@@ -259,7 +271,9 @@ impl Transport for SharedMemory {
     }
 
     fn open(&mut self) -> Result<Opened, Error> {
-        // The old link goes first: it may hold segments of a predecessor.
+        // A server that still lives is told that the old session is over: it counts against the server's limit. Then its link goes
+        // before the next one comes: it may hold segments of a predecessor.
+        self.leave();
         self.link = None;
         let mut link = Link::new(&self.address)?;
         let pid = std::process::id();
@@ -273,20 +287,15 @@ impl Transport for SharedMemory {
             }
             other => return Err(Error::System(format!("an unexpected answer to open: {other:?}"))),
         };
-        let wake = link
-            .node
-            .service_builder(&link::service_name(&names::wake_service_of(session))?)
-            .event()
-            .open()
-            .map_err(|e| system("the session's wake service", e))?
-            .listener_builder()
-            .create()
-            .map_err(|e| system("the session's wake port", e))?;
-        link.wake = Some(wake);
         link.session = session;
         link.spin = Duration::from_nanos(spin_ns);
         let epoch = link.epoch;
+        let listens = link.listen();
         self.link = Some(link);
+        if let Err(e) = listens {
+            self.leave();
+            return Err(e);
+        }
         Ok(Opened { session, epoch, max_batch })
     }
 
@@ -380,7 +389,7 @@ impl Transport for SharedMemory {
     }
 
     fn leave(&mut self) {
-        // Where it does not arrive the server ends the session with this process.
+        // Where it does not arrive the server finds that nobody listens.
         if let Some(link) = self.link.as_mut().filter(|link| !link.life.is_over()) {
             let _ = link.command(Command::Close, GOODBYE);
         }

@@ -1,14 +1,14 @@
 //! The server's loop: steps first, then commands, then finished jobs; spin, then block.
 //!
 //! One thread answers all sessions in the order in which their requests are found. Imports and mass properties are jobs for
-//! a thread of their own, so that a large model delays only its own session. Clients that died are noticed by their pidfd and lose their
-//! sessions; what they held in shared memory is freed.
+//! a thread of their own, so that a large model delays only its own session. Clients that died are noticed by their pidfd, those that left unheard by
+//! the port that they no longer have; both lose their sessions, and what they held in shared memory is freed.
 
 use super::config::ServerConfig;
 use super::models::{Loaded, Models};
 use super::root::{Root, RootError};
 use super::scene::{Import, Integration, Outcome, Scene, refusal, refused};
-use super::services::Services;
+use super::services::{Services, Wake};
 use crate::world::Refusal;
 use contactd_client::Error;
 use contactd_client::shm::link::Variant;
@@ -19,7 +19,6 @@ use contactd_proto::status::StatusRecord;
 use contactd_proto::step::ASK_POLLING;
 use contactd_proto::{ContactRecord, EffectCounters, ErrorCode, PoseRecord, StepReply, StepRequest};
 use iceoryx2::active_request::ActiveRequest;
-use iceoryx2::port::notifier::Notifier;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,6 +32,9 @@ type ControlCall = ActiveRequest<Variant, [u8], ControlHeader, [u8], ControlHead
 const BEAT: Duration = Duration::from_millis(50);
 /// The longest wait while a job runs: its end wakes nobody.
 const JOB_BEAT: Duration = Duration::from_millis(1);
+
+/// How long after the opening of its session a client may come to listen. Only one that could not take the answer needs longer.
+const ARRIVAL: Duration = Duration::from_secs(5);
 
 /// Why a server does not run.
 #[derive(Debug, thiserror::Error)]
@@ -57,12 +59,33 @@ impl From<Error> for ServeError {
 /// One client's session.
 struct Session {
     scene: Scene,
-    wake: Notifier<Variant>,
+    wake: Wake,
+    opened: Instant,
+    /// Its client was seen to listen, or has asked something, before which it listens.
+    arrived: bool,
     /// `None`: the client's process is not visible from here.
     life: Option<ProcessWatch>,
     last_request: Instant,
     /// A job of its is under way.
     waiting: bool,
+}
+
+impl Session {
+    fn asked(&mut self) {
+        (self.last_request, self.arrived) = (Instant::now(), true);
+    }
+
+    /// True when its client died, has long asked nothing where it cannot be watched, or left and was not heard: its goodbye dies with
+    /// its ports, so that it may miss a server that is busy with a step.
+    fn is_over(&mut self, idle: Duration) -> bool {
+        let is_gone = match &self.life {
+            Some(life) => life.is_dead(),
+            None => self.last_request.elapsed() >= idle,
+        };
+        let is_heard = self.wake.is_heard();
+        self.arrived |= is_heard;
+        is_gone || !is_heard && (self.arrived || self.opened.elapsed() >= ARRIVAL)
+    }
 }
 
 /// What takes too long for the loop.
@@ -197,7 +220,7 @@ impl Server {
             send_step(&call, 0, refusal(&request, code, None), &|_| ContactRecord::default());
             return;
         };
-        session.last_request = Instant::now();
+        session.asked();
         self.steps += 1;
         if session.waiting {
             send_step(&call, 0, refusal(&request, ErrorCode::Busy, None), &|_| ContactRecord::default());
@@ -211,7 +234,7 @@ impl Server {
         // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
         drop(call);
         if request.asked & ASK_POLLING == 0 {
-            let _ = session.wake.notify();
+            session.wake.notify();
         }
     }
 
@@ -238,26 +261,24 @@ impl Server {
         let Some(session) = session else {
             return answer(&call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
         };
-        session.last_request = Instant::now();
+        session.asked();
+        // Whatever is under way: what comes of a job has nobody to go to.
+        if envelope.command == Command::Close {
+            self.sessions.remove(&id);
+            self.show();
+            return answer(&call, &Answer::Done);
+        }
         if session.waiting {
             return answer(
                 &call,
                 &refused(Refusal::new(ErrorCode::Busy, "a model is being imported or integrated over")),
             );
         }
-        let answered = match envelope.command {
-            Command::Close => {
-                self.sessions.remove(&id);
-                self.show();
-                return answer(&call, &Answer::Done);
-            }
-            command => session.scene.command(command),
-        };
-        let job = match answered {
+        let job = match session.scene.command(envelope.command) {
             Outcome::Answered(a) => {
                 answer(&call, &a);
                 drop(call);
-                let _ = session.wake.notify();
+                session.wake.notify();
                 return;
             }
             Outcome::Import(import) => Job::Import(import),
@@ -277,6 +298,9 @@ impl Server {
             return Err(Refusal::new(ErrorCode::Version, format!("the client speaks {version}")));
         }
         if self.sessions.len() >= self.config.sessions {
+            self.end_sessions();
+        }
+        if self.sessions.len() >= self.config.sessions {
             let detail = format!("the limit is {}", self.config.sessions);
             return Err(Refusal::new(ErrorCode::LimitSessions, detail));
         }
@@ -286,6 +310,8 @@ impl Server {
         let session = Session {
             scene: Scene::new(&self.config),
             wake,
+            opened: Instant::now(),
+            arrived: false,
             life: ProcessWatch::of(process.0, process.1),
             last_request: Instant::now(),
             waiting: false,
@@ -310,20 +336,24 @@ impl Server {
         };
         answer(&call, &said);
         drop(call);
-        let _ = session.wake.notify();
+        session.wake.notify();
     }
 
-    /// Ends the sessions of clients that died.
-    fn beat(&mut self) {
+    /// Ends the sessions that are over.
+    fn end_sessions(&mut self) {
         let idle = Duration::from_secs(self.config.idle_s);
         let before = self.sessions.len();
-        self.sessions.retain(|_, session| match &session.life {
-            Some(life) => !life.is_dead(),
-            None => session.last_request.elapsed() < idle,
-        });
+        self.sessions.retain(|_, session| !session.is_over(idle));
+        if self.sessions.len() < before {
+            self.services.sweep_dead();
+        }
+    }
+
+    fn beat(&mut self) {
+        self.end_sessions();
         self.beats += 1;
-        // A client may also die before it has a session: rarely looked for, since the look costs milliseconds.
-        if self.sessions.len() < before || self.beats.is_multiple_of(200) {
+        // A client may also die without a session: rarely looked for, since the look costs milliseconds.
+        if self.beats.is_multiple_of(200) {
             self.services.sweep_dead();
         }
         self.show();

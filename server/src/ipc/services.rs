@@ -15,6 +15,26 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::writer::{EntryHandleMut, Writer};
 use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::event::PortFactory as EventService;
+
+/// The way to wake the client of a session.
+pub struct Wake {
+    notifier: Notifier<Variant>,
+    service: EventService<Variant>,
+}
+
+impl Wake {
+    /// Wakes it.
+    pub fn notify(&self) {
+        // A client that cannot be woken is dead, gone or full of wake-ups: either shows elsewhere.
+        let _ = self.notifier.notify();
+    }
+
+    /// True while the client has its port: from soon after the session was opened until the client leaves it.
+    pub fn is_heard(&self) -> bool {
+        self.service.dynamic_config().number_of_listeners() > 0
+    }
+}
 
 /// The server's ports. Dropped in this order.
 pub struct Services {
@@ -120,22 +140,22 @@ impl Services {
         self.status.update_with_copy(status);
     }
 
-    /// The port that wakes the client of a session; its service is created here.
+    /// The way to wake the client of a session; its service is created here.
     ///
     /// # Errors
     /// `System`.
-    pub fn wake_of(&self, session: u64) -> Result<Notifier<Variant>, Error> {
-        self.node
+    pub fn wake_of(&self, session: u64) -> Result<Wake, Error> {
+        let service = self
+            .node
             .service_builder(&link::service_name(&names::wake_service_of(session))?)
             .event()
             .max_notifiers(1)
             .max_listeners(1)
             .max_nodes(2)
             .create()
-            .map_err(|e| system("a session's wake service", e))?
-            .notifier_builder()
-            .create()
-            .map_err(|e| system("a session's wake port", e))
+            .map_err(|e| system("a session's wake service", e))?;
+        let notifier = service.notifier_builder().create().map_err(|e| system("a session's wake port", e))?;
+        Ok(Wake { notifier, service })
     }
 
     /// Frees what processes that have died still hold.

@@ -1,0 +1,211 @@
+//! Steps of a session: a batch is loaned, sent and answered.
+
+use super::Session;
+use crate::{Error, Reply, Transport};
+use contactd_proto::names::PROTOCOL_VERSION;
+use contactd_proto::step::{ASK_CLEAR, ASK_DETAILS, ASK_FIRST, ASK_POLLING, NO_INDEX, STEP_REFUSED};
+use contactd_proto::{ErrorCode, PoseRecord, StepRequest};
+use std::time::Duration;
+
+/// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepOptions {
+    /// Fraction 0..1 of its previous step at which every object stands before the next one.
+    pub advance: f64,
+    /// Duration of a step in seconds, for objects with a declared largest speed; 0: unknown.
+    pub dt: f64,
+    /// Only the pairs whose bracket meets the scene's earliest contact.
+    pub first: bool,
+    /// A detail slot with each record: upper end of the bracket, point in a's frame, penetration.
+    pub details: bool,
+    /// Records of clear pairs too.
+    pub clear: bool,
+    /// This client polls while it waits; the server then need not wake it.
+    pub polling: bool,
+    /// Most records, the earliest first; 0: all.
+    pub max_records: u32,
+    /// Most cells that one pair's search may refine; 0: the server's default.
+    pub cell_limit: u32,
+    /// Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
+    /// undecided, the latest first.
+    pub batch_limit: u32,
+}
+
+impl Default for StepOptions {
+    fn default() -> Self {
+        Self {
+            advance: 1.0,
+            dt: 0.0,
+            first: false,
+            details: false,
+            clear: false,
+            polling: false,
+            max_records: 0,
+            cell_limit: 0,
+            batch_limit: 0,
+        }
+    }
+}
+
+/// Where the step under way is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stage {
+    Idle,
+    Loaned,
+    Sent {
+        advance: f64,
+    },
+    /// The server is gone, or does not have the session that this client knows: reconnect first.
+    Lost,
+}
+
+impl<T: Transport> Session<T> {
+    /// Slots for `n` poses, to be filled in place. A batch that was begun and not sent is dropped.
+    ///
+    /// # Errors
+    /// `Refused` (`TooMany`), `Misuse` while a step is in flight, `ServerLost`, `System`.
+    pub fn begin_step(&mut self, n: usize) -> Result<&mut [PoseRecord], Error> {
+        self.check_idle()?;
+        self.check_count(n)?;
+        self.stage = Stage::Idle;
+        let slots = self.transport.loan(n)?;
+        self.stage = Stage::Loaned;
+        Ok(slots)
+    }
+
+    /// Whether something else may begin.
+    pub(super) fn check_idle(&self) -> Result<(), Error> {
+        match self.stage {
+            Stage::Sent { .. } => Err(Error::Misuse("a step is in flight: finish it first")),
+            Stage::Lost => Err(Error::ServerLost),
+            Stage::Idle | Stage::Loaned => Ok(()),
+        }
+    }
+
+    fn check_count(&self, n: usize) -> Result<(), Error> {
+        if n <= self.opened.max_batch as usize {
+            return Ok(());
+        }
+        let detail = format!("{n} records, the limit is {}", self.opened.max_batch);
+        Err(Error::Refused { code: ErrorCode::TooMany, index: None, detail })
+    }
+
+    /// Sends the batch without waiting; `finish` does it too.
+    ///
+    /// # Errors
+    /// `Misuse` when no step was begun, `ServerLost`, `System`.
+    pub fn send(&mut self) -> Result<(), Error> {
+        match self.stage {
+            Stage::Loaned => {}
+            Stage::Lost => return Err(Error::ServerLost),
+            Stage::Idle | Stage::Sent { .. } => return Err(Error::Misuse("no step was begun")),
+        }
+        let o = &self.options;
+        let asked = [(o.first, ASK_FIRST), (o.details, ASK_DETAILS), (o.clear, ASK_CLEAR), (o.polling, ASK_POLLING)];
+        let request = StepRequest {
+            version: PROTOCOL_VERSION,
+            asked: asked.iter().map(|(on, bit)| if *on { *bit } else { 0 }).sum(),
+            session: self.opened.session,
+            epoch: self.opened.epoch,
+            step: self.step + 1,
+            advance: o.advance,
+            dt: o.dt,
+            cell_limit: o.cell_limit,
+            batch_limit: o.batch_limit,
+            max_records: o.max_records,
+            records: self.transport.loaned().len() as u32,
+        };
+        match self.transport.send(request) {
+            Ok(()) => {
+                self.step += 1;
+                self.stage = Stage::Sent { advance: o.advance };
+                Ok(())
+            }
+            Err(e) => Err(self.failed(e)),
+        }
+    }
+
+    /// Sends the batch if it was not yet, and waits for its answer, which is read in place.
+    ///
+    /// # Errors
+    /// `Refused` with the index of the offending record (nothing has changed); `Timeout` (the step stays in flight:
+    /// call again); `ServerLost`, `ReplyLost` and `Refused` because the session is gone (see `reconnect` and `resend`);
+    /// `Misuse`; `System`.
+    pub fn finish(&mut self, timeout: Duration) -> Result<Reply<'_>, Error> {
+        if self.stage == Stage::Loaned {
+            self.send()?;
+        }
+        let advance = match self.stage {
+            Stage::Sent { advance } => advance,
+            Stage::Lost => return Err(Error::ServerLost),
+            _ => return Err(Error::Misuse("no step was begun")),
+        };
+        match self.transport.receive(timeout) {
+            Ok(()) => {}
+            Err(Error::Timeout) => return Err(Error::Timeout),
+            Err(e) => return Err(self.failed(e)),
+        }
+        let absent = || Error::System("a reply was announced that is not there".into());
+        let Some((header, _)) = self.transport.reply() else { return Err(self.failed(absent())) };
+        // Branched on once, so copied once.
+        let (status, error, index) = (header.status, header.error, header.index);
+        if status == STEP_REFUSED || error != 0 {
+            let code = ErrorCode::of_number(error).unwrap_or(ErrorCode::Internal);
+            let index = (index != NO_INDEX).then_some(index);
+            let record = index.and_then(|i| self.transport.loaned().get(i as usize));
+            let detail = record.map_or_else(String::new, |r| format!("object id {}", r.object));
+            return Err(self.failed(Error::Refused { code, index, detail }));
+        }
+        (self.stage, self.unanswered) = (Stage::Idle, None);
+        if self.transport.may_lose_server() {
+            self.journal.accepted(self.transport.loaned(), advance);
+        }
+        self.options.advance = 1.0;
+        match self.transport.reply() {
+            Some((header, slots)) => Ok(Reply::of(*header, slots)),
+            None => Err(absent()),
+        }
+    }
+
+    /// After `reconnect`: the batch that was in flight when the server was lost, loaned again with the same poses. It can be had
+    /// until a batch is accepted.
+    ///
+    /// # Errors
+    /// `Misuse` when there is none; otherwise as `begin_step`.
+    pub fn resend(&mut self) -> Result<&mut [PoseRecord], Error> {
+        self.check_idle()?;
+        let Some(n) = self.unanswered.as_ref().map(Vec::len) else {
+            return Err(Error::Misuse("no step was in flight when the server was lost"));
+        };
+        self.check_count(n)?;
+        self.stage = Stage::Idle;
+        let slots = self.transport.loan(n)?;
+        if let Some(batch) = &self.unanswered {
+            slots.copy_from_slice(batch);
+        }
+        self.stage = Stage::Loaned;
+        Ok(slots)
+    }
+
+    /// Notes why a step or a command failed.
+    pub(super) fn failed(&mut self, error: Error) -> Error {
+        // Where the reply is lost the server did what was asked, or refused it: the journal cannot tell, so the server can no
+        // longer be trusted to stand where the journal does. A replay settles it.
+        let lost = matches!(error, Error::ServerLost | Error::ReplyLost);
+        if lost || error.code() == Some(ErrorCode::SessionGone) {
+            self.lose();
+        } else if matches!(self.stage, Stage::Sent { .. }) {
+            self.stage = Stage::Idle;
+        }
+        error
+    }
+
+    /// The session is no longer what the server has. The journal stands before a batch that has no answer: it is kept. One that
+    /// was kept before still has none, unless another is under way.
+    pub(super) fn lose(&mut self) {
+        if matches!(self.stage, Stage::Loaned | Stage::Sent { .. }) {
+            self.unanswered = Some(self.transport.loaned().to_vec());
+        }
+        self.stage = Stage::Lost;
+    }
+}
