@@ -119,6 +119,9 @@ def test_record_by_record_is_the_same(session):
     with pytest.raises(IndexError, match="record 1: there are 1"):
         mine.add(reply, 1, (0, 0, -5), (0, 0, 0.1))
     mine.finish()
+    # Once more in the same update: in place of what was there.
+    mine.add(reply, 0, (0, 0, -5), (0, 0, 0.1))
+    mine.finish()
     [found], [pair] = mine.pairs, expected
     assert found[:4] == pair[:4] and len(found.points) == len(pair.points) == 4
     for p, q in zip(found.points, pair.points):

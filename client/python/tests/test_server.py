@@ -1,6 +1,5 @@
 """Servers that are not there, no longer there, or not answering: an exception, and the session goes on after it."""
 
-import contextlib
 import gc
 import signal
 import subprocess
@@ -8,7 +7,7 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import fill
+from conftest import fill, in_a_moment, interrupt
 
 import contactd
 
@@ -44,22 +43,6 @@ def test_a_killed_server_is_noticed_and_its_successor_told(own_server):
         assert poses[0].position.tolist() == [12, 0, 0]
         # From x = 4, where the last accepted step ended: the ball's surface meets the wall's after 4 of 8.
         assert session.finish(timeout=10)[0].time == pytest.approx(0.5, abs=1e-9)
-
-
-@contextlib.contextmanager
-def in_a_moment(work):
-    """Runs ``work`` in a signal handler of this thread."""
-    before = signal.signal(signal.SIGALRM, lambda *_: work())
-    signal.setitimer(signal.ITIMER_REAL, 0.15)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-
-
-def interrupt():
-    raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("timeout", [float("inf"), 1e300, 600.0])
