@@ -1,8 +1,8 @@
 """Views into a session's memory that know when their step is over.
 
 A ``View`` behaves as the numpy array it stands for: indexing, fields, arithmetic, numpy's functions, methods. What it gives of the
-same memory is a ``View`` again; what is computed is an array of its own. Once its step is over every use raises ``Stale``. A view
-never keeps its session from going on, so loops need no ``del``.
+same memory is a ``View`` again; what is computed is an array of its own. Once its step is over whatever reads or writes its
+elements raises ``Stale`` (its shape and type stay told). A view never keeps its session from going on, so loops need no ``del``.
 
 ``numpy.asarray(view)`` gives a plain array over the same memory, for code that needs one. Nothing can be asked of it later, so it
 is counted: while one lives (or anything numpy made of it), the session refuses to send its poses, or to begin the next step,
