@@ -19,7 +19,7 @@ import time
 import numpy as np
 
 import contactd
-from contactd import Order
+from contactd import Order, _native
 
 
 def batches(n, ids):
@@ -40,7 +40,7 @@ def whole(session, both):
     def rust():
         nonlocal k
         k ^= 1
-        return session._whole_in_rust(batch[k])
+        return _native._whole_in_rust(session, batch[k])
 
     def python():
         nonlocal k
@@ -63,7 +63,7 @@ def fields(session, both):
     def rust():
         nonlocal k
         k ^= 1
-        return session._fields_in_rust(objects, Order.END, position[k], rotation[k])
+        return _native._fields_in_rust(session, objects, Order.END, position[k], rotation[k])
 
     def python():
         nonlocal k

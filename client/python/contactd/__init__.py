@@ -12,6 +12,7 @@
 0.5 True 0.0
 """
 
+from . import convention, manifold
 from ._native import PROTOCOL_VERSION, MassProperties, Options, __version__
 from .errors import (
     BadAddress,

@@ -72,7 +72,8 @@ class Manifolds(_native.Manifolds):
 
     def add(self, reply: Reply, record: int, a: PoseLike, b: PoseLike) -> None:
         """Takes one record of a reply, whose bodies stood at these poses at the moment that it tells of: between ``start()`` and
-        ``finish()``, for each pair at most once."""
+        ``finish()``. A pair that is added again before the next ``start()`` gets the points of the last time that told any; between
+        the two lies a ``finish()``, or none."""
         self._add(reply, record, as_pose(a), as_pose(b))
 
     @property

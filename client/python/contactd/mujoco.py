@@ -14,18 +14,22 @@ MuJoCo's contacts are soft: bodies at rest sink into each other a little, and so
 acts from ``skin`` on (its ``includemargin``) while its ``dist`` is the true gap: bodies rest a fraction of the skin apart, where contactd
 knows all their regions. A pair that was driven into overlap is asked about once more, moved back by its depth, so that its
 points are those of the face it came through; this second request happens in the steps after a hard impact alone.
+
+A step that raises has not moved ``data`` on: it may be repeated. Where the wait for a server was interrupted, the next step first
+waits for the answer that is still under way.
 """
 
 from __future__ import annotations
 
-from typing import Any, Mapping
+from typing import Any, Container, Mapping
 
 import mujoco as mj
 import numpy as np
 
 from . import session as sessions
 from .convention import contact_to_mujoco, quaternion_from_wxyz
-from .manifold import Manifolds, Point
+from .errors import Error
+from .manifold import Manifold, Manifolds, Point
 from .pose import Pose
 from .records import Order, Status
 from .session import Reply, Rule, Session, embedded
@@ -64,9 +68,10 @@ class Coupling:
         #: Second requests so far, for pairs in overlap.
         self.retracted = 0
         #: The contacts of the last step in the order in which MuJoCo got them: the bodies' ids in MuJoCo, and the point in contactd's
-        #: unit. Its ``id`` names it within the pair for as long as it lasts; -1: the depth alone of an overlap.
+        #: unit. Its ``id`` names it within the pair for as long as it lasts.
         self.contacts: list[tuple[int, int, Point]] = []
-        self._manifolds, self._depths = Manifolds(), Manifolds()
+        self._manifolds = Manifolds()
+        self._in_flight = False
         self._own = session is None
         self.session = embedded() if session is None else session
         try:
@@ -147,46 +152,52 @@ class Coupling:
         """Asks contactd about the bodies as they stand in ``data`` and adds its contacts; for loops that stage their own steps."""
         positions = data.xpos[self._moving_bodies] / self.unit
         rotations = quaternion_from_wxyz(data.xquat[self._moving_bodies])
-        added = 0
+        points = self._points(positions, rotations)
         self.contacts = []
-        for a, b, point in self._points(positions, rotations):
+        for a, b, point in points:
             self.contacts.append((self._bodies[a], self._bodies[b], point))
             contact = self._contact(a, b, point)
             if mj.mj_addContact(self.model, data, contact) != 0:
                 raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")
-            added += 1
-        return added
+        return len(points)
 
     def _points(self, positions: np.ndarray, rotations: np.ndarray) -> list[tuple[int, int, Point]]:
         """Objects and points of all contacts, in contactd's unit."""
-        kept, depths = self._manifolds, self._depths
-        kept.start(), depths.start()
         reply = self._ask(positions, rotations)
-        for i, record in enumerate(reply):
-            a, b = int(record["a"]), int(record["b"])
-            told = depths if record["status"] == Status.OVERLAP else kept
-            told.add(reply, i, self._place(a, positions, rotations), self._place(b, positions, rotations))
-        depths.finish()
-        deep = {(pair.a, pair.b): point for pair in depths for point in pair.points}
-        back = np.zeros_like(positions)
-        if deep:
-            self._retract(deep, back, rotations, positions)
-        kept.finish()
+        # Not before there is an answer: without one, what is kept stays that of the last step.
+        self._manifolds.start()
+        pairs = self._told(reply, positions, rotations)
+        deep = {(pair.a, pair.b): pair.points[0] for pair in pairs if pair.status == Status.OVERLAP}
+        if not deep:
+            return [(pair.a, pair.b, p) for pair in pairs for p in pair.points]
+        back = self._retracted(deep, positions)
+        moved = positions + back
         found = []
-        for pair in kept:
-            away = self._gone(pair.a, pair.b, back) if deep.pop((pair.a, pair.b), None) else 0.0
-            # The gap that a pair has where it really is.
+        for pair in self._told(self._ask(moved, rotations), moved, rotations, deep):
+            # The gap that a pair has where it really is: one that is still in overlap was told there.
+            was_moved = (pair.a, pair.b) in deep and pair.status != Status.OVERLAP
+            away = self._gone(pair.a, pair.b, back) if was_moved else 0.0
             gaps = [p._replace(separation=p.separation - float(np.sum(p.normal * away))) for p in pair.points]
             found.extend((pair.a, pair.b, p) for p in gaps)
-        found.extend((a, b, p._replace(id=-1)) for (a, b), p in deep.items())
         return found
 
-    def _retract(
-        self, deep: dict[tuple[int, int], Point], back: np.ndarray, rotations: np.ndarray, positions: np.ndarray
-    ) -> None:
-        """Asks about the pairs in overlap once more, each moved apart along its direction, the moving body alone, to half a skin's gap;
-        how far each body went is added to ``back``, the points that the pairs have there to those that are kept."""
+    def _told(
+        self, reply: Reply, positions: np.ndarray, rotations: np.ndarray, again: Container[tuple[int, int]] | None = None
+    ) -> list[Manifold]:
+        """The points of all pairs with those of an answer; ``again``: only these pairs are taken of it, where they are out of
+        overlap, in place of what they had."""
+        for i, record in enumerate(reply):
+            a, b = int(record["a"]), int(record["b"])
+            if again is None or ((a, b) in again and record["status"] != Status.OVERLAP):
+                self._manifolds.add(reply, i, self._place(a, positions, rotations), self._place(b, positions, rotations))
+        self._manifolds.finish()
+        return self._manifolds.pairs
+
+    def _retracted(self, deep: dict[tuple[int, int], Point], positions: np.ndarray) -> np.ndarray:
+        """How far each body goes so that the pairs in overlap are apart along their directions, the moving body alone, by half a
+        skin's gap."""
         self.retracted += 1
+        back = np.zeros_like(positions)
         for (a, b), p in deep.items():
             way = p.normal * (0.5 * self.skin / self.unit - p.separation)
             # The normal points from a to b: b goes along, a against; where both move b does.
@@ -194,12 +205,7 @@ class Coupling:
             # What an earlier pair has asked for already need not be gone again.
             length = np.linalg.norm(way)
             back[body] += way * max(0.0, 1.0 - float(back[body] @ way) / float(length * length))
-        moved = positions + back
-        reply = self._ask(moved, rotations)
-        for i, record in enumerate(reply):
-            a, b = int(record["a"]), int(record["b"])
-            if (a, b) in deep and record["status"] != Status.OVERLAP:
-                self._manifolds.add(reply, i, self._place(a, moved, rotations), self._place(b, moved, rotations))
+        return back
 
     def _gone(self, a: int, b: int, back: np.ndarray) -> np.ndarray | float:
         """How far b went from a."""
@@ -211,12 +217,26 @@ class Coupling:
         return self._fixed[object] if at is None else Pose(positions[at], rotations[at])
 
     def _ask(self, positions: np.ndarray, rotations: np.ndarray) -> Reply:
+        if self._in_flight:
+            # An earlier request whose wait was interrupted: its answer is of no use any more.
+            try:
+                self.session.finish()
+            except Error:
+                pass  # it is over all the same
+            self._in_flight = False
         poses = self.session.begin_step(len(self._moving))
         poses["object"] = self._moving
         poses["flags"] = Order.START
         poses["position"] = positions
         poses["rotation"] = rotations
-        return self.session.finish()
+        self._in_flight = True
+        try:
+            reply = self.session.finish()
+        except Error:
+            self._in_flight = False
+            raise
+        self._in_flight = False
+        return reply
 
     def _contact(self, a: int, b: int, point: Point) -> mj.MjContact:
         model = self.model

@@ -174,7 +174,8 @@ class Session(_native.Session):
     def load_model(self, name: str, text: str, facets: str = "auto") -> Model:
         """Loads a model from OpenSCAD CSG text; ``name`` stands in error sentences.
 
-        ``facets``: how curved primitives are taken, "auto", "exact" or "as-written".
+        ``facets``: how curved primitives are taken, "auto", "exact" or "as-written". Large models take seconds; other threads
+        run meanwhile, and Ctrl-C is heard when the model is there.
         """
         id, faces, warnings = self._load_model(name, text, facets)
         return Model(id, [Face(*face) for face in faces], warnings)

@@ -1,17 +1,22 @@
 """Views into a session's memory that know when their step is over.
 
 A ``View`` behaves as the numpy array it stands for: indexing, fields, arithmetic, numpy's functions, methods. What it gives of the
-same memory is a ``View`` again; what is computed is an array of its own. Once its step is over every use raises ``Stale``. A view
-never keeps its session from going on, so loops need no ``del``.
+same memory is a ``View`` again; what is computed is an array of its own. Once its step is over whatever reads or writes its
+elements raises ``Stale`` (its shape and type stay told). A view never keeps its session from going on, so loops need no ``del``.
 
 ``numpy.asarray(view)`` gives a plain array over the same memory, for code that needs one. Nothing can be asked of it later, so it
 is counted: while one lives (or anything numpy made of it), the session refuses to send its poses, or to begin the next step,
 with ``StillExported``, a ``BufferError``. Passing a view to a function that converts it, as most of scipy, matplotlib or mujoco, is
 fine: its array is gone when the function returns. ``view.copy()`` and ``numpy.array(view)`` give arrays that may be kept.
+
+numpy itself gets the plain array, for as long as a call of it lasts, where it runs nothing of the caller's meanwhile: such code (a
+function that numpy calls back, an index or operand of a class of its own) could keep the array, or end the step. Where it
+may, numpy gets a counted one.
 """
 
 from __future__ import annotations
 
+from types import EllipsisType, NoneType
 from typing import Any, Iterator
 
 import numpy as np
@@ -23,6 +28,9 @@ from ._native import Lease
 # Ways to the memory that neither a check nor a count would see.
 _CLOSED = frozenset({"base", "ctypes", "data", "flat", "getfield", "resize", "setfield", "setflags", "view"})
 
+# Types and classes whose use runs nothing of the caller's, and numpy's own functions of elements.
+_PLAIN = frozenset({NoneType, EllipsisType, bool, int, float, complex, str, bytes})
+_UFUNCS = frozenset(f for f in vars(np).values() if isinstance(f, np.ufunc))
 
 _MOST = {n: 256**n - 1 for n in (1, 2, 4, 8)}
 
@@ -40,21 +48,23 @@ class View(NDArrayOperatorsMixin):
     # What is read
 
     def __getitem__(self, key: Any) -> Any:
-        self._lease.check()
-        array = self._array
+        kind, counted = type(key), False
+        if kind is not str and kind is not int:  # by far the most keys are
+            counted = not _is_plain(key)
+            key = _inner_of(key, [], counted)
+        array = _inner(self, True) if counted else self._checked()
         found = array[key]
+        if type(found) is np.void:
+            # A record: numpy's own would look at the memory without asking.
+            key = key if type(key) is tuple else (key,)
+            found = array[(*key, ...)]
         if type(found) is np.ndarray:
             if found.ndim == 0 and found.dtype.names is None:
                 return found[()]
             base = found.base
             if base is array or base is array.base:
-                return Part(found, self._lease)
-            return found  # chosen by a list or a mask: a copy
-        if type(found) is np.void:
-            # A record: numpy's own would look at the memory without asking.
-            key = key if type(key) is tuple else (key,)
-            return Part(array[(*key, ...)], self._lease)
-        return found
+                return Part(_uncounted(found, self._lease) if counted else found, self._lease)
+        return found  # a number, or chosen by a list or a mask: a copy
 
     def __getattr__(self, name: str) -> Any:
         array = self._array
@@ -65,11 +75,13 @@ class View(NDArrayOperatorsMixin):
         self._lease.check()
         found = getattr(array, name)
         if not callable(found):
-            return self._own(found)
+            return _own_of(found, [self._lease], False)
 
         def method(*args: Any, **kwargs: Any) -> Any:
-            self._lease.check()
-            return self._own(found(*(_inner(a) for a in args), **{k: _inner(v) for k, v in kwargs.items()}))
+            counted = not (_is_plain(args) and _is_plain(kwargs))
+            leases = [self._lease]
+            args, kwargs = _inner_of(args, leases, counted), _inner_of(kwargs, leases, counted)
+            return _own_of(getattr(_inner(self, counted), name)(*args, **kwargs), leases, counted)
 
         return method
 
@@ -82,7 +94,7 @@ class View(NDArrayOperatorsMixin):
             yield self[i]
 
     def __contains__(self, value: Any) -> bool:
-        return value in self._checked()
+        return value in _inner(self, not _is_plain(value))
 
     def __bool__(self) -> bool:
         return bool(self._checked())
@@ -96,10 +108,10 @@ class View(NDArrayOperatorsMixin):
     def __repr__(self) -> str:
         if not self._lease.alive:
             return "<view of a step that is over>"
-        return f"View({self._checked()!r})"
+        return f"View({self.__array__()!r})"  # the caller may have told numpy how numbers are written
 
     def __str__(self) -> str:
-        return str(self._checked())
+        return str(self.__array__())
 
     @property
     def dtype(self) -> np.dtype:
@@ -146,24 +158,29 @@ class View(NDArrayOperatorsMixin):
 
     def _assign(self, key: Any, value: Any) -> None:
         self._lease.check()
-        array = self._array
-        dtype = array.dtype
+        counted = not _is_plain(key)
+        array = _inner(self, counted)
         name = key
+        key = _inner_of(key, [], counted)
+        dtype = array.dtype
         if type(key) is str and dtype.names is not None:
             array, key = array[key], ...
             dtype = array.dtype
         if type(value) is not np.ndarray or (value.dtype is not dtype and value.dtype != dtype):
-            value = _fit(value, dtype, name)
+            value = _fit(_inner(value, counted), dtype, name)
+            # Its conversion may have run the caller's code.
+            self._lease.check()
         array[key] = value
 
     # What numpy asks for
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        wanted = self.dtype if dtype is None else np.dtype(dtype)
         array = self._checked()
-        if copy or (dtype is not None and np.dtype(dtype) != array.dtype):
+        if copy is True or wanted != array.dtype:
             if copy is False:
-                raise ValueError(f"a view of {array.dtype} cannot become {np.dtype(dtype)} without a copy")
-            return np.array(array, dtype=dtype)
+                raise ValueError(f"a view of {array.dtype} cannot become {wanted} without a copy")
+            return np.array(array, dtype=wanted)
         offset = array.__array_interface__["data"][0] - self._lease.address if array.size else 0
         if not 0 <= offset <= self._lease.bytes:
             return array  # slots that were gathered: memory of its own
@@ -171,27 +188,24 @@ class View(NDArrayOperatorsMixin):
         return np.ndarray(array.shape, array.dtype, memory, offset, array.strides)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        counted = not (ufunc in _UFUNCS and _is_plain(inputs) and _is_plain(kwargs))
         out = kwargs.get("out")
-        if out is not None:
-            kwargs["out"] = tuple(_inner(o) for o in out)
-        if "where" in kwargs:
-            kwargs["where"] = _inner(kwargs["where"])
-        found = getattr(ufunc, method)(*(_inner(i) for i in inputs), **kwargs)
+        inputs, kwargs = _inner_of(inputs, [], counted), _inner_of(kwargs, [], counted)
+        found = getattr(ufunc, method)(*inputs, **kwargs)
         if out is None:
             return found
         return out[0] if len(out) == 1 else out
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        module = getattr(function, "__module__", None) or ""
+        counted = not (module.partition(".")[0] == "numpy" and _is_plain(args) and _is_plain(kwargs))
         leases: list[Lease] = []
-        found = function(*_inner_of(args, leases), **_inner_of(kwargs, leases))
-        return _own_of(found, leases)
+        found = function(*_inner_of(args, leases, counted), **_inner_of(kwargs, leases, counted))
+        return _own_of(found, leases, counted)
 
     def _checked(self) -> np.ndarray:
         self._lease.check()
         return self._array
-
-    def _own(self, found: Any) -> Any:
-        return _own_of(found, [self._lease])
 
 
 class Part(View):
@@ -211,42 +225,80 @@ class Slots(_native.Slots, View):  # type: ignore[misc]
     __slots__ = ()
 
 
-def _inner(value: Any) -> Any:
-    return value._checked() if isinstance(value, View) else value
+def _is_plain(value: Any) -> bool:
+    """True when numpy can use it as an argument without running anything of the caller's."""
+    kind = type(value)
+    if kind in _PLAIN:
+        return True
+    if kind is tuple or kind is list:
+        return all(map(_is_plain, value))
+    if kind is dict:
+        return all(map(_is_plain, value.values()))
+    if kind is slice:
+        return type(value.start) in _PLAIN and type(value.stop) in _PLAIN and type(value.step) in _PLAIN
+    if kind is np.ndarray or (kind.__module__ == "numpy" and isinstance(value, np.generic)):
+        return not value.dtype.hasobject
+    if kind is type:
+        return value in _PLAIN or value.__module__ == "numpy"
+    return isinstance(value, (View, np.dtype))
 
 
-def _inner_of(value: Any, leases: list[Lease]) -> Any:
-    """The same arguments with arrays for views, whose leases are noted."""
+def _inner(value: Any, counted: bool) -> Any:
     if isinstance(value, View):
-        leases.append(value._lease)
-        return value._checked()
-    if type(value) in (list, tuple):
-        return type(value)(_inner_of(v, leases) for v in value)
-    if type(value) is dict:
-        return {k: _inner_of(v, leases) for k, v in value.items()}
+        return value.__array__() if counted else value._checked()
     return value
 
 
-def _own_of(found: Any, leases: list[Lease]) -> Any:
+def _inner_of(value: Any, leases: list[Lease], counted: bool) -> Any:
+    """The same arguments with arrays for views, whose leases are noted."""
+    if isinstance(value, View):
+        leases.append(value._lease)
+        return _inner(value, counted)
+    kind = type(value)
+    if kind is list or kind is tuple:
+        return kind([_inner_of(v, leases, counted) for v in value])
+    if kind is dict:
+        return {k: _inner_of(v, leases, counted) for k, v in value.items()}
+    return value
+
+
+def _own_of(found: Any, leases: list[Lease], counted: bool) -> Any:
     """A result in which every array of a lease's memory is a view again."""
     if isinstance(found, (list, tuple)):
-        items = [_own_of(f, leases) for f in found]
+        items = [_own_of(f, leases, counted) for f in found]
         if all(new is old for new, old in zip(items, found)):
             return found
         return items if isinstance(found, list) else tuple(items)
     if isinstance(found, np.ndarray) and not found.flags.owndata:
-        at = found.__array_interface__["data"][0]
+        if counted and type(found) is not np.ndarray:
+            return found  # of a class of the caller's: counted for as long as it lives
         for lease in leases:
-            if lease.address <= at < lease.address + max(lease.bytes, 1):
-                return Part(found, lease)
+            if _lies_in(found, lease):
+                return Part(_uncounted(found, lease) if counted else found, lease)
     if type(found) is np.void:
         return found.copy()
     return found
 
 
+def _lies_in(array: np.ndarray, lease: Lease) -> bool:
+    offset = array.__array_interface__["data"][0] - lease.address
+    return 0 <= offset < lease.bytes or (array.size == 0 and 0 <= offset <= lease.bytes)
+
+
+def _uncounted(array: np.ndarray, lease: Lease) -> np.ndarray:
+    """The same elements of a lease's memory, if they lie there, without the count that they were reached by."""
+    if not _lies_in(array, lease):
+        return array
+    offset = array.__array_interface__["data"][0] - lease.address
+    memory: Any = lease
+    again = np.ndarray(array.shape, array.dtype, memory, offset, array.strides)
+    again.flags.writeable = array.flags.writeable
+    return again
+
+
 def _fit(value: Any, dtype: np.dtype, key: Any) -> Any:
-    """A value that can be written as ``dtype`` without a surprise, where numpy would convert whatever it gets."""
-    value = _inner(value)
+    """A number or an array that can be written as ``dtype`` without a surprise, where numpy would convert whatever it gets. Writing
+    it runs nothing of the caller's any more."""
     if isinstance(value, int) and dtype.kind == "u" and 0 <= value <= _MOST[dtype.itemsize]:
         return int(value)
     if dtype.names is not None:
@@ -261,10 +313,10 @@ def _fit(value: Any, dtype: np.dtype, key: Any) -> Any:
         if found is None or found.names != dtype.names:
             what = type(value).__name__ if found is None else f"an array of {found}"
             raise TypeError(f"expected records with the fields {', '.join(dtype.names)}, found {what}")
-        return value
+        return np.asarray(value).astype(dtype, copy=False)
     array = np.asarray(value)
     if np.can_cast(array.dtype, dtype, "same_kind"):
-        return value
+        return array
     if array.dtype.kind in "iu" and dtype.kind == "u":
         most = np.iinfo(dtype).max
         if array.size and (array.min() < 0 or array.max() > most):

@@ -3,9 +3,10 @@
 //! It holds what needs Rust, and what every step does: the session, the memory of its poses and replies, the records' layouts.
 //! Views, rules, poses and exceptions are Python (`contactd/*.py`), which is what users see.
 //!
-//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`) and where the interpreter's lock is released
+//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`, `bench.rs`) and where the interpreter's lock is released
 //! around a session that belongs to one thread (`confined.rs`).
 
+mod bench;
 mod confined;
 mod errors;
 mod layout;
@@ -24,6 +25,8 @@ use pyo3::prelude::*;
 // References are counted to see what nobody else has (`session.rs`); without the interpreter's lock their number is no proof.
 #[pymodule(gil_used = true)]
 mod _native {
+    #[pymodule_export]
+    use crate::bench::{fields_in_rust, whole_in_rust};
     #[pymodule_export]
     use crate::errors::error_codes;
     #[pymodule_export]

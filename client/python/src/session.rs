@@ -1,13 +1,13 @@
 //! The session. Everything that may take time runs with the interpreter's lock released.
 
-use crate::confined::{Confined, Thread, detached};
+use crate::confined::{Confined, Thread, check_thread, detached};
 use crate::errors;
 use crate::lease::{Lease, What};
 use crate::mass::MassProperties;
 use crate::options::Options;
 use crate::reply::Reply;
 use crate::rules::RuleFields;
-use crate::slots::{Held, Slots, references};
+use crate::slots::{Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::control::Facets;
 use contactd_client::transport::Opened;
@@ -84,7 +84,7 @@ impl Session {
     }
 
     /// Runs `work` on the session while it is open.
-    fn with<R>(&self, py: Python<'_>, work: impl FnOnce(&mut Inner) -> R) -> PyResult<R> {
+    pub fn with<R>(&self, py: Python<'_>, work: impl FnOnce(&mut Inner) -> R) -> PyResult<R> {
         match self.with_any(py, |inner| inner.as_mut().map(work))? {
             Some(result) => Ok(result),
             None => Err(errors::misuse(py, "the session is closed")),
@@ -113,15 +113,21 @@ impl Session {
         Ok(())
     }
 
+    /// The open session for a new step: the views of the step before are over.
+    pub fn fresh<'py>(slf: &Bound<'py, Self>) -> PyResult<PyRefMut<'py, Self>> {
+        let mut this = Self::enter(slf)?;
+        this.with(slf.py(), |_| ())?;
+        this.revoke(slf.py())?;
+        Ok(this)
+    }
+
     /// Slots for poses from `loan`.
     fn loan(
         slf: &Bound<'_, Self>,
         loan: impl FnOnce(&mut Inner) -> Result<&mut [PoseRecord], Error>,
     ) -> PyResult<Py<Slots>> {
         let py = slf.py();
-        let mut this = Self::enter(slf)?;
-        this.with(py, |_| ())?;
-        this.revoke(py)?;
+        let mut this = Self::fresh(slf)?;
         let loaned = this.with(py, |s| loan(s).map(|slots| (slots.as_mut_ptr().cast_const(), slots.len())))?;
         let (start, n) = loaned.map_err(|e| errors::of(py, &e))?;
         let spare = this.spare_poses.iter().flatten().find(|slots| {
@@ -167,21 +173,6 @@ impl Session {
         Ok(reply)
     }
 
-    /// Nanoseconds of a step whose slots `fill` fills in.
-    fn timed(slf: &Bound<'_, Self>, n: usize, fill: impl FnOnce(&mut [PoseRecord])) -> PyResult<u64> {
-        let py = slf.py();
-        let mut this = Self::enter(slf)?;
-        this.with(py, |_| ())?;
-        this.revoke(py)?;
-        let time = this.with(py, |session| {
-            let start = Instant::now();
-            fill(session.begin_step(n)?);
-            session.finish(Duration::from_secs(60))?;
-            Ok(start.elapsed().as_nanos() as u64)
-        })?;
-        time.map_err(|e| errors::of(py, &e))
-    }
-
     /// Sends the poses if they were not yet: their memory is the server's from now on.
     fn send_loaned(&mut self, py: Python<'_>) -> PyResult<()> {
         self.with(py, |_| ())?;
@@ -222,8 +213,11 @@ impl Session {
 
     /// What is asked of the steps to come.
     #[getter]
-    fn options(&self, py: Python<'_>) -> Py<Options> {
-        self.options.clone_ref(py)
+    fn options(slf: &Bound<'_, Self>) -> PyResult<Py<Options>> {
+        let py = slf.py();
+        let this = Self::enter(slf)?;
+        check_thread(py, this.thread)?;
+        Ok(this.options.clone_ref(py))
     }
 
     /// The session's id on its server.
@@ -363,7 +357,16 @@ impl Session {
         if this.with(py, |s| s.transport_mut().may_lose_server())? {
             this.revoke(py)?;
         }
-        this.detached(py, |s| s.reconnect(timeout))
+        let start = Instant::now();
+        loop {
+            let wait = timeout.saturating_sub(start.elapsed()).min(SLICE);
+            match this.with(py, |s| detached(py, s, |s| s.reconnect(wait)))? {
+                Err(Error::NoServer(_) | Error::ServerLost | Error::Timeout) if start.elapsed() < timeout => {
+                    py.check_signals()?
+                }
+                answer => return answer.map_err(|e| errors::of(py, &e)),
+            }
+        }
     }
 
     /// Ends the session. Again does nothing; a server that is gone has ended it already.
@@ -378,30 +381,5 @@ impl Session {
             Ok(()) | Err(Error::ServerLost | Error::Misuse(_)) => Ok(()),
             Err(e) => Err(errors::of(py, &e)),
         }
-    }
-
-    /// Nanoseconds of a step made by Rust alone, which copies a whole batch of pose records: what the same of Python's is compared with.
-    fn _whole_in_rust(slf: &Bound<'_, Self>, batch: &Bound<'_, PyAny>) -> PyResult<u64> {
-        let batch = Held::of(batch)?;
-        let batch: &[PoseRecord] = batch.all()?;
-        Self::timed(slf, batch.len(), |slots| slots.copy_from_slice(batch))
-    }
-
-    /// The same, of a batch that is filled in field by field from arrays.
-    fn _fields_in_rust(
-        slf: &Bound<'_, Self>,
-        objects: &Bound<'_, PyAny>,
-        flags: u32,
-        positions: &Bound<'_, PyAny>,
-        rotations: &Bound<'_, PyAny>,
-    ) -> PyResult<u64> {
-        let held = [Held::of(objects)?, Held::of(positions)?, Held::of(rotations)?];
-        let (objects, positions): (&[u32], &[[f64; 3]]) = (held[0].all()?, held[1].all()?);
-        let rotations: &[[f64; 4]] = held[2].all()?;
-        Self::timed(slf, objects.len(), |slots| {
-            for (((slot, object), position), rotation) in slots.iter_mut().zip(objects).zip(positions).zip(rotations) {
-                *slot = PoseRecord { object: *object, flags, position: *position, rotation: *rotation };
-            }
-        })
     }
 }

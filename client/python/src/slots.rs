@@ -12,7 +12,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyInt, PySlice, PyString};
-use std::mem::{MaybeUninit, offset_of};
+use std::mem::offset_of;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Classes and types of Python that are looked up once.
@@ -109,39 +109,47 @@ impl Slots {
         made.map(|array| array.bind(py))
     }
 
+    /// The slots' records, while the step is not over. Whatever runs Python's code may end it (an index, a conversion): asked for
+    /// right before each copy, and nothing of Python's runs between.
+    fn records(&self, py: Python<'_>) -> PyResult<Records> {
+        let lease = self.lease.get();
+        lease.check(py)?;
+        // SAFETY: of the lease's memory, which may be written while its step is not over, as was checked, and which begins with
+        // `count` pose records: `new` and `renew` have counted them.
+        Ok(unsafe { Records::new(lease.start(), self.count()) })
+    }
+
     /// Writes `value` over all slots, or over one field of all; false when it is none of the values that can be copied as they are.
     fn copied(&self, key: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<bool> {
         let py = key.py();
-        let (lease, count) = (self.lease.get(), self.count());
-        if lease.what() != What::Poses {
+        if self.lease.get().what() != What::Poses {
             return Ok(false);
         }
         let known = known(py)?;
-        // SAFETY: of the lease's memory, which may be written while its step is not over, as its caller has checked, and
-        // which begins with `count` pose records: `new` has counted them.
-        let records = unsafe { Records::new(lease.start(), count) };
         if let Ok(key) = key.cast_exact::<PyString>() {
             let Some(field) = Field::of(key)? else { return Ok(false) };
             if let (Type::Word, Ok(number)) = (field.of, value.cast::<PyInt>()) {
                 let Ok(number) = number.extract::<u32>() else { return Ok(false) };
-                records.set(field, number);
+                self.records(py)?.set(field, number);
                 return Ok(true);
             }
             let dtype = if field.of == Type::Word { &known.word } else { &known.float };
             let Some(array) = Held::array(known, value, |found| Ok(found.is(dtype)))? else { return Ok(false) };
+            let records = self.records(py)?;
             let fits = match (array.shape(), field.numbers) {
-                (&[n], 1) => n == count as isize,
-                (&[n, m], k) => n == count as isize && m == k as isize && k > 1,
+                (&[n], 1) => n == records.count as isize,
+                (&[n, m], k) => n == records.count as isize && m == k as isize && k > 1,
                 _ => false,
             };
-            return Ok(fits && records.copy_field(field, array.bytes()));
+            return Ok(fits && records.copy_field(field, &array));
         }
-        if !key.cast_exact::<PySlice>().is_ok_and(|slice| is_all(slice, count)) {
+        if !key.cast_exact::<PySlice>().is_ok_and(|slice| is_all(slice, self.count())) {
             return Ok(false);
         }
         let pose = |found: &Bound<'_, PyAny>| if found.is(&known.pose) { Ok(true) } else { found.eq(&known.pose) };
         let Some(array) = Held::array(known, value, pose)? else { return Ok(false) };
-        Ok(array.shape() == [count as isize] && records.copy(array.bytes()))
+        let records = self.records(py)?;
+        Ok(array.shape() == [records.count as isize] && records.copy(&array))
     }
 }
 
@@ -241,12 +249,12 @@ impl Records {
     }
 
     /// All of them from as many bytes; false, and nothing is done, when there are others.
-    fn copy(&self, from: &[u8]) -> bool {
+    fn copy(&self, from: &Held) -> bool {
         if from.len() != self.count * Self::SIZE {
             return false;
         }
         // SAFETY: as long as the records, as was compared; the two may overlap.
-        unsafe { std::ptr::copy(from.as_ptr().cast(), self.start, from.len()) }
+        unsafe { std::ptr::copy(from.start(), self.start, from.len()) }
         true
     }
 
@@ -259,7 +267,7 @@ impl Records {
 
     /// One field of all, from its bytes without gaps; false, and nothing is done, when they are not as many, or lie among the
     /// records themselves.
-    fn copy_field(&self, field: Field, from: &[u8]) -> bool {
+    fn copy_field(&self, field: Field, from: &Held) -> bool {
         match (field.of, field.numbers) {
             (Type::Word, _) => self.copy_each::<4>(field.at, from),
             (Type::Float, 3) => self.copy_each::<24>(field.at, from),
@@ -267,22 +275,23 @@ impl Records {
         }
     }
 
-    fn copy_each<const N: usize>(&self, at: usize, from: &[u8]) -> bool {
-        let (own, theirs) = (self.start as usize, from.as_ptr() as usize);
+    fn copy_each<const N: usize>(&self, at: usize, from: &Held) -> bool {
+        let (own, theirs) = (self.start as usize, from.start() as usize);
         let apart = theirs + from.len() <= own || own + self.count * Self::SIZE <= theirs;
         if from.len() != self.count * N || !apart {
             return false;
         }
-        for (i, bytes) in from.chunks_exact(N).enumerate() {
-            // SAFETY: `N` bytes of a field of one of the records; apart from where they come from, as was compared.
-            unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr().cast(), self.start.add(i * Self::SIZE + at), N) }
+        for i in 0..self.count {
+            // SAFETY: `N` bytes of a field of one of the records, from the `N` of as many that are its own; apart from each other, as
+            // was compared.
+            unsafe { std::ptr::copy_nonoverlapping(from.start().add(i * N), self.start.add(i * Self::SIZE + at), N) }
         }
         true
     }
 }
 
-/// A buffer of Python's without gaps, held.
-pub struct Held(ffi::Py_buffer);
+/// A buffer of Python's without gaps, held. It stays where it was filled in: its shape may point into it.
+pub struct Held(Box<ffi::Py_buffer>);
 
 impl Held {
     /// That of an array; `None` for other things, for types that `dtype` says no to, for arrays with gaps.
@@ -301,7 +310,7 @@ impl Held {
 
     /// That of anything that has one without gaps.
     pub fn of(value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let mut buffer = MaybeUninit::<ffi::Py_buffer>::uninit();
+        let mut buffer = Box::<ffi::Py_buffer>::new_uninit();
         // SAFETY: `buffer` may be written; it is read and released only where the call says that it was filled in.
         if unsafe { ffi::PyObject_GetBuffer(value.as_ptr(), buffer.as_mut_ptr(), ffi::PyBUF_ND) } != 0 {
             return Err(PyErr::fetch(value.py()));
@@ -318,27 +327,20 @@ impl Held {
         unsafe { std::slice::from_raw_parts(self.0.shape, self.0.ndim as usize) }
     }
 
-    /// Its bytes.
-    fn bytes(&self) -> &[u8] {
-        if self.0.len <= 0 {
-            return &[];
-        }
-        // SAFETY: `buf` has `len` bytes until the buffer is released. Nobody writes to them meanwhile: the interpreter's lock is held
-        // while they are used, and what is copied from them goes elsewhere, or by pointer.
-        unsafe { std::slice::from_raw_parts(self.0.buf.cast(), self.0.len as usize) }
+    /// Where its bytes lie.
+    pub fn start(&self) -> *const u8 {
+        self.0.buf.cast_const().cast()
     }
-}
 
-impl Held {
-    /// Its bytes as so many `T`.
-    pub fn all<T: bytemuck::AnyBitPattern>(&self) -> PyResult<&[T]> {
-        bytemuck::try_cast_slice(self.bytes()).map_err(|e| PyValueError::new_err(e.to_string()))
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        usize::try_from(self.0.len).unwrap_or(0)
     }
 }
 
 impl Drop for Held {
     fn drop(&mut self) {
         // SAFETY: filled in by `of` and released once, under the interpreter's lock: it is never kept beyond a call.
-        unsafe { ffi::PyBuffer_Release(&mut self.0) }
+        unsafe { ffi::PyBuffer_Release(&mut *self.0) }
     }
 }

@@ -1,5 +1,6 @@
 """Servers and sessions for the tests. The server's binary: --server, $CONTACTD, or what is built under target/."""
 
+import contextlib
 import os
 import pathlib
 import shutil
@@ -110,3 +111,19 @@ def fill(session):
     wall = session.add_object("wall", wall, fixed=True, at=(10, 0, 0))
     ball = session.add_object("ball", ball)
     return ball, wall
+
+
+@contextlib.contextmanager
+def in_a_moment(work):
+    """Runs ``work`` in a signal handler of this thread."""
+    before = signal.signal(signal.SIGALRM, lambda *_: work())
+    signal.setitimer(signal.ITIMER_REAL, 0.15)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def interrupt():
+    raise KeyboardInterrupt

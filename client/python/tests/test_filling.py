@@ -92,6 +92,8 @@ def test_slots_are_filled_from_their_own_memory(session):
     assert np.array_equal(np.array(poses), expected)
     poses[:] = plain[::-1]
     assert np.array_equal(np.array(poses), expected[::-1])
+    poses[:] = plain
+    assert np.array_equal(np.array(poses), expected[::-1]), "their own memory over itself"
     del plain, inside
     session.begin_step(0)
 

@@ -1,5 +1,8 @@
 """Manifolds: few points of a region, with ids that stay."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -30,6 +33,12 @@ class Scene:
         poses = {self.floor: (0, 0, -5), self.body: (position, rotation)}
         self.manifolds.update(reply, lambda object, time: poses[object])
         return [(pair, p) for pair in self.manifolds for p in pair.points]
+
+
+def test_the_modules_are_there_once_the_package_is():
+    told = "import contactd; contactd.manifold.Manifolds(); print(contactd.convention.quaternion_from_wxyz([1, 0, 0, 0]))"
+    # An interpreter of its own: here others have imported them.
+    assert subprocess.run([sys.executable, "-c", told], capture_output=True, check=True, text=True).stdout == "[0. 0. 0. 1.]\n"
 
 
 def about_z(angle):
@@ -109,6 +118,9 @@ def test_record_by_record_is_the_same(session):
     mine.add(reply, 0, (0, 0, -5), (0, 0, 0.1))
     with pytest.raises(IndexError, match="record 1: there are 1"):
         mine.add(reply, 1, (0, 0, -5), (0, 0, 0.1))
+    mine.finish()
+    # Once more in the same update: in place of what was there.
+    mine.add(reply, 0, (0, 0, -5), (0, 0, 0.1))
     mine.finish()
     [found], [pair] = mine.pairs, expected
     assert found[:4] == pair[:4] and len(found.points) == len(pair.points) == 4

@@ -344,7 +344,8 @@ def test_another_thread_is_refused(ball_and_wall):
     found = []
 
     def run():
-        for call in (lambda: session.finish(), lambda: poses["object"], lambda: session.close(), lambda: session.closed):
+        calls = (session.finish, lambda: poses["object"], session.close, lambda: session.closed, lambda: session.options)
+        for call in calls:
             try:
                 call()
             except contactd.Misuse as e:
@@ -354,7 +355,7 @@ def test_another_thread_is_refused(ball_and_wall):
     thread = threading.Thread(target=run)
     thread.start()
     thread.join()
-    assert len(found) == 4 and all("belong to the thread that opened it" in f for f in found)
+    assert len(found) == 5 and all("belong to the thread that opened it" in f for f in found)
     del plain, run
     gc.collect()
     assert session.finish()[0].time == 0.5

@@ -1,7 +1,10 @@
 """MuJoCo with contactd's contacts, held against MuJoCo's own where both are right."""
 
+import signal
+
 import numpy as np
 import pytest
+from conftest import in_a_moment, interrupt
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -123,6 +126,74 @@ def test_contacts_of_a_body_at_rest_keep_their_ids():
             assert coupling.step(data) == 4 and data.ncon == 4
             for a, b, point in coupling.contacts:
                 assert model.body(b).name == "body" and np.allclose(point.on_b, first[point.id], atol=1e-6)
+
+
+def test_a_pair_that_stays_in_overlap_keeps_its_depth_and_ids():
+    # A box of 100 mm jammed between walls 98 mm apart: out of one is into the other.
+    wall = '<body name="{0}" pos="{1} 0 0"><geom type="box" size=".05 .2 .2"/></body>'
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><worldbody>{wall.format("left", -0.099)}{wall.format("right", 0.099)}
+        <body name="box"><freejoint/>{box()}</body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    slab = "cube(size = [100, 400, 400], center = true);"
+    with Coupling(model, {"left": slab, "right": slab, "box": BOX}, unit=1e-3) as coupling:
+        seen = []
+        for _ in range(3):
+            mujoco.mj_step1(model, data)
+            assert coupling.add_contacts(data) == data.ncon == 5
+            by_wall = {}
+            for a, b, point in coupling.contacts:
+                assert point.separation == pytest.approx(-1.0, abs=1e-2)
+                by_wall.setdefault(model.body(a).name, []).append(point.id)
+            assert sorted(map(len, by_wall.values())) == [1, 4]
+            assert all(min(ids) >= 0 and len(set(ids)) == len(ids) for ids in by_wall.values())
+            seen.append(by_wall)
+        assert seen[0] == seen[1] == seen[2] and coupling.retracted == 3
+
+
+def turned_over(session):
+    """A box that has been turned over where it lay, so that its points have ids from 4 on; the coupling and MuJoCo's data."""
+    model = scene(box())
+    data = mujoco.MjData(model)
+    coupling = Coupling(model, {"table": TABLE, "body": BOX}, unit=1e-3, session=session)
+    for pose in ((0, 0, 0.0501, 1, 0, 0, 0), (0.4, 0, 0.0501, 0, 1, 0, 0)):
+        data.qpos[:] = pose
+        coupling.step(data)
+    assert {point.id for _, _, point in coupling.contacts} == {4, 5, 6, 7}
+    return coupling, data
+
+
+def test_an_interrupted_request_changes_nothing(own_server):
+    with contactd.connect("own") as session:
+        coupling, data = turned_over(session)
+        before, kept = data.qpos.copy(), coupling.contacts
+        own_server.process.send_signal(signal.SIGSTOP)
+        try:
+            for _ in range(2):
+                with pytest.raises(KeyboardInterrupt), in_a_moment(interrupt):
+                    coupling.step(data)
+        finally:
+            own_server.process.send_signal(signal.SIGCONT)
+        assert np.array_equal(data.qpos, before) and coupling.contacts is kept
+        for _ in range(20):
+            assert coupling.step(data) == 4
+            assert {point.id for _, _, point in coupling.contacts} == {4, 5, 6, 7}
+
+
+def test_a_failed_request_changes_nothing(session):
+    coupling, data = turned_over(session)
+    kept = coupling.contacts
+    mujoco.mj_step1(coupling.model, data)
+    at = data.xpos[coupling.model.body("body").id]
+    height, at[2] = at[2], np.nan
+    for _ in range(2):
+        with pytest.raises(contactd.Refused):
+            coupling.add_contacts(data)
+    assert coupling.contacts is kept
+    at[2] = height
+    assert coupling.add_contacts(data) == 4
+    assert {point.id for _, _, point in coupling.contacts} == {4, 5, 6, 7}
 
 
 def test_bodies_without_a_solid_keep_mujocos_collisions():

@@ -1,6 +1,7 @@
 """Layouts, enumerations and stubs agree with what the native module was compiled with."""
 
 import ast
+import inspect
 import pathlib
 
 import numpy as np
@@ -67,29 +68,56 @@ def test_rules_know_the_protocols_words():
     assert [s.name.lower() for s in contactd.Status] == contactd.STATUS_NAMES[1:]
 
 
-def test_the_stubs_name_what_the_native_module_has():
+def written(function, bound):
+    """The arguments of a stub's function, each with its default as text; without the one it is bound to."""
+    args = function.args
+    assert not args.kwonlyargs and args.vararg is args.kwarg is None
+    named = [*args.posonlyargs, *args.args]
+    defaults = [None] * (len(named) - len(args.defaults)) + [ast.unparse(d) for d in args.defaults]
+    return [(a.arg, d) for a, d in zip(named, defaults)][bound:]
+
+
+def real(function, bound):
+    """The same of the native one."""
+    told = list(inspect.signature(function).parameters.values())[bound:]
+    defaults = [None if p.default is p.empty else "..." if p.default is ... else repr(p.default) for p in told]
+    return [(p.name, d) for p, d in zip(told, defaults)]
+
+
+def is_property(node):
+    return isinstance(node, ast.AnnAssign) or any(getattr(d, "id", "") == "property" for d in node.decorator_list)
+
+
+def test_the_stubs_are_what_the_native_module_has():
     folder = pathlib.Path(contactd.__file__).parent
     assert (folder / "py.typed").is_file()
     tree = ast.parse((folder / "_native.pyi").read_text())
     stubs = {}
     for node in tree.body:
-        if isinstance(node, ast.ClassDef):
-            stubs[node.name] = {
-                n.name if isinstance(n, ast.FunctionDef) else n.target.id
-                for n in node.body
-                if isinstance(n, (ast.FunctionDef, ast.AnnAssign))
-            }
-        elif isinstance(node, ast.FunctionDef):
-            stubs[node.name] = None
-        elif isinstance(node, ast.AnnAssign):
-            if node.target.id[0] != "_" or node.target.id == "__version__":
-                stubs[node.target.id] = None
-    real = {n for n in vars(_native) if not n.startswith("__") or n == "__version__"}
-    assert real == set(stubs)
-    for name, members in stubs.items():
-        if members is not None:
-            public = {m for m in vars(getattr(_native, name)) if not m.startswith("__")}
-            assert public == {m for m in members if not m.startswith("__")}, name
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+            stubs[node.name] = node
+        elif isinstance(node, ast.AnnAssign) and (node.target.id[0] != "_" or node.target.id == "__version__"):
+            stubs[node.target.id] = node
+    assert {n for n in vars(_native) if not n.startswith("__") or n == "__version__"} == set(stubs)
+    for name, node in stubs.items():
+        native = getattr(_native, name)
+        if isinstance(node, ast.FunctionDef):
+            assert real(native, 0) == written(node, 0), name
+        if not isinstance(node, ast.ClassDef):
+            continue
+        members = {n.name if isinstance(n, ast.FunctionDef) else n.target.id: n for n in node.body if not isinstance(n, ast.Expr)}
+        public = {m for m in vars(native) if not m.startswith("__")}
+        assert public == {m for m in members if not m.startswith("__")}, name
+        for member in public:
+            found, told = vars(native)[member], members[member]
+            assert inspect.isgetsetdescriptor(found) == is_property(told), f"{name}.{member}"
+            if not is_property(told):
+                assert real(found, 1) == written(told, 1), f"{name}.{member}"
+        made = members.get("__new__")
+        assert real(native, 0) == (written(made, 1) if made else []), name
+        if made is None:
+            with pytest.raises(TypeError):
+                native()
 
 
 def test_all_is_what_there_is():

@@ -3,10 +3,11 @@
 import gc
 import signal
 import subprocess
+import threading
 
 import numpy as np
 import pytest
-from conftest import fill
+from conftest import fill, in_a_moment, interrupt
 
 import contactd
 
@@ -42,6 +43,55 @@ def test_a_killed_server_is_noticed_and_its_successor_told(own_server):
         assert poses[0].position.tolist() == [12, 0, 0]
         # From x = 4, where the last accepted step ended: the ball's surface meets the wall's after 4 of 8.
         assert session.finish(timeout=10)[0].time == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("timeout", [float("inf"), 1e300, 600.0])
+def test_a_wait_for_a_server_is_as_long_as_it_is_and_ends_by_ctrl_c(own_server, timeout):
+    with contactd.connect("own") as session:
+        ball, _ = fill(session)
+        own_server.kill()
+        with pytest.raises(contactd.ServerLost):
+            session.set_resolution(None)
+        with pytest.raises(KeyboardInterrupt), in_a_moment(interrupt):
+            session.reconnect(timeout)
+        with pytest.raises(contactd.ServerLost):
+            session.begin_step(1)
+        later = threading.Timer(0.4, own_server.start)
+        later.start()
+        session.reconnect(timeout)
+        later.join()
+        session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
+        assert session.finish(timeout=10)[0].time == 0.5
+        for wrong in (-1.0, float("nan")):
+            with pytest.raises(ValueError, match="timeout"):
+                session.reconnect(wrong)
+
+
+def test_options_in_the_middle_of_a_call_are_misuse(own_server):
+    with contactd.connect("own") as session:
+        fill(session)
+        session.begin_step(0)
+        own_server.process.send_signal(signal.SIGSTOP)
+        try:
+            session.send()
+            found = []
+
+            def look():
+                try:
+                    found.append(session.options)
+                except contactd.Misuse as e:
+                    found.append(str(e))
+
+            other = threading.Timer(0.1, look)
+            other.start()
+            with in_a_moment(look), pytest.raises(contactd.Timeout):
+                session.finish(timeout=0.5)
+            other.join()
+        finally:
+            own_server.process.send_signal(signal.SIGCONT)
+        assert found == 2 * ["the session is in use by another call"]
+        session.finish(timeout=20)
+        assert session.options.advance == 1.0
 
 
 def test_a_server_killed_while_its_reply_is_read(own_server):
@@ -83,14 +133,8 @@ def test_a_step_outlives_its_timeout_and_ctrl_c(own_server):
             assert isinstance(out.value, TimeoutError) and "in flight" in str(out.value)
             assert session.options.advance == 0.25, "not yet accepted"
 
-            def interrupt(*_):
-                raise KeyboardInterrupt
-
-            before = signal.signal(signal.SIGALRM, interrupt)
-            signal.setitimer(signal.ITIMER_REAL, 0.15)
-            with pytest.raises(KeyboardInterrupt):
+            with pytest.raises(KeyboardInterrupt), in_a_moment(interrupt):
                 session.finish()
-            signal.signal(signal.SIGALRM, before)
         finally:
             own_server.process.send_signal(signal.SIGCONT)
         reply = session.finish(timeout=20)

@@ -34,7 +34,9 @@
 //! A solid meets no shape of rapier's own. Rays and shape casts miss solids; points project to their boxes. Continuous
 //! detection and its sub-steps (`ccd_enabled`, `soft_ccd_prediction` beyond [`Settings::prediction`]): what
 //! moves through a solid within a step is not stopped. A solid keeps its pose within the collider's body for good, and a fixed one
-//! its place. Models are in rapier's unit of length.
+//! its place. Models are in rapier's unit of length. Pairs that only a joint (`contacts_enabled(false)`) or a hook keeps from
+//! meeting are moved apart like others where they overlap, and what else their bodies meet may have its depth alone meanwhile: give
+//! their colliders `collision_groups` that say the same.
 #![forbid(unsafe_code)]
 
 mod dispatch;
@@ -53,7 +55,9 @@ use glam::{DQuat, DVec3};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::shape::SharedShape;
-use rapier3d_f64::prelude::{ColliderBuilder, ColliderSet, NarrowPhase, PhysicsWorld, RigidBodySet};
+use rapier3d_f64::prelude::{
+    Collider, ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase, PhysicsWorld, RigidBodySet, RigidBodyType,
+};
 use solid::vector;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
@@ -107,6 +111,8 @@ pub struct Coupling<T: Transport> {
     objects: Vec<Placed>,
     batch: Vec<u32>,
     deep: Vec<(u32, u32, Point)>,
+    /// The answer to a request did not come in time; it is still to come.
+    is_in_flight: bool,
     requests: u64,
     retracted: u64,
 }
@@ -121,6 +127,8 @@ struct Placed {
     is_fixed: bool,
     /// The session has it elsewhere.
     is_stale: bool,
+    /// Its collider, if the world has it.
+    collider: Option<ColliderHandle>,
 }
 
 impl Placed {
@@ -153,6 +161,7 @@ impl<T: Transport> Coupling<T> {
             objects: Vec::new(),
             batch: Vec::new(),
             deep: Vec::new(),
+            is_in_flight: false,
             requests: 0,
             retracted: 0,
         })
@@ -220,7 +229,7 @@ impl<T: Transport> Coupling<T> {
     /// Asks about all solids as they stand, then steps the world.
     ///
     /// # Errors
-    /// Those of `prefetch`; the world has not moved then.
+    /// Those of `prefetch`; the world has not moved then, and the step may be repeated.
     pub fn step(&mut self, world: &mut PhysicsWorld) -> Result<(), Error> {
         self.prefetch(&world.bodies, &world.colliders)?;
         world.step();
@@ -231,13 +240,16 @@ impl<T: Transport> Coupling<T> {
     /// before each step. Where all bodies sleep nothing is asked.
     ///
     /// # Errors
-    /// Those of [`Session::finish`]; the table stays as it was.
+    /// Those of [`Session::finish`]; the table stays as it was. After a `Timeout` the next call first waits for the answer that is still
+    /// to come.
     pub fn prefetch(&mut self, bodies: &RigidBodySet, colliders: &ColliderSet) -> Result<(), Error> {
         self.batch.clear();
+        self.objects.iter_mut().for_each(|o| o.collider = None);
         let mut any = false;
-        for (_, collider) in colliders.iter() {
+        for (handle, collider) in colliders.iter() {
             let Some(solid) = collider.shape().as_shape::<Solid>() else { continue };
             let Some(placed) = self.objects.get_mut(solid.object as usize) else { continue };
+            placed.collider = Some(handle);
             if solid.is_fixed {
                 continue;
             }
@@ -254,11 +266,12 @@ impl<T: Transport> Coupling<T> {
         if !any {
             return Ok(());
         }
-        self.manifolds.start();
         self.ask(false)?;
         self.deep.clear();
         for pair in self.manifolds.pairs().filter(|p| p.status == OVERLAP) {
-            self.deep.extend(pair.points.iter().map(|p| (pair.a, pair.b, *p)));
+            if is_solved([pair.a, pair.b].map(|o| self.objects[o as usize].collider), bodies, colliders) {
+                self.deep.extend(pair.points.iter().map(|p| (pair.a, pair.b, *p)));
+            }
         }
         if !self.deep.is_empty() {
             self.retract();
@@ -270,7 +283,7 @@ impl<T: Transport> Coupling<T> {
         Ok(())
     }
 
-    /// The points of the last `prefetch`, with their ids.
+    /// The points of the last `prefetch` that was answered, with their ids: those of its first request where the second one failed.
     pub fn manifolds(&self) -> &Manifolds {
         &self.manifolds
     }
@@ -295,7 +308,7 @@ impl<T: Transport> Coupling<T> {
         let object = Object::new(name, model.id).group(GROUP).at(pose);
         let object = self.session.add_object(if is_fixed { object.fixed() } else { object })?;
         // Ids count up from 1.
-        let nowhere = Placed { pose, back: DVec3::ZERO, is_fixed, is_stale: !is_fixed };
+        let nowhere = Placed { pose, back: DVec3::ZERO, is_fixed, is_stale: !is_fixed, collider: None };
         self.objects.resize(object as usize + 1, nowhere);
         let solid = Solid { object, is_fixed, bounds: model.bounds, mass: model.mass };
         Ok(ColliderBuilder::new(SharedShape::new(solid)).contact_skin(0.5 * self.settings.gap))
@@ -303,6 +316,13 @@ impl<T: Transport> Coupling<T> {
 
     /// One request for the batch; `again`: only the pairs in `deep` are taken of its answer, where they are out of overlap.
     fn ask(&mut self, again: bool) -> Result<(), Error> {
+        if self.is_in_flight {
+            // Of no use any more; whatever else it may be than late, it is over.
+            if let Err(Error::Timeout) = self.session.finish(TIMEOUT) {
+                return Err(Error::Timeout);
+            }
+            self.is_in_flight = false;
+        }
         let slots = self.session.begin_step(self.batch.len())?;
         for (slot, object) in slots.iter_mut().zip(&self.batch) {
             let placed = &mut self.objects[*object as usize];
@@ -310,7 +330,17 @@ impl<T: Transport> Coupling<T> {
             placed.is_stale = true;
         }
         self.requests += 1;
-        let reply = self.session.finish(TIMEOUT)?;
+        let reply = match self.session.finish(TIMEOUT) {
+            Ok(reply) => reply,
+            Err(e) => {
+                self.is_in_flight = e == Error::Timeout;
+                return Err(e);
+            }
+        };
+        if !again {
+            // Not before there is an answer: without one, what is kept stays that of the last step.
+            self.manifolds.start();
+        }
         for object in &self.batch {
             self.objects[*object as usize].is_stale = again;
         }
@@ -342,6 +372,23 @@ impl<T: Transport> Coupling<T> {
             }
         }
     }
+}
+
+/// True when rapier will push the bodies of two colliders apart where they meet, as far as colliders and bodies tell. As its narrow
+/// phase decides it (`update_pair`).
+fn is_solved(pair: [Option<ColliderHandle>; 2], bodies: &RigidBodySet, colliders: &ColliderSet) -> bool {
+    let [Some(c1), Some(c2)] = pair.map(|handle| colliders.get(handle?)) else { return false };
+    let meets = |c: &Collider| c.is_enabled() && !c.is_sensor();
+    if !meets(c1) || !meets(c2) || (c1.parent().is_some() && c1.parent() == c2.parent()) {
+        return false;
+    }
+    let [t1, t2] = [c1, c2].map(|c| {
+        let body = c.parent().and_then(|handle| bodies.get(handle));
+        body.map_or(RigidBodyType::Fixed, |b| b.body_type())
+    });
+    (c1.active_collision_types().test(t1, t2) || c2.active_collision_types().test(t1, t2))
+        && c1.collision_groups().test(c2.collision_groups())
+        && c1.solver_groups().test(c2.solver_groups())
 }
 
 fn world_pose(pose: &Pose) -> WorldPose {
