@@ -150,6 +150,12 @@ class Session:
 
         A batch that was begun and not sent is dropped. The views of the step before are over.
         """
+    def step(self, poses: np.ndarray | Sequence[Any], timeout: float | None = None) -> PublicReply:
+        """A whole step in one call: ``begin_step``, every slot set from ``poses``, ``finish``.
+
+        ``poses``: an array of dtype ``POSE`` along one axis and without gaps, which costs one copy, or whatever else
+        ``begin_step(len(poses))[:]`` takes. Errors are those of the three.
+        """
     def send(self) -> None:
         """Sends the batch without waiting; ``finish`` does it too."""
     def finish(self, timeout: float | None = None) -> PublicReply:

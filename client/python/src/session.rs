@@ -7,7 +7,7 @@ use crate::mass::MassProperties;
 use crate::options::Options;
 use crate::reply::Reply;
 use crate::rules::RuleFields;
-use crate::slots::{Slots, references};
+use crate::slots::{Batch, Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::control::Facets;
 use contactd_client::transport::Opened;
@@ -17,6 +17,7 @@ use contactd_proto::{ContactRecord, Pose, PoseRecord, StepReply};
 use glam::{DQuat, DVec3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PySlice;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -308,6 +309,29 @@ impl Session {
     /// After ``reconnect``: the batch that was in flight when the server died, loaned again with the same poses.
     fn resend(slf: &Bound<'_, Self>) -> PyResult<Py<Slots>> {
         Self::loan(slf, |s| s.resend())
+    }
+
+    /// A whole step in one call: ``begin_step``, every slot set from ``poses``, ``finish``.
+    ///
+    /// ``poses``: an array of dtype ``POSE`` along one axis and without gaps, which costs one copy, or whatever else
+    /// ``begin_step(len(poses))[:]`` takes. Errors are those of the three.
+    #[pyo3(signature = (poses, timeout = None))]
+    fn step(slf: &Bound<'_, Self>, poses: &Bound<'_, PyAny>, timeout: Option<f64>) -> PyResult<Py<Reply>> {
+        let py = slf.py();
+        duration(timeout)?;
+        if let Some(batch) = Batch::of(py, poses)? {
+            let mut this = Self::fresh(slf)?;
+            let options = StepOptions::from(&*this.options.try_borrow(py)?);
+            let begun = this.with(py, |s| {
+                s.options = options;
+                s.begin_step(batch.len()).map(|slots| batch.copy_to(slots))
+            })?;
+            begun.map_err(|e| errors::of(py, &e))?;
+        } else {
+            let slots = Self::begin_step(slf, poses.len()?)?;
+            slots.bind(py).as_any().set_item(PySlice::full(py), poses)?;
+        }
+        Self::finish(slf, timeout)
     }
 
     /// Sends the batch without waiting; ``finish`` does it too.

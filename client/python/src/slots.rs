@@ -146,8 +146,7 @@ impl Slots {
         if !key.cast_exact::<PySlice>().is_ok_and(|slice| is_all(slice, self.count())) {
             return Ok(false);
         }
-        let pose = |found: &Bound<'_, PyAny>| if found.is(&known.pose) { Ok(true) } else { found.eq(&known.pose) };
-        let Some(array) = Held::array(known, value, pose)? else { return Ok(false) };
+        let Some(array) = Held::poses(known, value)? else { return Ok(false) };
         let records = self.records(py)?;
         Ok(array.shape() == [records.count as isize] && records.copy(&array))
     }
@@ -308,6 +307,12 @@ impl Held {
         Ok(Self::of(value).ok())
     }
 
+    /// That of an array of pose records.
+    fn poses(known: &Known, value: &Bound<'_, PyAny>) -> PyResult<Option<Self>> {
+        let pose = |found: &Bound<'_, PyAny>| if found.is(&known.pose) { Ok(true) } else { found.eq(&known.pose) };
+        Self::array(known, value, pose)
+    }
+
     /// That of anything that has one without gaps.
     pub fn of(value: &Bound<'_, PyAny>) -> PyResult<Self> {
         let mut buffer = Box::<ffi::Py_buffer>::new_uninit();
@@ -335,6 +340,31 @@ impl Held {
     /// How many there are.
     pub fn len(&self) -> usize {
         usize::try_from(self.0.len).unwrap_or(0)
+    }
+}
+
+/// An array of pose records along one axis.
+pub struct Batch(Held);
+
+impl Batch {
+    /// Of an array; `None` for what is none, or has gaps.
+    pub fn of(py: Python<'_>, value: &Bound<'_, PyAny>) -> PyResult<Option<Self>> {
+        let held = Held::poses(known(py)?, value)?;
+        Ok(held
+            .filter(|h| h.shape().len() == 1 && h.len() == h.shape()[0] as usize * size_of::<PoseRecord>())
+            .map(Self))
+    }
+
+    /// How many records there are.
+    pub fn len(&self) -> usize {
+        self.0.len() / size_of::<PoseRecord>()
+    }
+
+    /// Copies them into as many slots.
+    pub fn copy_to(&self, slots: &mut [PoseRecord]) {
+        assert_eq!(slots.len(), self.len());
+        // SAFETY: as long as the slots; the two may overlap. Every pattern of bits is a record.
+        unsafe { std::ptr::copy(self.0.start(), slots.as_mut_ptr().cast::<u8>(), self.0.len()) }
     }
 }
 
