@@ -149,12 +149,16 @@ fn contacts_are_those_of_rust_there_and_back() {
 #[test]
 fn arrays_are_converted_in_place() {
     let mut q = [1.0, 2.0, 3.0, 4.0];
-    done(unsafe { contactd_quaternion_from_wxyz(q.as_ptr(), q.as_mut_ptr()) });
+    // One pointer to read from and to write to, as C has it.
+    let at = q.as_mut_ptr();
+    done(unsafe { contactd_quaternion_from_wxyz(at, at) });
     assert_eq!(q, [2.0, 3.0, 4.0, 1.0]);
-    done(unsafe { contactd_quaternion_to_wxyz(q.as_ptr(), q.as_mut_ptr()) });
+    let at = q.as_mut_ptr();
+    done(unsafe { contactd_quaternion_to_wxyz(at, at) });
     assert_eq!(q, [1.0, 2.0, 3.0, 4.0]);
     let (mut p, mut n, mut s) = ([1.0, 2.0, 3.0], [0.0, 0.6, 0.8], -0.5);
-    done(unsafe { contactd_contact_to_ode(p.as_ptr(), n.as_ptr(), s, p.as_mut_ptr(), n.as_mut_ptr(), &mut s) });
+    let (at, along) = (p.as_mut_ptr(), n.as_mut_ptr());
+    done(unsafe { contactd_contact_to_ode(at, along, s, at, along, &mut s) });
     assert_eq!((p, n, s), ([1.0, 2.0, 3.0], [0.0, -0.6, -0.8], 0.5));
 }
 
