@@ -23,7 +23,8 @@ pub enum Error {
     /// The server could not deliver its reply, since this client did not take earlier ones. What was asked was done, or refused:
     /// `reconnect` goes back to before it, then it is to be sent again (`resend`, for a step).
     ReplyLost,
-    /// The time ran out. A step stays in flight: `finish` may be called again.
+    /// The time ran out. A step stays in flight: `finish` may be called again. What a command asked for may be done yet: `reconnect`
+    /// goes back to before it.
     Timeout,
     /// The name or the runtime folder is not usable.
     Address(AddressError),

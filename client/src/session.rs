@@ -205,9 +205,15 @@ impl<T: Transport> Session<T> {
         if is_in_flight && matches!(self.finish(PATIENCE), Err(Error::Timeout | Error::ServerLost | Error::ReplyLost)) {
             return Ok(());
         }
-        self.done(Command::Close)?;
-        self.is_over = true;
-        Ok(())
+        // Also where the session is lost to this client: the server may have it yet.
+        match self.transport.command(Command::Close, self.command_timeout)? {
+            Answer::Done => {
+                self.is_over = true;
+                Ok(())
+            }
+            Answer::Refused { code, index, detail } => Err(refused(code, index, detail)),
+            other => Err(unexpected(&other)),
+        }
     }
 
     /// The transport, for what a session does not offer.
@@ -229,9 +235,15 @@ impl<T: Transport> Session<T> {
 
     fn command(&mut self, command: Command) -> Result<Answer, Error> {
         self.check_idle()?;
+        let only_asks = matches!(command, Command::MassProperties { .. });
         match self.transport.command(command, self.command_timeout) {
             Ok(Answer::Refused { code, index, detail }) => Err(self.failed(refused(code, index, detail))),
             Ok(answer) => Ok(answer),
+            // It may be done yet, with an id that would be given again: the journal cannot tell.
+            Err(Error::Timeout) if !only_asks => {
+                self.lose();
+                Err(Error::Timeout)
+            }
             Err(e) => Err(self.failed(e)),
         }
     }

@@ -3,7 +3,7 @@
 use contactd_client::proto::control::{Answer, Command, WireTrack};
 use contactd_client::proto::{ContactRecord, ErrorCode, Pose, PoseRecord, StepReply, StepRequest};
 use contactd_client::transport::{Opened, Transport};
-use contactd_client::{Error, Object, Session};
+use contactd_client::{Error, MassOptions, Object, Session};
 use glam::DVec3;
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -202,6 +202,29 @@ fn the_sentences_of_a_loss_say_what_to_do() {
     assert!(said.ends_with("; reconnect, and send the step or command again"), "{said}");
     let said = Error::ServerLost.to_string();
     assert!(said.contains("or the session on it") && said.contains("reconnect"), "{said}");
+}
+
+/// The server may carry it out later, with an id that this client would give again.
+#[test]
+fn a_command_that_was_not_answered_in_time_is_settled_by_a_replay() {
+    let (mut session, script) = scripted();
+    assert_eq!(step(&mut session, &script, 1, Ok(())), None);
+    script.borrow_mut().commands.push_back(Error::Timeout);
+    assert_eq!(session.remove_object(1), Err(Error::Timeout));
+    assert_eq!(session.begin_step(1).map(|_| ()), Err(Error::ServerLost));
+    assert_eq!(session.remove_object(1), Err(Error::ServerLost));
+    session.reconnect(LONG).unwrap();
+    assert_eq!(replayed(&script), [1.0, 0.0, 0.0]);
+    assert_eq!(step(&mut session, &script, 2, Ok(())), None);
+    // What only asks leaves nothing behind.
+    script.borrow_mut().commands.push_back(Error::Timeout);
+    assert_eq!(session.mass_properties(1, &MassOptions::default()).err(), Some(Error::Timeout));
+    assert_eq!(step(&mut session, &script, 3, Ok(())), None);
+    // And the server hears of the end of a session that is lost to its client.
+    script.borrow_mut().commands.push_back(Error::Timeout);
+    assert_eq!(session.set_resolution(None), Err(Error::Timeout));
+    assert_eq!(session.close(), Ok(()));
+    assert_eq!(script.borrow().log.last(), Some(&Said::Command(Command::Close)));
 }
 
 #[test]

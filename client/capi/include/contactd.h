@@ -697,14 +697,15 @@ int32_t contactd_connect(const char *name, struct contactd_session **session);
 int32_t contactd_embedded(const char *config, struct contactd_session **session);
 
 // Ends the session, frees all that belongs to it and sets `*session` to NULL; a step in flight is waited for, a second
-// at most. What the code says changes nothing about that, except CONTACTD_ERROR_MISUSE from another thread or from within a call: then nothing happened. A
-// `*session` that is NULL already is done.
+// at most. What the code says changes nothing about that, except CONTACTD_ERROR_MISUSE from another thread or from within a
+// call: then nothing happened. A `*session` that is NULL already is done.
 int32_t contactd_close(struct contactd_session **session);
 
 // The session's id, its server's epoch (0 embedded) and the most records of a batch.
 int32_t contactd_get_opened(struct contactd_session *session, struct contactd_opened *opened);
 
-// How long a command (everything but steps) may take, in seconds; 600 unless set. Imports of large models are commands.
+// How long a command (everything but steps) may take, in seconds; 600 unless set. Imports of large models are commands. After
+// CONTACTD_ERROR_TIMEOUT what was asked may be done yet: contactd_reconnect goes back to before it.
 int32_t contactd_set_command_timeout(struct contactd_session *session, double timeout);
 
 // After CONTACTD_ERROR_SERVER_LOST, CONTACTD_ERROR_REPLY_LOST or a session that is gone: waits up to `timeout` seconds until a

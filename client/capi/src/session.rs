@@ -63,8 +63,8 @@ pub unsafe extern "C" fn contactd_embedded(config: *const c_char, session: *mut 
 }
 
 /// Ends the session, frees all that belongs to it and sets `*session` to NULL; a step in flight is waited for, a second
-/// at most. What the code says changes nothing about that, except CONTACTD_ERROR_MISUSE from another thread or from within a call: then nothing happened. A
-/// `*session` that is NULL already is done.
+/// at most. What the code says changes nothing about that, except CONTACTD_ERROR_MISUSE from another thread or from within a
+/// call: then nothing happened. A `*session` that is NULL already is done.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_close(session: *mut *mut Session) -> i32 {
     free(|| {
@@ -98,7 +98,8 @@ pub unsafe extern "C" fn contactd_get_opened(session: *mut Session, opened: *mut
     unsafe { on(session, call) }
 }
 
-/// How long a command (everything but steps) may take, in seconds; 600 unless set. Imports of large models are commands.
+/// How long a command (everything but steps) may take, in seconds; 600 unless set. Imports of large models are commands. After
+/// CONTACTD_ERROR_TIMEOUT what was asked may be done yet: contactd_reconnect goes back to before it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_set_command_timeout(session: *mut Session, timeout: f64) -> i32 {
     let call = |state: &mut State| {

@@ -64,7 +64,8 @@ class ReplyLost(Error):
 
 
 class Timeout(Error, TimeoutError):
-    """The time ran out. A step stays in flight: ``finish`` may be called again."""
+    """The time ran out. A step stays in flight: ``finish`` may be called again. What a command asked for may be done yet:
+    ``Session.reconnect`` goes back to before it."""
 
 
 class BadAddress(Error):

@@ -1,8 +1,9 @@
 //! The server's loop: steps first, then commands, then finished jobs; spin, then block.
 //!
 //! One thread answers all sessions in the order in which their requests are found. Imports and mass properties are jobs for
-//! a thread of their own, so that a large model delays only its own session. Clients that died are noticed by their pidfd, those that left unheard by
-//! the port that they no longer have; both lose their sessions, and what they held in shared memory is freed.
+//! a thread of their own, so that a large model delays only its own session. Clients that died are noticed by their pidfd,
+//! those that left unheard by the port that they no longer have; both lose their sessions, and what they held in shared
+//! memory is freed.
 
 use super::config::ServerConfig;
 use super::models::{Loaded, Models};
