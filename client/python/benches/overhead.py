@@ -14,6 +14,7 @@ whose step lies in between. After a step that has gone through megabytes the int
 
 import sys
 import time
+from itertools import cycle
 
 import numpy as np
 
@@ -33,45 +34,29 @@ def batches(n, ids):
 
 def whole(session, both):
     """A step of Rust's and one of Python's, of a batch that is copied as a whole; nanoseconds."""
-    now, n, k = time.perf_counter_ns, both.shape[1], 0
-    batch = list(both)
-
-    def rust():
-        nonlocal k
-        k ^= 1
-        return _native._whole_in_rust(session, batch[k])
+    now, n, turns = time.perf_counter_ns, both.shape[1], cycle(both)
 
     def python():
-        nonlocal k
-        k ^= 1
-        records = batch[k]
+        records = next(turns)
         start = now()
         session.begin_step(n)[:] = records
         session.finish(60.0).records
         return now() - start
 
-    return rust, python
+    return lambda: _native._whole_in_rust(session, next(turns)), python
 
 
 def at_once(session, both):
     """The same in one call."""
-    now, k = time.perf_counter_ns, 0
-    batch = list(both)
-
-    def rust():
-        nonlocal k
-        k ^= 1
-        return _native._whole_in_rust(session, batch[k])
+    now, turns = time.perf_counter_ns, cycle(both)
 
     def python():
-        nonlocal k
-        k ^= 1
-        records = batch[k]
+        records = next(turns)
         start = now()
         session.step(records, 60.0).records
         return now() - start
 
-    return rust, python
+    return lambda: _native._whole_in_rust(session, next(turns)), python
 
 
 def fields(session, both):

@@ -139,9 +139,9 @@ pub struct StepState {
     neighbours: Neighbours,
     /// Swept boxes, each with the serial of the step it was taken for.
     boxes: Vec<(u64, Aabb)>,
-    /// Convex bodies in the step whose serial stands beside them.
+    /// Convex bodies, and the serial of the step for which each stance was taken.
     stances: Vec<Stance>,
-    stand_in: Vec<u64>,
+    stance_serials: Vec<u64>,
     /// Neighbours that their odometers don't prove apart.
     asked: Vec<usize>,
     /// How many of them a direction proved apart.
@@ -167,7 +167,7 @@ impl StepState {
             neighbours: Neighbours::default(),
             boxes: Vec::new(),
             stances: Vec::new(),
-            stand_in: Vec::new(),
+            stance_serials: Vec::new(),
             asked: Vec::new(),
             glanced: 0,
             jobs: Vec::new(),
@@ -312,7 +312,7 @@ impl World {
         let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
         let mut stances = std::mem::take(&mut self.state.stances);
-        let mut stand_in = std::mem::take(&mut self.state.stand_in);
+        let mut stance_serials = std::mem::take(&mut self.state.stance_serials);
         let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
         let plan = |i: u32, j: u32| {
@@ -331,7 +331,7 @@ impl World {
             *place
         };
         stances.resize(self.bodies.len(), Stance::default());
-        stand_in.resize(self.bodies.len(), 0);
+        stance_serials.resize(self.bodies.len(), 0);
         let mut glanced = 0;
         jobs.clear();
         if options.clear {
@@ -364,7 +364,7 @@ impl World {
                 let sight = *neighbours.sight(pair);
                 // What met mostly does so again: no look is worth its while.
                 let look = !sight.met && !sight.discrete;
-                let glance = if look { self.glance((i, j), &sight, &mut stances, &mut stand_in) } else { None };
+                let glance = if look { self.glance((i, j), &sight, &mut stances, &mut stance_serials) } else { None };
                 if let Some(glance) = glance {
                     neighbours.noticed(pair, &glance);
                     if glance.apart {
@@ -376,8 +376,11 @@ impl World {
                 // Where nothing is glanced at the swept boxes decide what is asked about, whether the bodies have met or not:
                 // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
                 // depend on what is remembered. Without a margin or regions nothing is.
-                let boxed =
-                    if sight.met { plan.1.tells_nearness() && !self.is_seen((i, j), &sight) } else { glance.is_none() };
+                let boxed = if sight.met {
+                    plan.1.tells_nearness() && !self.can_glance((i, j), &sight)
+                } else {
+                    glance.is_none()
+                };
                 if boxed {
                     neighbours.box_tests += 1;
                     let (reach, boxes) = (plan.1.reach(), [swept(i), swept(j)]);
@@ -396,14 +399,14 @@ impl World {
         self.state.neighbours = neighbours;
         self.state.boxes = boxes;
         self.state.stances = stances;
-        self.state.stand_in = stand_in;
+        self.state.stance_serials = stance_serials;
         self.state.glanced = glanced;
         self.state.asked = asked;
         self.state.jobs = jobs;
     }
 
     /// True when a pair is one that is glanced at: both bodies have hulls, out as far as they matter to each other.
-    fn is_seen(&self, (i, j): (u32, u32), sight: &Sight) -> bool {
+    fn can_glance(&self, (i, j): (u32, u32), sight: &Sight) -> bool {
         let holds = |k: u32| self.bodies[k as usize].hull.as_ref().is_some_and(|hull| hull.holds(sight.touch));
         !sight.discrete && holds(i) && holds(j)
     }
@@ -415,14 +418,14 @@ impl World {
         (i, j): (u32, u32),
         sight: &Sight,
         stances: &mut [Stance],
-        stand_in: &mut [u64],
+        stance_serials: &mut [u64],
     ) -> Option<Glance> {
         for k in [i, j] {
             let k = k as usize;
-            if stand_in[k] != self.state.serial {
+            if stance_serials[k] != self.state.serial {
                 let body = &self.bodies[k];
                 stances[k] = body.hull.as_ref()?.stance(&body.track);
-                stand_in[k] = self.state.serial;
+                stance_serials[k] = self.state.serial;
             }
         }
         let shapes = |k: usize| {
