@@ -236,7 +236,8 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     }
     // An import that nobody waits for any more.
     let mut session = connect();
-    session.command_timeout = Duration::from_millis(100);
+    // No import is answered at once, however quick the machine and whether its cache has the model or not.
+    session.command_timeout = Duration::ZERO;
     assert_eq!(session.load_model("large.csg", &spheres(15_000)).map(|m| m.id), Err(Error::Timeout));
     session.command_timeout = PATIENCE;
     session.close().unwrap();
