@@ -4,11 +4,15 @@
 //! `apart`: 512 balls, boxes and cylinders on a grid that each circle around their place and never come near; `peg`: a peg
 //! comes down on its hole, 1 mm at a time, and slides in; `rest`: 64 drilled blocks lie on a floor, and are told as touching
 //! in every step.
+//!
+//! Then a peg on its way into its hole (`approaches`), in steps of one world that remembers, and as one question to a world
+//! that does not.
 
+use contactd::contact::Status;
 use contactd::eco::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
+use contactd::world::{ObjectSpec, Part, StepError, StepOptions, World};
 use contactd_proto::motion::quat_of_rotation_vector;
-use contactd_proto::{Pose, PoseRecord, Report, Rule};
+use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
 use contactd_tests::scenes::Recipe;
 use glam::DVec3;
 use std::sync::Arc;
@@ -44,10 +48,14 @@ fn lying(object: usize, _: usize) -> Pose {
     Pose::at(DVec3::new(1.5 * (i % 8) as f64, 1.5 * (i / 8) as f64, 0.2))
 }
 
+fn plate_and_peg() -> [Recipe; 2] {
+    [Recipe::cuboid(0.8, 0.8, 0.2).minus(Recipe::cylinder(0.25, 1.0)), Recipe::cylinder(0.24, 0.5)]
+}
+
 /// The three scenes.
 pub fn scenes() -> [Scene; 3] {
     let kinds = [Recipe::sphere(0.4), Recipe::cuboid(0.25, 0.3, 0.25), Recipe::cylinder(0.25, 0.3)];
-    let plate = Recipe::cuboid(0.8, 0.8, 0.2).minus(Recipe::cylinder(0.25, 1.0));
+    let [plate, peg] = plate_and_peg();
     let block = Recipe::cuboid(0.5, 0.4, 0.2).minus(Recipe::cylinder(0.15, 1.0));
     let mut lying_blocks = vec![Recipe::cuboid(20.0, 20.0, 1.0)];
     lying_blocks.resize(65, block);
@@ -60,13 +68,7 @@ pub fn scenes() -> [Scene; 3] {
             pose: circling,
             rules: vec![],
         },
-        Scene {
-            name: "peg",
-            recipes: vec![plate, Recipe::cylinder(0.24, 0.5)],
-            fixed: 1,
-            pose: descending,
-            rules: vec![],
-        },
+        Scene { name: "peg", recipes: vec![plate, peg], fixed: 1, pose: descending, rules: vec![] },
         Scene { name: "rest", recipes: lying_blocks, fixed: 1, pose: lying, rules: vec![patches] },
     ]
 }
@@ -132,4 +134,79 @@ pub fn walk(scene: &Scene, steps: usize) -> Result<Walked, Box<dyn std::error::E
         walked.known += warm.known;
     }
     Ok(walked)
+}
+
+/// A peg on its way into its hole.
+pub struct Approach {
+    /// A word.
+    pub name: &'static str,
+    /// The peg's motion; the plate stands.
+    motion: Motion,
+}
+
+/// Straight, so that it slides in without meeting anything; tilted, and tilted and turning, so that it meets the rim.
+pub fn approaches() -> [Approach; 3] {
+    let of = |name, tilt: DVec3, spin: DVec3| {
+        let start = Pose::new(DVec3::new(0.001, 0.002, 2.0), quat_of_rotation_vector(tilt));
+        Approach { name, motion: Motion::turning(start, start.position - 1.7 * DVec3::Z, spin) }
+    };
+    let (tilt, spin) = (DVec3::new(0.05, 0.02, 0.0), DVec3::new(0.03, -0.05, 0.4));
+    [of("straight", DVec3::ZERO, DVec3::ZERO), of("tilted", tilt, DVec3::ZERO), of("turning", tilt, spin)]
+}
+
+/// What an approach cost.
+#[derive(Debug, Default)]
+pub struct Approached {
+    /// It ended in a contact.
+    pub met: bool,
+    /// Seconds and cells of each step, up to the contact.
+    pub steps: Vec<(f64, f64)>,
+    /// The same of the whole way as one question.
+    pub query: Vec<(f64, f64)>,
+}
+
+/// Goes an approach in so many steps, and as one; `times` over.
+///
+/// # Errors
+/// The two do not agree on whether they meet.
+pub fn approach(approach: &Approach, steps: usize, times: usize) -> Result<Approached, Box<dyn std::error::Error>> {
+    let mut world = World::new(2, 2);
+    for (i, recipe) in plate_and_peg().iter().enumerate() {
+        let part = Arc::new(Part::new(Arc::new(Model::new(recipe.build()))));
+        let spec = ObjectSpec::new(i as u32, &part, if i == 0 { Pose::IDENTITY } else { approach.motion.start });
+        world.add_object(ObjectSpec { is_static: i == 0, ..spec })?;
+    }
+    let n = steps as f64;
+    let turn = |to: f64, part: f64| PoseRecord::turn(1, approach.motion.at(to).position, approach.motion.spin * part);
+    let start = PoseRecord::start(1, &approach.motion.start);
+    let mut told = Approached::default();
+    for _ in 0..times {
+        timed(&mut world, start)?;
+        told.met = false;
+        for k in 1..=steps {
+            let (met, cost) = timed(&mut world, turn(k as f64 / n, 1.0 / n))?;
+            told.steps.push(cost);
+            told.met = met;
+            if met {
+                break;
+            }
+        }
+        timed(&mut world, start)?;
+        world.forget();
+        let (met, cost) = timed(&mut world, turn(1.0, 1.0))?;
+        told.query.push(cost);
+        if met != told.met {
+            return Err(format!("{}: met in steps: {}, at once: {met}", approach.name, told.met).into());
+        }
+    }
+    Ok(told)
+}
+
+/// A step of one record: whether it has a contact; its seconds and cells.
+fn timed(world: &mut World, record: PoseRecord) -> Result<(bool, (f64, f64)), StepError> {
+    let from = Instant::now();
+    let out = world.step(&[record], &StepOptions::default())?;
+    let took = from.elapsed().as_secs_f64();
+    let met = out.pairs.iter().any(|p| p.outcome.status == Status::Contact);
+    Ok((met, (took, (out.counters.cells + out.counters.instant_cells) as f64)))
 }

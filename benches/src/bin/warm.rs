@@ -1,14 +1,15 @@
 //! `warm`: what a step costs when earlier steps have proven much of it, against the same step with all of it forgotten.
 //!
 //! Three scenes, stepped side by side in two worlds (`stepped`). Times are medians over the steps, `asked` and `cells` means
-//! a step. Then the instructions (callgrind's) that a pair costs a step while its bodies are within their clearance: couples of
+//! a step. Then a peg's way into its hole, which takes 100 steps: what the median step costs against the whole way as one
+//! question to a world that remembers nothing. Then the instructions (callgrind's) that a pair costs a step while its bodies are within their clearance: couples of
 //! balls and couples of drilled blocks far from all others, stepped with the pair and with a rule that drops it.
 
 use clap::{Args, Parser, ValueEnum};
 use contactd_benches::callgrind;
-use contactd_benches::race::median;
+use contactd_benches::race::{median, worst};
 use contactd_benches::row;
-use contactd_benches::stepped::{scenes, walk};
+use contactd_benches::stepped::{approach, approaches, scenes, walk};
 use contactd_benches::table::Table;
 use contactd_client::Object;
 use contactd_proto::{Detect, Pose, PoseRecord, Rule};
@@ -34,6 +35,8 @@ enum Kind {
     Parts,
 }
 
+/// Steps of a peg's way into its hole.
+const WAY: usize = 100;
 /// Couples in a scene.
 const COUPLES: usize = 200;
 /// Steps of the shorter and of the longer run, after which the couples are still within their clearance.
@@ -136,6 +139,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("warm: a step that remembers / the same step with all forgotten before it");
     table.publish("warm", &options.folder())?;
+    let mut table =
+        Table::new(&["approach", "met", "steps", "cells", "cells_worst", "query_cells", "us", "query_us", "ratio"]);
+    for way in approaches() {
+        let told = approach(&way, WAY, options.pick(101, 21))?;
+        let [cost, query] = [&told.steps, &told.query].map(|costs| {
+            let (times, cells): (Vec<f64>, Vec<f64>) = costs.iter().copied().unzip();
+            (1e6 * median(times), median(cells.clone()), worst(cells))
+        });
+        let steps = told.steps.len() / told.query.len();
+        let met = if told.met { "yes" } else { "no" };
+        table.push(row![way.name, met, steps, cost.1, cost.2, query.1, cost.0, query.0, cost.0 / query.0]);
+    }
+    println!("a peg's way into its hole: the median step of {WAY} / all of it as one question");
+    table.publish("warm_approach", &options.folder())?;
     if !callgrind::is_there() {
         println!("instructions: not counted, valgrind is not on the PATH");
         return Ok(());
