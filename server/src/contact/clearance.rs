@@ -82,6 +82,10 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
         let (until, count) = pair.keeps(room + touch(&task, margin) + 8.0 * task.rounding);
         return Kept { until, room, counters: Counters { closed_forms: count, ..Counters::default() } };
     }
+    if Convex::are_two(&task) {
+        // No direction separates them: there is no distance to keep.
+        return Kept { until: 0.0, room, counters: Counters { closed_forms: 1, ..Counters::default() } };
+    }
     // Half of the distance on either side, with more than rounding to spare.
     let wanted = 0.5 * (room + touch(&task, margin)) * (1.0 + 1e-9) + 8.0 * task.rounding;
     let level = wanted.min(0.99 * reach(&task));

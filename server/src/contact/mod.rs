@@ -34,7 +34,8 @@ pub use clock::{Clock, Stage};
 pub(crate) use direct::{Glance, Glancing, Hull, Stance};
 pub use outcome::{Counters, Extent, Kind, Outcome, Status};
 pub use pair::{
-    Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, resolution_of,
+    Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, find_earliest,
+    resolution_of,
 };
 pub use region::{Region, RegionPoint, Regions};
 pub use search::Scratch;

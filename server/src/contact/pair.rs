@@ -101,24 +101,29 @@ pub fn resolution_of(query: &PairQuery) -> f64 {
 
 /// Searches a pair to its end.
 pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
-    scratch.enter(Stage::Front);
-    let outcome = match direct::balls(query) {
-        Some(passage) => passage.outcome(query),
-        None => earliest(query, scratch),
-    };
-    scratch.enter(None);
+    let mut outcome = clear(query);
+    find_earliest(query, scratch, &mut outcome);
     outcome
+}
+
+/// The same, written to a place: of thousands of pairs copies would take as long as the easiest of them.
+pub fn find_earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
+    scratch.enter(Stage::Front);
+    match direct::balls(query) {
+        Some(passage) => *outcome = passage.outcome(query),
+        None => earliest(query, scratch, outcome),
+    }
+    scratch.enter(None);
 }
 
 /// The same for what is no pair of balls. A function of its own, so that what is told stays where it was written.
 #[inline(never)]
-fn earliest(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
-    let mut outcome = clear(query);
-    let quick = direct::quick(query, &mut outcome);
+fn earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
+    *outcome = clear(query);
+    let quick = direct::quick(query, outcome);
     if !matches!(quick, Quick::Told) {
-        search(query, quick, &mut outcome, scratch);
+        search(query, quick, outcome, scratch);
     }
-    outcome
 }
 
 /// Answers what is not told without a search.

@@ -125,6 +125,11 @@ impl Knowledge {
         *self = Self { course: self.course.take(), answer: self.answer.take(), ..Self::default() };
     }
 
+    /// True when nothing in it could answer a question.
+    pub fn is_blank(&self) -> bool {
+        !self.answered && !self.on_course && self.cells.is_none()
+    }
+
     /// Answers from what is known, or from what little work makes known; `None`: search. `counters` counts the work.
     fn recall(
         &mut self,

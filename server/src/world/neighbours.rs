@@ -44,14 +44,12 @@ pub struct Sight {
     pub discrete: bool,
     /// They met when they were last asked about.
     pub met: bool,
-    /// Place of what else belongs to it.
-    entry: u32,
+    plan_index: u32,
 }
 
 /// What else belongs to a pair.
 #[derive(Debug)]
 struct Entry {
-    plan_index: u32,
     resolution: f64,
     /// What earlier steps have proven, if it has been asked about at all.
     knowledge: Option<Box<Knowledge>>,
@@ -72,12 +70,13 @@ pub struct Neighbours {
     pairs: Vec<Near>,
     /// One for each of them.
     sights: Vec<Sight>,
-    /// What else belongs to pairs stays in its place while the list changes …
+    /// One for each of them.
     entries: Vec<Entry>,
-    /// … and these places are of pairs that have left it.
-    spare: Vec<u32>,
     old_pairs: Vec<Near>,
     old_sights: Vec<Sight>,
+    old_entries: Vec<Entry>,
+    /// The memory of pairs that have left the list, empty.
+    spare: Vec<Box<Knowledge>>,
     odometers: Vec<Odometer>,
     /// Odometer up to which a body stays in its grown box.
     fences: Vec<f64>,
@@ -123,7 +122,6 @@ impl Neighbours {
         self.pairs.clear();
         self.sights.clear();
         self.entries.clear();
-        self.spare.clear();
         self.stale = true;
     }
 
@@ -178,40 +176,40 @@ impl Neighbours {
         // The old list beside the new one.
         std::mem::swap(&mut self.pairs, &mut self.old_pairs);
         std::mem::swap(&mut self.sights, &mut self.old_sights);
+        std::mem::swap(&mut self.entries, &mut self.old_entries);
         self.pairs.clear();
         self.sights.clear();
-        let mut old = self.old_pairs.iter().zip(&self.old_sights).peekable();
-        for &(a, b) in found.iter() {
-            while let Some((_, gone)) = old.next_if(|(n, _)| (n.a, n.b) < (a, b)) {
-                self.spare.push(gone.entry);
+        let spare = &mut self.spare;
+        let mut leaves = |entry: Entry| {
+            if let Some(mut knowledge) = entry.knowledge {
+                knowledge.empty();
+                spare.push(knowledge);
             }
-            if let Some((near, sight)) = old.next_if(|(n, _)| (n.a, n.b) == (a, b)) {
+        };
+        let of_bodies = self.old_pairs.iter().zip(&self.old_sights);
+        let mut old = of_bodies.zip(self.old_entries.drain(..)).peekable();
+        for &(a, b) in found.iter() {
+            while let Some((_, entry)) = old.next_if(|((n, _), _)| (n.a, n.b) < (a, b)) {
+                leaves(entry);
+            }
+            if let Some(((near, sight), entry)) = old.next_if(|((n, _), _)| (n.a, n.b) == (a, b)) {
                 self.pairs.push(*near);
                 self.sights.push(*sight);
+                self.entries.push(entry);
                 continue;
             }
             let Some((plan_index, plan, resolution)) = plan(a, b) else { continue };
-            let entry = if let Some(entry) = self.spare.pop() {
-                let place = &mut self.entries[entry as usize];
-                (place.plan_index, place.resolution) = (plan_index, resolution);
-                if let Some(known) = &mut place.knowledge {
-                    known.empty();
-                }
-                entry
-            } else {
-                self.entries.push(Entry { plan_index, resolution, knowledge: None });
-                self.entries.len() as u32 - 1
-            };
             self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
             self.sights.push(Sight {
                 along: DVec3::ZERO,
                 touch: plan.reach().max(2.0 * resolution),
                 discrete: plan.detect == Detect::Discrete,
                 met: false,
-                entry,
+                plan_index,
             });
+            self.entries.push(Entry { resolution, knowledge: None });
         }
-        self.spare.extend(old.map(|(_, gone)| gone.entry));
+        old.for_each(|(_, entry)| leaves(entry));
     }
 
     /// The two bodies of a pair.
@@ -229,10 +227,9 @@ impl Neighbours {
         &self.sights[pair]
     }
 
-    /// Index of the plan of a pair, and its resolution.
-    pub fn plan(&self, pair: usize) -> (u32, f64) {
-        let entry = &self.entries[self.sights[pair].entry as usize];
-        (entry.plan_index, entry.resolution)
+    /// Index of the plan of a pair.
+    pub fn plan(&self, pair: usize) -> u32 {
+        self.sights[pair].plan_index
     }
 
     /// Notes what was seen of a pair at the start of this step.
@@ -244,14 +241,15 @@ impl Neighbours {
         }
     }
 
-    /// Gives what is known of a pair away, until `learned`.
-    pub fn lend(&mut self, pair: usize) -> Box<Knowledge> {
-        self.entries[self.sights[pair].entry as usize].knowledge.take().unwrap_or_default()
+    /// The resolution of a pair; and gives what is known of it away, until `learned`.
+    pub fn lend(&mut self, pair: usize) -> (f64, Box<Knowledge>) {
+        let entry = &mut self.entries[pair];
+        (entry.resolution, entry.knowledge.take().or_else(|| self.spare.pop()).unwrap_or_default())
     }
 
     /// Takes it back; with the room found at the start of this step, if it is positive, and whether the bodies met.
-    pub fn learned(&mut self, pair: usize, knowledge: Box<Knowledge>, room: f64, met: bool) {
-        self.entries[self.sights[pair].entry as usize].knowledge = Some(knowledge);
+    pub fn learned(&mut self, pair: usize, knowledge: Option<Box<Knowledge>>, room: f64, met: bool) {
+        self.entries[pair].knowledge = knowledge;
         self.sights[pair].met = met;
         if room > 0.0 {
             self.note(pair, room);

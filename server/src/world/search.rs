@@ -43,8 +43,10 @@ pub struct PairJob {
     pub near: bool,
     /// Its place in the list of neighbours; `None`: proven clear without being asked about.
     pub pair: Option<usize>,
-    /// What earlier steps have proven; lent by the list of neighbours.
-    pub knowledge: Box<Knowledge>,
+    /// What earlier steps have proven, of a pair with a place; lent by the list of neighbours.
+    pub knowledge: Option<Box<Knowledge>>,
+    /// Nothing is known that could answer it.
+    is_blank: bool,
     /// The answer.
     pub found: Finding,
 }
@@ -56,12 +58,14 @@ impl PairJob {
         (plan_index, plan): (u32, PairPlan),
         resolution: f64,
         near: bool,
-        pair: Option<usize>,
-        knowledge: Box<Knowledge>,
+        pair: Option<(usize, Box<Knowledge>)>,
     ) -> Self {
         let known = pair.is_none();
         let found = Finding { outcome: Outcome::clear(resolution), room: 0.0, known, apart: known };
-        Self { a, b, plan, plan_index, resolution, near, pair, knowledge, found }
+        let (pair, knowledge) = pair.unzip();
+        // Looked up here, where many jobs are made in a row and the memory can answer several at a time.
+        let is_blank = knowledge.as_ref().is_none_or(|k: &Box<Knowledge>| k.is_blank());
+        Self { a, b, plan, plan_index, resolution, near, pair, knowledge, is_blank, found }
     }
 
     fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
@@ -70,10 +74,12 @@ impl PairJob {
         Question { bodies: pair, query, margin: self.plan.reach(), clock }
     }
 
-    fn take(&mut self, q: &Question, outcome: &Outcome) {
-        self.knowledge.learn(q, outcome);
+    /// Takes the outcome of a search, which has been written into `found`.
+    fn take(&mut self, q: &Question) {
         let found = &mut self.found;
-        found.outcome = *outcome;
+        if let Some(knowledge) = &mut self.knowledge {
+            knowledge.learn(q, &found.outcome);
+        }
         (found.room, found.known, found.apart) = (0.0, false, false);
         finish(&self.plan, &mut found.outcome);
     }
@@ -128,7 +134,8 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
         let mut q = job.question(bodies, options, clock);
         let cells = memory.with(|seat| {
             let mut counters = Counters::default();
-            if let Some(finding) = job.knowledge.ask(&q, &mut seat.scratch, &mut counters) {
+            let knowledge = job.knowledge.as_mut().filter(|_| !job.is_blank);
+            if let Some(finding) = knowledge.and_then(|k| k.ask(&q, &mut seat.scratch, &mut counters)) {
                 job.found = finding;
                 finish(&job.plan, &mut job.found.outcome);
                 seat.cells += job.found.outcome.counters.cells;
@@ -140,14 +147,16 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
             }
             let cut = q.query.cell_limit > most;
             q.query.cell_limit = q.query.cell_limit.min(most);
-            let mut outcome = contact::earliest_contact(&q.query, &mut seat.scratch);
+            // Outcomes are large: it is written where it is to be.
+            let outcome = &mut job.found.outcome;
+            contact::find_earliest(&q.query, &mut seat.scratch, outcome);
             let cells = outcome.counters.cells;
             if cut && outcome.status == Status::Undecided {
                 beyond.store(true, Relaxed);
             }
             outcome.counters += counters;
             seat.cells += outcome.counters.cells;
-            job.take(&q, &outcome);
+            job.take(&q);
             cells
         });
         if spent.fetch_add(cells, Relaxed) + cells > most {
@@ -203,7 +212,8 @@ fn run_queue(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, first
         match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
-                open[i].take(&questions[i], &outcome);
+                open[i].found.outcome = outcome;
+                open[i].take(&questions[i]);
                 if first && !open[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
                     horizon = horizon.min(open[i].found.outcome.time_upper + tolerance::FIRST_SLACK);
                 }

@@ -277,9 +277,11 @@ impl World {
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
         let Self { bodies, state, .. } = self;
-        let StepState { neighbours, moving, orders, put, serial, .. } = state;
+        let StepState { neighbours, moving, orders, put, serial, stances, stance_serials, .. } = state;
         state.clock += options.advance;
         neighbours.count(bodies.len());
+        stances.resize(bodies.len(), Stance::default());
+        stance_serials.resize(bodies.len(), 0);
         // What moved and is not named comes to rest.
         moving.retain(|index| {
             let body = &mut bodies[*index as usize];
@@ -304,6 +306,13 @@ impl World {
             let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
             neighbours.moved(index, jump, body.travel(1.0));
             moving.push(index);
+            // What was looked at in the last step will be in this one, mostly: now its body is at hand.
+            if let Some(hull) = &body.hull
+                && stance_serials[index as usize] + 1 == *serial
+            {
+                stances[index as usize] = hull.stance(&body.track);
+                stance_serials[index as usize] = *serial;
+            }
         }
     }
 
@@ -330,8 +339,6 @@ impl World {
             }
             *place
         };
-        stances.resize(self.bodies.len(), Stance::default());
-        stance_serials.resize(self.bodies.len(), 0);
         let mut glanced = 0;
         jobs.clear();
         if options.clear {
@@ -343,8 +350,8 @@ impl World {
                 let reach = 0.5 * plan.reach();
                 let near = swept(i).grown(reach).meets(&swept(j).grown(reach));
                 let pair = neighbours.find(i, j).filter(|pair| near && !neighbours.is_apart(*pair));
-                let knowledge = pair.map(|pair| neighbours.lend(pair)).unwrap_or_default();
-                jobs.push(PairJob::new((i, j), (index, plan), resolution, near, pair, knowledge));
+                let pair = pair.map(|pair| (pair, neighbours.lend(pair).1));
+                jobs.push(PairJob::new((i, j), (index, plan), resolution, near, pair));
             }
             if self.plans.count() > 1 {
                 jobs.sort_unstable_by_key(|job| (job.plan_index, job.a, job.b));
@@ -353,13 +360,9 @@ impl World {
             asked.clear();
             neighbours.asked(|pair| asked.push(pair));
             if self.plans.count() > 1 {
-                asked.sort_unstable_by_key(|pair| (neighbours.plan(*pair).0, *pair));
+                asked.sort_unstable_by_key(|pair| (neighbours.plan(*pair), *pair));
             }
-            let plan = |pair, neighbours: &Neighbours| {
-                let (index, resolution) = neighbours.plan(pair);
-                ((index, *self.plans.plan(index)), resolution)
-            };
-            for &pair in &asked {
+            asked.retain(|&pair| {
                 let (i, j) = neighbours.bodies(pair);
                 let sight = *neighbours.sight(pair);
                 // What met mostly does so again: no look is worth its while.
@@ -367,33 +370,32 @@ impl World {
                 let glance = if look { self.glance((i, j), &sight, &mut stances, &mut stance_serials) } else { None };
                 if let Some(glance) = glance {
                     neighbours.noticed(pair, &glance);
-                    if glance.apart {
-                        glanced += 1;
-                        continue;
-                    }
+                    glanced += u32::from(glance.apart);
+                    return !glance.apart;
                 }
-                let (plan, resolution) = plan(pair, &neighbours);
                 // Where nothing is glanced at the swept boxes decide what is asked about, whether the bodies have met or not:
                 // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
                 // depend on what is remembered. Without a margin or regions nothing is.
-                let boxed = if sight.met {
-                    plan.1.tells_nearness() && !self.can_glance((i, j), &sight)
-                } else {
-                    glance.is_none()
-                };
-                if boxed {
-                    neighbours.box_tests += 1;
-                    let (reach, boxes) = (plan.1.reach(), [swept(i), swept(j)]);
-                    if !boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach)) {
-                        if !sight.discrete {
-                            // Side by side, as they are compared: boxes whose corners are farther apart may meet sooner.
-                            neighbours.note(pair, boxes[0].gap(&boxes[1]) - reach);
-                        }
-                        continue;
-                    }
+                let plan = self.plans.plan(neighbours.plan(pair));
+                if sight.met && !(plan.tells_nearness() && !self.can_glance((i, j), &sight)) {
+                    return true;
                 }
-                let knowledge = neighbours.lend(pair);
-                jobs.push(PairJob::new((i, j), plan, resolution, true, Some(pair), knowledge));
+                neighbours.box_tests += 1;
+                let (reach, boxes) = (plan.reach(), [swept(i), swept(j)]);
+                let meet = boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach));
+                if !meet && !sight.discrete {
+                    // Side by side, as they are compared: boxes whose corners are farther apart may meet sooner.
+                    neighbours.note(pair, boxes[0].gap(&boxes[1]) - reach);
+                }
+                meet
+            });
+            // In a loop of its own: what is known of pairs lies all over the memory, which answers several at a time.
+            for &pair in &asked {
+                let plan_index = neighbours.plan(pair);
+                let plan = (plan_index, *self.plans.plan(plan_index));
+                let (resolution, knowledge) = neighbours.lend(pair);
+                let bodies = neighbours.bodies(pair);
+                jobs.push(PairJob::new(bodies, plan, resolution, true, Some((pair, knowledge))));
             }
         }
         self.state.neighbours = neighbours;
@@ -515,7 +517,7 @@ impl World {
                 let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
                 // What meets now will mostly do so in the next step: no look is worth its while.
                 let met = job.found.outcome.status != Status::Clear;
-                state.neighbours.learned(pair, std::mem::take(&mut job.knowledge), room, met);
+                state.neighbours.learned(pair, job.knowledge.take(), room, met);
             }
         }
     }

@@ -88,15 +88,18 @@ pub(super) fn decide(
             return false;
         }
     }
-    if within == Within::Apart && clear {
-        job.knowledge.tell(Told { outcome: job.found.outcome, regions: Vec::new() });
+    if within == Within::Apart
+        && clear
+        && let Some(knowledge) = &mut job.knowledge
+    {
+        knowledge.tell(Told { outcome: job.found.outcome, regions: Vec::new() });
     }
     within != Within::Open
 }
 
 /// What an earlier step told of the same answer.
 fn told(job: &PairJob) -> Option<&Told> {
-    job.knowledge.told().filter(|_| job.found.known && !job.found.apart)
+    job.knowledge.as_ref()?.told().filter(|_| job.found.known && !job.found.apart)
 }
 
 /// Finds the regions of the told pairs and gives each its slots.
@@ -129,8 +132,8 @@ pub(super) fn find_regions(
             p.regions_complete &= found.complete;
             p.regions.1 = found.regions.len() as u32;
             out.regions.extend_from_slice(&found.regions);
-            if p.regions_complete {
-                job.knowledge.tell(Told { outcome: p.outcome, regions: found.regions });
+            if let Some(knowledge) = job.knowledge.as_mut().filter(|_| p.regions_complete) {
+                knowledge.tell(Told { outcome: p.outcome, regions: found.regions });
             }
         }
         let own = record::patch_slots(&out.regions[p.regions.0 as usize..]);

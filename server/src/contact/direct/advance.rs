@@ -66,6 +66,11 @@ impl<'a> Convex<'a> {
         Some(Self { advance, start })
     }
 
+    /// True for two solids that are one convex primitive each, whether a direction separates them or not.
+    pub fn are_two(task: &Task) -> bool {
+        [task.a, task.b].iter().all(|solid| solid.whole().is_some_and(|p| body_of(p).is_some()))
+    }
+
     /// A lower bound of the distance at the start, but for rounding.
     pub fn distance(&self) -> f64 {
         self.start.phi
