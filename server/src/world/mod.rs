@@ -19,6 +19,7 @@ pub mod plan;
 pub mod record;
 pub mod scene;
 mod search;
+mod stances;
 pub mod step;
 #[cfg(test)]
 mod tests;

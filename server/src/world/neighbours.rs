@@ -76,6 +76,7 @@ pub struct Neighbours {
     old_sights: Vec<Sight>,
     old_entries: Vec<Entry>,
     /// The memory of pairs that have left the list, empty.
+    #[expect(clippy::vec_box, reason = "it is handed on as it is")]
     spare: Vec<Box<Knowledge>>,
     odometers: Vec<Odometer>,
     /// Odometer up to which a body stays in its grown box.

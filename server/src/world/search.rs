@@ -62,9 +62,9 @@ impl PairJob {
     ) -> Self {
         let known = pair.is_none();
         let found = Finding { outcome: Outcome::clear(resolution), room: 0.0, known, apart: known };
-        let (pair, knowledge) = pair.unzip();
+        let (pair, knowledge): (_, Option<Box<Knowledge>>) = pair.unzip();
         // Looked up here, where many jobs are made in a row and the memory can answer several at a time.
-        let is_blank = knowledge.as_ref().is_none_or(|k: &Box<Knowledge>| k.is_blank());
+        let is_blank = knowledge.as_deref().is_none_or(Knowledge::is_blank);
         Self { a, b, plan, plan_index, resolution, near, pair, knowledge, is_blank, found }
     }
 

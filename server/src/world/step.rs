@@ -9,8 +9,9 @@ use super::neighbours::{Neighbours, Sight};
 use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
+use super::stances::Stances;
 use super::touch;
-use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Scratch, Stance, Status};
+use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Scratch, Status};
 use crate::math::Aabb;
 use contactd_proto::pose_record::Order;
 use contactd_proto::{Detect, EffectCounters, ErrorCode, Pose, PoseRecord, Report, Track};
@@ -139,9 +140,7 @@ pub struct StepState {
     neighbours: Neighbours,
     /// Swept boxes, each with the serial of the step it was taken for.
     boxes: Vec<(u64, Aabb)>,
-    /// Convex bodies, and the serial of the step for which each stance was taken.
-    stances: Vec<Stance>,
-    stance_serials: Vec<u64>,
+    stances: Stances,
     /// Neighbours that their odometers don't prove apart.
     asked: Vec<usize>,
     /// How many of them a direction proved apart.
@@ -166,8 +165,7 @@ impl StepState {
             clock: 0.0,
             neighbours: Neighbours::default(),
             boxes: Vec::new(),
-            stances: Vec::new(),
-            stance_serials: Vec::new(),
+            stances: Stances::default(),
             asked: Vec::new(),
             glanced: 0,
             jobs: Vec::new(),
@@ -277,11 +275,10 @@ impl World {
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
         let Self { bodies, state, .. } = self;
-        let StepState { neighbours, moving, orders, put, serial, stances, stance_serials, .. } = state;
+        let StepState { neighbours, moving, orders, put, serial, stances, .. } = state;
         state.clock += options.advance;
         neighbours.count(bodies.len());
-        stances.resize(bodies.len(), Stance::default());
-        stance_serials.resize(bodies.len(), 0);
+        stances.begin(*serial, bodies.len());
         // What moved and is not named comes to rest.
         moving.retain(|index| {
             let body = &mut bodies[*index as usize];
@@ -306,13 +303,7 @@ impl World {
             let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
             neighbours.moved(index, jump, body.travel(1.0));
             moving.push(index);
-            // What was looked at in the last step will be in this one, mostly: now its body is at hand.
-            if let Some(hull) = &body.hull
-                && stance_serials[index as usize] + 1 == *serial
-            {
-                stances[index as usize] = hull.stance(&body.track);
-                stance_serials[index as usize] = *serial;
-            }
+            stances.moved(index as usize, body);
         }
     }
 
@@ -321,7 +312,6 @@ impl World {
         let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
         let mut stances = std::mem::take(&mut self.state.stances);
-        let mut stance_serials = std::mem::take(&mut self.state.stance_serials);
         let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
         let plan = |i: u32, j: u32| {
@@ -367,7 +357,7 @@ impl World {
                 let sight = *neighbours.sight(pair);
                 // What met mostly does so again: no look is worth its while.
                 let look = !sight.met && !sight.discrete;
-                let glance = if look { self.glance((i, j), &sight, &mut stances, &mut stance_serials) } else { None };
+                let glance = if look { self.glance((i, j), &sight, &mut stances) } else { None };
                 if let Some(glance) = glance {
                     neighbours.noticed(pair, &glance);
                     glanced += u32::from(glance.apart);
@@ -377,7 +367,7 @@ impl World {
                 // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
                 // depend on what is remembered. Without a margin or regions nothing is.
                 let plan = self.plans.plan(neighbours.plan(pair));
-                if sight.met && !(plan.tells_nearness() && !self.can_glance((i, j), &sight)) {
+                if sight.met && (!plan.tells_nearness() || self.can_glance((i, j), &sight)) {
                     return true;
                 }
                 neighbours.box_tests += 1;
@@ -401,7 +391,6 @@ impl World {
         self.state.neighbours = neighbours;
         self.state.boxes = boxes;
         self.state.stances = stances;
-        self.state.stance_serials = stance_serials;
         self.state.glanced = glanced;
         self.state.asked = asked;
         self.state.jobs = jobs;
@@ -415,26 +404,14 @@ impl World {
 
     /// What a direction tells of a pair of convex bodies.
     #[inline]
-    fn glance(
-        &self,
-        (i, j): (u32, u32),
-        sight: &Sight,
-        stances: &mut [Stance],
-        stance_serials: &mut [u64],
-    ) -> Option<Glance> {
-        for k in [i, j] {
-            let k = k as usize;
-            if stance_serials[k] != self.state.serial {
-                let body = &self.bodies[k];
-                stances[k] = body.hull.as_ref()?.stance(&body.track);
-                stance_serials[k] = self.state.serial;
-            }
-        }
+    fn glance(&self, (i, j): (u32, u32), sight: &Sight, stances: &mut Stances) -> Option<Glance> {
+        let indices = [i as usize, j as usize];
+        let seen = stances.look(indices, &self.bodies)?;
         let shapes = |k: usize| {
-            let body = &self.bodies[[i, j][k] as usize];
+            let body = &self.bodies[indices[k]];
             body.hull.as_ref()?.shape(&body.part.model)
         };
-        Some(Glancing::new([&stances[i as usize], &stances[j as usize]], shapes, sight.touch)?.look(sight.along))
+        Some(Glancing::new(seen, shapes, sight.touch)?.look(sight.along))
     }
 
     /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for

@@ -1,0 +1,59 @@
+//! The stances of the bodies in a step (`contact::Stance`), each taken when it is first looked at.
+//!
+//! What was looked at in one step mostly will be in the next one: such a body's stance is taken as soon as its track is known,
+//! while both are at hand. Thousands of bodies later they would have to be fetched from far away again.
+
+use super::body::Body;
+use crate::contact::Stance;
+
+/// Stances by bodies' indices.
+#[derive(Debug, Default)]
+pub struct Stances {
+    stances: Vec<Stance>,
+    uses: Vec<Use>,
+    /// The step that they are of.
+    serial: u64,
+}
+
+/// Steps, by their serials: that for which the stance was taken, and the last one in which it was looked at.
+#[derive(Clone, Copy, Debug, Default)]
+struct Use {
+    taken: u64,
+    looked: u64,
+}
+
+impl Stances {
+    /// A step of so many bodies begins; serials go up by one and begin with 1.
+    pub fn begin(&mut self, serial: u64, bodies: usize) {
+        self.serial = serial;
+        self.stances.resize(bodies, Stance::default());
+        self.uses.resize(bodies, Use::default());
+    }
+
+    /// A body has got its track for this step.
+    #[inline]
+    pub fn moved(&mut self, index: usize, body: &Body) {
+        if self.uses[index].looked + 1 == self.serial {
+            self.take(index, body);
+        }
+    }
+
+    /// A look at some bodies; `None` where one has no hull.
+    #[inline]
+    pub fn look<const N: usize>(&mut self, indices: [usize; N], bodies: &[Body]) -> Option<[&Stance; N]> {
+        for i in indices {
+            if self.uses[i].taken != self.serial {
+                self.take(i, &bodies[i])?;
+            }
+            self.uses[i].looked = self.serial;
+        }
+        Some(indices.map(|i| &self.stances[i]))
+    }
+
+    #[inline]
+    fn take(&mut self, index: usize, body: &Body) -> Option<()> {
+        self.stances[index] = body.hull.as_ref()?.stance(&body.track);
+        self.uses[index].taken = self.serial;
+        Some(())
+    }
+}
