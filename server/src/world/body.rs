@@ -169,18 +169,17 @@ impl Body {
         (m.velocity.length() * s + turning) * (1.0 + 1e-15)
     }
 
-    /// How far the farthest of its points is from where it was once the first part `s` of its motion is taken, at most: the
-    /// way, and what rounding does to the pose in which that is kept. An end that is taken whole is kept as it was given.
-    pub fn taken(&self, s: f64) -> f64 {
-        let (start, end) = (&self.track.motion.start, self.track.at(s));
-        let rounding = if s < 1.0 {
-            self.rounding(start, &end)
-        } else if end.rotation == start.rotation {
+    /// How much farther than `travel` tells the farthest of its points may be from where it was, once the first part `s` of its
+    /// motion is taken: what rounding does to the pose in which that is kept. An end that is taken whole is kept as it was given.
+    pub fn rounding_at(&self, s: f64) -> f64 {
+        let start = &self.track.motion.start;
+        if s < 1.0 {
+            self.rounding(start, &self.track.at(s))
+        } else if self.track.end.rotation == start.rotation {
             0.0
         } else {
             self.reach * tolerance::BOX_ROUNDING
-        };
-        self.travel(s) + rounding
+        }
     }
 
     /// How far the farthest of its points is displaced from one pose to another, at most.

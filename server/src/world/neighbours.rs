@@ -138,6 +138,19 @@ impl Neighbours {
         o.end = up(o.start, now);
     }
 
+    /// A part of a body's last motion is taken.
+    pub fn taken(&mut self, index: u32, body: &Body, part: f64) {
+        let way = if part == 1.0 {
+            // All of it, which the odometer shows already.
+            let o = &mut self.odometers[index as usize];
+            o.start = o.end;
+            body.rounding_at(part)
+        } else {
+            body.travel(part) + body.rounding_at(part)
+        };
+        self.moved(index, way, 0.0);
+    }
+
     /// Readies the odometers for as many bodies.
     pub fn count(&mut self, bodies: usize) {
         self.odometers.resize(bodies, Odometer::default());

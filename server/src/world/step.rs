@@ -283,12 +283,13 @@ impl World {
         moving.retain(|index| {
             let body = &mut bodies[*index as usize];
             if !body.named.contains(serial) && !body.track.is_rest() {
-                neighbours.moved(*index, body.taken(options.advance), 0.0);
+                neighbours.taken(*index, body, options.advance);
                 body.track = Track::resting(body.track.at(options.advance));
             }
             false
         });
-        for &(index, order) in orders.iter() {
+        for (index, order) in orders.iter() {
+            let index = *index;
             let body = &mut bodies[index as usize];
             if matches!(order, Order::Start(_)) && body.named[1] == *serial {
                 // Its motion begins there.
@@ -296,10 +297,10 @@ impl World {
             }
             let was = body.track.at(options.advance);
             if !body.track.is_rest() {
-                neighbours.moved(index, body.taken(options.advance), 0.0);
+                neighbours.taken(index, body, options.advance);
             }
             let start = place_of(put, index);
-            body.track = Track::ordered(start.unwrap_or(was), order);
+            body.track = Track::ordered(start.unwrap_or(was), *order);
             let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
             neighbours.moved(index, jump, body.travel(1.0));
             moving.push(index);
