@@ -6,9 +6,10 @@ use contactd::eco::span::primitive_span;
 use contactd::eco::tables::combine;
 use contactd::eco::{Kind, Limits, Meet, Model, Node, meet};
 use contactd::solid::local::{self, Truth};
-use contactd::solid::primitive::{Cuboid, Primitive, Sphere};
+use contactd::solid::primitive::{Cuboid, Cylinder, Primitive, Sphere};
 use contactd::solid::{Label, Op, Sense, Solid, SolidBuilder};
 use contactd_proto::Pose;
+use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_tests::random_solids::{Random, node, perforated_plate, shape, solid};
 use glam::DVec3;
 
@@ -402,4 +403,140 @@ fn a_voxel_that_a_surface_reaches_within_the_margin_is_neither_full_nor_empty() 
         let found = classifier.classify(&whole(&solid, &bounds), &mut Vec::new(), &mut Vec::new());
         assert_eq!(found.kind, kind, "at a distance of {distance}");
     }
+}
+
+/// A point where f is about 0, on the way between two points of unlike signs.
+fn on_surface(s: &Solid, mut inside: DVec3, mut outside: DVec3) -> DVec3 {
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        *if s.value(middle) < 0.0 { &mut inside } else { &mut outside } = middle;
+    }
+    0.5 * (inside + outside)
+}
+
+/// Asserts that the model says of its tree at a point what the tree says.
+fn assert_told(m: &Model, x: DVec3, what: &str) {
+    let s = &m.solid;
+    let f = s.value(x);
+    assert_eq!(m.value(x), f, "{what}");
+    let mut psi = |face: u32| s.faces[face as usize].value(x);
+    assert_eq!(m.deciding(x), local::deciding(&s.normal_form, &mut psi), "{what}");
+    for level in [1e-12, 1e-4, 0.1, 0.45, 2.0, 1e3].map(|part| part * m.margin()) {
+        for level in [level, -level] {
+            let told = m.value_within(x, level);
+            assert_eq!((told <= level, told < level), (f <= level, f < level), "{what}: {told} for {f} at {level}");
+        }
+        assert_eq!(m.value_within(x, level).clamp(-level, level), f.clamp(-level, level), "{what}");
+        let (mut near, mut all) = (vec![], vec![]);
+        let truth = m.literals_at(x, level, &mut near);
+        let expected = local::prune(&s.normal_form, &mut all, &mut |id| {
+            let v = s.faces[id.face() as usize].value(x);
+            local::truth_of(id.sense(), (v, v), 0.0, level)
+        });
+        assert_eq!((truth, near), (expected, all), "{what}: within {level}");
+    }
+}
+
+#[test]
+fn the_octree_tells_f_at_a_point_as_the_whole_tree_does_whatever_was_decomposed() {
+    let (mut solids, mut points, mut near) = (0, 0, 0);
+    for seed in 0..60 {
+        let mut r = Random::new(seed + 4_000);
+        let s = if seed % 10 == 0 { perforated_plate(2 + seed as usize / 10) } else { solid(&mut r, 3) };
+        if s.primitives.len() <= 8 {
+            continue;
+        }
+        let built = Model::new(s.clone());
+        if built.bounds.root().is_empty() {
+            continue;
+        }
+        solids += 1;
+        let bare = Model::with_limits(s, Limits::to_depth(0));
+        let around = built.bounds.root().aabb.grown(0.1);
+        let mut last: Option<(DVec3, bool)> = None;
+        for i in 0..60 {
+            let x = r.point_in(&around);
+            let inside = built.solid.value(x) < 0.0;
+            let mut at = vec![x];
+            if let Some((y, other)) = last
+                && other != inside
+            {
+                let (inside, outside) = if inside { (x, y) } else { (y, x) };
+                let edge = on_surface(&built.solid, inside, outside);
+                let off = r.direction() * built.margin();
+                at.extend([0.0, 0.3, 0.9, 3.0].map(|k| edge + off * k));
+                near += 1;
+            }
+            last = Some((x, inside));
+            for x in at {
+                let what = format!("seed {seed}, point {i}: {x}");
+                assert_told(&built, x, &what);
+                assert_told(&bare, x, &what);
+                if i % 4 == 0 && bare.eco.root().aabb().contains(x) {
+                    // All the way down there, then again.
+                    descend(&bare, x, |_| true, |_| {});
+                    assert_told(&bare, x, &what);
+                }
+                points += 1;
+            }
+        }
+    }
+    println!("{points} points in {solids} solids, {near} of them on a surface");
+    assert!(solids > 20 && near > 200, "{solids} {near}");
+}
+
+#[test]
+fn what_is_evaluated_at_a_point_does_not_grow_with_the_solid() {
+    let mut most = vec![];
+    for n in [3, 10, 30, 70] {
+        let s = perforated_plate(n);
+        // Nothing decomposed at load: what a model of millions of primitives would be.
+        for limits in [Limits::default(), Limits::to_depth(0)] {
+            let m = Model::with_limits(s.clone(), limits);
+            let mut r = Random::new(9);
+            let points: Vec<DVec3> = (0..2000)
+                .map(|_| {
+                    let hole = &m.solid.primitives[1 + 2 * r.below(n * n)];
+                    hole.ball.center
+                        + r.direction().with_z(0.0).normalize_or_zero() * 0.2
+                        + DVec3::Z * r.within(-0.2, 0.2)
+                })
+                .collect();
+            let mut terms = 0;
+            for x in &points {
+                assert_eq!(m.value_within(*x, 0.1 * m.margin()) <= 0.0, m.solid.value(*x) <= 0.0);
+                terms = terms.max(m.eco.locate(*x).expect("within the plate").terms().len());
+            }
+            let nodes = m.eco.census().nodes();
+            points.iter().for_each(|x| _ = m.value(*x));
+            assert_eq!(m.eco.census().nodes(), nodes, "nothing is decomposed twice");
+            most.push((s.primitives.len(), terms));
+        }
+    }
+    println!("primitives and most terms evaluated at a point: {most:?}");
+    assert!(most.iter().all(|(_, terms)| *terms <= 64), "{most:?}");
+}
+
+#[test]
+fn where_many_faces_meet_points_decompose_no_further_than_is_worthwhile() {
+    let mut b = SolidBuilder::new();
+    let blades: Vec<_> = (0..100)
+        .map(|k| {
+            let turn = quat_of_rotation_vector(DVec3::Z * (std::f64::consts::PI * f64::from(k) / 100.0));
+            b.primitive(Cuboid { half: DVec3::new(5.0, 0.01, 5.0) }, Pose::new(DVec3::ZERO, turn), Label::default())
+        })
+        .collect();
+    let ring = b.operation(Op::Union, &blades);
+    let drill = b.primitive(Cylinder { radius: 0.02, half_height: 6.0 }, Pose::IDENTITY, Label::default());
+    let root = b.operation(Op::Difference, &[ring, drill]);
+    let m = Model::with_limits(b.finish(root), Limits::to_depth(0));
+    let mut r = Random::new(3);
+    for _ in 0..3000 {
+        // On the wall of the drill, where all blades end.
+        let x = r.direction().with_z(0.0).normalize_or_zero() * 0.02 + DVec3::Z * r.within(-5.0, 5.0);
+        assert_eq!(m.value(x), m.solid.value(x));
+    }
+    let nodes = m.eco.census().nodes();
+    println!("{nodes} nodes");
+    assert!(nodes < 2000, "{nodes}");
 }

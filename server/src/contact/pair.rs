@@ -51,7 +51,7 @@ pub struct PairQuery<'a> {
 impl PairQuery<'_> {
     /// True when b carries the cells: small and without cavities is cheap to cover.
     pub(super) fn is_swapped(&self) -> bool {
-        let weight = |m: &Model| m.radius * if m.solid.senses.contains(&Sense::Negative) { HOLLOW } else { 1.0 };
+        let weight = |m: &Model| m.radius * if m.hollow { HOLLOW } else { 1.0 };
         weight(self.b.model) < weight(self.a.model)
     }
 }
@@ -161,7 +161,7 @@ pub(super) fn without_own_spin(body: &Body) -> Placed {
         let model_from_world = (placed.motion.start.rotation * placed.place.rotation).conjugate();
         let along = model_from_world * spin;
         let center = placed.place.inverse().position;
-        let axis = body.model.solid.axis_of_revolution(along, body.model.radius);
+        let axis = body.model.axis_of_revolution(along);
         if axis.is_some_and(|a| a.is_along(along) && a.passes(center, body.model.radius)) {
             placed.motion.spin = DVec3::ZERO;
         }
@@ -495,7 +495,7 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
         time_scale: 1.0,
         tolerance: task.rounding,
     };
-    let common = |x: DVec3| task.a.value(x).max(task.b.value(at.b_point(x)));
+    let common = |x: DVec3| task.model_a.value(x).max(task.model_b.value(at.b_point(x)));
     let x = now.filter(|x| common(*x) < common(s.x)).unwrap_or(s.x);
     o.point = task.relative.world_point(&at, x);
     let mut active = Active::of(&problem, s);
@@ -577,19 +577,16 @@ impl Active {
     /// a vertex, two edges already do. The adjacent normals are averaged as the paper does.
     fn add_incident(&mut self, task: &Task, x: DVec3, at: &Instant) {
         let mut sum = DVec3::ZERO;
-        for (side, solid, y, sign) in [(Side::A, task.a, x, 1.0), (Side::B, task.b, at.b_point(x), -1.0)] {
+        for (side, model, y, sign) in [(Side::A, task.model_a, x, 1.0), (Side::B, task.model_b, at.b_point(x), -1.0)] {
             let tol = INCIDENT * task.rounding;
             let mut open = Vec::new();
             let (mut normals, mut each, mut is_apex) = (DVec3::ZERO, Vec::new(), false);
-            local::prune(&solid.normal_form, &mut open, &mut |id| {
-                let v = solid.faces[id.face() as usize].value(y);
-                local::truth_of(id.sense(), (v, v), 0.0, tol)
-            });
+            model.literals_at(y, tol, &mut open);
             let mut ids: Vec<LiteralId> = local::literals(&open).collect();
             ids.sort_unstable();
             ids.dedup();
             for id in &ids {
-                let face = &solid.faces[id.face() as usize];
+                let face = &model.solid.faces[id.face() as usize];
                 let n = match *face {
                     Face::Cone { apex, axis, .. } if (y - apex).length() <= tol => {
                         is_apex = true;

@@ -12,6 +12,7 @@ use super::literal::{Faces, Side};
 use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, Solution, Weights};
 use super::search::{Cell, Search};
 use super::task::witness_level;
+use crate::eco::Model;
 use crate::motion::Instant;
 use crate::solid::local::{self, LiteralId};
 use crate::solid::{Face, Sense};
@@ -349,8 +350,8 @@ impl Search<'_> {
     /// The literal that keeps x from being deep in both bodies.
     fn deciding(&self, x: DVec3, at: &Instant) -> Constraint {
         let mut worst: Option<(f64, Constraint)> = None;
-        for (side, solid, y) in [(Side::A, self.task.a, x), (Side::B, self.task.b, at.b_point(x))] {
-            let (v, id) = local::deciding(&solid.normal_form, &mut |f| solid.faces[f as usize].value(y));
+        for (side, model, y) in [(Side::A, self.task.model_a, x), (Side::B, self.task.model_b, at.b_point(x))] {
+            let (v, id) = model.deciding(y);
             if worst.as_ref().is_none_or(|w| v > w.0) {
                 worst = Some((v, Constraint::Literal(side, id)));
             }
@@ -445,7 +446,8 @@ impl Search<'_> {
     fn is_touch(&self, s: &Solution, latest: f64) -> bool {
         let at = self.task.relative.at(s.t);
         let tol = 16.0 * self.task.rounding;
-        s.t <= latest && self.task.a.value(s.x).abs() <= tol && self.task.b.value(at.b_point(s.x)).abs() <= tol
+        let touches = |model: &Model, x: DVec3| model.value_within(x, tol).abs() <= tol;
+        s.t <= latest && touches(self.task.model_a, s.x) && touches(self.task.model_b, at.b_point(s.x))
     }
 
     /// A touch along a line or over a patch, at a point that the faces beside it have left meanwhile: moved to their edge.

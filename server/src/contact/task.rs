@@ -5,7 +5,7 @@ use super::literal::{Faces, View};
 use super::pair::Ideas;
 use crate::eco::Model;
 use crate::motion::{Bounds, Instant, Relative};
-use crate::solid::{Face, Sense, Solid};
+use crate::solid::{Face, Solid};
 use glam::DVec3;
 
 /// What to search: two solids, their motion, a depth, a limit.
@@ -80,30 +80,20 @@ impl<'a> Task<'a> {
     /// Same-shape fits hold for distances of both bodies below this: half the smallest radius of a subtracted round face,
     /// which grown bodies take from it.
     pub(super) fn fits_below(&self) -> f64 {
-        let of = |solid: &Solid| {
-            let faces = solid.faces.iter().zip(&solid.face_owner);
-            let hollow = faces.filter(|(_, owner)| solid.senses[**owner as usize] == Sense::Negative);
-            hollow
-                .map(|(f, _)| match *f {
-                    Face::Sphere { radius, .. } | Face::Cylinder { radius, .. } => radius,
-                    Face::Plane { .. } | Face::Cone { .. } => f64::INFINITY,
-                })
-                .fold(f64::INFINITY, f64::min)
-        };
-        0.5 * of(self.a).min(of(self.b))
+        0.5 * self.model_a.narrowest.min(self.model_b.narrowest)
     }
 
     /// True when x (A's frame) is at least delta deep in both whole solids at the instant, by `more` as computed.
     pub(super) fn is_deep(&self, x: DVec3, at: &Instant, more: f64) -> bool {
         let level = -self.delta - more;
-        self.a.value(x) <= level && self.b.value(at.b_point(x)) <= level
+        self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level
     }
 
     /// True when x is deep at the start, or so nearly that rounding forbids to prove the contrary: what the first search
     /// takes for deep is searched again at twice the depth.
     pub(super) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
-        let level = self.delta - (8.0 * self.nearly).min(0.5 * self.delta.abs());
-        self.a.value(x) <= -level && self.b.value(at.b_point(x)) <= -level
+        let level = (8.0 * self.nearly).min(0.5 * self.delta.abs()) - self.delta;
+        self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level
     }
 }
 

@@ -260,6 +260,42 @@ pub fn write_literals(solid: &Solid, terms: &[Term], region: &Aabb, delta: f64, 
     })
 }
 
+/// Appends the literals (`solid::local`) that are open at depth 0 at the point `x`, faces within `tolerance` (a length) of it
+/// being open, for the local tree at the head of `terms`; the point lies in the voxel of the local tree, and the tolerance
+/// within its margin.
+pub fn write_literals_at(solid: &Solid, terms: &[Term], x: DVec3, tolerance: f64, out: &mut Vec<Token>) -> Truth {
+    write(solid, terms, Sense::Positive, out, &mut |id| truth_at(solid, id, x, tolerance))
+}
+
+/// Truth of a literal at depth 0 at a point, its value there known to `tolerance`.
+pub fn truth_at(solid: &Solid, id: LiteralId, x: DVec3, tolerance: f64) -> Truth {
+    let value = solid.faces[id.face() as usize].value(x);
+    truth_of(id.sense(), (value, value), 0.0, tolerance)
+}
+
+/// f at the point `x` of the local tree at the head of `terms`; infinite where the voxel is known to lie in or out of all
+/// that decides there.
+pub fn value(solid: &Solid, terms: &[Term], x: DVec3) -> f64 {
+    let Some(head) = terms.first() else { return f64::INFINITY };
+    if head.is_full() {
+        return f64::NEG_INFINITY;
+    }
+    match &solid.nodes[head.node() as usize] {
+        Node::Empty => f64::INFINITY,
+        Node::Primitive(p) => solid.primitives[*p as usize].value(x),
+        Node::Op(op, _) => op.value(operands(&terms[1..1 + head.len_below()]).map(|t| value(solid, t, x))),
+    }
+}
+
+/// The operands in the body of an operation, each with what stands below it.
+fn operands(mut body: &[Term]) -> impl Iterator<Item = &[Term]> {
+    std::iter::from_fn(move || {
+        let (operand, rest) = body.split_at(1 + body.first()?.len_below());
+        body = rest;
+        Some(operand)
+    })
+}
+
 fn write(
     solid: &Solid,
     terms: &[Term],
@@ -291,16 +327,7 @@ fn write(
                 (Op::Union, Sense::Positive) | (Op::Intersection | Op::Difference, Sense::Negative) => OR,
                 _ => AND,
             };
-            let mut rest = &terms[1..1 + head.len_below()];
-            let mut index = 0;
-            let operands = std::iter::from_fn(move || {
-                let below = rest.first()?.len_below();
-                let (operand, tail) = rest.split_at(1 + below);
-                rest = tail;
-                index += 1;
-                Some((index - 1, operand))
-            });
-            fold(kind, operands, out, |(i, operand), out| {
+            fold(kind, operands(&terms[1..1 + head.len_below()]).enumerate(), out, |(i, operand), out| {
                 let s = if *op == Op::Difference && i > 0 { sense.flipped() } else { sense };
                 write(solid, operand, s, out, truth)
             })

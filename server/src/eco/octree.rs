@@ -100,6 +100,11 @@ impl Node {
         let sign = |bit: usize| if i >> bit & 1 == 0 { -h } else { h };
         (self.center + DVec3::new(sign(0), sign(1), sign(2)), h)
     }
+    /// The child in whose cube a point of this cube lies, by its index.
+    pub(super) fn child_at(&self, x: DVec3) -> usize {
+        let d = x.cmpge(self.center);
+        usize::from(d.x) + 2 * usize::from(d.y) + 4 * usize::from(d.z)
+    }
     /// The children that exist already, from (−,−,−) to (+,+,+), x first.
     pub fn children(&self) -> Option<&[Node; 8]> {
         self.children.get().map(|c| &**c)
@@ -186,8 +191,7 @@ impl Eco {
         }
         let mut node = &self.root;
         while let Some(children) = node.children() {
-            let d = x.cmpge(node.center);
-            node = &children[usize::from(d.x) + 2 * usize::from(d.y) + 4 * usize::from(d.z)];
+            node = &children[node.child_at(x)];
         }
         Some(node)
     }

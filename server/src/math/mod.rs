@@ -4,6 +4,7 @@
 
 pub mod aabb;
 pub mod ball;
+pub mod ball_tree;
 pub mod oriented;
 #[cfg(test)]
 pub(crate) mod random;
@@ -12,6 +13,7 @@ pub mod twin;
 
 pub use aabb::Aabb;
 pub use ball::Ball;
+pub use ball_tree::BallTree;
 pub use oriented::Oriented;
 pub use twin::{Lanes, Twin};
 

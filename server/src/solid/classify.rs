@@ -3,6 +3,20 @@
 use crate::solid::{Node, NodeId, Op, Solid};
 use glam::DVec3;
 
+impl Op {
+    /// f of an operation from the values of its operands, in order.
+    pub fn value(self, mut values: impl Iterator<Item = f64>) -> f64 {
+        match self {
+            Op::Union => values.fold(f64::INFINITY, f64::min),
+            Op::Intersection => values.fold(f64::NEG_INFINITY, f64::max),
+            Op::Difference => {
+                let first = values.next().unwrap_or(f64::INFINITY);
+                values.fold(first, |m, v| m.max(-v))
+            }
+        }
+    }
+}
+
 impl Solid {
     /// f at `x` (model frame): negative inside, positive outside, 0 on the surface and on internal seams; 1-Lipschitz.
     /// An empty solid has f = +infinity.
@@ -15,17 +29,7 @@ impl Solid {
         match &self.nodes[node as usize] {
             Node::Empty => f64::INFINITY,
             Node::Primitive(p) => self.primitives[*p as usize].value(x),
-            Node::Op(op, children) => {
-                let mut values = children.iter().map(|c| self.value_of(*c, x));
-                match op {
-                    Op::Union => values.fold(f64::INFINITY, f64::min),
-                    Op::Intersection => values.fold(f64::NEG_INFINITY, f64::max),
-                    Op::Difference => {
-                        let first = values.next().unwrap_or(f64::INFINITY);
-                        values.fold(first, |m, v| m.max(-v))
-                    }
-                }
-            }
+            Node::Op(op, children) => op.value(children.iter().map(|c| self.value_of(*c, x))),
         }
     }
 }

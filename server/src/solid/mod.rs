@@ -4,15 +4,20 @@
 //! (`classify`) is the tree's min/max: union = min, intersection = max, difference A - B = max(f_A, -f_B). f < 0 inside,
 //! > 0 outside, 1-Lipschitz.
 //!
+//! Of a whole solid: about what it may be symmetric (`revolution`), and its parts where it is a union of convex primitives less
+//! others (`parts`).
+//!
 //! Floor 2: imports `math` and `proto`.
 
 pub mod classify;
 pub mod face;
 pub mod local;
+pub mod parts;
 pub mod primitive;
 pub mod revolution;
 pub mod tree;
 
 pub use face::Face;
+pub use parts::Parts;
 pub use primitive::{Primitive, Shape};
 pub use tree::{Label, Node, NodeId, Op, Sense, Solid, SolidBuilder};

@@ -27,32 +27,54 @@ impl Axis {
     }
 }
 
-impl Solid {
-    /// The axis about which every face of the solid is symmetric, where there is one. `extent` is the solid's size. A
-    /// solid of spheres alone about one centre has any axis through it: `along` chooses.
-    pub fn axis_of_revolution(&self, along: DVec3, extent: f64) -> Option<Axis> {
-        let mut axis = None;
+/// About what a solid may be symmetric.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Revolution {
+    /// Every face is symmetric about this axis.
+    Axis(Axis),
+    /// A sphere's centre: of a solid without another curved face any axis through it is left, as far as the other faces
+    /// have it.
+    Center(DVec3),
+}
+
+impl Revolution {
+    /// About what a solid of the size `extent` may be symmetric; `None` when no axis can be one.
+    pub fn of(solid: &Solid, extent: f64) -> Option<Self> {
         let mut center = None;
-        for face in &self.faces {
+        for face in &solid.faces {
             match *face {
                 Face::Cylinder { origin, axis: direction, .. } | Face::Cone { apex: origin, axis: direction, .. } => {
-                    axis = Some(Axis { origin, direction });
-                    break;
+                    let axis = Axis { origin, direction };
+                    return is_symmetric(solid, &axis, extent).then_some(Self::Axis(axis));
                 }
                 Face::Sphere { center: c, .. } => center = Some(c),
                 Face::Plane { .. } => {}
             }
         }
-        let axis = axis.or_else(|| Some(Axis { origin: center?, direction: along.try_normalize()? }))?;
-        let symmetric = self.faces.iter().all(|f| match *f {
-            Face::Plane { normal, .. } => axis.is_along(normal),
-            Face::Sphere { center, .. } => axis.passes(center, extent),
-            Face::Cylinder { origin, axis: d, .. } | Face::Cone { apex: origin, axis: d, .. } => {
-                axis.is_along(d) && axis.passes(origin, extent)
-            }
-        });
-        symmetric.then_some(axis)
+        center.map(Self::Center)
     }
+
+    /// The axis about which every face is symmetric; where any is, the one along `along` (any length).
+    pub fn axis(&self, solid: &Solid, along: DVec3, extent: f64) -> Option<Axis> {
+        match *self {
+            Self::Axis(axis) => Some(axis),
+            Self::Center(origin) => {
+                let axis = Axis { origin, direction: along.try_normalize()? };
+                is_symmetric(solid, &axis, extent).then_some(axis)
+            }
+        }
+    }
+}
+
+/// True when every face of a solid of the size `extent` is symmetric about an axis.
+fn is_symmetric(solid: &Solid, axis: &Axis, extent: f64) -> bool {
+    solid.faces.iter().all(|f| match *f {
+        Face::Plane { normal, .. } => axis.is_along(normal),
+        Face::Sphere { center, .. } => axis.passes(center, extent),
+        Face::Cylinder { origin, axis: d, .. } | Face::Cone { apex: origin, axis: d, .. } => {
+            axis.is_along(d) && axis.passes(origin, extent)
+        }
+    })
 }
 
 #[cfg(test)]
@@ -72,11 +94,19 @@ mod tests {
             let root = b.operation(Op::Difference, &[ring, ball, hole]);
             b.finish(root)
         };
-        let axis = build(0.0).axis_of_revolution(DVec3::X, 3.0).expect("all about z");
+        let axis_of = |s: &Solid, along: DVec3| Revolution::of(s, 3.0).and_then(|r| r.axis(s, along, 3.0));
+        let axis = axis_of(&build(0.0), DVec3::X).expect("all about z");
         assert!(axis.is_along(DVec3::Z * 7.0) && axis.passes(DVec3::Z * 4.0, 3.0));
-        assert_eq!(build(0.5).axis_of_revolution(DVec3::Z, 3.0), None);
+        assert_eq!(Revolution::of(&build(0.5), 3.0), None);
         let mut b = SolidBuilder::new();
         let cube = b.primitive(Cuboid { half: DVec3::ONE }, Pose::IDENTITY, Label::default());
-        assert_eq!(b.finish(cube).axis_of_revolution(DVec3::Z, 2.0), None);
+        assert_eq!(Revolution::of(&b.finish(cube), 2.0), None);
+        let mut b = SolidBuilder::new();
+        let ball = b.primitive(Sphere { radius: 1.0 }, Pose::IDENTITY, Label::default());
+        let floor = b.primitive(HalfSpace, Pose::IDENTITY, Label::default());
+        let root = b.operation(Op::Intersection, &[ball, floor]);
+        let dome = b.finish(root);
+        assert!(axis_of(&dome, DVec3::Z * 2.0).is_some_and(|axis| axis.is_along(DVec3::Z)));
+        assert_eq!(axis_of(&dome, DVec3::X), None);
     }
 }

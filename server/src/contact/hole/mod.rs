@@ -24,7 +24,8 @@ use super::task::Task;
 use crate::math::any_perpendicular;
 use crate::motion::Relative;
 use crate::solid::local::LiteralId;
-use crate::solid::{Face, Node, NodeId, Op, Primitive, Sense, Solid};
+use crate::solid::parts::Part;
+use crate::solid::{Face, Primitive, Sense};
 use body::{Best, Body, Moment, Plane};
 use glam::DVec3;
 use proof::{Verdict, Wall};
@@ -33,8 +34,6 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Pairs of parts beyond which the search does better.
 const MOST_PAIRS: usize = 256;
-/// Parts of one solid that are looked through.
-const MOST_PARTS: usize = 256;
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
 const APART: f64 = 4.0;
 /// Moments at which the first contact is looked for.
@@ -53,46 +52,6 @@ const SETTLED: f64 = 1e-4;
 const SETTLING: u32 = 4;
 /// Contacts that are solved for before a pair is left to the search.
 const MOST_CONTACTS: usize = 6;
-
-/// A convex primitive less some others.
-struct Part<'a> {
-    main: &'a Primitive,
-    holes: SmallVec<[&'a Primitive; 2]>,
-}
-
-/// The parts of which a solid is the union; `None` where it is no union of such.
-fn parts(solid: &Solid) -> Option<SmallVec<[Part<'_>; 1]>> {
-    let mut out = SmallVec::new();
-    take(solid, solid.root, &mut out)?;
-    (out.len() <= MOST_PARTS).then_some(out)
-}
-
-fn take<'a>(solid: &'a Solid, node: NodeId, out: &mut SmallVec<[Part<'a>; 1]>) -> Option<()> {
-    match &solid.nodes[node as usize] {
-        Node::Primitive(p) => out.push(Part { main: &solid.primitives[*p as usize], holes: SmallVec::new() }),
-        Node::Op(Op::Union, children) => children.iter().try_for_each(|c| take(solid, *c, out))?,
-        Node::Op(Op::Difference, children) => {
-            let (first, rest) = children.split_first()?;
-            let mut holes: SmallVec<[&Primitive; 2]> = SmallVec::new();
-            // A subtracted node is what its parts' bodies are: holes in it would be material.
-            for node in rest {
-                let mut taken = SmallVec::new();
-                take(solid, *node, &mut taken)?;
-                if taken.iter().any(|part| !part.holes.is_empty()) {
-                    return None;
-                }
-                holes.extend(taken.iter().map(|part| part.main));
-            }
-            let from = out.len();
-            take(solid, *first, out)?;
-            for part in &mut out[from..] {
-                part.holes.extend(holes.iter().copied());
-            }
-        }
-        Node::Op(Op::Intersection, _) | Node::Empty => return None,
-    }
-    Some(())
-}
 
 /// A round wall: a point of its axis, the axis, its radius and face.
 #[derive(Clone, Copy, Debug)]
@@ -141,7 +100,8 @@ enum First {
 
 impl<'a> Pair<'a> {
     /// The pair of a body and a part with a hole near it, on `side`; `None` if they are not of that kind.
-    fn new(task: &Task, primitive: &'a Primitive, part: &Part, side: Side, relative: &'a Relative) -> Option<Self> {
+    fn new(task: &Task, primitive: &'a Primitive, part: Part, side: Side, relative: &'a Relative) -> Option<Self> {
+        let model = if side == Side::A { task.model_a } else { task.model_b };
         let body = Body::of(primitive)?;
         let planes = |p: &Primitive| -> SmallVec<[Plane; 6]> {
             let faces = p.faces.iter().enumerate();
@@ -154,7 +114,7 @@ impl<'a> Pair<'a> {
         };
         // The hole that the body is deepest in, half way of the step.
         let center = relative.at(0.5).b_point(primitive.ball.center);
-        let hole = deepest(&part.holes, center)?;
+        let hole = model.parts.as_ref()?.deepest(&model.solid, part, center)?;
         let (mut round, mut directions) = (None, [DVec3::ZERO; 8]);
         for (i, face) in hole.faces.iter().enumerate() {
             match *face {
@@ -169,7 +129,7 @@ impl<'a> Pair<'a> {
                 Face::Sphere { .. } | Face::Cone { .. } => return None,
             }
         }
-        let main = part.main;
+        let main = &model.solid.primitives[part.main as usize];
         let (middle, half) = (main.aabb.center(), main.aabb.half());
         // A wall that the pierced body does not reach is none.
         let is_wall = |p: &Plane| p.normal.dot(middle) + p.normal.abs().dot(half) > p.offset;
@@ -372,38 +332,24 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// The hole that a point is deepest in, or else nearest to. Of thousands most are dropped by their balls.
-fn deepest<'a>(holes: &[&'a Primitive], point: DVec3) -> Option<&'a Primitive> {
-    let mut best: Option<(f64, &Primitive)> = None;
-    for hole in holes {
-        let within = best.map_or(f64::INFINITY, |(value, _)| hole.ball.radius + value.max(0.0));
-        if (point - hole.ball.center).length_squared() < within * within {
-            let value = hole.value(point);
-            if best.is_none_or(|(least, _)| value < least) {
-                best = Some((value, hole));
-            }
-        }
-    }
-    best.map(|(_, hole)| hole)
-}
-
 /// The answer for two unions of convex primitives, of which one or both have holes; `None` leaves them to the search.
 pub(super) fn answer(search: &mut Search) -> Option<Ending> {
     let task = search.task;
-    let (of_a, of_b) = (parts(task.a)?, parts(task.b)?);
-    let pierced = |parts: &[Part]| parts.iter().any(|p| !p.holes.is_empty());
-    if !(pierced(&of_a) || pierced(&of_b)) || of_a.len() * of_b.len() > MOST_PAIRS {
+    let (of_a, of_b) = (task.model_a.parts.as_ref()?, task.model_b.parts.as_ref()?);
+    let pierced = of_a.are_pierced() || of_b.are_pierced();
+    if !pierced || of_a.all().len() * of_b.all().len() > MOST_PAIRS {
         return None;
     }
     let (placed_a, placed_b) = task.relative.placed();
     let seen_from_a = Relative::new(placed_b, placed_a);
     let mut pairs: SmallVec<[(Pair, Option<DVec3>); 1]> = SmallVec::new();
     let mut guess: Option<(usize, Guess)> = None;
-    for a in &of_a {
-        for b in &of_b {
-            let of_b = || Pair::new(&task, a.main, b, Side::B, &task.relative);
-            let of_a = || Pair::new(&task, b.main, a, Side::A, &seen_from_a);
-            let pair = if b.holes.is_empty() { of_a() } else { of_b().or_else(of_a) }?;
+    for a in of_a.all() {
+        for b in of_b.all() {
+            let (main_a, main_b) = (&task.a.primitives[a.main as usize], &task.b.primitives[b.main as usize]);
+            let of_b = || Pair::new(&task, main_a, *b, Side::B, &task.relative);
+            let of_a = || Pair::new(&task, main_b, *a, Side::A, &seen_from_a);
+            let pair = if b.is_pierced() { of_b().or_else(of_a) } else { of_a() }?;
             // Later ones than what is known are not looked for to their end.
             let until = guess.as_ref().map_or(1.0, |(_, g)| g.t);
             match pair.first(until, &mut search.counters.closed_forms) {

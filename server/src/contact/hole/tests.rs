@@ -1,8 +1,8 @@
 //! The shortcut against the search without it: the same answers on random placements of pegs, balls and boxes in holes.
 
+use super::Pair;
 use super::body::{Moment, Plane};
 use super::proof::{Verdict, Wall};
-use super::{Pair, parts};
 use crate::contact::literal::Side;
 use crate::contact::{
     Asked, Body, Ideas, Outcome, PairQuery, PairSearch, Scratch, Status, default_resolution, earliest_contact,
@@ -294,9 +294,12 @@ fn a_proof_does_not_jump_over_an_arc() {
         let (task, swapped) = PairSearch::task(&query);
         let (placed_a, placed_b) = task.relative.placed();
         let seen = Relative::new(placed_b, placed_a);
-        let (of_pipe, of_ball, side, relative) =
-            if swapped { (task.b, task.a, Side::B, &task.relative) } else { (task.a, task.b, Side::A, &seen) };
-        let part = &parts(of_pipe).expect("a pipe")[0];
+        let (of_pipe, of_ball, side, relative) = if swapped {
+            (task.model_b, task.a, Side::B, &task.relative)
+        } else {
+            (task.model_a, task.b, Side::A, &seen)
+        };
+        let part = of_pipe.parts.as_ref().expect("a pipe").all()[0];
         let pair = Pair::new(&task, &of_ball.primitives[0], part, side, relative).expect("a ball in a pipe");
         let ends = [0.0, 1.0].map(|t| pair.best(&pair.moment(t), Wall::Round(DVec3::X)).phi);
         assert!(ends.iter().all(|phi| *phi > 0.0), "{ends:?}");
