@@ -53,6 +53,11 @@ impl PoseRecord {
         Self::of_pose(object, END, pose)
     }
 
+    /// True for a record that says where its object moves to, the shortest way.
+    pub fn is_end(&self) -> bool {
+        self.flags == END
+    }
+
     /// The object is put at `pose` before the step.
     pub fn start(object: u32, pose: &Pose) -> Self {
         Self::of_pose(object, START, pose)

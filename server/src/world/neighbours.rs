@@ -1,8 +1,9 @@
 //! The pairs of bodies near enough to be asked about, kept from step to step.
 //!
-//! A body stays within its box at the start of a step, grown by a distance, as long as the farthest of its points has gone
-//! no further than that. Bodies whose grown boxes share no point need not be looked at while both stay within theirs: the
-//! broad phase runs again only when one leaves. The pairs it lets through are a list; what is known of each stays with it.
+//! A body stays within its box at the start of a step, grown by a distance, as long as the farthest of its points is no further
+//! from where it was than that: the way it has gone since tells, or where that is longer the two poses. Bodies whose grown
+//! boxes share no point need not be looked at while both stay within theirs: the broad phase runs again only when one leaves.
+//! The pairs it lets through are a list; what is known of each stays with it.
 //!
 //! Odometers count how far the farthest point of a body may have gone; each sum is rounded up. A pair that was `room`
 //! apart when its odometers stood at p and q cannot meet before they show p' + q' > p + q + room: the one comparison
@@ -15,7 +16,7 @@ use super::coherence::Knowledge;
 use super::plan::PairPlan;
 use crate::contact::Glance;
 use crate::math::Aabb;
-use contactd_proto::Detect;
+use contactd_proto::{Detect, Pose};
 use glam::DVec3;
 
 /// A body's box grows by the way of this many steps like the last one …
@@ -24,6 +25,8 @@ const STEPS: f64 = 8.0;
 const MOST: f64 = 0.5;
 /// … and by at least this part of it.
 const LEAST: f64 = 0.02;
+/// The part of it that is used: the rest is far more than what rounding does to sums of ways.
+const SAFE: f64 = 0.999_999;
 
 /// Two bodies, the smaller index first, and the sum of odometers up to which they are known to stay apart.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +84,8 @@ pub struct Neighbours {
     odometers: Vec<Odometer>,
     /// Odometer up to which a body stays in its grown box.
     fences: Vec<f64>,
+    /// Where a body stood when its box was taken, and by how much it was grown for the body's motion.
+    homes: Vec<(Pose, f64)>,
     boxes: Vec<Aabb>,
     broad: BroadPhase,
     found: Vec<(u32, u32)>,
@@ -166,13 +171,13 @@ impl Neighbours {
         touch: impl Fn(&Body) -> f64,
         plan: impl Fn(u32, u32) -> Option<(u32, PairPlan, f64)>,
     ) {
-        let within = |i: &u32| self.odometers[*i as usize].end <= self.fences[*i as usize];
-        if !self.stale && moving.iter().all(within) {
+        if !self.stale && moving.iter().all(|i| self.stays(*i as usize, &bodies[*i as usize])) {
             return;
         }
         self.stale = false;
         self.boxes.clear();
         self.fences.clear();
+        self.homes.clear();
         for (body, odometer) in bodies.iter().zip(&self.odometers) {
             let way = odometer.end - odometer.start;
             let more =
@@ -180,7 +185,8 @@ impl Neighbours {
             // What turns without bounds has no way that could be told.
             let room = if way.is_finite() { way + more } else { 0.0 };
             self.boxes.push(body.still().grown(room + touch(body)));
-            self.fences.push(odometer.start + 0.999_999 * room);
+            self.fences.push(odometer.start + SAFE * room);
+            self.homes.push((body.track.motion.start, room));
         }
         let (found, boxes) = (&mut self.found, &self.boxes);
         found.clear();
@@ -224,6 +230,21 @@ impl Neighbours {
             self.entries.push(Entry { resolution, knowledge: None });
         }
         old.for_each(|(_, entry)| leaves(entry));
+    }
+
+    /// True when a body stays in its grown box over this step: as its odometer tells, or because it has come back.
+    fn stays(&mut self, index: usize, body: &Body) -> bool {
+        let odometer = self.odometers[index];
+        if odometer.end <= self.fences[index] {
+            return true;
+        }
+        let (home, room) = &self.homes[index];
+        let start = &body.track.motion.start;
+        let fence = odometer.start + (SAFE * room - body.displacement(home, start));
+        if odometer.end <= fence {
+            self.fences[index] = fence;
+        }
+        odometer.end <= fence
     }
 
     /// The two bodies of a pair.

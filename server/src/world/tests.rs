@@ -140,6 +140,28 @@ fn a_refused_batch_changes_nothing() {
 }
 
 #[test]
+fn bodies_that_swing_about_their_places_are_not_paired_anew() {
+    // Three balls, 4 apart: the first and the last swing, the one between rests; 100 times as far as their boxes are grown for.
+    let mut world = balls(3);
+    let mut tests = 0;
+    for step in 1..=400 {
+        let x = if step % 2 == 0 { 0.0 } else { 0.2 };
+        let out = world.step(&[to(2, x, 3.0), to(4, 8.0 - x, 3.0)], &StepOptions::default()).unwrap();
+        assert!(!out.contact);
+        tests += if step > 2 { out.box_tests } else { 0 };
+    }
+    assert_eq!(tests, 0);
+    // Who goes on leaves its box all the same, by small steps, and meets the one between them: centres 2 apart at x = 2.
+    for k in 1..10 {
+        let out = world.step(&[to(2, 0.2 * f64::from(k), 3.0)], &StepOptions::default()).unwrap();
+        assert!(!out.contact);
+    }
+    let out = world.step(&[to(2, 2.1, 3.0)], &StepOptions::default()).unwrap();
+    assert_eq!(keys(out), [(2, 3, Status::Contact)]);
+    assert!((out.pairs[0].outcome.time - 0.2 / 0.3).abs() < 1e-9);
+}
+
+#[test]
 fn steps_continue_where_the_last_one_ended_or_was_stopped() {
     let mut world = balls(1);
     world.step(&[to(2, 8.0, 3.0)], &StepOptions::default()).unwrap();
