@@ -25,8 +25,10 @@ type Arrived = Response<Variant, [ContactRecord], StepReply>;
 
 /// Longest wait between two looks at whether the server lives.
 const SLICE: Duration = Duration::from_millis(50);
-/// The same for a client that polls.
+/// The same for a client that polls. Nor is a server looked after whose last answer is no older: that is a system call.
 const POLLED: Duration = Duration::from_millis(1);
+/// Looks for a reply for each look at the clock.
+const LOOKS: u64 = 8;
 /// How long a session that is dropped waits until its server has heard of it: a request dies with the port that sent it.
 const GOODBYE: Duration = Duration::from_millis(200);
 
@@ -57,6 +59,8 @@ struct Link {
     spin: Duration,
     /// The request under way asked the server not to wake this client.
     polling: bool,
+    /// When the server was last known to live.
+    alive: Instant,
     node: Node<Variant>,
 }
 
@@ -199,6 +203,7 @@ impl Link {
             session: 0,
             spin: Duration::ZERO,
             polling: false,
+            alive: Instant::now(),
             node,
         })
     }
@@ -330,7 +335,7 @@ impl Transport for SharedMemory {
 
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         let link = self.link()?;
-        if link.life.is_over() {
+        if link.alive.elapsed() > POLLED && link.life.is_over() {
             return Err(Error::ServerLost);
         }
         let Some(mut loan) = link.loan.take() else {
@@ -350,16 +355,24 @@ impl Transport for SharedMemory {
         };
         let start = Instant::now();
         let mut looked = start;
+        let polls = link.polling || !link.spin.is_zero();
+        let mut looks = 0_u64;
         loop {
+            looks += 1;
             // Looked at before receiving: a reply that came before the end of the connection is then not missed.
             let connected = pending.is_connected();
             match pending.receive() {
                 Ok(Some(reply)) => {
                     link.reply = Some(reply);
+                    link.alive = looked;
                     return Ok(());
                 }
                 Ok(None) => {}
                 Err(e) => return Err(system("a reply cannot be received", e)),
+            }
+            if connected && polls && !looks.is_multiple_of(LOOKS) {
+                std::hint::spin_loop();
+                continue;
             }
             let waited = start.elapsed();
             let spins = waited < link.spin || (link.polling && looked.elapsed() < POLLED && waited < timeout);

@@ -31,6 +31,8 @@ type ControlCall = ActiveRequest<Variant, [u8], ControlHeader, [u8], ControlHead
 
 /// Time between two looks at the clients' lives, and the longest wait.
 const BEAT: Duration = Duration::from_millis(50);
+/// Looks for a step for each look at all else, while it polls.
+const LOOKS: usize = 8;
 /// The longest wait while a job runs: its end wakes nobody.
 const JOB_BEAT: Duration = Duration::from_millis(1);
 
@@ -175,10 +177,15 @@ impl Server {
         let mut last_beat = Instant::now();
         while !stop.load(Ordering::Relaxed) {
             let mut worked = false;
-            // A failed receive concerns one client's connection; the others go on.
-            while let Ok(Some(call)) = self.services.steps.receive() {
-                self.step(call);
-                worked = true;
+            let spins = last_work.elapsed() < self.spin();
+            // Steps first: while it polls it looks for them several times for each look at all else.
+            for _ in 0..if spins { LOOKS } else { 1 } {
+                // A failed receive concerns one client's connection; the others go on.
+                while let Ok(Some(call)) = self.services.steps.receive() {
+                    self.step(call);
+                    worked = true;
+                }
+                std::hint::spin_loop();
             }
             while let Ok(Some(call)) = self.services.control.receive() {
                 self.command(call);
@@ -194,9 +201,7 @@ impl Server {
             }
             if worked {
                 last_work = Instant::now();
-            } else if last_work.elapsed() < self.spin() {
-                std::hint::spin_loop();
-            } else {
+            } else if !spins {
                 let wait = if self.pending.is_empty() { BEAT } else { JOB_BEAT };
                 // An interrupted wait ends early, a failing one must not become a busy loop.
                 if self.services.wake.timed_wait(|_| {}, wait).is_err() {
