@@ -7,13 +7,16 @@
 //! objects are spheres far apart: what is measured is the step's way, not its geometry.
 //!
 //! polled: both sides poll; spin: 30 µs of polling, then block; blocked: they block at once. contactd's server gives up
-//! polling while its sessions and itself have no core each, so with four clients it blocks. Times are what the client sees,
-//! writing the records included.
+//! polling while itself and the sessions that have asked lately have no core each, so with four clients it blocks. Times are what the
+//! client sees, writing the records included.
+//!
+//! The second table: a client alone, and beside one that has sent a step and reads neither its reply nor anything else; blocks of the
+//! two in turn.
 
 use clap::{Parser, ValueEnum};
 use contactd::ipc::{Server, ServerConfig};
 use contactd_benches::options::Options;
-use contactd_benches::race::median;
+use contactd_benches::race::{median, quantile};
 use contactd_benches::raw::{CLIENTS, RawClient, RawServer, Waiting};
 use contactd_benches::row;
 use contactd_benches::socket::{self, Connection, POLL};
@@ -244,7 +247,42 @@ fn measure(
     })
 }
 
+/// Objects of a client beside one that stopped reading.
+const BESIDE: usize = 16;
+
+/// Times of a client's steps alone, and beside a client that stopped reading, block by block.
+fn beside_one_that_stopped(dir: &Path, mode: Mode, blocks: usize, count: usize) -> Result<[Vec<Vec<u64>>; 2], Failure> {
+    let mut client = Client::new(dir, 0, mode.waiting(), BESIDE)?;
+    let mut found = [Vec::new(), Vec::new()];
+    // Until the server knows who asks no more; the same before either block.
+    let settle = || std::thread::sleep(Duration::from_millis(300));
+    for _ in 0..blocks {
+        settle();
+        found[0].push(client.block(0, count)?);
+        let mut other = Client::new(dir, 1, mode.waiting(), BESIDE)?;
+        other.session.begin_step(BESIDE)?.copy_from_slice(&other.batches[0]);
+        other.session.send()?;
+        settle();
+        found[1].push(client.block(0, count)?);
+        other.session.finish(Duration::from_secs(10))?;
+        other.session.close()?;
+    }
+    client.session.close()?;
+    Ok(found)
+}
+
 fn run(options: &Options) -> Result<(), Failure> {
+    let mut stopped = Table::new(&[
+        "mode",
+        "poses",
+        "steps",
+        "alone_p50_us",
+        "alone_p99",
+        "beside_p50_us",
+        "beside_p99",
+        "ratio_p50",
+        "ratio_p99",
+    ]);
     let mut table = Table::new(&[
         "mode",
         "clients",
@@ -290,12 +328,30 @@ fn run(options: &Options) -> Result<(), Failure> {
             }
             table.push(cells);
         }
+        let count = options.pick(5_000, 500);
+        let times = beside_one_that_stopped(&process.dir, mode, blocks, count)?;
+        let of = |block: &Vec<u64>, q: f64| quantile(block.iter().map(|t| *t as f64), q);
+        let micros = |which: usize, q: f64| median(times[which].iter().map(|block| 1e-3 * of(block, q)));
+        let ratio = |q: f64| median(times[0].iter().zip(&times[1]).map(|(alone, beside)| of(beside, q) / of(alone, q)));
+        stopped.push(row![
+            mode.name(),
+            BESIDE,
+            blocks * count,
+            micros(0, 0.5),
+            micros(0, 0.99),
+            micros(1, 0.5),
+            micros(1, 0.99),
+            ratio(0.5),
+            ratio(0.99),
+        ]);
     }
     println!(
         "latency: a step as the client sees it, contactd / raw iceoryx2 request-response / Unix socket with bincode"
     );
     println!("ratio: contactd's over the other's, median over {blocks} blocks of the ratio of the blocks' medians");
     table.publish("latency", &options.folder())?;
+    println!("a client's steps beside one that stopped reading / alone: medians over {blocks} blocks of either");
+    stopped.publish("latency_stopped", &options.folder())?;
     Ok(())
 }
 

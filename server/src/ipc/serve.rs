@@ -31,6 +31,8 @@ type ControlCall = ActiveRequest<Variant, [u8], ControlHeader, [u8], ControlHead
 
 /// Time between two looks at the clients' lives, and the longest wait.
 const BEAT: Duration = Duration::from_millis(50);
+/// A session that has asked within it is active.
+const LATELY: Duration = Duration::from_millis(200);
 /// Looks for a step for each look at all else, while it polls.
 const LOOKS: usize = 8;
 /// The longest wait while a job runs: its end wakes nobody.
@@ -125,6 +127,8 @@ pub struct Server {
     /// What they worked out.
     effects: EffectCounters,
     beats: u64,
+    /// Sessions that have asked something lately, as of the last beat; new ones count.
+    active: usize,
     cores: usize,
     root: Root,
 }
@@ -166,6 +170,7 @@ impl Server {
             steps: 0,
             effects: EffectCounters::default(),
             beats: 0,
+            active: 0,
             cores,
             root,
         })
@@ -211,9 +216,10 @@ impl Server {
         }
     }
 
-    /// How long to poll before blocking: not at all when the clients that poll need the cores.
+    /// How long to poll before blocking: not at all when the clients that poll need the cores. Who has asked nothing of late
+    /// polls no more.
     fn spin(&self) -> Duration {
-        let spinners = 1 + self.sessions.len();
+        let spinners = 1 + self.active;
         Duration::from_micros(if spinners <= self.cores { self.config.spin_us } else { 0 })
     }
 
@@ -323,6 +329,7 @@ impl Server {
             waiting: false,
         };
         self.sessions.insert(id, session);
+        self.active += 1;
         self.show();
         // The client polls beside the server: only where both have a core.
         let spin = if self.cores > 1 { self.config.spin_us } else { 0 };
@@ -357,6 +364,7 @@ impl Server {
 
     fn beat(&mut self) {
         self.end_sessions();
+        self.active = self.sessions.values().filter(|s| s.last_request.elapsed() < LATELY).count();
         self.beats += 1;
         // A client may also die without a session: rarely looked for, since the look costs milliseconds.
         if self.beats.is_multiple_of(200) {
