@@ -10,6 +10,8 @@ use crate::table::Table;
 use contactd::eco::{Limits, Model};
 use std::cell::Cell;
 
+/// Loads of a model, the fastest of which counts: single ones are short and noisy.
+const LOADS: usize = 5;
 /// Nodes that an octree may have here: a quarter of a gigabyte or so.
 const MOST_NODES: usize = 300_000;
 
@@ -54,16 +56,25 @@ pub fn octree(context: &Context) -> Section {
     let mut pooled = [Vec::new(), Vec::new()];
     let mut curves = Vec::new();
     let mut builds = Vec::new();
+    // What a level costs over the one above.
+    let mut growth = Vec::new();
     for (color, (class, known)) in context.of("parts").enumerate() {
         let (mut p50, mut loads, mut mid_cells) = (Vec::new(), Vec::new(), Vec::new());
         for depth in &depths {
             context.progress(&format!("octree depth {depth}, {}", class.name));
             let (nodes, built, seconds) = (Cell::new(0), Cell::new(0), Cell::new(0.0));
             let remake = |m: &Model| {
-                let from = std::time::Instant::now();
                 let limits = Limits { nodes: MOST_NODES, ..Limits::to_depth(*depth) };
-                let made = Model::with_limits(m.solid.clone(), limits);
-                seconds.set(seconds.get() + from.elapsed().as_secs_f64());
+                let load = || {
+                    let from = std::time::Instant::now();
+                    let made = Model::with_limits(m.solid.clone(), limits);
+                    (from.elapsed().as_secs_f64(), made)
+                };
+                let (mut least, made) = load();
+                for _ in 1..LOADS {
+                    least = load().0.min(least);
+                }
+                seconds.set(seconds.get() + least);
                 nodes.set(nodes.get() + made.eco.census().nodes());
                 built.set(built.get().max(usize::from(made.eco.depth())));
                 made
@@ -101,6 +112,8 @@ pub fn octree(context: &Context) -> Section {
             p50.push([f64::from(*depth), us(0.5)]);
             loads.push([f64::from(*depth), 1e3 * seconds.get()]);
         }
+        let levels = loads.windows(2).filter(|w| w[0][0] >= 2.0 && w[1][0] == w[0][0] + 1.0);
+        growth.extend(levels.map(|w| w[1][1] / w[0][1]));
         let at = |line: &[[f64; 2]], depth: f64| line.iter().find(|p| p[0] == depth).map_or(f64::NAN, |p| p[1]);
         summary.push(row![
             class.name.clone(),
@@ -120,6 +133,15 @@ pub fn octree(context: &Context) -> Section {
         curves.push(series(class.name.clone(), p50, stroke, color % 6));
         builds.push(series(class.name.clone(), loads, stroke, color % 6));
     }
+    let levels = if growth.is_empty() {
+        String::new()
+    } else {
+        let of = |q: f64| times(quantile(growth.iter().copied(), q));
+        let (middle, low, high) = (of(0.5), of(0.1), of(0.9));
+        format!(
+            " From the third on a level takes {middle} times the one above in the median, eight in ten {low} to {high}."
+        )
+    };
     let told = |k: usize, q: f64| times(quantile(pooled[k].iter().copied(), q));
     let axes = |label: &str| [Axis::Linear("levels below the root".into()), Axis::Log(label.into())];
     Section {
@@ -150,10 +172,10 @@ pub fn octree(context: &Context) -> Section {
             Figure {
                 name: "accuracy_octree_load".into(),
                 title: "What the octrees' depth costs at load".into(),
-                caption:
-                    "Time to preprocess the models of a class, once for each model. Each level costs two to four times \
-                          the one above; the default stops at six, within limits on work and memory."
-                        .into(),
+                caption: format!(
+                    "Time to preprocess the models of a class, once for each model, the fastest of {LOADS}.{levels} The default stops \
+                     at six, within limits on work and memory."
+                ),
                 axes: axes("milliseconds to load"),
                 series: builds,
             },
