@@ -4,11 +4,12 @@
 //! on the other side's life.
 
 use contactd_client::Error;
-use contactd_client::shm::link::{self, StepClient, StepServer, Variant, system};
+use contactd_client::shm::link::{self, StepClient, Variant, system};
 use contactd_proto::names::Address;
 use contactd_proto::{ContactRecord, PoseRecord, StepReply, StepRequest};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::server::Server;
 use iceoryx2::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -42,7 +43,7 @@ impl Waiting {
 
 /// The answering side.
 pub struct RawServer {
-    steps: StepServer,
+    steps: Server<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>,
     wake: Listener<Variant>,
     back: Vec<Notifier<Variant>>,
     _node: Node<Variant>,

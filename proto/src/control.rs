@@ -4,7 +4,7 @@
 
 use crate::{Detect, ErrorCode, InitialOverlap, MassProperties, Motion, Pose, Report, Rule, Track};
 use bincode::{Decode, Encode, config};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Most bytes that an encoded command or answer may have.
@@ -105,18 +105,15 @@ impl From<Pose> for WirePose {
 }
 
 impl WirePose {
-    /// The pose, exactly these bits, if they are finite and of unit length.
+    /// The pose, its quaternion as in a [`PoseRecord`](crate::PoseRecord): to the bit as it is where it is unit, normalised where it
+    /// is nearly so. A pose that was accepted once comes back with the same bits.
     ///
     /// # Errors
     /// `NotFinite`, `BadQuaternion`.
     pub fn checked(&self) -> Result<Pose, ErrorCode> {
         let position = DVec3::from_array(self.position);
         crate::pose::check_position(position)?;
-        let unit = crate::pose_record::unit_quaternion(self.rotation)?;
-        let given = DQuat::from_array(self.rotation);
-        // A quaternion that a session once normalised must come back with the same bits.
-        let rotation = if (given.length_squared() - 1.0).abs() < 1e-14 { given } else { unit };
-        Ok(Pose::new(position, rotation))
+        Ok(Pose::new(position, crate::pose_record::unit_quaternion(self.rotation)?))
     }
 }
 

@@ -8,7 +8,8 @@ use glam::{DMat3, DVec3};
 pub struct MassOptions {
     /// Error of the volume that is good enough, as a fraction of the volume; between 0 and 1.
     pub tolerance: f64,
-    /// Boxes that may be looked at, at least 1 and at most [`MassOptions::MOST_BOXES`]. Where they do not suffice, the
+    /// Boxes that may be looked at, at least 1 and at most [`MassOptions::MOST_BOXES`]; where many faces meet in a box it counts
+    /// as several, by the work it takes. Where they do not suffice, the
     /// answer carries the larger bounds that were reached.
     pub boxes: u64,
 }

@@ -36,7 +36,13 @@ impl Motion {
 
     /// The pose at time `t` (fraction of the step).
     pub fn at(&self, t: f64) -> Pose {
-        let rotation = (quat_of_rotation_vector(self.spin * t) * self.start.rotation).normalize();
+        let turn = self.spin * t;
+        // What does not turn keeps its rotation to the bit: a product with the identity is normalised once more.
+        let rotation = if turn == DVec3::ZERO {
+            self.start.rotation
+        } else {
+            (quat_of_rotation_vector(turn) * self.start.rotation).normalize()
+        };
         Pose { position: self.start.position + self.velocity * t, rotation }
     }
 

@@ -18,6 +18,11 @@ pub const START: u32 = 4;
 /// How far the squared norm of a quaternion may be off 1; such are normalised, others refused.
 pub const QUATERNION_TOLERANCE: f64 = 1e-3;
 
+/// A quaternion whose squared norm, as it is computed, is this near to 1 is unit and kept as it is: its norm is right to four units
+/// in the last place (3, and one for the sum of squares). What normalising leaves is less, so that a quaternion is normalised
+/// once at most, however many hands it goes through.
+pub const UNIT_TOLERANCE: f64 = 6.0 * f64::EPSILON;
+
 /// One object's motion, as it lies in shared memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -76,7 +81,7 @@ impl PoseRecord {
     /// Checks the numbers of a record (pass a copy when it lies in shared memory).
     ///
     /// # Errors
-    /// `BadCount` for flags out of the protocol, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
+    /// `BadCount` for flags out of the protocol and for a [`TURN`] whose last number is not 0, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
     /// `BadQuaternion`.
     pub fn decode(&self) -> Result<Order, ErrorCode> {
         let position = DVec3::from_array(self.position);
@@ -86,10 +91,14 @@ impl PoseRecord {
         }
         match self.flags {
             TURN => {
-                let [x, y, z, _] = self.rotation;
+                let [x, y, z, w] = self.rotation;
                 let vector = DVec3::new(x, y, z);
                 if !vector.length_squared().is_finite() {
                     return Err(ErrorCode::NotFinite);
+                }
+                // A quaternion by mistake: its w would be dropped in silence.
+                if w != 0.0 {
+                    return Err(ErrorCode::BadCount);
                 }
                 Ok(Order::Turn(position, vector))
             }
@@ -100,7 +109,8 @@ impl PoseRecord {
     }
 }
 
-/// A quaternion x, y, z, w normalised, if its squared norm is within [`QUATERNION_TOLERANCE`] of 1.
+/// A quaternion x, y, z, w normalised, if its squared norm is within [`QUATERNION_TOLERANCE`] of 1; to the bit as it is, if that
+/// is within [`UNIT_TOLERANCE`] of 1. What it returns it returns again.
 ///
 /// # Errors
 /// `NotFinite`, `BadQuaternion`.
@@ -109,10 +119,16 @@ pub fn unit_quaternion(q: [f64; 4]) -> Result<DQuat, ErrorCode> {
     if !q.is_finite() {
         return Err(ErrorCode::NotFinite);
     }
-    if (q.length_squared() - 1.0).abs() > QUATERNION_TOLERANCE {
+    let is_unit = |q: DQuat, tolerance: f64| (q.length_squared() - 1.0).abs() <= tolerance;
+    if !is_unit(q, QUATERNION_TOLERANCE) {
         return Err(ErrorCode::BadQuaternion);
     }
-    Ok(q.normalize())
+    if is_unit(q, UNIT_TOLERANCE) {
+        return Ok(q);
+    }
+    let unit = q.normalize();
+    // Rounding at its very worst may leave a little more.
+    Ok(if is_unit(unit, UNIT_TOLERANCE) { unit } else { unit.normalize() })
 }
 
 #[cfg(test)]
@@ -134,10 +150,35 @@ mod tests {
             (PoseRecord { flags: 0, ..good }, ErrorCode::BadCount),
             (PoseRecord { flags: END | START, ..good }, ErrorCode::BadCount),
             (PoseRecord { flags: TURN, rotation: [1e200; 4], ..good }, ErrorCode::NotFinite),
+            (PoseRecord { flags: TURN, ..good }, ErrorCode::BadCount),
         ];
         for (record, code) in table {
             assert_eq!(record.decode(), Err(code), "{record:?}");
         }
+    }
+
+    #[test]
+    fn a_quaternion_is_normalised_once() {
+        let mut state = 1u64;
+        let mut number = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let mut changed = 0;
+        for _ in 0..20_000 {
+            let q = DQuat::from_xyzw(number(), number(), number(), number()).normalize();
+            let rough = q * (1.0 + 4e-4 * number());
+            for given in [q, rough] {
+                let once = unit_quaternion(given.to_array()).unwrap();
+                let bits = |q: DQuat| q.to_array().map(f64::to_bits);
+                assert_eq!(bits(unit_quaternion(once.to_array()).unwrap()), bits(once), "{given}");
+                assert!((once.length() - 1.0).abs() <= 4.0 * f64::EPSILON);
+                changed += usize::from(bits(once) != bits(given));
+            }
+            // What is unit already is kept.
+            assert_eq!(unit_quaternion(q.to_array()), Ok(q));
+        }
+        assert!(changed > 19_000);
     }
 
     #[test]

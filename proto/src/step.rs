@@ -32,9 +32,9 @@ pub struct StepRequest {
     pub advance: f64,
     /// Duration of the step in seconds, for objects with a declared largest speed; 0: unknown.
     pub dt: f64,
-    /// Most cells that one pair's search may refine; 0: the server's default.
+    /// Most cells' worth of work of one pair's search (docs/protocol.md); 0: the server's default.
     pub cell_limit: u32,
-    /// Most cells that all searches of the step may refine together; what may meet earliest comes first, the rest stays
+    /// The same of all searches of the step together; what may meet earliest comes first, the rest stays
     /// undecided. 0: the server's default.
     pub batch_limit: u32,
     /// Most contact records of the reply, the earliest first; 0: no cap.

@@ -42,10 +42,16 @@ impl Track {
         }
     }
 
-    /// True when the object did not move.
+    /// True when the object did not move, not even by a last bit of its pose: what did comes to rest at its end.
     pub fn is_rest(&self) -> bool {
-        self.motion.is_rest()
+        self.motion.is_rest() && same_bits(&self.motion.start, &self.end)
     }
+}
+
+/// True for poses that are one to the bit; zeros of either sign are two.
+fn same_bits(a: &Pose, b: &Pose) -> bool {
+    let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+    same(&a.position.to_array(), &b.position.to_array()) && same(&a.rotation.to_array(), &b.rotation.to_array())
 }
 
 #[cfg(test)]
@@ -60,6 +66,32 @@ mod tests {
         let end = Pose::new(DVec3::new(1.0 / 3.0, 1e-9, 7.0), quat_of_rotation_vector(DVec3::new(2.0, -0.2, 0.3)));
         assert_eq!(Track::ordered(start, Order::End(end)).at(1.0), end);
         assert_eq!(Track::ordered(start, Order::End(end)).at(0.0).position, start.position);
+    }
+
+    #[test]
+    fn an_end_that_is_another_pose_by_a_bit_alone_is_no_rest() {
+        let q = quat_of_rotation_vector(DVec3::new(0.4, -1.1, 2.0));
+        let start = Pose::new(DVec3::new(1.0, 0.0, -2.0), q);
+        assert!(Track::ordered(start, Order::End(start)).is_rest());
+        let other = glam::DQuat::from_xyzw(f64::from_bits(q.x.to_bits() + 1), q.y, q.z, q.w);
+        for end in
+            [Pose::new(start.position, other), Pose::new(DVec3::new(1.0, -0.0, -2.0), q), Pose::new(start.position, -q)]
+        {
+            let track = Track::ordered(start, Order::End(end));
+            assert!(!track.is_rest(), "{end:?}");
+            let next = track.at(1.0);
+            assert_eq!(next.rotation.to_array().map(f64::to_bits), end.rotation.to_array().map(f64::to_bits));
+            assert_eq!(next.position.to_array().map(f64::to_bits), end.position.to_array().map(f64::to_bits));
+        }
+    }
+
+    #[test]
+    fn what_does_not_turn_keeps_its_rotation_at_any_part_of_a_step() {
+        let q = quat_of_rotation_vector(DVec3::new(0.4, -1.1, 2.0));
+        let off = glam::DQuat::from_xyzw(f64::from_bits(q.x.to_bits() + 2), q.y, q.z, q.w);
+        for q in [q, off] {
+            assert_eq!(Track::resting(Pose::new(DVec3::X, q)).at(0.3).rotation, q);
+        }
     }
 
     #[test]

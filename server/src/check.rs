@@ -5,32 +5,39 @@
 
 use crate::contact::{self, Body, Clock, Ideas, PairQuery, Scratch, certificate};
 use crate::eco::Model;
-use crate::import::Scene;
+use crate::import::{Place, Scene};
 use crate::motion::Placed;
-use crate::world::{ObjectSpec, PairOutcome, Part, Refusal, StepError, StepOptions, StepOutcome, World};
-use contactd_proto::{Detect, InitialOverlap, Motion, PoseRecord, Report};
+use crate::world::{ObjectSpec, PairOutcome, Part, Refusal, StepOptions, StepOutcome, World};
+use contactd_proto::{Detect, ErrorCode, InitialOverlap, Motion, PoseRecord, Report};
 use std::sync::Arc;
 
 /// Why a scene that was read cannot be stepped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CheckError {
+    /// A resolution that the caller gave.
+    #[error("{0}")]
+    Resolution(Refusal),
     /// An object, a rule or the resolution.
-    #[error("{file}: {refusal}")]
+    #[error("{file}:{at}: {refusal}")]
     World {
         /// The scene's file.
         file: String,
+        /// Where it says so.
+        at: Place,
         /// The world's reason.
         refusal: Refusal,
     },
     /// An object's motion.
-    #[error("{file}: object \"{object}\": {error}")]
+    #[error("{file}:{at}: object \"{object}\": {code}")]
     Step {
         /// The scene's file.
         file: String,
+        /// Where it names the object; its head when it is the step as a whole.
+        at: Place,
         /// The object; empty when it is the step as a whole.
         object: String,
         /// The world's reason.
-        error: StepError,
+        code: ErrorCode,
     },
 }
 
@@ -41,8 +48,8 @@ pub struct Check {
     pub world: World,
     /// The step: one record for every object that moves.
     pub records: Vec<PoseRecord>,
-    /// Names of the objects that the records move.
-    moving: Vec<String>,
+    /// Names of the objects that the records move, and where the scene names them.
+    moving: Vec<(String, Place)>,
     /// Duration of the step in seconds; 0: unknown.
     dt: f64,
     file: String,
@@ -56,7 +63,7 @@ impl Check {
     /// What the world refuses.
     pub fn new(scene: &Scene, models: &[Arc<Model>], resolution: Option<f64>) -> Result<Self, CheckError> {
         let file = scene.file.clone();
-        let refused = |refusal| CheckError::World { file: scene.file.clone(), refusal };
+        let refused = |at| move |refusal| CheckError::World { file: scene.file.clone(), at, refusal };
         let mut parts: Vec<Arc<Part>> = Vec::with_capacity(models.len());
         for model in models {
             let same = parts.iter().find(|p| Arc::ptr_eq(&p.model, model)).cloned();
@@ -64,7 +71,11 @@ impl Check {
         }
         let count = scene.objects.len();
         let mut world = World::new(count, count);
-        world.set_resolution(resolution.or(scene.resolution)).map_err(refused)?;
+        if let Some(given) = resolution {
+            world.set_resolution(Some(given)).map_err(CheckError::Resolution)?;
+        } else {
+            world.set_resolution(scene.resolution).map_err(refused(scene.resolution_at.unwrap_or(Place::START)))?;
+        }
         let (mut records, mut moving) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for (id, o) in (0u32..).zip(&scene.objects) {
             let spec = ObjectSpec {
@@ -78,13 +89,13 @@ impl Check {
                 place: o.place,
                 pose: o.motion.start,
             };
-            world.add_object(spec).map_err(refused)?;
+            world.add_object(spec).map_err(refused(o.at))?;
             if let Some(record) = o.record {
                 records.push(PoseRecord { object: id, ..record });
-                moving.push(o.name.clone());
+                moving.push((o.name.clone(), o.at));
             }
         }
-        world.set_rules(scene.rules.clone()).map_err(refused)?;
+        world.set_rules(scene.rules.clone()).map_err(refused(Place::START))?;
         Ok(Self { world, records, moving, dt: scene.dt.unwrap_or(0.0), file })
     }
 
@@ -96,8 +107,9 @@ impl Check {
         let Self { world, records, moving, dt, file } = self;
         let options = StepOptions { first, clear: true, dt: *dt, ..StepOptions::default() };
         world.step(records, &options).map_err(|error| {
-            let object = error.index.and_then(|i| moving.get(i as usize)).cloned().unwrap_or_default();
-            CheckError::Step { file: file.clone(), object, error }
+            let named = error.index.and_then(|i| moving.get(i as usize)).cloned();
+            let (object, at) = named.unwrap_or((String::new(), Place::START));
+            CheckError::Step { file: file.clone(), at, object, code: error.code }
         })
     }
 

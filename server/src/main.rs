@@ -42,6 +42,9 @@ enum Command {
         /// A TOML file of limits and waiting times.
         #[arg(long)]
         config: Option<PathBuf>,
+        /// Milliseconds within which a step is answered, undecided where it is not known by then; 0: no such limit.
+        #[arg(long, value_name = "MS")]
+        deadline: Option<u64>,
         #[command(flatten)]
         cache: CacheArguments,
     },
@@ -54,10 +57,10 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         csv: Option<PathBuf>,
         /// Write the scene of one step instead, for `contactd check`.
-        #[arg(long, value_name = "STEP")]
+        #[arg(long, value_name = "STEP", conflicts_with_all = ["embedded", "csv", "cache"])]
         scene_of: Option<usize>,
         /// Where that scene and its models go.
-        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        #[arg(long, value_name = "FOLDER", default_value = ".", requires = "scene_of")]
         into: PathBuf,
         #[command(flatten)]
         cache: CacheArguments,
@@ -128,27 +131,38 @@ enum Done {
 }
 
 fn main() -> ExitCode {
-    let done = match Arguments::parse().command {
+    let command = Arguments::parse().command;
+    if let Err(sentence) = contactd::ipc::ready_threads() {
+        say(&format!("contactd: expected to start threads, found: {sentence}"));
+        return ExitCode::from(2);
+    }
+    let done = match command {
         Command::Check(arguments) => check_scene(&arguments),
         Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
         Command::Demo { embedded, csv, cache, .. } => run_demo(embedded, csv.as_deref(), cache),
         Command::Inspect { file, facets, picture, cache } => inspect_file(&file, facets, picture.as_deref(), &cache),
-        Command::Serve { name, config, cache } => serve(&name, config.as_deref(), cache),
+        Command::Serve { name, config, deadline, cache } => serve(&name, config.as_deref(), deadline, cache),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
         Ok(Done::Undecided) => ExitCode::from(3),
         Err(sentence) => {
-            eprintln!("{sentence}");
+            say(&sentence.to_string());
             ExitCode::from(2)
         }
     }
 }
 
-fn serve(name: &str, config: Option<&Path>, cache: CacheArguments) -> Result<Done, Box<dyn Error>> {
+fn serve(
+    name: &str,
+    config: Option<&Path>,
+    deadline: Option<u64>,
+    cache: CacheArguments,
+) -> Result<Done, Box<dyn Error>> {
     let mut config = config.map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
     // The command line stands before the file, `off` too.
     config.cache = cache.cache.unwrap_or(config.cache);
+    config.deadline_ms = deadline.unwrap_or(config.deadline_ms);
     let ready = || {
         let pid = std::process::id();
         // A reader that has gone away does not stop a server.
@@ -228,6 +242,11 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
 fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
     let prepared = cache::prepare_scene(cache.open().as_ref(), scene, facets, &Limits::default())?;
     prepared.iter().filter_map(|p| p.trouble.as_deref()).for_each(warn);
+    scene.notes.iter().for_each(|n| warn(&format!("{}:{n}", scene.file)));
+    for (source, _) in scene.models.iter().zip(&prepared).filter(|(_, p)| p.model.solid.is_empty()) {
+        let (file, at) = (&scene.file, source.at);
+        warn(&format!("{file}:{at}: the model \"{}\" is empty: nothing can touch it", source.name));
+    }
     Ok(prepared)
 }
 
@@ -236,7 +255,12 @@ fn models_of(prepared: &[Prepared]) -> Vec<Arc<Model>> {
 }
 
 fn warn(sentence: &str) {
-    eprintln!("contactd: {sentence}");
+    say(&format!("contactd: {sentence}"));
+}
+
+/// A line on standard error, if anybody reads it.
+fn say(sentence: &str) {
+    let _ = writeln!(std::io::stderr(), "{sentence}");
 }
 
 fn inspect_file(

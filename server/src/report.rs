@@ -49,6 +49,9 @@ pub struct PairAnswer {
     pub time_lower: Option<f64>,
     pub time_upper: Option<f64>,
     pub touching: bool,
+    /// Told where it holds: `time` could not be continued back from its witness and equals `time_upper`.
+    #[serde(skip_serializing_if = "is_false")]
+    pub not_continued: bool,
     pub point: Option<[f64; 3]>,
     pub normal: Option<[f64; 3]>,
     pub separation: Option<f64>,
@@ -69,6 +72,11 @@ pub struct PairAnswer {
     /// Told when the work limit cut the search for regions.
     #[serde(skip_serializing_if = "is_true")]
     pub regions_complete: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_false(b: &bool) -> bool {
+    !*b
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
@@ -128,7 +136,7 @@ impl Feature {
             Sense::Positive => "positive",
             Sense::Negative => "negative",
         };
-        let face = p.shape.geometry().face_name((face - p.first_face) as usize);
+        let face = p.face_name((face - p.first_face) as usize);
         Some(Self { primitive, name: p.label.name.clone(), face, sense })
     }
 }
@@ -150,7 +158,13 @@ impl Answer {
         let header = ["a", "b", "status", "time", "separation", "normal speed", "kind", "extent", "point", "normal"];
         let mut rows = vec![header.map(String::from)];
         for p in &self.pairs {
-            let status = if p.touching { format!("{} (touching)", p.status) } else { p.status.into() };
+            let mut status = String::from(p.status);
+            if p.touching {
+                status += " (touching)";
+            }
+            if p.not_continued {
+                status += " (not continued)";
+            }
             rows.push([
                 p.a.clone(),
                 p.b.clone(),
@@ -208,6 +222,7 @@ impl PairAnswer {
             time_lower: told(Report::Time).then_some(o.time_lower),
             time_upper: told(Report::Time).then_some(o.time_upper),
             touching: o.touching,
+            not_continued: o.not_continued && told(Report::Time),
             point: (meets || rests).then(|| o.point.to_array()),
             normal: (meets || rests).then(|| o.normal.to_array()),
             separation: (meets || rests).then_some(o.separation),
@@ -399,6 +414,17 @@ mod tests {
             r#"{"primitive":0,"name":"cube","face":"+z","sense":"positive"}]},"cells":0}]}"#
         );
         assert_eq!(json, expected);
+    }
+
+    #[test]
+    fn a_time_that_was_not_continued_is_told_so() {
+        let solid = plate();
+        let outcome = Outcome { not_continued: true, ..contact() };
+        let answer = Answer::of_pairs(&[report(&solid, &outcome)]);
+        assert!(answer.json().expect("json").contains(r#""touching":false,"not_continued":true,"point""#));
+        assert!(answer.table().contains("contact (not continued)"), "{}", answer.table());
+        let hit = PairReport { report: Report::Hit, ..report(&solid, &outcome) };
+        assert!(!Answer::of_pairs(&[hit]).json().expect("json").contains("not_continued"), "a hit has no time");
     }
 
     #[test]

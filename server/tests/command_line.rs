@@ -74,6 +74,58 @@ fn a_clear_pair_has_nulls_and_first_leaves_it_out_beside_a_contact() {
 }
 
 #[test]
+fn what_has_no_effect_is_a_line_on_standard_error() {
+    let rule = "[[rule]]\nbetween = [\"cell\", \"default\"]\n";
+    let empty =
+        "[[model]]\nname = \"nothing\"\nfile = \"nothing.csg\"\n[[object]]\nname = \"n\"\nmodel = \"nothing\"\n";
+    let text_of = format!("{}{empty}{rule}", scene(4.0));
+    let folder = folder(&[("ball.csg", BALL), ("nothing.csg", "group();\n"), ("s.toml", &text_of)]);
+    for command in ["check", "inspect"] {
+        let out = run(folder.path(), &[command, "s.toml"]);
+        assert_eq!(out.status.code(), Some(0));
+        assert_eq!(
+            text(&out.stderr),
+            "contactd: s.toml:20:12: the rule decides for no pair: no object is of the group \"cell\"\n\
+             contactd: s.toml:15:8: the model \"nothing\" is empty: nothing can touch it\n",
+            "{command}"
+        );
+    }
+}
+
+#[test]
+fn what_a_step_refuses_is_told_with_its_place() {
+    let fast = format!("dt = 1.0\n{}max_speed = 1.0\n", scene(4.0));
+    let coarse = format!("resolution = 1.0\n{}", scene(4.0));
+    let folder = folder(&[("ball.csg", BALL), ("fast.toml", &fast), ("coarse.toml", &coarse), ("s.toml", &scene(4.0))]);
+    for (arguments, sentence) in [
+        (&["check", "fast.toml"][..], "fast.toml:10:8: object \"b\": the motion breaks what was declared"),
+        (&["check", "coarse.toml"], "coarse.toml:6:8: the resolution is not a positive length well below"),
+        (&["check", "s.toml", "--resolution", "1"], "s.toml:5:8: the resolution is not a positive length well below"),
+    ] {
+        let out = run(folder.path(), arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&out.stderr).starts_with(sentence), "{arguments:?}: {}", text(&out.stderr));
+        assert_eq!(text(&out.stderr).lines().count(), 1);
+    }
+}
+
+#[test]
+fn arguments_that_would_have_no_effect_are_refused() {
+    let folder = folder(&[]);
+    for arguments in [
+        &["demo", "--scene-of", "3", "--embedded"][..],
+        &["demo", "--scene-of", "3", "--csv", "x.csv"],
+        &["demo", "--scene-of", "3", "--cache", "off"],
+        &["demo", "--into", "."],
+    ] {
+        let out = run(folder.path(), arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&out.stderr).starts_with("error: "), "{arguments:?}: {}", text(&out.stderr));
+    }
+    assert!(std::fs::read_dir(folder.path()).expect("a folder").next().is_none(), "nothing was written");
+}
+
+#[test]
 fn bad_input_is_one_line_and_status_2() {
     let unknown = scene(4.0).replace("model = \"ball\"\nmotion", "model = \"bat\"\nmotion");
     let folder = folder(&[
@@ -92,7 +144,7 @@ fn bad_input_is_one_line_and_status_2() {
         (&["inspect", "bytes.csg"], "bytes.csg:1:6: expected text in UTF-8, found the byte 0xff"),
         (&["check", "lost.toml"], "lost.toml:3:8: expected a model file, found lost.csg: "),
         (&["check", "none.toml"], "none.toml: expected a readable file, found "),
-        (&["check", "good.toml", "--resolution", "0.6"], "good.toml: the resolution is not a positive length"),
+        (&["check", "good.toml", "--resolution", "0.6"], "good.toml:5:8: the resolution is not a positive length"),
     ];
     for (arguments, sentence) in table {
         let out = run(folder.path(), arguments);

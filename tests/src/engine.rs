@@ -10,7 +10,7 @@ use contactd::solid::Solid;
 use contactd_proto::Pose;
 
 /// Cells that a test may spend on a pair, far below the default: what needs more should be told so.
-pub const CELL_LIMIT: u64 = 30_000;
+pub const CELL_LIMIT: u64 = 60_000;
 
 /// Asks about two placed solids; `None` is the default resolution.
 pub fn ask_solids(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>) -> Outcome {

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod engine;
+pub mod families;
 pub mod fuzz;
 pub mod judge;
 pub mod lanes;
@@ -9,6 +10,9 @@ pub mod openscad;
 pub mod primitive_pairs;
 pub mod random_solids;
 pub mod rays;
+pub mod record_judge;
+pub mod record_scenes;
 pub mod reference;
 pub mod scenes;
+pub mod stepped;
 pub mod verifier;

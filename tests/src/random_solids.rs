@@ -116,7 +116,7 @@ pub fn node(r: &mut Random, b: &mut SolidBuilder, depth: usize, size: f64, opera
 }
 
 fn label(name: &str) -> Label {
-    Label { name: name.into(), line: 0, column: 0 }
+    Label { name: name.into(), ..Label::default() }
 }
 
 /// A plate with a grid of `n`×`n` holes and a boss beside each: real parts' shape of tree (one difference, flat unions).

@@ -7,11 +7,12 @@ use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, defaul
 use contactd::eco::Model;
 use contactd::motion::Placed;
 use contactd::solid::Solid;
-use contactd_proto::Pose;
+use contactd_proto::{Motion, Pose};
 use contactd_tests::judge::cases;
 use contactd_tests::random_solids::Random;
-use contactd_tests::scenes::{self, Scene};
+use contactd_tests::scenes::{self, Recipe, Scene};
 use contactd_tests::verifier::{Checked, check};
+use glam::{DQuat, DVec3};
 use std::collections::BTreeMap;
 
 /// Cells of a search, and of a certificate.
@@ -351,5 +352,38 @@ fn a_deleted_or_altered_exclusion_is_caught() {
     for (kind, least) in kinds {
         let n = caught.get(kind).copied().unwrap_or_default();
         assert!(n >= least, "{kind}: {n} caught");
+    }
+}
+
+#[test]
+fn what_lies_on_itself_is_certified() {
+    let turned = |r: Recipe| r.moved(&Pose::new(DVec3::ZERO, DQuat::from_rotation_z(0.7)));
+    let falling =
+        Motion::turning(Pose::at(DVec3::new(0.1, 0.2, 5.0)), DVec3::new(0.0, 0.0, -5.0), DVec3::new(1.0, 0.3, 0.2));
+    let plate = Recipe::cuboid(2.0, 2.0, 0.5);
+    let parts = [Recipe::sphere(1.0), Recipe::cylinder(0.7, 0.5), Recipe::cone(0.8, 0.3, 0.6)];
+    let inner = [
+        Recipe::sphere(1.0 - 1.9e-6),
+        Recipe::cylinder(0.7 - 1.9e-6, 0.6),
+        Recipe::cone(0.8 - 1.9e-6, 0.3 - 1.9e-6, 0.6),
+    ];
+    for (part, inner) in parts.into_iter().zip(inner) {
+        let beside = Recipe::cuboid(0.3, 0.4, 0.2).at(0.0, 0.0, -1.4);
+        let skin = part.clone().minus(turned(part.clone()));
+        let kinds = [
+            skin.clone(),
+            skin.union(beside.clone()),
+            part.clone().minus(inner),
+            part.clone().union(turned(part.clone())),
+            part.clone().union(beside).minus(turned(part)),
+        ];
+        for (i, body) in kinds.into_iter().enumerate() {
+            let mut scene = Scene::new("itself", plate.clone(), Motion::resting(Pose::IDENTITY), body, falling);
+            scene.resolution = Some(1e-6);
+            let c = of_scene(&scene, CELLS);
+            assert_ne!(c.outcome.status, Status::Undecided, "{i}: {:?}", c.outcome);
+            let checked = c.proven().unwrap_or_else(|e| panic!("{i}: {e}"));
+            assert!(checked.is_some(), "{i}: {:?}", c.outcome);
+        }
     }
 }

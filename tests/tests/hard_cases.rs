@@ -578,3 +578,60 @@ fn a_body_stopped_a_little_inside_its_contact_touches_and_does_not_overlap() {
         assert_eq!((o.status, o.touching), (status, true), "{depth} resolutions deep: {o:?}");
     }
 }
+
+// What lies on itself, or nearly so.
+
+/// A plate through which a body falls and turns.
+fn through_a_plate(body: Recipe) -> Scene {
+    let falling = Motion::turning(Pose::at(dvec3(0.1, 0.2, 5.0)), dvec3(0.0, 0.0, -5.0), dvec3(1.0, 0.3, 0.2));
+    scene(Recipe::cuboid(2.0, 2.0, 0.5), still(), body, falling)
+}
+
+#[test]
+fn a_skin_of_no_thickness_is_not_there() {
+    let turned = |r: Recipe| r.moved(&Pose::new(DVec3::ZERO, DQuat::from_rotation_z(0.7)));
+    let round = [
+        ("sphere", Recipe::sphere(1.0)),
+        ("cylinder", Recipe::cylinder(0.7, 0.5)),
+        ("cone", Recipe::cone(0.8, 0.0, 0.6)),
+        ("frustum", Recipe::cone(0.8, 0.3, 0.6)),
+    ];
+    for (name, part) in round {
+        misses(&format!("skin_{name}"), &through_a_plate(part.clone().minus(turned(part.clone()))));
+        let beside = Recipe::cuboid(0.3, 0.4, 0.2).at(0.0, 0.0, -0.9);
+        let skin = part.clone().union(beside.clone()).minus(part.clone());
+        let alone = ask_scene_with(&through_a_plate(beside.minus(part)), SEARCH_ALONE);
+        assert_eq!(alone.status, Status::Contact);
+        meets(&format!("skin_{name}_and_a_box"), &through_a_plate(skin), alone.time);
+    }
+}
+
+#[test]
+fn the_same_part_twice_costs_what_it_costs_once() {
+    let shell = |r: Recipe| r.minus(Recipe::cuboid(0.999, 0.999, 0.999)).minus(Recipe::sphere(0.3).at(0.0, 0.2, 1.0));
+    let once = shell(Recipe::cuboid(1.0, 1.0, 1.0));
+    let body = || Recipe::cylinder(0.1, 0.2).union(Recipe::cone(0.15, 0.0, 0.2).at(0.05, 0.1, -0.1));
+    let way = || Motion::turning(Pose::at(dvec3(0.6, -0.4, 2.5)), dvec3(0.5, -0.3, 0.5), dvec3(0.8, -0.4, 0.3));
+    let alone = ask_scene_with(&scene(once.clone(), still(), body(), way()), SEARCH_ALONE);
+    for (name, twice) in
+        [("union", once.clone().union(once.clone())), ("common", once.clone().intersection(once.clone()))]
+    {
+        let o = meets(&format!("twice_{name}"), &scene(twice, still(), body(), way()), alone.time);
+        assert!(o.normal.distance(alone.normal) < 1e-9 && o.kind == alone.kind, "{name}: {o:?}, alone {alone:?}");
+        assert!(o.counters.cells <= 2 * alone.counters.cells + 50, "{name}: {o:?}, alone {alone:?}");
+    }
+}
+
+#[test]
+fn a_curved_wall_is_there_from_twice_the_resolution_on() {
+    let shell = |wall: f64| Recipe::sphere(1.0).minus(Recipe::sphere(1.0 - wall));
+    for (name, times) in [("wall_1", 1.0), ("wall_1.9", 1.9), ("wall_2", 2.0)] {
+        let s = Scene { resolution: Some(1e-6), ..through_a_plate(shell(times * 1e-6)) };
+        let o = misses(name, &s);
+        assert!(o.resolution >= 1e-6 && o.resolution < 1.001e-6, "{name}: {}", o.resolution);
+        // Just that thick it is neither there nor not: the resolution was raised, and told.
+        assert_eq!(o.resolution > 1e-6, times == 2.0, "{name}: {}", o.resolution);
+    }
+    let there = Scene { resolution: Some(1e-6), ..through_a_plate(shell(2.1e-6)) };
+    meets("wall_2.1", &there, ask(&through_a_plate(Recipe::sphere(1.0))).time);
+}

@@ -39,7 +39,13 @@ fn ask(scene: &Scene) -> Outcome {
     ASKED.set((asked + 1, undecided + usize::from(o.status == Status::Undecided)));
     if o.status == Status::Undecided {
         let (place, first) = SCENE.with_borrow(Clone::clone);
-        println!("UNDECIDED {place}, ask {} ({}): free before {}", asked - first, scene.class, o.time_lower);
+        let cells = o.counters.cells;
+        println!(
+            "UNDECIDED {place}, ask {} ({}): free before {}, {cells} cells",
+            asked - first,
+            scene.class,
+            o.time_lower
+        );
         if std::env::var_os("CONTACTD_LAW_SHOW").is_some() {
             println!("{scene:?}");
         }

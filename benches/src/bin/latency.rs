@@ -11,7 +11,7 @@
 //! client sees, writing the records included.
 //!
 //! The second table: a client alone, and beside one that has sent a step and reads neither its reply nor anything else; blocks of the
-//! two in turn.
+//! two in turn. The third: a client alone, and beside one whose every pair is hard and which asks for one step after the other.
 
 use clap::{Parser, ValueEnum};
 use contactd::ipc::{Server, ServerConfig};
@@ -23,7 +23,7 @@ use contactd_benches::socket::{self, Connection, POLL};
 use contactd_benches::table::Table;
 use contactd_client::{Object, Session, SharedMemory};
 use contactd_proto::names::Address;
-use contactd_proto::{Pose, PoseRecord};
+use contactd_proto::{Pose, PoseRecord, Rule};
 use glam::DVec3;
 use hdrhistogram::Histogram;
 use std::error::Error;
@@ -271,8 +271,75 @@ fn beside_one_that_stopped(dir: &Path, mode: Mode, blocks: usize, count: usize) 
     Ok(found)
 }
 
+/// A body whose overlaps are searched for their deepest points by thousands of cells each.
+const LUMP: &str = "union() {
+    cube(size = [4, 3, 2], center = true);
+    multmatrix([[1, 0, 0, 1.3], [0, 0.8, -0.6, 0.7], [0, 0.6, 0.8, 0.2], [0, 0, 0, 1]]) {
+        cylinder($fn = 0, h = 5, r1 = 1.4, r2 = 0.3, center = true);
+    }
+    difference() { sphere($fn = 0, r = 2.2); cylinder($fn = 0, h = 9, r1 = 0.9, r2 = 0.9, center = true); }
+}";
+/// How many of them stand in each other.
+const LUMPS: usize = 16;
+
+/// A client that asks for hard steps until it is told to stop; `begun` is set once the first one is under way for a while.
+fn hard_client(dir: &Path, begun: &AtomicBool, stop: &AtomicBool) -> Result<usize, Failure> {
+    let mut session = Session::connect_to(addresses(dir)?[0].clone())?;
+    let lump = session.load_model("lump.csg", LUMP)?.id;
+    let mut ids = Vec::new();
+    for _ in 0..LUMPS {
+        ids.push(session.add_object(Object::new("lump", lump).group("lumps"))?);
+    }
+    session.set_rules(&[Rule { penetration: true, ..Rule::new(["lumps".into(), "lumps".into()]) }])?;
+    let mut steps = 0;
+    while !stop.load(Ordering::Relaxed) {
+        for (i, record) in session.begin_step(LUMPS)?.iter_mut().enumerate() {
+            // Never the same question twice: nothing is remembered of it.
+            let at = DVec3::new(0.1 * i as f64, 0.07 * (i * i % 7) as f64, 1e-3 * (steps % 100) as f64);
+            *record = PoseRecord::start(ids[i], &Pose::at(at));
+        }
+        session.send()?;
+        begun.store(true, Ordering::Relaxed);
+        session.finish(Duration::from_secs(600))?;
+        steps += 1;
+    }
+    session.close()?;
+    Ok(steps)
+}
+
+/// Times of a client's steps alone, and beside a client whose every pair is hard, block by block; and the steps of that one.
+fn beside_a_hard_one(
+    dir: &Path,
+    mode: Mode,
+    blocks: usize,
+    count: usize,
+) -> Result<([Vec<Vec<u64>>; 2], usize), Failure> {
+    let mut client = Client::new(dir, 0, mode.waiting(), BESIDE)?;
+    let (mut found, mut steps) = ([Vec::new(), Vec::new()], 0);
+    let settle = || std::thread::sleep(Duration::from_millis(300));
+    for _ in 0..blocks {
+        settle();
+        found[0].push(client.block(0, count)?);
+        let (begun, stop) = (AtomicBool::new(false), AtomicBool::new(false));
+        steps += std::thread::scope(|scope| {
+            let hard = scope.spawn(|| hard_client(dir, &begun, &stop));
+            while !begun.load(Ordering::Relaxed) && !hard.is_finished() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            settle();
+            let times = client.block(0, count);
+            stop.store(true, Ordering::Relaxed);
+            let steps = hard.join().map_err(|_| "the hard client panicked")??;
+            found[1].push(times?);
+            Ok::<usize, Failure>(steps)
+        })?;
+    }
+    client.session.close()?;
+    Ok((found, steps))
+}
+
 fn run(options: &Options) -> Result<(), Failure> {
-    let mut stopped = Table::new(&[
+    let header = [
         "mode",
         "poses",
         "steps",
@@ -282,7 +349,9 @@ fn run(options: &Options) -> Result<(), Failure> {
         "beside_p99",
         "ratio_p50",
         "ratio_p99",
-    ]);
+    ];
+    let (mut stopped, mut hard) = (Table::new(&header), Table::new(&header));
+    let mut hard_steps = 0;
     let mut table = Table::new(&[
         "mode",
         "clients",
@@ -329,21 +398,27 @@ fn run(options: &Options) -> Result<(), Failure> {
             table.push(cells);
         }
         let count = options.pick(5_000, 500);
-        let times = beside_one_that_stopped(&process.dir, mode, blocks, count)?;
         let of = |block: &Vec<u64>, q: f64| quantile(block.iter().map(|t| *t as f64), q);
-        let micros = |which: usize, q: f64| median(times[which].iter().map(|block| 1e-3 * of(block, q)));
-        let ratio = |q: f64| median(times[0].iter().zip(&times[1]).map(|(alone, beside)| of(beside, q) / of(alone, q)));
-        stopped.push(row![
-            mode.name(),
-            BESIDE,
-            blocks * count,
-            micros(0, 0.5),
-            micros(0, 0.99),
-            micros(1, 0.5),
-            micros(1, 0.99),
-            ratio(0.5),
-            ratio(0.99),
-        ]);
+        let compared = |times: [Vec<Vec<u64>>; 2]| {
+            let micros = |which: usize, q: f64| median(times[which].iter().map(|block| 1e-3 * of(block, q)));
+            let ratio =
+                |q: f64| median(times[0].iter().zip(&times[1]).map(|(alone, beside)| of(beside, q) / of(alone, q)));
+            row![
+                mode.name(),
+                BESIDE,
+                blocks * count,
+                micros(0, 0.5),
+                micros(0, 0.99),
+                micros(1, 0.5),
+                micros(1, 0.99),
+                ratio(0.5),
+                ratio(0.99),
+            ]
+        };
+        stopped.push(compared(beside_one_that_stopped(&process.dir, mode, blocks, count)?));
+        let (times, steps) = beside_a_hard_one(&process.dir, mode, blocks, count)?;
+        hard.push(compared(times));
+        hard_steps += steps;
     }
     println!(
         "latency: a step as the client sees it, contactd / raw iceoryx2 request-response / Unix socket with bincode"
@@ -352,6 +427,10 @@ fn run(options: &Options) -> Result<(), Failure> {
     table.publish("latency", &options.folder())?;
     println!("a client's steps beside one that stopped reading / alone: medians over {blocks} blocks of either");
     stopped.publish("latency_stopped", &options.folder())?;
+    println!(
+        "a client's steps beside one whose every pair is hard ({hard_steps} steps of {LUMPS} bodies in each other) / alone"
+    );
+    hard.publish("latency_hard", &options.folder())?;
     Ok(())
 }
 

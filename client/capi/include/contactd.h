@@ -145,6 +145,8 @@
 // The pose is set before the step starts, without motion. May stand beside an END or TURN of the same object.
 #define CONTACTD_START 4
 
+
+
 // `status`: the surfaces meet within the step.
 #define CONTACTD_CONTACT 1
 

@@ -81,6 +81,11 @@ pub(crate) fn word<T: Copy>(all: &[T], number: u32, what: &str) -> Result<T, Fai
     found.ok_or_else(|| Failure::argument(format!("expected {what} of 0 to {}, found {number}", all.len() - 1)))
 }
 
+/// A field that means nothing yet: 0, so that what a later version puts there is not dropped in silence.
+pub(crate) fn reserved(number: u32, what: &str) -> Result<(), Failure> {
+    word(&[()], number, what)
+}
+
 /// Yes or no.
 pub(crate) fn flag(number: u32, what: &str) -> Result<bool, Failure> {
     word(&[false, true], number, what)

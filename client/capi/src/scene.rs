@@ -3,7 +3,7 @@
 use crate::abi::{Names, Object, Pose, Rule};
 use crate::error::Failure;
 use crate::handle::{Session, State, on};
-use crate::raw::{flag, given, place, row, text, word};
+use crate::raw::{flag, given, place, reserved, row, text, word};
 use contactd_proto::{Detect, InitialOverlap, Report};
 use std::ffi::c_char;
 
@@ -77,6 +77,7 @@ pub unsafe extern "C" fn contactd_add_object(session: *mut Session, object: *con
     let call = |state: &mut State| {
         // SAFETY: the caller's structure and variable (1).
         let (object, id) = unsafe { (given(object, "object")?, place(id, "id")?) };
+        reserved(object.reserved, "object.reserved")?;
         // SAFETY: the caller's strings (2).
         let (name, group) = unsafe { (text(object.name, "object.name")?, text(object.group, "object.group")?) };
         let mut spec = contactd_client::Object::new(name, object.model).group(group).max_speed(object.max_speed);
@@ -136,6 +137,7 @@ unsafe fn checked(rule: &Rule) -> Result<contactd_proto::Rule, Failure> {
         let (a, b) = unsafe { (text(names.a, what)?, text(names.b, what)?) };
         Ok([a.to_owned(), b.to_owned()])
     };
+    reserved(rule.reserved, "rule.reserved")?;
     // SAFETY: the caller's structures (1).
     let except = unsafe { row(rule.except, rule.except_count, "rule.except")? };
     Ok(contactd_proto::Rule {

@@ -3,7 +3,7 @@
 use crate::abi::{Options, Reply};
 use crate::error::Failure;
 use crate::handle::{Session, State, on};
-use crate::raw::{flag, given, place, seconds};
+use crate::raw::{flag, given, place, reserved, seconds};
 use contactd_client::{StepOptions, Transport as _};
 use contactd_proto::{ContactRecord, DetailSlot, PatchSlot, PoseRecord, RegionSlot};
 
@@ -38,6 +38,7 @@ pub unsafe extern "C" fn contactd_set_options(session: *mut Session, options: *c
     let call = |state: &mut State| {
         // SAFETY: the caller's structure (1).
         let o = unsafe { given(options, "options")? };
+        reserved(o.reserved, "options.reserved")?;
         state.session.options = StepOptions {
             advance: o.advance,
             dt: o.dt,

@@ -7,7 +7,10 @@
             coupling.step(data)
 
 Bodies that have a solid meet as these solids do; their geoms are still drawn and still give them mass, but no longer
-collide. Other bodies keep MuJoCo's own collisions among themselves. A step is MuJoCo's staged step: ``mj_step1``, one batched
+collide until the coupling is closed. Other bodies keep MuJoCo's own collisions among themselves. Between bodies that have solids the model's
+filters are kept: ``<exclude>``, parents, ``contype`` and ``conaffinity``. What a coupling would lose or cannot keep (contacts with bodies
+that have no solid, a ``<pair>``) is refused by name, and what it takes in another way (``margin``, ``gap``, geoms of one body that differ)
+is a ``CouplingWarning``. A step is MuJoCo's staged step: ``mj_step1``, one batched
 request to contactd, ``mj_addContact`` for each point of the answer, the constraints anew, ``mj_step2``.
 
 MuJoCo's contacts are soft: bodies at rest sink into each other a little, and solids that overlap touch nowhere. So each contact
@@ -21,6 +24,7 @@ waits for the answer that is still under way.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, Container, Mapping
 
 import mujoco as mj
@@ -30,9 +34,12 @@ from . import session as sessions
 from .convention import contact_to_mujoco, quaternion_from_wxyz
 from .errors import Error
 from .manifold import Manifold, Manifolds, Point
+from .mujoco_filter import CouplingWarning, Filter
 from .pose import Pose
 from .records import Order, Status
 from .session import Reply, Rule, Session, embedded
+
+__all__ = ["Coupling", "CouplingWarning"]
 
 _GROUP = "mujoco"
 
@@ -41,12 +48,17 @@ class Coupling:
     """contactd's contacts for the bodies of an ``MjModel``.
 
     ``solids``: for each body by name, its solid as OpenSCAD CSG text in the body's frame; the text's unit is ``unit`` lengths
-    of MuJoCo (0.001: models in millimetres in a scene in metres). Bodies welded to the world are fixed. ``skin``: the gap, in MuJoCo's
+    of MuJoCo (0.001: models in millimetres in a scene in metres). Bodies welded to the world are fixed, unless they hang on a mocap
+    body. ``skin``: the gap, in MuJoCo's
     unit, at which contacts begin to act. ``session``: to use one that is open (by default an embedded one is opened, and closed
     with the coupling); its rules are replaced.
 
-    Geoms of these bodies get ``contype`` and ``conaffinity`` 0. Friction, ``solref``, ``solimp``, ``condim`` are those of the bodies' first geoms,
-    combined as MuJoCo does.
+    Geoms of these bodies get ``contype`` and ``conaffinity`` 0 until the coupling is closed. Friction, ``solref``, ``solimp``, ``condim`` are
+    those of the bodies' first colliding geoms, combined as MuJoCo does. The filters are read once: what is changed in the model
+    later is not seen.
+
+    Raises ``ValueError`` before anything is changed where contacts would not be those that the model asks for; warns
+    (``CouplingWarning``) where they are taken in another way. Each sentence names the body or geom and says what to do.
     """
 
     def __init__(
@@ -58,10 +70,15 @@ class Coupling:
         unit: float = 1.0,
         session: Session | None = None,
     ) -> None:
-        if model.opt.integrator == mj.mjtIntegrator.mjINT_RK4:
-            raise ValueError("the staged step has no Runge-Kutta: choose Euler, implicit or implicitfast")
-        if not skin > 0.0 or not unit > 0.0:
-            raise ValueError(f"expected a skin and a unit above 0, found {skin} and {unit}")
+        if not 0.0 < skin < np.inf or not 0.0 < unit < np.inf:
+            raise ValueError(f"expected a finite skin and unit above 0, found {skin} and {unit}")
+        bodies = {name: mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, name) for name in solids}
+        for name, body in bodies.items():
+            if body < 0:
+                raise ValueError(f"the model has no body called {name!r}")
+        rules = Filter(model, list(bodies.values()))
+        for sentence in rules.warnings:
+            warnings.warn(sentence, CouplingWarning, stacklevel=2)
         self.model = model
         self.skin = skin
         self.unit = unit
@@ -74,8 +91,10 @@ class Coupling:
         self._in_flight = False
         self._own = session is None
         self.session = embedded() if session is None else session
+        #: The geoms that no longer collide, with their contype and conaffinity.
+        self._silenced: list[tuple[int, int, int]] = []
         try:
-            self._add(solids)
+            self._add(solids, bodies, rules)
         except BaseException:
             self.close()
             raise
@@ -87,11 +106,14 @@ class Coupling:
         self.close()
 
     def close(self) -> None:
-        """Closes the session, if the coupling opened it."""
+        """Lets the bodies' geoms collide again as they did; closes the session, if the coupling opened it."""
+        for geom, contype, conaffinity in self._silenced:
+            self.model.geom_contype[geom], self.model.geom_conaffinity[geom] = contype, conaffinity
+        self._silenced = []
         if self._own:
             self.session.close()
 
-    def _add(self, solids: Mapping[str, str]) -> None:
+    def _add(self, solids: Mapping[str, str], bodies: Mapping[str, int], rules: Filter) -> None:
         model, session = self.model, self.session
         self._bodies: dict[int, int] = {}
         self._geoms: dict[int, int] = {}
@@ -99,21 +121,15 @@ class Coupling:
         loaded: dict[str, sessions.Model] = {}
         moving = []
         for name, text in solids.items():
-            body = mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, name)
-            if body < 0:
-                raise ValueError(f"the model has no body called {name!r}")
-            if model.body_geomnum[body] == 0:
-                raise ValueError(f"body {name!r} has no geom: contacts need one, for friction and to be told by")
-            geoms = slice(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-            model.geom_contype[geoms] = model.geom_conaffinity[geoms] = 0
+            body = bodies[name]
             if text not in loaded:
                 loaded[text] = session.load_model(f"{name}.csg", text)
-            fixed = bool(model.body_weldid[body] == 0)
+            fixed = not rules.moves(body)
             position, rotation = self._rest(body)
             at = Pose(position / self.unit, rotation)
             object = session.add_object(name, loaded[text], group=_GROUP, fixed=fixed, at=at)
             self._bodies[object] = body
-            self._geoms[object] = geoms.start
+            self._geoms[object] = rules.geoms[body]
             if fixed:
                 self._fixed[object] = at
             else:
@@ -121,13 +137,17 @@ class Coupling:
         self._moving = np.array(moving, dtype=np.uint32)
         self._index = {object: i for i, object in enumerate(moving)}
         self._moving_bodies = np.array([self._bodies[o] for o in moving], dtype=int)
-        # MuJoCo's own rule: a body does not meet its parent, unless that is welded to the world.
-        names = {body: name for name, body in zip(solids, self._bodies.values())}
-        parents = [(names[b], names.get(int(model.body_parentid[b]))) for b in self._moving_bodies]
-        kin = [(a, b) for a, b in parents if b is not None and model.body_weldid[mj.mj_name2id(model, 1, b)] != 0]
+        names = {body: name for name, body in bodies.items()}
+        apart = [(names[a], names[b]) for a, b in rules.apart if rules.moves(a) or rules.moves(b)]
         margin = self.skin / self.unit
-        session.set_rules([Rule((_GROUP, _GROUP), except_=kin, report="patch", margin=margin, penetration=True)])
+        session.set_rules([Rule((_GROUP, _GROUP), except_=apart, report="patch", margin=margin, penetration=True)])
         session.options.details = True
+        # Last, so that what is refused before has changed nothing.
+        for body in bodies.values():
+            first = int(model.body_geomadr[body])
+            for geom in range(first, first + int(model.body_geomnum[body])):
+                self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
+                model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
 
     def _rest(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         data = mj.MjData(self.model)
@@ -264,7 +284,7 @@ class Coupling:
             solref = mix * r1 + (1 - mix) * r2 if r1[0] > 0 and r2[0] > 0 else np.minimum(r1, r2)
             solimp = mix * model.geom_solimp[g1] + (1 - mix) * model.geom_solimp[g2]
         contact.dim = int(dim)
-        slide, spin, roll = friction
+        slide, spin, roll = np.maximum(friction, mj.mjMINMU)
         contact.friction = [slide, slide, spin, roll, roll]
         contact.solref, contact.solimp = solref, solimp
         return contact

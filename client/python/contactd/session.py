@@ -160,6 +160,9 @@ class Session(_native.Session):
     Errors are ``contactd.Error`` and its subclasses.
     """
 
+    # No attributes of its own: ``session.advance = 0.5`` (it is ``session.options.advance``) must not be taken in silence.
+    __slots__ = ("__weakref__",)
+
     def __enter__(self) -> Session:
         return self
 
@@ -206,7 +209,13 @@ class Session(_native.Session):
 
     def set_rules(self, rules: Iterable[Rule]) -> None:
         """Replaces the session's rules; ``Refused`` with the index of a bad one."""
-        self._set_rules(list(rules))
+        rules = list(rules)
+        for i, rule in enumerate(rules):
+            # A word is a sequence of letters to Python: "ab" would be the groups "a" and "b".
+            for field, pairs in (("between", [rule.between]), ("except_", [rule.except_, *rule.except_])):
+                if any(isinstance(pair, str) for pair in pairs):
+                    raise TypeError(f"rule {i}: expected pairs of names as {field}, found {getattr(rule, field)!r}")
+        self._set_rules(rules)
 
 
 def _id(model: Model | int) -> int:

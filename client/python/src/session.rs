@@ -204,6 +204,10 @@ impl Session {
     #[new]
     #[pyo3(signature = (server = None, config = None))]
     fn new(py: Python<'_>, server: Option<&str>, config: Option<PathBuf>) -> PyResult<Self> {
+        if let (Some(name), Some(path)) = (server, &config) {
+            let sentence = format!("{} is for an engine in this process, not for the server {name:?}", path.display());
+            return Err(PyValueError::new_err(sentence));
+        }
         if let Some(name) = server {
             return open(py, || Ok(Box::new(SharedMemory::new(Address::of(name)?))));
         }

@@ -376,3 +376,21 @@ def test_every_error_is_an_error():
                  contactd.SystemFailure):
         assert issubclass(kind, contactd.Error)
     assert issubclass(contactd.Timeout, TimeoutError) and issubclass(contactd.StillExported, BufferError)
+
+
+def test_what_would_be_taken_in_silence_is_refused(tmp_path):
+    with contactd.embedded() as session:
+        for rule, field in [
+            (contactd.Rule("ab"), "between"),
+            (contactd.Rule(("a", "b"), except_=["ab"]), "except_"),
+            (contactd.Rule(("a", "b"), except_="ab"), "except_"),
+        ]:
+            with pytest.raises(TypeError, match=f"rule 1: expected pairs of names as {field}"):
+                session.set_rules([contactd.Rule(("a", "b")), rule])
+        for name in ("advance", "rules", "resolution"):
+            with pytest.raises(AttributeError):
+                setattr(session, name, 0.5)
+        with pytest.raises(AttributeError):
+            session.options.advanced = 0.5
+    with pytest.raises(ValueError, match="is for an engine in this process, not for the server"):
+        contactd.Session("default", config=tmp_path / "contactd.toml")

@@ -10,7 +10,7 @@ mujoco = pytest.importorskip("mujoco")
 
 import contactd  # noqa: E402
 from contactd.convention import contact_to_mujoco  # noqa: E402
-from contactd.mujoco import Coupling  # noqa: E402
+from contactd.mujoco import Coupling, CouplingWarning  # noqa: E402
 
 TABLE = "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,-100],[0,0,0,1]]) { cube(size = [2000, 2000, 200], center = true); }"
 BOX = "cube(size = [100, 100, 100], center = true);"
@@ -61,6 +61,7 @@ def test_a_box_falls_and_rests_as_mujocos_own_does():
         ({"solref": "-1000 -10"}, {"solref": "-2000 -5"}),
         ({"solmix": 0}, {"solmix": 0}),
         ({"solmix": 0}, {"solref": ".05 2"}),
+        ({"friction": "0 0 0"}, {"friction": "0 0 0"}),
     ],
 )
 def test_contacts_have_the_parameters_that_mujoco_gives_them(table, body):
@@ -200,7 +201,8 @@ def test_bodies_without_a_solid_keep_mujocos_collisions():
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><option timestep="0.001"/><worldbody><geom type="plane" size="1 1 .1"/>
         <body name="free" pos="0 0 .05"><freejoint/><geom size=".05"/></body>
-        <body name="exact" pos=".5 0 .05"><freejoint/><geom size=".05"/></body></worldbody></mujoco>"""
+        <body name="exact" pos=".5 0 .05"><freejoint/><geom size=".05"/></body></worldbody>
+        <contact><exclude body1="world" body2="exact"/><exclude body1="free" body2="exact"/></contact></mujoco>"""
     )
     data = mujoco.MjData(model)
     with Coupling(model, {"exact": "sphere(r = 0.05);"}) as coupling:
@@ -229,6 +231,163 @@ def test_a_session_of_ones_own_and_bodies_on_joints():
         session.finish()
 
 
+def bodies(*inner, before="", after="", option=""):
+    """A model of bodies, each a name, its attributes and joints, and its geoms."""
+    text = "".join(f'<body name="{name}" {words}>{geoms}</body>' for name, words, geoms in inner)
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.001">{option}</option><worldbody>{before}{text}</worldbody>{after}</mujoco>'
+    )
+
+
+FREE = "<freejoint/>"
+CUBE = "cube(size = [0.1, 0.1, 0.1], center = true);"
+
+
+def touching(coupling):
+    """The pairs of bodies' names that contacts were added for in a model's rest position."""
+    data = mujoco.MjData(coupling.model)
+    mujoco.mj_step1(coupling.model, data)
+    coupling.add_contacts(data)
+    return {(coupling.model.body(a).name, coupling.model.body(b).name) for a, b, _ in coupling.contacts}
+
+
+def test_contacts_that_would_be_lost_are_refused():
+    free = ("free", 'pos="0 0 .1"', FREE + '<geom name="ball" size=".05"/>')
+    two = lambda **k: bodies(("exact", "", FREE + box(name="block")), free, **k)  # noqa: E731
+    floor = '<geom name="floor" type="plane" size="1 1 .1"/>'
+    model = two()
+    with pytest.raises(ValueError, match="body 'exact' has a solid and body 'free' has none, so geom 'block' and geom 'ball' would"):
+        Coupling(model, {"exact": CUBE})
+    assert model.geom_contype.tolist() == [1, 1], "what is refused has changed nothing"
+    with pytest.raises(ValueError, match="body 'exact' has a solid and body 'world' has none.* geom 'floor' .* and so with 1 more"):
+        Coupling(two(before=floor), {"exact": CUBE})
+    # What the model itself keeps apart is nobody's loss.
+    exclude = '<contact><exclude body1="free" body2="exact"/></contact>'
+    Coupling(two(after=exclude), {"exact": CUBE}).close()
+    Coupling(bodies(("exact", "", FREE + box(contype=2, conaffinity=2)), free, before=floor), {"exact": CUBE}).close()
+    # And the world may have a solid like any other body.
+    slab = "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,-0.5],[0,0,0,1]]) { cube(size = [4, 4, 1], center = true); }"
+    model = bodies(("exact", 'pos="0 0 .0501"', FREE + box()), before=floor)
+    with Coupling(model, {"world": slab, "exact": CUBE}) as coupling:
+        assert touching(coupling) == {("world", "exact")}
+
+
+def test_a_flex_that_would_lose_its_contacts_is_refused():
+    flex = """<flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" mass="1" radius=".01" dim="2" pos="0 0 1">
+        <contact selfcollide="none"/></flexcomp>"""
+    with pytest.raises(ValueError, match="body 'exact' has a solid, so geom 'block' and the flex 'cloth' would no longer meet"):
+        Coupling(bodies(("exact", "", FREE + box(name="block")), before=flex), {"exact": CUBE})
+    Coupling(bodies(("exact", "", FREE + box(contype=4, conaffinity=4)), before=flex), {"exact": CUBE}).close()
+
+
+def test_pairs_are_refused():
+    geoms = [(n, f'pos="0 0 {z}"', FREE + box(name=f"{n} block")) for n, z in (("a", 0), ("b", 0.1))]
+    pair = '<contact><pair name="grip" geom1="a block" geom2="b block"/></contact>'
+    with pytest.raises(ValueError, match="the <pair> 'grip' makes MuJoCo's contacts between geom 'a block' and geom 'b block'"):
+        Coupling(bodies(*geoms, after=pair), {"a": CUBE, "b": CUBE})
+
+
+def test_filters_between_coupled_bodies_are_mujocos():
+    stack = [(n, f'pos="0 0 {0.1 * i}"', FREE + box()) for i, n in enumerate("abc")]
+    solids = dict.fromkeys("abc", CUBE)
+    with Coupling(bodies(*stack), solids) as coupling:
+        assert touching(coupling) == {("a", "b"), ("b", "c")}
+    exclude = '<contact><exclude body1="b" body2="a"/></contact>'
+    with Coupling(bodies(*stack, after=exclude), solids) as coupling:
+        assert touching(coupling) == {("b", "c")}
+    bits = [(n, f'pos="0 0 {0.1 * i}"', FREE + box(contype=1 << i, conaffinity=1)) for i, n in enumerate("abc")]
+    with Coupling(bodies(*bits), solids) as coupling:
+        assert touching(coupling) == {("a", "b")}
+    # Welded bodies are one; the child of a moving body does not meet it, unless the model says so.
+    hand = FREE + box() + f'<body name="b" pos="0 0 .1">{box()}<body name="c" pos="0 0 .1"><joint/>{box()}</body></body>'
+    with Coupling(bodies(("a", "", hand)), solids) as coupling:
+        assert touching(coupling) == set()
+    with Coupling(bodies(("a", "", hand), option='<flag filterparent="disable"/>'), solids) as coupling:
+        assert touching(coupling) == {("b", "c")}
+
+
+def test_filters_that_bodies_cannot_keep_are_told():
+    mixed = FREE + box(name="shell") + '<geom name="core" size=".01" contype="2" conaffinity="2"/>'
+    model = bodies(("a", "", mixed), ("b", 'pos="0 0 .1"', FREE + box(name="block")))
+    with pytest.warns(CouplingWarning, match="body 'a' and body 'b' meet as whole solids, though geom 'core' and geom 'block' do not"):
+        Coupling(model, {"a": CUBE, "b": CUBE}).close()
+
+
+@pytest.mark.parametrize(("field", "value"), [("margin", ".01"), ("gap", ".01")])
+def test_margin_and_gap_are_told(field, value):
+    model = bodies(("a", "", FREE + box(name="block", **{field: value})))
+    with pytest.warns(CouplingWarning, match=f"the {field} of geom 'block' has no effect: contacts of body 'a' act from the coupling's skin"):
+        Coupling(model, {"a": CUBE}).close()
+
+
+def test_the_first_colliding_geom_gives_the_parameters():
+    seen = '<geom name="seen" size=".01" contype="0" conaffinity="0" friction=".9 .1 .1" condim="6" margin=".5"/>'
+    for geoms in (seen + box(name="block", friction=".3 .02 .001"), box(name="block", friction=".3 .02 .001") + seen):
+        model = bodies(("a", "", FREE + geoms), ("b", 'pos="0 0 .1"', FREE + box(friction=".2 .01 .001")))
+        data = mujoco.MjData(model)
+        with Coupling(model, {"a": CUBE, "b": CUBE}) as coupling:
+            mujoco.mj_step1(model, data)
+            assert coupling.add_contacts(data) == 4
+            contact = data.contact[0]
+            assert model.geom(contact.geom[0]).name == "block" and contact.dim == 3 and contact.friction[0] == 0.3
+    with pytest.raises(ValueError, match="no geom of body 'a' collides .* give one of them contype"):
+        Coupling(bodies(("a", "", FREE + seen.replace("<geom", '<geom mass="1"'))), {"a": CUBE})
+
+
+@pytest.mark.parametrize("words", ['friction=".1"', 'condim="4"', 'solref=".1 1"', 'solimp=".5"', 'solmix="2"', 'priority="1"'])
+def test_geoms_of_one_body_that_differ_are_told(words):
+    field = words.split("=")[0]
+    other = f'<geom name="other" size=".01" {words}/>'
+    with pytest.warns(CouplingWarning, match=f"have the {field} of its first colliding geom, geom 'block'; geom 'other' differ"):
+        Coupling(bodies(("a", "", FREE + box(name="block") + other)), {"a": CUBE}).close()
+
+
+def test_options_that_change_contacts_are_refused():
+    for flag, sentence in [
+        ('contact="disable"', "flag contact is off"),
+        ('constraint="disable"', "flag constraint is off"),
+        ('override="enable"', "option flag override"),
+        ('sleep="enable"', "bodies that sleep"),
+    ]:
+        try:
+            model = bodies(("a", "", FREE + box()), option=f"<flag {flag}/>")
+        except ValueError:
+            continue  # this MuJoCo has no such flag
+        with pytest.raises(ValueError, match=sentence):
+            Coupling(model, {"a": CUBE})
+    for field, word in (("geom_adhesion", "adhesion"), ("geom_surfacevel", "surfacevel")):
+        model = bodies(("a", "", FREE + box(name="belt")))
+        if hasattr(model, field):
+            getattr(model, field)[:] = 1.0
+            with pytest.raises(ValueError, match=f"do not know {word}, which geom 'belt' has"):
+                Coupling(model, {"a": CUBE})
+
+
+def test_a_closed_coupling_gives_the_geoms_back():
+    model = bodies(("a", "", FREE + box(contype=3, conaffinity=5)), ("b", 'pos="0 0 1"', FREE + box()))
+    with Coupling(model, {"a": CUBE, "b": CUBE}):
+        assert not model.geom_contype.any() and not model.geom_conaffinity.any()
+        with pytest.raises(ValueError, match="another coupling's bodies are so until it is closed"):
+            Coupling(model, {"a": CUBE, "b": CUBE})
+    assert model.geom_contype.tolist() == [3, 1] and model.geom_conaffinity.tolist() == [5, 1]
+    with pytest.raises(contactd.Refused):
+        Coupling(model, {"a": CUBE, "b": "cube(;"})
+    assert model.geom_contype.tolist() == [3, 1]
+
+
+def test_a_mocap_body_moves():
+    model = bodies(("paddle", 'mocap="true"', box()), ("ball", 'pos="0 0 .2"', FREE + '<geom size=".05"/>'))
+    model.opt.gravity[:] = 0
+    data = mujoco.MjData(model)
+    with Coupling(model, {"paddle": CUBE, "ball": "sphere(r = 0.05);"}) as coupling:
+        assert coupling.step(data) == 0
+        for _ in range(300):
+            data.mocap_pos[0, 2] += 0.0005
+            coupling.step(data)
+    # A mocap body has no velocity to give, so the ball lags behind; were the paddle taken for a fixed body it would lie at .2.
+    assert data.qpos[2] > 0.22
+
+
 def test_misuse_is_named():
     with pytest.raises(ValueError, match="Runge-Kutta"):
         Coupling(scene(box(), option='integrator="RK4"'), {})
@@ -236,5 +395,9 @@ def test_misuse_is_named():
         Coupling(scene(box()), {"nobody": BOX})
     with pytest.raises(ValueError, match="skin"):
         Coupling(scene(box()), {}, skin=0.0)
+    with pytest.raises(ValueError, match="unit"):
+        Coupling(scene(box()), {}, unit=float("inf"))
+    with pytest.raises(ValueError, match="body 'table' has no geom"):
+        Coupling(scene(box(), table=""), {"table": TABLE})
     with pytest.raises(contactd.Refused, match="body.csg:1:"):
-        Coupling(scene(box()), {"body": "cube(;"})
+        Coupling(scene(box()), {"table": TABLE, "body": "cube(;"})

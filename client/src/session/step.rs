@@ -24,9 +24,9 @@ pub struct StepOptions {
     pub polling: bool,
     /// Most records, the earliest first; 0: all.
     pub max_records: u32,
-    /// Most cells that one pair's search may refine; 0: the server's default.
+    /// Most cells' worth of work of one pair's search; 0: the server's default.
     pub cell_limit: u32,
-    /// Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
+    /// The same of all searches of a step together; 0: the server's default. Pairs that would need more stay
     /// undecided, the latest first.
     pub batch_limit: u32,
 }

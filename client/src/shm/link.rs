@@ -13,18 +13,20 @@ use iceoryx2::service::port_factory::request_response::PortFactory as RequestRes
 
 /// The variant of iceoryx2's services that is used.
 pub type Variant = ipc::Service;
+/// The server's: the same in shared memory, its ports may go from one thread to another.
+pub type Shared = ipc_threadsafe::Service;
 /// The step service.
 pub type StepService = RequestResponse<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
 /// A client's port of it.
 pub type StepClient = Client<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
 /// The server's port of it.
-pub type StepServer = Server<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
+pub type StepServer = Server<Shared, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
 /// The control service.
 pub type ControlService = RequestResponse<Variant, [u8], ControlHeader, [u8], ControlHeader>;
 /// A client's port of it.
 pub type ControlClient = Client<Variant, [u8], ControlHeader, [u8], ControlHeader>;
 /// The server's port of it.
-pub type ControlServer = Server<Variant, [u8], ControlHeader, [u8], ControlHeader>;
+pub type ControlServer = Server<Shared, [u8], ControlHeader, [u8], ControlHeader>;
 /// Key of the one entry of the status service.
 pub const STATUS_KEY: u32 = 0;
 
@@ -53,11 +55,19 @@ pub fn config(address: &Address, epoch: u64) -> Result<Config, Error> {
 /// # Errors
 /// `System`.
 pub fn node(config: &Config) -> Result<Node<Variant>, Error> {
+    node_of(config)
+}
+
+/// The same for either variant.
+///
+/// # Errors
+/// `System`.
+pub fn node_of<V: iceoryx2::service::Service>(config: &Config) -> Result<Node<V>, Error> {
     // Its log would go to the user's terminal, for conditions that are handled here.
     set_log_level(LogLevel::Fatal);
     // Signals belong to the program; iceoryx2 would install handlers of its own.
     let builder = NodeBuilder::new().config(config).signal_handling_mode(SignalHandlingMode::Disabled);
-    builder.create::<Variant>().map_err(|e| system("a node cannot be created", e))
+    builder.create::<V>().map_err(|e| system("a node cannot be created", e))
 }
 
 /// A service name from a text that is known to be one.

@@ -262,17 +262,7 @@ impl Pruned {
         match &solid.nodes[n as usize] {
             Node::Empty => f64::INFINITY,
             Node::Primitive(p) => solid.primitives[*p as usize].value(x),
-            Node::Op(op, children) => {
-                let mut values = children.iter().map(|c| self.value_of(solid, *c, x));
-                match op {
-                    Op::Union => values.fold(f64::INFINITY, f64::min),
-                    Op::Intersection => values.fold(f64::NEG_INFINITY, f64::max),
-                    Op::Difference => {
-                        let first = values.next().unwrap_or(f64::INFINITY);
-                        values.fold(first, |m, v| m.max(-v))
-                    }
-                }
-            }
+            Node::Op(op, children) => op.value(children.iter().map(|c| self.value_of(solid, *c, x))),
         }
     }
 }

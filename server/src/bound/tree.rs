@@ -16,7 +16,7 @@
 
 use super::rules::oriented;
 use super::{Bound, Volumes};
-use crate::math::{Oriented, tolerance::BOUND_PROGRESS};
+use crate::math::{Oriented, halt, tolerance::BOUND_PROGRESS};
 use crate::solid::{Node, NodeId, Solid};
 use rayon::prelude::*;
 
@@ -108,6 +108,7 @@ impl SBounds {
 
     /// Gives each node of a level the bound that `next` has for it; true when one shrank noticeably.
     fn replace(&mut self, level: &[NodeId], share: usize, next: impl Fn(NodeId, &[Bound]) -> Bound + Sync) -> bool {
+        halt::point();
         let mut moved = false;
         let mut take = |bounds: &mut Vec<Bound>, n: NodeId, bound: Bound| {
             moved |= bound.shrank_from(&bounds[n as usize], BOUND_PROGRESS);

@@ -17,9 +17,10 @@ use super::outcome::{NO_FACE, Outcome, Status};
 use super::pair::{PairQuery, PairSearch};
 use super::task::Task;
 use super::work::Work;
+use crate::bound::{Bound, Volumes};
 use crate::math::Aabb;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
-use crate::solid::{Face, Sense};
+use crate::solid::{Face, Node, NodeId, Op, Sense, Solid};
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -28,12 +29,16 @@ type Key = (Side, LiteralId);
 
 /// Room left for a checker: depth proven, relative to the depth claimed.
 const DEPTH: f64 = 0.8;
+/// Room left for a checker: depth by which a wall is told, which nothing moves, relative to the depth claimed.
+const WALL: f64 = 1.0 - 1e-9;
 /// Room left for a checker: the cell is bounded as if this much larger.
 const SWELL: f64 = 1.02;
 /// Room left for a checker: share of the proven time that is used.
 const HASTE: f64 = 0.85;
 /// Part of the depth that a witness must reach: the point deepened from the touch is right to less than the rest.
 const WITNESS: f64 = 0.995;
+/// Room left for a checker: the box of a proof at a distance holds what is so many times as near.
+const ROOM: f64 = 4.0;
 /// How much before `time_lower` the proof of an undecided answer may end, in depths over the fastest speed.
 const BACK: [f64; 3] = [0.0, 10.0, 1000.0];
 /// Combinations of a span above which they are not thinned out.
@@ -111,7 +116,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
         witness: witness(&task, outcome, depth),
         cells: Vec::new(),
     };
-    if task.a.is_empty() || task.b.is_empty() {
+    if task.a.is_void() || task.b.is_void() {
         return Some(made);
     }
     if !root.is_finite() {
@@ -129,11 +134,47 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     tries.into_iter().find_map(|made| cover(&task, swapped, outcome, made, limit))
 }
 
+/// Proves that no point has f_A <= `level` and f_B <= `level` (a length, positive) until `until`; the cells are bounded at `made`,
+/// a little more than that, which leaves a checker room. `None` when the limit of cells is reached.
+pub fn certify_level(query: &PairQuery, level: f64, made: f64, until: f64) -> Option<Certificate> {
+    let (mut task, swapped) = PairSearch::task(query);
+    let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+    task.relative = crate::motion::Relative::new(carrier.placed, other.placed);
+    task.delta = -made;
+    task.ideas.fits &= made < task.fits_below();
+    // A checker has bounds of its own of how far {f <= level} reaches beyond a cone or a polyhedron.
+    let hull = extent(task.a, task.a.root, ROOM * level);
+    let slack = hull.half() * 1e-9 + DVec3::splat(level);
+    let root = Aabb::new(hull.min - slack, hull.max + slack);
+    let made = Certificate { swapped, depth: -level, until, root, witness: None, cells: Vec::new() };
+    if task.a.is_empty() || task.b.is_empty() {
+        return Some(made);
+    }
+    let nothing = Outcome::clear(query.resolution);
+    if root.is_finite() { cover(&task, swapped, &nothing, made, query.cell_limit) } else { None }
+}
+
+/// A box around all points with f <= `level` below a node, as its operations bound it.
+fn extent(solid: &Solid, node: NodeId, level: f64) -> Aabb {
+    match &solid.nodes[node as usize] {
+        Node::Empty => Aabb::EMPTY,
+        Node::Primitive(p) => Bound::of_primitive(&solid.primitives[*p as usize], level, Volumes::Boxes).aabb,
+        Node::Op(Op::Difference, children) => extent(solid, children[0], level),
+        Node::Op(Op::Union, children) => {
+            children.iter().fold(Aabb::EMPTY, |all, c| all.union(&extent(solid, *c, level)))
+        }
+        Node::Op(Op::Intersection, children) => {
+            children.iter().fold(Aabb::ALL, |all, c| all.intersection(&extent(solid, *c, level)))
+        }
+    }
+}
+
 /// Covers the box with cells.
 fn cover(task: &Task, swapped: bool, outcome: &Outcome, mut made: Certificate, limit: u64) -> Option<Certificate> {
     let mut scratch = clause::Scratch::recording();
     let hints = hints(task, swapped, outcome);
-    let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
+    // What lies on itself is left for the checker to see: the trees as they stand.
+    let (a, b) = (task.a.literal_form(), task.b.literal_form());
     let mut stack = vec![Open { region: made.root, t: 0.0, started: false, a, b, reach: 1.0 }];
     while let Some(open) = stack.pop() {
         if made.cells.len() as u64 >= limit {
@@ -374,6 +415,7 @@ impl Placed<'_> {
             center_b: self.at.b_point(self.center),
             velocity: self.at.velocity(self.center),
             delta: self.task.delta,
+            wall: self.task.delta * (WALL / DEPTH),
             rounding: self.task.rounding,
             fits: self.task.ideas.fits,
             multipliers: true,

@@ -16,11 +16,12 @@
 //! literals that all clauses of a subtree share bound all of them, so a subtree is left as soon as they suffice, and
 //! running out of the enumeration's allowance only weakens the bound.
 
-use super::fit::{self, fit};
+use super::fit::{self, fit, spun};
 use super::literal::{Linear, Side, View};
 use super::lp::{self, Solution};
-use crate::solid::Sense;
+use crate::solid::alike::{Ball, above};
 use crate::solid::local::{self, Expression, LiteralId, Token};
+use crate::solid::{Face, Sense};
 use glam::DVec3;
 
 /// Clauses bounded per cell before the remaining ones share their common literals' bound.
@@ -33,6 +34,12 @@ const IDLE_COST: f64 = 0.25;
 const IDLE_CONVEX: f64 = 1e-3;
 /// The same where a fit stands for the literal, which costs more of what matters.
 const FITTED_COST: f64 = 0.02;
+/// Comparisons of two literals that cost as much as one evaluation of a literal.
+const COMPARED: u64 = 16;
+/// Planes that a pivot of the linear program costs beside those that it looks at; and looks of it at a plane that cost as
+/// much as one evaluation of a literal.
+const PIVOT: u64 = 12;
+const SIMPLEX: u64 = 4;
 /// How far beyond the end of its reach a clause is looked at, in cell radii of relative motion.
 const LOOK_BEYOND: f64 = 0.02;
 
@@ -47,6 +54,9 @@ pub struct Advance {
     pub y: DVec3,
     /// What each axis of the cell costs that bound: the one to split is the largest.
     pub cost: DVec3,
+    /// The bound at the view's instant, where a face spins about its own axis: then the speed of the bodies says nothing of how
+    /// fast it is lost. Infinite elsewhere.
+    pub now: f64,
 }
 
 /// A point at which a curved convex face is worth touching: where a contact was found.
@@ -69,8 +79,12 @@ pub struct Scratch {
     /// Where the clause's last program ended.
     warm: lp::Warm,
     ors: Vec<(Side, u32, u32)>,
+    /// Two literals of one body that contradict each other, and how many bounds there were before.
+    clash: Option<(usize, Side, [LiteralId; 2])>,
     /// Clauses bounded so far, over the whole query.
     pub clauses: u64,
+    /// Work of these so far, in literals evaluated; see `Counters::evaluations`.
+    pub evaluations: u64,
     /// When present, every combination of literals that excluded something is written here.
     pub record: Option<Vec<Proof>>,
 }
@@ -135,6 +149,7 @@ pub fn advance(
 ) -> Advance {
     scratch.lits.clear();
     scratch.ors.clear();
+    scratch.clash = None;
     let mut run = Run { view, pool: pair.pool, hints, rounding, useless, left: MAX_CLAUSES, scratch };
     for (side, range) in [(Side::A, pair.a), (Side::B, pair.b)] {
         if range.0 < range.1 {
@@ -190,9 +205,12 @@ impl Run<'_, '_> {
                 self.scratch.lits.push(self.view.tangent(side, id, h.point));
             }
         }
-        let before = if self.view.fits { self.scratch.lits.len() } else { 0 };
+        let before = self.scratch.lits.len();
         self.scratch.lits.push(self.view.linear(side, id, DVec3::ZERO));
-        for i in 0..before {
+        if self.view.faces(side).solid.alike.has_walls(self.view.wall) {
+            self.against_own(side, id, before);
+        }
+        for i in 0..if self.view.fits { before } else { 0 } {
             let l = &self.scratch.lits[i];
             if l.side == side || l.id.sense() == id.sense() || l.other.is_some() {
                 continue;
@@ -201,12 +219,58 @@ impl Run<'_, '_> {
                 if id.sense() == Sense::Positive { ((side, id), (l.side, l.id)) } else { ((l.side, l.id), (side, id)) };
             self.scratch.lits.extend(fit(self.view, p, q));
         }
+        if side == Side::B && self.view.fits && self.view.curved && !self.view.b.is_guard(id.face()) {
+            self.scratch.lits.extend(spun(self.view, id));
+        }
+    }
+
+    /// Compares a literal with those of its own body: the two sides of a wall thinner than twice the depth never hold together,
+    /// whatever moves, and those of a thin one fit each other.
+    fn against_own(&mut self, side: Side, id: LiteralId, before: usize) {
+        let faces = self.view.faces(side);
+        for i in 0..before {
+            let l = &self.scratch.lits[i];
+            if l.side != side || l.id.sense() == id.sense() || l.other.is_some() {
+                continue;
+            }
+            let (p, q) = if id.sense() == Sense::Positive { (id, l.id) } else { (l.id, id) };
+            let solid = faces.solid;
+            let Some(wall) = solid.alike.wall(&solid.faces, p.face(), q.face(), self.view.wall) else { continue };
+            // Near a tip, where fits know nothing, cones part by less than elsewhere.
+            let here = || {
+                let (one, other) = (faces.get(p.face()), faces.get(q.face()));
+                let v = self.view;
+                let (center, way) = match side {
+                    Side::A => (v.center, 0.0),
+                    Side::B => (v.center_b, v.motion.speed * v.motion.h + v.rounding),
+                };
+                let ball = Ball { center, radius: v.radius + way };
+                matches!(one, Face::Cone { .. })
+                    && above(one, other, &ball).is_some_and(|least| least > -2.0 * v.wall + 2.0 * v.rounding)
+            };
+            if wall > -2.0 * self.view.wall || here() {
+                self.scratch.clash.get_or_insert((before, side, [p, q]));
+                return;
+            }
+            if self.view.fits {
+                self.scratch.lits.extend(fit::within(self.view, side, p, q));
+            }
+        }
     }
 
     /// The weakest clause that completes the literals taken so far with one alternative of each open list from
     /// `from` on.
     fn bound(&mut self, from: usize) -> Advance {
-        let mut own = Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO };
+        let mut own =
+            Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 };
+        if let Some((_, side, [p, q])) = self.scratch.clash {
+            let dt = self.view.motion.h;
+            if let Some(record) = &mut self.scratch.record {
+                let (literal, other, lambda) = ((side, p), Some((side, q)), [1.0; 2]);
+                record.push(Proof { dt, terms: vec![Term { literal, other, lambda, point: DVec3::ZERO }] });
+            }
+            return Advance { dt, ..own };
+        }
         if !self.scratch.lits.is_empty() {
             self.left = self.left.saturating_sub(1);
             self.scratch.clauses += 1;
@@ -231,6 +295,7 @@ impl Run<'_, '_> {
             let found = self.bound(from + 1);
             self.scratch.lits.truncate(lits);
             self.scratch.ors.truncate(ors);
+            self.scratch.clash = self.scratch.clash.filter(|clash| clash.0 < lits);
             let weaker = weakest.as_ref().is_none_or(|w| found.dt < w.dt);
             if weaker {
                 let stop = found.dt.max(own.dt) < self.useless;
@@ -359,6 +424,9 @@ impl Run<'_, '_> {
     fn touch(&mut self, s: &Solution, look: f64) -> bool {
         let v = self.view;
         let mut added = false;
+        // Each literal is compared with those before it.
+        let count = self.scratch.lits.len() as u64;
+        self.scratch.evaluations += count + count * count / COMPARED;
         for i in 0..self.scratch.lits.len() {
             let l = self.scratch.lits[i];
             let again = self.scratch.lits[..i]
@@ -401,10 +469,13 @@ impl Run<'_, '_> {
             s.b.push(l.ahead(look));
             s.normals.push(l.normal_ahead(look));
         }
+        s.evaluations += s.lits.len() as u64;
         if !self.view.multipliers {
             return lp::best_alone(&s.normals, &s.b, self.view.half);
         }
-        lp::min_max(&s.normals, &s.b, self.view.half, &mut s.warm)
+        let solution = lp::min_max(&s.normals, &s.b, self.view.half, &mut s.warm);
+        s.evaluations += s.warm.pivots * (s.lits.len() as u64 + PIVOT) / SIMPLEX;
+        solution
     }
 
     /// The bound that the multipliers of `s` give, through time.
@@ -430,7 +501,9 @@ impl Run<'_, '_> {
     fn finish(&mut self, best: &Reach, s: &Solution) -> Advance {
         self.note(best);
         let dt = best.dt;
-        let mut a = Advance { dt, support: Vec::new(), y: s.y, cost: DVec3::ZERO };
+        let is_spun = self.scratch.lits.iter().any(|l| l.weights.is_some() && l.other.is_none());
+        let now = if is_spun { self.course(&best.path[0]).at(0.0, self.view.half) } else { f64::INFINITY };
+        let mut a = Advance { dt, support: Vec::new(), y: s.y, cost: DVec3::ZERO, now };
         let (mut w, mut turn) = (DVec3::ZERO, DVec3::ZERO);
         for &(i, lambda) in &s.support[..s.count] {
             let l = &self.scratch.lits[i as usize];

@@ -7,6 +7,7 @@
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
 use super::asked::Asked;
+use super::certificate::{self, Certificate};
 use super::depth;
 use super::direct::Convex;
 use super::outcome::Counters;
@@ -19,6 +20,7 @@ use super::work::Work;
 use crate::math::tolerance::WIDE_MARGIN;
 use crate::motion::Placed;
 use contactd_proto::Motion;
+use glam::DVec3;
 
 /// A proof that a pair keeps a distance over a motion.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +52,9 @@ fn reach(task: &Task) -> f64 {
     }
 }
 
-/// The search for a point within `level` of both bodies, which is one for a contact of that negative depth.
+/// The search for a point with f <= `level` in both bodies, which is one for a contact of that negative depth: it holds every point
+/// within `level` of both, and at sharp features more. Fits hold while a subtracted face that has shrunk by it is left; the
+/// shortcuts in front of the search, made for depths, are not asked.
 fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>, Counters) {
     task.delta = -level;
     task.ideas.fits &= level < task.fits_below();
@@ -70,6 +74,37 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
 pub fn room(query: &PairQuery, margin: f64) -> Option<f64> {
     let (task, _) = PairSearch::task(query);
     Some(Convex::new(task)?.distance() - touch(&task, margin) - 8.0 * task.rounding)
+}
+
+/// The direction that proves `room`: unit, world axes, from the query's first body to its second.
+pub fn direction_of_room(query: &PairQuery) -> Option<DVec3> {
+    let (task, swapped) = PairSearch::task(query);
+    let n = Convex::new(task)?.direction().normalize();
+    Some(if swapped { -n } else { n })
+}
+
+/// What proves that a pair keeps a distance over a motion, as `keep` has found out.
+pub enum Distance {
+    /// Of two convex primitives: directions, from a to b in world axes, each from its time (fraction of the motion) on.
+    Directions(Vec<(f64, DVec3)>),
+    /// Of others cells at a negative depth.
+    Cells(Certificate),
+}
+
+/// The proof that a pair keeps a distance until `until` over the query's motion: one in which bodies displaced together by `way`
+/// are farther than their touching distance apart, where `keep` has proven as much for `room`, which is more. `None` where it
+/// takes more cells than the query allows, or the two are too near each other to leave a checker room.
+pub fn certify_kept(query: &PairQuery, margin: f64, (way, room): (f64, f64), until: f64) -> Option<Distance> {
+    let (task, swapped) = PairSearch::task(query);
+    let touch = touch(&task, margin);
+    if let Some(pair) = Convex::new(task) {
+        let sign = if swapped { -1.0 } else { 1.0 };
+        let all = pair.directions(room + touch + 8.0 * task.rounding);
+        return Some(Distance::Directions(all.into_iter().map(|(t, n)| (t, n * sign)).collect()));
+    }
+    let [needed, proven] = [way, room].map(|d| 0.5 * (d + touch));
+    let spare = proven - needed;
+    certificate::certify_level(query, needed + 0.1 * spare, needed + 0.9 * spare, until).map(Distance::Cells)
 }
 
 /// Until when a pair keeps its surfaces a distance apart that leaves `room` (a length) for displacements, or as much of it

@@ -116,13 +116,27 @@ pub fn climb(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
 }
 
 fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
+    let (x, depth, support) = ascend(rounds, f64::INFINITY, task, at, start, work);
+    (x, normal(task, at, x, &support), depth, support.iter().map(|s| (s.0, s.1)).collect())
+}
+
+/// A locally deepest point near `start`, its depth and the literals that hold it with their weights; the climb ends once it
+/// is as deep as `enough`.
+pub(super) fn climb_to(enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
+    ascend(ROUNDS, enough, task, at, start, work)
+}
+
+/// A point, its depth, what holds it there.
+pub(super) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
+
+fn ascend(rounds: usize, enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
     let f = |x: DVec3| separation::value(task, at, x);
     let (mut x, mut best) = (start, f(start));
     let mut size = 0.5 * task.scale;
     let mut scratch = clause::Scratch::default();
     let mut support: Vec<(Side, LiteralId, f64)> = Vec::new();
     for _ in 0..rounds {
-        if size < 1e-13 * task.scale {
+        if size < 1e-13 * task.scale || -best >= enough {
             break;
         }
         work.bound();
@@ -138,6 +152,7 @@ fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work
             center_b: at.b_point(x),
             velocity: DVec3::ZERO,
             delta: -best,
+            wall: f64::NEG_INFINITY,
             rounding: 0.0,
             fits: false,
             multipliers: true,
@@ -170,7 +185,7 @@ fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work
             size *= 0.5;
         }
     }
-    (x, normal(task, at, x, &support), -best, support.iter().map(|s| (s.0, s.1)).collect())
+    (x, -best, support)
 }
 
 /// Direction from a to b: the multiplied normals of a, else of b, else the deciding face's.

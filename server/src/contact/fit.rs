@@ -102,6 +102,9 @@ const STEEPEST: f64 = 4.0;
 /// Difference of two cones' axes, or angles in radians, up to which a bound by their tips is worth it.
 const SIMILAR: f64 = 0.25;
 
+/// Share of a literal's rounding that the fit of two faces of one body does not have.
+const SPARED: f64 = 0.9;
+
 /// Sine of the angle between two axes up to which a fit is worth a bound.
 const LEAN: f64 = 0.5;
 
@@ -134,10 +137,12 @@ impl Bend {
             Self { convex: across, remainder, cost: (l.abs() * extent(m) + m.abs() * extent(l)) * half }
         };
         if let (Some(a_p), Some(a_q), true) = (p.axis, q.axis, curved)
-            && let Some(f) = (a_p - a_q * a_p.dot(a_q)).try_normalize()
+            && let Some(f) = a_q.cross(a_p.cross(a_q)).try_normalize()
         {
+            // By cross products: of axes that lean by 1e-8 a difference keeps half its digits, and the lean is lost in what it has
+            // along `a_q`.
             // In the plane of both axes M has at most one negative eigenvalue; across it, it is `spare`.
-            let (along, aside) = (p.bend.dot(a_q), p.bend.dot(f));
+            let (along, aside) = (p.bend.dot(a_q), p.bend.length() * a_p.cross(a_q).length());
             let m11 = spare + mu_q * q.bend.length_squared() - mu_p * along * along;
             let (m12, m22) = (-mu_p * along * aside, spare - mu_p * aside * aside);
             let (mean, root) = (0.5 * (m11 + m22), (0.25 * (m11 - m22) * (m11 - m22) + m12 * m12).sqrt());
@@ -149,7 +154,8 @@ impl Bend {
             };
             let e = e.normalize_or_zero();
             let pull = (-least).max(0.0);
-            let remainder = pull * extent(e) * extent(e);
+            let lost = 16.0 * f64::EPSILON * (mu_p * p.bend.length_squared() + mu_q * q.bend.length_squared());
+            let remainder = pull * extent(e) * extent(e) + lost * half.length_squared();
             if remainder < best.remainder {
                 let whole = DMat3::IDENTITY * spare + outer(q.bend, mu_q) - outer(p.bend, mu_p);
                 best =
@@ -192,6 +198,13 @@ pub fn fit(
     [even, steep, tips].into_iter().flatten()
 }
 
+/// The bound G of a positive and a negative literal of one body, where both are round alike and near each other: two sides of
+/// a thin wall, or of a crescent. With even weights it is next to linear, and moves with its body as a plane does.
+pub fn within(view: &View, side: Side, p: LiteralId, q: LiteralId) -> Option<Linear> {
+    let (face_p, face_q) = (*view.faces(side).get(p.face()), *view.faces(side).get(q.face()));
+    quadrics(view, (side, p, &face_p), (side, q, &face_q), true).filter(|l| l.normal.length() <= 1.0)
+}
+
 fn quadrics(
     view: &View,
     (side_p, p, face_p): (Side, LiteralId, &Face),
@@ -218,7 +231,10 @@ fn quadrics(
         return None;
     }
     let mu = weights(&at_p, &at_q, even);
-    let bend = Bend::of(&at_p, &at_q, mu, view.half, view.curved);
+    let own = side_p == side_q;
+    // What stays curved moves with the cell over a body of its own: bounded wherever that takes it in the span.
+    let half = if own { view.half + DVec3::splat(way) } else { view.half };
+    let bend = Bend::of(&at_p, &at_q, mu, half, view.curved);
     // Value and half the gradient of Q at the cell's centre.
     let value = |f: &Around| f.u.length_squared() - f.rho * f.rho;
     let slope = |f: &Around| f.u - f.axis.map_or(DVec3::ZERO, |a| a * (f.slope * f.rho));
@@ -227,6 +243,28 @@ fn quadrics(
     let off = view.rounding + view.motion.rounding.matrix * (at_p.arm + at_q.arm + view.radius);
     let gradient = |f: &Around| (1.0 + f.slope * f.slope) * (f.u.length() + f.rho.abs() + 2.0 * view.radius);
     let lost = off * (1.0 + 4.0 * (mu[0] * gradient(&at_p) + mu[1] * gradient(&at_q)));
+    let normal = 2.0 * (slope(&at_p) * mu[0] - slope(&at_q) * mu[1]);
+    if own {
+        // Where the body is shifts both alike: what stays is what rounding does to each offset, and to the squares. The
+        // clause takes a literal's whole rounding off, of which only the sums' share is this one's.
+        let each = |f: &Around, mu: f64| {
+            let arm = f.arm + f.u.length() + view.radius;
+            mu * f64::EPSILON
+                * (32.0 * (1.0 + f.slope) * (f.u.length() + f.slope * f.rho.abs()) * arm + 8.0 * arm * arm)
+        };
+        let reach = (round_p.origin.length() + round_q.origin.length()) * 2.0 * f64::EPSILON;
+        let lost =
+            each(&at_p, mu[0]) + each(&at_q, mu[1]) + reach + 2.0 * off * normal.length() - SPARED * view.rounding;
+        let bound = value(&at_p) * mu[0] - value(&at_q) * mu[1] - bend.remainder - lost;
+        let plane = view.plane(side_p, p, normal, bound);
+        return Some(Linear {
+            other: Some((side_q, q)),
+            weights: Some(mu),
+            point: view.center,
+            cost: bend.cost,
+            ..plane
+        });
+    }
     let m = moving(view, sigma, moved, off)?;
     let twice = 2.0 * mu_b;
     Some(Linear {
@@ -235,7 +273,7 @@ fn quadrics(
         other: Some((side_q, q)),
         weights: Some(mu),
         point: view.center,
-        normal: 2.0 * (slope(&at_p) * mu[0] - slope(&at_q) * mu[1]),
+        normal,
         bound: value(&at_p) * mu[0] - value(&at_q) * mu[1] - bend.remainder - lost,
         rate: m.rate * twice,
         turn: m.turn * twice,
@@ -243,6 +281,75 @@ fn quadrics(
         q: m.second * twice,
         rigid: false,
         cost: bend.cost,
+    })
+}
+
+/// How much faster than everything else a round face must spin about its own axis for a bound of its own.
+const SPINS: f64 = 8.0;
+
+/// The quadric of one round face of B, where that spins about its own axis more than it moves: with μ_p = 0 or μ_q = 0 what is
+/// left of G needs Q_p <= 0 or −Q_q <= 0 at a contact. A plane that is fixed in B turns away with the spin; the quadric
+/// does not know of it.
+pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
+    let face = view.b.get(id.face());
+    let around_axis = match *face {
+        Face::Plane { .. } => return None,
+        Face::Sphere { .. } => view.at.omega.length(),
+        Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => view.at.omega.dot(view.at.a_vector(axis)).abs(),
+    };
+    if around_axis == 0.0 {
+        return None;
+    }
+    let f = Round::of(face, id.sense(), view.delta)?.at(view, Side::B);
+    let w = view.at.velocity(view.center - f.u);
+    let (slides, leans) = match f.axis {
+        None => (w.length(), 0.0),
+        Some(a) => ((w - a * w.dot(a)).length(), view.at.omega.cross(a).length()),
+    };
+    if around_axis * f.u.length() <= SPINS * (slides + leans * view.radius) {
+        return None;
+    }
+    let way = view.motion.speed * view.motion.h;
+    if !(f.rho.is_finite() && f.rho > 0.0) || (f.slope > 0.0 && f.z <= view.radius + way) {
+        return None;
+    }
+    let mu = 0.5 / f.rho;
+    let (sigma, remainder, cost) = if id.sense() == Sense::Positive {
+        if f.slope > 0.0 {
+            // Not convex.
+            return None;
+        }
+        (1.0, 0.0, DVec3::ZERO)
+    } else {
+        // |y|² − (y·b)² is at most what is across the axis.
+        let across = f.axis.map_or(DVec3::ONE, |a| DVec3::ONE - a * a);
+        let extent = |v: DVec3| v.abs().dot(view.half);
+        let d = f.axis.map_or(view.radius, |a| {
+            let u = crate::math::any_perpendicular(a);
+            extent(u).hypot(extent(a.cross(u))).min(view.radius)
+        });
+        (-1.0, mu * d * d, across * view.half * view.half * mu)
+    };
+    let off = view.rounding + view.motion.rounding.matrix * (f.arm + view.radius);
+    let steep = (1.0 + f.slope * f.slope) * (f.u.length() + f.rho + 2.0 * view.radius);
+    let lost = off * (1.0 + 4.0 * mu * steep);
+    let m = moving(view, sigma, &f, off)?;
+    let gradient = f.u - f.axis.map_or(DVec3::ZERO, |a| a * (f.slope * f.rho));
+    let twice = 2.0 * mu;
+    Some(Linear {
+        side: Side::B,
+        id,
+        other: None,
+        weights: Some([mu; 2]),
+        point: view.center,
+        normal: gradient * (sigma * twice),
+        bound: sigma * mu * (f.u.length_squared() - f.rho * f.rho) - remainder - lost,
+        rate: m.rate * twice,
+        turn: m.turn * twice,
+        s: m.s * twice,
+        q: m.second * twice,
+        rigid: false,
+        cost,
     })
 }
 
@@ -272,6 +379,9 @@ pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVe
 /// The bound of a fit, its convex part yᵀCy touched at another point `y` of the cell; `None` for cones taken by their tips.
 pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
     let ((side_q, q), mu) = (fit.other?, fit.weights?);
+    if side_q == fit.side {
+        return None;
+    }
     let (p, q) = (view.faces(fit.side).get(fit.id.face()), view.faces(side_q).get(q.face()));
     if !view.curved && !matches!(p, Face::Sphere { .. }) {
         return None;

@@ -120,6 +120,8 @@ pub struct View<'a> {
     pub velocity: DVec3,
     /// Depth of the contact that is searched.
     pub delta: f64,
+    /// Depth by which a wall of one body is told to be too thin for a contact: `delta`, or a little more where that leaves room.
+    pub wall: f64,
     /// What rounding may do to a literal's plane over the cell: E, a length (`rounding::of_literals`).
     pub rounding: f64,
     /// Same-shape fits are used.
@@ -270,7 +272,7 @@ impl View<'_> {
     }
 
     /// A bound by a plane that is fixed in its body.
-    fn plane(&self, side: Side, id: LiteralId, normal: DVec3, bound: f64) -> Linear {
+    pub(super) fn plane(&self, side: Side, id: LiteralId, normal: DVec3, bound: f64) -> Linear {
         let (rate, turn) = match side {
             Side::A => (0.0, DVec3::ZERO),
             Side::B => (normal.dot(self.velocity), normal.cross(self.at.omega)),

@@ -40,12 +40,16 @@ const NONE: usize = usize::MAX;
 
 /// A basis to start from: that of the last program, whose planes were much the same.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Warm(Option<[usize; 4]>);
+pub struct Warm {
+    basis: Option<[usize; 4]>,
+    /// Pivots of the last program.
+    pub pivots: u64,
+}
 
 impl Warm {
     /// The inverse of the basis over these planes; `None` if it is none, nearly singular, or not feasible.
     fn inverse(&self, normals: &[DVec3], count: usize) -> Option<([usize; 4], [[f64; 4]; 4])> {
-        let basis = self.0?;
+        let basis = self.basis?;
         if basis.iter().any(|c| *c >= SLACKS + count) {
             return None;
         }
@@ -78,7 +82,9 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3, warm: &mut Warm) -> So
     let (mut basis, mut inv) = warm.inverse(normals, count).unwrap_or_else(|| single(normals, b, half));
     let profit = |c: usize| if c >= SLACKS { b[c - SLACKS] } else { -half[c / 2] };
     let mut y = [0.0; 4];
+    let mut pivots = 0;
     for _ in 0..MAX_PIVOTS {
+        pivots += 1;
         let p = [profit(basis[0]), profit(basis[1]), profit(basis[2]), profit(basis[3])];
         for k in 0..4 {
             y[k] = p[0] * inv[0][k] + p[1] * inv[1][k] + p[2] * inv[2][k] + p[3] * inv[3][k];
@@ -140,7 +146,7 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3, warm: &mut Warm) -> So
         }
         basis[leaving] = entering;
     }
-    warm.0 = Some(basis);
+    *warm = Warm { basis: Some(basis), pivots };
     let mut s = Solution { z: y[3], y: DVec3::new(-y[0], -y[1], -y[2]), support: [(0, 0.0); 4], count: 0 };
     s.y = s.y.clamp(-half, half);
     for r in 0..4 {

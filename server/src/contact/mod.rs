@@ -10,6 +10,7 @@ pub mod clock;
 pub mod closed;
 mod depth;
 mod direct;
+mod features;
 pub mod fit;
 mod hole;
 pub mod literal;
@@ -19,6 +20,7 @@ pub mod outcome;
 pub mod pair;
 mod propose;
 pub mod region;
+mod rescue;
 pub mod roots;
 pub mod rounding;
 pub mod search;
@@ -32,10 +34,9 @@ mod work;
 pub use asked::Asked;
 pub use clock::{Clock, Stage};
 pub(crate) use direct::{Glance, Glancing, Hull, Stance};
-pub use outcome::{Counters, Extent, Kind, Outcome, Status};
+pub use outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
 pub use pair::{
-    Body, DEFAULT_CELL_LIMIT, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, find_earliest,
-    resolution_of,
+    Body, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, find_earliest, resolution_of,
 };
 pub use region::{Region, RegionPoint, Regions};
 pub use search::Scratch;

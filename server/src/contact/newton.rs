@@ -28,6 +28,10 @@ const FARTHEST: f64 = 4.0;
 const HARDLY: f64 = 1e-6;
 /// Steps in which a slow pair passes its scale.
 const SLOW: f64 = 1e3;
+/// |Σ λ g| below which multipliers have settled.
+pub(super) const SETTLED: f64 = 1e-6;
+/// Constraints that hold a point in space and time.
+pub(super) const HELD: usize = 4;
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
 /// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
@@ -175,6 +179,61 @@ impl Problem<'_> {
     /// Solves from a starting guess. `None` when it does not converge to finite numbers, or, where one is not `patient`, not
     /// steadily.
     pub fn solve(
+        &self,
+        active: &[Constraint],
+        x: DVec3,
+        t: f64,
+        lambda: &[f64],
+        level: f64,
+        patient: bool,
+    ) -> Option<Solution> {
+        let found = self.descend(active, x, t, lambda, level, patient);
+        let is_settled = found.as_ref().is_some_and(|s| s.stationarity < SETTLED);
+        if is_settled || !patient || active.len() < HELD {
+            return found;
+        }
+        self.settle(active, x, t, level).filter(|s| s.stationarity < SETTLED).or(found)
+    }
+
+    /// The place and time of constraints that leave neither open, and the multipliers that balance there. Where one column of
+    /// the whole system is small against the others (how fast a body moves that is small against its partner) or two
+    /// faces are nearly opposite (a rim in its hole's rim), the damped steps of the whole stop short of it.
+    fn settle(&self, active: &[Constraint], x: DVec3, t: f64, level: f64) -> Option<Solution> {
+        let (x, t) = self.meet(active, x, t, level)?;
+        let at = self.relative.at(t);
+        let m = active.len();
+        let gradients: SmallVec<[DVec3; MAX_ACTIVE]> =
+            active.iter().map(|c| self.row(c, x, &at, level).gradient).collect();
+        // What is summed to 1; of apexes alone the first one is held at −1.
+        let literal = |i: usize| f64::from(u8::from(matches!(active[i], Constraint::Literal(..))));
+        let any = (0..m).any(|i| literal(i) > 0.0);
+        let (weight, total) =
+            (|i: usize| if any { literal(i) } else { f64::from(u8::from(i == 0)) }, if any { 1.0 } else { -1.0 });
+        let mut lambda: Weights = SmallVec::from_elem(0.0, m);
+        let mut sum = DVec3::ZERO;
+        // Least squares, once more for what the damping left.
+        for _ in 0..3 {
+            let (mut gram, mut rhs) = ([[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS], [0.0; MAX_UNKNOWNS]);
+            let left = total - (0..m).map(|i| weight(i) * lambda[i]).sum::<f64>();
+            for i in 0..m {
+                for j in 0..m {
+                    gram[i][j] = gradients[i].dot(gradients[j]) + weight(i) * weight(j);
+                }
+                gram[i][i] += LEAST_DAMPING;
+                rhs[i] = weight(i) * left - gradients[i].dot(sum);
+            }
+            let step = cholesky_solve(&mut gram, rhs, m)?;
+            lambda.iter_mut().zip(&step).for_each(|(l, s)| *l += s);
+            sum = gradients.iter().zip(&lambda).map(|(g, l)| *g * *l).sum();
+        }
+        let left = (total - (0..m).map(|i| weight(i) * lambda[i]).sum::<f64>()).abs();
+        let stationarity = sum.abs().max_element().max(left);
+        let active = Actives::from_slice(active);
+        stationarity.is_finite().then_some(Solution { x, t, active, lambda, stationarity })
+    }
+
+    /// Damped steps on place, time and multipliers together; see `solve`.
+    fn descend(
         &self,
         active: &[Constraint],
         x: DVec3,

@@ -88,6 +88,8 @@ pub struct Counters {
     pub newton: u64,
     /// Whole-primitive closed forms used.
     pub closed_forms: u64,
+    /// Work of stage 3 in evaluations of a literal: what cells differ in, from one to a thousand and more.
+    pub evaluations: u64,
     /// Cells' worth of work on one instant: whether a pair touches, its regions, its deepest point.
     pub instant_cells: u64,
     /// Times of contact worked out.
@@ -100,6 +102,32 @@ pub struct Counters {
     pub past_overlaps: u64,
 }
 
+/// Evaluations that count as one cell where a limit of cells is concerned; a limit below `DEFAULT_CELL_LIMIT` allows as many of
+/// them as that one does, so that few cells are few cells, however dear. So no kind of cells makes a search last longer than
+/// others.
+pub const EVALUATIONS_PER_CELL: u64 = 64;
+
+/// Cells that a pair may cost by default.
+pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
+
+impl Counters {
+    /// What counts against a limit of so many cells: the cells refined, or the evaluations that they took in cells' worth of
+    /// them (less what a small limit leaves of the default one), whichever is more.
+    pub fn spent(&self, limit: u64) -> u64 {
+        self.cells.max(self.worth(limit))
+    }
+
+    fn worth(&self, limit: u64) -> u64 {
+        (self.evaluations / EVALUATIONS_PER_CELL).saturating_sub(DEFAULT_CELL_LIMIT.saturating_sub(limit))
+    }
+
+    /// True when a search that took this, at all its depths together, would not have been cut by a limit of so many cells.
+    pub fn fits(&self, limit: u64) -> bool {
+        // At each depth the larger of both counts; at none the last cell's evaluations decide.
+        self.cells + self.worth(limit) < limit
+    }
+}
+
 impl std::ops::AddAssign for Counters {
     fn add_assign(&mut self, o: Self) {
         self.primitives += o.primitives;
@@ -110,6 +138,7 @@ impl std::ops::AddAssign for Counters {
         self.clauses += o.clauses;
         self.newton += o.newton;
         self.closed_forms += o.closed_forms;
+        self.evaluations += o.evaluations;
         self.instant_cells += o.instant_cells;
         self.times += o.times;
         self.contacts += o.contacts;
@@ -207,7 +236,8 @@ impl Outcome {
     /// The same answer with a and b exchanged.
     pub(super) fn swap_sides(&mut self) {
         self.normal = -self.normal;
-        self.direction = -self.direction;
+        // A field that is not asked for is +0, whichever body was searched first.
+        self.direction = DVec3::ZERO - self.direction;
         std::mem::swap(&mut self.faces_a, &mut self.faces_b);
     }
 }

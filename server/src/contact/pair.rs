@@ -4,6 +4,7 @@ use super::asked::Asked;
 use super::clock::Stage;
 use super::depth;
 use super::direct::{self, Quick};
+use super::features::Features;
 use super::hole;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
@@ -11,13 +12,12 @@ use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
 use super::propose::Found;
 use super::search::{Ending, Scratch, Search};
 use super::separation;
-use super::task::Task;
+use super::task::{Task, witness_level};
 use super::work::Work;
 use crate::eco::Model;
 use crate::math::tolerance;
 use crate::motion::{Instant, Placed, Relative};
-use crate::solid::local::{self, LiteralId};
-use crate::solid::{Face, Sense};
+use crate::solid::Sense;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
@@ -40,7 +40,7 @@ pub struct PairQuery<'a> {
     /// Depth delta at which a contact is decided; see `default_resolution`. Raised to `LEAST_RESOLUTION` of the pair's
     /// extent over the step; the outcome tells what was used.
     pub resolution: f64,
-    /// Cells that may be refined before the answer is `undecided`.
+    /// Cells' worth of work (`Counters::spent`) before the answer is `undecided`.
     pub cell_limit: u64,
     /// Ideas of the search that are switched on: all, unless their worth is measured.
     pub ideas: Ideas,
@@ -85,9 +85,6 @@ impl Default for Ideas {
 
 /// A hollow body counts as this much larger when the carrier of the cells is chosen.
 const HOLLOW: f64 = 2.0;
-
-/// Cells a pair may cost by default.
-pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
 
 /// 1e-9 of the larger bounding radius of the two models.
 pub fn default_resolution(a: &Model, b: &Model) -> f64 {
@@ -188,6 +185,8 @@ pub struct PairSearch<'a> {
     raised: usize,
     /// Cells that the question allows.
     limit: u64,
+    /// Cells' worth of work of the searches that have ended: at other depths.
+    spent: u64,
 }
 
 /// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
@@ -197,6 +196,25 @@ const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
 fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
     resolution + 2e-6 * resolution + more * rounding
 }
+
+/// The resolution, raised where a wall of a body is as thick as twice a depth that is searched: a point in its middle could
+/// neither be excluded nor confirmed.
+fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
+    let at_depth = |wall: f64, depth: f64| {
+        (2.0 * depth..=2.0 * (witness_level(depth, rounding) + NEARLY_DEEP * rounding)).contains(&wall)
+    };
+    for _ in 0..RAISES.len() {
+        let mut walls = models.iter().flat_map(|m| m.solid.alike.walls()).map(|above| -above);
+        if !walls.any(|wall| at_depth(wall, resolution) || at_depth(wall, 2.0 * resolution)) {
+            break;
+        }
+        resolution = raised(resolution, RAISES[0], rounding);
+    }
+    resolution
+}
+
+/// Roundings beyond a witness' depth up to which a wall counts as just that thick.
+const NEARLY_DEEP: f64 = 8.0;
 
 /// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
 pub(super) fn most_raised(resolution: f64, rounding: f64) -> f64 {
@@ -220,7 +238,7 @@ impl<'a> PairSearch<'a> {
             + relative.difference(0.0).length().max(relative.difference(1.0).length());
         let rounding = super::rounding::of_literals(model_a, model_b, &relative);
         let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
-        let resolution = query.resolution.max(least);
+        let resolution = clear_of_walls(query.resolution.max(least), rounding, [model_a, model_b]);
         let task = Task {
             a,
             b,
@@ -236,15 +254,16 @@ impl<'a> PairSearch<'a> {
             scale,
             lead: 0.0,
             limit: query.cell_limit,
+            asked_limit: query.cell_limit,
         };
         (task, swapped)
     }
 
     /// Runs as `run` does, but refines at most `cells` more cells: a search that would need more is undecided.
     pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
-        let done = self.outcome.counters.cells;
         if let Some(search) = &mut self.search {
-            let limit = self.limit.saturating_sub(done).min(search.counters.cells.saturating_add(cells));
+            let limit =
+                self.limit.saturating_sub(self.spent).min(search.counters.spent(self.limit).saturating_add(cells));
             search.task.limit = limit;
             self.task.limit = limit;
         }
@@ -270,6 +289,7 @@ impl<'a> PairSearch<'a> {
                 resolution,
                 raised: 0,
                 limit,
+                spent: 0,
             };
         }
         Self::of_task(query, task, swapped, (quick, &outcome), scratch)
@@ -290,20 +310,33 @@ impl<'a> PairSearch<'a> {
         outcome.counters.closed_forms = before.counters.closed_forms;
         let mut search = Search::new(task, scratch);
         let (mut ending, mut overlap) = (None, None);
+        // Of what has no volume nothing is asked.
+        let some = !a.is_empty() && !b.is_empty();
         match quick {
             Quick::Overlap(x) => overlap = Some(x),
             Quick::Open(along) if query.ideas.direct => ending = direct::answer(&mut search, along),
             _ => {}
         }
-        if ending.is_none() && overlap.is_none() && query.ideas.holes {
+        if ending.is_none() && overlap.is_none() && some && query.ideas.holes {
             ending = hole::answer(&mut search);
         }
-        if ending.is_none() && overlap.is_none() && !a.is_empty() && !b.is_empty() {
+        if ending.is_none() && overlap.is_none() && some {
             search.start();
         }
         let (search, limit) = (Some(search), query.cell_limit);
-        let mut pair =
-            Self { task, swapped, level: 1.0, search, ending, told: None, outcome, resolution, raised: 0, limit };
+        let mut pair = Self {
+            task,
+            swapped,
+            level: 1.0,
+            search,
+            ending,
+            told: None,
+            outcome,
+            resolution,
+            raised: 0,
+            limit,
+            spent: 0,
+        };
         if let Some(x) = overlap
             && !pair.goes_past(x, 0)
         {
@@ -388,7 +421,11 @@ impl<'a> PairSearch<'a> {
                 Some(ending) => ending,
                 None => search.run(until)?,
             };
-            let cells = search.counters.cells;
+            // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
+            let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
+            let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
+            let cells = search.counters.spent(self.limit);
+            self.spent += cells;
             self.outcome.counters += search.counters;
             search.counters = Default::default();
             match ending {
@@ -455,6 +492,11 @@ impl<'a> PairSearch<'a> {
         self.search = Some(search);
     }
 
+    /// Cells' worth of work done so far.
+    pub fn spent(&self) -> u64 {
+        self.spent + self.search.as_ref().map_or(0, |search| search.counters.spent(self.limit))
+    }
+
     /// Work done so far.
     pub fn counters(&self) -> Counters {
         let mut counters = self.outcome.counters;
@@ -496,11 +538,24 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
         tolerance: task.rounding,
     };
     let common = |x: DVec3| task.model_a.value(x).max(task.model_b.value(at.b_point(x)));
-    let x = now.filter(|x| common(*x) < common(s.x)).unwrap_or(s.x);
+    let mut x = now.filter(|x| common(*x) < common(s.x)).unwrap_or(s.x);
+    // Of round faces the way from the touch to the witness bends: what holds the bodies at the start is solved for.
+    let start = found.touch.as_ref().filter(|touch| touch.t < 0.0 && deep.t > 0.0);
+    let balance = |c: &Constraint| problem.row(c, x, &at, 0.0).gradient;
+    let start = start
+        .filter(|_| s.active.iter().zip(&s.lambda).map(|(c, l)| balance(c) * *l).sum::<DVec3>().length() > BENT)
+        .and_then(|touch| at_the_start(task, touch, deep));
+    let s = start.as_ref().unwrap_or(s);
+    x = start.as_ref().map_or(x, |s| s.x);
     o.point = task.relative.world_point(&at, x);
-    let mut active = Active::of(&problem, s);
-    if active.extent == Extent::Point && found.touch.as_ref().is_some_and(|touch| touch.t >= 0.0) {
-        active.add_incident(task, s.x, &at);
+    // Where the point is no touch, faces pass as far from it as it is deep.
+    let is_touch = found.touch.as_ref().is_some_and(|touch| touch.t >= 0.0);
+    let off = if is_touch { 0.0 } else { task.model_a.value(x).abs().max(task.model_b.value(at.b_point(x)).abs()) };
+    // Deep in each other bodies show no faces in one point: those of the solution are told.
+    let features = Features::at(task, x, &at, (task.past == 0.0).then_some(off + INCIDENT * task.rounding));
+    let mut active = Active::of(&problem, s, (x, &at), &features);
+    if active.extent == Extent::Point {
+        active.add_incident(&features);
     }
     o.kind = Kind::of_active(active.count[0], active.count[1]);
     o.faces_a = active.faces[0];
@@ -509,9 +564,37 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     o.averaged_normal = o.kind == Kind::VertexVertex;
     let normal = if o.averaged_normal { active.average.unwrap_or(active.normal) } else { active.normal };
     o.normal = (at.world_from_a * normal).normalize();
-    o.normal_speed = at.velocity(s.x).dot(normal);
+    o.normal_speed = at.velocity(x).dot(normal);
     // Of an overlap that is searched past: how deep the bodies then are.
     o.separation = if task.past > 0.0 { -2.0 * task.delta } else { 0.0 };
+}
+
+/// Gradients that miss each other by more than this are not of the point where the bodies hold each other.
+const BENT: f64 = 1e-9;
+
+/// Steps towards the depth that a contact has at the start.
+const DEPTHS: usize = 6;
+
+/// What a contact that touched before the start is at the start: its equations at the depth that it has reached by then.
+fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Solution> {
+    let problem = task.problem();
+    // Depths and times before and after it.
+    let (mut before, mut after) = ((0.0, touch.t), (witness_level(task.delta, task.rounding), deep.t));
+    let mut s = deep.clone();
+    for _ in 0..DEPTHS {
+        let level = before.0 - before.1 * (after.0 - before.0) / (after.1 - before.1);
+        s = problem.solve(&s.active, s.x, s.t, &s.lambda, level, true)?;
+        if s.t.abs() <= f64::EPSILON {
+            break;
+        }
+        *(if s.t < 0.0 { &mut before } else { &mut after }) = (level, s.t);
+    }
+    // The same contact still, at a depth between.
+    let at = task.relative.at(0.0);
+    let most = witness_level(task.delta, task.rounding) + INCIDENT * task.rounding;
+    let values = [task.model_a.value(s.x), task.model_b.value(at.b_point(s.x))];
+    let held = s.lambda.iter().zip(&s.active).all(|(l, c)| *l >= -ACTIVE || matches!(c, Constraint::Apex(..)));
+    (held && values.iter().all(|v| v.abs() <= most)).then_some(s)
 }
 
 /// Adds a face to those of a contact, once, where there is room.
@@ -536,6 +619,8 @@ struct Active {
     normal: DVec3,
     /// Average of the adjacent normals of both sides, where known.
     average: Option<DVec3>,
+    /// Sides whose apex meets the other body.
+    apex: [bool; 2],
     extent: Extent,
 }
 
@@ -543,15 +628,40 @@ struct Active {
 pub(super) const ACTIVE: f64 = 1e-8;
 
 impl Active {
-    fn of(problem: &Problem, s: &Solution) -> Self {
-        let at = problem.relative.at(s.t);
-        let mut count = [0; 2];
+    /// What holds a solution at a point and an instant: its own constraints, as far as they are active there.
+    fn of(problem: &Problem, s: &Solution, (x, at): (DVec3, &Instant), features: &Features) -> Self {
+        let mut held: SmallVec<[(Constraint, f64); 6]> =
+            s.active.iter().copied().zip(s.lambda.iter().copied()).collect();
+        let is_active = |c: &Constraint, l: f64| match *c {
+            Constraint::Literal(side, id) => l <= ACTIVE || features.has(side, id),
+            Constraint::Apex(..) => true,
+        };
+        let known = features.active.iter().all(|ids| !ids.is_empty());
+        if known && !held.iter().all(|(c, l)| is_active(c, *l)) {
+            // Of faces in one plane that which is there; else what holds the bodies there is worked out anew.
+            let mut renamed = held.clone();
+            let all = renamed.iter_mut().all(|(c, l)| match *c {
+                Constraint::Literal(side, id) if *l > ACTIVE && !features.has(side, id) => {
+                    let other = features.in_plane_of(side, id);
+                    *c = Constraint::Literal(side, other.unwrap_or(id));
+                    other.is_some()
+                }
+                _ => true,
+            });
+            if all {
+                held = renamed;
+            } else if let Some(anew) = features.held() {
+                held = anew.into_iter().map(|(side, id, l)| (Constraint::Literal(side, id), l)).collect();
+            }
+        }
+        let (mut count, mut apex) = ([0; 2], [false; 2]);
         let mut faces = [[NO_FACE; 3]; 2];
         let mut sums = [DVec3::ZERO; 2];
         let mut gradients: SmallVec<[DVec3; 6]> = SmallVec::new();
+        let mut of_side: [SmallVec<[DVec3; 6]>; 2] = Default::default();
         let mut curvature = DMat3::ZERO;
-        for (c, l) in s.active.iter().zip(&s.lambda) {
-            let row = problem.row(c, s.x, &at, 0.0);
+        for (c, l) in &held {
+            let row = problem.row(c, x, at, 0.0);
             let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
             let k = side as usize;
             sums[k] += row.gradient * *l;
@@ -560,56 +670,50 @@ impl Active {
                 Constraint::Literal(..) => *l > ACTIVE,
                 Constraint::Apex(..) => true,
             };
+            apex[k] |= matches!(c, Constraint::Apex(..));
             if active {
                 gradients.push(row.gradient);
+                of_side[k].push(row.gradient);
                 note(&mut faces[k], id.face());
-                count[k] += 1;
             }
+        }
+        // Faces in one plane are one, and those that share an edge two.
+        for k in 0..2 {
+            count[k] = if apex[k] { 3 } else { rank_of(&of_side[k]) };
         }
         let normal =
             (sums[0] - sums[1]).try_normalize().unwrap_or_else(|| gradients.first().copied().unwrap_or(DVec3::X));
-        Self { count, faces, normal, average: None, extent: extent(&gradients, curvature, problem.scale) }
+        Self { count, faces, normal, average: None, apex, extent: extent(&gradients, curvature, problem.scale) }
     }
-}
 
-impl Active {
     /// Counts the faces that pass through a point of contact without being needed to hold it there: where a vertex meets
     /// a vertex, two edges already do. The adjacent normals are averaged as the paper does.
-    fn add_incident(&mut self, task: &Task, x: DVec3, at: &Instant) {
+    fn add_incident(&mut self, features: &Features) {
         let mut sum = DVec3::ZERO;
-        for (side, model, y, sign) in [(Side::A, task.model_a, x, 1.0), (Side::B, task.model_b, at.b_point(x), -1.0)] {
-            let tol = INCIDENT * task.rounding;
-            let mut open = Vec::new();
-            let (mut normals, mut each, mut is_apex) = (DVec3::ZERO, Vec::new(), false);
-            model.literals_at(y, tol, &mut open);
-            let mut ids: Vec<LiteralId> = local::literals(&open).collect();
-            ids.sort_unstable();
-            ids.dedup();
-            for id in &ids {
-                let face = &model.solid.faces[id.face() as usize];
-                let n = match *face {
-                    Face::Cone { apex, axis, .. } if (y - apex).length() <= tol => {
-                        is_apex = true;
-                        -axis
-                    }
-                    _ => face.at(y).normal,
-                };
+        for (side, sign) in [(Side::A, 1.0), (Side::B, -1.0)] {
+            let k = side as usize;
+            let ids = &features.active[k];
+            if ids.is_empty() {
+                continue;
+            }
+            let (mut normals, mut each, mut is_apex) = (DVec3::ZERO, Vec::new(), self.apex[k]);
+            for id in ids {
+                let n = features.normal(side, *id);
+                is_apex |= features.is_apex(side, *id);
                 each.push(n);
                 normals += if id.sense() == Sense::Positive { n } else { -n };
             }
-            let k = side as usize;
             let list = &mut self.faces[k];
             if ids.len() > list.len() {
                 // More faces than are told: the first ones, whichever of them hold the contact.
-                list.iter_mut().zip(&ids).for_each(|(f, id)| *f = id.face());
+                list.iter_mut().zip(ids).for_each(|(f, id)| *f = id.face());
             }
-            for id in &ids {
+            for id in ids {
                 note(list, id.face());
             }
-            // Faces that share one edge make an edge, however many they are.
-            let rank = if is_apex { 3 } else { span_of(&each).len() };
-            self.count[k] = self.count[k].max(rank);
-            let normals = if side == Side::A { normals } else { at.a_vector(normals) };
+            // Faces that share one edge make an edge, however many they are; faces of one tangent plane are one.
+            self.count[k] = if is_apex { 3 } else { rank_of(&each) };
+            let normals = if side == Side::A { normals } else { features.turned(normals) };
             sum += normals.normalize_or_zero() * sign;
         }
         self.average = sum.try_normalize();
@@ -618,6 +722,14 @@ impl Active {
 
 /// A face within this many roundings of a contact point passes through it.
 pub(super) const INCIDENT: f64 = 16.0;
+
+/// How many tangent planes some unit normals make: at least one.
+fn rank_of(normals: &[DVec3]) -> usize {
+    match normals {
+        [] | [_] => 1,
+        _ => span_of(normals).len(),
+    }
+}
 
 /// Orthonormal basis of the span of some unit vectors (Gram-Schmidt).
 fn span_of(vectors: &[DVec3]) -> SmallVec<[DVec3; 3]> {

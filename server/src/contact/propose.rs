@@ -7,22 +7,19 @@
 //! The search asks for proposals and uses their time; it never believes one that is not confirmed here.
 
 use super::clause::{Advance, Hint};
+use super::depth;
 use super::fit;
 use super::literal::{Faces, Side};
-use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, Solution, Weights};
+use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution, Weights};
 use super::search::{Cell, Search};
+use super::separation;
 use super::task::witness_level;
+use super::work::Work;
 use crate::eco::Model;
 use crate::motion::Instant;
 use crate::solid::local::{self, LiteralId};
 use crate::solid::{Face, Sense};
 use glam::DVec3;
-
-/// |Σ λ g| below which multipliers have settled.
-const SETTLED: f64 = 1e-6;
-
-/// Steps in which the slowest motion that is told from rest passes the scale of a pair.
-const SLOWEST: f64 = 1e12;
 
 /// Witnesses this close in time are of one contact; touches this close are at the same time.
 const SAME_TIME: f64 = 1e-12;
@@ -32,6 +29,22 @@ const SAME_POINT: f64 = 1e-6;
 
 /// A cell thinner than this part of the pair's scale may be held by one body alone.
 const THIN: f64 = 1e-6;
+
+/// Halvings of the depth on the way from a witness back to its touch.
+const CONTINUATIONS: usize = 40;
+
+/// Size of a small feature against its body.
+const FEATURE: f64 = 1e-3;
+
+/// Exchanges of faces at one depth.
+const MENDS: usize = 8;
+
+/// A continuation that leads farther from its witness than this, in scales of the pair, is another contact's.
+const NOT_FAR: f64 = 1e-2;
+/// When a witness is first looked for beside a point, a part of the step; ten times later each time after …
+const FIRST_WAIT: f64 = 1e-12;
+/// … as often.
+const LATER: i32 = 11;
 
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
@@ -69,17 +82,8 @@ impl Found {
 }
 
 impl Search<'_> {
-    fn problem(&self) -> Problem<'_> {
-        let speed = self.task.relative.bounds(0.0, 1.0, self.task.scale).speed;
-        Problem {
-            a: Faces { solid: self.task.a, guards: &[] },
-            b: Faces { solid: self.task.b, guards: &[] },
-            relative: &self.task.relative,
-            scale: self.task.scale,
-            // However slow the pair: else equations that only time can meet look as if they had no solution.
-            time_scale: (self.task.scale / speed.max(f64::MIN_POSITIVE)).min(SLOWEST),
-            tolerance: 0.5 * self.task.rounding,
-        }
+    pub(super) fn problem(&self) -> Problem<'_> {
+        self.task.problem()
     }
 
     /// Tries to find the contact that a cell's weakest clause points to.
@@ -284,7 +288,21 @@ impl Search<'_> {
 
     /// Newton from a guess, with the active set mended by what the trees say; true when a contact with settled
     /// multipliers was confirmed.
-    fn polish(&mut self, mut active: Vec<Constraint>, x: DVec3, t: f64, mut lambda: Vec<f64>) -> bool {
+    fn polish(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, lambda: Vec<f64>) -> bool {
+        // A whole-primitive guess that leads nowhere is given up early: the next one is from nearer.
+        let patient = !self.stage2.all;
+        self.polish_for(patient, active, x, t, lambda)
+    }
+
+    /// The same, patient or not.
+    pub(super) fn polish_for(
+        &mut self,
+        patient: bool,
+        mut active: Vec<Constraint>,
+        x: DVec3,
+        t: f64,
+        mut lambda: Vec<f64>,
+    ) -> bool {
         let level = witness_level(self.task.delta, self.task.rounding);
         for _ in 0..7 {
             debug_assert!(
@@ -292,8 +310,6 @@ impl Search<'_> {
                 "stage 3 asks for a primitive that stage 2 has not handed over: {active:?}"
             );
             self.counters.newton += 1;
-            // A whole-primitive guess that leads nowhere is given up early: the next one is from nearer.
-            let patient = !self.stage2.all;
             let Some(s) = self.problem().solve(&active, x, t, &lambda, level, patient) else { return false };
             // Where only an unsettled witness is known, a settled one of the same time is still worth having.
             let settled = self.found.as_ref().is_none_or(|f| f.deep.stationarity < SETTLED);
@@ -347,6 +363,49 @@ impl Search<'_> {
         false
     }
 
+    /// Looks for a witness where the equations of a contact are too ill-conditioned to be solved, at the edge of a crescent: the
+    /// deepest common point beside x, a little later than `t`. What it tells is a bound on the time and no more: everything
+    /// before is still searched.
+    pub(super) fn deepen(&mut self, x: DVec3, t: f64, support: &[(Side, LiteralId, f64)]) {
+        let level = witness_level(self.task.delta, self.task.rounding) + self.task.rounding;
+        let climbed = |later: f64| {
+            let at = self.task.relative.at(later);
+            let (x, ..) = depth::climb(&self.task, &at, x, &Work::new(u64::MAX));
+            (separation::value(&self.task, &at, x) <= -level).then_some(x)
+        };
+        let (mut before, mut after) = (0.0, None);
+        for k in 0..LATER {
+            let wait = FIRST_WAIT * 10f64.powi(k);
+            if t + wait > 1.0 {
+                break;
+            }
+            if let Some(x) = climbed(t + wait) {
+                after = Some((wait, x));
+                break;
+            }
+            before = wait;
+        }
+        let Some((mut wait, mut deepest)) = after else { return };
+        while wait > 1.1 * before + 1e-2 * FIRST_WAIT {
+            let middle = 0.5 * (before + wait);
+            match climbed(t + middle) {
+                Some(x) => (wait, deepest) = (middle, x),
+                None => before = middle,
+            }
+        }
+        let total: f64 = support.iter().map(|l| l.2).sum();
+        let active: Actives = support.iter().take(MAX_ACTIVE).map(|l| Constraint::Literal(l.0, l.1)).collect();
+        let lambda: Weights = support.iter().take(MAX_ACTIVE).map(|l| l.2 / total).collect();
+        // From so near the equations may still be solved.
+        if has_both_sides(&active) && self.polish(active.to_vec(), deepest, t + wait, lambda.to_vec()) {
+            return;
+        }
+        let witness = Solution { x: deepest, t: t + wait, active, lambda, stationarity: f64::INFINITY };
+        if self.task.is_deep(deepest, &self.task.relative.at(t + wait), self.task.rounding) && witness.t < self.goal() {
+            self.accept(witness);
+        }
+    }
+
     /// The literal that keeps x from being deep in both bodies.
     fn deciding(&self, x: DVec3, at: &Instant) -> Constraint {
         let mut worst: Option<(f64, Constraint)> = None;
@@ -395,10 +454,10 @@ impl Search<'_> {
         }
         let settled = deep.stationarity < SETTLED;
         if !settled {
-            // A witness, but an earlier one lies beside it: everything before it is still searched.
-            let goal = deep.t;
+            // A witness, but an earlier one lies beside it: everything before it is still searched, and so is the start.
+            let goal = deep.t.max(f64::MIN_POSITIVE);
             if goal < self.goal() {
-                self.found = Some(Found { upper: goal, deep, touch: None, goal });
+                self.found = Some(Found { upper: deep.t, deep, touch: None, goal });
             }
             return false;
         }
@@ -416,6 +475,11 @@ impl Search<'_> {
             if continues { problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0, true) } else { None }
         });
         let touch = touch.and_then(|s| if self.is_touch(&s, deep.t) { Some(s) } else { self.touch_beside(s, deep.t) });
+        let touch = match touch {
+            Some(s) if holds(&s) => Some(s),
+            other if continues => self.continued_by_steps(&deep).or(other),
+            other => other,
+        };
         let at = self.task.relative.at(deep.t);
         let rates = deep.active.iter().zip(&deep.lambda).map(|(c, l)| l * problem.row(c, deep.x, &at, 0.0).rate);
         let speed = rates.sum::<f64>().abs().max(f64::MIN_POSITIVE);
@@ -443,11 +507,104 @@ impl Search<'_> {
     }
 
     /// True when the surfaces meet in a solution, as both whole trees say, no later than the witness.
-    fn is_touch(&self, s: &Solution, latest: f64) -> bool {
+    pub(super) fn is_touch(&self, s: &Solution, latest: f64) -> bool {
         let at = self.task.relative.at(s.t);
         let tol = 16.0 * self.task.rounding;
         let touches = |model: &Model, x: DVec3| model.value_within(x, tol).abs() <= tol;
         s.t <= latest && touches(self.task.model_a, s.x) && touches(self.task.model_b, at.b_point(s.x))
+    }
+
+    /// The touch of a witness that its own equations do not lead to: because other faces decide where the bodies are less
+    /// deep, or because they bend too much on the way. The depth is taken back by halves, the set of faces mended by what
+    /// both trees say at each; from every depth the last step is tried.
+    fn continued_by_steps(&self, deep: &Solution) -> Option<Solution> {
+        let mut from = deep.clone();
+        let mut level = witness_level(self.task.delta, self.task.rounding);
+        for _ in 0..CONTINUATIONS {
+            let last = self.mended(&from, 0.0).filter(|s| holds(s) && self.is_touch(s, deep.t));
+            if last.is_some() || level < self.task.rounding {
+                return last;
+            }
+            level *= 0.5;
+            let next = self.mended(&from, level)?;
+            // Backwards, and not to another contact far away.
+            if next.t > deep.t || (next.x - deep.x).length() > NOT_FAR * self.task.scale {
+                return None;
+            }
+            from = next;
+        }
+        None
+    }
+
+    /// The contact at a depth from one at another, its faces exchanged until both trees have that depth at its point.
+    fn mended(&self, from: &Solution, level: f64) -> Option<Solution> {
+        // Beside a far larger body, and at small round features, equations in units of the pair's scale lose all digits.
+        let own = self.task.model_a.radius.min(self.task.model_b.radius).min(self.task.scale);
+        let near = [self.task.scale, own, FEATURE * own].map(|scale| {
+            let problem = self.problem();
+            Problem { scale, time_scale: problem.time_scale * (scale / self.task.scale), ..problem }
+        });
+        let tol = 16.0 * self.task.rounding;
+        let (mut active, mut lambda) = (from.active.to_vec(), from.lambda.to_vec());
+        let (mut x, mut t) = (from.x, from.t);
+        for _ in 0..MENDS {
+            let s = near.iter().find_map(|p| {
+                let s = p.solve(&active, x, t, &lambda, level, true);
+                s.filter(|s| s.stationarity < SETTLED)
+            })?;
+            let weakest = (0..active.len())
+                .filter(|i| matches!(active[*i], Constraint::Literal(..)))
+                .min_by(|i, j| s.lambda[*i].total_cmp(&s.lambda[*j]));
+            if let Some(i) = weakest.filter(|i| s.lambda[*i] < -1e-9) {
+                if active.len() <= 2 {
+                    return None;
+                }
+                active.remove(i);
+                lambda = s.lambda.to_vec();
+                lambda.remove(i);
+                if !has_both_sides(&active) {
+                    return None;
+                }
+                continue;
+            }
+            let at = self.task.relative.at(s.t);
+            let mut entering = None;
+            for (side, model, y) in [(Side::A, self.task.model_a, s.x), (Side::B, self.task.model_b, at.b_point(s.x))] {
+                let (value, id) = model.deciding(y);
+                if (value + level).abs() > tol {
+                    entering = Some((value + level > 0.0, Constraint::Literal(side, id)));
+                    break;
+                }
+            }
+            let Some((is_outside, entering)) = entering else { return Some(s) };
+            if active.contains(&entering) {
+                return None;
+            }
+            if !is_outside {
+                // The body is deeper there than its faces say: it has others.
+                let Constraint::Literal(side, _) = entering else { unreachable!("a literal decides") };
+                let of_other =
+                    |c: &Constraint| !matches!(*c, Constraint::Literal(s, _) | Constraint::Apex(s, _, _) if s == side);
+                let kept: Vec<bool> = active.iter().map(of_other).collect();
+                let mut keep = kept.iter();
+                active.retain(|_| *keep.next().expect("one each"));
+                let mut keep = kept.iter();
+                lambda.retain(|_| *keep.next().expect("one each"));
+            } else if active.len() >= 4 {
+                active.remove(weakest?);
+                lambda.remove(weakest?);
+            }
+            active.push(entering);
+            lambda.push(0.25);
+            if !has_both_sides(&active) {
+                return None;
+            }
+            // From where the faces meet now, unless that led away.
+            if (s.x - from.x).length() <= NOT_FAR * self.task.scale {
+                (x, t) = (s.x, s.t);
+            }
+        }
+        None
     }
 
     /// A touch along a line or over a patch, at a point that the faces beside it have left meanwhile: moved to their edge.
@@ -463,7 +620,13 @@ impl Search<'_> {
     }
 }
 
-fn has_both_sides(active: &[Constraint]) -> bool {
+/// True when a solution's multipliers balance and none pulls.
+fn holds(s: &Solution) -> bool {
+    let pushes = |(c, l): (&Constraint, &f64)| matches!(c, Constraint::Apex(..)) || *l >= -1e-6;
+    s.stationarity < SETTLED && s.active.iter().zip(&s.lambda).all(pushes)
+}
+
+pub(super) fn has_both_sides(active: &[Constraint]) -> bool {
     let side = |c: &Constraint| match c {
         Constraint::Literal(s, _) | Constraint::Apex(s, _, _) => *s,
     };

@@ -3,7 +3,12 @@
 //! A contact point lies in some positive primitive of A, so A's expression is split at its bounded alternatives: an *or*
 //! into its operands, an *and* along its bounded *or*. Each root carries only its own alternative, and its box is what the
 //! positive primitives of that alternative have in common.
+//!
+//! At a negative depth −g it is {f <= g} that is split, and a point of it lies in {psi <= g} of a positive primitive: beyond
+//! the primitive's own box, and at a corner beyond that box grown by g. A box that held the primitive alone would lie
+//! inside {f <= g} and be taken for its interior, where no first contact is.
 
+use crate::bound::{Bound, Volumes};
 use crate::math::Aabb;
 use crate::solid::local::{self, Expression, Token};
 use crate::solid::{Sense, Solid};
@@ -17,31 +22,39 @@ pub struct Root {
     pub tokens: Vec<Token>,
 }
 
-/// Alternatives of an expression that is asked for within `region`. At most about `most` of them.
-pub fn alternatives(solid: &Solid, tokens: &[Token], region: &Aabb, most: usize) -> Vec<Root> {
+/// Alternatives of an expression that is asked for within `region`, for points with f <= `level` (a length, not negative). At
+/// most about `most` of them.
+pub fn alternatives(solid: &Solid, tokens: &[Token], region: &Aabb, level: f64, most: usize) -> Vec<Root> {
     let mut out = Vec::new();
-    split(solid, tokens, region, most, &mut out);
+    split(&Grown { solid, level, most }, tokens, region, &mut out);
     out
 }
 
-fn split(solid: &Solid, tokens: &[Token], region: &Aabb, most: usize, out: &mut Vec<Root>) {
-    let region = bound(solid, tokens).intersection(region);
+/// A solid whose primitives are asked for up to a level of f.
+struct Grown<'s> {
+    solid: &'s Solid,
+    level: f64,
+    most: usize,
+}
+
+fn split(of: &Grown, tokens: &[Token], region: &Aabb, out: &mut Vec<Root>) {
+    let region = bound(of, tokens).intersection(region);
     if region.is_empty() {
         return;
     }
-    if out.len() >= most {
+    if out.len() >= of.most {
         out.push(Root { region, tokens: tokens.to_vec() });
         return;
     }
     match local::first(tokens).0 {
-        Expression::Or(body) => each(body, |operand| split(solid, operand, &region, most, out)),
+        Expression::Or(body) => each(body, |operand| split(of, operand, &region, out)),
         Expression::And(body) => {
             // The bounded operand with alternatives whose boxes together are smallest; the rest rides along.
             let mut pick: Option<(usize, &[Token])> = None;
             let mut at = 0;
             each(body, |operand| {
                 if matches!(local::first(operand).0, Expression::Or(_))
-                    && bound(solid, operand).is_finite()
+                    && bound(of, operand).is_finite()
                     && pick.is_none()
                 {
                     pick = Some((at, operand));
@@ -64,7 +77,7 @@ fn split(solid: &Solid, tokens: &[Token], region: &Aabb, most: usize, out: &mut 
             each(inner, |alternative| {
                 let mut joined = Vec::new();
                 local::write_and(std::iter::once(alternative).chain(rest.iter().copied()), &mut joined);
-                split(solid, &joined, &region, most, out);
+                split(of, &joined, &region, out);
             });
         }
         Expression::Literal(_) => out.push(Root { region, tokens: tokens.to_vec() }),
@@ -80,22 +93,24 @@ fn each<'t>(mut body: &'t [Token], mut f: impl FnMut(&'t [Token])) {
     }
 }
 
-/// A box that holds an expression: a positive literal lies in its whole primitive, whose other faces stand beside it or
-/// hold throughout the region.
-fn bound(solid: &Solid, tokens: &[Token]) -> Aabb {
+/// A box that holds an expression's points with f <= level: a positive literal lies in its whole primitive, whose other faces
+/// stand beside it or hold throughout the region.
+fn bound(of: &Grown, tokens: &[Token]) -> Aabb {
     match local::first(tokens).0 {
         Expression::Literal(id) if id.sense() == Sense::Positive => {
-            solid.face_owner.get(id.face() as usize).map_or(Aabb::ALL, |p| solid.primitives[*p as usize].aabb)
+            let Some(p) = of.solid.face_owner.get(id.face() as usize) else { return Aabb::ALL };
+            let p = &of.solid.primitives[*p as usize];
+            if of.level > 0.0 { Bound::of_primitive(p, of.level, Volumes::Both).aabb } else { p.aabb }
         }
         Expression::Literal(_) => Aabb::ALL,
         Expression::And(body) => {
             let mut b = Aabb::ALL;
-            each(body, |o| b = b.intersection(&bound(solid, o)));
+            each(body, |o| b = b.intersection(&bound(of, o)));
             b
         }
         Expression::Or(body) => {
             let mut b = Aabb::EMPTY;
-            each(body, |o| b = b.union(&bound(solid, o)));
+            each(body, |o| b = b.union(&bound(of, o)));
             b
         }
     }

@@ -44,7 +44,9 @@ pub fn of_motion(a: &Model, b: &Model, [offset_a, offset_b]: [f64; 2], apart: f6
     let on_a = FACE * (reach + a.face_reach) * U;
     let seen_from_b = arm + apart + offset_b;
     let on_b = FACE * (seen_from_b + b.face_reach) * U + rounding.point(arm) + rounding.matrix * radius;
-    on_a.max(on_b) + CELL * radius * U
+    // Faces that are taken for one.
+    let same = a.solid.alike.slack.max(b.solid.alike.slack);
+    on_a.max(on_b) + CELL * radius * U + same
 }
 
 /// What the plane of a tangent has beyond E (a length), touched at this distance from the cell's centre.

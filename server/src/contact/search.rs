@@ -7,7 +7,8 @@
 //! queued is the proof that nothing came before.
 //!
 //! A cell inside one body may be dropped only at t > 0: once the start is known to be free of overlap and containment,
-//! the first contact lies on both surfaces (f_A = f_B = −delta). At t = 0 such cells are refined like any other, and a
+//! the first contact lies on both surfaces (f_A = f_B = −delta). Were x deeper in A and just at −delta in B, the same point of B
+//! was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for clearances, too. At t = 0 such cells are refined like any other, and a
 //! witness found there restarts the search at 2 delta, then means overlap.
 
 use super::clause::{self, Advance, Hint};
@@ -15,15 +16,18 @@ use super::clock::{Clock, Stage};
 use super::literal::{Side, View};
 use super::outcome::Counters;
 use super::propose::Found;
+use super::rescue;
 use super::stage2::Stage2;
 use super::task::Task;
 use crate::math::Aabb;
+use crate::math::halt::Halt;
 use crate::motion::Instant;
 use crate::solid::Face;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 /// An expression in the token pool; `start == end` means true everywhere.
 pub(super) type Range = (u32, u32);
@@ -128,6 +132,20 @@ const LEAST_ADVANCE: f64 = 1e-15;
 /// The same as a way, in roundings of a bound.
 const LEAST_STEP: f64 = 1e-2;
 
+/// Cells after which a contact that is known, and comes soon, is told as it is.
+const LONG: u64 = 20_000;
+
+/// A part of the step within which a contact comes soon.
+const SOON: f64 = 1e-6;
+
+/// Share of a bound's rounding down to which the cells at a thin wall's edge are halved.
+const SHARP: f64 = 0.05;
+
+/// Of so many cells at a thin wall one looks for a witness by another way.
+const DEEPEN_EVERY: u64 = 1000;
+/// Cells for each look at the clock, where there is a deadline.
+const CELLS_PER_LOOK: u64 = 16;
+
 /// A point this many roundings short of delta can be neither excluded nor confirmed by much.
 const NEARLY: f64 = 8.0;
 
@@ -141,12 +159,19 @@ pub struct Scratch {
     pub(super) hints: Vec<Hint>,
     pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
     clock: Option<Clock>,
+    /// Ends searches like their limit, from outside.
+    pub halt: Option<Arc<Halt>>,
 }
 
 impl Scratch {
     /// With a clock: `take_clock` tells afterwards where the time went.
     pub fn timed() -> Self {
         Self { clock: Some(Clock::default()), ..Self::default() }
+    }
+
+    /// Memory whose searches end from outside.
+    pub fn heeding(halt: Option<Arc<Halt>>) -> Self {
+        Self { halt, ..Self::default() }
     }
 
     /// What the clock says, which starts anew.
@@ -172,6 +197,10 @@ pub struct Search<'a> {
     /// Cells beyond the goal that were asked for a rival.
     rivals: u32,
     instant: Instant,
+    /// Cells after which a witness is looked for where the search has come to.
+    probe: u64,
+    /// Where the search came to its end without an answer: time and place.
+    pub(super) stuck: Option<(f64, DVec3)>,
     /// Work done so far.
     pub counters: Counters,
 }
@@ -184,7 +213,7 @@ impl<'a> Search<'a> {
         scratch.guards_b.clear();
         scratch.tried.clear();
         scratch.hints.clear();
-        scratch.clause.clauses = 0;
+        (scratch.clause.clauses, scratch.clause.evaluations) = (0, 0);
         let instant = task.relative.at(0.0);
         Self {
             task,
@@ -194,6 +223,8 @@ impl<'a> Search<'a> {
             found: None,
             rivals: 0,
             instant,
+            probe: rescue::FIRST_PROBE,
+            stuck: None,
             counters: Counters::default(),
         }
     }
@@ -260,7 +291,7 @@ impl<'a> Search<'a> {
             if cell.t >= self.goal() {
                 // Proven. What lies just behind may touch earlier all the same: a few cells are asked once more.
                 let asks = cell.source == Source::Cell && cell.t < self.horizon() && self.rivals < MAX_RIVALS;
-                if asks && self.counters.cells < self.task.limit {
+                if asks && self.counters.spent(self.task.asked_limit) < self.task.limit {
                     self.scratch.heap.pop();
                     self.rivals += 1;
                     self.refine(cell);
@@ -271,17 +302,49 @@ impl<'a> Search<'a> {
             if cell.t > until {
                 return None;
             }
+            if self.counters.cells >= LONG
+                && let Some(ending) = self.settle_for(cell.t)
+            {
+                return Some(ending);
+            }
             // Slices of time are few, and cost no cells.
-            if cell.source == Source::Cell && self.counters.cells >= self.task.limit {
+            if cell.source == Source::Cell
+                && (self.counters.spent(self.task.asked_limit) >= self.task.limit || self.is_halted())
+            {
                 return Some(Ending::Limit(cell.t));
+            }
+            if cell.source == Source::Cell && self.counters.cells >= self.probe {
+                self.probe = 2 * self.counters.cells;
+                if let Some(ending) = self.look_for_witness(&cell) {
+                    return Some(ending);
+                }
+                continue;
             }
             self.scratch.heap.pop();
             let ending = self.refine(cell);
             self.counters.clauses = self.scratch.clause.clauses;
+            self.counters.evaluations = self.scratch.clause.evaluations;
             if ending.is_some() {
                 return ending;
             }
         }
+    }
+
+    /// The ending with the contact that is known, where it comes so soon after `proven` that what is left is the sharpness of an
+    /// edge: nothing is met before, and the bracket says what is open.
+    fn settle_for(&mut self, proven: f64) -> Option<Ending> {
+        let known = self.found.as_ref()?;
+        if proven <= 0.0 || known.upper - proven > SOON {
+            return None;
+        }
+        let found = self.found.take()?;
+        Some(Ending::Contact(Found { goal: proven.min(found.goal), ..found }))
+    }
+
+    /// True once the search is to end from outside. The clock is looked at once for some cells.
+    fn is_halted(&self) -> bool {
+        let looks = self.counters.cells.is_multiple_of(CELLS_PER_LOOK);
+        self.scratch.halt.as_ref().is_some_and(|halt| if looks { halt.is_over() } else { halt.is_set() })
     }
 
     /// Refines one cell. A point deeper than delta in both bodies at t = 0 ends the search, and so does one that rounding
@@ -338,7 +401,7 @@ impl<'a> Search<'a> {
         }
         let one_sided = b_full || cell.a.0 == cell.a.1;
         let found = if b_full && cell.a.0 == cell.a.1 {
-            Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO }
+            Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 }
         } else {
             let pair = clause::Pair { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
@@ -368,7 +431,8 @@ impl<'a> Search<'a> {
             // What splitting could gain is what the cell's extents cost the bound.
             let gain = found.cost.element_sum().min(radius);
             let proven = cell.t + found.dt >= self.goal();
-            if found.dt * motion.speed >= 0.25 * gain || found.dt >= 0.25 * end || proven {
+            let far = found.dt * motion.speed >= 0.25 * gain && found.now >= 0.25 * gain;
+            if far || found.dt >= self.worthwhile() * end || proven {
                 self.again(cell, found.dt, end, false);
                 return None;
             }
@@ -386,7 +450,13 @@ impl<'a> Search<'a> {
             if cell.t >= self.goal() {
                 return None;
             }
-            if found.cost.element_sum() <= self.task.rounding {
+            let walls = self.task.has_walls();
+            // At the edge of a crescent its two faces part slower than a bound's rounding: fits know better.
+            let fine = if walls { SHARP * self.task.rounding } else { self.task.rounding };
+            if walls && self.found.is_none() && self.counters.cells.is_multiple_of(DEEPEN_EVERY) {
+                self.deepen(cell.center + found.y, cell.t, &found.support);
+            }
+            if found.cost.element_sum() <= fine {
                 // The bound is as good as rounding lets it be, and its faces may be those of a later time: what of now?
                 let view = self.task.view((cell.center, cell.half), &at, still, &self.scratch.guards_b);
                 let pair = clause::Pair { pool: &self.scratch.pool, a: cell.a, b };
@@ -396,12 +466,29 @@ impl<'a> Search<'a> {
                     return None;
                 }
                 if self.task.is_deep(cell.center + now.y, &at, -NEARLY * self.task.rounding) {
+                    if walls && self.found.is_none() {
+                        self.deepen(cell.center + now.y, cell.t, &found.support);
+                    }
+                    if walls && let Some(ending) = self.settle_for(cell.t) {
+                        return Some(ending);
+                    }
+                    self.stuck = Some((cell.t, cell.center + now.y));
                     return Some(Ending::Rounding(cell.t));
                 }
             }
         }
         self.split(cell, found.cost);
         None
+    }
+
+    /// The part of the time left that is worth taking as it is. A slow pair hardly moves in it, and smaller cells would hardly
+    /// get further: the more of them there are, the less they must ask for.
+    fn worthwhile(&self) -> f64 {
+        match self.counters.cells {
+            0..1_000 => 0.25,
+            1_000..4_000 => 1.0 / 16.0,
+            _ => 1.0 / 64.0,
+        }
     }
 
     /// True unless B is proven out of a cell's reach for the whole of its slice.

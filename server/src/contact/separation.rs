@@ -1,9 +1,11 @@
 //! How near two bodies are at one instant, without motion: what a threshold of separation decides.
 //!
-//! F(x) = max(f_A, f_B) is what both bodies' distance functions say of a point. A point with F <= level lies within
-//! `level` of both; where none exists their distance exceeds 2·level (f is 1-Lipschitz). `Cover` walks the boxes in which
-//! such a point may exist: a box is dropped once a combination of its literals' planes, the search's own bound
-//! (`clause`), proves F > level over it. So "apart" is a proof, and "within" has a witness.
+//! F(x) = max(f_A, f_B) is what both bodies' distance functions say of a point. A point within `level` of both has F <= level
+//! (f is 1-Lipschitz), and where the bodies' distance is 2·level or less there is one; so where none exists it is more. The
+//! contrary does not hold: at an edge of half angle a {f <= level} reaches out to level/sin a. `Cover` walks the boxes in which
+//! a point within `level` of both may lie: those of both bodies, grown by it, and a box is dropped once a combination of its
+//! literals' planes, the search's own bound (`clause`), proves F > level over it. So "apart" proves a distance, and
+//! "within" has a witness of F.
 //!
 //! The same walk with a level that sinks to the best point found is branch and bound: it makes the deepest point of an
 //! overlap the deepest of all, up to a tolerance.
@@ -67,7 +69,8 @@ pub(super) struct Cover<'t, 'a> {
 }
 
 impl<'t, 'a> Cover<'t, 'a> {
-    /// A cover of what two bodies have in common, as far as the work goes. Their trees are kept for depths up to `deep` and
+    /// A cover of what two bodies have in common, as far as the work goes. The boxes are those of the bodies' bounds grown by
+    /// `far`: they hold what lies within that distance of both, not all of {F <= far}. Their trees are kept for depths up to `deep` and
     /// distances up to `far`, or up to the level that is asked for.
     pub fn new(task: &'t Task<'a>, at: &'t Instant, deep: f64, far: f64, work: &'t Work) -> Self {
         let mut cover = Self {
@@ -115,6 +118,7 @@ impl<'t, 'a> Cover<'t, 'a> {
             center_b: self.at.b_point(place.center),
             velocity: DVec3::ZERO,
             delta,
+            wall: delta,
             rounding: self.task.rounding,
             fits: -delta < self.fits_below,
             multipliers: true,
@@ -192,7 +196,7 @@ pub(super) fn value(task: &Task, at: &Instant, x: DVec3) -> f64 {
 pub enum Within {
     /// A point with F <= level, A's frame.
     Witness(DVec3),
-    /// Proven: there is none.
+    /// Proven: no point is within `level` of both, and the bodies' distance exceeds twice that.
     Apart,
     /// The limit ran out before either was found.
     Open,

@@ -21,6 +21,7 @@ use crate::eco::span::primitive_span;
 use crate::eco::walk::{Detail, Next, NodePair, Walk};
 use crate::eco::{Kind, Node};
 use crate::math::Aabb;
+use crate::solid;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::{Face, NodeId, Sense, Solid};
 use glam::DVec3;
@@ -67,7 +68,8 @@ impl<'a> Search<'a> {
         let (t0, t1) = (cell.t, cell.until);
         let (placed_a, placed_b) = self.task.relative.placed();
         let (model_a, model_b) = (self.task.model_a, self.task.model_b);
-        // A clearance is a negative depth; bounds are kept for either.
+        // A clearance is a negative depth. S-bounds, octree and walk keep f clamped to ±margin, so with a margin of |delta| they
+        // hold {f <= −delta} whatever the sign is: at −g what is left of f reaches g beyond the surface, at corners further.
         let level = self.task.delta.abs();
         let mut region = None;
         if self.task.ideas.region {
@@ -106,7 +108,7 @@ impl<'a> Search<'a> {
             self.hand_over((t0, t1), &box_a, &box_b, &a, &b);
             return;
         }
-        let roots = roots::alternatives(self.task.a, &a, &box_a, MOST_ALTERNATIVES);
+        let roots = roots::alternatives(self.task.a, &a, &box_a, self.task.highest(), MOST_ALTERNATIVES);
         let detail = Detail { finest: f64::INFINITY, ..Detail::default() };
         let walk = Walk::new((model_a, placed_a), (model_b, placed_b), region, level, detail);
         let ends = self.ends(&walk, t0, t1);
@@ -126,7 +128,7 @@ impl<'a> Search<'a> {
         let full = |n: &Node| n.kind() == Kind::Full;
         while let Some(pair) = queue.pop_front() {
             self.counters.node_pairs += 1;
-            // After the start first contacts lie on both surfaces.
+            // After the start first contacts lie on both surfaces {f = −delta}; in a full voxel f is below −margin.
             if t0 > 0.0 && (full(pair.a) || full(pair.b)) {
                 continue;
             }
@@ -150,14 +152,14 @@ impl<'a> Search<'a> {
 
     /// Earliest time at which an alternative of A may meet B, and the hulls of A's and B's voxels in which it may.
     fn met(&self, root: &Root, ends: &[NodePair<'a>]) -> Option<(f64, Aabb, Aabb)> {
-        // The alternative holds only inside each of its positive primitives: one of them is tested.
+        // The alternative holds only inside each of its positive primitives, or as near as is searched: one of them is tested.
         let positive = local::literals(&root.tokens).find(|id| id.sense() == Sense::Positive);
         let primitive = positive.map(|id| &self.task.a.primitives[self.task.a.face_owner[id.face() as usize] as usize]);
         let mut found: Option<(f64, Aabb, Aabb)> = None;
         for pair in ends {
             let voxel = pair.a.aabb();
             if !voxel.meets(&root.region)
-                || primitive.is_some_and(|p| primitive_span(p, voxel.center(), voxel.half()).0 > 0.0)
+                || primitive.is_some_and(|p| primitive_span(p, voxel.center(), voxel.half()).0 > self.task.highest())
             {
                 continue;
             }
@@ -172,7 +174,10 @@ impl<'a> Search<'a> {
         let solid = if side == Side::A { self.task.a } else { self.task.b };
         match region {
             Some(r) => write_pruned(solid, if side == Side::A { &r.a } else { &r.b }, out),
-            None => local::write_tree(solid, out),
+            None => {
+                out.extend_from_slice(&solid.normal_form);
+                if solid.is_empty() { Truth::False } else { Truth::Open }
+            }
         }
     }
 
@@ -189,7 +194,10 @@ impl<'a> Search<'a> {
         if truth_a == Truth::False || truth_b == Truth::False {
             return;
         }
-        // After the start first contacts lie on both surfaces.
+        // After the start first contacts lie on both surfaces, f_A = f_B = −delta: {f <= −delta} moves with its body like any solid,
+        // so what holds for solids holds for it, whatever the sign of delta is. A box throughout which f stays below −delta by a
+        // rounding holds none of them, provided that the box was not cut from a larger set for another depth: `in_a` and `in_b`
+        // hold all of {f <= −delta} that may meet (S-bounds, octree and roots are all asked for that level).
         if t > 0.0 && (truth_a == Truth::True || truth_b == Truth::True) {
             return;
         }
@@ -258,5 +266,23 @@ const FEW_PRIMITIVES: usize = 6;
 
 /// The tree as literals with the nodes that stage 1 removed left out.
 fn write_pruned(solid: &Solid, pruned: &Pruned, out: &mut Vec<Token>) -> Truth {
+    if solid.simplified {
+        // What the whole tree says twice is said once: of its normal form the literals of the primitives left.
+        let mut left = vec![false; solid.primitives.len()];
+        let mut stack = vec![solid.root];
+        while let Some(n) = stack.pop() {
+            match &solid.nodes[n as usize] {
+                _ if !pruned.node_alive(n) => {}
+                solid::Node::Empty => {}
+                solid::Node::Primitive(p) => left[*p as usize] = true,
+                solid::Node::Op(_, children) => stack.extend(children),
+            }
+        }
+        return local::prune(&solid.normal_form, out, &mut |id| match id.sense() {
+            _ if left[solid.face_owner[id.face() as usize] as usize] => Truth::Open,
+            Sense::Positive => Truth::False,
+            Sense::Negative => Truth::True,
+        });
+    }
     local::write_node(solid, solid.root, Sense::Positive, &|n: NodeId| pruned.node_alive(n), out)
 }

@@ -2,11 +2,15 @@
 
 use super::asked::Asked;
 use super::literal::{Faces, View};
+use super::newton::Problem;
 use super::pair::Ideas;
 use crate::eco::Model;
 use crate::motion::{Bounds, Instant, Relative};
 use crate::solid::{Face, Solid};
 use glam::DVec3;
+
+/// Steps in which the slowest motion that is told from rest passes the scale of a pair.
+const SLOWEST: f64 = 1e12;
 
 /// What to search: two solids, their motion, a depth, a limit.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +41,10 @@ pub struct Task<'a> {
     pub scale: f64,
     /// Everything is proven up to this long before the contact, a fraction of the step: 0 for an answer.
     pub lead: f64,
-    /// Cells that may be refined.
+    /// Cells' worth of work that may be done (`Counters::spent`).
     pub limit: u64,
+    /// The limit that the question gives; `limit` may be lowered for a part of the search.
+    pub asked_limit: u64,
 }
 
 impl<'a> Task<'a> {
@@ -64,6 +70,7 @@ impl<'a> Task<'a> {
             center_b: at.b_point(center),
             velocity: at.velocity(center),
             delta: self.delta,
+            wall: self.delta,
             rounding: self.rounding,
             fits: self.ideas.fits,
             multipliers: self.ideas.multipliers,
@@ -71,10 +78,34 @@ impl<'a> Task<'a> {
         }
     }
 
+    /// The equations of a contact, in the pair's units.
+    pub(super) fn problem(&self) -> Problem<'_> {
+        let speed = self.relative.bounds(0.0, 1.0, self.scale).speed;
+        Problem {
+            a: Faces { solid: self.a, guards: &[] },
+            b: Faces { solid: self.b, guards: &[] },
+            relative: &self.relative,
+            scale: self.scale,
+            // However slow the pair: else equations that only time can meet look as if they had no solution.
+            time_scale: (self.scale / speed.max(f64::MIN_POSITIVE)).min(SLOWEST),
+            tolerance: 0.5 * self.rounding,
+        }
+    }
+
+    /// True where a body has a thin curved wall, or a crescent.
+    pub(super) fn has_walls(&self) -> bool {
+        self.a.alike.any_near() || self.b.alike.any_near()
+    }
+
     /// True when a witness is to be continued back to where the surfaces meet: they did so before the start if it was an
     /// overlap, and do so later than bodies are near each other.
     pub(super) fn continues(&self) -> bool {
         self.asked.time() && self.past == 0.0 && self.delta > 0.0
+    }
+
+    /// The largest f that a point searched for may have in a body: 0 at depths, the distance at a clearance.
+    pub(super) fn highest(&self) -> f64 {
+        (-self.delta).max(0.0)
     }
 
     /// Same-shape fits hold for distances of both bodies below this: half the smallest radius of a subtracted round face,
@@ -91,6 +122,7 @@ impl<'a> Task<'a> {
 
     /// True when x is deep at the start, or so nearly that rounding forbids to prove the contrary: what the first search
     /// takes for deep is searched again at twice the depth.
+    /// At a negative depth −g that is a point hardly farther than g: what keeps a distance is told to be nearer, never the contrary.
     pub(super) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
         let level = (8.0 * self.nearly).min(0.5 * self.delta.abs()) - self.delta;
         self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level

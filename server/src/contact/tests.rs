@@ -1,6 +1,7 @@
 //! Pairs with a right answer in closed form, each through the whole search.
 
 use super::*;
+use crate::contact::outcome::EVALUATIONS_PER_CELL;
 use crate::eco::Model;
 use crate::eco::testing::{pierced, simple};
 use crate::motion::Placed;
@@ -345,4 +346,64 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
     let clock = timed.take_clock().expect("a clock");
     assert!(met.counters.cells == 0 && clock.last() == Stage::Front && !clock.total().is_zero(), "{met:?} {clock:?}");
     assert!(Scratch::default().take_clock().is_none());
+}
+
+/// A fork over a plate of 25 holes: cells of many clauses, each of many literals.
+fn fork_and_plate() -> (Model, Model) {
+    let hole = |i: i32| {
+        let at = Pose::at(v(f64::from(i / 5 - 2) * 0.25, f64::from(i % 5 - 2) * 0.25, 0.0));
+        (Shape::from(Cylinder { radius: 0.08, half_height: 0.3 }), at)
+    };
+    let plate = pierced(Cuboid { half: v(0.7, 0.7, 0.1) }, (0..25).map(hole).collect());
+    let slot = |y: f64| (Shape::from(Cuboid { half: v(1.0, 0.12, 0.4) }), Pose::at(v(0., y, -0.3)));
+    (pierced(Cuboid { half: v(0.1, 0.6, 0.5) }, vec![slot(-0.25), slot(0.25)]), plate)
+}
+
+/// A limit is one of work, too: what a million cells may evaluate ends a search of fewer, whatever its own limit is below that.
+#[test]
+fn a_limit_of_cells_counts_their_work() {
+    let most = EVALUATIONS_PER_CELL * DEFAULT_CELL_LIMIT;
+    for limit in [20, 30_000, DEFAULT_CELL_LIMIT, 4 * DEFAULT_CELL_LIMIT] {
+        let allowed = EVALUATIONS_PER_CELL * limit.max(DEFAULT_CELL_LIMIT);
+        let with = |evaluations: u64| Counters { cells: 7, evaluations, ..Counters::default() };
+        assert!(with(allowed - 1).spent(limit) < limit && with(allowed).spent(limit) >= limit, "{limit}");
+        assert!(!with(allowed).fits(limit) && with(most / 2).fits(limit), "{limit}");
+        assert_eq!(Counters { cells: limit, ..Counters::default() }.spent(limit), limit);
+    }
+}
+
+/// A limit cuts the same bits again.
+#[test]
+fn a_limit_of_cells_cuts_the_same_bits() {
+    let (fork, plate) = fork_and_plate();
+    const LIMIT: u64 = 20;
+    let mut cut = 0;
+    for k in 0..60 {
+        let r = |a: f64| (f64::from(k) * a).fract() * 2.0 - 1.0;
+        let falling =
+            turn(Pose::new(v(r(0.31), r(0.47), 0.9), tilt(v(0.2, 0.1, r(0.7)))), v(0.1, 0.2, -1.2), v(0.3, 0.0, 0.4));
+        let place = Pose::IDENTITY;
+        let query = PairQuery {
+            a: Body { model: &fork, placed: Placed { place, motion: falling } },
+            b: Body { model: &plate, placed: Placed { place, motion: rest() } },
+            resolution: default_resolution(&fork, &plate),
+            cell_limit: LIMIT,
+            ideas: Ideas { direct: false, holes: false, ..Ideas::default() },
+            asked: Asked::CONTACT,
+        };
+        let o = earliest_contact(&query, &mut Scratch::default());
+        assert_eq!(o, earliest_contact(&query, &mut Scratch::default()));
+        assert!(o.counters.cells <= LIMIT && (o.counters.cells == 0) == (o.counters.evaluations == 0), "{o:?}");
+        if o.status == Status::Undecided {
+            assert!(o.counters.spent(LIMIT) >= LIMIT, "{o:?}");
+            cut += 1;
+        }
+        // Ended from outside before the first cell: nothing is known but that.
+        let halt = std::sync::Arc::new(crate::math::halt::Halt::default());
+        halt.set();
+        let ended = earliest_contact(&query, &mut Scratch::heeding(Some(halt)));
+        assert!(ended.counters.cells == 0 && matches!(ended.status, Status::Undecided | Status::Clear), "{ended:?}");
+        assert!(ended.time_lower <= o.time_upper);
+    }
+    assert!(cut > 3, "{cut} of 60 were cut");
 }

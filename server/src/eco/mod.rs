@@ -184,6 +184,13 @@ impl Model {
         }
         match self.voxel(x) {
             Some(node) if node.kind() == Kind::Full => Truth::True,
+            Some(node) if self.solid.simplified => {
+                let mut near = Vec::new();
+                match local::write_literals_at(&self.solid, node.terms(), x, tolerance, &mut near) {
+                    Truth::Open => self.solid.alike.simplified(&near, out),
+                    truth => truth,
+                }
+            }
             Some(node) => local::write_literals_at(&self.solid, node.terms(), x, tolerance, out),
             None => Truth::False,
         }

@@ -14,7 +14,7 @@
 use super::local::{Classifier, Term, whole};
 use super::tables::Kind;
 use crate::bound::SBounds;
-use crate::math::Aabb;
+use crate::math::{Aabb, halt};
 use crate::solid::Solid;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -244,6 +244,7 @@ fn classified(
     path: u64,
     work: &mut usize,
 ) -> Node {
+    halt::point();
     let (mut out, mut refs) = (vec![], vec![]);
     let mut classifier = Classifier { solid, bounds, center, half, work: 0 };
     let local = classifier.classify(terms, &mut out, &mut refs);

@@ -70,6 +70,7 @@ impl Snapshot {
             out.word(name);
             out.word(p.label.line as usize);
             out.word(p.label.column as usize);
+            out.word(p.label.mirrored.into());
             out.shape(&p.shape);
             out.numbers(p.frame.position.to_array());
             out.numbers(p.frame.rotation.to_array());
@@ -225,7 +226,13 @@ impl SnapshotView<'_> {
         let mut faces = 0;
         for _ in 0..count {
             let name = *self.names.get(from.word()? as usize).ok_or("the name of a primitive")?;
-            let label = Label { name: name.to_owned(), line: from.word()?, column: from.word()? };
+            let (line, column) = (from.word()?, from.word()?);
+            let mirrored = match from.word()? {
+                0 => false,
+                1 => true,
+                _ => return Err("whether a primitive is mirrored"),
+            };
+            let label = Label { name: name.to_owned(), line, column, mirrored };
             let shape = from.shape()?;
             let frame = from.pose()?;
             let primitive = Primitive::new(shape, frame, label, faces);

@@ -1,16 +1,17 @@
 //! Scene files: models, objects with their motions over one step, rules.
 //!
 //! TOML, every key known or refused. Errors name the file, the line, the column, what was expected and what was found.
-//! Nothing is guessed: NaN and infinity are refused, a quaternion is normalised only when it nearly is one. The models'
+//! Nothing is guessed: NaN and infinity are refused, a quaternion is normalised only when it nearly is one. What is right but has
+//! no effect (a rule for a group that no object has, which leaves its pairs without one) is a `Note`. The models'
 //! files are read by `Scene::load_models`, so that a scene can be looked at without them.
 
 use super::csg::{import_csg, read_text};
-use super::{Facets, Import, ImportError, Limits, Place};
+use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule, Track};
 use glam::DVec3;
 use serde::Deserialize;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -24,6 +25,8 @@ pub struct Scene {
     pub unit: String,
     /// Resolution for every pair, length; `None` for the default of each pair.
     pub resolution: Option<f64>,
+    /// Where the scene states its resolution.
+    pub resolution_at: Option<Place>,
     /// Duration of the step in seconds, for objects with a declared largest speed.
     pub dt: Option<f64>,
     /// Models in file order.
@@ -32,6 +35,8 @@ pub struct Scene {
     pub objects: Vec<SceneObject>,
     /// Rules in file order; none means every pair.
     pub rules: Vec<Rule>,
+    /// What stands there without effect, in file order: most likely a slip of the pen.
+    pub notes: Vec<Note>,
     /// What errors call the scene's file.
     pub file: String,
 }
@@ -52,6 +57,8 @@ pub struct ModelSource {
 pub struct SceneObject {
     /// Its name.
     pub name: String,
+    /// Where the scene names it.
+    pub at: Place,
     /// Index of its model in `Scene::models`.
     pub model: usize,
     /// Its group, for rules.
@@ -130,8 +137,8 @@ impl Scene {
             let message = e.message().lines().map(str::trim).collect::<Vec<_>>().join(", ");
             SceneError::Format { file: file.to_owned(), at, message }
         })?;
-        let resolution = raw.resolution.map(|r| checker.positive("resolution", &r)).transpose()?;
-        let dt = raw.dt.map(|dt| checker.positive("dt", &dt)).transpose()?;
+        let resolution = raw.resolution.as_ref().map(|r| checker.positive("resolution", r)).transpose()?;
+        let dt = raw.dt.as_ref().map(|dt| checker.positive("dt", dt)).transpose()?;
 
         let mut models = Vec::with_capacity(raw.model.len());
         let mut model_of: HashMap<String, usize> = HashMap::new();
@@ -157,8 +164,10 @@ impl Scene {
         for r in &raw.rule {
             rules.push(checker.rule(r, &object_of)?);
         }
+        let notes = checker.without_effect(&raw, &objects);
         let unit = raw.unit.unwrap_or_default();
-        Ok(Self { unit, resolution, dt, models, objects, rules, file: file.to_owned() })
+        let resolution_at = raw.resolution.as_ref().map(|r| checker.place(r));
+        Ok(Self { unit, resolution, resolution_at, dt, models, objects, rules, notes, file: file.to_owned() })
     }
 
     /// Reads every model of the scene, in order.
@@ -240,7 +249,7 @@ struct RawPose {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawRule {
-    between: [String; 2],
+    between: [Spanned<String>; 2],
     #[serde(default)]
     except: Vec<[Spanned<String>; 2]>,
     detect: Option<Spanned<String>>,
@@ -358,10 +367,10 @@ impl Checker<'_> {
             },
         };
         // The numbers were checked one by one: what a step would refuse has been refused.
-        let motion =
-            record.decode().map_or(Motion::resting(start.pose), |order| Track::ordered(start.pose, order).motion);
-        let record = (!motion.is_rest()).then_some(record);
-        if is_static && !motion.is_rest() {
+        let track = record.decode().map_or(Track::resting(start.pose), |order| Track::ordered(start.pose, order));
+        let motion = track.motion;
+        let record = (!track.is_rest()).then_some(record);
+        if is_static && !track.is_rest() {
             return Err(self.wrong(&o.name, &format!("a static object \"{name}\" that rests"), "one that moves"));
         }
         if o.rotates == Some(false) && motion.spin != DVec3::ZERO {
@@ -371,6 +380,7 @@ impl Checker<'_> {
         let max_speed = o.max_speed.as_ref().map(|v| self.positive("max_speed", v)).transpose()?;
         Ok(SceneObject {
             name: name.clone(),
+            at: self.place(&o.name),
             model,
             group: o.group.clone().unwrap_or_else(|| "default".into()),
             is_static,
@@ -383,7 +393,7 @@ impl Checker<'_> {
     }
 
     fn rule(&self, r: &RawRule, objects: &HashMap<String, usize>) -> Result<Rule, SceneError> {
-        let mut rule = Rule::new(r.between.clone());
+        let mut rule = Rule::new([0, 1].map(|i| r.between[i].as_ref().clone()));
         for pair in &r.except {
             for name in pair {
                 if !objects.contains_key(name.as_ref()) {
@@ -415,6 +425,69 @@ impl Checker<'_> {
         rule.penetration = r.penetration;
         rule.sensor = r.sensor;
         Ok(rule)
+    }
+
+    /// What stands in a scene without effect: models of no object, rules that decide for no pair, exceptions that except none,
+    /// and the duration of a step that no declaration asks for.
+    fn without_effect(&self, raw: &RawScene, objects: &[SceneObject]) -> Vec<Note> {
+        let mut notes = Vec::new();
+        let mut note = |at: Place, text: String| notes.push(Note { at, text, amount: None });
+        if let (Some(dt), true) = (&raw.dt, objects.iter().all(|o| o.max_speed.is_none())) {
+            note(self.place(dt), "dt has no effect: no object has a max_speed".into());
+        }
+        let used: HashSet<usize> = objects.iter().map(|o| o.model).collect();
+        for (_, m) in raw.model.iter().enumerate().filter(|(i, _)| !used.contains(i)) {
+            note(self.place(&m.name), format!("no object is of the model \"{}\"", m.name.as_ref()));
+        }
+        // How many objects each group has, and the group of each object.
+        let mut members: HashMap<&str, usize> = HashMap::new();
+        objects.iter().for_each(|o| *members.entry(&o.group).or_default() += 1);
+        let group_of: HashMap<&str, &str> = objects.iter().map(|o| (o.name.as_str(), o.group.as_str())).collect();
+        let mut decided: HashSet<[&str; 2]> = HashSet::new();
+        for r in &raw.rule {
+            let mut groups = [r.between[0].as_ref().as_str(), r.between[1].as_ref().as_str()];
+            let strangers = r.between.iter().filter(|g| !members.contains_key(g.as_ref().as_str()));
+            let mut known = true;
+            for g in strangers {
+                known = false;
+                note(
+                    self.place(g),
+                    format!("the rule decides for no pair: no object is of the group \"{}\"", g.as_ref()),
+                );
+            }
+            if known && groups[0] == groups[1] && members[groups[0]] == 1 {
+                let text = format!("the rule decides for no pair: the group \"{}\" has one object only", groups[0]);
+                note(self.place(&r.between[0]), text);
+            }
+            groups.sort_unstable();
+            if decided.contains(&groups) {
+                let text = "the rule decides for no pair: one before it has the same groups and no exceptions".into();
+                note(self.place(&r.between[0]), text);
+            }
+            if r.except.is_empty() {
+                decided.insert(groups);
+            }
+            for [a, b] in &r.except {
+                let mut theirs = [a, b].map(|name| group_of.get(name.as_ref().as_str()).copied().unwrap_or_default());
+                theirs.sort_unstable();
+                if theirs != groups || a.as_ref() == b.as_ref() {
+                    let pair = format!("\"{}\" and \"{}\"", a.as_ref(), b.as_ref());
+                    note(
+                        self.place(a),
+                        format!("the exception has no effect: {pair} are no pair of the rule's groups"),
+                    );
+                }
+            }
+            if r.detect.as_ref().is_some_and(|d| d.as_ref() == Detect::Off.name()) {
+                let words = [&r.report, &r.initial_overlap].into_iter().flatten().map(|w| self.place(w));
+                let set = words.chain(r.margin.as_ref().map(|m| self.place(m))).min_by_key(|p| (p.line, p.column));
+                if let Some(at) = set {
+                    note(at, "what the rule asks for has no effect beside detect = \"off\"".into());
+                }
+            }
+        }
+        notes.sort_by_key(|n| (n.at.line, n.at.column));
+        notes
     }
 
     fn wrong_word(&self, word: &Spanned<String>, words: impl Iterator<Item = &'static str>) -> SceneError {
@@ -583,5 +656,47 @@ mod tests {
         assert!(error.starts_with("s.toml:3:8: expected a model file, found parts/m.csg: "), "{error}");
         let error = read_scene(Path::new("nowhere.toml")).expect_err("no such file").to_string();
         assert!(error.starts_with("nowhere.toml: expected a readable file, found "), "{error}");
+    }
+
+    #[test]
+    fn what_has_no_effect_is_told() {
+        let objects = "[[object]]\nname = \"a\"\nmodel = \"m\"\ngroup = \"cell\"\n[[object]]\nname = \"b\"\nmodel = \"m\"\n\
+            group = \"robot\"\n[[object]]\nname = \"c\"\nmodel = \"m\"\ngroup = \"robot\"\n";
+        let notes = |rest: &str| -> Vec<String> {
+            let scene = parse(&format!("{MODELS}{objects}{rest}")).unwrap_or_else(|e| panic!("{rest}: {e}"));
+            scene.notes.iter().map(ToString::to_string).collect()
+        };
+        let rule = |lines: &str| notes(&format!("[[rule]]\n{lines}\n"));
+        for lines in [
+            "between = [\"cell\", \"robot\"]",
+            "between = [\"robot\", \"robot\"]\nexcept = [[\"c\", \"b\"]]\n[[rule]]\nbetween = [\"robot\", \"robot\"]",
+            "between = [\"robot\", \"cell\"]\nexcept = [[\"c\", \"a\"]]\ndetect = \"off\"",
+        ] {
+            assert_eq!(rule(lines), Vec::<String>::new(), "{lines}");
+        }
+        let none = "the rule decides for no pair";
+        for (lines, note) in [
+            ("between = [\"cel\", \"robot\"]", format!("17:12: {none}: no object is of the group \"cel\"")),
+            ("between = [\"cell\", \"Robot\"]", format!("17:20: {none}: no object is of the group \"Robot\"")),
+            ("between = [\"cell\", \"cell\"]", format!("17:12: {none}: the group \"cell\" has one object only")),
+            (
+                "between = [\"cell\", \"robot\"]\n[[rule]]\nbetween = [\"robot\", \"cell\"]",
+                format!("19:12: {none}: one before it has the same groups and no exceptions"),
+            ),
+            (
+                "between = [\"cell\", \"robot\"]\nexcept = [[\"b\", \"c\"]]",
+                "18:12: the exception has no effect: \"b\" and \"c\" are no pair of the rule's groups".into(),
+            ),
+            (
+                "between = [\"cell\", \"robot\"]\ndetect = \"off\"\nmargin = 1.0\nreport = \"time\"",
+                "19:10: what the rule asks for has no effect beside detect = \"off\"".into(),
+            ),
+        ] {
+            assert_eq!(rule(lines), [note], "{lines}");
+        }
+        let unused = notes("[[model]]\nname = \"n\"\nfile = \"n.csg\"");
+        assert_eq!(unused, ["17:8: no object is of the model \"n\""]);
+        let scene = parse(&format!("dt = 0.5\n{MODELS}{objects}")).expect("readable");
+        assert_eq!(scene.notes[0].to_string(), "1:6: dt has no effect: no object has a max_speed");
     }
 }

@@ -1,6 +1,7 @@
 //! What a server is told at its start: limits and waiting. Every field has a default that suits a workstation.
 
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -18,9 +19,11 @@ pub struct ServerConfig {
     pub records: usize,
     /// Bytes of a model's text.
     pub text: usize,
+    /// Megabytes of the texts of a session's models together.
+    pub models_mb: u64,
     /// Nodes of a model's tree.
     pub nodes: usize,
-    /// Depth of a model's tree.
+    /// Depth of a model's tree; trees are walked by recursion, so this may be lowered alone.
     pub depth: usize,
     /// Faces of a model.
     pub faces: usize,
@@ -29,6 +32,9 @@ pub struct ServerConfig {
     pub spin_us: u64,
     /// Seconds after which a session ends whose client cannot be watched (another pid namespace) and asks nothing.
     pub idle_s: u64,
+    /// Milliseconds within which a step is answered; what is not known by then is undecided. 0: work alone limits a step, and
+    /// its answer does not depend on time.
+    pub deadline_ms: u64,
     /// Folder for preprocessed models, or `"off"`.
     pub cache: CacheFolder,
     /// Megabytes that the files in it may take; those used longest ago go first.
@@ -69,11 +75,13 @@ impl Default for ServerConfig {
             batch: 1 << 20,
             records: 1 << 20,
             text: limits.text,
+            models_mb: 256,
             nodes: limits.nodes,
             depth: limits.depth,
             faces: limits.faces,
             spin_us: 30,
             idle_s: 300,
+            deadline_ms: 0,
             cache: CacheFolder::default(),
             cache_mb: crate::cache::DEFAULT_BYTES >> 20,
         }
@@ -100,17 +108,32 @@ impl ServerConfig {
             let at = crate::import::Place::of_offset(text, e.span().map_or(0, |s| s.start));
             format!("{file}:{at}: {}", e.message())
         })?;
+        let limits = crate::import::Limits::default();
+        // The values' places; what could be read once can be read again.
+        let places: BTreeMap<String, toml::Spanned<toml::Value>> = toml::from_str(text).unwrap_or_default();
         let bounded = [
             ("sessions", config.sessions, 200),
             ("objects", config.objects, 1 << 24),
             ("batch", config.batch, 1 << 24),
             ("records", config.records, 1 << 24),
             ("text", config.text, contactd_proto::control::DECODE_LIMIT - (1 << 20)),
+            ("nodes", config.nodes, 1 << 30),
+            ("depth", config.depth, limits.depth),
+            ("faces", config.faces, 1 << 30),
+            ("idle_s", usize::try_from(config.idle_s).unwrap_or(usize::MAX), 1 << 31),
+            ("models_mb", config.models_mb as usize, 1 << 20),
             ("cache_mb", config.cache_mb as usize, 1 << 20),
         ];
-        for (name, value, most) in bounded {
-            if value == 0 || value > most {
-                return Err(format!("{file}: {name} = {value}: expected 1 to {most}"));
+        let spin = usize::try_from(config.spin_us).unwrap_or(usize::MAX);
+        let deadline = usize::try_from(config.deadline_ms).unwrap_or(usize::MAX);
+        let each = bounded.map(|(name, value, most)| (name, value, 1, most));
+        for (name, value, least, most) in
+            each.into_iter().chain([("spin_us", spin, 0, 1_000_000), ("deadline_ms", deadline, 0, 1 << 31)])
+        {
+            if !(least..=most).contains(&value) {
+                let start = places.get(name).map_or(0, |v| v.span().start);
+                let at = crate::import::Place::of_offset(text, start);
+                return Err(format!("{file}:{at}: {name} = {value}: expected {least} to {most}"));
             }
         }
         Ok(config)
@@ -137,7 +160,12 @@ mod tests {
         for (text, what) in [
             ("sessions = 3\nsesions = 4", "c.toml:2:1: unknown field"),
             ("sessions = \"x\"", "c.toml:1:12: invalid type"),
-            ("sessions = 0", "sessions = 0: expected 1 to 200"),
+            ("sessions = 0", "c.toml:1:12: sessions = 0: expected 1 to 200"),
+            ("sessions = 2\nidle_s = 0", "c.toml:2:10: idle_s = 0: expected 1 to 2147483648"),
+            ("nodes = 0", "c.toml:1:9: nodes = 0: expected 1 to 1073741824"),
+            ("faces = 0", "c.toml:1:9: faces = 0: expected 1 to 1073741824"),
+            ("depth = 1001", "c.toml:1:9: depth = 1001: expected 1 to 1000"),
+            ("spin_us = 1000001", "c.toml:1:11: spin_us = 1000001: expected 0 to 1000000"),
             ("sessions = ", "c.toml:1:"),
             ("cache_mb = 0", "cache_mb = 0: expected 1 to 1048576"),
             ("cache = 1", "c.toml:1:9: invalid type"),

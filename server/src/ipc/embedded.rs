@@ -45,7 +45,7 @@ impl Embedded {
 
     fn import(&mut self, import: Import) -> Answer {
         let loaded = self.models.load(&import.name, &import.text, import.facets);
-        self.scene.loaded(import.model, loaded)
+        self.scene.loaded(import.model, import.text.len(), loaded)
     }
 }
 
@@ -83,7 +83,7 @@ impl Transport for Embedded {
 
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         let Self { scene, records, slots, .. } = self;
-        let reply = scene.step(&request, records, |n, reply, slot| {
+        let reply = scene.step(&request, records, None, |n, reply, slot| {
             slots.clear();
             slots.extend((0..n).map(slot));
             reply

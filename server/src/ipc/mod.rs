@@ -1,7 +1,7 @@
 //! The server's two doors: shared memory for other processes, and an embedded session for the caller's own.
 //!
 //! Both lead to the same `scene`: commands and steps on one session's world. The loop (`serve`) takes steps as they come
-//! and waits by spinning first and blocking then; imports run beside it on a thread of their own. `root` makes sure that
+//! and waits by spinning first and blocking then; long steps (`relay`), imports and mass properties (`jobs`) run beside it. `root` makes sure that
 //! one server of a name runs, that a killed predecessor is no obstacle, and that nothing stays behind.
 //!
 //! Invariant: what lies in shared memory is copied before it is branched on. It is no security boundary between
@@ -11,7 +11,9 @@
 
 pub mod config;
 mod embedded;
+mod jobs;
 mod models;
+mod relay;
 mod root;
 mod scene;
 mod serve;
@@ -19,4 +21,4 @@ mod services;
 
 pub use config::{CacheFolder, ServerConfig};
 pub use embedded::{Embedded, embedded};
-pub use serve::{ServeError, Server, serve};
+pub use serve::{ServeError, Server, ready_threads, serve};

@@ -6,12 +6,13 @@
 use super::config::ServerConfig;
 use crate::cache::{self, Cache, Prepared};
 use crate::import::{self, ImportError, Problem};
+use crate::math::halt;
 use crate::solid::Sense;
 use crate::world::{Part, Refusal};
 use contactd_proto::ErrorCode;
 use contactd_proto::control::{FaceName, Facets};
 use std::collections::HashMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// A model as sessions use it.
@@ -51,7 +52,7 @@ impl Models {
         if let Some(known) = known {
             return Ok(known);
         }
-        let made = catch_unwind(AssertUnwindSafe(|| self.make(name, text, facets)));
+        let made = halt::catch(|| self.make(name, text, facets));
         let loaded =
             made.unwrap_or_else(|_| Err(Refusal::new(ErrorCode::Internal, format!("{name}: import failed"))))?;
         let loaded = Arc::new(loaded);
@@ -79,8 +80,9 @@ impl Models {
     }
 }
 
-fn warn(sentence: &str) {
-    eprintln!("contactd: {sentence}");
+/// A line on standard error, if anybody reads it: a terminal that is gone is no reason to end.
+pub fn warn(sentence: &str) {
+    let _ = writeln!(std::io::stderr(), "contactd: {sentence}");
 }
 
 fn loaded(Prepared { model, notes, .. }: Prepared) -> Loaded {
@@ -91,7 +93,7 @@ fn loaded(Prepared { model, notes, .. }: Prepared) -> Loaded {
         FaceName {
             primitive,
             name: p.label.name.clone(),
-            face: p.shape.geometry().face_name(id - p.first_face as usize),
+            face: p.face_name(id - p.first_face as usize),
             subtracted: solid.senses[primitive as usize] == Sense::Negative,
         }
     });

@@ -3,7 +3,8 @@
 use super::config::ServerConfig;
 use super::models::Loaded;
 use crate::eco::mass::mass_properties;
-use crate::world::{ObjectSpec, Refusal, StepOptions, World, record};
+use crate::math::halt;
+use crate::world::{Heed, ObjectSpec, Refusal, StepOptions, World, record};
 use contactd_proto::control::{Answer, Command, Facets, ObjectSpec as WireObject, WireMass};
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::step::{ASK_ALL, ASK_CLEAR, ASK_DETAILS, ASK_FIRST, NO_INDEX, STEP_REFUSED};
@@ -18,6 +19,9 @@ pub struct Scene {
     world: World,
     models: HashMap<u32, Arc<Loaded>>,
     last_model: u32,
+    /// Bytes of the texts of its models, and the most that they may have.
+    text: u64,
+    max_text: u64,
     max_records: usize,
     /// Set for good when the engine failed within a step: its world can no longer be trusted.
     broken: bool,
@@ -44,7 +48,7 @@ pub struct Integration {
 impl Integration {
     /// Computes the answer; may take seconds.
     pub fn answer(&self) -> Answer {
-        let computed = catch_unwind(AssertUnwindSafe(|| mass_properties(&self.model.part.model, &self.options)));
+        let computed = halt::catch(|| mass_properties(&self.model.part.model, &self.options));
         match computed {
             Ok(Ok(mass)) => Answer::Mass(WireMass::from(&mass)),
             Ok(Err(e)) => refused(Refusal::new(e.code(), e.to_string())),
@@ -73,6 +77,8 @@ impl Scene {
             world: World::new(config.objects, config.batch),
             models: HashMap::new(),
             last_model: 0,
+            text: 0,
+            max_text: config.models_mb << 20,
             max_records: config.records,
             broken: false,
         }
@@ -83,12 +89,13 @@ impl Scene {
         self.obey(command).unwrap_or_else(|refusal| Outcome::Answered(refused(refusal)))
     }
 
-    /// Takes an imported model.
-    pub fn loaded(&mut self, model: u32, loaded: Result<Arc<Loaded>, Refusal>) -> Answer {
+    /// Takes an imported model, of a text of so many bytes.
+    pub fn loaded(&mut self, model: u32, text: usize, loaded: Result<Arc<Loaded>, Refusal>) -> Answer {
         match loaded {
             Ok(loaded) => {
                 let answer = Answer::Loaded { faces: loaded.faces.clone(), warnings: loaded.warnings.clone() };
                 self.last_model = self.last_model.max(model);
+                self.text += text as u64;
                 self.models.insert(model, loaded);
                 answer
             }
@@ -105,6 +112,11 @@ impl Scene {
                 if model <= self.last_model {
                     let detail = format!("model id {model} was used before");
                     return Err(Refusal::new(ErrorCode::BadCommand, detail));
+                }
+                let after = self.text + text.len() as u64;
+                if after > self.max_text {
+                    let detail = format!("{name}: {after} bytes of models, the limit is {}", self.max_text);
+                    return Err(Refusal::new(ErrorCode::LimitMemory, detail));
                 }
                 return Ok(Outcome::Import(Import { model, name, text, facets }));
             }
@@ -158,12 +170,13 @@ impl Scene {
         })
     }
 
-    /// One step. `request` is a copy of the header; `write` is called once with the number of slots (0 for a refusal),
+    /// One step, which heeds what is said to it meanwhile. `request` is a copy of the header; `write` is called once with the number of slots (0 for a refusal),
     /// the header of the reply and the slots by index, and passes them on.
     pub fn step<R>(
         &mut self,
         request: &StepRequest,
         records: &[PoseRecord],
+        heed: Option<&Heed>,
         write: impl FnOnce(usize, StepReply, &dyn Fn(usize) -> ContactRecord) -> R,
     ) -> R {
         let refuse = |code: ErrorCode, index: Option<u32>| refusal(request, code, index);
@@ -196,7 +209,7 @@ impl Scene {
             batch_limit: request.batch_limit.into(),
         };
         let world = &mut self.world;
-        let stepped = catch_unwind(AssertUnwindSafe(|| world.step(&records[..n], &options).map(|_| ())));
+        let stepped = catch_unwind(AssertUnwindSafe(|| world.step_heeding(&records[..n], &options, heed).map(|_| ())));
         match stepped {
             Err(_) => {
                 self.broken = true;

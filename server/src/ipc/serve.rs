@@ -1,18 +1,22 @@
-//! The server's loop: steps first, then commands, then finished jobs; spin, then block.
+//! The server's loop: steps first, then commands, then what other threads have done; spin, then block.
 //!
-//! One thread answers all sessions in the order in which their requests are found. Imports and mass properties are jobs for
-//! a thread of their own, so that a large model delays only its own session. Clients that died are noticed by their pidfd,
-//! those that left unheard by the port that they no longer have; both lose their sessions, and what they held in shared
-//! memory is freed.
+//! One thread leads: it takes requests as they come and runs steps itself. A step that takes long keeps its thread and loses
+//! the lead (`relay`); from then on the session has a thread of its own for its steps, of low priority, until they are
+//! short again. Imports and mass properties are jobs on threads of their own (`jobs`). So a session whose steps or models
+//! take long delays nobody but itself, and what nobody waits for any more is ended. Clients that died are noticed by their
+//! pidfd, those that left unheard by the port that they no longer have; both lose their sessions, and what they held in
+//! shared memory is freed.
 
 use super::config::ServerConfig;
-use super::models::{Loaded, Models};
+use super::jobs::{Finished, Job, Work};
+use super::models::{Models, warn};
+use super::relay::Relay;
 use super::root::{Root, RootError};
-use super::scene::{Import, Integration, Outcome, Scene, refusal, refused};
+use super::scene::{Outcome, Scene, refusal, refused};
 use super::services::{Services, Wake};
-use crate::world::Refusal;
+use crate::world::{Crew, Heed, Refusal, yield_to_others};
 use contactd_client::Error;
-use contactd_client::shm::link::Variant;
+use contactd_client::shm::link::Shared;
 use contactd_client::shm::watch::ProcessWatch;
 use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, encode};
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
@@ -20,14 +24,19 @@ use contactd_proto::status::StatusRecord;
 use contactd_proto::step::ASK_POLLING;
 use contactd_proto::{ContactRecord, EffectCounters, ErrorCode, PoseRecord, StepReply, StepRequest};
 use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::response_mut::ResponseMut;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::Weak;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::{Builder, Scope};
 use std::time::{Duration, Instant};
 
-type StepCall = ActiveRequest<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
-type ControlCall = ActiveRequest<Variant, [u8], ControlHeader, [u8], ControlHeader>;
+type StepCall = ActiveRequest<Shared, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
+type StepResponse = ResponseMut<Shared, [ContactRecord], StepReply>;
+type ControlCall = ActiveRequest<Shared, [u8], ControlHeader, [u8], ControlHeader>;
 
 /// Time between two looks at the clients' lives, and the longest wait.
 const BEAT: Duration = Duration::from_millis(50);
@@ -35,8 +44,13 @@ const BEAT: Duration = Duration::from_millis(50);
 const LATELY: Duration = Duration::from_millis(200);
 /// Looks for a step for each look at all else, while it polls.
 const LOOKS: usize = 8;
-/// The longest wait while a job runs: its end wakes nobody.
-const JOB_BEAT: Duration = Duration::from_millis(1);
+/// A step on a thread of its session's own is short below this; after so many of them in a row the session has none any more.
+const SHORT: Duration = Duration::from_millis(1);
+const CALM: u32 = 16;
+/// How long the end of a server waits for what it has cancelled.
+const CANCELLED: Duration = Duration::from_secs(2);
+/// The part of a deadline that is left to the reply.
+const REPLY_PART: u32 = 10;
 
 /// How long after the opening of its session a client may come to listen. Only one that could not take the answer needs longer.
 const ARRIVAL: Duration = Duration::from_secs(5);
@@ -47,8 +61,8 @@ pub enum ServeError {
     /// It has no place.
     #[error(transparent)]
     Root(#[from] RootError),
-    /// There are no threads for jobs.
-    #[error("expected threads for imports, found {0}")]
+    /// A thread cannot be started.
+    #[error("expected to start threads, found: {0}")]
     Threads(String),
     /// Shared memory failed.
     #[error("{0}")]
@@ -63,16 +77,24 @@ impl From<Error> for ServeError {
 
 /// One client's session.
 struct Session {
-    scene: Scene,
-    wake: Wake,
+    /// Its scene; `None` while another thread runs a step on it.
+    scene: Option<Box<Scene>>,
+    wake: Arc<Wake>,
     opened: Instant,
     /// Its client was seen to listen, or has asked something, before which it listens.
     arrived: bool,
     /// `None`: the client's process is not visible from here.
     life: Option<ProcessWatch>,
     last_request: Instant,
+    /// Its client polled for the reply to its last step.
+    polls: bool,
     /// A job of its is under way.
     waiting: bool,
+    /// What its step under way heeds, or its next.
+    heed: Arc<Heed>,
+    /// Its own thread, since its steps take long; and how many short ones in a row it has run.
+    thread: Option<Sender<Task>>,
+    calm: u32,
 }
 
 impl Session {
@@ -85,137 +107,290 @@ impl Session {
     fn is_over(&mut self, idle: Duration) -> bool {
         let is_gone = match &self.life {
             Some(life) => life.is_dead(),
-            None => self.last_request.elapsed() >= idle,
+            None => self.scene.is_some() && self.last_request.elapsed() >= idle,
         };
         let is_heard = self.wake.is_heard();
         self.arrived |= is_heard;
         is_gone || !is_heard && (self.arrived || self.opened.elapsed() >= ARRIVAL)
     }
+
+    /// Its client may be polling, or will soon ask.
+    fn is_active(&self) -> bool {
+        // While a long step is under way a client that does not poll has gone to sleep.
+        self.last_request.elapsed() < LATELY && (self.polls || self.thread.is_none())
+    }
 }
 
-/// What takes too long for the loop.
-enum Job {
-    Import(Import),
-    Integrate(Integration),
+impl Drop for Session {
+    fn drop(&mut self) {
+        // Nobody waits for what is under way.
+        self.heed.halt();
+    }
 }
 
-/// What came of it.
-enum Finished {
-    Imported(u32, Result<Arc<Loaded>, Refusal>),
-    Integrated(Answer),
+/// What other threads tell the leader, and its bell.
+struct Desk {
+    told: Sender<(u64, Told)>,
+    bell: Notifier<Shared>,
 }
 
-impl Job {
-    fn run(self, models: &Models) -> Finished {
-        match self {
-            Job::Import(i) => Finished::Imported(i.model, models.load(&i.name, &i.text, i.facets)),
-            Job::Integrate(integration) => Finished::Integrated(integration.answer()),
+impl Desk {
+    fn tell(&self, session: u64, told: Told) {
+        if self.told.send((session, told)).is_ok() {
+            // Where the bell does not ring the next beat finds it.
+            let _ = self.bell.notify();
         }
     }
 }
 
-/// A server that holds its place and has created its services. Dropped in the order of its fields, the place last.
-pub struct Server {
-    pending: Vec<(u64, ControlCall)>,
+/// What they tell.
+enum Told {
+    /// A job is done.
+    Job(Finished),
+    /// A step is done, or as good as.
+    Stepped { scene: Box<Scene>, effects: EffectCounters, short: bool, thread: Option<Sender<Task>> },
+}
+
+/// A step of a session, with all that it takes.
+struct Task {
+    session: u64,
+    scene: Box<Scene>,
+    heed: Arc<Heed>,
+    request: StepRequest,
+    call: StepCall,
+    wake: Arc<Wake>,
+    desk: Arc<Desk>,
+}
+
+impl Task {
+    /// Runs it; the reply is written and not yet sent.
+    fn run(&mut self) -> (EffectCounters, Option<StepResponse>) {
+        let Self { scene, heed, request, call, .. } = self;
+        scene.step(request, call.payload(), Some(heed), |n, reply, slot| {
+            (reply.effect_counters, write_step(call, n, reply, slot))
+        })
+    }
+
+    /// Answers, on the leader's thread: gives the scene back.
+    fn answer(self, response: Option<StepResponse>) -> Box<Scene> {
+        send_step(response, self.call, &self.request, &self.wake);
+        self.scene
+    }
+
+    /// Answers, on another thread. The scene is back before the client can ask again.
+    fn answer_from_afar(
+        self,
+        (effects, response): (EffectCounters, Option<StepResponse>),
+        short: bool,
+        thread: Option<Sender<Task>>,
+    ) {
+        let Self { session, scene, request, call, wake, desk, .. } = self;
+        desk.tell(session, Told::Stepped { scene, effects, short, thread });
+        send_step(response, call, &request, &wake);
+    }
+}
+
+/// Sends a reply that was written.
+fn send_step(response: Option<StepResponse>, call: StepCall, request: &StepRequest, wake: &Wake) {
+    // A reply that cannot be delivered is dropped; the end of the call tells the client.
+    let _ = response.map(StepResponse::send);
+    // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
+    drop(call);
+    if request.asked & ASK_POLLING == 0 {
+        wake.notify();
+    }
+}
+
+/// What the leader holds. Dropped in the order of its fields, the place last.
+struct Lead {
+    pending: BTreeMap<u64, (ControlCall, Job)>,
     sessions: BTreeMap<u64, Session>,
+    told: Receiver<(u64, Told)>,
+    desk: Arc<Desk>,
     services: Services,
-    jobs: Sender<(u64, Job)>,
-    finished: Receiver<(u64, Finished)>,
+    models: Arc<Models>,
     config: ServerConfig,
     last_session: u64,
     steps: u64,
     /// What they worked out.
     effects: EffectCounters,
     beats: u64,
+    last_work: Instant,
+    last_beat: Instant,
     /// Sessions that have asked something lately, as of the last beat; new ones count.
     active: usize,
     cores: usize,
+    /// A thread watches, to take the lead; and that none could be started was told.
+    watched: bool,
+    alone: bool,
+    hangup: Arc<AtomicBool>,
     root: Root,
+}
+
+/// A server that holds its place and has created its services.
+pub struct Server {
+    lead: Option<Box<Lead>>,
 }
 
 impl Server {
     /// Takes the place, creates the services, and tells clients.
     ///
     /// # Errors
-    /// Another server of the name runs; folders are not private; shared memory fails.
+    /// Another server of the name runs; folders are not private; shared memory fails; no threads can be started.
     pub fn start(address: &Address, config: ServerConfig) -> Result<Self, ServeError> {
         let root = Root::take(address)?;
-        let services = Services::create(address, root.epoch(), &config, status(&root, &config, 0, 0))?;
-        let (jobs, work) = channel::<(u64, Job)>();
-        let (done, finished) = channel();
-        let models = Models::new(&config);
+        ready_threads().map_err(ServeError::Threads)?;
+        let (services, bell) = Services::create(address, root.epoch(), &config, status(&root, &config, 0, 0))?;
+        let (told, hears) = channel();
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        // Threads of their own: in those that steps are searched on, a step would wait for what is being built. The loop
-        // keeps a core.
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(cores.saturating_sub(1).max(1)).build();
-        let threads = threads.map_err(|e| ServeError::Threads(e.to_string()))?;
-        // Ends when the server drops its sender.
-        std::thread::spawn(move || {
-            for (session, job) in work {
-                let result = threads.install(|| job.run(&models));
-                if done.send((session, result)).is_err() {
-                    break;
-                }
-            }
-        });
         root.publish()?;
-        Ok(Self {
-            pending: Vec::new(),
+        let lead = Lead {
+            pending: BTreeMap::new(),
             sessions: BTreeMap::new(),
+            told: hears,
+            desk: Arc::new(Desk { told, bell }),
             services,
-            jobs,
-            finished,
+            models: Arc::new(Models::new(&config)),
             config,
             last_session: 0,
             steps: 0,
             effects: EffectCounters::default(),
             beats: 0,
+            last_work: Instant::now(),
+            last_beat: Instant::now(),
             active: 0,
             cores,
+            watched: false,
+            alone: false,
+            hangup: Arc::default(),
             root,
-        })
+        };
+        Ok(Self { lead: Some(Box::new(lead)) })
+    }
+
+    /// Tells, in a line on standard error, when `hangup` was set.
+    fn hears(&mut self, hangup: Arc<AtomicBool>) {
+        if let Some(lead) = &mut self.lead {
+            lead.hangup = hangup;
+        }
     }
 
     /// Serves until `stop` is set.
     pub fn run(&mut self, stop: &AtomicBool) {
-        let mut last_work = Instant::now();
-        let mut last_beat = Instant::now();
-        while !stop.load(Ordering::Relaxed) {
-            let mut worked = false;
-            let spins = last_work.elapsed() < self.spin();
-            // Steps first: while it polls it looks for them several times for each look at all else.
-            for _ in 0..if spins { LOOKS } else { 1 } {
-                // A failed receive concerns one client's connection; the others go on.
-                while let Ok(Some(call)) = self.services.steps.receive() {
-                    self.step(call);
-                    worked = true;
-                }
-                std::hint::spin_loop();
+        let Some(lead) = self.lead.take() else { return };
+        let relay = Relay::new(lead);
+        std::thread::scope(|scope| {
+            // On a thread of its own: a long step keeps the thread on which it began, and its priority is not the caller's.
+            let leads = || follow(scope, &relay, relay.take_back(), stop);
+            if Builder::new().name("contactd-loop".into()).spawn_scoped(scope, leads).is_err() {
+                follow(scope, &relay, relay.take_back(), stop);
             }
-            while let Ok(Some(call)) = self.services.control.receive() {
-                self.command(call);
-                worked = true;
-            }
-            while let Ok((session, result)) = self.finished.try_recv() {
-                self.finished(session, result);
-                worked = true;
-            }
-            if last_beat.elapsed() >= BEAT {
-                self.beat();
-                last_beat = Instant::now();
-            }
-            if worked {
-                last_work = Instant::now();
-            } else if !spins {
-                let wait = if self.pending.is_empty() { BEAT } else { JOB_BEAT };
-                // An interrupted wait ends early, a failing one must not become a busy loop.
-                if self.services.wake.timed_wait(|_| {}, wait).is_err() {
-                    std::thread::sleep(JOB_BEAT);
-                }
+        });
+        self.lead = relay.into_lead();
+    }
+}
+
+/// Starts the threads that steps share, unless the program has started them.
+///
+/// # Errors
+/// Why they cannot be started.
+pub fn ready_threads() -> Result<(), String> {
+    use std::error::Error as _;
+    match rayon::ThreadPoolBuilder::new().build_global() {
+        // Without a cause it is that there are some already.
+        Err(e) if e.source().is_some() => Err(e.to_string()),
+        _ => Ok(()),
+    }
+}
+
+/// What becomes of a thread that leads: it serves to the end, or runs the steps of the session that kept it.
+fn follow<'scope, 'env>(
+    scope: &'scope Scope<'scope, 'env>,
+    relay: &'scope Relay<Box<Lead>>,
+    lead: Option<Box<Lead>>,
+    stop: &'scope AtomicBool,
+) {
+    let Some(lead) = lead else { return };
+    let own = rustix::thread::gettid();
+    if let Some((task, ran)) = lead_on(scope, relay, lead, stop, own) {
+        yield_to_others();
+        let (to, tasks) = channel();
+        task.answer_from_afar(ran, false, Some(to));
+        // Until the session has no use for it.
+        while !relay.is_over() {
+            match tasks.recv_timeout(BEAT) {
+                Ok(task) => run_from_afar(task),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
             }
         }
     }
+}
 
+fn run_from_afar(mut task: Task) {
+    let began = Instant::now();
+    let ran = task.run();
+    task.answer_from_afar(ran, began.elapsed() < SHORT, None);
+}
+
+/// Serves until `stop` is set, or until a step has taken so long that another thread leads: then that step, done.
+fn lead_on<'scope, 'env>(
+    scope: &'scope Scope<'scope, 'env>,
+    relay: &'scope Relay<Box<Lead>>,
+    mut lead: Box<Lead>,
+    stop: &'scope AtomicBool,
+    own: rustix::process::Pid,
+) -> Option<(Task, (EffectCounters, Option<StepResponse>))> {
+    lead.watched = false;
+    while !stop.load(Ordering::Relaxed) {
+        if !lead.watched {
+            let watch = move || follow(scope, relay, relay.watch(), stop);
+            lead.watched = Builder::new().name("contactd-watch".into()).spawn_scoped(scope, watch).is_ok();
+            lead.is_alone();
+        }
+        let mut worked = false;
+        let spins = lead.last_work.elapsed() < lead.spin();
+        // Steps first: while it polls it looks for them several times for each look at all else.
+        for _ in 0..if spins { LOOKS } else { 1 } {
+            // A failed receive concerns one client's connection; the others go on.
+            while let Ok(Some(call)) = lead.services.steps.receive() {
+                worked = true;
+                let Some(mut task) = lead.begin(call) else { continue };
+                let id = task.session;
+                relay.lend(lead, task.heed.clone(), own);
+                let ran = task.run();
+                match relay.take_back() {
+                    Some(back) => lead = back,
+                    None => return Some((task, ran)),
+                }
+                lead.effects += ran.0;
+                let scene = task.answer(ran.1);
+                lead.put_back(id, scene);
+            }
+            std::hint::spin_loop();
+        }
+        while let Ok(Some(call)) = lead.services.control.receive() {
+            lead.command(call);
+            worked = true;
+        }
+        worked |= lead.hear();
+        if lead.last_beat.elapsed() >= BEAT {
+            lead.beat();
+            lead.last_beat = Instant::now();
+        }
+        if worked {
+            lead.last_work = Instant::now();
+        } else if !spins && lead.services.wake.timed_wait(|_| {}, BEAT).is_err() {
+            // An interrupted wait ends early, a failing one must not become a busy loop.
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    lead.end();
+    relay.end(lead);
+    None
+}
+
+impl Lead {
     /// How long to poll before blocking: not at all when the clients that poll need the cores. Who has asked nothing of late
     /// polls no more.
     fn spin(&self) -> Duration {
@@ -223,30 +398,92 @@ impl Server {
         Duration::from_micros(if spinners <= self.cores { self.config.spin_us } else { 0 })
     }
 
-    fn step(&mut self, call: StepCall) {
+    /// Takes what other threads tell; true when there was something.
+    fn hear(&mut self) -> bool {
+        let mut heard = false;
+        while let Ok((session, told)) = self.told.try_recv() {
+            heard = true;
+            match told {
+                Told::Job(finished) => self.finished(session, finished),
+                Told::Stepped { scene, effects, short, thread } => {
+                    self.effects += effects;
+                    self.stepped(session, short, thread);
+                    self.put_back(session, scene);
+                }
+            }
+        }
+        heard
+    }
+
+    /// A session's step is done on another thread.
+    fn stepped(&mut self, id: u64, short: bool, thread: Option<Sender<Task>>) {
+        let Some(session) = self.sessions.get_mut(&id) else { return };
+        session.calm = if short { session.calm + 1 } else { 0 };
+        if thread.is_some() {
+            session.thread = thread;
+        } else if session.calm >= CALM {
+            // Its steps are short again: they are the loop's, and its threads end.
+            session.thread = None;
+            session.heed = fresh_heed(self.cores);
+        }
+    }
+
+    /// A scene comes back to its session.
+    fn put_back(&mut self, id: u64, scene: Box<Scene>) {
+        match self.sessions.get_mut(&id) {
+            Some(session) => session.scene = Some(scene),
+            None => discard(scene),
+        }
+    }
+
+    /// A step that is to be run by the caller; `None` where it is answered, or runs elsewhere.
+    fn begin(&mut self, call: StepCall) -> Option<Task> {
         // One copy: the client could write to it while it is read.
         let request = *call.user_header();
-        let session = if request.epoch == self.root.epoch() { self.sessions.get_mut(&request.session) } else { None };
+        let refuse = |call: &StepCall, code| {
+            let _ = write_step(call, 0, refusal(&request, code, None), &|_| ContactRecord::default())
+                .map(StepResponse::send);
+        };
+        let is_mine = request.epoch == self.root.epoch();
+        if is_mine && self.sessions.get(&request.session).is_some_and(|session| session.scene.is_none()) {
+            // Its reply was sent: what is left of its last step is on its way.
+            self.hear();
+        }
+        let session = if is_mine { self.sessions.get_mut(&request.session) } else { None };
         let Some(session) = session else {
             let code = if request.version == PROTOCOL_VERSION { ErrorCode::SessionGone } else { ErrorCode::Version };
-            send_step(&call, 0, refusal(&request, code, None), &|_| ContactRecord::default());
-            return;
+            refuse(&call, code);
+            return None;
         };
         session.asked();
+        session.polls = request.asked & ASK_POLLING != 0;
         self.steps += 1;
-        if session.waiting {
-            send_step(&call, 0, refusal(&request, ErrorCode::Busy, None), &|_| ContactRecord::default());
-        } else {
-            let effects = &mut self.effects;
-            session.scene.step(&request, call.payload(), |n, reply, slot| {
-                *effects += reply.effect_counters;
-                send_step(&call, n, reply, slot);
-            });
+        let scene = if session.waiting { None } else { session.scene.take() };
+        let Some(scene) = scene else {
+            refuse(&call, ErrorCode::Busy);
+            drop(call);
+            if !session.polls {
+                session.wake.notify();
+            }
+            return None;
+        };
+        if self.config.deadline_ms > 0 {
+            let has_left = session.thread.is_some();
+            session.heed = session.heed.next(Some(deadline(&self.config)));
+            if has_left {
+                session.heed.leave();
+            }
         }
-        // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
-        drop(call);
-        if request.asked & ASK_POLLING == 0 {
-            session.wake.notify();
+        let (heed, wake, desk) = (session.heed.clone(), session.wake.clone(), self.desk.clone());
+        let task = Task { session: request.session, scene, heed, request, call, wake, desk };
+        let Some(thread) = &session.thread else { return Some(task) };
+        match thread.send(task) {
+            Ok(()) => None,
+            // Its thread has gone: the loop is what is left.
+            Err(e) => {
+                session.thread = None;
+                Some(e.0)
+            }
         }
     }
 
@@ -269,39 +506,48 @@ impl Server {
             return answer(&call, &opened);
         }
         let id = envelope.session;
+        self.hear();
         let session = if envelope.epoch == self.root.epoch() { self.sessions.get_mut(&id) } else { None };
         let Some(session) = session else {
             return answer(&call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
         };
         session.asked();
-        // Whatever is under way: what comes of a job has nobody to go to.
+        // Whatever is under way: what comes of it has nobody to go to.
         if envelope.command == Command::Close {
-            self.sessions.remove(&id);
+            self.remove(id);
             self.show();
             return answer(&call, &Answer::Done);
         }
-        if session.waiting {
-            return answer(
-                &call,
-                &refused(Refusal::new(ErrorCode::Busy, "a model is being imported or integrated over")),
-            );
-        }
-        let job = match session.scene.command(envelope.command) {
+        let scene = if session.waiting { None } else { session.scene.as_mut() };
+        let Some(scene) = scene else {
+            let detail = if session.waiting { "a model is being imported or integrated over" } else { "a step runs" };
+            return answer(&call, &refused(Refusal::new(ErrorCode::Busy, detail)));
+        };
+        let work = match scene.command(envelope.command) {
             Outcome::Answered(a) => {
                 answer(&call, &a);
                 drop(call);
                 session.wake.notify();
                 return;
             }
-            Outcome::Import(import) => Job::Import(import),
-            Outcome::Integrate(integration) => Job::Integrate(integration),
+            Outcome::Import(import) => Work::Import(import),
+            Outcome::Integrate(integration) => Work::Integrate(integration),
         };
-        session.waiting = true;
-        if self.jobs.send((id, job)).is_ok() {
-            self.pending.push((id, call));
-        } else {
-            session.waiting = false;
-            answer(&call, &refused(Refusal::new(ErrorCode::Internal, "imports have stopped")));
+        // A core is left to the loop; the others are shared between the jobs by the system.
+        let threads = self.cores.saturating_sub(1) / (self.pending.len() + 1);
+        // The bell must not outlive its service: a job that is still to be told of that has ended is told to nobody.
+        let desk: Weak<Desk> = Arc::downgrade(&self.desk);
+        let done = move |finished| {
+            if let Some(desk) = desk.upgrade() {
+                desk.tell(id, Told::Job(finished));
+            }
+        };
+        match Job::start(work, threads, self.models.clone(), done) {
+            Ok(job) => {
+                session.waiting = true;
+                self.pending.insert(id, (call, job));
+            }
+            Err(refusal) => answer(&call, &refused(refusal)),
         }
     }
 
@@ -320,13 +566,17 @@ impl Server {
         let wake = self.services.wake_of(id).map_err(|e| Refusal::new(ErrorCode::Internal, e.to_string()))?;
         self.last_session = id;
         let session = Session {
-            scene: Scene::new(&self.config),
-            wake,
+            scene: Some(Box::new(Scene::new(&self.config))),
+            wake: Arc::new(wake),
             opened: Instant::now(),
             arrived: false,
             life: ProcessWatch::of(process.0, process.1),
             last_request: Instant::now(),
+            polls: false,
             waiting: false,
+            heed: fresh_heed(self.cores),
+            thread: None,
+            calm: 0,
         };
         self.sessions.insert(id, session);
         self.active += 1;
@@ -337,46 +587,103 @@ impl Server {
     }
 
     /// A job is done, or was refused.
-    fn finished(&mut self, id: u64, result: Finished) {
-        let Some(at) = self.pending.iter().position(|(session, _)| *session == id) else { return };
-        let (_, call) = self.pending.swap_remove(at);
+    fn finished(&mut self, id: u64, finished: Finished) {
         // A session that ended meanwhile has nobody to answer.
+        let Some((call, _job)) = self.pending.remove(&id) else { return };
         let Some(session) = self.sessions.get_mut(&id) else { return };
         session.waiting = false;
-        let said = match result {
-            Finished::Imported(model, loaded) => session.scene.loaded(model, loaded),
-            Finished::Integrated(said) => said,
+        let said = match (finished, session.scene.as_mut()) {
+            (Finished::Imported(model, text, loaded), Some(scene)) => scene.loaded(model, text, loaded),
+            (Finished::Imported(..), None) => refused(Refusal::new(ErrorCode::Busy, "a step runs")),
+            (Finished::Integrated(said), _) => said,
         };
         answer(&call, &said);
         drop(call);
         session.wake.notify();
     }
 
+    /// Ends a session: what runs for it is cancelled, and its scene freed on another thread.
+    fn remove(&mut self, id: u64) {
+        self.pending.remove(&id);
+        if let Some(mut session) = self.sessions.remove(&id)
+            && let Some(scene) = session.scene.take()
+        {
+            discard(scene);
+        }
+    }
+
     /// Ends the sessions that are over.
     fn end_sessions(&mut self) {
         let idle = Duration::from_secs(self.config.idle_s);
-        let before = self.sessions.len();
-        self.sessions.retain(|_, session| !session.is_over(idle));
-        if self.sessions.len() < before {
+        let over: Vec<u64> =
+            self.sessions.iter_mut().filter_map(|(id, session)| session.is_over(idle).then_some(*id)).collect();
+        for id in &over {
+            self.remove(*id);
+        }
+        if !over.is_empty() {
             self.services.sweep_dead();
         }
     }
 
     fn beat(&mut self) {
         self.end_sessions();
-        self.active = self.sessions.values().filter(|s| s.last_request.elapsed() < LATELY).count();
+        self.active = self.sessions.values().filter(|s| s.is_active()).count();
         self.beats += 1;
         // A client may also die without a session: rarely looked for, since the look costs milliseconds.
         if self.beats.is_multiple_of(200) {
             self.services.sweep_dead();
         }
+        if self.hangup.swap(false, Ordering::Relaxed) {
+            warn("SIGHUP: there is nothing to read again, the server goes on");
+        }
         self.show();
+    }
+
+    /// Tells, once, that nobody watches.
+    fn is_alone(&mut self) {
+        if !self.watched && !self.alone {
+            warn("no thread can be started: a step that takes long delays all sessions");
+        }
+        self.alone = !self.watched;
+    }
+
+    /// Ends what runs for its sessions, and waits for it.
+    fn end(&mut self) {
+        let until = Instant::now() + CANCELLED;
+        for session in self.sessions.values_mut() {
+            session.heed.halt();
+            session.thread = None;
+        }
+        let mut left: usize = self.pending.len();
+        self.pending.clear();
+        while left > 0
+            && let Ok((_, told)) = self.told.recv_timeout(until.saturating_duration_since(Instant::now()))
+        {
+            left -= usize::from(matches!(told, Told::Job(_)));
+        }
     }
 
     fn show(&mut self) {
         let status = status(&self.root, &self.config, self.sessions.len(), self.steps);
         self.services.show(StatusRecord { effects: self.effects, ..status });
     }
+}
+
+/// What the steps of a session heed that are short so far.
+fn fresh_heed(cores: usize) -> Arc<Heed> {
+    Arc::new(Heed::new(None, Arc::new(Crew::new(cores))))
+}
+
+/// When a step that begins now must have been searched.
+fn deadline(config: &ServerConfig) -> Instant {
+    let whole = Duration::from_millis(config.deadline_ms);
+    Instant::now() + (whole - whole / REPLY_PART)
+}
+
+/// Frees a scene on another thread: a large one takes longer than a step may wait.
+fn discard(scene: Box<Scene>) {
+    // Where no thread can be started it is freed here.
+    let _ = Builder::new().name("contactd-free".into()).spawn(move || drop(scene));
 }
 
 fn status(root: &Root, config: &ServerConfig, sessions: usize, steps: u64) -> StatusRecord {
@@ -396,23 +703,24 @@ fn status(root: &Root, config: &ServerConfig, sessions: usize, steps: u64) -> St
     }
 }
 
-/// Writes a reply once into slots of shared memory and sends it.
-fn send_step(call: &StepCall, n: usize, reply: StepReply, slot: &dyn Fn(usize) -> ContactRecord) {
+/// Writes a reply once into slots of shared memory; `None` where there is no room for it: the end of the call says that it was
+/// lost.
+fn write_step(
+    call: &StepCall,
+    n: usize,
+    reply: StepReply,
+    slot: &dyn Fn(usize) -> ContactRecord,
+) -> Option<StepResponse> {
     // iceoryx2 knows no empty slices: the header says how many slots count.
     let (loan, reply) = match call.loan_slice_uninit(n.max(1)) {
         Ok(loan) => (loan, reply),
-        Err(_) => match call.loan_slice_uninit(1) {
-            // The step was taken, its records cannot be told: the client learns that they are cut off.
-            Ok(loan) => (loan, StepReply { records: 0, slots: 0, truncated: 1, ..reply }),
-            // Without a reply the end of the call says that it was lost.
-            Err(_) => return,
-        },
+        // The step was taken, its records cannot be told: the client learns that they are cut off.
+        Err(_) => (call.loan_slice_uninit(1).ok()?, StepReply { records: 0, slots: 0, truncated: 1, ..reply }),
     };
     let told = (reply.records + reply.slots) as usize;
     let mut response = loan.write_from_fn(|i| if i < told { slot(i) } else { ContactRecord::default() });
     *response.user_header_mut() = reply;
-    // A reply that cannot be delivered is dropped; the end of the call tells the client.
-    let _ = response.send();
+    Some(response)
 }
 
 /// Sends the answer to a command.
@@ -424,7 +732,8 @@ fn answer(call: &ControlCall, answer: &Answer) {
     let _ = response.send();
 }
 
-/// Serves until SIGINT or SIGTERM; calls `ready` once clients can connect.
+/// Serves until SIGINT or SIGTERM; calls `ready` once clients can connect. SIGHUP, which a terminal sends that is closed, is a
+/// line on standard error.
 ///
 /// # Errors
 /// As `Server::start`.
@@ -434,7 +743,11 @@ pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce()) -> R
         signal_hook::flag::register(signal, stop.clone())
             .map_err(|e| ServeError::System(Error::System(format!("signal handler: {e}"))))?;
     }
+    let hangup = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(signal_hook::consts::SIGHUP, hangup.clone())
+        .map_err(|e| ServeError::System(Error::System(format!("signal handler: {e}"))))?;
     let mut server = Server::start(address, config)?;
+    server.hears(hangup);
     ready();
     server.run(&stop);
     Ok(())

@@ -6,7 +6,7 @@
 
 use super::config::ServerConfig;
 use contactd_client::Error;
-use contactd_client::shm::link::{self, ControlServer, StepServer, Variant, system};
+use contactd_client::shm::link::{self, ControlServer, Shared, StepServer, system};
 use contactd_proto::control::ControlHeader;
 use contactd_proto::names::{self, Address};
 use contactd_proto::status::StatusRecord;
@@ -19,8 +19,8 @@ use iceoryx2::service::port_factory::event::PortFactory as EventService;
 
 /// The way to wake the client of a session.
 pub struct Wake {
-    notifier: Notifier<Variant>,
-    service: EventService<Variant>,
+    notifier: Notifier<Shared>,
+    service: EventService<Shared>,
 }
 
 impl Wake {
@@ -43,19 +43,24 @@ pub struct Services {
     /// Commands.
     pub control: ControlServer,
     /// Woken by clients.
-    pub wake: Listener<Variant>,
-    status: EntryHandleMut<Variant, u32, StatusRecord>,
-    _writer: Writer<Variant, u32>,
-    node: Node<Variant>,
+    pub wake: Listener<Shared>,
+    status: EntryHandleMut<Shared, u32, StatusRecord>,
+    _writer: Writer<Shared, u32>,
+    node: Node<Shared>,
 }
 
 impl Services {
-    /// Creates them.
+    /// Creates them; and a bell that wakes the server itself: what other threads have done is to be taken.
     ///
     /// # Errors
     /// `System`.
-    pub fn create(address: &Address, epoch: u64, config: &ServerConfig, status: StatusRecord) -> Result<Self, Error> {
-        let node = link::node(&link::config(address, epoch)?)?;
+    pub fn create(
+        address: &Address,
+        epoch: u64,
+        config: &ServerConfig,
+        status: StatusRecord,
+    ) -> Result<(Self, Notifier<Shared>), Error> {
+        let node = link::node_of::<Shared>(&link::config(address, epoch)?)?;
         // A few more than sessions: clients that are just coming or going, and those that only look at the status.
         let clients = config.sessions + 8;
         let steps = node
@@ -109,17 +114,16 @@ impl Services {
             .override_response_preallocation(move |n| n.min(3 * clients))
             .create()
             .map_err(|e| system("control port", e))?;
-        let wake = node
+        let wakes = node
             .service_builder(&link::service_name(names::WAKE_SERVICE)?)
             .event()
-            .max_notifiers(clients)
+            .max_notifiers(clients + 1)
             .max_listeners(1)
             .max_nodes(clients + 1)
             .create()
-            .map_err(|e| system(names::WAKE_SERVICE, e))?
-            .listener_builder()
-            .create()
-            .map_err(|e| system("wake port", e))?;
+            .map_err(|e| system(names::WAKE_SERVICE, e))?;
+        let wake = wakes.listener_builder().create().map_err(|e| system("wake port", e))?;
+        let bell = wakes.notifier_builder().create().map_err(|e| system("bell port", e))?;
         let writer = node
             .service_builder(&link::service_name(names::STATUS_SERVICE)?)
             .blackboard_creator::<u32>()
@@ -132,7 +136,8 @@ impl Services {
             .create()
             .map_err(|e| system("status writer", e))?;
         let status = writer.entry::<StatusRecord>(&link::STATUS_KEY).map_err(|e| system("status entry", e))?;
-        Ok(Self { steps, control, wake, status, _writer: writer, node })
+        let services = Self { steps, control, wake, status, _writer: writer, node };
+        Ok((services, bell))
     }
 
     /// Shows the server's state.

@@ -5,6 +5,7 @@
 pub mod aabb;
 pub mod ball;
 pub mod ball_tree;
+pub mod halt;
 pub mod oriented;
 #[cfg(test)]
 pub(crate) mod random;

@@ -4,11 +4,12 @@
 //! (`classify`) is the tree's min/max: union = min, intersection = max, difference A - B = max(f_A, -f_B). f < 0 inside,
 //! > 0 outside, 1-Lipschitz.
 //!
-//! Of a whole solid: about what it may be symmetric (`revolution`), and its parts where it is a union of convex primitives less
-//! others (`parts`).
+//! Of a whole solid: which of its faces lie on each other (`alike`), about what it may be symmetric (`revolution`), and its parts
+//! where it is a union of convex primitives less others (`parts`).
 //!
 //! Floor 2: imports `math` and `proto`.
 
+pub mod alike;
 pub mod classify;
 pub mod face;
 pub mod local;

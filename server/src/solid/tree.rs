@@ -1,7 +1,8 @@
 //! The CSG tree, in file order and in any arity, and its normal form without complements.
 
 use crate::math::Aabb;
-use crate::solid::local::{self, Token};
+use crate::solid::alike::Alike;
+use crate::solid::local::{self, Token, Truth};
 use crate::solid::{Face, Primitive, Shape};
 use contactd_proto::Pose;
 
@@ -58,6 +59,9 @@ pub struct Label {
     pub line: u32,
     /// 1-based column.
     pub column: u32,
+    /// The source mirrors the primitive, and the mirror went into x of its frame: what its own axes call +x stands where
+    /// the frame has −x.
+    pub mirrored: bool,
 }
 
 /// A solid: primitives in file order, and the tree over them. Immutable once built.
@@ -75,8 +79,15 @@ pub struct Solid {
     pub face_owner: Vec<u32>,
     /// Sense of each primitive in this solid (every primitive stands at one leaf).
     pub senses: Vec<Sense>,
-    /// The tree as and/or of literals (`local`); empty when the solid is empty.
+    /// The tree as and/or of literals (`local`), simplified where faces lie on each other (`alike`); empty when the solid is
+    /// empty.
     pub normal_form: Vec<Token>,
+    /// Faces that lie on or near each other.
+    pub alike: Alike,
+    /// True where the normal form is less than the tree says.
+    pub simplified: bool,
+    /// True where nothing with a volume is left of a tree that is not empty.
+    vanishes: bool,
 }
 
 impl Solid {
@@ -108,10 +119,26 @@ impl Solid {
         let faces = primitives.iter().flat_map(|p| p.faces.iter().copied()).collect();
         let owners = primitives.iter().enumerate();
         let face_owner = owners.flat_map(|(i, p)| std::iter::repeat_n(i as u32, p.faces.len())).collect();
-        let mut solid = Self { primitives, nodes, root, faces, face_owner, senses, normal_form: Vec::new() };
-        let mut normal_form = Vec::new();
-        local::write_tree(&solid, &mut normal_form);
-        solid.normal_form = normal_form;
+        let (normal_form, alike) = (Vec::new(), Alike::default());
+        let (simplified, vanishes) = (false, false);
+        let mut solid =
+            Self { primitives, nodes, root, faces, face_owner, senses, normal_form, alike, simplified, vanishes };
+        let mut whole = Vec::new();
+        local::write_tree(&solid, &mut whole);
+        let sense = |f: u32| solid.senses[solid.face_owner[f as usize] as usize];
+        solid.alike = Alike::of(&solid.faces, sense, &solid.aabb());
+        if solid.alike.any_same() && !whole.is_empty() {
+            let mut left = Vec::new();
+            solid.vanishes = solid.alike.simplified(&whole, &mut left) == Truth::False;
+            solid.simplified = left.len() < whole.len();
+            if solid.simplified {
+                whole = left;
+            }
+        }
+        if !solid.simplified {
+            solid.alike.slack = 0.0;
+        }
+        solid.normal_form = whole;
         solid
     }
 
@@ -135,9 +162,25 @@ impl Solid {
         boxes[self.root as usize]
     }
 
-    /// True when nothing is left of it: the root is an empty node.
+    /// True when nothing is left of it: the root is an empty node, or all that the tree says has no volume (A − A).
     pub fn is_empty(&self) -> bool {
+        self.vanishes || self.is_void()
+    }
+
+    /// True when the tree says nothing at all: the root is an empty node.
+    pub fn is_void(&self) -> bool {
         self.nodes[self.root as usize] == Node::Empty
+    }
+
+    /// The tree as it stands, as and/or of literals (`local`); nothing for a void one. What `normal_form` says of depths, at
+    /// greater length.
+    pub fn literal_form(&self) -> Vec<Token> {
+        let mut out = self.normal_form.clone();
+        if self.simplified {
+            out.clear();
+            local::write_tree(self, &mut out);
+        }
+        out
     }
 }
 

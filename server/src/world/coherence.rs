@@ -40,19 +40,33 @@ const LEAD: f64 = 0.25;
 /// Failed courses double the steps that pass before the next one is tried, up to two to this power.
 const MOST_WAIT: u32 = 6;
 
+/// Which kind of knowledge has answered last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Via {
+    /// None: the pair was searched.
+    #[default]
+    Search,
+    /// The same question.
+    Answer,
+    /// A course.
+    Course,
+    /// The distance at the start of the step.
+    Room,
+}
+
 /// Two bodies as they were expected to go.
 #[derive(Clone, Copy, Debug)]
-struct Course {
+pub struct Course {
     /// Their motions over the step with which it begins.
-    motions: [Motion; 2],
+    pub motions: [Motion; 2],
     /// When that step began, in steps.
-    begin: f64,
+    pub begin: f64,
     /// How many steps they are expected to go on like that; they stand afterwards.
-    steps: f64,
+    pub steps: f64,
     /// Until then, in steps, they keep their distance; infinite: standing, too.
-    until: f64,
+    pub until: f64,
     /// How far they may stray together.
-    room: f64,
+    pub room: f64,
 }
 
 /// A question and its answer.
@@ -92,6 +106,8 @@ pub struct Knowledge {
     wait: u32,
     /// Cells of the last search; `None` before the first one and after any that was not clear.
     cells: Option<u64>,
+    /// What has answered last.
+    via: Via,
 }
 
 /// What was found out about a pair in a step.
@@ -140,14 +156,18 @@ impl Knowledge {
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
             && last.motions == q.motions()
             && last.asked == q.query.asked
-            && last.outcome.counters.cells <= q.query.cell_limit
+            && last.outcome.counters.fits(q.query.cell_limit)
         {
+            self.via = Via::Answer;
             return Some((last.outcome, None));
         }
         let clear = || Outcome::clear(q.query.resolution);
         if let Some(course) = self.course.as_ref().filter(|_| self.on_course) {
             match course.strays(q) {
-                Some(way) if way < course.room => return Some((clear(), Some(0.0))),
+                Some(way) if way < course.room => {
+                    self.via = Via::Course;
+                    return Some((clear(), Some(0.0)));
+                }
                 Some(_) if !course.is_over(q) => {
                     // They stray: less far ahead, with more room.
                     self.steps = (0.5 * self.steps).max(1.0);
@@ -162,6 +182,7 @@ impl Knowledge {
         if let Some(room) = clearance::room(&q.query, q.margin) {
             counters.closed_forms += 1;
             let travel = q.travel();
+            self.via = Via::Room;
             if room > LONG * travel || room > travel && self.wait > 0 {
                 self.wait = self.wait.saturating_sub(1);
                 return Some((clear(), Some(room)));
@@ -234,11 +255,18 @@ impl Knowledge {
         let course = Course { motions, begin: q.clock, steps: self.steps, until, room: kept.room };
         put(&mut self.course, course);
         self.on_course = true;
+        self.via = Via::Course;
         true
+    }
+
+    /// What has answered last, and the course it was.
+    pub fn via(&self) -> (Via, Option<&Course>) {
+        (self.via, self.course.as_deref())
     }
 
     /// Learns from a search.
     pub fn learn(&mut self, q: &Question, outcome: &Outcome) {
+        self.via = Via::Search;
         self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
         // More work might tell an overlap that was to be searched past.
         let open = outcome.status == Status::Overlap && q.query.asked.past_overlap;
@@ -284,7 +312,7 @@ impl Course {
     }
 
     /// How far both bodies stray from it over the step; `None` where nothing was proven.
-    fn strays(&self, q: &Question) -> Option<f64> {
+    pub fn strays(&self, q: &Question) -> Option<f64> {
         let begin = q.clock - self.begin;
         let end = begin + 1.0;
         // A step that begins before the bodies are expected to stand and ends later has a bend in it.

@@ -14,6 +14,8 @@
 pub mod body;
 pub mod broad;
 mod coherence;
+pub mod heed;
+pub mod memory;
 mod neighbours;
 pub mod plan;
 pub mod record;
@@ -26,6 +28,7 @@ mod tests;
 mod touch;
 
 pub use body::{ObjectSpec, Part};
+pub use heed::{Crew, Heed, LONG_PRIORITY, yield_to_others};
 pub use plan::{PairPlan, Plans};
 pub use scene::{Refusal, World};
 pub use step::{PairOutcome, StepError, StepOptions, StepOutcome};

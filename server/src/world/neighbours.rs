@@ -123,8 +123,10 @@ fn by_ids(pairs: &mut Vec<(u32, u32)>, sorted: &mut Vec<(u32, u32)>, counts: &mu
 }
 
 impl Neighbours {
-    /// Forgets the list and what is known of its pairs: bodies or rules have changed.
+    /// Forgets the list and what is known of its pairs: bodies or rules have changed. Odometers begin anew: nothing refers to them,
+    /// and a body may have another one's place.
     pub fn forget(&mut self) {
+        self.odometers.clear();
         self.pairs.clear();
         self.sights.clear();
         self.entries.clear();
@@ -175,6 +177,14 @@ impl Neighbours {
             return;
         }
         self.stale = false;
+        // An odometer that has gone beyond all numbers begins anew, and what was noted by it is forgotten.
+        let mut anew = Vec::new();
+        for (i, (body, odometer)) in bodies.iter().zip(&mut self.odometers).enumerate() {
+            if !odometer.end.is_finite() && body.reach().is_finite() {
+                *odometer = Odometer { start: 0.0, end: body.travel(1.0) };
+                anew.push(i as u32);
+            }
+        }
         self.boxes.clear();
         self.fences.clear();
         self.homes.clear();
@@ -184,7 +194,7 @@ impl Neighbours {
                 if body.is_static { 0.0 } else { (STEPS * way).min(MOST * body.reach()).max(LEAST * body.reach()) };
             // What turns without bounds has no way that could be told.
             let room = if way.is_finite() { way + more } else { 0.0 };
-            self.boxes.push(body.still().grown(room + touch(body)));
+            self.boxes.push(if way.is_finite() { body.still().grown(room + touch(body)) } else { Aabb::ALL });
             self.fences.push(odometer.start + SAFE * room);
             self.homes.push((body.track.motion.start, room));
         }
@@ -213,7 +223,8 @@ impl Neighbours {
                 leaves(entry);
             }
             if let Some(((near, sight), entry)) = old.next_if(|((n, _), _)| (n.a, n.b) == (a, b)) {
-                self.pairs.push(*near);
+                let limit = if anew.iter().any(|i| *i == a || *i == b) { f64::NEG_INFINITY } else { near.limit };
+                self.pairs.push(Near { limit, ..*near });
                 self.sights.push(*sight);
                 self.entries.push(entry);
                 continue;
@@ -235,6 +246,10 @@ impl Neighbours {
     /// True when a body stays in its grown box over this step: as its odometer tells, or because it has come back.
     fn stays(&mut self, index: usize, body: &Body) -> bool {
         let odometer = self.odometers[index];
+        if !odometer.end.is_finite() {
+            // Only a body without bounds is everywhere.
+            return body.reach().is_infinite();
+        }
         if odometer.end <= self.fences[index] {
             return true;
         }
@@ -260,6 +275,16 @@ impl Neighbours {
     /// What a glance needs of a pair.
     pub fn sight(&self, pair: usize) -> &Sight {
         &self.sights[pair]
+    }
+
+    /// What is known of a pair.
+    pub fn knowledge(&self, pair: usize) -> Option<&Knowledge> {
+        self.entries[pair].knowledge.as_deref()
+    }
+
+    /// Where a body stood when the list was taken last, its box there grown for the time since, and by how much.
+    pub fn home(&self, body: u32) -> (&Pose, &Aabb) {
+        (&self.homes[body as usize].0, &self.boxes[body as usize])
     }
 
     /// Index of the plan of a pair.

@@ -105,7 +105,7 @@ impl World {
     /// # Errors
     /// `LimitObjects`; `DuplicateObject` for an id that is not larger than all before; `NotFinite`; `BadNumber` for a
     /// speed that is not positive; `Resolution` when a pair's resolution would swallow a primitive.
-    pub fn add_object(&mut self, spec: ObjectSpec) -> Result<(), Refusal> {
+    pub fn add_object(&mut self, mut spec: ObjectSpec) -> Result<(), Refusal> {
         let name = format!("object \"{}\"", spec.name);
         if self.bodies.len() >= self.max_objects {
             return Err(Refusal::new(ErrorCode::LimitObjects, format!("the limit is {}", self.max_objects)));
@@ -113,8 +113,8 @@ impl World {
         if self.last_id.is_some_and(|last| spec.id <= last) {
             return Err(Refusal::new(ErrorCode::DuplicateObject, format!("{name}: id {} was used before", spec.id)));
         }
-        for (pose, which) in [(&spec.place, "place"), (&spec.pose, "pose")] {
-            check_pose(pose).map_err(|code| Refusal::new(code, format!("{name}: {which}")))?;
+        for (pose, which) in [(&mut spec.place, "place"), (&mut spec.pose, "pose")] {
+            *pose = check_pose(pose).map_err(|code| Refusal::new(code, format!("{name}: {which}")))?;
         }
         if spec.max_speed.is_nan() || spec.max_speed <= 0.0 {
             return Err(Refusal::new(ErrorCode::BadNumber, format!("{name}: max_speed must be positive")));
@@ -228,9 +228,10 @@ impl World {
     }
 }
 
-fn check_pose(pose: &Pose) -> Result<(), ErrorCode> {
+/// The pose as a record with a start would set it.
+fn check_pose(pose: &Pose) -> Result<Pose, ErrorCode> {
     contactd_proto::pose::check_position(pose.position)?;
-    contactd_proto::pose_record::unit_quaternion(pose.rotation.to_array()).map(|_| ())
+    Ok(Pose::new(pose.position, contactd_proto::pose_record::unit_quaternion(pose.rotation.to_array())?))
 }
 
 /// A resolution must stay below a quarter of the smallest dimension: deeper than that a primitive has no inside left.

@@ -9,17 +9,19 @@
 
 use super::body::Body;
 use super::coherence::{Finding, Knowledge, Question};
+use super::heed::Heed;
 use super::plan::PairPlan;
 use super::step::StepOptions;
 use crate::contact::{self, Asked, Counters, Outcome, PairQuery, PairSearch, Scratch, Status};
+use crate::math::halt::Halt;
 use crate::math::tolerance;
 use crate::motion::Placed;
 use contactd_proto::{Detect, Motion, Report};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 
 pub(super) use crate::contact::default_resolution;
 
@@ -47,6 +49,8 @@ pub struct PairJob {
     pub knowledge: Option<Box<Knowledge>>,
     /// Nothing is known that could answer it.
     is_blank: bool,
+    /// Its answer was found, but for what a queue over all pairs adds.
+    is_done: bool,
     /// The answer.
     pub found: Finding,
 }
@@ -65,10 +69,10 @@ impl PairJob {
         let (pair, knowledge): (_, Option<Box<Knowledge>>) = pair.unzip();
         // Looked up here, where many jobs are made in a row and the memory can answer several at a time.
         let is_blank = knowledge.as_deref().is_none_or(Knowledge::is_blank);
-        Self { a, b, plan, plan_index, resolution, near, pair, knowledge, is_blank, found }
+        Self { a, b, plan, plan_index, resolution, near, pair, knowledge, is_blank, is_done: false, found }
     }
 
-    fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
+    pub(super) fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
         let query = query(bodies, self, options);
         let pair = [self.a, self.b].map(|i| &bodies[i as usize]);
         Question { bodies: pair, query, margin: self.plan.reach(), clock }
@@ -107,6 +111,14 @@ impl Memory {
         work(&mut seat)
     }
 
+    /// Makes a seat for each thread.
+    fn ready(&mut self) {
+        let threads = rayon::current_num_threads();
+        if self.seats.len() <= threads {
+            self.seats.resize_with(threads + 1, Mutex::default);
+        }
+    }
+
     /// Cells that the busiest thread has refined in the last step.
     pub fn busiest(&mut self) -> u64 {
         let cells = |seat: &mut Mutex<Seat>| seat.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells;
@@ -115,34 +127,43 @@ impl Memory {
 }
 
 /// Searches every pair to its end; when only the first contact is asked for, none further than that needs.
-pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: f64, memory: &mut Memory) {
-    let threads = rayon::current_num_threads();
-    if memory.seats.len() <= threads {
-        memory.seats.resize_with(threads + 1, Mutex::default);
-    }
+///
+/// Work that is to leave the shared threads (`Heed`) leaves the pairs that it has not answered as they were; they are searched
+/// from the beginning on the step's own. Once the step is to end what is not answered is undecided.
+pub fn run(
+    bodies: &[Body],
+    jobs: &mut [PairJob],
+    options: &StepOptions,
+    clock: f64,
+    memory: &mut Memory,
+    heed: Option<&Heed>,
+) {
     for seat in &mut memory.seats {
         seat.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
     }
-    let memory = &*memory;
+    let is_over = || heed.is_some_and(Heed::is_over);
     let first = options.first && !options.clear;
     let most = batch_limit(options);
     let (spent, beyond) = (AtomicU64::new(0), AtomicBool::new(false));
-    let work = |job: &mut PairJob| {
-        if job.pair.is_none() || beyond.load(Relaxed) {
+    let work = |memory: &Memory, halt: Option<&Arc<Halt>>, job: &mut PairJob| {
+        if job.pair.is_none() || job.is_done || beyond.load(Relaxed) || halt.is_some_and(|halt| halt.is_over()) {
             return;
         }
         let mut q = job.question(bodies, options, clock);
         let cells = memory.with(|seat| {
+            seat.scratch.halt = halt.cloned();
             let mut counters = Counters::default();
             let knowledge = job.knowledge.as_mut().filter(|_| !job.is_blank);
             if let Some(finding) = knowledge.and_then(|k| k.ask(&q, &mut seat.scratch, &mut counters)) {
                 job.found = finding;
                 finish(&job.plan, &mut job.found.outcome);
                 seat.cells += job.found.outcome.counters.cells;
+                job.is_done = true;
                 return 0;
             }
             job.found.known = false;
             if first {
+                job.is_done = true;
                 return 0;
             }
             let cut = q.query.cell_limit > most;
@@ -150,26 +171,57 @@ pub fn run(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, clock: 
             // Outcomes are large: it is written where it is to be.
             let outcome = &mut job.found.outcome;
             contact::find_earliest(&q.query, &mut seat.scratch, outcome);
-            let cells = outcome.counters.cells;
+            if outcome.status == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
+                if !is_over() {
+                    // Cut short, perhaps, to be searched elsewhere: it counts for nothing.
+                    job.found.outcome = Outcome::clear(job.resolution);
+                    return 0;
+                }
+                outcome.counters += counters;
+                job.take(&q);
+                job.is_done = true;
+                return 0;
+            }
+            let cells = outcome.counters.spent(q.query.cell_limit);
             if cut && outcome.status == Status::Undecided {
                 beyond.store(true, Relaxed);
             }
             outcome.counters += counters;
             seat.cells += outcome.counters.cells;
             job.take(&q);
+            job.is_done = true;
             cells
         });
         if spent.fetch_add(cells, Relaxed) + cells > most {
             beyond.store(true, Relaxed);
         }
     };
-    if threads > 1 && jobs.len() >= WORTH_SHARING {
-        jobs.par_iter_mut().for_each(work);
-    } else {
-        jobs.iter_mut().for_each(work);
+    let mut share = |jobs: &mut [PairJob], halt: Option<&Arc<Halt>>| {
+        memory.ready();
+        if rayon::current_num_threads() > 1 && jobs.len() >= WORTH_SHARING {
+            jobs.par_iter_mut().for_each(|job| work(memory, halt, job));
+        } else {
+            jobs.iter_mut().for_each(|job| work(memory, halt, job));
+        }
+    };
+    match heed {
+        None => share(jobs, None),
+        Some(heed) => {
+            share(jobs, Some(&heed.leave));
+            if heed.has_left() && !beyond.load(Relaxed) {
+                heed.elsewhere(|| share(jobs, Some(&heed.halt)));
+            }
+        }
     }
-    if first || beyond.into_inner() {
-        run_queue(bodies, jobs, options, first, clock);
+    if is_over() {
+        // Nothing is proven of pairs that were not come to.
+        for job in jobs.iter_mut().filter(|job| job.pair.is_some() && (!job.is_done || first && !job.found.known)) {
+            (job.found.known, job.found.apart) = (false, false);
+            job.found.outcome.status = Status::Undecided;
+            job.found.outcome.time_lower = 0.0;
+        }
+    } else if first || beyond.into_inner() {
+        run_queue(bodies, jobs, options, first, clock, heed);
     }
     if options.clear {
         // A line for each pair, the same whether it was searched or known.
@@ -188,10 +240,22 @@ pub(super) fn batch_limit(options: &StepOptions) -> u64 {
 /// another is in front. Where only the first contact is asked for, the one found bounds how far any other needs to be
 /// searched; a pair that is left unfinished is clear until later than that, which is all that is said of it. Once the
 /// batch's cells are spent every pair that needs more of them is undecided.
-fn run_queue(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, first: bool, clock: f64) {
+fn run_queue(
+    bodies: &[Body],
+    jobs: &mut [PairJob],
+    options: &StepOptions,
+    first: bool,
+    clock: f64,
+    heed: Option<&Heed>,
+) {
     let mut open: Vec<&mut PairJob> = jobs.iter_mut().filter(|job| job.pair.is_some() && !job.found.known).collect();
-    let questions: Vec<Question> = open.iter().map(|job| job.question(bodies, options, clock)).collect();
-    let searches = questions.iter().map(|q| PairSearch::new(&q.query, Scratch::default()));
+    let mut questions: Vec<Question> = open.iter().map(|job| job.question(bodies, options, clock)).collect();
+    for q in &mut questions {
+        q.query.cell_limit = q.query.cell_limit.min(batch_limit(options));
+    }
+    let halt = heed.map(|heed| &heed.halt);
+    let scratch = || Scratch::heeding(halt.cloned());
+    let searches = questions.iter().map(|q| PairSearch::new(&q.query, scratch()));
     let mut searches: Vec<PairSearch> = searches.collect();
     // All times are >= 0, so their bits order as they do; ties go to the smaller pair.
     let mut queue: BinaryHeap<Reverse<(u64, usize)>> = (0..open.len()).map(|i| Reverse((0, i))).collect();
@@ -206,9 +270,9 @@ fn run_queue(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, first
             continue;
         }
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
-        let before = search.counters().cells;
+        let before = search.spent();
         let ended = search.run_within(next.max(time).min(horizon), left);
-        left = left.saturating_sub(search.counters().cells - before);
+        left = left.saturating_sub(search.spent() - before);
         match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
@@ -222,8 +286,8 @@ fn run_queue(bodies: &[Body], jobs: &mut [PairJob], options: &StepOptions, first
     }
 }
 
-/// Cells that all pairs of a step together may cost by default: sixteen pairs at their own limit.
-pub const DEFAULT_BATCH_LIMIT: u64 = 16 * contact::DEFAULT_CELL_LIMIT;
+/// Cells' worth of work that all pairs of a step together may cost by default: two pairs at their own limit.
+pub const DEFAULT_BATCH_LIMIT: u64 = 2 * contact::DEFAULT_CELL_LIMIT;
 
 pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions) -> PairQuery<'a> {
     let side = |index: u32| {

@@ -5,6 +5,8 @@
 //! a, b); nothing in them depends on the order of records or of searches.
 
 use super::body::Body;
+use super::heed::Heed;
+use super::memory::{Decided, Notes};
 use super::neighbours::{Neighbours, Sight};
 use super::plan::PairPlan;
 use super::scene::World;
@@ -52,9 +54,9 @@ pub struct StepOptions {
     pub max_records: u32,
     /// Most further slots for contact regions, those of the earliest pairs; 0: all.
     pub max_patch_slots: u32,
-    /// Most cells that one pair's search refines; 0: the default.
+    /// Most cells' worth of work (`Counters::spent`) of one pair's search; 0: the default.
     pub cell_limit: u64,
-    /// Most cells that the searches of the whole step refine, the pairs that may meet earliest first; 0: the default.
+    /// The same of the searches of the whole step, the pairs that may meet earliest first; 0: the default.
     pub batch_limit: u64,
 }
 
@@ -152,6 +154,8 @@ pub struct StepState {
     /// Memory of what is asked beside the searches.
     scratch: Scratch,
     outcome: StepOutcome,
+    /// What is noted for certificates of what is remembered, where somebody asks for them.
+    pub(super) notes: Option<Box<Notes>>,
 }
 
 impl StepState {
@@ -173,7 +177,23 @@ impl StepState {
             searches: search::Memory::default(),
             scratch: Scratch::default(),
             outcome: StepOutcome::default(),
+            notes: None,
         }
+    }
+
+    /// The list of neighbours.
+    pub(super) fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// When the last step began, in steps taken.
+    pub(super) fn clock(&self) -> f64 {
+        self.clock
+    }
+
+    /// The pairs that were asked about in the last step.
+    pub(super) fn jobs(&self) -> &[PairJob] {
+        &self.jobs
     }
 
     /// There are more bodies than before; what is known of the others stays true.
@@ -195,11 +215,24 @@ impl World {
     /// # Errors
     /// What is wrong with the batch, and the index of the record; the world has not changed.
     pub fn step(&mut self, records: &[PoseRecord], options: &StepOptions) -> Result<&StepOutcome, StepError> {
+        self.step_heeding(records, options, None)
+    }
+
+    /// The same step, which heeds what is said to it while it runs.
+    ///
+    /// # Errors
+    /// As `step`.
+    pub fn step_heeding(
+        &mut self,
+        records: &[PoseRecord],
+        options: &StepOptions,
+        heed: Option<&Heed>,
+    ) -> Result<&StepOutcome, StepError> {
         self.check(records, options)?;
         self.stage(options)?;
         self.take(options);
         self.find_pairs(options);
-        self.search(options);
+        self.search(options, heed);
         Ok(&self.state.outcome)
     }
 
@@ -315,6 +348,10 @@ impl World {
         let mut stances = std::mem::take(&mut self.state.stances);
         let mut asked = std::mem::take(&mut self.state.asked);
         let mut jobs = std::mem::take(&mut self.state.jobs);
+        let mut notes = std::mem::take(&mut self.state.notes);
+        if let Some(notes) = &mut notes {
+            notes.begin(*options);
+        }
         let plan = |i: u32, j: u32| {
             let index = self.pair_plan(i, j)?;
             Some((index, *self.plans.plan(index), self.resolution_of(i, j)))
@@ -340,7 +377,12 @@ impl World {
                 // Side by side: bodies whose corners are farther apart may be within it.
                 let reach = 0.5 * plan.reach();
                 let near = swept(i).grown(reach).meets(&swept(j).grown(reach));
-                let pair = neighbours.find(i, j).filter(|pair| near && !neighbours.is_apart(*pair));
+                let found = neighbours.find(i, j);
+                let pair = found.filter(|pair| near && !neighbours.is_apart(*pair));
+                if let (Some(notes), None) = (&mut notes, pair) {
+                    let apart = found.is_some_and(|pair| neighbours.is_apart(pair));
+                    notes.decided((i, j), if apart { Decided::Room } else { Decided::boxes(swept(i), swept(j)) });
+                }
                 let pair = pair.map(|pair| (pair, neighbours.lend(pair).1));
                 jobs.push(PairJob::new((i, j), (index, plan), resolution, near, pair));
             }
@@ -360,6 +402,13 @@ impl World {
                 let look = !sight.met && !sight.discrete;
                 let glance = if look { self.glance((i, j), &sight, &mut stances) } else { None };
                 if let Some(glance) = glance {
+                    if let Some(notes) = &mut notes {
+                        notes.glanced((i, j), &self.bodies, &glance);
+                        if glance.apart {
+                            let last = self.glance_to((i, j), &sight, &mut stances).unwrap_or([glance.along; 2]);
+                            notes.decided((i, j), Decided::Directions(last));
+                        }
+                    }
                     neighbours.noticed(pair, &glance);
                     glanced += u32::from(glance.apart);
                     return !glance.apart;
@@ -374,6 +423,12 @@ impl World {
                 neighbours.box_tests += 1;
                 let (reach, boxes) = (plan.reach(), [swept(i), swept(j)]);
                 let meet = boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach));
+                if let (Some(notes), false) = (&mut notes, meet) {
+                    notes.decided((i, j), Decided::boxes(boxes[0], boxes[1]));
+                    if !sight.discrete {
+                        notes.apart_by((i, j), &self.bodies, boxes[0].gap(&boxes[1]) - reach, boxes);
+                    }
+                }
                 if !meet && !sight.discrete {
                     // Side by side, as they are compared: boxes whose corners are farther apart may meet sooner.
                     neighbours.note(pair, boxes[0].gap(&boxes[1]) - reach);
@@ -389,6 +444,7 @@ impl World {
                 jobs.push(PairJob::new(bodies, plan, resolution, true, Some((pair, knowledge))));
             }
         }
+        self.state.notes = notes;
         self.state.neighbours = neighbours;
         self.state.boxes = boxes;
         self.state.stances = stances;
@@ -415,6 +471,17 @@ impl World {
         Some(Glancing::new(seen, shapes, sight.touch)?.look(sight.along))
     }
 
+    /// The directions by which a glance keeps a pair apart.
+    fn glance_to(&self, (i, j): (u32, u32), sight: &Sight, stances: &mut Stances) -> Option<[glam::DVec3; 2]> {
+        let indices = [i as usize, j as usize];
+        let seen = stances.look(indices, &self.bodies)?;
+        let shapes = |k: usize| {
+            let body = &self.bodies[indices[k]];
+            body.hull.as_ref()?.shape(&body.part.model)
+        };
+        Glancing::new(seen, shapes, sight.touch)?.directions(sight.along)
+    }
+
     /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for
     /// that pair alone.
     fn touch(&self, body: &Body) -> f64 {
@@ -423,10 +490,11 @@ impl World {
     }
 
     /// Searches the jobs and orders what they found.
-    fn search(&mut self, options: &StepOptions) {
+    fn search(&mut self, options: &StepOptions, heed: Option<&Heed>) {
         let Self { bodies, state, .. } = self;
         let out = &mut state.outcome;
-        search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches);
+        search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches, heed);
+        state.scratch.halt = heed.map(|heed| heed.halt.clone());
         *out = StepOutcome {
             pairs: std::mem::take(&mut out.pairs),
             regions: std::mem::take(&mut out.regions),
@@ -449,6 +517,9 @@ impl World {
             let discrete = plan.detect == Detect::Discrete;
             for (i, job) in (before..).zip(jobs.iter_mut()) {
                 let (effects, scratch) = (&mut out.effect_counters, &mut state.scratch);
+                if heed.is_some_and(Heed::is_over) {
+                    left = 0;
+                }
                 let complete = touch::decide(bodies, job, options, &mut left, effects, scratch);
                 count_effects(job, bodies, effects);
                 let outcome = &job.found.outcome;
@@ -489,10 +560,13 @@ impl World {
             out.pairs.truncate(options.max_records as usize);
             out.truncated = true;
         }
-        touch::find_regions(bodies, &mut state.jobs, options, left, out);
+        touch::find_regions(bodies, &mut state.jobs, options, left, out, heed);
         for job in &mut state.jobs {
             if let Some(pair) = job.pair {
                 let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
+                if let Some(notes) = state.notes.as_mut().filter(|_| room > 0.0) {
+                    notes.measured(job, bodies, options, room);
+                }
                 // What meets now will mostly do so in the next step: no look is worth its while.
                 let met = job.found.outcome.status != Status::Clear;
                 state.neighbours.learned(pair, job.knowledge.take(), room, met);

@@ -141,7 +141,7 @@ fn a_refused_batch_changes_nothing() {
 
 #[test]
 fn bodies_that_swing_about_their_places_are_not_paired_anew() {
-    // Three balls, 4 apart: the first and the last swing, the one between rests; 100 times as far as their boxes are grown for.
+    // Three balls, 4 apart: the first and the last swing, the one between rests; in all much farther than their boxes are grown for.
     let mut world = balls(3);
     let mut tests = 0;
     for step in 1..=400 {

@@ -5,6 +5,7 @@
 
 use super::body::Body;
 use super::coherence::Told;
+use super::heed::Heed;
 use super::record;
 use super::search::{self, PairJob};
 use super::step::{StepOptions, StepOutcome};
@@ -38,7 +39,8 @@ pub(super) fn decide(
     effects: &mut EffectCounters,
     scratch: &mut Scratch,
 ) -> bool {
-    // The flag stands beside every contact whose time is told, whether regions are asked or not.
+    // The flag stands beside every pair whose time is told, whether regions are asked or not; clear pairs are told where
+    // their rule or the step asks for them.
     let margin = job.near && job.plan.margin > 0.0;
     let outcome = &mut job.found.outcome;
     let (status, resolution) = (outcome.status, outcome.resolution);
@@ -49,7 +51,11 @@ pub(super) fn decide(
     if outcome.touching || job.found.apart || job.plan.report < Report::Time && !margin {
         return true;
     }
-    if !(status == Status::Contact || margin || is_asked(job, options, &job.found.outcome)) {
+    let is_told = match status {
+        Status::Contact | Status::Undecided => true,
+        _ => options.clear && !options.first,
+    };
+    if !(is_told || margin || is_asked(job, options, &job.found.outcome)) {
         return true;
     }
     let outcome = &mut job.found.outcome;
@@ -109,6 +115,7 @@ pub(super) fn find_regions(
     options: &StepOptions,
     mut left: u64,
     out: &mut StepOutcome,
+    heed: Option<&Heed>,
 ) {
     let mut slots = 0;
     for p in &mut out.pairs {
@@ -121,6 +128,9 @@ pub(super) fn find_regions(
             p.regions.1 = told.regions.len() as u32;
             out.regions.extend_from_slice(&told.regions);
         } else {
+            if heed.is_some_and(Heed::is_over) {
+                left = 0;
+            }
             let query = query(bodies, job, options, left);
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
             let found = region::complete(&query, &mut p.outcome, threshold);

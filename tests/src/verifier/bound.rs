@@ -223,6 +223,44 @@ impl Bounder<'_> {
         Some(Jet { v: Interval::new(value.lo, f64::INFINITY), g: [any; 4], h: [any; 10] })
     }
 
+    /// ½(psi_p − psi_q) + delta for two faces of one body, from below; y is the point in its frame. With centres, points of the
+    /// axes or apexes o and Δ = o_p − o_q, at every x: of spheres psi_p − psi_q >= R_q − R_p − |Δ|; of cylinders
+    /// >= R_q − R_p − |Δ − (Δ·a)a| − |a_p ∓ a_q| |x − o_q|; of cones as above. It does not move, and only its lower end is known.
+    fn wall(&self, p: &Face, q: &Face, y: &[Jet; 3]) -> Option<Jet> {
+        let place = |v: DVec3| vector(v.to_array());
+        let far = |o: DVec3| length(std::array::from_fn(|i| y[i].v - point(o[i])));
+        let least = match (*p, *q) {
+            (Face::Sphere { center: o, radius: r }, Face::Sphere { center: u, radius: s }) => {
+                point(s) - point(r) - length(minus(place(o), place(u)))
+            }
+            (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: u, axis: b, radius: s }) => {
+                let (turned, own) = (if a.dot(b) < 0.0 { -b } else { b }, unit(place(a)));
+                let lean = length(minus(own, unit(place(turned))));
+                let delta = minus(place(o), place(u));
+                let across = length(minus(delta, times(dot(delta, own), own)));
+                point(s) - point(r) - across - lean * far(u)
+            }
+            (Face::Cone { apex: o, axis: a, sin, cos }, Face::Cone { apex: u, axis: b, sin: sin_q, cos: cos_q }) => {
+                let own = unit(place(a));
+                let (sin, cos) = (point(sin), point(cos));
+                let angle = (sin * point(cos_q) - cos * point(sin_q)).mag() * 1.58;
+                let lean = length(minus(own, unit(place(b))));
+                let delta = minus(place(o), place(u));
+                let along = dot(delta, own);
+                let across = length(minus(delta, times(along, own)));
+                sin * along - cos * across - far(u) * (lean * (sin + cos) + point(angle))
+            }
+            _ => return None,
+        };
+        let any = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+        let value = point(0.5) * least + point(self.depth);
+        if value.lo > 0.0 {
+            // A number below it holds all over the region.
+            return Some(Jet::constant(point(value.lo)));
+        }
+        Some(Jet { v: Interval::new(value.lo, f64::INFINITY), g: [any; 4], h: [any; 10] })
+    }
+
     /// With |u_p| <= R_p − delta and |u_q| >= R_q + delta at a contact:
     /// [ |u_p|² − |u_q|² + (R_q + delta)² − (R_p − delta)² ] / (2(R_p + R_q)) <= 0, for spheres and cylinders.
     fn fit(
@@ -233,8 +271,14 @@ impl Bounder<'_> {
         (x, t): (Vector, Interval),
         touched: DVec3,
     ) -> Option<Jet> {
-        if p.0.on_b == q.0.on_b || p.0.negative || !q.0.negative {
+        if p.0.negative || !q.0.negative {
             return None;
+        }
+        if p.0.on_b == q.0.on_b {
+            let wall = self.wall(p.1, q.1, if p.0.on_b { b } else { a })?;
+            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone { .. }) {
+                return Some(wall);
+            }
         }
         if let (Face::Cone { .. }, Face::Cone { .. }) = (p.1, q.1) {
             return self.cones(p, q, x, t);
@@ -272,6 +316,10 @@ impl Bounder<'_> {
         let (p_name, q_name) = (p, q);
         let ((p, r_p), (q, r_q)) = (square(p.0, p.1)?, square(q.0, q.1)?);
         if r_p <= self.depth {
+            return None;
+        }
+        // At a negative depth the subtracted face has shrunk.
+        if r_q + self.depth <= 0.0 {
             return None;
         }
         let (r_p, r_q, depth) = (point(r_p), point(r_q), point(self.depth));

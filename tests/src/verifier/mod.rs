@@ -11,6 +11,7 @@
 
 pub mod bound;
 pub mod interval;
+pub mod memory;
 pub mod motion;
 
 use bound::{Bounder, Literal, Region, Term};
@@ -152,6 +153,17 @@ pub fn check(
     first: (&Solid, &Placed),
     second: (&Solid, &Placed),
 ) -> Result<Checked, String> {
+    let checked = check_level(text, names, first, second)?;
+    if checked.depth > 0.0 { Ok(checked) } else { Err("line 1: depth out of range".into()) }
+}
+
+/// The same where the depth may be negative: no point is then within that distance of both bodies, as f measures it.
+fn check_level(
+    text: &str,
+    names: (usize, usize),
+    first: (&Solid, &Placed),
+    second: (&Solid, &Placed),
+) -> Result<Checked, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>())).peekable();
     let (_, head) = lines.next().ok_or("empty certificate")?;
     let [_, a, b, _, carrier, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
@@ -168,17 +180,17 @@ pub fn check(
     };
     let (carrier, other) = if swapped { (second, first) } else { (first, second) };
     let (depth, until, count) = (number(depth)?, number(until)?, index(cells)?);
-    if !(depth > 0.0 && (0.0..=1.0).contains(&until)) {
+    if !(depth != 0.0 && (0.0..=1.0).contains(&until)) {
         return Err("line 1: depth or time out of range".into());
     }
     let mut checked = Checked { until, depth, ..Checked::default() };
-    if carrier.0.is_empty() || other.0.is_empty() {
+    if carrier.0.is_void() || other.0.is_void() {
         return Ok(checked);
     }
     let corners: Vec<f64> = corners.iter().map(|s| number(s)).collect::<Result<_, _>>()?;
     let [x0, y0, z0, x1, y1, z1] = corners.as_slice() else { return Err("line 1: a box has six numbers".into()) };
     let root = [(*x0, *x1), (*y0, *y1), (*z0, *z1)];
-    if !holds_solid(&root, carrier.0) {
+    if !holds_solid(&root, carrier.0, (-depth).max(0.0)) {
         return Err("line 1: the box does not hold the carrier".into());
     }
     let motions = Motions::new(carrier.1, other.1);
@@ -365,37 +377,43 @@ fn literal(s: &str) -> Result<Literal, String> {
     Ok(Literal { on_b, negative, face: s[2..].parse().map_err(|_| bad())? })
 }
 
-/// True when the box holds every positive primitive of the solid that takes part in its extent.
-fn holds_solid(root: &[(f64, f64); 3], solid: &Solid) -> bool {
-    fn extent(solid: &Solid, node: NodeId) -> Option<[Interval; 3]> {
-        match &solid.nodes[node as usize] {
-            Node::Empty => None,
-            Node::Primitive(p) => Some(primitive_box(solid, *p)),
-            Node::Op(Op::Difference, children) => extent(solid, children[0]),
-            Node::Op(Op::Union, children) => {
-                let each = children.iter().filter_map(|c| extent(solid, *c));
-                each.reduce(|a, b| std::array::from_fn(|k| a[k].hull(b[k])))
-            }
-            Node::Op(Op::Intersection, children) => {
-                let mut left = extent(solid, children[0])?;
-                for c in &children[1..] {
-                    let o = extent(solid, *c)?;
-                    for k in 0..3 {
-                        left[k] = Interval::new(left[k].lo.max(o[k].lo), left[k].hi.min(o[k].hi));
-                        if left[k].lo > left[k].hi {
-                            return None;
-                        }
+/// A box around all points with f <= `level` below a node: positive primitives as their operations join them.
+fn extent(solid: &Solid, node: NodeId, level: f64) -> Option<[Interval; 3]> {
+    match &solid.nodes[node as usize] {
+        Node::Empty => None,
+        Node::Primitive(p) => Some(primitive_box(solid, *p, level)),
+        Node::Op(Op::Difference, children) => extent(solid, children[0], level),
+        Node::Op(Op::Union, children) => {
+            let each = children.iter().filter_map(|c| extent(solid, *c, level));
+            each.reduce(|a, b| std::array::from_fn(|k| a[k].hull(b[k])))
+        }
+        Node::Op(Op::Intersection, children) => {
+            let mut left = extent(solid, children[0], level)?;
+            for c in &children[1..] {
+                let o = extent(solid, *c, level)?;
+                for k in 0..3 {
+                    left[k] = Interval::new(left[k].lo.max(o[k].lo), left[k].hi.min(o[k].hi));
+                    if left[k].lo > left[k].hi {
+                        return None;
                     }
                 }
-                Some(left)
             }
+            Some(left)
         }
     }
-    let Some(all) = extent(solid, solid.root) else { return true };
+}
+
+/// True when the box holds all points of the solid with f <= `level`.
+fn holds_solid(root: &[(f64, f64); 3], solid: &Solid, level: f64) -> bool {
+    let Some(all) = extent(solid, solid.root, level) else { return true };
     (0..3).all(|k| root[k].0 <= all[k].lo && all[k].hi <= root[k].1)
 }
 
-fn primitive_box(solid: &Solid, p: u32) -> [Interval; 3] {
+/// A box around {psi <= level} of a primitive. A convex psi that is −rho at a point grows from there along every ray at least as
+/// fast as up to the surface: of a cone and a polyhedron, scaled about such a point by 1 + level/rho, it holds.
+fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
+    let grown = |x: f64| if level > 0.0 { (x + level) * (1.0 + 1e-15) } else { x };
+    let scale = |rho: f64| if level > 0.0 { (1.0 + level / rho) * (1.0 + 1e-14) } else { 1.0 };
     let p = &solid.primitives[p as usize];
     let m = p.frame.matrix();
     // Placing a corner and the matrix itself are right to a few units in the last place.
@@ -414,19 +432,31 @@ fn primitive_box(solid: &Solid, p: u32) -> [Interval; 3] {
     let axis = m.z_axis;
     let disc = |r: f64| move |k: usize| r * (1.0 - axis[k] * axis[k]).max(0.0).sqrt() + r * 1e-12;
     match &p.shape {
-        Shape::Sphere(s) => around(&[DVec3::ZERO], &|_| s.radius),
-        Shape::Cylinder(c) => around(&[DVec3::Z * c.half_height, -DVec3::Z * c.half_height], &disc(c.radius)),
+        Shape::Sphere(s) => around(&[DVec3::ZERO], &|_| grown(s.radius)),
+        Shape::Cylinder(c) => {
+            let end = DVec3::Z * grown(c.half_height);
+            around(&[end, -end], &disc(grown(c.radius)))
+        }
         Shape::Cone(c) => {
-            let top = around(&[DVec3::Z * c.half_height], &disc(c.top));
-            let bottom = around(&[-DVec3::Z * c.half_height], &disc(c.bottom));
+            // The middle of the axis: from the side it is half of both radii, as the side leans.
+            let slant = (2.0 * c.half_height).hypot(c.bottom - c.top);
+            let k = scale(c.half_height.min((c.bottom + c.top) * c.half_height / slant));
+            let top = around(&[DVec3::Z * (k * c.half_height)], &disc(k * c.top));
+            let bottom = around(&[-DVec3::Z * (k * c.half_height)], &disc(k * c.bottom));
             std::array::from_fn(|k| top[k].hull(bottom[k]))
         }
         Shape::Cuboid(c) => {
             let sign = |i: u32, bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            let corners: Vec<DVec3> = (0..8).map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)) * c.half).collect();
+            let corners: Vec<DVec3> =
+                (0..8).map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)) * c.half.map(grown)).collect();
             around(&corners, &|_| 0.0)
         }
-        Shape::Polyhedron(p) => around(&p.vertices, &|_| 0.0),
+        Shape::Polyhedron(p) => {
+            let middle = p.vertices.iter().sum::<DVec3>() / p.vertices.len() as f64;
+            let rho = p.planes.iter().map(|(n, d)| d - n.dot(middle)).fold(f64::INFINITY, f64::min);
+            let all: Vec<DVec3> = p.vertices.iter().map(|v| middle + (*v - middle) * scale(rho)).collect();
+            around(&all, &|_| 0.0)
+        }
         Shape::HalfSpace(_) => [point(0.0); 3].map(|_| Interval::new(f64::NEG_INFINITY, f64::INFINITY)),
     }
 }

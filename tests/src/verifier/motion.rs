@@ -17,7 +17,7 @@ use contactd::motion::Placed;
 use contactd_proto::Pose;
 
 /// The matrix of a quaternion of about unit length.
-fn rotation(pose: &Pose) -> Matrix {
+pub(super) fn rotation(pose: &Pose) -> Matrix {
     let q = pose.rotation;
     let [x, y, z, w] = [q.x, q.y, q.z, q.w].map(point);
     let s = point(2.0) * (x.square() + y.square() + z.square() + w.square()).recip();
@@ -30,7 +30,7 @@ fn rotation(pose: &Pose) -> Matrix {
 }
 
 /// exp(t·[spin]×).
-fn turned(spin: Vector, t: Interval) -> Matrix {
+pub(super) fn turned(spin: Vector, t: Interval) -> Matrix {
     let square = spin[0].square() + spin[1].square() + spin[2].square();
     let (mut t, mut doublings) = (t, 0);
     while square.hi * t.mag() * t.mag() > 1.0 {

@@ -3,7 +3,7 @@
 use crate::stub::{Script, scripted};
 use crate::support::*;
 use contactd_capi::Session;
-use contactd_capi::abi::{Mass, Pose};
+use contactd_capi::abi::{Mass, Options, Pose, Rule};
 use contactd_capi::error::*;
 use contactd_capi::model::*;
 use contactd_capi::scene::*;
@@ -153,10 +153,15 @@ fn arguments_out_of_their_range_are_named() {
     refused(add(|o| o.place.rotation = [1.0; 4]), number(ErrorCode::BadQuaternion), "unit length");
     refused(add(|o| o.is_static = 2), ERROR_ARGUMENT, "object.is_static of 0 to 1, found 2");
     refused(add(|o| o.rotates = 7), ERROR_ARGUMENT, "object.rotates of 0 to 1, found 7");
+    refused(add(|o| o.reserved = 1), ERROR_ARGUMENT, "object.reserved of 0 to 0, found 1");
+    let rule = Rule { reserved: 1, ..contactd_rule_new(name, name) };
+    refused(unsafe { contactd_set_rules(s, &rule, 1) }, ERROR_ARGUMENT, "rule.reserved of 0 to 0, found 1");
 
     let mut options = out(|o| unsafe { contactd_get_options(s, o) });
     options.polling = 2;
     refused(unsafe { contactd_set_options(s, &options) }, ERROR_ARGUMENT, "options.polling of 0 to 1, found 2");
+    let options = Options { polling: 0, reserved: 1, ..options };
+    refused(unsafe { contactd_set_options(s, &options) }, ERROR_ARGUMENT, "options.reserved of 0 to 0, found 1");
     done(unsafe { contactd_set_advance(s, 1.5) });
     session.begin(1)[0] = end(ball, [1.0, 0.0, 0.0]);
     let refusal = unsafe { contactd_finish(s, 60.0, std::mem::MaybeUninit::uninit().as_mut_ptr()) };

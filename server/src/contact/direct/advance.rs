@@ -78,20 +78,33 @@ impl<'a> Convex<'a> {
 
     /// Time until which the distance stays above `least` (a length), at least; of how many evaluations it took.
     pub fn keeps(self, least: f64) -> (f64, u64) {
-        let (until, _, count) = self.advance_to(least, KEPT, SHORT);
+        let (until, _, count) = self.advance_to(least, KEPT, SHORT, &mut |_| {});
         (until, count)
+    }
+
+    /// The direction, from the carrier and in the world's axes, that proves the distance at the start.
+    pub fn direction(&self) -> DVec3 {
+        self.start.n
+    }
+
+    /// The directions by which the distance was found to stay above `least`, each from its time on: what `keeps` proves.
+    pub fn directions(self, least: f64) -> Vec<(f64, DVec3)> {
+        let mut all = Vec::new();
+        self.advance_to(least, KEPT, SHORT, &mut |gap| all.push((gap.t, gap.n)));
+        all
     }
 
     /// The same to the end: where it stops short of 1 the distance then, a lower bound, is hardly above `least`, or what may
     /// be spent has run out.
     pub fn nears(self, least: f64) -> (f64, f64, u64) {
-        self.advance_to(least, NEARED, 0.0)
+        self.advance_to(least, NEARED, 0.0, &mut |_| {})
     }
 
-    fn advance_to(mut self, least: f64, most: u64, shortest: f64) -> (f64, f64, u64) {
+    fn advance_to(mut self, least: f64, most: u64, shortest: f64, step: &mut impl FnMut(&Gap)) -> (f64, f64, u64) {
         self.advance.pace.least = least;
         let (mut here, mut count) = (self.start, 1);
         while here.phi > least && count < most {
+            step(&here);
             let m = self.advance.moment(1.0);
             let until = self.advance.pace.proven(&here, &self.advance.gap(&m, here.n));
             if until >= 1.0 {

@@ -255,17 +255,31 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
     /// Looks along the direction that was remembered (0: none was), or else from centre to centre, and then along others.
     #[inline]
     pub fn look(&self, along: DVec3) -> Glance {
+        let mut last = DVec3::ZERO;
+        self.look_to(along, &mut last)
+    }
+
+    /// The two directions, at the start and at the end, that keep the bodies apart where a look says that they stay so.
+    pub fn directions(&self, along: DVec3) -> Option<[DVec3; 2]> {
+        let mut last = DVec3::ZERO;
+        let glance = self.look_to(along, &mut last);
+        glance.apart.then_some([glance.along, if last == DVec3::ZERO { glance.along } else { last }])
+    }
+
+    /// Notes the direction at the end in `last` where it is another one.
+    #[inline]
+    fn look_to(&self, along: DVec3, last: &mut DVec3) -> Glance {
         let along = if along == DVec3::ZERO { self.way().normalize_or(DVec3::X) } else { along };
         let gaps = self.gap(along);
         if self.proves((along, gaps[0]), (along, gaps[1])) {
             return self.seen(along, gaps[0], true);
         }
-        self.look_around(along, gaps[0])
+        self.look_around(along, gaps[0], last)
     }
 
     /// Looks along the directions of nearest points, where `along` does not keep the bodies apart.
     #[inline(never)]
-    fn look_around(&self, along: DVec3, gap: f64) -> Glance {
+    fn look_around(&self, along: DVec3, gap: f64, last: &mut DVec3) -> Glance {
         for k in 0..2 {
             for n in self.sides(k) {
                 let gaps = self.gap(n);
@@ -287,6 +301,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
         if self.proves((n1, later[0]), (n1, later[1])) {
             return self.seen(n1, later[0], true);
         }
+        *last = n1;
         self.seen(n0, gaps[0], self.proves((n0, gaps[0]), (n1, later[1])))
     }
 

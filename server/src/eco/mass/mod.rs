@@ -41,6 +41,9 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use voxel::{Evaluator, Voxel};
 
+/// Work (`Voxel::work`) that a box may take; a limit of boxes is one of so much work for each of them, too. Most take less.
+const WORK_PER_BOX: u64 = 1024;
+
 /// Boxes of a batch at most …
 const BATCH: usize = 256;
 /// … and their errors, as a fraction of the largest: a batch stays close to the order by error.
@@ -126,12 +129,23 @@ struct Found {
     /// Boxes that could be halved further; nothing in the places of those that were.
     open: Vec<Option<Voxel>>,
     boxes: u64,
+    /// What they took (`Voxel::work`).
+    work: u64,
 }
 
 impl Found {
     fn new(around: Aabb) -> Self {
         let (settled, settled_error, settled_spread) = Default::default();
-        Self { around, origin: around.center(), settled, settled_error, settled_spread, open: vec![], boxes: 0 }
+        Self {
+            around,
+            origin: around.center(),
+            settled,
+            settled_error,
+            settled_spread,
+            open: vec![],
+            boxes: 0,
+            work: 0,
+        }
     }
 
     fn settle(&mut self, moments: &Moments, error: f64, spread: f64) {
@@ -155,6 +169,7 @@ impl Found {
         let mut free: Vec<usize> = vec![];
         loop {
             self.boxes += fresh.len() as u64;
+            self.work += fresh.iter().map(|voxel| voxel.work).sum::<u64>();
             for voxel in fresh {
                 volume.add(voxel.moments.volume());
                 error.add(voxel.error);
@@ -173,9 +188,16 @@ impl Found {
                 break;
             }
             let left = (options.boxes.saturating_sub(self.boxes) / 2) as usize;
+            // A half takes about what the whole box did.
+            let mut left_work = options.boxes.saturating_mul(WORK_PER_BOX).saturating_sub(self.work);
             let least = queue.peek().map_or(0.0, |rank: &Rank| ALIKE * rank.error);
             batch.clear();
             while batch.len() < left.min(BATCH) && queue.peek().is_some_and(|rank: &Rank| rank.error >= least) {
+                let cost = queue.peek().and_then(|rank| self.open[rank.at].as_ref()).map_or(0, |voxel| 2 * voxel.work);
+                if cost > left_work {
+                    break;
+                }
+                left_work -= cost;
                 let at = queue.pop().map_or(0, |rank| rank.at);
                 let Some(voxel) = self.open[at].take() else { continue };
                 volume.add(-voxel.moments.volume());

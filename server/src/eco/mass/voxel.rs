@@ -23,7 +23,7 @@ use super::cell::Cell;
 use super::moments::Moments;
 use super::slab::{Curve, Slab};
 use crate::eco::span::face_span;
-use crate::math::Aabb;
+use crate::math::{Aabb, halt};
 use crate::solid::local::{LiteralId, Token, Truth, literals, prune, truth_of};
 use crate::solid::{Face, Sense};
 use glam::DVec3;
@@ -31,6 +31,12 @@ use smallvec::SmallVec;
 
 /// Cuts of one box at most. Beyond, halving the box is cheaper.
 const MOST_CUTS: usize = 32;
+/// What a cut of a cell and the moments of its pieces cost, in literals compared with a cell; and how many spans of a face
+/// over the box cost as much as one.
+const CUT: u64 = 16;
+const SPANS: u64 = 2;
+/// Slabs among which one is looked up that cost as much.
+const LOOKUPS: u64 = 16;
 
 /// Rounding of the moments of a cell, as a fraction of its box' volume (times the extents, for the others): the signed
 /// tetrahedra of a few dozen triangles, each of a volume below that of the box and right to 8 ε.
@@ -54,6 +60,8 @@ pub struct Voxel {
     pub spread: f64,
     /// Axis across which to halve it; `None` when that brings nothing.
     pub axis: Option<usize>,
+    /// What it took, in literals compared with a cell.
+    pub work: u64,
 }
 
 /// What is known of a box in the coordinates of the cube.
@@ -99,6 +107,8 @@ pub struct Evaluator<'a> {
     expressions: Vec<Vec<Token>>,
     cuts: usize,
     most_cuts: usize,
+    /// Work of the box at hand.
+    work: u64,
 }
 
 impl<'a> Evaluator<'a> {
@@ -106,7 +116,7 @@ impl<'a> Evaluator<'a> {
     pub fn new(faces: &'a [Face]) -> Self {
         let (slabs, closer, cells, expressions) = Default::default();
         let (half, cube) = (DVec3::ZERO, Cell::cube());
-        Self { faces, slabs, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS }
+        Self { faces, slabs, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS, work: 0 }
     }
 
     /// The same without a limit of cuts: for a solid that shall be one box.
@@ -116,15 +126,17 @@ impl<'a> Evaluator<'a> {
 
     /// A box where `tokens` are left of the solid, or of a box around it.
     pub fn voxel(&mut self, region: Aabb, tokens: &[Token]) -> Voxel {
+        halt::point();
         let (center, half) = (region.center(), region.half());
         let faces = self.faces;
+        self.work = tokens.len() as u64 / SPANS;
         let mut kept = self.expressions.pop().unwrap_or_default();
         kept.clear();
         let truth = prune(tokens, &mut kept, &mut |id| {
             truth_of(id.sense(), face_span(&faces[id.face() as usize], center, half), 0.0, 0.0)
         });
         let (tokens, moments) = Default::default();
-        let mut voxel = Voxel { region, tokens, moments, error: 0.0, spread: 0.0, axis: None };
+        let mut voxel = Voxel { region, tokens, moments, error: 0.0, spread: 0.0, axis: None, work: 0 };
         if truth != Truth::False {
             let whole = Moments::of_box(half);
             (voxel.error, voxel.spread) = (CELL_ROUNDING * whole.volume(), CELL_ROUNDING * whole.volume());
@@ -135,6 +147,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         self.expressions.push(kept);
+        voxel.work = self.work;
         voxel
     }
 
@@ -147,6 +160,8 @@ impl<'a> Evaluator<'a> {
                 self.slabs.push((id.face(), Slab::new(&self.faces[id.face() as usize], center, half)));
             }
         }
+        let count = self.slabs.len() as u64;
+        self.work += count * (1 + count / LOOKUPS);
         let mut part = Part::default();
         let unit = half.x * half.y * half.z;
         if self.measure(kept, &cube, Body::Solid, &mut part) {
@@ -208,6 +223,8 @@ impl<'a> Evaluator<'a> {
     fn measure(&mut self, tokens: &[Token], cell: &Cell, body: Body, part: &mut Part) -> bool {
         let mut kept = self.expressions.pop().unwrap_or_default();
         kept.clear();
+        // Each literal's slab is looked up among all.
+        self.work += tokens.len() as u64 * (1 + self.slabs.len() as u64 / LOOKUPS);
         let truth = prune(tokens, &mut kept, &mut |id| self.truth(id, cell, body));
         let done = match truth {
             Truth::False => true,
@@ -247,6 +264,7 @@ impl<'a> Evaluator<'a> {
                 continue;
             }
             self.cuts += 1;
+            self.work += CUT;
             done &= self.cuts <= self.most_cuts;
             if !done {
                 break;
@@ -302,6 +320,7 @@ impl<'a> Evaluator<'a> {
         if slab.curve.is_none() {
             return slab;
         }
+        self.work += 2 * CUT;
         let [mut outer, mut between] = [(); 2].map(|()| self.cells.pop().unwrap_or_default());
         slab.between(cell, &mut outer, &mut between);
         let closer = if between.is_empty() { slab } else { slab.tightened(&between) };
@@ -311,6 +330,7 @@ impl<'a> Evaluator<'a> {
 
     /// The same for one face of known curvature.
     fn single(&mut self, id: LiteralId, slab: &Slab, curve: Curve, cell: &Cell, part: &mut Part) {
+        self.work += 3 * CUT;
         let [mut outer, mut between, mut inner] = [(); 3].map(|()| self.cells.pop().unwrap_or_default());
         slab.between(cell, &mut outer, &mut between);
         slab.inside(&outer, &mut inner);

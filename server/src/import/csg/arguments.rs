@@ -1,12 +1,16 @@
 //! Typed access to a call's arguments.
 //!
 //! Flattened files name every argument; unnamed ones are taken in OpenSCAD's order. A name that the call does not have
-//! is refused rather than dropped, for a dropped name would silently change the shape. `$`-variables and hints for the
-//! preview (`convexity`) are allowed everywhere.
+//! is refused rather than dropped, for a dropped name would silently change the shape. What OpenSCAD itself may write and what
+//! changes no shape is allowed everywhere: `HARMLESS`.
 
 use super::syntax::{Call, Value, ValueKind};
 use super::{Place, Problem};
 use glam::{DVec2, DVec3};
+
+/// Arguments that any call may have, whatever their values: a hint for the preview, and into how many pieces curves are
+/// cut, which says something of curved primitives alone (they read it). Any other `$`-variable is refused.
+pub const HARMLESS: [&str; 5] = ["convexity", "$fn", "$fa", "$fs", "$fe"];
 
 /// The arguments of one call, matched with its parameters.
 pub struct Arguments<'a> {
@@ -23,7 +27,11 @@ impl<'a> Arguments<'a> {
         let mut unnamed = parameters.iter();
         for a in &call.arguments {
             let name = match &a.name {
-                Some(n) if n.starts_with('$') || n == "convexity" || parameters.contains(&n.as_str()) => n.as_str(),
+                Some(n) if HARMLESS.contains(&n.as_str()) || parameters.contains(&n.as_str()) => n.as_str(),
+                Some(n) if n == "file" => {
+                    let construct = format!("{} of another file", call.name);
+                    return Err((a.at, Problem::Unsupported { construct, hint: OTHER_FILES }));
+                }
                 Some(n) => {
                     let problem = Problem::syntax(expected_names(&call.name, parameters), format!("\"{n}\""));
                     return Err((a.at, problem));
@@ -93,13 +101,12 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// `true` or `false`, or `default`; a number counts as OpenSCAD counts it.
+    /// `true` or `false`, or `default`.
     pub fn bool_or(&self, name: &str, default: bool) -> Result<bool> {
         match self.get(name) {
             None => Ok(default),
             Some(v) => match v.kind {
                 ValueKind::Bool(b) => Ok(b),
-                ValueKind::Number(n) => Ok(n != 0.0),
                 _ => Err(self.wrong(v, "true or false", name)),
             },
         }
@@ -210,6 +217,9 @@ impl<'a> Arguments<'a> {
         (v.at, Problem::syntax(format!("{what} as {name} of {}", self.call.name), v.found()))
     }
 }
+
+/// What to do about a call that takes its shape from another file.
+pub const OTHER_FILES: &str = " (other files are not read: write the shape out in primitives)";
 
 /// A finite number.
 pub fn finite(v: &Value) -> Result<f64> {

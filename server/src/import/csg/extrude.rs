@@ -26,10 +26,14 @@ pub struct Extrusion {
 }
 
 impl Extrusion {
+    /// Its arguments by name. Without twist, `slices` and `segments` cut flat walls into flat pieces: they change nothing.
+    pub fn arguments(call: &Call) -> Result<Arguments<'_>> {
+        Arguments::new(call, &["height", "center", "twist", "slices", "scale", "segments", "v"])
+    }
+
     /// Reads the arguments of `linear_extrude`.
     pub fn new(call: &Call) -> Result<Self> {
-        let parameters = ["height", "center", "twist", "slices", "scale", "segments", "v"];
-        let arguments = Arguments::new(call, &parameters)?;
+        let arguments = Self::arguments(call)?;
         let mut height = arguments.finite_positive("height")?;
         if arguments.number_or("twist", 0.0)? != 0.0 {
             return Err((call.at, Problem::unsupported("twist of linear_extrude")));
@@ -117,7 +121,14 @@ impl Extrusion {
         let top: Vec<DVec2> = bottom.iter().map(|p| *p * self.scale).collect();
         let (points, faces) = prism(&bottom, &top, low, high);
         match place::polyhedron(outer, &points, &faces) {
-            Ok((placed, _)) => Ok(placed),
+            // Either way round is the same outline, and so is one with corners on its sides.
+            Ok((mut placed, fit)) => {
+                if fit.moved > 0.0 {
+                    let text = "a polygon that is not quite convex: taken as the hull of its sides";
+                    placed.notes.push((text.into(), Some(fit.moved)));
+                }
+                Ok(placed)
+            }
             Err(Problem::Mesh(MeshError::Flat)) => Err(Problem::syntax("a polygon with an area", "none")),
             Err(Problem::Mesh(_)) if self.scale.x != self.scale.y => {
                 Err(Problem::unsupported("non-uniform scale of linear_extrude on a polygon"))

@@ -5,13 +5,13 @@
 //! subtracted from nothing) are left out before primitives get their indices: every primitive of the solid stands at
 //! exactly one leaf, in file order.
 
-use super::arguments::{Arguments, finite};
+use super::arguments::{Arguments, OTHER_FILES, finite};
 use super::extrude::{Extrusion, prism, ring, turn};
 use super::place::{self, Placed};
 use super::syntax::{Call, CallId, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
 use crate::import::Note;
-use crate::math::tolerance::SIMILARITY;
+use crate::math::tolerance::{ROUNDING, SIMILARITY};
 use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -25,7 +25,9 @@ const EXACT_FROM: f64 = 9.0;
 pub fn lower(file: &File, facets: Facets, limits: &Limits) -> Result<Import> {
     let mut lowering = Lowering { file, facets, limits, notes: Vec::new(), parts: Vec::new(), faces: 0 };
     let root = lowering.tree()?;
-    let solid = emit(lowering.parts, root);
+    let mut notes = lowering.notes;
+    let solid = emit(lowering.parts, root, &mut notes);
+    notes.sort_by_key(|n| (n.at.line, n.at.column));
     let unbounded = solid.primitives.iter().find(|p| matches!(p.shape, Shape::HalfSpace(_)));
     if let Some(p) = unbounded
         && !solid.aabb().is_empty()
@@ -35,7 +37,6 @@ pub fn lower(file: &File, facets: Facets, limits: &Limits) -> Result<Import> {
         let expected = "something bounded that this infinite primitive is cut down by";
         return Err((at, Problem::syntax(expected, "a solid that reaches to infinity")));
     }
-    let mut notes = lowering.notes;
     if solid.is_empty() {
         notes.push(Note { at: Place::START, text: "the model is empty: nothing can touch it".into(), amount: None });
     }
@@ -49,7 +50,8 @@ type PartId = usize;
 enum Part {
     Empty,
     Leaf(Shape, Pose, Label),
-    Op(Op, Vec<PartId>),
+    /// An operation, where it stands, and its operands.
+    Op(Op, Place, Vec<PartId>),
 }
 
 /// The surroundings of a call.
@@ -70,6 +72,7 @@ struct Outline {
 
 /// A call whose children are being lowered.
 struct Open<'a> {
+    at: Place,
     children: &'a [CallId],
     next: usize,
     op: Op,
@@ -98,8 +101,12 @@ impl<'a> Lowering<'a> {
         let file = self.file;
         let root = root_call(file);
         let top: &[CallId] = root.as_ref().map_or(&file.top, std::slice::from_ref);
+        if let Some(root) = root {
+            self.roots(root);
+        }
         let context = Context { outer: DAffine3::IDENTITY, outline: None };
-        let mut open = vec![Open { children: top, next: 0, op: Op::Union, context, built: Vec::new() }];
+        let mut open =
+            vec![Open { at: Place::START, children: top, next: 0, op: Op::Union, context, built: Vec::new() }];
         loop {
             let depth = open.len();
             let current = &mut open[depth - 1];
@@ -107,6 +114,8 @@ impl<'a> Lowering<'a> {
                 current.next += 1;
                 let call = &file.calls[id];
                 if call.disabled || (call.background && root != Some(id)) {
+                    let mark = if call.disabled { "*" } else { "%" };
+                    self.note(call.at, format!("{} after {mark}: left out, as OpenSCAD does", call.short()), None);
                     continue;
                 }
                 let mut context = current.context;
@@ -122,18 +131,33 @@ impl<'a> Lowering<'a> {
                         open[depth - 1].built.push(id);
                     }
                     Step::Open(op, context) => {
-                        open.push(Open { children: &call.children, next: 0, op, context, built: Vec::new() });
+                        let children = &call.children;
+                        open.push(Open { at: call.at, children, next: 0, op, context, built: Vec::new() });
                     }
                 }
                 continue;
             }
-            let (op, built) = (current.op, std::mem::take(&mut current.built));
+            let (op, at, built) = (current.op, current.at, std::mem::take(&mut current.built));
             open.pop();
-            let part = self.push(Part::Op(op, built));
+            let part = self.push(Part::Op(op, at, built));
             match open.last_mut() {
                 Some(parent) => parent.built.push(part),
                 None => return Ok(part),
             }
+        }
+    }
+
+    fn note(&mut self, at: Place, text: String, amount: Option<f64>) {
+        self.notes.push(Note { at, text, amount });
+    }
+
+    /// Tells that the model is the call `root` alone, and which other calls would be it too.
+    fn roots(&mut self, root: CallId) {
+        let file = self.file;
+        let call = &file.calls[root];
+        self.note(call.at, format!("{} after !: the model is this call alone", call.short()), None);
+        for (_, other) in file.calls.iter().enumerate().filter(|(id, c)| *id != root && c.root && !c.disabled) {
+            self.note(other.at, "a second !: without effect, the first one counts, as in OpenSCAD".into(), None);
         }
     }
 
@@ -154,6 +178,8 @@ impl<'a> Lowering<'a> {
             "linear_extrude" => {
                 solid_wanted(call, &context)?;
                 if call.children.is_empty() {
+                    Extrusion::arguments(call)?;
+                    self.note(call.at, "linear_extrude without a shape inside: nothing is there".into(), None);
                     return Ok(Step::Leaf(Part::Empty));
                 }
                 let extrusion = Extrusion::new(call)?;
@@ -179,10 +205,7 @@ impl<'a> Lowering<'a> {
                 no_children(call)?;
                 self.outline(call, &context.outer, &outline).map(Step::Leaf)
             }
-            other => {
-                let construct = other.chars().take(40).collect();
-                Err((call.at, Problem::Unsupported { construct, hint: hint(other) }))
-            }
+            other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
     }
 
@@ -210,6 +233,11 @@ impl<'a> Lowering<'a> {
             return Ok(Context { outer, ..context });
         };
         // In 2D only x and y count. With z scaled as they are, a plane similarity is one in space, and snaps as one.
+        let aside = [m[0][2], m[1][2], m[2][0], m[2][1], m[2][3]].iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+        if aside > ROUNDING {
+            let text = "a matrix inside of linear_extrude that moves along z: ignored, as OpenSCAD does".into();
+            self.note(value.at, text, Some(aside));
+        }
         let plane = |z: f64| DMat3::from_cols(columns(0).with_z(0.0), columns(1).with_z(0.0), DVec3::Z * z);
         let size = plane(1.0).determinant().abs().sqrt();
         flat(plane(size))?;
@@ -306,7 +334,7 @@ impl<'a> Lowering<'a> {
             let part = self.leaf(call, Ok(place::half_space(outer, n, d)))?;
             parts.push(self.push(part));
         }
-        Ok(Part::Op(Op::Intersection, parts))
+        Ok(Part::Op(Op::Intersection, call.at, parts))
     }
 
     fn polyhedron(&mut self, call: &Call, outer: &DAffine3) -> Result<Part> {
@@ -384,6 +412,10 @@ impl<'a> Lowering<'a> {
             }
             return Ok(None);
         }
+        if fn_ <= 0.0 && arguments.number_or("$fe", 0.0)? > 0.0 {
+            let construct = format!("$fe of {name} taken as written");
+            return Err((arguments.at(), Problem::Unsupported { construct, hint: " (give $fn, or $fa and $fs)" }));
+        }
         // OpenSCAD's rule (Calc::get_fragments_from_r).
         let (fs, fa) = (arguments.number_or("$fs", 2.0)?, arguments.number_or("$fa", 12.0)?);
         let n = if fn_ > 0.0 {
@@ -409,7 +441,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn leaf(&mut self, call: &Call, placed: std::result::Result<Placed, Problem>) -> Result<Part> {
-        let Placed { shape, frame, notes } = placed.map_err(|p| (call.at, p))?;
+        let Placed { shape, frame, mirrored, notes } = placed.map_err(|p| (call.at, p))?;
         let geometry = shape.geometry();
         self.faces += geometry.faces().len();
         if self.faces > self.limits.faces {
@@ -419,10 +451,10 @@ impl<'a> Lowering<'a> {
         if !(bounded && frame.position.is_finite()) {
             return Err((call.at, Problem::syntax("coordinates that a double can hold", "an overflow")));
         }
-        for text in notes {
-            self.notes.push(Note { at: call.at, text, amount: None });
+        for (text, amount) in notes {
+            self.note(call.at, text, amount);
         }
-        let label = Label { name: call.name.clone(), line: call.at.line, column: call.at.column };
+        let label = Label { name: call.name.clone(), line: call.at.line, column: call.at.column, mirrored };
         Ok(Part::Leaf(shape, frame, label))
     }
 }
@@ -457,11 +489,16 @@ fn no_children(call: &Call) -> Result<()> {
     }
 }
 
+/// What to do about a construct that is not supported.
 fn hint(name: &str) -> &'static str {
     match name {
-        "translate" | "rotate" | "scale" | "mirror" | "for" | "if" | "let" | "echo" | "assert" | "children" => {
-            " (flatten the file first: openscad -o model.csg model.scad)"
+        "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
+        | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
+        "import" | "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
+        "hull" | "minkowski" | "rotate_extrude" | "resize" | "projection" | "roof" => {
+            " (write the shape out in spheres, cylinders, cubes and convex polyhedra)"
         }
+        "text" | "offset" | "fill" => " (write the outline out in circles, squares and convex polygons)",
         _ => "",
     }
 }
@@ -510,17 +547,28 @@ fn faceted_sphere(r: f64, n: u32, rings: u32) -> (Vec<DVec3>, Vec<Vec<u32>>) {
     (points, faces)
 }
 
-/// Builds the solid of `root`, leaving out what cannot contribute.
-fn emit(mut parts: Vec<Part>, root: PartId) -> Solid {
+/// Builds the solid of `root`, leaving out what cannot contribute; where that is more than nothing, a note tells.
+fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid {
     let mut empty = vec![false; parts.len()];
     for (i, part) in parts.iter().enumerate() {
         empty[i] = match part {
             Part::Empty => true,
             Part::Leaf(..) => false,
-            Part::Op(Op::Union, c) => c.iter().all(|c| empty[*c]),
-            Part::Op(Op::Intersection, c) => c.is_empty() || c.iter().any(|c| empty[*c]),
-            Part::Op(Op::Difference, c) => c.first().is_none_or(|c| empty[*c]),
+            Part::Op(Op::Union, _, c) => c.iter().all(|c| empty[*c]),
+            Part::Op(Op::Intersection, _, c) => c.is_empty() || c.iter().any(|c| empty[*c]),
+            Part::Op(Op::Difference, _, c) => c.first().is_none_or(|c| empty[*c]),
         };
+        if let Part::Op(op, at, c) = part
+            && empty[i]
+            && c.iter().any(|c| !empty[*c])
+        {
+            let what = if *op == Op::Difference { "a difference from" } else { "an intersection with" };
+            notes.push(Note {
+                at: *at,
+                text: format!("{what} nothing: left out with all that is inside"),
+                amount: None,
+            });
+        }
     }
     enum Visit {
         Enter(PartId),
@@ -535,7 +583,7 @@ fn emit(mut parts: Vec<Part>, root: PartId) -> Solid {
             Visit::Enter(p) => match std::mem::replace(&mut parts[p], Part::Empty) {
                 Part::Empty => built.push(builder.empty()),
                 Part::Leaf(shape, frame, label) => built.push(builder.primitive(shape, frame, label)),
-                Part::Op(op, children) => {
+                Part::Op(op, _, children) => {
                     let kept: Vec<PartId> = children.into_iter().filter(|c| !empty[*c]).collect();
                     visits.push(Visit::Leave(op, kept.len()));
                     visits.extend(kept.into_iter().rev().map(Visit::Enter));

@@ -5,10 +5,18 @@
 //! `#` (kept), `!` (root). A cylinder with infinite radius and height, or a cube with infinite sides, is a half-space or
 //! an intersection of some. Everything else is refused by name.
 //!
+//! Nothing is dropped in silence. Read without effect is only what changes no shape: the arguments of color, convexity, the
+//! `$`-variables that cut curves into pieces (`arguments::HARMLESS`; where they say that a curve is a prism they are read),
+//! `slices` and `segments` of an extrusion without twist, and what a matrix says of z in 2D, which OpenSCAD ignores too (a
+//! note tells of it). What a modifier leaves out, an extrusion of nothing, and what is subtracted from or cut with nothing
+//! are notes. A test goes through all kinds of nodes with all their arguments.
+//!
 //! OpenSCAD drops primitives of size zero in silence; here they are refused, for an object that vanishes in silence is
 //! never what a collision query should answer for.
 
 mod arguments;
+#[cfg(test)]
+mod dialect;
 mod extrude;
 mod lexer;
 mod lower;

@@ -19,13 +19,24 @@ pub struct Placed {
     pub shape: Shape,
     /// That frame in the model.
     pub frame: Pose,
-    /// What was snapped, as sentences.
-    pub notes: Vec<String>,
+    /// x of the frame runs against the x that the source means.
+    pub mirrored: bool,
+    /// What was snapped, as sentences, and by how much.
+    pub notes: Vec<(String, Option<f64>)>,
 }
 
 impl Placed {
     fn new(shape: impl Into<Shape>, frame: Pose) -> Self {
-        Self { shape: shape.into(), frame, notes: Vec::new() }
+        Self { shape: shape.into(), frame, mirrored: false, notes: Vec::new() }
+    }
+
+    /// Tells that the transform was not quite what the shape needs: `off` of its scale.
+    fn off(mut self, off: f64, kind: &str) -> Self {
+        if off > ROUNDING {
+            let text = format!("a transform that would bend a {kind} a little: taken as one that does not");
+            self.notes.push((text, Some(off)));
+        }
+        self
     }
 }
 
@@ -75,7 +86,7 @@ pub fn snapped(m: DMat3) -> (DMat3, Option<f64>) {
     match similarity(m) {
         Some(s) if s.off > ROUNDING && s.off <= SIMILARITY => {
             let scale = if (s.scale - 1.0).abs() <= SIMILARITY { 1.0 } else { s.scale };
-            (s.orthogonal * scale, Some(s.off))
+            (s.orthogonal * scale, Some(s.off.max((s.scale - scale).abs())))
         }
         _ => (m, None),
     }
@@ -84,15 +95,17 @@ pub fn snapped(m: DMat3) -> (DMat3, Option<f64>) {
 /// A ball of radius `radius` around the origin.
 pub fn sphere(a: &DAffine3, radius: f64) -> Result<Placed, Problem> {
     let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "sphere"))?;
-    Ok(Placed::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)))
+    Ok(Placed::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
 }
 
 /// A cylinder, cone or frustum around `center`, along z, with radii `bottom` (low z) and `top`.
 pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64) -> Result<Placed, Problem> {
-    let even = |l: &DVec3| (l.x - l.y).abs() <= SIMILARITY * l.x;
-    let Some((lengths, rotation)) = along_axes(a.matrix3).filter(|(l, _)| even(l)) else {
-        return Err(refusal(a.matrix3, if bottom == top { "cylinder" } else { "cone" }));
+    let kind = if bottom == top { "cylinder" } else { "cone" };
+    let uneven = |l: &DVec3| (l.x - l.y).abs() / l.x;
+    let Some((lengths, rotation, off)) = along_axes(a.matrix3).filter(|(l, ..)| uneven(l) <= SIMILARITY) else {
+        return Err(refusal(a.matrix3, kind));
     };
+    let off = off.max(uneven(&lengths));
     // Even in x and y within rounding: their mean; the half sum is exact when they are equal.
     let across = 0.5 * (lengths.x + lengths.y);
     let half_height = 0.5 * height * lengths.z;
@@ -101,18 +114,20 @@ pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64)
     if (bottom - top).abs() <= SAME_RADIUS * larger {
         let mut placed = Placed::new(Cylinder { radius: larger * across, half_height }, frame);
         if bottom != top {
-            placed.notes.push("radii that differ by less than 1e-9 of themselves: taken as a cylinder".into());
+            placed.notes.push(("radii that differ by less than 1e-9 of themselves: taken as a cylinder".into(), None));
         }
-        return Ok(placed);
+        return Ok(placed.off(off, kind));
     }
-    Ok(Placed::new(Cone { bottom: bottom * across, top: top * across, half_height }, frame))
+    Ok(Placed::new(Cone { bottom: bottom * across, top: top * across, half_height }, frame).off(off, kind))
 }
 
 /// A box around `center` with half extents `half`.
 pub fn cuboid(a: &DAffine3, center: DVec3, half: DVec3) -> Result<Placed, Problem> {
-    if let Some((lengths, frame)) = along_axes(a.matrix3) {
+    if let Some((lengths, frame, off)) = along_axes(a.matrix3) {
         let frame = Pose::new(a.transform_point3(center), frame);
-        return Ok(Placed::new(Cuboid { half: half * lengths }, frame));
+        let mirrored = a.matrix3.determinant() < 0.0;
+        let placed = Placed { mirrored, ..Placed::new(Cuboid { half: half * lengths }, frame) };
+        return Ok(placed.off(off, "box"));
     }
     // Corner i has the signs of i's bits; faces clockwise from outside.
     let corners: Vec<DVec3> = (0..8)
@@ -123,20 +138,20 @@ pub fn cuboid(a: &DAffine3, center: DVec3, half: DVec3) -> Result<Placed, Proble
         .collect();
     let faces = [[5, 7, 3, 1], [2, 6, 4, 0], [3, 7, 6, 2], [4, 5, 1, 0], [6, 7, 5, 4], [1, 3, 2, 0]];
     let mut placed = polyhedron(a, &corners, &faces.map(|f| f.to_vec()))?.0;
-    placed.notes.push("a sheared box: taken as a polyhedron".into());
+    placed.notes.push(("a sheared box: taken as a polyhedron".into(), None));
     Ok(placed)
 }
 
 /// The polyhedron of a mesh, faces clockwise from outside; the frame follows similarities, other transforms are applied
 /// to the points.
 pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Placed, Fit), Problem> {
-    let (points, frame): (Vec<DVec3>, Pose) = match similarity(a.matrix3) {
+    let (points, frame, off): (Vec<DVec3>, Pose, f64) = match similarity(a.matrix3) {
         Some(s) if s.off <= SIMILARITY => {
             let (rotation, mirrored) = proper(s.orthogonal);
             let flip = DVec3::new(if mirrored { -s.scale } else { s.scale }, s.scale, s.scale);
-            (points.iter().map(|p| *p * flip).collect(), Pose::new(a.translation, rotation))
+            (points.iter().map(|p| *p * flip).collect(), Pose::new(a.translation, rotation), s.off)
         }
-        _ => (points.iter().map(|p| a.matrix3 * *p).collect(), Pose::at(a.translation)),
+        _ => (points.iter().map(|p| a.matrix3 * *p).collect(), Pose::at(a.translation), 0.0),
     };
     let (shape, fit) = if a.matrix3.determinant() < 0.0 {
         let reversed: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
@@ -144,7 +159,7 @@ pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<
     } else {
         Polyhedron::from_faces(&points, faces)?
     };
-    Ok((Placed::new(shape, frame), fit))
+    Ok((Placed::new(shape, frame).off(off, "polyhedron"), fit))
 }
 
 /// The half-space n·x <= d.
@@ -166,14 +181,15 @@ fn columns_are_perpendicular(m: DMat3) -> bool {
     across(x, y) && across(x, z) && across(y, z)
 }
 
-/// `m` as rotation × scaling along x, y, z (a mirror goes into x, which boxes and cylinders do not notice).
-fn along_axes(m: DMat3) -> Option<(DVec3, DQuat)> {
+/// `m` as scaling along x, y, z, then a rotation (a mirror goes into x, of which boxes and cylinders notice no more than the
+/// names of two faces: `Placed::mirrored`), and how far its axes are off a right angle.
+fn along_axes(m: DMat3) -> Option<(DVec3, DQuat, f64)> {
     if !columns_are_perpendicular(m) {
         return None;
     }
     let lengths = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
     let s = similarity(DMat3::from_cols(m.x_axis / lengths.x, m.y_axis / lengths.y, m.z_axis / lengths.z))?;
-    Some((lengths, proper(s.orthogonal).0))
+    Some((lengths, proper(s.orthogonal).0, s.off))
 }
 
 /// The rotation of an orthogonal matrix, after a mirror in x if it has one.

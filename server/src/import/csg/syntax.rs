@@ -76,6 +76,13 @@ pub enum ValueKind {
     List(Vec<Value>),
 }
 
+impl Call {
+    /// Its name, short enough for a sentence.
+    pub fn short(&self) -> String {
+        self.name.chars().take(40).collect()
+    }
+}
+
 impl Value {
     /// How an error calls it.
     pub fn found(&self) -> String {

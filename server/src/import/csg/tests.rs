@@ -277,8 +277,8 @@ fn every_refusal_is_a_sentence_with_its_place() {
         ("cube(size = [1, 2]);".into(), "1:13: expected three positive numbers as size of cube, found a list of 2"),
         ("cube(size = [0, 1, 1]);".into(), "1:14: expected a positive number as size of cube, found 0"),
         (
-            "cube(1, center = 7.5);cube(1, center = \"a\");".into(),
-            "1:40: expected true or false as center of cube, found the string \"a\"",
+            "cube(1, center = true);cube(1, center = \"a\");".into(),
+            "1:41: expected true or false as center of cube, found the string \"a\"",
         ),
         ("cube(1) { sphere(1); }".into(), "1:1: expected nothing inside of cube, found calls"),
         ("cube(1)".into(), "1:8: expected \";\" or \"{\", found the end of the file"),

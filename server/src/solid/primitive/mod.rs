@@ -88,6 +88,14 @@ impl Primitive {
         Self { faces, aabb, ball, shape, frame, label, first_face }
     }
 
+    /// Name of face `index` of its faces, in the words of its source: of a box that is mirrored there ±x are exchanged against
+    /// its frame.
+    pub fn face_name(&self, index: usize) -> String {
+        let is_box = matches!(self.shape, Shape::Cuboid(_));
+        let index = if self.label.mirrored && is_box && index < 2 { 1 - index } else { index };
+        self.shape.geometry().face_name(index)
+    }
+
     /// psi of the whole primitive: the largest of its faces' values. 1-Lipschitz, negative inside.
     pub fn value(&self, x: DVec3) -> f64 {
         self.faces.iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(x)))

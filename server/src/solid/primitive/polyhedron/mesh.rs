@@ -96,8 +96,12 @@ impl Polyhedron {
 
         let mut used: Vec<u32> = touching.keys().copied().collect();
         used.sort_unstable();
+        // Also those at slivers alone: a thin spike is a dent like any other.
+        let mut all: Vec<u32> = facets.iter().flat_map(|f| f.corners.iter().copied()).collect();
+        all.sort_unstable();
+        all.dedup();
         for ((n, d), group) in planes.iter().zip(&groups) {
-            for &c in &used {
+            for &c in &all {
                 let by = n.dot(points[c as usize]) - d;
                 if by > CONVEXITY * size {
                     return Err(MeshError::Dented { point: c, face: facets[group[0]].index, by });

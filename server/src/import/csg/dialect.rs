@@ -1,0 +1,320 @@
+//! OpenSCAD's kinds of nodes with all their arguments, one by one: each is read, changes no shape whatever its value, or
+//! is refused with its place. Nothing is dropped in silence.
+
+use crate::import::{Facets, Import, Limits, import_csg};
+
+/// What becomes of an argument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fate {
+    /// It shapes the solid: two values make two solids, and a value of the wrong type is refused.
+    Read(&'static str, &'static str),
+    /// Whatever its value, the solid is the same.
+    Harmless,
+    /// Refused at its own place.
+    Refused,
+}
+use Fate::{Harmless, Read, Refused};
+
+/// A kind of node that is supported: its name, arguments that make something of it, what is inside of it, and every argument
+/// that OpenSCAD writes or reads for it (the node's `toString` and its module's parameters, 2015.03 to the snapshots of 2026).
+struct Kind {
+    name: &'static str,
+    arguments: &'static [(&'static str, &'static str)],
+    inside: &'static str,
+    fates: &'static [(&'static str, Fate)],
+}
+
+const CURVES: [(&str, Fate); 4] = [("$fn", Read("3", "4")), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
+const FLAT: [(&str, Fate); 4] = [("$fn", Harmless), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
+const BALL: &str = "{ sphere(r = 1); cube(size = [1, 1, 1]); }";
+const SQUARE: &str = "{ square(size = [1, 2]); }";
+const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin", Refused), ("timestamp", Refused)];
+
+const KINDS: [Kind; 15] = [
+    Kind { name: "group", arguments: &[], inside: BALL, fates: &[] },
+    Kind { name: "union", arguments: &[], inside: BALL, fates: &[] },
+    Kind { name: "difference", arguments: &[], inside: BALL, fates: &[] },
+    Kind { name: "intersection", arguments: &[], inside: BALL, fates: &[] },
+    Kind { name: "render", arguments: &[], inside: BALL, fates: &[] },
+    Kind { name: "color", arguments: &[], inside: BALL, fates: &[("c", Harmless), ("alpha", Harmless)] },
+    Kind {
+        name: "multmatrix",
+        arguments: &[("m", "[[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")],
+        inside: BALL,
+        fates: &[(
+            "m",
+            Read(
+                "[[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]",
+                "[[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]]",
+            ),
+        )],
+    },
+    Kind {
+        name: "linear_extrude",
+        arguments: &[("height", "2")],
+        inside: SQUARE,
+        fates: &[
+            ("height", Read("3", "4")),
+            ("center", Read("true", "false")),
+            ("scale", Read("2", "[3, 3]")),
+            ("v", Read("[1, 0, 1]", "[0, 1, 1]")),
+            ("twist", Read("0", "5")),
+            ("slices", Harmless),
+            ("segments", Harmless),
+            ("h", Refused),
+        ],
+    },
+    Kind { name: "sphere", arguments: &[("r", "1")], inside: ";", fates: &[("r", Read("1", "2")), ("d", Refused)] },
+    Kind {
+        name: "cylinder",
+        arguments: &[("h", "1"), ("r1", "1"), ("r2", "1")],
+        inside: ";",
+        fates: &[
+            ("h", Read("1", "2")),
+            ("r1", Read("1", "2")),
+            ("r2", Read("1", "2")),
+            ("center", Read("true", "false")),
+            ("r", Refused),
+            ("d", Refused),
+            ("d1", Refused),
+            ("d2", Refused),
+        ],
+    },
+    Kind {
+        name: "cube",
+        arguments: &[("size", "[1, 2, 3]")],
+        inside: ";",
+        fates: &[("size", Read("1", "[1, 1, 2]")), ("center", Read("true", "false"))],
+    },
+    Kind {
+        name: "polyhedron",
+        arguments: &[
+            ("points", "[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]"),
+            ("faces", "[[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]]"),
+        ],
+        inside: ";",
+        fates: &[
+            (
+                "points",
+                Read("[[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 1]]", "[[0, 0, 0], [3, 0, 0], [0, 1, 0], [0, 0, 1]]"),
+            ),
+            ("faces", Read("[[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]]", "[[0, 1, 2]]")),
+            ("triangles", Refused),
+        ],
+    },
+    Kind { name: "circle", arguments: &[("r", "1")], inside: ";", fates: &[("r", Read("1", "2")), ("d", Refused)] },
+    Kind {
+        name: "square",
+        arguments: &[("size", "[1, 2]")],
+        inside: ";",
+        fates: &[("size", Read("1", "[1, 3]")), ("center", Read("true", "false"))],
+    },
+    Kind {
+        name: "polygon",
+        arguments: &[("points", "[[0, 0], [1, 0], [0, 1], [5, 5]]"), ("paths", "[[0, 1, 2]]")],
+        inside: ";",
+        fates: &[
+            ("points", Read("[[0, 0], [1, 0], [0, 1], [5, 5]]", "[[0, 0], [2, 0], [0, 1], [5, 5]]")),
+            ("paths", Read("[[0, 1, 2]]", "[[0, 1, 3]]")),
+        ],
+    },
+];
+
+/// Kinds of nodes and modules of OpenSCAD that make or change shapes in ways that are not imported.
+const REFUSED: [&str; 32] = [
+    "hull",
+    "minkowski",
+    "rotate_extrude",
+    "resize",
+    "projection",
+    "roof",
+    "offset",
+    "fill",
+    "text",
+    "import",
+    "surface",
+    "import_stl",
+    "import_off",
+    "import_dxf",
+    "dxf_linear_extrude",
+    "dxf_rotate_extrude",
+    "cgaladv",
+    "subdiv",
+    "glide",
+    "translate",
+    "rotate",
+    "scale",
+    "mirror",
+    "for",
+    "intersection_for",
+    "if",
+    "let",
+    "assign",
+    "echo",
+    "assert",
+    "children",
+    "child",
+];
+
+/// Values of every type.
+const ANY: [&str; 10] = ["0", "7", "-1", "0.5", "inf", "nan", "true", "undef", "\"a\"", "[1, [2]]"];
+
+/// The text of a call in its place, on line 2.
+fn text(kind: &Kind, changed: Option<(&str, &str)>) -> String {
+    let mut arguments: Vec<(&str, &str)> = kind.arguments.to_vec();
+    if let Some((name, value)) = changed {
+        arguments.retain(|a| a.0 != name);
+        arguments.push((name, value));
+    }
+    let arguments: Vec<String> = arguments.iter().map(|(n, v)| format!("{n} = {v}")).collect();
+    let call = format!("{}({}) {}", kind.name, arguments.join(", "), kind.inside);
+    match kind.name {
+        "circle" | "square" | "polygon" => format!("linear_extrude(height = 1) {{\n{call}\n}}"),
+        _ => format!("\n{call}"),
+    }
+}
+
+fn read(text: &str) -> Result<Import, String> {
+    import_csg("m.csg", text, Facets::Auto, &Limits::default()).map_err(|e| e.to_string())
+}
+
+/// The solid with the places of its primitives left out, for these change with the text.
+fn solid(text: &str) -> Result<String, String> {
+    let mut solid = read(text)?.solid;
+    solid.primitives.iter_mut().for_each(|p| p.label.column = 0);
+    Ok(format!("{solid:?}"))
+}
+
+/// Line 2, and the column of `word` there.
+fn place(text: &str, word: &str) -> String {
+    let line = text.lines().nth(1).unwrap_or_default();
+    format!("m.csg:2:{}: ", line.find(word).map_or(0, |i| i + 1))
+}
+
+#[test]
+fn every_argument_is_read_without_effect_or_refused() {
+    for kind in &KINDS {
+        let plain = solid(&text(kind, None)).unwrap_or_else(|e| panic!("{}: {e}", kind.name));
+        let curved = matches!(kind.name, "sphere" | "cylinder" | "circle");
+        let everywhere = if curved { CURVES } else { FLAT };
+        let fates = kind.fates.iter().chain(&everywhere).chain(&FILE).chain(&[("convexity", Harmless)]);
+        for (name, fate) in fates.chain(&[("$fx", Refused), ("colour", Refused), ("chamfer", Refused)]) {
+            match fate {
+                Read(one, two) => {
+                    let [a, b] = [one, two].map(|v| solid(&text(kind, Some((name, v)))));
+                    assert_ne!(a, b, "{name} of {}", kind.name);
+                    let words = text(kind, Some((name, "\"a\"")));
+                    let error = read(&words).err().unwrap_or_else(|| panic!("{words}: was read"));
+                    assert!(error.starts_with("m.csg:2:"), "{words}: {error}");
+                }
+                Harmless => {
+                    for value in ANY {
+                        let words = text(kind, Some((name, value)));
+                        assert_eq!(solid(&words).as_ref(), Ok(&plain), "{words}");
+                    }
+                }
+                Refused => {
+                    for value in ANY {
+                        let words = text(kind, Some((name, value)));
+                        let error = read(&words).err().unwrap_or_else(|| panic!("{words}: was read"));
+                        assert!(error.starts_with(&place(&words, &format!("{name} = "))), "{words}: {error}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_other_kind_is_refused_with_its_place_and_what_to_do() {
+    for name in REFUSED {
+        for call in ["()", "(file = \"x.dxf\");", "(1, [2], a = 3)", "(convexity = 1) { sphere(r = 1); }"] {
+            let end = if call.ends_with(')') { ";" } else { "" };
+            for around in [["union() {\n", "}"], ["linear_extrude(height = 1) {\n", "}"], ["\n", ""]] {
+                let words = format!("{}{name}{call}{end}{}", around[0], around[1]);
+                let error = read(&words).err().unwrap_or_else(|| panic!("{words}: was read"));
+                let expected = format!("m.csg:2:1: expected a supported construct, found {name}");
+                assert!(error.starts_with(&expected), "{words}: {error}");
+                let told = error.contains("not supported (");
+                assert!(told || ["cgaladv", "subdiv", "glide"].contains(&name) || name.starts_with("dxf"), "{error}");
+            }
+        }
+    }
+    assert_eq!(
+        read("union() {\n  linear_extrude(file = \"part.dxf\", layer = \"0\", height = 3);\n}").unwrap_err(),
+        "m.csg:2:18: expected a supported construct, found linear_extrude of another file, which is not \
+         supported (other files are not read: write the shape out in primitives)"
+    );
+}
+
+#[test]
+fn the_experimental_curve_setting_counts_where_curves_are_cut() {
+    let ball = |facets| import_csg("m.csg", "sphere(r = 5, $fe = 0.1);", facets, &Limits::default());
+    assert!(ball(Facets::Exact).is_ok() && ball(Facets::Auto).is_ok());
+    assert!(ball(Facets::AsWritten).unwrap_err().to_string().starts_with("m.csg:1:1: "));
+}
+
+#[test]
+fn what_is_left_out_is_told() {
+    for (text, note) in [
+        ("%sphere(r = 1);cube(1);", "1:2: sphere after %: left out, as OpenSCAD does"),
+        ("cube(1);\n*hull() { sphere(r = 1); }", "2:2: hull after *: left out, as OpenSCAD does"),
+        ("cube(1); group() { !sphere(r = 1); }", "1:21: sphere after !: the model is this call alone"),
+        (
+            "group() { !sphere(r = 1); } group() { !cube(1); }",
+            "1:40: a second !: without effect, the first one counts, as in OpenSCAD",
+        ),
+        ("cube(1); linear_extrude(height = 1);", "1:10: linear_extrude without a shape inside: nothing is there"),
+        (
+            "cube(1); intersection() { cube(1); group(); }",
+            "1:10: an intersection with nothing: left out with all that is inside",
+        ),
+        (
+            "cube(1); difference() { group(); cube(1); }",
+            "1:10: a difference from nothing: left out with all that is inside",
+        ),
+        (
+            "linear_extrude(height = 1) { multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]) { circle(r = 1); } }",
+            "1:41: a matrix inside of linear_extrude that moves along z: ignored, as OpenSCAD does (by 3.0e0)",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon(points = [[0, 0], [1, 0.000001], [2, 0], [2, 2], [0, 2]]); }",
+            "1:30: a polygon that is not quite convex: taken as the hull of its sides",
+        ),
+        (
+            "multmatrix([[1,0.000001,0,0],[0,2,0,0],[0,0,3,0],[0,0,0,1]]) { cube(1); }",
+            "1:64: a transform that would bend a box a little: taken as one that does not",
+        ),
+        (
+            "multmatrix([[1,0,0,0],[0,1.000001,0,0],[0,0,3,0],[0,0,0,1]]) { cylinder(1, 1, 1); }",
+            "1:64: a transform that would bend a cylinder a little: taken as one that does not",
+        ),
+        (
+            "multmatrix([[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) { multmatrix([[0.5,0,0,0],[0,1.000001,0,0],[0,0,1,0],\
+             [0,0,0,1]]) { sphere(1); } }",
+            "1:122: a transform that would bend a sphere a little: taken as one that does not",
+        ),
+    ] {
+        let notes: Vec<String> = read(text).expect(text).notes.iter().map(ToString::to_string).collect();
+        assert!(notes.iter().any(|n| n.starts_with(note)), "{text}: {notes:?}");
+    }
+    // And where nothing is, nothing is told.
+    for text in [
+        "cube(1); group(); union() { } difference() { } intersection() { } #sphere(r = 1);",
+        "difference() { cube(1); group(); }",
+    ] {
+        assert_eq!(read(text).expect(text).notes, vec![], "{text}");
+    }
+}
+
+#[test]
+fn a_spike_of_slivers_is_a_dent_like_any_other() {
+    // A cube of side 2 whose top carries a needle 3 high, its walls so thin that no normal can be taken of them.
+    let points = "[[-1,-1,-1],[1,-1,-1],[1,1,-1],[-1,1,-1],[-1,-1,1],[1,-1,1],[1,1,1],[-1,1,1],[0,0,1],[1e-7,0,1],[0,1e-7,1],\
+                  [0,0,4]]";
+    let faces = "[[0,1,2,3],[0,4,5,1],[1,5,6,2],[2,6,7,3],[3,7,4,0],[4,8,9,5],[5,9,6],[6,9,10,7],[7,10,8,4],[8,11,9],[9,11,10],\
+                 [10,11,8]]";
+    let text = format!("polyhedron(points = {points}, faces = {faces});");
+    let error = read(&text).expect_err("a needle");
+    assert!(error.contains("a non-convex polyhedron: point 11 lies 3.000e0 outside"), "{error}");
+}

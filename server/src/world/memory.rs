@@ -1,0 +1,288 @@
+//! Certificates of what a step has answered without a search: what was proven, when, for which motions, and what is left of it.
+//!
+//! A world that is asked for them (`World::certify`) notes, beside each proof that it keeps, where the bodies stood and which
+//! direction it was; the rest is worked out when a certificate is asked for (`World::remembered`). Nobody who does not ask pays
+//! more than one look at an empty place for each pair that a direction or a box has excluded.
+//!
+//! What a certificate says is checked by `tests/src/verifier/memory.rs` against the true motions of the step. Format and what
+//! follows from what: docs/certificate.md, "What is remembered".
+
+use super::body::Body;
+use super::coherence::Via;
+use super::scene::World;
+use super::search::{self, PairJob};
+use super::step::StepOptions;
+use crate::contact::certificate::{self, Certificate};
+use crate::contact::clearance::{self, Distance};
+use crate::contact::{self, Asked, Glance, Outcome, PairQuery, Scratch, Status};
+use crate::math::Aabb;
+use crate::motion::Placed;
+use contactd_proto::{Motion, Pose};
+use glam::DVec3;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+/// The first line of every certificate of what is remembered.
+pub const HEADER: &str = "contactd-memory 1";
+
+/// How a pair was excluded before any job was made of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Decided {
+    /// Its odometers do not show its room.
+    Room,
+    /// Directions at both ends of the step.
+    Directions([DVec3; 2]),
+}
+
+impl Decided {
+    /// Two boxes that hold the bodies over the step share no point: the axis along which they are farthest apart.
+    pub fn boxes(a: Aabb, b: Aabb) -> Self {
+        Self::Directions([axis_between(&a, &b); 2])
+    }
+}
+
+/// The axis along which two boxes are farthest apart, from a to b.
+fn axis_between(a: &Aabb, b: &Aabb) -> DVec3 {
+    let (up, down) = (b.min - a.max, a.min - b.max);
+    let k = up.max(down).max_position();
+    let mut axis = DVec3::ZERO;
+    axis[k] = if up[k] >= down[k] { 1.0 } else { -1.0 };
+    axis
+}
+
+/// A distance at one moment: where the bodies stood, and the direction along which they were apart by that much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Room {
+    /// The poses of both objects then.
+    pub poses: [Pose; 2],
+    /// Unit, world axes, from a to b.
+    pub along: DVec3,
+    /// How much farther than their touching distance they were apart, a length.
+    pub room: f64,
+}
+
+/// What is noted in the steps of a world that is asked for certificates.
+#[derive(Debug, Default)]
+pub(super) struct Notes {
+    options: StepOptions,
+    /// By ids: those stay when bodies go.
+    rooms: HashMap<(u32, u32), Room>,
+    /// By indices, of the last step.
+    decided: HashMap<(u32, u32), Decided>,
+}
+
+impl Notes {
+    /// A step begins.
+    pub fn begin(&mut self, options: StepOptions) {
+        self.options = options;
+        self.decided.clear();
+    }
+
+    /// A pair is excluded in this step.
+    pub fn decided(&mut self, pair: (u32, u32), how: Decided) {
+        self.decided.insert(pair, how);
+    }
+
+    /// A glance has measured a pair at the start of the step.
+    pub fn glanced(&mut self, pair: (u32, u32), bodies: &[Body], glance: &Glance) {
+        if glance.room > 0.0 {
+            self.note(pair, bodies, glance.along, glance.room);
+        }
+    }
+
+    /// Boxes that hold two bodies over the step have told their room.
+    pub fn apart_by(&mut self, pair: (u32, u32), bodies: &[Body], room: f64, boxes: [Aabb; 2]) {
+        if room > 0.0 {
+            self.note(pair, bodies, axis_between(&boxes[0], &boxes[1]), room);
+        }
+    }
+
+    /// The distance of two convex bodies at the start of the step has told their room.
+    pub fn measured(&mut self, job: &PairJob, bodies: &[Body], options: &StepOptions, room: f64) {
+        if let Some(along) = clearance::direction_of_room(&search::query(bodies, job, options)) {
+            self.note((job.a, job.b), bodies, along, room);
+        }
+    }
+
+    fn note(&mut self, (i, j): (u32, u32), bodies: &[Body], along: DVec3, room: f64) {
+        let (a, b) = (&bodies[i as usize], &bodies[j as usize]);
+        let poses = [a, b].map(|body| body.track.motion.start);
+        self.rooms.insert((a.id, b.id), Room { poses, along, room });
+    }
+}
+
+/// What has answered for a pair in the last step.
+// One at a time, and only where somebody asks.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Remembered {
+    /// Nothing was remembered: it was searched.
+    Nothing,
+    /// A distance measured before, of which the bodies have not gone as much since. Of pairs beyond each other's boxes, too: these
+    /// stood as far apart when the list of neighbours was taken.
+    Room(Room),
+    /// Directions at the start and at the end of the step, one going over into the other.
+    Directions([DVec3; 2]),
+    /// A course.
+    Course {
+        /// The motions over the step with which it began.
+        motions: [Motion; 2],
+        /// Steps since then.
+        since: f64,
+        /// Steps that they were expected to go on so.
+        steps: f64,
+        /// Steps until which they were proven to keep their distance; infinite: standing afterwards, too.
+        until: f64,
+        /// How far they may stray together.
+        room: f64,
+        /// How far they stray in this step, at most.
+        strays: f64,
+    },
+    /// The answer to the same question.
+    Answer {
+        /// The motions that were asked about.
+        motions: [Motion; 2],
+        /// What was answered.
+        outcome: Outcome,
+    },
+}
+
+/// Parts of a course's room for which its proof is made: the smallest that holds what the bodies stray serves many steps.
+const SHARES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
+
+impl World {
+    /// Notes from now on what certificates of remembered answers need, or no longer. What was remembered is forgotten.
+    pub fn certify(&mut self, on: bool) {
+        self.forget();
+        self.state.notes = on.then(Box::default);
+    }
+
+    /// What has answered for the pair of two objects in the last step; `None` for a pair that is never asked about, and unless
+    /// `certify` was called before the step.
+    pub fn remembered(&self, a: u32, b: u32) -> Option<Remembered> {
+        let notes = self.state.notes.as_deref()?;
+        let (a, b) = (a.min(b), a.max(b));
+        self.plan_of(a, b)?;
+        let pair = (*self.by_id.get(&a)?, *self.by_id.get(&b)?);
+        let neighbours = self.state.neighbours();
+        let room = || notes.rooms.get(&(a, b)).copied().map_or(Remembered::Nothing, Remembered::Room);
+        match notes.decided.get(&pair) {
+            Some(Decided::Room) => return Some(room()),
+            Some(Decided::Directions(n)) => return Some(Remembered::Directions(*n)),
+            None => {}
+        }
+        let Some(place) = neighbours.find(pair.0, pair.1) else {
+            let ((p, own), (q, other)) = (neighbours.home(pair.0), neighbours.home(pair.1));
+            let along = axis_between(own, other);
+            return Some(Remembered::Room(Room { poses: [*p, *q], along, room: own.gap(other) }));
+        };
+        let Some(job) = self.job(pair) else { return Some(room()) };
+        let (Some(knowledge), true) = (neighbours.knowledge(place), job.found.known) else {
+            return Some(Remembered::Nothing);
+        };
+        let q = job.question(&self.bodies, &notes.options, self.state.clock());
+        let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
+        Some(match knowledge.via() {
+            (Via::Search, _) | (Via::Course, None) => Remembered::Nothing,
+            (Via::Answer, _) => Remembered::Answer { motions, outcome: job.found.outcome },
+            (Via::Room, _) => room(),
+            (Via::Course, Some(course)) => Remembered::Course {
+                motions: course.motions,
+                since: self.state.clock() - course.begin,
+                steps: course.steps,
+                until: course.until,
+                room: course.room,
+                strays: course.strays(&q).unwrap_or(f64::INFINITY),
+            },
+        })
+    }
+
+    fn job(&self, (i, j): (u32, u32)) -> Option<&PairJob> {
+        self.state.jobs().iter().find(|job| (job.a, job.b) == (i, j) && job.pair.is_some())
+    }
+
+    /// The certificate of what has answered for a pair (see [`World::remembered`]) as text; proofs of courses and answers may
+    /// take `cells` cells. `None` where there is nothing to certify or the proof takes more.
+    pub fn certificate_of(&self, a: u32, b: u32, cells: u64) -> Option<String> {
+        let (a, b) = (a.min(b), a.max(b));
+        let notes = self.state.notes.as_deref()?;
+        let mut out = String::new();
+        match self.remembered(a, b)? {
+            Remembered::Nothing => return None,
+            Remembered::Room(Room { poses, along, room }) => {
+                let _ = write!(out, "pair {a} {b} room {room:e} along {}", numbers(&[along]));
+                poses.iter().for_each(|p| write_pose(&mut out, p));
+                out.push('\n');
+            }
+            Remembered::Directions([n0, n1]) => {
+                let _ = writeln!(out, "pair {a} {b} directions {} {}", numbers(&[n0]), numbers(&[n1]));
+            }
+            Remembered::Course { motions, since, steps, until, room, strays } => {
+                let job = self.job((*self.by_id.get(&a)?, *self.by_id.get(&b)?))?;
+                let q = job.question(&self.bodies, &notes.options, self.state.clock());
+                let share = SHARES.into_iter().find(|share| strays <= share * room)?;
+                let part = if until.is_finite() { until / steps } else { 1.0 };
+                let query = over(&q.query, motions, steps, cells);
+                let proof = clearance::certify_kept(&query, q.margin, (share * room, room), part)?;
+                let _ = write!(out, "pair {a} {b} course since {since:e} steps {steps:e} until {until:e}");
+                motions.iter().for_each(|m| write_motion(&mut out, m));
+                out.push('\n');
+                match proof {
+                    Distance::Directions(all) => {
+                        for (t, n) in all {
+                            let _ = writeln!(out, "from {t:e} {}", numbers(&[n]));
+                        }
+                    }
+                    Distance::Cells(proof) => write_cells(&proof, &mut out),
+                }
+            }
+            // Of a search past an overlap nothing is proven that two certificates could say.
+            Remembered::Answer { outcome, .. } if outcome.past => return None,
+            Remembered::Answer { motions, outcome } => {
+                let job = self.job((*self.by_id.get(&a)?, *self.by_id.get(&b)?))?;
+                let query = search::query(&self.bodies, job, &notes.options);
+                let query = PairQuery { cell_limit: cells, asked: Asked::CONTACT, ..query };
+                let _ = write!(out, "pair {a} {b} answer");
+                motions.iter().for_each(|m| write_motion(&mut out, m));
+                out.push('\n');
+                if outcome.status == Status::Overlap {
+                    // Less may have been asked for than a point.
+                    let found = contact::earliest_contact(&query, &mut Scratch::default());
+                    let _ = writeln!(out, "overlap {}", numbers(&[found.point]));
+                } else {
+                    write_cells(&certificate::certify(&query, &outcome)?, &mut out);
+                }
+            }
+        }
+        Some(out)
+    }
+}
+
+/// A question about the motions of a course, all of its steps taken as one.
+fn over<'a>(query: &PairQuery<'a>, motions: [Motion; 2], steps: f64, cells: u64) -> PairQuery<'a> {
+    let mut query = PairQuery { cell_limit: cells, ..*query };
+    for (body, motion) in [&mut query.a, &mut query.b].into_iter().zip(motions) {
+        let motion = Motion { velocity: motion.velocity * steps, spin: motion.spin * steps, ..motion };
+        body.placed = Placed { motion, ..body.placed };
+    }
+    query
+}
+
+fn write_cells(proof: &Certificate, out: &mut String) {
+    proof.write((0, 1), out);
+}
+
+fn write_pose(out: &mut String, pose: &Pose) {
+    let q = pose.rotation;
+    let _ = write!(out, " pose {} {:e} {:e} {:e} {:e}", numbers(&[pose.position]), q.x, q.y, q.z, q.w);
+}
+
+fn write_motion(out: &mut String, motion: &Motion) {
+    write_pose(out, &motion.start);
+    let _ = write!(out, " {}", numbers(&[motion.velocity, motion.spin]));
+}
+
+fn numbers(points: &[DVec3]) -> String {
+    let all: Vec<String> = points.iter().flat_map(|p| p.to_array()).map(|v| format!("{v:e}")).collect();
+    all.join(" ")
+}

@@ -1,0 +1,560 @@
+//! An independent judge of one record: is the contact that it tells of there, and is it what it is called?
+//!
+//! Idea: the point is put into both models at the reported time, and f is evaluated there by code of its own, from the
+//! tree (min and max over faces with their signs) and the formulas of the faces. Which faces are active is read off how f
+//! grows from the point: its derivative along a direction d is the same min and max over the faces through the point,
+//! each with its own derivative along d. A face is active if for some d the outcome changes with it. That is no matter of
+//! multipliers and clauses, which the search goes by.
+//!
+//! What is demanded of a contact: the point lies on both surfaces, on every named face, and named faces are active
+//! there; the normal lies in the cone of the active faces' gradients of a, and its opposite in that of b; kind is what
+//! the active faces are (one tangent plane a face, two an edge, three or an apex a vertex); separation is 0; normal_speed
+//! is how fast the bodies' matter closes in along the normal there; the times are in order. Of an overlap: the point is
+//! deeper than 2 delta in both and proves the depth told.
+//!
+//! Where docs say less, less is demanded: the averaged normal of two vertices lies in the cone of both sides' gradients
+//! together; a contact that is flagged as not continued, or that starts the step, has its point up to 2 delta deep, and its
+//! normal is as near to the gradients as these are to those of points so far away; a
+//! line or a patch of contact is told by any of its points, its border included, so that its kind may be smoother than
+//! the point is.
+
+use crate::reference::Moving;
+use crate::reference::field::Literal;
+use contactd::contact::{Extent, Kind, Outcome, Status};
+use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Sense, Solid};
+use contactd_proto::contact_record::NO_FACE;
+use glam::DVec3;
+
+/// What a record says that is not so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Lie {
+    /// Times out of order or outside of the step, or not those of the status.
+    Bracket,
+    /// The point does not lie on both surfaces (contact) or not deep in both (overlap).
+    Point,
+    /// A named face does not pass through the point.
+    FaceElsewhere,
+    /// A named face passes through the point but f does not depend on it there, or none is named.
+    FaceInactive,
+    /// The normal is no unit vector, or lies outside of the cone of the active faces' gradients.
+    Normal,
+    /// The kind is not what the active faces are.
+    Kind,
+    /// A named face's primitive enters the solid with another sense than the model's table says.
+    Sense,
+    /// The separation is not what it is at the time told.
+    Separation,
+    /// The normal speed is not that of the bodies along the normal.
+    NormalSpeed,
+    /// Equals the upper end of its bracket though the surfaces met before, without the flag; or the flag stands without need.
+    NotContinued,
+}
+
+/// Everything that is wrong with a record, with figures; empty if it is right. `o` must have been asked for everything.
+pub fn lies(a: &Moving, b: &Moving, o: &Outcome) -> Vec<(Lie, String)> {
+    let mut out = Vec::new();
+    if !times_in_order(o) {
+        out.push((Lie::Bracket, format!("{} {} {} {}", o.status.name(), o.time_lower, o.time, o.time_upper)));
+        return out;
+    }
+    match o.status {
+        Status::Contact => contact(&[Side::new(a, o.time), Side::new(b, o.time)], o, &mut out),
+        Status::Overlap => overlap(&[Side::new(a, 0.0), Side::new(b, 0.0)], o, &mut out),
+        Status::Clear | Status::Undecided => {}
+    }
+    out
+}
+
+/// `lies`, as a test that prints what is wrong: true if nothing is.
+pub fn holds(name: &str, a: &Moving, b: &Moving, o: &Outcome) -> bool {
+    let found = lies(a, b, o);
+    for (lie, what) in &found {
+        println!("{name}: {lie:?}: {what}");
+    }
+    found.is_empty()
+}
+
+fn times_in_order(o: &Outcome) -> bool {
+    let (l, t, u) = (o.time_lower, o.time, o.time_upper);
+    match o.status {
+        Status::Contact => 0.0 <= l && l <= t && t <= u && u <= 1.0,
+        Status::Clear => l == 1.0 && t == 1.0 && u == 1.0,
+        Status::Overlap => l == 0.0 && t == 0.0 && u == 0.0,
+        Status::Undecided => (0.0..=1.0).contains(&l) && t == 1.0 && u == 1.0,
+    }
+}
+
+/// A face in its place in the tree.
+enum Node {
+    Literal(usize),
+    Min(Vec<Node>),
+    Max(Vec<Node>),
+    Constant(f64),
+}
+
+/// A body at the time of a record.
+struct Side<'a> {
+    moving: &'a Moving<'a>,
+    literals: Vec<Literal>,
+    /// Face id of each literal.
+    ids: Vec<u32>,
+    root: Node,
+    time: f64,
+    /// Bounding radius of the model, and the size of all numbers that its points are computed from.
+    radius: f64,
+    extent: f64,
+}
+
+impl<'a> Side<'a> {
+    fn new(moving: &'a Moving<'a>, time: f64) -> Self {
+        let solid = moving.solid;
+        let mut first = vec![0];
+        for p in &solid.primitives {
+            first.push(first.last().unwrap() + p.faces.len() as u32);
+        }
+        let (mut literals, mut ids) = (vec![], vec![]);
+        let root = lower(solid, &first, solid.root, false, &mut literals, &mut ids);
+        let bounds = solid.aabb();
+        let (radius, reach) = if solid.is_empty() {
+            (0.0, 0.0)
+        } else {
+            ((bounds.max - bounds.min).length() / 2.0, bounds.min.abs().max(bounds.max.abs()).length())
+        };
+        // Faces may have their numbers far outside of the solid.
+        let numbers = solid.faces.iter().map(|f| match *f {
+            Face::Plane { offset, .. } => offset.abs(),
+            Face::Sphere { center: o, radius } | Face::Cylinder { origin: o, radius, .. } => o.length() + radius,
+            Face::Cone { apex, .. } => apex.length(),
+        });
+        let motion = &moving.motion;
+        let extent = motion.start.position.length()
+            + motion.velocity.length()
+            + 2.0 * moving.place.position.length()
+            + 2.0 * reach
+            + numbers.fold(0.0, f64::max);
+        Self { moving, literals, ids, root, time, radius, extent }
+    }
+
+    /// A world point in the model's frame.
+    fn local(&self, world: DVec3) -> DVec3 {
+        let at = self.moving.motion.at(self.time);
+        let object = at.rotation.conjugate() * (world - at.position);
+        self.moving.place.rotation.conjugate() * (object - self.moving.place.position)
+    }
+
+    /// A world direction along the model's axes.
+    fn turned(&self, world: DVec3) -> DVec3 {
+        let at = self.moving.motion.at(self.time);
+        self.moving.place.rotation.conjugate() * (at.rotation.conjugate() * world)
+    }
+
+    /// World velocity of the body's matter at a world point, per step.
+    fn velocity(&self, world: DVec3) -> DVec3 {
+        let motion = &self.moving.motion;
+        motion.velocity + motion.spin.cross(world - motion.at(self.time).position)
+    }
+
+    fn value(&self, x: DVec3) -> f64 {
+        value(&self.root, &mut |i| self.literals[i].value(x))
+    }
+
+    /// Derivative of a literal at a point that lies on it to `tau`, along d.
+    fn slope(&self, i: usize, x: DVec3, tau: f64, d: DVec3) -> f64 {
+        let l = &self.literals[i];
+        match l.face {
+            Face::Cone { apex, axis, sin, cos } if apex.distance(x) <= tau / sin => {
+                l.sign * (axis.cross(d).length() * cos - axis.dot(d) * sin)
+            }
+            _ => l.gradient(x).dot(d),
+        }
+    }
+
+    fn is_apex(&self, i: usize, x: DVec3, tau: f64) -> bool {
+        match self.literals[i].face {
+            Face::Cone { apex, sin, .. } => apex.distance(x) <= tau / sin,
+            _ => false,
+        }
+    }
+}
+
+fn lower(
+    solid: &Solid,
+    first: &[u32],
+    id: NodeId,
+    negated: bool,
+    literals: &mut Vec<Literal>,
+    ids: &mut Vec<u32>,
+) -> Node {
+    match &solid.nodes[id as usize] {
+        TreeNode::Empty => Node::Constant(if negated { f64::NEG_INFINITY } else { f64::INFINITY }),
+        TreeNode::Primitive(p) => {
+            let sign = if negated { -1.0 } else { 1.0 };
+            let leaves = solid.primitives[*p as usize].faces.iter().enumerate().map(|(k, face)| {
+                literals.push(Literal { face: *face, sign, owner: *p });
+                ids.push(first[*p as usize] + k as u32);
+                Node::Literal(literals.len() - 1)
+            });
+            let leaves = leaves.collect();
+            if negated { Node::Min(leaves) } else { Node::Max(leaves) }
+        }
+        TreeNode::Op(op, children) => {
+            let flips = |i: usize| negated != (*op == Op::Difference && i > 0);
+            let lowered = children.iter().enumerate();
+            let lowered = lowered.map(|(i, c)| lower(solid, first, *c, flips(i), literals, ids)).collect();
+            if (*op == Op::Union) != negated { Node::Min(lowered) } else { Node::Max(lowered) }
+        }
+    }
+}
+
+fn value(node: &Node, of: &mut impl FnMut(usize) -> f64) -> f64 {
+    match node {
+        Node::Literal(i) => of(*i),
+        Node::Min(c) => c.iter().map(|n| value(n, of)).fold(f64::INFINITY, f64::min),
+        Node::Max(c) => c.iter().map(|n| value(n, of)).fold(f64::NEG_INFINITY, f64::max),
+        Node::Constant(v) => *v,
+    }
+}
+
+/// What a body is at a point of its surface, faces within `tau` passing through it.
+struct Spot {
+    /// Active literals.
+    active: Vec<usize>,
+    /// Generators of the cone of their gradients, along the model's axes.
+    generators: Vec<DVec3>,
+    /// An active cone has its apex there.
+    apex: bool,
+    /// Dimension of what the gradients span: 1 a face, 2 an edge, 3 a vertex.
+    rank: usize,
+}
+
+/// A literal that does not pass through the point has this slope, of its value's sign.
+const FAR: f64 = 1e9;
+
+impl Spot {
+    fn of(side: &Side, x: DVec3, tau: f64, normal: DVec3) -> Self {
+        let n = side.literals.len();
+        let values: Vec<f64> = side.literals.iter().map(|l| l.value(x)).collect();
+        let through: Vec<usize> = (0..n).filter(|i| values[*i].abs() <= tau).collect();
+        let gradients: Vec<DVec3> = through.iter().map(|i| side.literals[*i].gradient(x)).collect();
+        let has_apex = through.iter().any(|i| side.is_apex(*i, x, tau));
+        let mut is_active = vec![false; n];
+        let mut slopes: Vec<f64> = values.iter().map(|v| FAR * v.signum()).collect();
+        for d in directions(&gradients, has_apex) {
+            for i in &through {
+                slopes[*i] = side.slope(*i, x, tau, d);
+            }
+            let now = value(&side.root, &mut |i| slopes[i]);
+            if now.abs() > 2.0 {
+                // Deep inside or far outside, whatever these faces do.
+                break;
+            }
+            for i in &through {
+                let moved = |by: f64| value(&side.root, &mut |k| if k == *i { slopes[k] + by } else { slopes[k] });
+                is_active[*i] |= moved(1e-7) != now || moved(-1e-7) != now;
+            }
+        }
+        let active: Vec<usize> = through.into_iter().filter(|i| is_active[*i]).collect();
+        let mut generators = vec![];
+        let mut apex = false;
+        for i in &active {
+            if side.is_apex(*i, x, tau) {
+                let Face::Cone { axis, sin, cos, .. } = side.literals[*i].face else { unreachable!() };
+                let sign = side.literals[*i].sign;
+                let u = axis.any_orthonormal_vector();
+                let v = axis.cross(u);
+                let towards = (normal * sign - axis * axis.dot(normal * sign)).try_normalize();
+                let around = (0..256).map(|k| {
+                    let (s, c) = (f64::from(k) * std::f64::consts::TAU / 256.0).sin_cos();
+                    u * c + v * s
+                });
+                generators.extend(around.chain(towards).map(|r| (r * cos - axis * sin) * sign));
+                generators.push(-axis * sign);
+                apex = true;
+            } else {
+                generators.push(side.literals[*i].gradient(x));
+            }
+        }
+        let rank = if apex { 3 } else { rank(&generators) };
+        Self { active, generators, apex, rank }
+    }
+}
+
+/// Directions that reach every way in which one of some gradients may decide: at random, and around every edge and wall
+/// of the arrangement of the planes on which two of them agree.
+fn directions(gradients: &[DVec3], apex: bool) -> Vec<DVec3> {
+    let mut state = 0x9E37_79B9_97F4_A7C1_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let mut out = vec![];
+    for _ in 0..if apex { 2000 } else { 100 } {
+        let d = DVec3::new(random(), random(), random());
+        out.extend(d.try_normalize());
+    }
+    out.extend(gradients.iter().flat_map(|g| [*g, -*g]));
+    let mut walls: Vec<DVec3> = vec![];
+    for (i, g) in gradients.iter().enumerate() {
+        for h in &gradients[i + 1..] {
+            for wall in [*g - *h, *g + *h].into_iter().filter(|w| w.length() > 1e-7).map(DVec3::normalize) {
+                if walls.len() < 40 && walls.iter().all(|w| w.cross(wall).length() > 1e-6) {
+                    walls.push(wall);
+                }
+            }
+        }
+    }
+    for (i, w) in walls.iter().enumerate() {
+        for _ in 0..16 {
+            let d = DVec3::new(random(), random(), random());
+            let Some(d) = (d - *w * d.dot(*w)).try_normalize() else { continue };
+            out.extend([(d + *w * 1e-3).normalize(), (d - *w * 1e-3).normalize()]);
+        }
+        for v in &walls[i + 1..] {
+            let Some(edge) = w.cross(*v).try_normalize() else { continue };
+            for _ in 0..4 {
+                let aside = DVec3::new(random(), random(), random()) * 1e-3;
+                out.extend([(edge + aside).normalize(), (aside - edge).normalize()]);
+            }
+        }
+    }
+    out
+}
+
+/// Gradients closer than this, in radians, are one direction: a seam where faces meet tangentially is no edge.
+const TANGENT: f64 = 1e-6;
+
+fn rank(vectors: &[DVec3]) -> usize {
+    let mut span: Vec<DVec3> = vec![];
+    for g in vectors {
+        let rest = span.iter().fold(*g, |r, e| r - *e * e.dot(r));
+        if rest.length() > TANGENT && span.len() < 3 {
+            span.push(rest.normalize());
+        }
+    }
+    span.len()
+}
+
+/// Distance of a unit vector from the cone that some vectors generate.
+fn off_cone(n: DVec3, generators: &[DVec3]) -> f64 {
+    let mut best = 1.0f64;
+    for (i, g) in generators.iter().enumerate() {
+        best = best.min(n.distance(*g * n.dot(*g).max(0.0) / g.length_squared()));
+        for (j, h) in generators.iter().enumerate().skip(i + 1) {
+            let up = g.cross(*h);
+            let Some(up) = (up.length() > 1e-9).then(|| up.normalize()) else { continue };
+            let flat = n - up * n.dot(up);
+            // flat = s g + t h
+            let (gg, gh, hh) = (g.length_squared(), g.dot(*h), h.length_squared());
+            let det = gg * hh - gh * gh;
+            let (s, t) = ((flat.dot(*g) * hh - flat.dot(*h) * gh) / det, (flat.dot(*h) * gg - flat.dot(*g) * gh) / det);
+            if s >= 0.0 && t >= 0.0 {
+                best = best.min(n.distance(flat));
+            }
+            for k in if generators.len() <= 40 { &generators[j + 1..] } else { &[] } {
+                let volume = g.dot(h.cross(*k));
+                if volume.abs() < 1e-12 {
+                    continue;
+                }
+                let share = [n.dot(h.cross(*k)), g.dot(n.cross(*k)), g.dot(h.cross(n))].map(|v| v / volume);
+                if share.iter().all(|v| *v >= -1e-12) {
+                    return 0.0;
+                }
+            }
+        }
+    }
+    best
+}
+
+/// How far a normal may be off its cone.
+const NORMAL: f64 = 1e-6;
+
+fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
+    let size = sides[0].radius.max(sides[1].radius);
+    let extent = sides[0].extent + sides[1].extent;
+    let rounding = 64.0 * f64::EPSILON * extent;
+    let normals = [o.normal, -o.normal];
+    if (o.normal.length() - 1.0).abs() > 1e-12 || !o.normal.is_finite() || !o.point.is_finite() {
+        out.push((Lie::Normal, format!("point {}, normal {}", o.point, o.normal)));
+        return;
+    }
+    let points = [sides[0].local(o.point), sides[1].local(o.point)];
+    let values = [sides[0].value(points[0]), sides[1].value(points[1])];
+    // What starts in touch, or was not continued, is told where it is deep.
+    let at_depth = o.not_continued || o.time == 0.0;
+    let near = (1e-11 * size).max(rounding);
+    let off = if at_depth { near + 2.001 * o.resolution } else { near };
+    if values.iter().any(|v| v.abs() > off) {
+        out.push((Lie::Point, format!("f {:e} {:e} at {}, within {off:e}", values[0], values[1], o.point)));
+    }
+    let apart = values[0].max(values[1]);
+    if !o.past && (o.separation - 2.0 * apart.min(0.0)).abs() > 2.0 * off {
+        out.push((Lie::Separation, format!("{:e}, f {apart:e}", o.separation)));
+    }
+    let closing = (sides[0].velocity(o.point) - sides[1].velocity(o.point)).dot(o.normal);
+    let fastest: f64 =
+        sides.iter().map(|s| s.moving.motion.velocity.length() + s.moving.motion.spin.length() * (s.extent)).sum();
+    if (closing - o.normal_speed).abs()
+        > 1e-9 * fastest.min(1e3 * (closing.abs() + o.normal_speed.abs())) + 1e-13 * fastest
+        && !o.averaged_normal
+    {
+        out.push((Lie::NormalSpeed, format!("{}, the bodies close in by {closing}", o.normal_speed)));
+    }
+    if o.time == o.time_upper && !o.not_continued && o.time > 0.0 {
+        // Between touch and depth delta the step must pass, if a double can tell.
+        let lag = o.resolution / closing.abs().max(f64::MIN_POSITIVE);
+        if lag > 16.0 * f64::EPSILON && closing > 0.0 {
+            out.push((Lie::NotContinued, format!("time {} is time_upper, delta takes {lag:e}", o.time)));
+        }
+    }
+    // Which faces pass through the point is a matter of what counts as through: any sensible measure will do for all.
+    let least = 4.0 * f64::EPSILON * extent;
+    let most = if at_depth { off } else { 1e-9 * size + rounding };
+    let mut doubts: Option<Vec<(Lie, String)>> = None;
+    for tau in [16.0, 1.0, 4.0, 64.0, 256.0, 1024.0].map(|k| k * least).into_iter().filter(|t| *t < most).chain([most])
+    {
+        let mut wrong = vec![];
+        features(sides, &points, &normals, tau, o, &mut wrong);
+        if wrong.is_empty() {
+            return;
+        }
+        if doubts.as_ref().is_none_or(|d| wrong.len() < d.len()) {
+            doubts = Some(wrong);
+        }
+    }
+    out.extend(doubts.unwrap_or_default());
+}
+
+fn features(
+    sides: &[Side; 2],
+    points: &[DVec3; 2],
+    normals: &[DVec3; 2],
+    tau: f64,
+    o: &Outcome,
+    out: &mut Vec<(Lie, String)>,
+) {
+    let spots: [Spot; 2] = std::array::from_fn(|k| Spot::of(&sides[k], points[k], tau, sides[k].turned(normals[k])));
+    let at_depth = o.not_continued || o.time == 0.0;
+    // Of a round feature the gradient turns while a point moves: by its rounding, or, of one that is told where it is
+    // deep, by how deep it is; then both sides' gradients are what the normal lies between.
+    let turns: [f64; 2] = std::array::from_fn(|k| {
+        let (side, point) = (&sides[k], points[k]);
+        let moves = 64.0 * f64::EPSILON * side.extent + if at_depth { tau } else { 0.0 };
+        let each = spots[k].active.iter().map(|i| match side.literals[*i].face {
+            Face::Plane { .. } => 0.0,
+            Face::Sphere { center, .. } => moves / point.distance(center).max(f64::MIN_POSITIVE),
+            Face::Cylinder { origin: o, axis, .. } | Face::Cone { apex: o, axis, .. } => {
+                moves / axis.cross(point - o).length().max(f64::MIN_POSITIVE)
+            }
+        });
+        each.fold(0.0, f64::max)
+    });
+    let mut together = vec![];
+    let mut ranks = [None; 2];
+    for (k, (side, spot)) in sides.iter().zip(&spots).enumerate() {
+        let name = ["a", "b"][k];
+        let named: Vec<u32> = [o.faces_a, o.faces_b][k].into_iter().filter(|f| *f != NO_FACE).collect();
+        if named.is_empty() || spot.active.is_empty() {
+            out.push((Lie::FaceInactive, format!("{name}: {named:?} named, {} active", spot.active.len())));
+            continue;
+        }
+        for face in &named {
+            let Some(i) = side.ids.iter().position(|id| id == face) else {
+                out.push((Lie::FaceElsewhere, format!("{name}: there is no face {face}")));
+                continue;
+            };
+            let off = side.literals[i].value(points[k]);
+            if off.abs() > tau {
+                out.push((Lie::FaceElsewhere, format!("{name}: face {face} is {off:e} away, {tau:e} allowed")));
+            } else if !spot.active.contains(&i) {
+                out.push((Lie::FaceInactive, format!("{name}: f does not depend on face {face}, tau {tau:e}")));
+            }
+            let owner = side.literals[i].owner as usize;
+            let positive = side.literals[i].sign > 0.0;
+            if (side.moving.solid.senses[owner] == Sense::Positive) != positive {
+                out.push((Lie::Sense, format!("{name}: face {face} of primitive {owner}")));
+            }
+        }
+        let n = side.turned(normals[k]);
+        let allowed = NORMAL + turns[k].min(0.5) + if at_depth { turns[1 - k].min(0.5) } else { 0.0 };
+        let off = off_cone(n, &spot.generators);
+        let allowed = if spot.apex { allowed.max(2e-4) } else { allowed };
+        if !o.averaged_normal && off > allowed {
+            out.push((Lie::Normal, format!("{name}: {off:e} off the cone of faces {:?}", ids(side, spot))));
+        }
+        let at = side.moving.motion.at(side.time).rotation * side.moving.place.rotation;
+        together.extend(spot.generators.iter().map(|g| if k == 0 { at * *g } else { -(at * *g) }));
+        // Named faces that are all there are, are as many as the kind says.
+        if spot.active.len() <= 3 && !spot.apex {
+            let gradients: Vec<DVec3> = named
+                .iter()
+                .filter_map(|f| side.ids.iter().position(|id| id == f))
+                .map(|i| side.literals[i].gradient(points[k]))
+                .collect();
+            ranks[k] = Some(rank(&gradients));
+            if o.extent == Extent::Point && rank(&gradients) != spot.rank {
+                out.push((Lie::FaceInactive, format!("{name}: of {:?} only {named:?} named", ids(side, spot))));
+            }
+        }
+    }
+    if let [Some(a), Some(b)] = ranks
+        && Kind::of_active(a, b) != o.kind
+    {
+        out.push((Lie::FaceInactive, format!("{} by {a} and {b} named", o.kind.name())));
+    }
+    if o.averaged_normal && off_cone(o.normal, &together) > 2e-4 {
+        out.push((Lie::Normal, format!("the averaged {} is not between the faces", o.normal)));
+    }
+    let kind = Kind::of_active(spots[0].rank, spots[1].rank);
+    let fits = match o.extent {
+        Extent::Point => o.kind == kind,
+        // Any point of a line or a patch, its border included.
+        Extent::Line => {
+            let has_vertex = matches!(o.kind, Kind::VertexFace | Kind::VertexEdge | Kind::VertexVertex);
+            (o.kind as usize) <= kind as usize && !has_vertex
+        }
+        Extent::Patch => o.kind == Kind::FaceFace,
+    };
+    if !fits {
+        let at = [ids(&sides[0], &spots[0]), ids(&sides[1], &spots[1])];
+        out.push((Lie::Kind, format!("{} {}, faces {at:?} make {}", o.kind.name(), o.extent.name(), kind.name())));
+    }
+    if o.averaged_normal != (o.kind == Kind::VertexVertex) {
+        out.push((Lie::Kind, format!("{} and averaged {}", o.kind.name(), o.averaged_normal)));
+    }
+}
+
+fn ids(side: &Side, spot: &Spot) -> Vec<u32> {
+    spot.active.iter().map(|i| side.ids[*i]).collect()
+}
+
+fn overlap(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
+    let rounding = 64.0 * f64::EPSILON * (sides[0].extent + sides[1].extent);
+    if (o.normal.length() - 1.0).abs() > 1e-12 || !o.normal.is_finite() || !o.point.is_finite() {
+        out.push((Lie::Normal, format!("point {}, normal {}", o.point, o.normal)));
+        return;
+    }
+    let depth = |p: DVec3| -sides[0].value(sides[0].local(p)).max(sides[1].value(sides[1].local(p)));
+    let at = depth(o.point);
+    if at < 2.0 * o.resolution - rounding {
+        out.push((Lie::Point, format!("depth {at:e} at {}, 2 delta are {:e}", o.point, 2.0 * o.resolution)));
+    }
+    if -o.separation > 2.0 * at + rounding || o.separation > 0.0 {
+        out.push((Lie::Separation, format!("{:e}, the point proves {:e}", o.separation, -2.0 * at)));
+    }
+    if o.penetration > 0.0 && o.penetration > 2.0 * depth(o.deepest) + rounding {
+        out.push((Lie::Separation, format!("penetration {:e}, deepest {:e}", o.penetration, 2.0 * depth(o.deepest))));
+    }
+    // A spin about a body's own axis of revolution moves nothing of it, so it may be left out. Inside of the bodies that makes a
+    // difference: the point is on neither surface.
+    let turning = |s: &Side| s.velocity(o.point);
+    let carried = |s: &Side| s.moving.motion.velocity;
+    let speeds = [turning(&sides[0]), carried(&sides[0])]
+        .map(|a| [turning(&sides[1]), carried(&sides[1])].map(|b| (a - b).dot(o.normal)));
+    let closing = speeds[0][0];
+    let fastest: f64 =
+        sides.iter().map(|s| s.moving.motion.velocity.length() + s.moving.motion.spin.length() * (s.extent)).sum();
+    let off = speeds.as_flattened().iter().map(|v| (v - o.normal_speed).abs()).fold(f64::INFINITY, f64::min);
+    if off > 1e-9 * fastest && rank(&[o.normal]) == 1 {
+        out.push((Lie::NormalSpeed, format!("{}, the bodies close in by {closing}", o.normal_speed)));
+    }
+}

@@ -1,0 +1,368 @@
+//! Checks certificates of what a session has remembered (docs/certificate.md, "What is remembered") against the motions that
+//! its bodies truly make in the step.
+//!
+//! Everything is worked out from the solids, the poses in the text and the motions that the caller gives, in intervals: how far a
+//! body reaches along a direction by formulas of its own for each primitive, how far bodies have gone from where they stood by
+//! their poses alone. What is added up on the server is not asked for.
+
+use super::interval::{Interval, Vector, apply, dot, minus, plus, point, product, times, transpose, vector};
+use super::motion::{Motions, rotation, turned};
+use super::{Bounder, Checked, Region, certain, check_level, expression, extent, number};
+use contactd::motion::Placed;
+use contactd::solid::{Node, NodeId, Op, Shape, Solid};
+use contactd_proto::{Motion, Pose};
+use glam::{DQuat, DVec3};
+
+/// What was found to hold.
+#[derive(Clone, Copy, Debug)]
+pub enum Proven {
+    /// Apart over the whole step by a distance measured before.
+    Room,
+    /// Apart over the whole step along directions.
+    Directions,
+    /// Apart over the whole step since they keep to a course.
+    Course,
+    /// The same question: what its certificate proves.
+    Answer(Checked),
+    /// The same question: in each other at the start.
+    Overlap,
+}
+
+/// A body as it truly is in the step.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth<'a> {
+    solid: &'a Solid,
+    placed: Placed,
+    /// A box around the solid, its own frame; `None` for an empty one.
+    extent: Option<[Interval; 3]>,
+    /// Farthest point from the object's origin, at most.
+    reach: f64,
+}
+
+/// By what a body is bounded: its box, or its whole tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum By {
+    Box,
+    Tree,
+}
+
+/// Spans of time that a proof by directions may be halved into.
+const SPANS: usize = 4096;
+
+/// How far a solid reaches along a direction of its own frame, at most.
+fn support(solid: &Solid, node: NodeId, m: Vector) -> f64 {
+    match &solid.nodes[node as usize] {
+        Node::Empty => f64::NEG_INFINITY,
+        Node::Primitive(p) => primitive_support(solid, *p, m),
+        Node::Op(Op::Difference, children) => support(solid, children[0], m),
+        Node::Op(Op::Union, children) => {
+            children.iter().map(|c| support(solid, *c, m)).fold(f64::NEG_INFINITY, f64::max)
+        }
+        Node::Op(Op::Intersection, children) => {
+            let own = children.iter().map(|c| support(solid, *c, m)).fold(f64::INFINITY, f64::min);
+            own.min(extent(solid, node, 0.0).map_or(f64::NEG_INFINITY, |all| box_support(&all, m)))
+        }
+    }
+}
+
+fn box_support(all: &[Interval; 3], m: Vector) -> f64 {
+    let mut sum = point(0.0);
+    for k in 0..3 {
+        if !(all[k].lo.is_finite() && all[k].hi.is_finite()) {
+            return f64::INFINITY;
+        }
+        let most = (m[k] * point(all[k].hi)).hi.max((m[k] * point(all[k].lo)).hi);
+        sum = sum + point(most);
+    }
+    sum.hi
+}
+
+fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
+    let p = &solid.primitives[p as usize];
+    let n = apply(&transpose(&rotation(&p.frame)), m);
+    let at = dot(vector(p.frame.position.to_array()), m);
+    let abs = |x: Interval| point(x.mag());
+    let across = (n[0].square() + n[1].square()).sqrt();
+    let own = match &p.shape {
+        Shape::Sphere(s) => point(s.radius) * (n[0].square() + n[1].square() + n[2].square()).sqrt(),
+        Shape::Cylinder(c) => point(c.half_height) * abs(n[2]) + point(c.radius) * across,
+        Shape::Cone(c) => {
+            let top = point(c.half_height) * n[2] + point(c.top) * across;
+            let bottom = point(-c.half_height) * n[2] + point(c.bottom) * across;
+            point(top.hi.max(bottom.hi))
+        }
+        Shape::Cuboid(c) => point(c.half.x) * abs(n[0]) + point(c.half.y) * abs(n[1]) + point(c.half.z) * abs(n[2]),
+        Shape::Polyhedron(p) => {
+            let each = p.vertices.iter().map(|v| dot(vector(v.to_array()), n).hi);
+            point(each.fold(f64::NEG_INFINITY, f64::max))
+        }
+        Shape::HalfSpace(_) => return f64::INFINITY,
+    };
+    (at + own).hi
+}
+
+fn length(v: Vector) -> f64 {
+    (v[0].square() + v[1].square() + v[2].square()).sqrt().hi
+}
+
+impl<'a> Truth<'a> {
+    /// A solid with its place and motion.
+    pub fn new(solid: &'a Solid, placed: Placed) -> Self {
+        let extent = extent(solid, solid.root, 0.0);
+        let mut reach: f64 = 0.0;
+        if let Some(all) = extent {
+            let m = rotation(&placed.place);
+            for i in 0..8u32 {
+                let corner: Vector =
+                    std::array::from_fn(|k| point(if i >> k & 1 == 0 { all[k].lo } else { all[k].hi }));
+                reach = reach.max(length(plus(apply(&m, corner), vector(placed.place.position.to_array()))));
+            }
+        }
+        Self { solid, placed, extent, reach }
+    }
+
+    /// The same with another motion.
+    pub fn moving(self, motion: Motion) -> Self {
+        Self { placed: Placed { motion, ..self.placed }, ..self }
+    }
+
+    /// How far it reaches from its object's origin along a direction of the world at a time of a motion.
+    fn support(&self, motion: &Motion, n: Vector, t: f64, by: By) -> f64 {
+        let r = product(&turned(vector(motion.spin.to_array()), point(t)), &rotation(&motion.start));
+        let along = apply(&transpose(&r), n);
+        let own = apply(&transpose(&rotation(&self.placed.place)), along);
+        let around = self.extent.map_or(f64::NEG_INFINITY, |all| box_support(&all, own));
+        let solid = if by == By::Box { around } else { around.min(support(self.solid, self.solid.root, own)) };
+        (point(solid) + dot(vector(self.placed.place.position.to_array()), along)).hi
+    }
+}
+
+/// The gap of two bodies along n (from the first to the second) at a time of two motions, at least.
+fn gap(bodies: &[Truth; 2], motions: &[Motion; 2], n: Vector, t: f64, by: By) -> f64 {
+    let [p, q] = motions.map(|m| vector(m.start.position.to_array()));
+    let [v, w] = motions.map(|m| vector(m.velocity.to_array()));
+    let way = plus(minus(q, p), times(point(t), minus(w, v)));
+    let back = times(point(-1.0), n);
+    let (a, b) = (bodies[0].support(&motions[0], n, t, by), bodies[1].support(&motions[1], back, t, by));
+    if a == f64::NEG_INFINITY || b == f64::NEG_INFINITY {
+        // Nothing is apart from everything.
+        return f64::INFINITY;
+    }
+    (dot(way, n) - point(a) - point(b)).lo
+}
+
+/// True when two bodies are farther than `least` apart over [t0, t1] of their motions, along a direction that goes over from one
+/// to another. For points a, b of the bodies n·(b − a) has a second derivative of at most 2|ν|(|v₀| + ω_A ρ_A + ω_B ρ_B) +
+/// |n|(ω_A² ρ_A + ω_B² ρ_B), so over a span h it lies above the line between its ends by no less than −⅛ of that times h².
+fn apart(bodies: &[Truth; 2], motions: &[Motion; 2], from: (f64, DVec3), to: (f64, DVec3), least: f64) -> bool {
+    [By::Box, By::Tree].into_iter().any(|by| apart_by(bodies, motions, from, to, least, by))
+}
+
+fn apart_by(
+    bodies: &[Truth; 2],
+    motions: &[Motion; 2],
+    (t0, n0): (f64, DVec3),
+    (t1, n1): (f64, DVec3),
+    least: f64,
+    by: By,
+) -> bool {
+    let up = 1.0 + 1e-12;
+    let reach = [bodies[0].reach, bodies[1].reach];
+    let omega = motions.map(|m| m.spin.length() * up);
+    let way = (motions[0].velocity - motions[1].velocity).length() * up;
+    let speed = way + omega[0] * reach[0] + omega[1] * reach[1];
+    let pull = omega[0] * omega[0] * reach[0] + omega[1] * omega[1] * reach[1];
+    let longest = n0.length().max(n1.length()) * up;
+    let turn = if t1 > t0 { (n1 - n0).length() / (t1 - t0) * up } else { 0.0 };
+    let curve = (2.0 * turn * speed + longest * pull) * up;
+    let at = |t: f64| {
+        let s = if t1 > t0 { (t - t0) / (t1 - t0) } else { 0.0 };
+        let n = if n0 == n1 { n0 } else { n0 * (1.0 - s) + n1 * s };
+        // However the direction is rounded: it is one, and the bound of its turning has room for that.
+        gap(bodies, motions, vector(n.to_array()), t, by)
+    };
+    let (first, last) = (at(t0), at(t1));
+    let need = least * longest;
+    let mut stack = vec![((t0, first), (t1, last))];
+    for _ in 0..SPANS {
+        let Some((p, q)) = stack.pop() else { return true };
+        if !(p.1 > need && q.1 > need) {
+            return false;
+        }
+        let h = q.0 - p.0;
+        // Mixed directions are shorter than unit ones: a gap along them is at least as much in lengths.
+        if p.1.min(q.1) - 0.125 * curve * h * h > need {
+            continue;
+        }
+        let t = 0.5 * (p.0 + q.0);
+        let middle = (t, at(t));
+        stack.push((middle, q));
+        stack.push((p, middle));
+    }
+    false
+}
+
+/// Sine of half the angle between two rotations, at most.
+fn half_angle_sine(p: DQuat, q: DQuat) -> f64 {
+    let r = p.normalize() * q.normalize().conjugate();
+    DVec3::new(r.x, r.y, r.z).length() + 1e-15
+}
+
+/// How far any point of a body is, over the step that it truly makes, from where it would be in `expected` at the same time.
+fn strays(body: &Truth, expected: &Motion) -> f64 {
+    let truth = &body.placed.motion;
+    let off = truth.start.position - expected.start.position;
+    let later = off + (truth.velocity - expected.velocity);
+    let turned = 2.0 * half_angle_sine(truth.start.rotation, expected.start.rotation);
+    let turning = (turned + (truth.spin - expected.spin).length()).min(2.0);
+    let size = truth.start.position.abs().max_element() + expected.start.position.abs().max_element();
+    (off.length().max(later.length()) + turning * body.reach) * (1.0 + 1e-14) + 4.0 * f64::EPSILON * size
+}
+
+/// Checks the certificate of one pair: its text, the two bodies as they truly move in the step (the one with the smaller id
+/// first) and the resolution of the pair. Apart means: by more than the resolution.
+///
+/// # Errors
+/// The first thing that is not certain.
+pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -> Result<Proven, String> {
+    let (head, rest) = text.split_once('\n').ok_or("no line")?;
+    let words: Vec<&str> = head.split(' ').collect();
+    let ["pair", a, b, kind, words @ ..] = words.as_slice() else { return Err("not the head of a pair".into()) };
+    if (a.parse().ok(), b.parse().ok()) != (Some(ids.0), Some(ids.1)) {
+        return Err("another pair".into());
+    }
+    let motions = [bodies[0].placed.motion, bodies[1].placed.motion];
+    match *kind {
+        "room" => {
+            let mut numbers = Numbers::of(words)?;
+            let room = numbers.next()?;
+            let along = numbers.vector()?;
+            let poses = [numbers.pose()?, numbers.pose()?];
+            let then = poses.map(Motion::resting);
+            let unit = (along.length() - 1.0).abs() < 1e-9;
+            let gone = strays(&bodies[0], &then[0]) + strays(&bodies[1], &then[1]);
+            let size = 1e-12 * (bodies[0].reach + bodies[1].reach + gone);
+            let n = vector(along.to_array());
+            let least = (room - size).max((gone + resolution) * (1.0 + 1e-8));
+            let by_box = gap(&bodies, &then, n, 0.0, By::Box);
+            let apart = if by_box > least { by_box } else { gap(&bodies, &then, n, 0.0, By::Tree) };
+            if !unit || apart < room - size {
+                return Err(format!("the bodies were {apart:e} apart, not {room:e}"));
+            }
+            if apart * (1.0 - 2e-9) - gone <= resolution {
+                return Err(format!("{apart:e} apart, they may have gone {gone:e} since"));
+            }
+            Ok(Proven::Room)
+        }
+        "directions" => {
+            let mut numbers = Numbers::of(words)?;
+            let (n0, n1) = (numbers.vector()?, numbers.vector()?);
+            if apart(&bodies, &motions, (0.0, n0), (1.0, n1), resolution) {
+                Ok(Proven::Directions)
+            } else {
+                Err("the directions do not keep the bodies apart".into())
+            }
+        }
+        "course" => course(words, rest, &bodies, resolution),
+        "answer" => {
+            let mut numbers = Numbers::of(words)?;
+            let asked = [numbers.motion()?, numbers.motion()?];
+            if asked != motions {
+                return Err("another question".into());
+            }
+            let [a, b] = &bodies;
+            if let Some(x) = rest.strip_prefix("overlap ") {
+                let words: Vec<&str> = x.trim_end().split(' ').collect();
+                let x = Numbers::of(&words)?.vector()?;
+                let place = a.placed.place.inverse();
+                let x = place.point(a.placed.motion.start.inverse().point(x));
+                let motions = Motions::new(&a.placed, &b.placed);
+                let mut bounder = Bounder { a: a.solid, b: b.solid, motions, depth: resolution, evaluations: 0 };
+                let region = Region([(x.x, x.x), (x.y, x.y), (x.z, x.z), (0.0, 0.0)]);
+                let own = expression(a.solid, a.solid.root, false, false);
+                let other = expression(b.solid, b.solid.root, false, true);
+                if certain(&mut bounder, &own, region) && certain(&mut bounder, &other, region) {
+                    return Ok(Proven::Overlap);
+                }
+                return Err("the point is not inside both bodies".into());
+            }
+            super::check(rest, (0, 1), (a.solid, &a.placed), (b.solid, &b.placed)).map(Proven::Answer)
+        }
+        _ => Err(format!("{kind:?} is no kind of memory")),
+    }
+}
+
+/// A course: the bodies were proven to keep a distance over motions, and stray from these by less.
+fn course(words: &[&str], rest: &str, bodies: &[Truth; 2], resolution: f64) -> Result<Proven, String> {
+    let mut numbers = Numbers::of(words)?;
+    let (since, steps, until) = (numbers.next()?, numbers.next()?, numbers.next()?);
+    let expected = [numbers.motion()?, numbers.motion()?];
+    let stands = since >= steps;
+    if !(since >= 0.0 && steps >= 1.0) || !stands && since + 1.0 > steps.min(until) || stands && until < f64::INFINITY {
+        return Err("the step is not within the course".into());
+    }
+    // As the bodies were expected to go in this step.
+    let now = expected.map(|m| {
+        let start = m.at(since.min(steps));
+        if stands { Motion::resting(start) } else { Motion { start, ..m } }
+    });
+    let astray = strays(&bodies[0], &now[0]) + strays(&bodies[1], &now[1]);
+    let whole = expected.map(|m| Motion { velocity: m.velocity * steps, spin: m.spin * steps, ..m });
+    // This step's part of the course, as a fraction of it.
+    let (from, to) = if stands { (1.0, 1.0) } else { (since / steps, (since + 1.0) / steps) };
+    if rest.starts_with("from ") {
+        let mut turns = Vec::new();
+        for line in rest.lines() {
+            let words: Vec<&str> = line.split(' ').skip(1).collect();
+            let mut numbers = Numbers::of(&words)?;
+            turns.push((numbers.next()?, numbers.vector()?));
+        }
+        let least = astray + resolution;
+        for (i, (begin, n)) in turns.iter().enumerate() {
+            let end = turns.get(i + 1).map_or(1.0, |next| next.0);
+            let (t0, t1) = (begin.max(from), end.min(to));
+            let here = if i == 0 { t0 <= from || t0 <= t1 } else { t0 <= t1 };
+            if here && t0 <= t1 && !apart(bodies, &whole, (t0, *n), (t1, *n), least) {
+                return Err(format!("direction {i} does not keep the bodies {least:e} apart on their course"));
+            }
+        }
+        let begins = turns.first().is_some_and(|t| t.0 <= from);
+        let ordered = turns.windows(2).all(|w| w[0].0 <= w[1].0);
+        return if begins && ordered { Ok(Proven::Course) } else { Err("the directions leave time out".into()) };
+    }
+    let [a, b] = [0, 1].map(|k| Placed { motion: whole[k], ..bodies[k].placed });
+    let checked = check_level(rest, (0, 1), (bodies[0].solid, &a), (bodies[1].solid, &b))?;
+    if checked.until < to * (1.0 - 1e-12) {
+        return Err(format!("the course is proven until {}, the step ends at {to} of it", checked.until));
+    }
+    // Every point x of both bodies would lie within half of what they stray of both as they were expected.
+    if -2.0 * checked.depth - astray <= resolution {
+        return Err(format!("proven to keep f above {:e}, they stray {astray:e}", -checked.depth));
+    }
+    Ok(Proven::Course)
+}
+
+/// The numbers of a line, words between them left out.
+struct Numbers(std::vec::IntoIter<f64>);
+
+impl Numbers {
+    fn of(words: &[&str]) -> Result<Self, String> {
+        let named = |w: &&&str| !w.chars().all(|c| c.is_ascii_alphabetic()) || **w == "inf";
+        let value = |w: &&str| if *w == "inf" { Ok(f64::INFINITY) } else { number(w) };
+        let all: Result<Vec<f64>, String> = words.iter().filter(named).map(value).collect();
+        Ok(Self(all?.into_iter()))
+    }
+    fn next(&mut self) -> Result<f64, String> {
+        self.0.next().ok_or_else(|| "a number is missing".into())
+    }
+    fn vector(&mut self) -> Result<DVec3, String> {
+        Ok(DVec3::new(self.next()?, self.next()?, self.next()?))
+    }
+    fn pose(&mut self) -> Result<Pose, String> {
+        let at = self.vector()?;
+        Ok(Pose::new(at, DQuat::from_xyzw(self.next()?, self.next()?, self.next()?, self.next()?)))
+    }
+    fn motion(&mut self) -> Result<Motion, String> {
+        Ok(Motion { start: self.pose()?, velocity: self.vector()?, spin: self.vector()? })
+    }
+}

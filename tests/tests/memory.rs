@@ -1,0 +1,409 @@
+//! A session that remembers tells what one tells that never saw a step before: to the bit, whatever happens to its bodies.
+//!
+//! The steps are drawn by `stepped`, which knows nothing of what is remembered. 100,000 of them:
+//! `CONTACTD_MEMORY_STEPS=100000 cargo test --release -p contactd-tests --test memory -- --nocapture`
+#![allow(missing_docs)]
+
+use contactd::contact::{Counters, Outcome, Status};
+use contactd::eco::Model;
+use contactd::motion::Placed;
+use contactd::world::memory::Remembered;
+use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World, record};
+use contactd_proto::contact_record::{ContactRecord, DETAIL_SLOT, DetailSlot};
+use contactd_proto::{Detect, Motion, Pose, PoseRecord, Rule, Track};
+use contactd_tests::random_solids::Random;
+use contactd_tests::scenes::Recipe;
+use contactd_tests::stepped::{Act, Change, Play, Thing, block, plate, tracks};
+use contactd_tests::verifier::memory::{Proven, Truth, check};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+fn part(recipe: &Recipe) -> Arc<Part> {
+    Arc::new(Part::new(Arc::new(Model::new(recipe.build()))))
+}
+
+/// The reply to a step as its caller reads it, to the bit: header and all slots, work left out.
+fn told(world: &World) -> (String, Vec<ContactRecord>) {
+    let out = world.outcome();
+    let r = record::reply(out, true);
+    let header = format!(
+        "{} {} {} {} {:x} {}",
+        r.status,
+        r.records,
+        r.slots,
+        r.truncated,
+        r.safe_time.to_bits(),
+        out.may_have_passed
+    );
+    let slot = |i: usize| {
+        let slot = record::slot(world, out, true, i);
+        let detail: DetailSlot = bytemuck::cast(slot);
+        // Cells are work.
+        if i >= out.pairs.len() && detail.tag == DETAIL_SLOT {
+            bytemuck::cast(DetailSlot { cells: 0, ..detail })
+        } else {
+            slot
+        }
+    };
+    (header, (0..record::slots_of(out, true)).map(slot).collect())
+}
+
+fn same(a: &(String, Vec<ContactRecord>), b: &(String, Vec<ContactRecord>)) -> bool {
+    a.0 == b.0 && bytemuck::cast_slice::<_, u8>(&a.1) == bytemuck::cast_slice::<_, u8>(&b.1)
+}
+
+/// The first slot in which two replies differ.
+fn differing(a: &(String, Vec<ContactRecord>), b: &(String, Vec<ContactRecord>)) -> String {
+    let bytes = |x: &ContactRecord| bytemuck::bytes_of(x).to_vec();
+    let slots = a.1.iter().zip(&b.1).enumerate().find(|(_, (x, y))| bytes(x) != bytes(y));
+    let slots = slots.map(|(i, (x, y))| {
+        let at: Vec<usize> =
+            bytes(x).iter().zip(bytes(y)).enumerate().filter(|(_, (x, y))| **x != *y).map(|(k, _)| k).collect();
+        format!("slot {i} of {}, bytes {at:?}: {x:?}, {y:?}", a.1.len())
+    });
+    format!("{} {} {slots:?}", a.0, b.0)
+}
+
+/// What is said of each pair, as text.
+fn lines(out: &StepOutcome) -> Vec<String> {
+    let text = |p: &PairOutcome| {
+        let outcome = Outcome { counters: Counters::default(), apart: 0.0, ..p.outcome };
+        format!("{:?} {} {:?} {:?}", (p.a, p.b), p.regions_complete, outcome, out.regions_of(p))
+            .replace("-0.0,", "0.0,")
+    };
+    out.pairs.iter().map(text).collect()
+}
+
+/// A world that has never been asked anything: objects, rules and the tracks of the step before.
+struct Fresh {
+    parts: Vec<Arc<Part>>,
+    things: Vec<Thing>,
+    rules: Vec<Rule>,
+    resolution: Option<f64>,
+    tracks: Vec<(u32, Track)>,
+}
+
+impl Fresh {
+    fn world(&self) -> World {
+        let mut world = World::new(256, 256);
+        for thing in &self.things {
+            world.add_object(thing.spec(&self.parts)).expect("an object");
+        }
+        world.set_rules(self.rules.clone()).expect("rules");
+        world.set_resolution(self.resolution).expect("a resolution");
+        world.restore(&self.tracks).expect("tracks");
+        world
+    }
+
+    fn change(&mut self, change: &Change) {
+        match change {
+            Change::Add(thing) => self.things.push(thing.clone()),
+            Change::Remove(id) => {
+                self.things.retain(|t| t.id != *id);
+                self.tracks.retain(|t| t.0 != *id);
+            }
+            Change::Rules(rules) => self.rules.clone_from(rules),
+            Change::Resolution(resolution) => self.resolution = *resolution,
+        }
+    }
+}
+
+fn apply(world: &mut World, parts: &[Arc<Part>], change: &Change) {
+    match change {
+        Change::Add(thing) => world.add_object(thing.spec(parts)).expect("an object"),
+        Change::Remove(id) => world.remove_object(*id).expect("an object to remove"),
+        Change::Rules(rules) => world.set_rules(rules.clone()).expect("rules"),
+        Change::Resolution(resolution) => world.set_resolution(*resolution).expect("a resolution"),
+    }
+}
+
+#[derive(Default)]
+struct Work {
+    difference: Option<String>,
+    steps: usize,
+    /// Steps with a contact, with an overlap alone, with nothing met; of the last those without a search.
+    contacts: usize,
+    overlaps: usize,
+    clear: usize,
+    known: usize,
+    /// Steps that only a session without memory had to leave open.
+    open: usize,
+    /// Certificates that hold, by kind: room, directions, course, answer, overlap.
+    proven: [usize; 5],
+    /// Answers of memory without a certificate, and pairs whose certificate does not hold.
+    unproven: usize,
+    refused: Option<String>,
+    /// Steps with more than 12 primitives in both trees of some pair asked about.
+    large: usize,
+}
+
+/// Cells that the proof of a course or an answer may take.
+const CELLS: u64 = 4_000;
+
+/// Asks a world for a certificate of each pair that it has answered without a search, and checks it against the motions that
+/// another world has.
+fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), String> {
+    let ids: Vec<u32> = cold.bodies().iter().map(|b| b.id).collect();
+    let truths: Vec<Truth> = cold
+        .bodies()
+        .iter()
+        .map(|b| Truth::new(&b.part.model.solid, Placed { place: b.place, motion: b.track.motion }))
+        .collect();
+    for (i, a) in ids.iter().enumerate() {
+        for (j, b) in ids.iter().enumerate().skip(i + 1) {
+            let Some(plan) = cold.plan_of(*a, *b) else { continue };
+            let remembered = warm.remembered(*a, *b).ok_or(format!("{a}, {b}: nothing is said of the pair"))?;
+            if remembered == Remembered::Nothing {
+                continue;
+            }
+            let Some(text) = warm.certificate_of(*a, *b, CELLS) else {
+                work.unproven += 1;
+                continue;
+            };
+            let bodies = [i, j].map(|k| match plan.detect {
+                Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].track.end)),
+                _ => truths[k],
+            });
+            let own = |id: u32| cold.body(id).expect("a body").part.resolution;
+            let resolution = own(*a).max(own(*b));
+            let kind = match check(&text, (*a, *b), bodies, resolution) {
+                Ok(Proven::Room) => 0,
+                Ok(Proven::Directions) => 1,
+                Ok(Proven::Course) => 2,
+                Ok(Proven::Answer(checked)) => {
+                    let told = warm.outcome().pairs.iter().find(|p| (p.a, p.b) == (*a, *b));
+                    let lower = told.map_or(1.0, |p| p.outcome.time_lower);
+                    if checked.until < lower && plan.detect != Detect::Discrete {
+                        return Err(format!("{a}, {b}: proven until {}, told {lower}", checked.until));
+                    }
+                    3
+                }
+                Ok(Proven::Overlap) => 4,
+                Err(e) => {
+                    let tracks = [i, j].map(|k| cold.bodies()[k].track);
+                    return Err(format!("{a}, {b}: {e}\n{}\n{plan:?}\n{tracks:?}", &text[..text.len().min(600)]));
+                }
+            };
+            work.proven[kind] += 1;
+        }
+    }
+    Ok(())
+}
+
+/// A play in a world that remembers, and each of its steps in a world made for it.
+fn run(seed: u64, steps: usize) -> Work {
+    let mut play = Play::new(seed);
+    let parts: Vec<Arc<Part>> = play.recipes.iter().map(part).collect();
+    // Octrees are refined by searches: the fresh worlds have models of their own.
+    let own: Vec<Arc<Part>> = play.recipes.iter().map(part).collect();
+    let mut fresh = Fresh { parts: own, things: Vec::new(), rules: Vec::new(), resolution: None, tracks: Vec::new() };
+    let mut warm = World::new(256, 256);
+    warm.certify(true);
+    let mut work = Work::default();
+    let mut free = 1.0;
+    for k in 0..steps {
+        let Act { changes, records, options } = play.next(free);
+        for change in &changes {
+            fresh.change(change);
+            apply(&mut warm, &parts, change);
+        }
+        let mut cold = fresh.world();
+        cold.step(&records, &options).expect("a step");
+        warm.step(&records, &options).expect("a step");
+        let (expected, answer) = (cold.outcome(), warm.outcome());
+        if !same(&told(&warm), &told(&cold)) {
+            // What a limit left open may be known; then it is what no limit leaves open.
+            let is_open = |p: &PairOutcome| p.outcome.status == Status::Undecided || !p.regions_complete;
+            let open = expected.undecided || expected.pairs.iter().any(is_open);
+            let (mine, other) = (lines(answer), lines(expected));
+            let wide = StepOptions { cell_limit: 0, batch_limit: 0, max_records: 0, max_patch_slots: 0, ..options };
+            let is_known = open && {
+                let mut whole = fresh.world();
+                let all = lines(whole.step(&records, &wide).expect("a step"));
+                mine.iter().all(|line| all.contains(line) || other.contains(line))
+            };
+            if !is_known {
+                let differs = |a: &[String], b: &[String]| {
+                    a.iter().filter(|x| !b.contains(x)).map(|x| x[..x.len().min(600)].to_string()).collect::<Vec<_>>()
+                };
+                work.difference = Some(format!(
+                    "seed {seed}, step {k}, {options:?}\nremembers: {:#?}\nfresh: {:#?}\n{}",
+                    differs(&mine, &other),
+                    differs(&other, &mine),
+                    differing(&told(&warm), &told(&cold))
+                ));
+                break;
+            }
+            work.open += 1;
+        }
+        if let Err(e) = certificates(&warm, &cold, &mut work) {
+            work.refused = Some(format!("seed {seed}, step {k}: {e}"));
+            break;
+        }
+        work.steps += 1;
+        let has = |status| expected.pairs.iter().any(|p| p.outcome.status == status);
+        work.contacts += usize::from(has(Status::Contact));
+        work.overlaps += usize::from(!has(Status::Contact) && has(Status::Overlap));
+        if !expected.contact && !expected.undecided {
+            work.clear += 1;
+            work.known += usize::from(answer.known == answer.searched);
+        }
+        work.large += usize::from(answer.counters.primitives > 12);
+        free = expected.safe_time;
+        fresh.tracks = tracks(&cold);
+        play.follow(&cold);
+    }
+    work
+}
+
+const STEPS: usize = 25;
+
+#[test]
+fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
+    let steps = std::env::var("CONTACTD_MEMORY_STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(2_000usize);
+    let first: u64 = std::env::var("CONTACTD_MEMORY_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(40_000_001);
+    let plays = steps.div_ceil(STEPS) as u64;
+    let all: Vec<Work> = (0..plays).into_par_iter().map(|i| run(first + i, STEPS)).collect();
+    let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
+    println!(
+        "{} steps: {} with a contact, {} in overlap alone, {} clear, {} of them without a search; {} with trees of more than 12 \
+         primitives; {} known that a limit left open",
+        sum(|w| w.steps),
+        sum(|w| w.contacts),
+        sum(|w| w.overlaps),
+        sum(|w| w.clear),
+        sum(|w| w.known),
+        sum(|w| w.large),
+        sum(|w| w.open)
+    );
+    let differences: Vec<&String> = all.iter().filter_map(|w| w.difference.as_ref()).collect();
+    for d in differences.iter().take(5) {
+        println!("{d}");
+    }
+    let proven: [usize; 5] = std::array::from_fn(|k| all.iter().map(|w| w.proven[k]).sum());
+    let unproven = sum(|w| w.unproven);
+    println!(
+        "certificates that hold: {} rooms, {} by directions, {} courses, {} answers, {} overlaps; {unproven} without one",
+        proven[0], proven[1], proven[2], proven[3], proven[4]
+    );
+    let refused: Vec<&String> = all.iter().filter_map(|w| w.refused.as_ref()).collect();
+    for r in refused.iter().take(5) {
+        println!("{r}");
+    }
+    assert!(refused.is_empty(), "{} certificates do not hold: {}", refused.len(), refused[0]);
+    assert!(differences.is_empty(), "{} of {plays} plays: {}", differences.len(), differences[0]);
+    let steps = sum(|w| w.steps);
+    assert!(sum(|w| w.contacts) * 20 > steps && sum(|w| w.clear) * 5 > steps, "too few of a kind to say anything");
+    assert!(sum(|w| w.known) * 4 > sum(|w| w.clear), "hardly anything is remembered");
+}
+
+/// Two objects in a world.
+fn two(parts: [&Arc<Part>; 2], poses: [Pose; 2], margin: f64) -> World {
+    let mut world = World::new(2, 8);
+    for (i, (part, pose)) in parts.iter().zip(poses).enumerate() {
+        world.add_object(ObjectSpec::new(i as u32 + 1, part, pose)).expect("an object");
+    }
+    let rule = Rule { margin, ..Rule::new(["default".into(), "default".into()]) };
+    world.set_rules(vec![rule]).expect("a rule");
+    world
+}
+
+/// Boxes, L's and prisms fall on plates with 4 to 16 holes: the step in which they meet is told as by a fresh world. A course is a
+/// search at a negative depth, whose boxes must reach as far as its level does.
+#[test]
+fn what_falls_on_a_plate_with_holes_is_told_in_the_step_in_which_it_meets() {
+    let options = StepOptions { clear: true, cell_limit: 20_000, ..StepOptions::default() };
+    let found: Vec<Option<usize>> = (0..120u64)
+        .into_par_iter()
+        .map(|seed| {
+            let mut r = Random::new(910_000 + seed);
+            let (below, above) = (part(&plate(&mut r)), part(&block(&mut r)));
+            let dt = [0.02, 0.05, 0.2][r.below(3)];
+            let pace = [0.0, 1.0, 3.0][r.below(3)] * dt;
+            let spin = r.vector(pace);
+            let velocity = (DVec3::new(r.within(-0.3, 0.3), r.within(-0.3, 0.3), -1.0)) * dt;
+            let height = r.within(1.2, 2.0);
+            let mut pose = Pose::new(DVec3::new(r.within(-0.5, 0.5), r.within(-0.5, 0.5), height), r.rotation());
+            let mut warm = two([&below, &above], [Pose::IDENTITY, pose], 0.0);
+            for step in 0..(3.0 / dt) as usize {
+                let motion = contactd_proto::Motion::turning(pose, pose.position + velocity, spin);
+                let end = motion.at(1.0);
+                let record = [PoseRecord::end(2, &end)];
+                let mut cold = two([&below, &above], [Pose::IDENTITY, pose], 0.0);
+                cold.restore(&[(2, Track::resting(pose))]).expect("a track");
+                cold.step(&record, &options).expect("a step");
+                warm.step(&record, &options).expect("a step");
+                assert!(
+                    same(&told(&warm), &told(&cold)),
+                    "seed {seed}, step {step}: {}",
+                    differing(&told(&warm), &told(&cold))
+                );
+                if warm.outcome().contact {
+                    return Some(step);
+                }
+                pose = warm.body(2).expect("a body").track.end;
+            }
+            None
+        })
+        .collect();
+    let met = found.iter().flatten().count();
+    let late = found.iter().flatten().filter(|step| **step >= 5).count();
+    assert!(met > 80 && late > 40, "{met} of 120 meet, {late} of them after five steps");
+}
+
+/// A body that stands in the list where one without bounds stood is followed like any other: ways beyond all numbers are not
+/// inherited.
+#[test]
+fn a_body_in_the_place_of_one_without_bounds_is_followed() {
+    let half = part(&Recipe::of(contactd::solid::primitive::HalfSpace));
+    let cube = part(&Recipe::cuboid(0.5, 0.5, 0.5));
+    let mut world = World::new(3, 8);
+    let far = Pose::at(DVec3::Z * -50.0);
+    for (id, part, pose) in [(1, &half, far), (2, &cube, Pose::at(DVec3::X * 9.0)), (3, &cube, Pose::IDENTITY)] {
+        world.add_object(ObjectSpec::new(id, part, pose)).expect("an object");
+    }
+    let options = StepOptions::default();
+    let tilted = Pose::new(DVec3::Z * -50.0, glam::DQuat::from_rotation_x(0.01));
+    world.step(&[PoseRecord::end(1, &tilted)], &options).expect("a step");
+    world.remove_object(1).expect("an object to remove");
+    let mut met = 0;
+    for k in 1..=20 {
+        let at = Pose::at(DVec3::X * (9.0 - 0.5 * f64::from(k)));
+        met += usize::from(world.step(&[PoseRecord::end(2, &at)], &options).expect("a step").contact);
+    }
+    assert_eq!(met, 4, "from the step that goes on beyond 1");
+}
+
+/// A body that ends a tenth of a millionth above a plate is within any larger margin before, whatever its faces are.
+#[test]
+fn a_small_margin_is_entered_by_boxes_as_by_others() {
+    let shapes = [
+        Recipe::cuboid(0.5, 0.4, 0.3),
+        Recipe::cuboid(0.5, 0.15, 0.3).union(Recipe::cuboid(0.15, 0.15, 0.4).at(0.35, 0.0, 0.3)),
+        Recipe::cylinder(0.4, 0.3),
+        Recipe::cuboid(0.5, 0.4, 0.3).union(Recipe::sphere(0.45)),
+    ];
+    let options = StepOptions { clear: true, cell_limit: 50_000, ..StepOptions::default() };
+    let mut r = Random::new(77);
+    for (k, shape) in shapes.iter().cycle().take(12).enumerate() {
+        let (below, above) = (part(&plate(&mut r)), part(shape));
+        let start = Pose::new(DVec3::new(r.within(-0.4, 0.4), r.within(-0.4, 0.4), 1.6), r.rotation());
+        let fall = DVec3::new(r.within(-0.2, 0.2), r.within(-0.2, 0.2), -2.5);
+        let to = |t: f64| [PoseRecord::end(2, &Pose { position: start.position + fall * t, ..start })];
+        let mut world = two([&below, &above], [Pose::IDENTITY, start], 0.0);
+        let out = world.step(&to(1.0), &options).expect("a step");
+        if out.pairs[0].outcome.status != Status::Contact {
+            continue;
+        }
+        let met = out.pairs[0].outcome.time;
+        for margin in [1e-6, 1e-5, 1e-4, 1e-2] {
+            let mut world = two([&below, &above], [Pose::IDENTITY, start], margin);
+            let o = world.step(&to(met - 4e-8), &options).expect("a step").pairs[0].outcome;
+            assert_eq!(o.status, Status::Clear, "{k}, margin {margin}");
+            // No sooner than where faces moved out by half the margin on both sides meet, at sharp corners.
+            let soonest = 1.0 - 20.0 * margin / 2.5;
+            assert!(o.margin_time < 1.0 && o.margin_time > soonest, "{k}, margin {margin}: {}", o.margin_time);
+        }
+    }
+}
