@@ -40,6 +40,9 @@ const COMPARED: u64 = 16;
 /// much as one evaluation of a literal.
 const PIVOT: u64 = 12;
 const SIMPLEX: u64 = 4;
+/// Part of what may be used up where multipliers change that a certificate's do: a checker, whose bounds are others, would look
+/// for ever at a bound that all but vanishes.
+const RECORDED: f64 = 0.9;
 /// How far beyond the end of its reach a clause is looked at, in cell radii of relative motion.
 const LOOK_BEYOND: f64 = 0.02;
 
@@ -386,8 +389,9 @@ impl Run<'_, '_> {
                 let start = self.course(first);
                 if start.at(0.0, self.view.half) > 0.0 && end.at(look, self.view.half) > 0.0 {
                     let far = end.from(look, self.view.half).min(h);
+                    let part = if self.scratch.record.is_some() { RECORDED } else { 1.0 - 1e-12 };
                     for dt in [far, 0.5 * (look + far), look] {
-                        if dt > best.dt && start.leads_to(&end, dt, self.view.half) {
+                        if dt > best.dt && start.leads_to(&end, dt, self.view.half, part) {
                             *best = Reach { dt, path: [*first, *s] };
                             break;
                         }
@@ -591,8 +595,8 @@ impl Course {
     /// M = dt·(rate1 − rate0 + Σ_k e_k |turn1 − turn0|_k) − dt²·min(½ q1, q1 − ½ q0),
     /// ```
     ///
-    /// which is positive for all s where M <= (√F0(0) + √F1(dt))².
-    fn leads_to(&self, end: &Course, dt: f64, half: DVec3) -> bool {
+    /// which is positive for all s where M <= (√F0(0) + √F1(dt))²; M may be `part` of that.
+    fn leads_to(&self, end: &Course, dt: f64, half: DVec3, part: f64) -> bool {
         let (f0, f1) = (self.at(0.0, half), end.at(dt, half));
         if !(f0 > 0.0 && f1 >= 0.0) {
             return false;
@@ -600,7 +604,7 @@ impl Course {
         let m = dt * (end.rate - self.rate + (end.turn - self.turn).abs().dot(half))
             - dt * dt * (0.5 * end.q).min(end.q - 0.5 * self.q);
         let root = f0.sqrt() + f1.sqrt();
-        m <= root * root * (1.0 - 1e-12)
+        m <= root * root * part
     }
 }
 

@@ -29,6 +29,7 @@ mod stage2;
 mod task;
 #[cfg(test)]
 mod tests;
+mod unbounded;
 mod work;
 
 pub use asked::Asked;

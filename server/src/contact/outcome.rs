@@ -123,8 +123,9 @@ impl Counters {
 
     /// True when a search that took this, at all its depths together, would not have been cut by a limit of so many cells.
     pub fn fits(&self, limit: u64) -> bool {
-        // At each depth the larger of both counts; at none the last cell's evaluations decide.
-        self.cells + self.worth(limit) < limit
+        // At each depth the larger of both counts; at none the last cell's evaluations decide. How deep an overlap is was worked out
+        // within the same limit.
+        self.cells + self.instant_cells + self.worth(limit) < limit
     }
 }
 

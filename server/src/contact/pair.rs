@@ -13,6 +13,7 @@ use super::propose::Found;
 use super::search::{Ending, Scratch, Search};
 use super::separation;
 use super::task::{Task, witness_level};
+use super::unbounded;
 use super::work::Work;
 use crate::eco::Model;
 use crate::math::tolerance;
@@ -93,7 +94,7 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 
 /// The resolution that a question's answer will tell: its own, or the least that its rounding allows.
 pub fn resolution_of(query: &PairQuery) -> f64 {
-    PairSearch::task(query).0.delta
+    unbounded::resolution(query).unwrap_or_else(|| PairSearch::task(query).0.delta)
 }
 
 /// Searches a pair to its end.
@@ -117,10 +118,19 @@ pub fn find_earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Out
 #[inline(never)]
 fn earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
     *outcome = clear(query);
-    let quick = direct::quick(query, outcome);
+    let quick = whole(query, outcome);
     if !matches!(quick, Quick::Told) {
         search(query, quick, outcome, scratch);
     }
+}
+
+/// What is told without a search of a pair that is no pair of balls; `outcome` is clear before.
+fn whole(query: &PairQuery, outcome: &mut Outcome) -> Quick {
+    if let Some(told) = unbounded::answer(query) {
+        *outcome = told;
+        return Quick::Told;
+    }
+    direct::quick(query, outcome)
 }
 
 /// Answers what is not told without a search.
@@ -146,7 +156,7 @@ fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
             *outcome = passage.outcome(query);
             Quick::Told
         }
-        None => direct::quick(query, outcome),
+        None => whole(query, outcome),
     }
 }
 

@@ -75,6 +75,8 @@ struct Answer {
     motions: [Motion; 2],
     /// Of the first contact alone more is asked than of others.
     asked: Asked,
+    /// Work that it might take. Another limit has the same answer where none of both cuts it.
+    limit: u64,
     outcome: Outcome,
 }
 
@@ -156,7 +158,7 @@ impl Knowledge {
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
             && last.motions == q.motions()
             && last.asked == q.query.asked
-            && last.outcome.counters.fits(q.query.cell_limit)
+            && (last.limit == q.query.cell_limit || last.outcome.counters.fits(q.query.cell_limit.min(last.limit)))
         {
             self.via = Via::Answer;
             return Some((last.outcome, None));
@@ -264,8 +266,8 @@ impl Knowledge {
         (self.via, self.course.as_deref())
     }
 
-    /// Learns from a search.
-    pub fn learn(&mut self, q: &Question, outcome: &Outcome) {
+    /// Learns from a search that was allowed so much work.
+    pub fn learn(&mut self, q: &Question, limit: u64, outcome: &Outcome) {
         self.via = Via::Search;
         self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
         // More work might tell an overlap that was to be searched past.
@@ -275,7 +277,8 @@ impl Knowledge {
         let moves = || [&q.query.a, &q.query.b].iter().any(|body| !body.placed.motion.is_rest());
         self.answered = outcome.status != Status::Undecided && !open && !(cheap && moves());
         if self.answered {
-            put(&mut self.answer, Answer { motions: q.motions(), asked: q.query.asked, outcome: *outcome });
+            let (motions, asked) = (q.motions(), q.query.asked);
+            put(&mut self.answer, Answer { motions, asked, limit, outcome: *outcome });
             self.told = None;
         }
     }

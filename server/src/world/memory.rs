@@ -97,10 +97,14 @@ impl Notes {
         }
     }
 
-    /// The distance of two convex bodies at the start of the step has told their room.
-    pub fn measured(&mut self, job: &PairJob, bodies: &[Body], options: &StepOptions, room: f64) {
-        if let Some(along) = clearance::direction_of_room(&search::query(bodies, job, options)) {
-            self.note((job.a, job.b), bodies, along, room);
+    /// The distance of two convex bodies where they are asked about has told their room: at the start of the step, and at its end
+    /// of a discrete pair.
+    pub fn measured(&mut self, job: &PairJob, bodies: &[Body], options: &StepOptions) {
+        let query = search::query(bodies, job, options);
+        if let (Some(along), true) = (clearance::direction_of_room(&query), job.found.room > 0.0) {
+            let poses = [&query.a, &query.b].map(|body| body.placed.motion.start);
+            let ids = [job.a, job.b].map(|i| bodies[i as usize].id);
+            self.rooms.insert(ids.into(), Room { poses, along, room: job.found.room });
         }
     }
 

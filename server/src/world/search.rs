@@ -78,11 +78,11 @@ impl PairJob {
         Question { bodies: pair, query, margin: self.plan.reach(), clock }
     }
 
-    /// Takes the outcome of a search, which has been written into `found`.
-    fn take(&mut self, q: &Question) {
+    /// Takes the outcome of a search that was allowed so much work, which has been written into `found`.
+    fn take(&mut self, q: &Question, limit: u64) {
         let found = &mut self.found;
         if let Some(knowledge) = &mut self.knowledge {
-            knowledge.learn(q, &found.outcome);
+            knowledge.learn(q, limit, &found.outcome);
         }
         (found.room, found.known, found.apart) = (0.0, false, false);
         finish(&self.plan, &mut found.outcome);
@@ -178,7 +178,7 @@ pub fn run(
                     return 0;
                 }
                 outcome.counters += counters;
-                job.take(&q);
+                job.take(&q, q.query.cell_limit);
                 job.is_done = true;
                 return 0;
             }
@@ -188,7 +188,7 @@ pub fn run(
             }
             outcome.counters += counters;
             seat.cells += outcome.counters.cells;
-            job.take(&q);
+            job.take(&q, q.query.cell_limit);
             job.is_done = true;
             cells
         });
@@ -271,13 +271,14 @@ fn run_queue(
         }
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
         let before = search.spent();
+        let allowed = before.saturating_add(left);
         let ended = search.run_within(next.max(time).min(horizon), left);
         left = left.saturating_sub(search.spent() - before);
         match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
                 open[i].found.outcome = outcome;
-                open[i].take(&questions[i]);
+                open[i].take(&questions[i], questions[i].query.cell_limit.min(allowed));
                 if first && !open[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
                     horizon = horizon.min(open[i].found.outcome.time_upper + tolerance::FIRST_SLACK);
                 }

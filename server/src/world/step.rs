@@ -564,8 +564,8 @@ impl World {
         for job in &mut state.jobs {
             if let Some(pair) = job.pair {
                 let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
-                if let Some(notes) = state.notes.as_mut().filter(|_| room > 0.0) {
-                    notes.measured(job, bodies, options, room);
+                if let Some(notes) = &mut state.notes {
+                    notes.measured(job, bodies, options);
                 }
                 // What meets now will mostly do so in the next step: no look is worth its while.
                 let met = job.found.outcome.status != Status::Clear;

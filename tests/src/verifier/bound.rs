@@ -46,6 +46,8 @@ pub struct Bounder<'a> {
     pub depth: f64,
     /// Evaluations so far.
     pub evaluations: u64,
+    /// A budget ran out: what was not shown may hold.
+    pub exhausted: bool,
 }
 
 /// A box of A and a span of time.
@@ -70,24 +72,37 @@ impl Bounder<'_> {
         });
         let some = |k: usize| terms.iter().any(|t| t.lambda[k] > 0.0);
         let span = region.0[3];
-        fine && some(0) && some(1) && self.positive(region, &|s: &Self, x, t| s.sum(terms, span, x, t))
+        fine && some(0)
+            && some(1)
+            && self.positive(region, &|s: &Self, x, t| s.sum(terms, span, x, t), &|s, r| s.at_corners(terms, span, r))
     }
 
     /// True when it is certain that the literal holds with room everywhere in the region.
     pub fn holds(&mut self, l: &Literal, region: Region) -> bool {
         self.face(l).is_some()
-            && self.positive(region, &|s: &Self, x, t| {
-                let jet = s.psi(s.face(l)?, &s.coordinates(l.on_b, x, t));
-                // −(±psi) − depth > 0.
-                Some(jet.scaled(point(if l.negative { 1.0 } else { -1.0 })).plus(point(-s.depth)))
-            })
+            && self.positive(
+                region,
+                &|s: &Self, x, t| {
+                    let jet = s.psi(s.face(l)?, &s.coordinates(l.on_b, x, t));
+                    // −(±psi) − depth > 0.
+                    Some(jet.scaled(point(if l.negative { 1.0 } else { -1.0 })).plus(point(-s.depth)))
+                },
+                &|_, _| f64::NEG_INFINITY,
+            )
     }
 
-    fn positive(&mut self, region: Region, f: &dyn Fn(&Self, Vector, Interval) -> Option<Jet>) -> bool {
+    /// `at_corners` is another lower bound, asked for where second derivatives are not known.
+    fn positive(
+        &mut self,
+        region: Region,
+        f: &dyn Fn(&Self, Vector, Interval) -> Option<Jet>,
+        at_corners: &dyn Fn(&Self, Region) -> f64,
+    ) -> bool {
         let mut stack = vec![region];
         let mut left = BUDGET;
         while let Some(r) = stack.pop() {
             if left == 0 {
+                self.exhausted = true;
                 return false;
             }
             left -= 1;
@@ -120,7 +135,7 @@ impl Bounder<'_> {
                 cost[k] += (whole.g[k].hi - whole.g[k].lo).min(1e3) * y[k].mag() * 1e-9;
             }
             let best = [whole.v.lo, second.lo, first.lo].into_iter().fold(f64::NEG_INFINITY, f64::max);
-            if best > 0.0 {
+            if best > 0.0 || !second.lo.is_finite() && at_corners(self, r) > 0.0 {
                 continue;
             }
             let k = (0..4).max_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
@@ -137,6 +152,54 @@ impl Bounder<'_> {
             }
         }
         true
+    }
+
+    /// A lower bound of the sum over a region near the axes of its faces, where nothing is known of curvatures. −psi is concave
+    /// and a tangent is linear in space, and both change by no more than a point's way: with the literals as they are in the
+    /// middle of the time t_m
+    ///
+    /// ```text
+    /// Σ λ_i(t) ℓ_i(x, t) >= Σ λ_i(t) [ℓ_i(x, t_m) − max |ẏ_i| ½(t_1 − t_0)],
+    /// ```
+    ///
+    /// which is least at a corner of the box, at one end of the time.
+    fn at_corners(&self, terms: &[Term], span: (f64, f64), r: Region) -> f64 {
+        if terms.iter().any(|t| t.other.is_some()) {
+            return f64::NEG_INFINITY;
+        }
+        let (t0, t1) = r.0[3];
+        let middle = (0.5 * (t0 + t1)).clamp(t0, t1);
+        let all: Vector = std::array::from_fn(|k| Interval::new(r.0[k].0, r.0[k].1));
+        let moving = self.motions.in_b(all, Interval::new(t0, t1));
+        let speed = length(std::array::from_fn(|i| moving[i].g[3])).hi;
+        let part = |t: f64| {
+            let whole = point(span.1) - point(span.0);
+            if span.1 > span.0 { (point(t) - point(span.0)) * whole.recip() } else { point(0.0) }
+        };
+        let away = (point(middle) - point(t0)).mag().max((point(t1) - point(middle)).mag());
+        let mut least = f64::INFINITY;
+        for corner in 0..8u32 {
+            let x: Vector = std::array::from_fn(|k| point(if corner >> k & 1 == 0 { r.0[k].0 } else { r.0[k].1 }));
+            let (a, b) = (in_a(x), self.motions.in_b(x, point(middle)));
+            for t in [t0, t1] {
+                let s = part(t);
+                let mut sum = point(0.0);
+                for term in terms {
+                    let Some(face) = self.face(&term.literal) else { return f64::NEG_INFINITY };
+                    let y = if term.literal.on_b { &b } else { &a };
+                    let value = match term.literal.negative {
+                        true => point(0.0) - self.psi(face, y).v,
+                        false => tangent(face, term.point, y).v,
+                    };
+                    let lambda = point(term.lambda[0]) + s * (point(term.lambda[1]) - point(term.lambda[0]));
+                    let lambda = Interval::new(lambda.lo.max(0.0), lambda.hi.max(0.0));
+                    let way = if term.literal.on_b { point(speed) * point(away) } else { point(0.0) };
+                    sum = sum + lambda * (value + point(self.depth) - way);
+                }
+                least = least.min(sum.lo);
+            }
+        }
+        least
     }
 
     fn coordinates(&self, on_b: bool, x: Vector, t: Interval) -> [Jet; 3] {

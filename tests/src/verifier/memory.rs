@@ -277,7 +277,8 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
                 let place = a.placed.place.inverse();
                 let x = place.point(a.placed.motion.start.inverse().point(x));
                 let motions = Motions::new(&a.placed, &b.placed);
-                let mut bounder = Bounder { a: a.solid, b: b.solid, motions, depth: resolution, evaluations: 0 };
+                let mut bounder =
+                    Bounder { a: a.solid, b: b.solid, motions, depth: resolution, evaluations: 0, exhausted: false };
                 let region = Region([(x.x, x.x), (x.y, x.y), (x.z, x.z), (0.0, 0.0)]);
                 let own = expression(a.solid, a.solid.root, false, false);
                 let other = expression(b.solid, b.solid.root, false, true);

@@ -40,6 +40,9 @@ pub struct Checked {
     pub witness: Option<f64>,
 }
 
+/// How the error begins of a combination that the checker's budget did not suffice for.
+pub const UNSHOWN: &str = "a combination is not shown within the budget";
+
 /// Part of the depth that a witness must reach for certain: it is a point found by descent, in doubles.
 const WITNESS: f64 = 0.99;
 
@@ -194,7 +197,7 @@ fn check_level(
         return Err("line 1: the box does not hold the carrier".into());
     }
     let motions = Motions::new(carrier.1, other.1);
-    let mut bounder = Bounder { a: carrier.0, b: other.0, motions, depth, evaluations: 0 };
+    let mut bounder = Bounder { a: carrier.0, b: other.0, motions, depth, evaluations: 0, exhausted: false };
     let a = expression(carrier.0, carrier.0.root, false, false);
     let b = expression(other.0, other.0.root, false, true);
     if let Some((line, words)) = lines.next_if(|(_, words)| words[0] == "witness") {
@@ -256,7 +259,8 @@ fn check_level(
                         for group in &groups {
                             checked.combinations += 1;
                             if !bounder.excludes(group, span) {
-                                return wrong(&format!("a combination may hold: {group:?} over {span:?}"));
+                                let why = if bounder.exhausted { UNSHOWN } else { "a combination may hold" };
+                                return wrong(&format!("{why}: {group:?} over {span:?}"));
                             }
                         }
                         let keys: Vec<Vec<Literal>> = groups
