@@ -229,7 +229,7 @@ fn wrong(rng: &mut Random, known: &Known, o: &Outcome) -> Option<String> {
     let scene = &known.scene;
     let solids = [scene.a.build(), scene.b.build()];
     let motions = [scene.motion_a, scene.motion_b];
-    let depth = (1.0 + 1e-6) * o.resolution * if o.touching { 2.0 } else { 1.0 } + 1e-13;
+    let depth = (1.0 + 1e-6) * o.depth + 1e-13;
     for side in 0..if o.status == Status::Overlap { 0 } else { 2 } {
         let (own, other) = (side, 1 - side);
         for x in deep_points(rng, &solids[own], depth, 300) {

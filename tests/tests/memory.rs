@@ -326,6 +326,16 @@ fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
     assert!(sum(|w| w.known) * 4 > sum(|w| w.clear), "hardly anything is remembered");
 }
 
+/// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,
+/// discrete pairs, pairs later than the first contact, unbounded bodies, multipliers that all but vanish on their way.
+#[test]
+fn plays_that_were_told_wrong_once_are_told_right() {
+    for seed in [40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_000_682] {
+        let work = run(seed, STEPS);
+        assert_eq!((work.difference, work.refused, work.steps), (None, None, STEPS), "seed {seed}");
+    }
+}
+
 /// Two objects in a world.
 fn two(parts: [&Arc<Part>; 2], poses: [Pose; 2], margin: f64) -> World {
     let mut world = World::new(2, 8);

@@ -267,7 +267,7 @@ impl Pair<'_> {
 
 /// What is wrong with an answer; nothing where it is right.
 fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -> Option<String> {
-    let depth = o.resolution * if o.touching { 2.0 } else { 1.0 };
+    let depth = o.depth;
     let radius = pair.models.iter().map(|m| m.radius).fold(f64::INFINITY, f64::min);
     let small = if pair.models[0].radius <= pair.models[1].radius { 0 } else { 1 };
     let anywhere = |rng: &mut Random, t: f64| {

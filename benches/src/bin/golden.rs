@@ -100,7 +100,7 @@ impl Told {
         faces.into_iter().for_each(|f| self.word(f.into()));
     }
 
-    /// Every field of an answer but its work and `apart`, a bound for the engine's own use. A new field does not compile until
+    /// Every field of an answer but its work, `apart`, a bound for the engine's own use, and the witness, which proves and tells nothing. A new field does not compile until
     /// it is decided which it is.
     fn outcome(&mut self, o: &Outcome) {
         let Outcome {
@@ -112,6 +112,7 @@ impl Told {
             apart: _,
             not_continued,
             averaged_normal,
+            witness: _,
             point,
             normal,
             separation,
@@ -119,6 +120,7 @@ impl Told {
             kind,
             extent,
             resolution,
+            depth,
             faces_a,
             faces_b,
             penetration,
@@ -132,7 +134,7 @@ impl Told {
         let flags = [touching, not_continued, averaged_normal, past];
         let words = [status as u64, kind as u64, extent as u64].into_iter().chain(flags.map(u64::from));
         words.for_each(|w| self.word(w));
-        for x in [time_lower, time, time_upper, separation, normal_speed, resolution, penetration, margin_time] {
+        for x in [time_lower, time, time_upper, separation, normal_speed, resolution, depth, penetration, margin_time] {
             self.number(x);
         }
         [point, normal, deepest, direction].into_iter().for_each(|v| self.vector(v));

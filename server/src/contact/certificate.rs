@@ -19,6 +19,7 @@ use super::task::Task;
 use super::work::Work;
 use crate::bound::{Bound, Volumes};
 use crate::math::Aabb;
+use crate::motion::Relative;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
 use crate::solid::{Face, Node, NodeId, Op, Sense, Solid};
 use glam::DVec3;
@@ -99,10 +100,11 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
         return None;
     }
     let (mut task, swapped) = PairSearch::task(query);
-    let depth = outcome.resolution * if outcome.touching { 2.0 } else { 1.0 };
+    let depth = outcome.depth;
     // In the frames of the bodies as they move: the search may leave out a spin that moves nothing.
     let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
-    task.relative = crate::motion::Relative::new(carrier.placed, other.placed);
+    let still = task.relative;
+    task.relative = Relative::new(carrier.placed, other.placed);
     task.delta = DEPTH * depth;
     let hull = task.a.aabb();
     // Coordinates of the box and of what it holds are right to a few units in the last place.
@@ -113,7 +115,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
         depth,
         until: outcome.time_lower.min(1.0),
         root,
-        witness: witness(&task, outcome, depth),
+        witness: witness(&task, (swapped, &still), outcome, depth),
         cells: Vec::new(),
     };
     if task.a.is_void() || task.b.is_void() {
@@ -139,7 +141,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
 pub fn certify_level(query: &PairQuery, level: f64, made: f64, until: f64) -> Option<Certificate> {
     let (mut task, swapped) = PairSearch::task(query);
     let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
-    task.relative = crate::motion::Relative::new(carrier.placed, other.placed);
+    task.relative = Relative::new(carrier.placed, other.placed);
     task.delta = -made;
     task.ideas.fits &= made < task.fits_below();
     // A checker has bounds of its own of how far {f <= level} reaches beyond a cone or a polyhedron.
@@ -189,15 +191,26 @@ fn cover(task: &Task, swapped: bool, outcome: &Outcome, mut made: Certificate, l
 }
 
 /// The point of a contact, deepened to what both bodies share when it is decided.
-fn witness(task: &Task, o: &Outcome, depth: f64) -> Option<(f64, DVec3)> {
+fn witness(task: &Task, (swapped, still): (bool, &Relative), o: &Outcome, depth: f64) -> Option<(f64, DVec3)> {
     if o.status != Status::Contact {
         return None;
     }
     let x = carried(task, o);
     let at = task.relative.at(o.time_upper);
     let deep = |x: DVec3| -task.a.value(x).max(task.b.value(at.b_point(x)));
-    let (deepest, ..) = depth::climb(task, &at, x, &Work::new(u64::MAX));
-    [x, deepest].into_iter().find(|x| deep(*x) >= WITNESS * depth).map(|x| (o.time_upper, x))
+    let enough = |x: &DVec3| deep(*x) >= WITNESS * depth;
+    // The search has left out a spin that moves nothing; the frame that carries the point here takes part in it.
+    let named = o.witness.map(|x| {
+        let searched = still.at(o.time_upper);
+        let x = if swapped { searched.a_point(x) } else { x };
+        let off = still.world_point(&searched, DVec3::ZERO) - task.relative.world_point(&at, DVec3::ZERO);
+        at.world_from_a.transpose() * (searched.world_from_a * x + off)
+    });
+    let found = named.filter(enough).or_else(|| Some(x).filter(enough)).or_else(|| {
+        let (deepest, ..) = depth::climb(task, &at, x, &Work::new(u64::MAX));
+        Some(deepest).filter(enough)
+    });
+    found.map(|x| (o.time_upper, x))
 }
 
 /// The contact's point in the carrier's frame.

@@ -170,6 +170,9 @@ pub struct Outcome {
     pub not_continued: bool,
     /// A vertex met a vertex: the normal is the average of the adjacent normals.
     pub averaged_normal: bool,
+    /// A point that lies `depth` deep in both bodies at `time_upper`, in the frame of a's model, which does not take part in a spin about
+    /// an axis of revolution of its own (`pair::without_own_spin`). Of contacts that a search has found.
+    pub witness: Option<DVec3>,
     /// Contact point, or a point that proves an overlap: deeper than 2 delta in both. Meaningful for these two only.
     pub point: DVec3,
     /// Unit normal from a to b. Meaningful for contact and overlap.
@@ -185,6 +188,9 @@ pub struct Outcome {
     pub extent: Extent,
     /// The resolution delta that was used.
     pub resolution: f64,
+    /// The depth that was searched for, which `time_lower` and `time_upper` speak of: delta; twice as much where the bodies start deeper
+    /// than that; the depth of an overlap that was searched past, and delta.
+    pub depth: f64,
     /// Active faces of a, by face id within its model; `NO_FACE` fills.
     pub faces_a: [u32; 3],
     /// Active faces of b.
@@ -216,6 +222,7 @@ impl Outcome {
             apart: f64::NEG_INFINITY,
             not_continued: false,
             averaged_normal: false,
+            witness: None,
             point: DVec3::ZERO,
             normal: DVec3::ZERO,
             separation: 0.0,
@@ -223,6 +230,7 @@ impl Outcome {
             kind: Kind::FaceFace,
             extent: Extent::Point,
             resolution,
+            depth: resolution,
             faces_a: [NO_FACE; 3],
             faces_b: [NO_FACE; 3],
             penetration: 0.0,

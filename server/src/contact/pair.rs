@@ -440,7 +440,12 @@ impl<'a> PairSearch<'a> {
             search.counters = Default::default();
             match ending {
                 Ending::Clear => {}
-                Ending::Contact(found) => fill_contact(&mut self.outcome, &self.task, &found),
+                Ending::Contact(found) => {
+                    fill_contact(&mut self.outcome, &self.task, &found);
+                    let x = found.witness;
+                    let x = if self.swapped { self.task.relative.at(found.upper).b_point(x) } else { x };
+                    self.outcome.witness = Some(x);
+                }
                 Ending::Limit(t) => {
                     self.outcome.status = Status::Undecided;
                     self.outcome.time_lower = t;
@@ -479,6 +484,7 @@ impl<'a> PairSearch<'a> {
             if self.swapped {
                 self.outcome.swap_sides();
             }
+            self.outcome.depth = self.task.delta;
             return Some(self.outcome);
         }
     }

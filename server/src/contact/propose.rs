@@ -60,6 +60,8 @@ pub struct Found {
     pub goal: f64,
     /// Earliest time of a witness of depth delta, this contact's or a rival's.
     pub upper: f64,
+    /// That witness, in A's frame.
+    pub witness: DVec3,
 }
 
 impl Found {
@@ -71,13 +73,19 @@ impl Found {
 
     /// The contact to report of two: of those that reach delta at about the same time the one that touches first.
     fn or(self, other: Self) -> Self {
-        let (goal, upper) = (self.goal.min(other.goal), self.upper.min(other.upper));
+        let goal = self.goal.min(other.goal);
+        let (upper, witness) = self.earlier_witness(&other);
         let (first, second) = if other.goal < self.goal { (other, self) } else { (self, other) };
         let earlier = match (&first.touch, &second.touch) {
             (Some(a), Some(b)) => b.t < a.t - SAME_TIME && second.deep.t <= first.latest_rival(),
             _ => false,
         };
-        Self { goal, upper, ..if earlier { second } else { first } }
+        Self { goal, upper, witness, ..if earlier { second } else { first } }
+    }
+
+    /// The earlier of two witnesses.
+    fn earlier_witness(&self, other: &Self) -> (f64, DVec3) {
+        if other.upper < self.upper { (other.upper, other.witness) } else { (self.upper, self.witness) }
     }
 }
 
@@ -449,7 +457,7 @@ impl Search<'_> {
         if !self.task.asked.time() {
             // A witness is all of a hit, once the start is known to be free: what is left to refine is what lies there.
             let goal = self.now().max(f64::MIN_POSITIVE);
-            self.found = Some(Found { upper: deep.t, deep, touch: None, goal });
+            self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal });
             return true;
         }
         let settled = deep.stationarity < SETTLED;
@@ -457,7 +465,7 @@ impl Search<'_> {
             // A witness, but an earlier one lies beside it: everything before it is still searched, and so is the start.
             let goal = deep.t.max(f64::MIN_POSITIVE);
             if goal < self.goal() {
-                self.found = Some(Found { upper: deep.t, deep, touch: None, goal });
+                self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal });
             }
             return false;
         }
@@ -494,11 +502,12 @@ impl Search<'_> {
             None => crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9).max(reserve),
         };
         let goal = goal.max(f64::MIN_POSITIVE);
-        let new = Found { upper: deep.t, deep, touch, goal };
+        let new = Found { upper: deep.t, witness: deep.x, deep, touch, goal };
         self.found = Some(match self.found.take() {
             // One that has not settled is only a bound on the time.
             Some(old) if old.deep.stationarity >= SETTLED => {
-                Found { upper: new.upper.min(old.upper), goal: new.goal.min(old.goal), ..new }
+                let (upper, witness) = new.earlier_witness(&old);
+                Found { upper, witness, goal: new.goal.min(old.goal), ..new }
             }
             Some(old) => old.or(new),
             None => new,

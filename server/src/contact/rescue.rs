@@ -43,6 +43,9 @@ const FINE: usize = 40;
 /// A climb's end that is this many roundings deep lies on both surfaces.
 const ON_SURFACE: f64 = 4.0;
 
+/// How deep the end of a climb may lie that is told as a touch, relative to the bodies.
+const TOUCHES: f64 = 2e-10;
+
 impl Search<'_> {
     /// Looks for a witness soon after a cell's time; an ending where nothing more is to be gained by further cells.
     pub(super) fn look_for_witness(&mut self, cell: &Cell) -> Option<Ending> {
@@ -200,7 +203,11 @@ impl Search<'_> {
         let on_both = support.iter().any(|s| s.0 == Side::A) && support.iter().any(|s| s.0 == Side::B);
         let touch = solution(meets.0, meets.1, if on_both { support } else { &meets.2 });
         let goal = (0.5 * (touch.t + t)).max(f64::MIN_POSITIVE);
-        self.found = Some(Found { deep: solution(t, x, support), touch: Some(touch), goal, upper: t });
+        // The climb may end elsewhere a moment before: then it has come to no touch.
+        let at = self.task.relative.at(touch.t);
+        let off = separation::value(&self.task, &at, touch.x).abs();
+        let touch = Some(touch).filter(|s| s.t == 0.0 || off <= TOUCHES * self.task.scale + 4.0 * least);
+        self.found = Some(Found { deep: solution(t, x, support), touch, goal, upper: t, witness: x });
     }
 }
 

@@ -417,7 +417,8 @@ impl World {
                 // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
                 // depend on what is remembered. Without a margin or regions nothing is.
                 let plan = self.plans.plan(neighbours.plan(pair));
-                if sight.met && (!plan.tells_nearness() || self.can_glance((i, j), &sight)) {
+                // Of discrete pairs those are counted that may have passed through each other: by their boxes alone.
+                if sight.met && !sight.discrete && (!plan.tells_nearness() || self.can_glance((i, j), &sight)) {
                     return true;
                 }
                 neighbours.box_tests += 1;
