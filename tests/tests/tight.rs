@@ -468,6 +468,36 @@ fn a_prism_spins_into_a_round_hole() {
     }
 }
 
+/// A round peg slides and turns by up to a radian in a hole with 3 to 8 flat walls that its side touches, or nearly, about an axis that
+/// leans by less than its clearance and some resolutions: seen from the hole it all but stands.
+#[test]
+fn a_round_peg_turns_in_a_hole_with_flat_walls() {
+    let rng = &mut Random::new(4_711);
+    for k in 0..120 {
+        let (sides, radius) = (3 + rng.below(6), rng.within(0.2, 1.5));
+        let clearance = if rng.chance(0.3) { 0.0 } else { radius * decades(rng, -12.0, -7.0) };
+        let wide = (radius + clearance) / (PI / sides as f64).cos();
+        let hole = Recipe::cuboid(2.0 * radius, 2.0 * radius, 2.0 * radius).minus(prism(sides, wide, 4.0 * radius));
+        let a = if wide < 1.9 * radius { hole } else { continue };
+        let half = radius * rng.within(0.3, 1.0);
+        // No point of the peg strays farther than the clearance and a third of the resolution, 1e-9 of the block's radius.
+        let stray = clearance + radius * 0.3e-9;
+        let lean = DVec3::Z.cross(rng.direction()) * stray / (4.0 * (radius + half));
+        let start = Pose::new(dvec3(0.0, 0.0, rng.within(-0.2, 0.2) * radius), DQuat::from_scaled_axis(lean));
+        let axis = DQuat::from_scaled_axis(-lean * rng.within(-1.0, 1.0)) * DVec3::Z;
+        let motion = Motion {
+            start,
+            velocity: DVec3::Z * rng.within(-0.3, 0.3) * radius,
+            spin: axis * rng.within(0.2, 1.0) * if rng.chance(0.5) { 1.0 } else { -1.0 },
+        };
+        let b = Recipe::cylinder(radius, half);
+        let scene = Scene::new("turning peg", a, still(), b, motion);
+        let scene = if rng.chance(0.5) { scene.swapped() } else { scene };
+        let o = decided(&format!("peg {k}"), &scene, 400);
+        assert_eq!(o.status, Status::Clear, "{k}: {sides} walls, clearance {clearance:e}");
+    }
+}
+
 #[test]
 fn tight_and_tiny_scenes_are_decided() {
     let number = |name: &str, or: u64| std::env::var(name).map_or(or, |v| v.parse().expect("a number"));

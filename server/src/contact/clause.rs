@@ -225,6 +225,30 @@ impl Run<'_, '_> {
         if side == Side::B && self.view.fits && self.view.curved && !self.view.b.is_guard(id.face()) {
             self.scratch.lits.extend(spun(self.view, id));
         }
+        self.against_walls(side, id, before);
+    }
+
+    /// Touches faces that spin about their own axes where they look against flat walls of the other body.
+    fn against_walls(&mut self, side: Side, id: LiteralId, before: usize) {
+        let is_wall = |v: &View, l: &Linear| {
+            l.side == Side::A && l.id.sense() == Sense::Negative && matches!(v.a.get(l.id.face()), Face::Plane { .. })
+        };
+        let is_spun = |l: &Linear| l.weights.is_some() && l.other.is_none();
+        let end = self.scratch.lits.len();
+        if side == Side::A {
+            let wall = self.scratch.lits[before];
+            let spun = self.scratch.lits[..before].iter().find(|l| is_spun(l)).copied();
+            if let Some(spun) = spun.filter(|_| wall.id == id && is_wall(self.view, &wall)) {
+                self.scratch.lits.extend(fit::touch_spun_against(self.view, &spun, wall.normal));
+            }
+        } else if let Some(spun) = self.scratch.lits[before..end].iter().find(|l| is_spun(l)).copied() {
+            for i in 0..before {
+                let wall = self.scratch.lits[i];
+                if is_wall(self.view, &wall) {
+                    self.scratch.lits.extend(fit::touch_spun_against(self.view, &spun, wall.normal));
+                }
+            }
+        }
     }
 
     /// Compares a literal with those of its own body: the two sides of a wall thinner than twice the depth never hold together,
@@ -441,6 +465,15 @@ impl Run<'_, '_> {
             }
             if l.other.is_some() {
                 if let Some(t) = fit::touch(v, &l, s.y)
+                    && t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * v.delta
+                {
+                    self.scratch.lits.push(t);
+                    added = true;
+                }
+                continue;
+            }
+            if l.weights.is_some() {
+                if let Some(t) = fit::touch_spun(v, &l, s.y)
                     && t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * v.delta
                 {
                     self.scratch.lits.push(t);

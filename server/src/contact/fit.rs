@@ -306,7 +306,7 @@ pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
         None => (w.length(), 0.0),
         Some(a) => ((w - a * w.dot(a)).length(), view.at.omega.cross(a).length()),
     };
-    if around_axis * f.u.length() <= SPINS * (slides + leans * view.radius) {
+    if around_axis * (f.u.length() + view.radius) <= SPINS * (slides + leans * view.radius) {
         return None;
     }
     let way = view.motion.speed * view.motion.h;
@@ -351,6 +351,32 @@ pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
         rigid: false,
         cost,
     })
+}
+
+/// The quadric of a positive face that spins (`spun`), touched at another point `y` of the cell: its second-order part
+/// μ(|y|² − (y·a)²) is convex, and how the quadric changes with time does not depend on where it is touched. `None` for others.
+pub fn touch_spun(view: &View, spun: &Linear, y: DVec3) -> Option<Linear> {
+    let mu = spun.weights?[0];
+    if spun.other.is_some() || spun.id.sense() != Sense::Positive {
+        return None;
+    }
+    let f = Round::of(view.b.get(spun.id.face()), Sense::Positive, view.delta)?.at(view, Side::B);
+    let pull = (y - f.axis.map_or(DVec3::ZERO, |a| a * a.dot(y))) * mu;
+    // |∇Q| has grown: its rounding, and that of the axis.
+    let lost = view.rounding * (2.0 * pull.length() + 8.0 * mu * view.radius);
+    let bound = spun.bound - y.dot(pull) - lost;
+    Some(Linear { point: view.center + y, normal: spun.normal + 2.0 * pull, bound, ..*spun })
+}
+
+/// The same, touched where its surface looks against a plane's bound of that normal (A's axes): both together bound the cell as far
+/// as the plane reaches.
+pub fn touch_spun_against(view: &View, spun: &Linear, normal: DVec3) -> Option<Linear> {
+    if spun.weights.is_none() || spun.other.is_some() || spun.id.sense() != Sense::Positive {
+        return None;
+    }
+    let f = Round::of(view.b.get(spun.id.face()), Sense::Positive, view.delta)?.at(view, Side::B);
+    let across = f.axis.map_or(normal, |a| normal - a * a.dot(normal));
+    touch_spun(view, spun, -across.try_normalize()? * f.rho - f.u)
 }
 
 /// Where two like faces meet first when their axes or centres drift apart: on `p` in the direction in which it is off

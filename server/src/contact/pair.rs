@@ -18,7 +18,7 @@ use super::work::Work;
 use crate::eco::Model;
 use crate::math::tolerance;
 use crate::motion::{Instant, Placed, Relative};
-use crate::solid::Sense;
+use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
@@ -50,8 +50,15 @@ pub struct PairQuery<'a> {
 }
 
 impl PairQuery<'_> {
-    /// True when b carries the cells: small and without cavities is cheap to cover.
+    /// True when b carries the cells: small and without cavities is cheap to cover. A round peg that spins about hardly another axis
+    /// than its own in a hole with flat walls does not: seen from it the walls rush by, seen from these it all but stands
+    /// (`fit::spun`).
     pub(super) fn is_swapped(&self) -> bool {
+        match (spins_nearly_about(&self.a), spins_nearly_about(&self.b)) {
+            (Some(axis), None) if has_flat_walls_along(&self.b, axis) => return true,
+            (None, Some(axis)) if has_flat_walls_along(&self.a, axis) => return false,
+            _ => {}
+        }
         let weight = |m: &Model| m.radius * if m.hollow { HOLLOW } else { 1.0 };
         weight(self.b.model) < weight(self.a.model)
     }
@@ -174,6 +181,37 @@ pub(super) fn without_own_spin(body: &Body) -> Placed {
         }
     }
     placed
+}
+
+/// A spin about an axis of revolution of a body, nearly: this much of it, radians, and off the axis by no more than this part.
+const SPINS: f64 = 0.1;
+const OFF_AXIS: f64 = 0.02;
+
+/// The axis of revolution (world axes, at the start) that a body without cavities spins nearly about, but not exactly.
+fn spins_nearly_about(body: &Body) -> Option<DVec3> {
+    let spin = body.placed.motion.spin;
+    if spin.length_squared() < SPINS * SPINS || body.model.hollow {
+        return None;
+    }
+    let world_from_model = body.placed.motion.start.rotation * body.placed.place.rotation;
+    let along = world_from_model.conjugate() * spin;
+    let axis = body.model.axis_of_revolution(along)?;
+    let off = axis.direction.cross(along).length();
+    (!axis.is_along(along) && off <= OFF_AXIS * along.length()).then(|| world_from_model * axis.direction)
+}
+
+/// Cosine of the angle between a wall and an axis up to which the one is along the other.
+const ALONG: f64 = 0.1;
+
+/// True when a bounded body has subtracted planes along an axis (world axes, at the start).
+fn has_flat_walls_along(body: &Body, axis: DVec3) -> bool {
+    let solid = &body.model.solid;
+    let axis = (body.placed.motion.start.rotation * body.placed.place.rotation).conjugate() * axis;
+    let is_wall = |(face, owner): (&Face, &u32)| {
+        let negative = solid.senses[*owner as usize] == Sense::Negative;
+        matches!(face, Face::Plane { normal, .. } if negative && normal.dot(axis).abs() <= ALONG)
+    };
+    body.model.hollow && body.model.radius.is_finite() && solid.faces.iter().zip(&solid.face_owner).any(is_wall)
 }
 
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
