@@ -7,14 +7,13 @@ mod harness;
 use contactd::ipc::ServerConfig;
 use contactd_client::proto::contact_record::UNDECIDED;
 use contactd_client::proto::names::Address;
-use contactd_client::proto::status::StatusRecord;
 use contactd_client::proto::{Detect, ErrorCode, Pose, PoseRecord, Rule};
 use contactd_client::{Error, MassOptions, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
-use harness::scene::{bits, build, fill, set_options};
+use harness::scene::{bits, build, fill, set_options, spheres};
 use harness::{PATIENCE, ServerProcess};
 use std::process::{Command as Process, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The same for what yields to whatever else the machine does.
 const LONG: Duration = Duration::from_secs(600);
@@ -117,18 +116,9 @@ fn a_client_that_leaves_during_a_long_step_takes_its_session_along() {
     begin(&mut hard, &ids, 1);
     hard.send().unwrap();
     drop(hard);
-    wait_for(&server, |s| s.sessions == 0);
+    server.wait_for(|s| s.sessions == 0);
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new());
-}
-
-/// Waits until the server shows something of itself.
-fn wait_for(server: &ServerProcess, what: impl Fn(&StatusRecord) -> bool) {
-    let until = Instant::now() + PATIENCE;
-    while !what(&SharedMemory::status(&server.address).unwrap()) {
-        assert!(Instant::now() < until, "the status never came to what it should be");
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }
 
 #[test]
@@ -152,18 +142,6 @@ fn a_deadline_leaves_undecided_what_is_not_known_by_then() {
     let pairs = 1000 * 999 / 2;
     assert_eq!(answers.map(|(_, told)| told), [pairs; 2], "each pair is told, decided or not");
     assert!(answers[0].0 == 0 && answers[1].0 > 0, "{answers:?}");
-}
-
-/// A model of many spheres in a grid.
-fn spheres(n: u32) -> String {
-    let sphere = |i: u32| {
-        format!(
-            "multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n",
-            i % 150,
-            i / 150
-        )
-    };
-    format!("union() {{ {} }}", (0..n).map(sphere).collect::<String>())
 }
 
 /// Asks until the server is seen to be at it: true, or to have done it. A request that is given up at once may never be heard.
@@ -208,7 +186,7 @@ fn imports_of_some_keep_no_other_from_its_small_model() {
         small.finish(PATIENCE).unwrap();
     }
     // Those that left are gone with what they asked for.
-    wait_for(&server, |s| s.sessions == 5);
+    server.wait_for(|s| s.sessions == 5);
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new());
 }

@@ -10,7 +10,7 @@ use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
 use contactd_client::proto::{Detect, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule, StepRequest};
 use contactd_client::{Error, MassOptions, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
-use harness::scene::{Bits, bits, build, fill, set_options};
+use harness::scene::{Bits, bits, build, fill, set_options, spheres};
 use harness::{PATIENCE, ServerProcess, serve_command};
 use std::os::unix::fs::MetadataExt as _;
 use std::process::{Child, Command as Process, Stdio};
@@ -166,15 +166,6 @@ fn a_killed_client_loses_its_session_and_a_stopped_server_is_told() {
     assert_eq!(step(&mut survivor, &ids, 2, 1), Err(Error::ServerLost));
 }
 
-/// Waits until the server shows `n` sessions; what it shows of itself follows its beat.
-fn wait_for_sessions(server: &ServerProcess, n: u64) {
-    let until = Instant::now() + PATIENCE;
-    while SharedMemory::status(&server.address).unwrap().sessions != n {
-        assert!(Instant::now() < until, "the server never came to {n} sessions");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
 #[test]
 fn a_session_that_reconnects_to_a_server_that_lives_takes_no_second_place() {
     let mut server = ServerProcess::start("again", "sessions = 2\n");
@@ -219,7 +210,7 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     };
     // A step in flight: waited for.
     begun().close().unwrap();
-    wait_for_sessions(&server, 0);
+    server.wait_for(|s| s.sessions == 0);
     // One that takes longer than anybody waits: the server finds that nobody listens, whether the session was closed or dropped.
     for closes in [true, false] {
         let mut session = connect();
@@ -232,7 +223,7 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
             drop(session);
         }
         rustix::process::kill_process(server.pid(), rustix::process::Signal::CONT).unwrap();
-        wait_for_sessions(&server, 0);
+        server.wait_for(|s| s.sessions == 0);
     }
     // An import that nobody waits for any more.
     let mut session = connect();
@@ -248,23 +239,11 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     let open = Command::Open { version: names::PROTOCOL_VERSION, process };
     assert!(matches!(session.transport_mut().command(open, PATIENCE), Ok(Answer::Opened { .. })));
     assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 2);
-    wait_for_sessions(&server, 1);
+    server.wait_for(|s| s.sessions == 1);
     session.set_resolution(None).unwrap();
     drop(session);
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new());
-}
-
-/// A model of many spheres in a grid.
-fn spheres(n: u32) -> String {
-    let sphere = |i: u32| {
-        format!(
-            "multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n",
-            i % 150,
-            i / 150
-        )
-    };
-    format!("union() {{ {} }}", (0..n).map(sphere).collect::<String>())
 }
 
 /// What each effect adds to records, slots and header comes through shared memory as it is.

@@ -54,10 +54,12 @@ impl PairQuery<'_> {
     /// than its own in a hole with flat walls does not: seen from it the walls rush by, seen from these it all but stands
     /// (`fit::spun`).
     pub(super) fn is_swapped(&self) -> bool {
-        match (spins_nearly_about(&self.a), spins_nearly_about(&self.b)) {
-            (Some(axis), None) if has_flat_walls_along(&self.b, axis) => return true,
-            (None, Some(axis)) if has_flat_walls_along(&self.a, axis) => return false,
-            _ => {}
+        let [a, b] = [&self.a, &self.b];
+        if turns_between_walls(a, b) {
+            return true;
+        }
+        if turns_between_walls(b, a) {
+            return false;
         }
         let weight = |m: &Model| m.radius * if m.hollow { HOLLOW } else { 1.0 };
         weight(self.b.model) < weight(self.a.model)
@@ -187,31 +189,29 @@ pub(super) fn without_own_spin(body: &Body) -> Placed {
 const SPINS: f64 = 0.1;
 const OFF_AXIS: f64 = 0.02;
 
-/// The axis of revolution (world axes, at the start) that a body without cavities spins nearly about, but not exactly.
-fn spins_nearly_about(body: &Body) -> Option<DVec3> {
-    let spin = body.placed.motion.spin;
-    if spin.length_squared() < SPINS * SPINS || body.model.hollow {
-        return None;
-    }
-    let world_from_model = body.placed.motion.start.rotation * body.placed.place.rotation;
-    let along = world_from_model.conjugate() * spin;
-    let axis = body.model.axis_of_revolution(along)?;
-    let off = axis.direction.cross(along).length();
-    (!axis.is_along(along) && off <= OFF_AXIS * along.length()).then(|| world_from_model * axis.direction)
-}
-
 /// Cosine of the angle between a wall and an axis up to which the one is along the other.
 const ALONG: f64 = 0.1;
 
-/// True when a bounded body has subtracted planes along an axis (world axes, at the start).
-fn has_flat_walls_along(body: &Body, axis: DVec3) -> bool {
-    let solid = &body.model.solid;
-    let axis = (body.placed.motion.start.rotation * body.placed.place.rotation).conjugate() * axis;
-    let is_wall = |(face, owner): (&Face, &u32)| {
+/// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the other one, which is
+/// bounded, has subtracted planes along that axis.
+fn turns_between_walls(peg: &Body, hole: &Body) -> bool {
+    let spin = peg.placed.motion.spin;
+    let candidates = hole.model.hollow && !peg.model.hollow && hole.model.radius.is_finite();
+    if !candidates || spin.length_squared() < SPINS * SPINS {
+        return false;
+    }
+    let world_from_model = |body: &Body| body.placed.motion.start.rotation * body.placed.place.rotation;
+    let along = world_from_model(peg).conjugate() * spin;
+    let Some(axis) = peg.model.axis_of_revolution(along) else { return false };
+    if axis.is_along(along) || axis.direction.cross(along).length() > OFF_AXIS * along.length() {
+        return false;
+    }
+    let axis = world_from_model(hole).conjugate() * (world_from_model(peg) * axis.direction);
+    let solid = &hole.model.solid;
+    solid.faces.iter().zip(&solid.face_owner).any(|(face, owner)| {
         let negative = solid.senses[*owner as usize] == Sense::Negative;
         matches!(face, Face::Plane { normal, .. } if negative && normal.dot(axis).abs() <= ALONG)
-    };
-    body.model.hollow && body.model.radius.is_finite() && solid.faces.iter().zip(&solid.face_owner).any(is_wall)
+    })
 }
 
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no

@@ -2,7 +2,9 @@
 
 pub mod scene;
 
+use contactd_client::SharedMemory;
 use contactd_client::proto::names::Address;
+use contactd_client::proto::status::StatusRecord;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -32,6 +34,15 @@ impl ServerProcess {
     /// The runtime folder.
     pub fn runtime(&self) -> &Path {
         self.runtime.path()
+    }
+
+    /// Waits until the server shows something of itself; what it shows follows its beat.
+    pub fn wait_for(&self, what: impl Fn(&StatusRecord) -> bool) {
+        let until = Instant::now() + PATIENCE;
+        while !what(&SharedMemory::status(&self.address).unwrap()) {
+            assert!(Instant::now() < until, "the status never came to what it should be");
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     /// The server's process id.

@@ -83,3 +83,15 @@ fn numbers(seed: u64) -> impl FnMut() -> f64 {
         ((s ^ (s >> 29)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }
+
+/// A model of many spheres in a grid.
+pub fn spheres(n: u32) -> String {
+    let sphere = |i: u32| {
+        format!(
+            "multmatrix([[1,0,0,{}],[0,1,0,{}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n",
+            i % 150,
+            i / 150
+        )
+    };
+    format!("union() {{ {} }}", (0..n).map(sphere).collect::<String>())
+}
