@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
+import time
 
 import pytest
 
@@ -60,6 +61,20 @@ class Server:
         self.process.kill()
         self.process.wait()
         self.process.stdout.close()
+
+    @contextlib.contextmanager
+    def suspended(self):
+        """The server does nothing while the block runs. The signal alone is not enough: a thread that runs stops a little later."""
+        tasks = pathlib.Path("/proc", str(self.process.pid), "task")
+        self.process.send_signal(signal.SIGSTOP)
+        try:
+            end = time.monotonic() + 20
+            while any(task.joinpath("stat").read_text().rpartition(")")[2].split()[0] != "T" for task in tasks.iterdir()):
+                assert time.monotonic() < end, "the server does not stop"
+                time.sleep(0.001)
+            yield
+        finally:
+            self.process.send_signal(signal.SIGCONT)
 
     def stop(self):
         self.process.send_signal(signal.SIGTERM)

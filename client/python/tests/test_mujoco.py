@@ -1,6 +1,5 @@
 """MuJoCo with contactd's contacts, held against MuJoCo's own where both are right."""
 
-import signal
 
 import numpy as np
 import pytest
@@ -169,13 +168,10 @@ def test_an_interrupted_request_changes_nothing(own_server):
     with contactd.connect("own") as session:
         coupling, data = turned_over(session)
         before, kept = data.qpos.copy(), coupling.contacts
-        own_server.process.send_signal(signal.SIGSTOP)
-        try:
+        with own_server.suspended():
             for _ in range(2):
                 with pytest.raises(KeyboardInterrupt), in_a_moment(interrupt):
                     coupling.step(data)
-        finally:
-            own_server.process.send_signal(signal.SIGCONT)
         assert np.array_equal(data.qpos, before) and coupling.contacts is kept
         for _ in range(20):
             assert coupling.step(data) == 4

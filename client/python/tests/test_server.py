@@ -1,7 +1,6 @@
 """Servers that are not there, no longer there, or not answering: an exception, and the session goes on after it."""
 
 import gc
-import signal
 import subprocess
 import threading
 
@@ -71,8 +70,7 @@ def test_options_in_the_middle_of_a_call_are_misuse(own_server):
     with contactd.connect("own") as session:
         fill(session)
         session.begin_step(0)
-        own_server.process.send_signal(signal.SIGSTOP)
-        try:
+        with own_server.suspended():
             session.send()
             found = []
 
@@ -87,8 +85,6 @@ def test_options_in_the_middle_of_a_call_are_misuse(own_server):
             with in_a_moment(look), pytest.raises(contactd.Timeout):
                 session.finish(timeout=0.5)
             other.join()
-        finally:
-            own_server.process.send_signal(signal.SIGCONT)
         assert found == 2 * ["the session is in use by another call"]
         session.finish(timeout=20)
         assert session.options.advance == 1.0
@@ -125,8 +121,7 @@ def test_a_step_outlives_its_timeout_and_ctrl_c(own_server):
         ball, _ = fill(session)
         session.options.advance = 0.25
         session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
-        own_server.process.send_signal(signal.SIGSTOP)
-        try:
+        with own_server.suspended():
             session.send()
             with pytest.raises(contactd.Timeout) as out:
                 session.finish(timeout=0.05)
@@ -135,8 +130,6 @@ def test_a_step_outlives_its_timeout_and_ctrl_c(own_server):
 
             with pytest.raises(KeyboardInterrupt), in_a_moment(interrupt):
                 session.finish()
-        finally:
-            own_server.process.send_signal(signal.SIGCONT)
         reply = session.finish(timeout=20)
         assert reply[0].time == 0.5 and session.options.advance == 1.0
 
