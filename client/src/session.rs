@@ -2,9 +2,11 @@
 //!
 //! Ids are given here, counting up, so that they stay the same when the session is replayed on another server.
 
+mod options;
+mod stage;
 mod step;
 
-pub use step::StepOptions;
+pub use options::StepOptions;
 
 use crate::journal::Journal;
 use crate::transport::{Opened, Transport};
@@ -13,8 +15,8 @@ use contactd_proto::control::{Answer, Command, Facets, WireRule};
 use contactd_proto::names::Address;
 use contactd_proto::step::NO_INDEX;
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, PoseRecord, Rule};
+use stage::Stage;
 use std::time::{Duration, Instant};
-use step::Stage;
 
 /// How long closing waits for a step in flight.
 const PATIENCE: Duration = Duration::from_secs(1);

@@ -1,6 +1,7 @@
 //! Independent truth and harnesses shared by the integration tests.
 #![forbid(unsafe_code)]
 
+pub mod closed;
 pub mod engine;
 pub mod families;
 pub mod fuzz;

@@ -5,7 +5,7 @@
 //! distance of the rays, and two rules tell how far it has come.
 
 use contactd::math::Aabb;
-use contactd::solid::{Face, Solid};
+use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
 
 /// ∫ 1, x, y, z, xx, yy, zz, xy, xz, yz.
@@ -46,16 +46,16 @@ fn add_roots(face: &Face, at: DVec3, roots: &mut Vec<f64>) {
     let e = DVec3::Z;
     // c₀ + 2 c₁ z + c₂ z² = 0.
     let [c0, c1, c2] = match *face {
-        Face::Plane { normal, offset } => [normal.dot(at) - offset, normal.z / 2.0, 0.0],
-        Face::Sphere { center, radius } => {
+        Face::Plane(surface::Plane { normal, offset }) => [normal.dot(at) - offset, normal.z / 2.0, 0.0],
+        Face::Sphere(surface::Sphere { center, radius }) => {
             let o = at - center;
             [o.dot(o) - radius * radius, o.dot(e), 1.0]
         }
-        Face::Cylinder { origin, axis, radius } => {
+        Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
             let (o, d) = (across(at - origin, axis), across(e, axis));
             [o.dot(o) - radius * radius, o.dot(d), d.dot(d)]
         }
-        Face::Cone { apex, axis, sin, cos } => {
+        Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
             // ρ² cos² = z² sin², both nappes: a root too many only divides an interval.
             let (o, d) = (across(at - apex, axis), across(e, axis));
             let (h, k) = ((at - apex).dot(axis), axis.z);

@@ -7,12 +7,12 @@
 //! contactd-tests --test closed_forms -- --nocapture` sets the number of pairs per combination (200, 60 and 30 by default).
 #![allow(missing_docs)]
 
-use contactd::contact::closed::{Meeting, time_of_contact, time_of_leaving};
 use contactd::contact::{Outcome, Status, default_resolution};
 use contactd::eco::Model;
 use contactd::motion::{Placed, Relative};
 use contactd::solid::Primitive;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::closed::{Meeting, time_of_contact, time_of_leaving};
 use contactd_tests::engine::{SEARCH_ALONE, ask_models, ask_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;

@@ -4,7 +4,7 @@
 
 use contactd::contact::clearance::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
-use contactd::contact::separation::Within;
+use contactd::contact::within::Within;
 use contactd::contact::{
     Asked, Body, DEFAULT_CELL_LIMIT, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution,
     earliest_contact,

@@ -2,7 +2,7 @@
 //! of which asks for the effect. Counts only; the times beside them are in docs/effects.md.
 #![allow(missing_docs)]
 
-use contactd::contact::separation::Within;
+use contactd::contact::within::Within;
 use contactd::contact::{Counters, DEFAULT_CELL_LIMIT, PairQuery, Scratch, Status};
 use contactd::contact::{clearance, earliest_contact, region};
 use contactd::motion::Placed;

@@ -1,7 +1,9 @@
-//! The floors of the server: each folder imports only from floors below it, as the table in docs/architecture.md says.
+//! The floors of the server: each folder imports only from floors below it, as the table in docs/architecture.md says; and no files
+//! import each other in a circle, in any package.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use syn::visit::{self, Visit};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -132,4 +134,170 @@ fn only_the_transports_name_iceoryx2_and_no_crate_allows_unsafe() {
             assert!(!text.contains("use iceoryx2"), "{} names iceoryx2", file.display());
         }
     }
+}
+
+/// A module's path from the root of its crate.
+type Module = Vec<String>;
+
+/// What a file names: paths, of imports and in place. What it hands on it does not use.
+#[derive(Default)]
+struct Names {
+    used: Vec<Module>,
+}
+
+impl Names {
+    fn import(&mut self, tree: &syn::UseTree, path: &mut Module) {
+        match tree {
+            syn::UseTree::Path(p) => {
+                path.push(p.ident.to_string());
+                self.import(&p.tree, path);
+                path.pop();
+            }
+            syn::UseTree::Group(g) => g.items.iter().for_each(|tree| self.import(tree, path)),
+            syn::UseTree::Name(syn::UseName { ident }) | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {
+                let name = (ident != "self").then(|| ident.to_string());
+                self.used.push(path.iter().cloned().chain(name).collect());
+            }
+            syn::UseTree::Glob(_) => self.used.push(path.clone()),
+        }
+    }
+}
+
+fn is_test(attributes: &[syn::Attribute]) -> bool {
+    attributes
+        .iter()
+        .any(|a| a.path().is_ident("cfg") && a.meta.require_list().is_ok_and(|l| l.tokens.to_string() == "test"))
+}
+
+impl<'a> Visit<'a> for Names {
+    fn visit_item_use(&mut self, item: &'a syn::ItemUse) {
+        if !is_test(&item.attrs) && matches!(item.vis, syn::Visibility::Inherited) {
+            self.import(&item.tree, &mut Vec::new());
+        }
+    }
+    fn visit_item_mod(&mut self, item: &'a syn::ItemMod) {
+        if !is_test(&item.attrs) {
+            visit::visit_item_mod(self, item);
+        }
+    }
+    fn visit_path(&mut self, path: &'a syn::Path) {
+        if path.segments.len() > 1 {
+            self.used.push(path.segments.iter().map(|s| s.ident.to_string()).collect());
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+/// The modules of a crate that stand in files of their own, with what each names.
+fn modules(source: &Path) -> BTreeMap<Module, Names> {
+    let mut files = Vec::new();
+    rust_files(source, &mut files);
+    let mut all = BTreeMap::new();
+    for file in files {
+        let mut path: Module = file
+            .strip_prefix(source)
+            .unwrap()
+            .with_extension("")
+            .iter()
+            .map(|s| s.to_str().unwrap().to_owned())
+            .collect();
+        path.pop_if(|last| last == "mod" || last == "lib");
+        // A program of its own, and what stands in for tests.
+        if path.last().is_some_and(|last| ["main", "tests", "testing", "random"].contains(&last.as_str())) {
+            continue;
+        }
+        let mut names = Names::default();
+        names.visit_file(&syn::parse_file(&std::fs::read_to_string(&file).unwrap()).unwrap());
+        all.insert(path, names);
+    }
+    all
+}
+
+/// The module in whose file that stands which `at` names by a path; `None` for what is no module of the crate.
+fn place_of(all: &BTreeMap<Module, Names>, at: &Module, path: &[String]) -> Option<Module> {
+    let (mut here, mut rest) = (at.clone(), path);
+    match rest.first()?.as_str() {
+        "crate" => (here, rest) = (Module::new(), &rest[1..]),
+        "self" => rest = &rest[1..],
+        "super" => {}
+        child => {
+            let inner: Module = at.iter().cloned().chain([child.to_owned()]).collect();
+            if !all.contains_key(&inner) {
+                return None;
+            }
+        }
+    }
+    while let [first, more @ ..] = rest {
+        if first == "super" {
+            here.pop();
+        } else {
+            let inner: Module = here.iter().cloned().chain([first.clone()]).collect();
+            if !all.contains_key(&inner) {
+                // An item, of this file or one that a folder's face hands on from its files.
+                return Some(here);
+            }
+            here = inner;
+        }
+        rest = more;
+    }
+    Some(here)
+}
+
+/// A circle of files that import each other, if there is one, and how many imports were read.
+fn circle(all: &BTreeMap<Module, Names>) -> (Option<Vec<Module>>, usize) {
+    let mut to: BTreeMap<&Module, BTreeSet<Module>> = BTreeMap::new();
+    for (at, names) in all {
+        let places = names.used.iter().filter_map(|path| place_of(all, at, path));
+        // A folder's face (`mod.rs`) belongs to all of its files.
+        to.insert(at, places.filter(|place| !at.starts_with(place) && all.contains_key(place)).collect());
+    }
+    let count = to.values().map(BTreeSet::len).sum();
+    // What imports nothing that is left goes; what stays is on a circle or above one.
+    loop {
+        let ends: Vec<Module> = to.iter().filter(|(_, b)| b.is_empty()).map(|(a, _)| (*a).clone()).collect();
+        if ends.is_empty() {
+            break;
+        }
+        to.retain(|a, _| !ends.contains(a));
+        to.values_mut().for_each(|b| b.retain(|place| !ends.contains(place)));
+    }
+    let Some((&first, _)) = to.first_key_value() else { return (None, count) };
+    let mut at = first;
+    let mut way: Vec<Module> = Vec::new();
+    while !way.contains(at) {
+        way.push(at.clone());
+        at = to.keys().find(|place| to[at].contains(**place)).unwrap();
+    }
+    let begin = way.iter().position(|place| *place == *at).unwrap();
+    (Some(way.split_off(begin)), count)
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    for (package, least) in [("proto", 4), ("client", 20), ("server", 300), ("client/capi", 10), ("client/rapier", 1)] {
+        let (found, count) = circle(&modules(&root().join(package).join("src")));
+        println!("{package}: {count} imports");
+        assert!(found.is_none(), "{package}: {:?} import each other", found.unwrap());
+        assert!(count >= least, "{package}: only {count} imports were found: the reader of sources is broken");
+    }
+}
+
+#[test]
+fn a_circle_of_files_is_seen() {
+    let read = |files: &[(&str, &str)]| {
+        let names = |text: &str| {
+            let mut names = Names::default();
+            names.visit_file(&syn::parse_file(text).unwrap());
+            names
+        };
+        let path = |p: &str| p.split('/').filter(|s| !s.is_empty()).map(str::to_owned).collect();
+        circle(&files.iter().map(|(p, text)| (path(p), names(text))).collect())
+    };
+    let up = ("", "pub mod a; mod b; pub use b::Y;");
+    let (none, count) =
+        read(&[up, ("a", "use super::b::Y; pub struct X;"), ("b", "pub struct Y; #[cfg(test)] use crate::a::X;")]);
+    assert_eq!((none, count), (None, 1));
+    let (some, _) =
+        read(&[up, ("a", "use super::b::Y; pub struct X;"), ("b", "pub struct Y; fn f(_: crate::a::X) {}")]);
+    assert_eq!(some, Some(vec![vec!["a".to_owned()], vec!["b".to_owned()]]));
 }

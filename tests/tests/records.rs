@@ -11,7 +11,7 @@ use contactd::contact::{Extent, Kind, Outcome, Status};
 use contactd::eco::Model;
 use contactd::import::{Facets, Limits, import_csg, read_scene};
 use contactd::ipc::ServerConfig;
-use contactd::solid::{Face, Sense, Solid};
+use contactd::solid::{Face, Sense, Solid, surface};
 use contactd::world::{ObjectSpec, Part, StepOptions, World};
 use contactd_client::Object;
 use contactd_proto::control::WireTrack;
@@ -218,7 +218,7 @@ fn named_faces(text: &str) -> Vec<(String, DVec3)> {
         import_csg("a.csg", text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}")).solid;
     let p = &solid.primitives[0];
     let each = p.faces.iter().enumerate().filter_map(|(k, face)| match *face {
-        Face::Plane { normal, .. } => Some((p.face_name(k), normal)),
+        Face::Plane(surface::Plane { normal, .. }) => Some((p.face_name(k), normal)),
         _ => None,
     });
     each.collect()

@@ -13,7 +13,7 @@ use contactd::eco::Model;
 use contactd::motion::{Placed, Relative};
 use contactd::solid::local::{LiteralId, literal_token};
 use contactd::solid::primitive::{Cone, Cylinder, Sphere};
-use contactd::solid::{Face, Label, Sense, Shape, SolidBuilder};
+use contactd::solid::{Face, Label, Sense, Shape, SolidBuilder, surface};
 use contactd_proto::{Motion, Pose};
 use contactd_tests::random_solids::{self, Random};
 use dashu_float::FBig;
@@ -136,10 +136,12 @@ fn psi(face: &Face, x: &Vector) -> Big {
         (o.minus(&a.times(&z)).length(), z)
     };
     match *face {
-        Face::Plane { normal, offset } => Vector::of(normal).dot(x) - big(offset),
-        Face::Sphere { center, radius } => x.minus(&Vector::of(center)).length() - big(radius),
-        Face::Cylinder { origin, axis, radius } => across(axis, &x.minus(&Vector::of(origin))).0 - big(radius),
-        Face::Cone { apex, axis, sin, cos } => {
+        Face::Plane(surface::Plane { normal, offset }) => Vector::of(normal).dot(x) - big(offset),
+        Face::Sphere(surface::Sphere { center, radius }) => x.minus(&Vector::of(center)).length() - big(radius),
+        Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
+            across(axis, &x.minus(&Vector::of(origin))).0 - big(radius)
+        }
+        Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
             let (rho, z) = across(axis, &x.minus(&Vector::of(apex)));
             rho * big(cos) - z * big(sin)
         }
@@ -151,15 +153,17 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
     // |u|² − ρ² of a face that delta shrinks; the fit takes an axis' direction, not its stored length.
     let square = |face: &Face, x: &Vector, shrink: f64| {
         let (origin, axis, radius, steep) = match *face {
-            Face::Sphere { center, radius } => (Vector::of(center), None, big(radius) - big(shrink), big(0.0)),
-            Face::Cylinder { origin, axis, radius } => {
+            Face::Sphere(surface::Sphere { center, radius }) => {
+                (Vector::of(center), None, big(radius) - big(shrink), big(0.0))
+            }
+            Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
                 (Vector::of(origin), Some(axis), big(radius) - big(shrink), big(0.0))
             }
-            Face::Cone { apex, axis, sin, cos } => {
+            Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
                 let tan = big(sin) / big(cos);
                 (Vector::of(apex + axis * (shrink / sin)), Some(axis), big(0.0), &tan * &tan)
             }
-            Face::Plane { .. } => return None,
+            Face::Plane(_) => return None,
         };
         let o = x.minus(&origin);
         let along = axis.map_or(big(0.0), |a| {
@@ -334,7 +338,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 worst.see(|w| &mut w.value, difference, budget, &what);
                 assert_eq!(computed.value.to_bits(), face.value(point).to_bits(), "{}", what());
                 // A plane's gradient over the cell, both ways.
-                if let Face::Plane { normal, .. } = *face {
+                if let Face::Plane(surface::Plane { normal, .. }) = *face {
                     let along = if side == Side::B { at.a_vector(normal) } else { normal };
                     let step = x - center;
                     let difference =
@@ -356,7 +360,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 worst.see(|w| &mut w.plane, double(&above).max(0.0), budget, &what);
                 // Neither does a fit's.
                 let other = if side == Side::A { &b.solid } else { &a.solid };
-                let round = |f: &Face| !matches!(f, Face::Plane { .. });
+                let round = |f: &Face| !matches!(f, Face::Plane(_));
                 let fitting = (0..other.faces.len()).find(|i| round(face) && round(&other.faces[*i]));
                 if let (Sense::Positive, Some(i)) = (sense, fitting) {
                     let other_side = if side == Side::A { Side::B } else { Side::A };
@@ -407,13 +411,13 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
 /// A curved face, drawn from those of the model, and a point of its axis or its centre.
 fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
     let curved: Vec<usize> =
-        (0..m.solid.faces.len()).filter(|i| !matches!(m.solid.faces[*i], Face::Plane { .. })).collect();
+        (0..m.solid.faces.len()).filter(|i| !matches!(m.solid.faces[*i], Face::Plane(_))).collect();
     let face = *curved.get(r.below(curved.len().max(1)))?;
     let point = match m.solid.faces[face] {
-        Face::Cylinder { origin, axis, .. } => origin + axis * r.within(-1.0, 1.0),
-        Face::Cone { apex, axis, .. } => apex + axis * r.within(0.0, 2.0),
-        Face::Sphere { center, .. } => center,
-        Face::Plane { .. } => return None,
+        Face::Cylinder(surface::Cylinder { origin, axis, .. }) => origin + axis * r.within(-1.0, 1.0),
+        Face::Cone(surface::Cone { apex, axis, .. }) => apex + axis * r.within(0.0, 2.0),
+        Face::Sphere(surface::Sphere { center, .. }) => center,
+        Face::Plane(_) => return None,
     };
     Some((face, point))
 }

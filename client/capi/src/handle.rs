@@ -1,7 +1,7 @@
 //! The handle behind `contactd_session *`: whose it is, whether a call is under way, and the one way into it.
 
 use crate::error::Failure;
-use crate::model::Models;
+use crate::models::Models;
 use contactd_client::{Error, Transport};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};

@@ -29,6 +29,7 @@ pub mod scene;
 pub mod session;
 pub mod step;
 
+mod models;
 mod raw;
 
 pub use handle::{Session, hand_over};

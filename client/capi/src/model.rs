@@ -4,11 +4,9 @@ use crate::abi::{Face, Mass, Pose};
 use crate::error::Failure;
 use crate::handle::{Session, State, free, on};
 use crate::raw::{given, place, text, word};
-use contactd_client::{MassOptions, MassProperties, ModelInfo};
+use contactd_client::{MassOptions, MassProperties};
 use contactd_proto::control::Facets;
-use contactd_proto::error::ErrorCode;
-use std::collections::HashMap;
-use std::ffi::{CString, c_char};
+use std::ffi::c_char;
 
 /// Curved primitives are exact when `$fn` is 0 or at least 9, as written below that.
 pub const FACETS_AUTO: u32 = 0;
@@ -19,29 +17,6 @@ pub const FACETS_AS_WRITTEN: u32 = 2;
 
 /// By their numbers.
 const FACETS: [Facets; 3] = [Facets::Auto, Facets::Exact, Facets::AsWritten];
-
-/// The models of a session, and the strings that were given out of them.
-#[derive(Default)]
-pub(crate) struct Models {
-    infos: HashMap<u32, ModelInfo>,
-    strings: HashMap<String, CString>,
-}
-
-impl Models {
-    fn of(&self, model: u32) -> Result<&ModelInfo, Failure> {
-        self.infos.get(&model).ok_or_else(|| ErrorCode::UnknownModel.into())
-    }
-
-    /// A string that stays where it is as long as the models do.
-    fn string(&mut self, text: &str) -> *const c_char {
-        if !self.strings.contains_key(text) {
-            // Names and warnings have no zero bytes; one that had would end there.
-            let bytes = text.split('\0').next().unwrap_or_default();
-            self.strings.insert(text.into(), CString::new(bytes).unwrap_or_default());
-        }
-        self.strings[text].as_ptr()
-    }
-}
 
 fn index(i: u32, n: usize, what: &str) -> Result<usize, Failure> {
     if (i as usize) < n {
@@ -67,7 +42,7 @@ pub unsafe extern "C" fn contactd_load_model(
         let model = unsafe { place(model, "model")? };
         let info = state.session.load_model_with(name, csg, word(&FACETS, facets, "facets")?)?;
         model.write(info.id);
-        state.models.infos.insert(info.id, info);
+        state.models.add(info);
         Ok(())
     };
     // SAFETY: the caller's handle (3).

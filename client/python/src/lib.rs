@@ -14,6 +14,7 @@ mod lease;
 mod manifold;
 mod mass;
 mod options;
+mod pose;
 mod reply;
 mod rules;
 mod session;

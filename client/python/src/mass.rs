@@ -1,6 +1,6 @@
 //! Mass properties, with the arithmetic of their bounds left to Rust.
 
-use crate::session::pose;
+use crate::pose::pose;
 use contactd_proto::MassProperties as Mass;
 use pyo3::prelude::*;
 

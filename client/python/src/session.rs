@@ -5,6 +5,7 @@ use crate::errors;
 use crate::lease::{Lease, What};
 use crate::mass::MassProperties;
 use crate::options::Options;
+use crate::pose::pose;
 use crate::reply::Reply;
 use crate::rules::RuleFields;
 use crate::slots::{Batch, Slots, references};
@@ -13,8 +14,7 @@ use contactd_client::proto::control::Facets;
 use contactd_client::transport::Opened;
 use contactd_client::{Error, MassOptions, Object, SharedMemory, StepOptions, Transport};
 use contactd_proto::names::Address;
-use contactd_proto::{ContactRecord, Pose, PoseRecord, StepReply};
-use glam::{DQuat, DVec3};
+use contactd_proto::{ContactRecord, PoseRecord, StepReply};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
@@ -29,11 +29,6 @@ type Loaded = (u32, Vec<(u32, String, String, bool)>, Vec<String>);
 
 /// Longest wait between two looks for signals (Ctrl-C).
 const SLICE: Duration = Duration::from_millis(100);
-
-/// A pose from its numbers. The rotation must be a unit quaternion x, y, z, w; the server says when it is not.
-pub fn pose(position: [f64; 3], rotation: [f64; 4]) -> Pose {
-    Pose::new(DVec3::from_array(position), DQuat::from_array(rotation))
-}
 
 /// One client's scene; `contactd.Session` inherits from it.
 #[pyclass(subclass, module = "contactd._native")]
@@ -324,7 +319,7 @@ impl Session {
         let py = slf.py();
         duration(timeout)?;
         if let Some(batch) = Batch::of(py, poses)? {
-            let mut this = Self::fresh(slf)?;
+            let this = Self::fresh(slf)?;
             let options = StepOptions::from(&*this.options.try_borrow(py)?);
             let begun = this.with(py, |s| {
                 s.options = options;

@@ -23,7 +23,7 @@ pub struct Point {
     pub gap: f64,
     /// Force on the second body in the last solve: along the normal and two tangents.
     pub force: DVec3,
-    pub(super) row: super::solver::Row,
+    pub(super) row: super::row::Row,
 }
 
 /// An overlap that the engine reports where bodies stand.

@@ -18,6 +18,7 @@ mod inertia;
 mod islands;
 mod plan;
 mod report;
+mod row;
 mod solver;
 mod spin;
 mod step;

@@ -1,63 +1,12 @@
 //! Steps of a session: a batch is loaned, sent and answered.
 
 use super::Session;
+use super::stage::Stage;
 use crate::{Error, Reply, Transport};
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::step::{ASK_CLEAR, ASK_DETAILS, ASK_FIRST, ASK_POLLING, NO_INDEX, STEP_REFUSED};
 use contactd_proto::{ErrorCode, PoseRecord, StepRequest};
 use std::time::Duration;
-
-/// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepOptions {
-    /// Fraction 0..1 of its previous step at which every object stands before the next one.
-    pub advance: f64,
-    /// Duration of a step in seconds, for objects with a declared largest speed; 0: unknown.
-    pub dt: f64,
-    /// Only the pairs whose bracket meets the scene's earliest contact.
-    pub first: bool,
-    /// A detail slot with each record: upper end of the bracket, point in a's frame, penetration.
-    pub details: bool,
-    /// Records of clear pairs too.
-    pub clear: bool,
-    /// This client polls while it waits; the server then need not wake it.
-    pub polling: bool,
-    /// Most records, the earliest first; 0: all.
-    pub max_records: u32,
-    /// Most cells' worth of work of one pair's search; 0: the server's default.
-    pub cell_limit: u32,
-    /// The same of all searches of a step together; 0: the server's default. Pairs that would need more stay
-    /// undecided, the latest first.
-    pub batch_limit: u32,
-}
-
-impl Default for StepOptions {
-    fn default() -> Self {
-        Self {
-            advance: 1.0,
-            dt: 0.0,
-            first: false,
-            details: false,
-            clear: false,
-            polling: false,
-            max_records: 0,
-            cell_limit: 0,
-            batch_limit: 0,
-        }
-    }
-}
-
-/// Where the step under way is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Stage {
-    Idle,
-    Loaned,
-    Sent {
-        advance: f64,
-    },
-    /// The server is gone, or does not have the session that this client knows: reconnect first.
-    Lost,
-}
 
 impl<T: Transport> Session<T> {
     /// Slots for `n` poses, to be filled in place. A batch that was begun and not sent is dropped.

@@ -14,14 +14,14 @@ use super::clause::{self, Hint, Proof, Term};
 use super::depth;
 use super::literal::{Faces, Side, View};
 use super::outcome::{NO_FACE, Outcome, Status};
-use super::pair::{PairQuery, PairSearch};
+use super::query::PairQuery;
 use super::task::Task;
 use super::work::Work;
 use crate::bound::{Bound, Volumes};
 use crate::math::Aabb;
 use crate::motion::Relative;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
-use crate::solid::{Face, Node, NodeId, Op, Sense, Solid};
+use crate::solid::{Node, NodeId, Op, Sense, Solid};
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -99,7 +99,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     if outcome.status == Status::Overlap {
         return None;
     }
-    let (mut task, swapped) = PairSearch::task(query);
+    let (mut task, swapped) = Task::of(query);
     let depth = outcome.depth;
     // In the frames of the bodies as they move: the search may leave out a spin that moves nothing.
     let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
@@ -139,7 +139,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
 /// Proves that no point has f_A <= `level` and f_B <= `level` (a length, positive) until `until`; the cells are bounded at `made`,
 /// a little more than that, which leaves a checker room. `None` when the limit of cells is reached.
 pub fn certify_level(query: &PairQuery, level: f64, made: f64, until: f64) -> Option<Certificate> {
-    let (mut task, swapped) = PairSearch::task(query);
+    let (mut task, swapped) = Task::of(query);
     let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
     task.relative = Relative::new(carrier.placed, other.placed);
     task.delta = -made;
@@ -244,16 +244,7 @@ impl Task<'_> {
     fn touched(&self, (side, id): Key, point: DVec3) -> DVec3 {
         let face = &(if side == Side::A { self.a } else { self.b }).faces[id.face() as usize];
         let normal = face.at(point).normal;
-        match *face {
-            Face::Plane { .. } => point,
-            Face::Sphere { center, radius } => center + normal * radius,
-            Face::Cylinder { origin, axis, radius } => origin + axis * (point - origin).dot(axis) + normal * radius,
-            Face::Cone { apex, axis, sin, cos } => {
-                // Any point on the side of the axis to which the normal leans.
-                let far = (point - apex).length().max(self.scale);
-                apex + axis * (far * cos) + (normal + axis * sin) / cos * (far * sin)
-            }
-        }
+        face.foot(point, normal, self.scale)
     }
 }
 

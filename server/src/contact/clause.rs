@@ -19,9 +19,9 @@
 use super::fit::{self, fit, spun};
 use super::literal::{Linear, Side, View};
 use super::lp::{self, Solution};
+use crate::solid::Sense;
 use crate::solid::alike::{Ball, above};
 use crate::solid::local::{self, Expression, LiteralId, Token};
-use crate::solid::{Face, Sense};
 use glam::DVec3;
 
 /// Clauses bounded per cell before the remaining ones share their common literals' bound.
@@ -231,7 +231,7 @@ impl Run<'_, '_> {
     /// Touches faces that spin about their own axes where they look against flat walls of the other body.
     fn against_walls(&mut self, side: Side, id: LiteralId, before: usize) {
         let is_wall = |v: &View, l: &Linear| {
-            l.side == Side::A && l.id.sense() == Sense::Negative && matches!(v.a.get(l.id.face()), Face::Plane { .. })
+            l.side == Side::A && l.id.sense() == Sense::Negative && v.a.get(l.id.face()).is_flat()
         };
         let is_spun = |l: &Linear| l.weights.is_some() && l.other.is_none();
         let end = self.scratch.lits.len();
@@ -272,7 +272,7 @@ impl Run<'_, '_> {
                     Side::B => (v.center_b, v.motion.speed * v.motion.h + v.rounding),
                 };
                 let ball = Ball { center, radius: v.radius + way };
-                matches!(one, Face::Cone { .. })
+                one.apex().is_some()
                     && above(one, other, &ball).is_some_and(|least| least > -2.0 * v.wall + 2.0 * v.rounding)
             };
             if wall > -2.0 * self.view.wall || here() {

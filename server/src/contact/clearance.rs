@@ -7,15 +7,16 @@
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
 use super::asked::Asked;
+use super::cell::Ending;
 use super::certificate::{self, Certificate};
 use super::depth;
 use super::direct::Convex;
 use super::outcome::Counters;
-use super::pair::{Body, PairQuery, PairSearch};
+use super::query::{Body, PairQuery};
 use super::region;
-use super::search::{Ending, Scratch, Search};
-use super::separation::{self, Within};
+use super::search::{Scratch, Search};
 use super::task::Task;
+use super::within::{Within, within};
 use super::work::Work;
 use crate::math::tolerance::WIDE_MARGIN;
 use crate::motion::Placed;
@@ -72,13 +73,13 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
 /// A lower bound of the distance of two whole convex primitives at the start of the motion, less their touching
 /// distance (`margin`, at least 2 delta); `None` for anything else. A length; negative when they may touch.
 pub fn room(query: &PairQuery, margin: f64) -> Option<f64> {
-    let (task, _) = PairSearch::task(query);
+    let (task, _) = Task::of(query);
     Some(Convex::new(task)?.distance() - touch(&task, margin) - 8.0 * task.rounding)
 }
 
 /// The direction that proves `room`: unit, world axes, from the query's first body to its second.
 pub fn direction_of_room(query: &PairQuery) -> Option<DVec3> {
-    let (task, swapped) = PairSearch::task(query);
+    let (task, swapped) = Task::of(query);
     let n = Convex::new(task)?.direction().normalize();
     Some(if swapped { -n } else { n })
 }
@@ -95,7 +96,7 @@ pub enum Distance {
 /// are farther than their touching distance apart, where `keep` has proven as much for `room`, which is more. `None` where it
 /// takes more cells than the query allows, or the two are too near each other to leave a checker room.
 pub fn certify_kept(query: &PairQuery, margin: f64, (way, room): (f64, f64), until: f64) -> Option<Distance> {
-    let (task, swapped) = PairSearch::task(query);
+    let (task, swapped) = Task::of(query);
     let touch = touch(&task, margin);
     if let Some(pair) = Convex::new(task) {
         let sign = if swapped { -1.0 } else { 1.0 };
@@ -111,7 +112,7 @@ pub fn certify_kept(query: &PairQuery, margin: f64, (way, room): (f64, f64), unt
 /// as the models' bounds can tell. The query's limit bounds the work; what was proven when it ran out counts. What comes
 /// within `lead` (fraction of the motion) of the end of that time need not be told exactly.
 pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut Scratch) -> Kept {
-    let (mut task, _) = PairSearch::task(query);
+    let (mut task, _) = Task::of(query);
     task.asked = Asked::CONTACT;
     if let Some(pair) = Convex::new(task) {
         let (until, count) = pair.keeps(room + touch(&task, margin) + 8.0 * task.rounding);
@@ -144,7 +145,7 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
 /// early, and it is not known whether they do. Within the models' reach it is the search for a contact
 /// of that negative depth; farther, the whole trees tell how near the bodies are, and their speed how long that lasts.
 pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (f64, bool, Counters) {
-    let (mut task, _) = PairSearch::task(query);
+    let (mut task, _) = Task::of(query);
     task.asked = Asked::CONTACT;
     if task.a.is_empty() || task.b.is_empty() {
         return (1.0, true, Counters::default());
@@ -221,7 +222,7 @@ fn standing(body: Body<'_>) -> Body<'_> {
 /// bodies that stand still there; farther it covers the whole trees.
 pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Within, u64) {
     let still = PairQuery { a: standing(query.a), b: standing(query.b), ..*query };
-    let (mut task, _) = PairSearch::task(&still);
+    let (mut task, _) = Task::of(&still);
     if task.a.is_empty() || task.b.is_empty() {
         return (Within::Apart, 0);
     }
@@ -233,7 +234,7 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
     task.limit = task.limit.min(region::MOST_CELLS);
     if level > 0.99 * reach(&task) {
         let work = Work::new(task.limit);
-        let within = separation::within(&task, &task.relative.at(0.0), level, &work);
+        let within = within(&task, &task.relative.at(0.0), level, &work);
         return (within, work.cells());
     }
     let (ending, counters) = nearing(task, level, scratch);

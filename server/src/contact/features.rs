@@ -12,6 +12,7 @@ use super::newton::cholesky_solve;
 use super::task::Task;
 use crate::motion::Instant;
 use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
+use crate::solid::surface::Apex;
 use crate::solid::{Face, Sense};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -77,9 +78,9 @@ impl<'t, 'a> Features<'t, 'a> {
     /// The outward normal of a literal's face at the point, along its own body's axes; at an apex against the cone's axis.
     pub fn normal(&self, side: Side, id: LiteralId) -> DVec3 {
         let (face, y) = self.face(side, id);
-        match *face {
-            Face::Cone { axis, .. } if self.is_apex(side, id) => -axis,
-            _ => face.at(y).normal,
+        match face.apex().filter(|apex| self.is_at(apex, y)) {
+            Some(apex) => -apex.axis,
+            None => face.at(y).normal,
         }
     }
 
@@ -88,10 +89,15 @@ impl<'t, 'a> Features<'t, 'a> {
         self.at.a_vector(direction)
     }
 
-    /// True when an active cone has its apex at the point.
+    /// True when an active cone has its apex at the point: every face that passes there comes as near to the apex of a slender cone as
+    /// the tolerance over sin α.
     pub fn is_apex(&self, side: Side, id: LiteralId) -> bool {
         let (face, y) = self.face(side, id);
-        matches!(*face, Face::Cone { apex, .. } if (y - apex).length() <= self.tolerance)
+        face.apex().is_some_and(|apex| self.is_at(&apex, y))
+    }
+
+    fn is_at(&self, apex: &Apex, y: DVec3) -> bool {
+        (y - apex.point).length() * apex.sin <= self.tolerance
     }
 
     /// The active face of `side` that lies in the tangent plane of another face there.

@@ -35,53 +35,14 @@
 use super::literal::{Linear, Side, View};
 use crate::motion::Instant;
 use crate::solid::local::LiteralId;
+use crate::solid::surface::{Apex, Quadric, Section, Symmetry};
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 
-/// A round face of a contact at depth delta; the body's own frame.
-struct Round {
-    /// Centre, a point of the axis, or the apex as delta moves it.
-    origin: DVec3,
-    axis: Option<DVec3>,
-    /// R as delta changes it; 0 for a cone.
-    radius: f64,
-    /// tan α; 0 unless a cone.
-    slope: f64,
-}
-
-impl Round {
-    fn of(face: &Face, sense: Sense, delta: f64) -> Option<Self> {
-        // What a contact needs: positive faces shrink, subtracted ones grow.
-        let shrink = if sense == Sense::Positive { delta } else { -delta };
-        match *face {
-            Face::Sphere { center, radius } => {
-                Some(Self { origin: center, axis: None, radius: radius - shrink, slope: 0.0 })
-            }
-            Face::Cylinder { origin, axis, radius } => {
-                Some(Self { origin, axis: Some(axis), radius: radius - shrink, slope: 0.0 })
-            }
-            Face::Cone { apex, axis, sin, cos } if sin <= STEEPEST * cos => {
-                Some(Self { origin: apex + axis * (shrink / sin), axis: Some(axis), radius: 0.0, slope: sin / cos })
-            }
-            Face::Cone { .. } | Face::Plane { .. } => None,
-        }
-    }
-
-    /// The same round a cell, along A's axes: u at the cell's centre, the axis, the height of the centre, ρ there.
-    fn at(&self, view: &View, side: Side) -> Around {
-        let (mut u, mut axis) = match side {
-            Side::A => (view.center - self.origin, self.axis),
-            Side::B => (view.at.a_vector(view.center_b - self.origin), self.axis.map(|a| view.at.a_vector(a))),
-        };
-        let (mut z, arm) = (0.0, u.length());
-        if let Some(a) = &mut axis {
-            *a = a.normalize();
-            z = u.dot(*a);
-            u -= *a * z;
-        }
-        let bend = axis.map_or(DVec3::ZERO, |a| a * (1.0 + self.slope * self.slope).sqrt());
-        Around { u, axis, z, arm, rho: self.radius + self.slope * z, slope: self.slope, bend }
-    }
+/// The quadric of a round face of a contact at depth delta; the body's own frame.
+fn quadric(face: &Face, sense: Sense, delta: f64) -> Option<Quadric> {
+    // What a contact needs: positive faces shrink, subtracted ones grow.
+    face.quadric(if sense == Sense::Positive { delta } else { -delta })
 }
 
 struct Around {
@@ -96,8 +57,23 @@ struct Around {
     bend: DVec3,
 }
 
-/// tan α of a cone up to which it is taken as a quadric: a flatter one loses digits in its square.
-const STEEPEST: f64 = 4.0;
+impl Around {
+    /// A quadric round a cell, along A's axes: u at the cell's centre, the axis, the height of the centre, ρ there.
+    fn of(q: &Quadric, view: &View, side: Side) -> Self {
+        let (mut u, mut axis) = match side {
+            Side::A => (view.center - q.origin, q.axis),
+            Side::B => (view.at.a_vector(view.center_b - q.origin), q.axis.map(|a| view.at.a_vector(a))),
+        };
+        let (mut z, arm) = (0.0, u.length());
+        if let Some(a) = &mut axis {
+            *a = a.normalize();
+            z = u.dot(*a);
+            u -= *a * z;
+        }
+        let bend = axis.map_or(DVec3::ZERO, |a| a * (1.0 + q.slope * q.slope).sqrt());
+        Self { u, axis, z, arm, rho: q.radius + q.slope * z, slope: q.slope, bend }
+    }
+}
 
 /// Difference of two cones' axes, or angles in radians, up to which a bound by their tips is worth it.
 const SIMILAR: f64 = 0.25;
@@ -191,10 +167,7 @@ pub fn fit(
     // Radii alike to a hundredth bend alike: one bound will do.
     let steep =
         even.filter(|_| view.curved).and_then(|_| of(false)).filter(|l| l.weights.is_some_and(|[p, q]| p > 1.01 * q));
-    let tips = match (even, &face_p, &face_q) {
-        (None, Face::Cone { .. }, Face::Cone { .. }) => cones(view, (side_p, p, &face_p), (side_q, q, &face_q)),
-        _ => None,
-    };
+    let tips = if even.is_none() { cones(view, (side_p, p, &face_p), (side_q, q, &face_q)) } else { None };
     [even, steep, tips].into_iter().flatten()
 }
 
@@ -212,11 +185,11 @@ fn quadrics(
     even: bool,
 ) -> Option<Linear> {
     let (round_p, round_q) =
-        (Round::of(face_p, Sense::Positive, view.delta)?, Round::of(face_q, Sense::Negative, view.delta)?);
+        (quadric(face_p, Sense::Positive, view.delta)?, quadric(face_q, Sense::Negative, view.delta)?);
     if !view.curved && (round_p.slope > 0.0 || round_q.slope > 0.0) {
         return None;
     }
-    let (at_p, at_q) = (round_p.at(view, side_p), round_q.at(view, side_q));
+    let (at_p, at_q) = (Around::of(&round_p, view, side_p), Around::of(&round_q, view, side_q));
     // Where coordinates near the end of the numbers have no differences left there is no fit; nor round nothing.
     if !(at_p.rho.is_finite() && at_q.rho.is_finite() && at_q.rho > 0.0) {
         return None;
@@ -292,15 +265,15 @@ const SPINS: f64 = 8.0;
 /// does not know of it.
 pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
     let face = view.b.get(id.face());
-    let around_axis = match *face {
-        Face::Plane { .. } => return None,
-        Face::Sphere { .. } => view.at.omega.length(),
-        Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => view.at.omega.dot(view.at.a_vector(axis)).abs(),
+    let around_axis = match face.symmetry() {
+        Symmetry::Normal(_) => return None,
+        Symmetry::Center(_) => view.at.omega.length(),
+        Symmetry::Axis(axis) => view.at.omega.dot(view.at.a_vector(axis.direction)).abs(),
     };
     if around_axis == 0.0 {
         return None;
     }
-    let f = Round::of(face, id.sense(), view.delta)?.at(view, Side::B);
+    let f = Around::of(&quadric(face, id.sense(), view.delta)?, view, Side::B);
     let w = view.at.velocity(view.center - f.u);
     let (slides, leans) = match f.axis {
         None => (w.length(), 0.0),
@@ -360,7 +333,7 @@ pub fn touch_spun(view: &View, spun: &Linear, y: DVec3) -> Option<Linear> {
     if spun.other.is_some() || spun.id.sense() != Sense::Positive {
         return None;
     }
-    let f = Round::of(view.b.get(spun.id.face()), Sense::Positive, view.delta)?.at(view, Side::B);
+    let f = Around::of(&quadric(view.b.get(spun.id.face()), Sense::Positive, view.delta)?, view, Side::B);
     let pull = (y - f.axis.map_or(DVec3::ZERO, |a| a * a.dot(y))) * mu;
     // |∇Q| has grown: its rounding, and that of the axis.
     let lost = view.rounding * (2.0 * pull.length() + 8.0 * mu * view.radius);
@@ -374,7 +347,7 @@ pub fn touch_spun_against(view: &View, spun: &Linear, normal: DVec3) -> Option<L
     if spun.weights.is_none() || spun.other.is_some() || spun.id.sense() != Sense::Positive {
         return None;
     }
-    let f = Round::of(view.b.get(spun.id.face()), Sense::Positive, view.delta)?.at(view, Side::B);
+    let f = Around::of(&quadric(view.b.get(spun.id.face()), Sense::Positive, view.delta)?, view, Side::B);
     let across = f.axis.map_or(normal, |a| normal - a * a.dot(normal));
     touch_spun(view, spun, -across.try_normalize()? * f.rho - f.u)
 }
@@ -385,12 +358,7 @@ pub fn touch_spun_against(view: &View, spun: &Linear, normal: DVec3) -> Option<L
 pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVec3) -> Option<DVec3> {
     let on_axis = |side: Side, face: &Face| {
         let y = if side == Side::A { x } else { at.b_point(x) };
-        let (o, axis, radius) = match *face {
-            Face::Sphere { center, radius } => (center, None, radius),
-            Face::Cylinder { origin, axis, radius } => (origin, Some(axis), radius),
-            Face::Cone { apex, axis, sin, cos } => (apex, Some(axis), (y - apex).dot(axis).max(0.0) * sin / cos),
-            Face::Plane { .. } => return None,
-        };
+        let Section { origin: o, axis, radius } = face.section(y)?;
         let o = axis.map_or(o, |a| o + a * (y - o).dot(a));
         Some(if side == Side::A { (o, axis, radius) } else { (at.a_point(o), axis.map(|a| at.a_vector(a)), radius) })
     };
@@ -409,11 +377,11 @@ pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
         return None;
     }
     let (p, q) = (view.faces(fit.side).get(fit.id.face()), view.faces(side_q).get(q.face()));
-    if !view.curved && !matches!(p, Face::Sphere { .. }) {
+    if !view.curved && p.ball().is_none() {
         return None;
     }
-    let at_p = Round::of(p, Sense::Positive, view.delta)?.at(view, fit.side);
-    let at_q = Round::of(q, Sense::Negative, view.delta)?.at(view, side_q);
+    let at_p = Around::of(&quadric(p, Sense::Positive, view.delta)?, view, fit.side);
+    let at_q = Around::of(&quadric(q, Sense::Negative, view.delta)?, view, side_q);
     let pull = Bend::of(&at_p, &at_q, mu, view.half, view.curved).convex * y;
     // |∇G| has grown: its rounding, and that of C.
     let steep = (1.0 + at_p.slope * at_p.slope) * mu[0] + (1.0 + at_q.slope * at_q.slope) * mu[1];
@@ -436,11 +404,8 @@ fn cones(
     (side_q, q, face_q): (Side, LiteralId, &Face),
 ) -> Option<Linear> {
     let (on_a, on_b) = if side_p == Side::A { (face_p, face_q) } else { (face_q, face_p) };
-    let (Face::Cone { apex: o_a, axis: a, sin, cos }, Face::Cone { apex, axis, sin: sin_b, cos: cos_b }) =
-        (*on_a, *on_b)
-    else {
-        return None;
-    };
+    let Apex { point: o_a, axis: a, sin, cos } = on_a.apex()?;
+    let Apex { point: apex, axis, sin: sin_b, cos: cos_b } = on_b.apex()?;
     let o_b = view.center - view.at.a_vector(view.center_b - apex);
     let axis_b = view.at.a_vector(axis);
     let angle = (sin * cos_b - cos * sin_b).abs() * std::f64::consts::FRAC_PI_2; // |α' − α| <= π/2·|sin(α' − α)|

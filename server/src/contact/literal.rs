@@ -15,7 +15,8 @@
 use super::rounding;
 use crate::motion::{Bounds, Instant};
 use crate::solid::local::{LiteralId, Truth, truth_of};
-use crate::solid::{Face, Sense, Solid, face::FaceAt};
+use crate::solid::surface::FaceAt;
+use crate::solid::{Face, Sense, Solid};
 use glam::DVec3;
 
 /// Least distance from the axis, relative to the centre's, for the slab bound: nearer, its denominator spoils it.
@@ -157,14 +158,14 @@ impl View<'_> {
     /// tangents), each the largest distance from the centre. `normal` is the face's there, along A's axes.
     fn extents(&self, side: Side, face: &Face, normal: DVec3) -> (f64, f64, f64) {
         let along = |n: DVec3| n.abs().dot(self.half);
-        match *face {
-            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+        match face.developable() {
+            Some(axis) => {
                 let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
                 let t = axis.cross(normal).normalize_or_zero();
                 let u = t.cross(axis);
                 (along(u).hypot(along(t)).min(self.radius), along(u), along(t))
             }
-            _ => {
+            None => {
                 let u = crate::math::any_perpendicular(normal);
                 let t = along(u).hypot(along(normal.cross(u))).min(self.radius);
                 (self.radius, along(normal), t)
@@ -225,12 +226,12 @@ impl View<'_> {
             let closest = rho - radial - way;
             // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
             let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
-            let round = match *face {
-                Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+            let round = match face.developable() {
+                Some(axis) => {
                     let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
                     DVec3::ONE - axis * axis
                 }
-                _ => DVec3::ONE,
+                None => DVec3::ONE,
             };
             cost = if slab {
                 let steepness = f.k * (tangential / closest) * (tangential / closest) * 0.5;
@@ -245,9 +246,9 @@ impl View<'_> {
                 q = f.k * self.motion.speed * self.motion.speed / rho;
             } else {
                 // −psi >= −psi(c) [+ sin α axis·(x−c) for a cone] − k·D.
-                normal = match *face {
-                    Face::Cone { axis, sin, .. } => sin * if side == Side::A { axis } else { self.at.a_vector(axis) },
-                    _ => DVec3::ZERO,
+                normal = match face.apex() {
+                    Some(c) => c.sin * if side == Side::A { c.axis } else { self.at.a_vector(c.axis) },
+                    None => DVec3::ZERO,
                 };
                 remainder = f.k * d;
                 s = f.k * self.motion.speed;
@@ -299,19 +300,19 @@ impl View<'_> {
         if f.k == 0.0 {
             return DVec3::ZERO;
         }
-        let across = match *face {
-            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
+        let across = match face.developable() {
+            Some(axis) => {
                 let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
                 let t = axis.cross(f.normal);
                 t * t
             }
-            _ => DVec3::ONE - f.normal * f.normal,
+            None => DVec3::ONE - f.normal * f.normal,
         };
         across * self.half * self.half * (f.k / (2.0 * f.rho.max(self.radius)))
     }
 
     /// True where a tangent at another point can tighten the literal's bound.
     pub fn is_curved_convex(&self, side: Side, id: LiteralId) -> bool {
-        id.sense() == Sense::Positive && !matches!(self.faces(side).get(id.face()), Face::Plane { .. })
+        id.sense() == Sense::Positive && !self.faces(side).get(id.face()).is_flat()
     }
 }

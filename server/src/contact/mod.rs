@@ -3,15 +3,18 @@
 //! Floor 6: imports `eco`, `bound`, `motion`, `solid`, `math`, `proto`.
 
 pub mod asked;
+mod cell;
 pub mod certificate;
 pub mod clause;
 pub mod clearance;
 pub mod clock;
-pub mod closed;
 mod depth;
 mod direct;
+mod extent;
 mod features;
 pub mod fit;
+mod found;
+mod handed;
 mod hole;
 pub mod literal;
 pub mod lp;
@@ -19,6 +22,7 @@ pub mod newton;
 pub mod outcome;
 pub mod pair;
 mod propose;
+pub mod query;
 pub mod region;
 mod rescue;
 pub mod roots;
@@ -30,14 +34,14 @@ mod task;
 #[cfg(test)]
 mod tests;
 mod unbounded;
+pub mod within;
 mod work;
 
 pub use asked::Asked;
 pub use clock::{Clock, Stage};
 pub(crate) use direct::{Glance, Glancing, Hull, Stance};
 pub use outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
-pub use pair::{
-    Body, Ideas, PairQuery, PairSearch, default_resolution, earliest_contact, find_earliest, resolution_of,
-};
+pub use pair::{PairSearch, earliest_contact, find_earliest, resolution_of};
+pub use query::{Body, Ideas, PairQuery, default_resolution};
 pub use region::{Region, RegionPoint, Regions};
 pub use search::Scratch;

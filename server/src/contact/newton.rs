@@ -16,8 +16,8 @@
 
 use super::literal::{Faces, Side};
 use crate::motion::{Instant, Relative};
-use crate::solid::face::FaceAt;
 use crate::solid::local::LiteralId;
+use crate::solid::surface::Curvature;
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -96,46 +96,9 @@ pub struct Row {
     pub(crate) gradient_rate: DVec3,
 }
 
-fn outer(u: DVec3, v: DVec3) -> DMat3 {
-    DMat3::from_cols(u * v.x, u * v.y, u * v.z)
-}
-
-/// The Hessian of psi of a face at a point, `each`·I + `factor`·`along`⊗`along`, in the face's own frame: a form that
-/// turns by turning one vector.
-struct Curvature {
-    each: f64,
-    factor: f64,
-    along: DVec3,
-}
-
-impl Curvature {
-    const NONE: Self = Self { each: 0.0, factor: 0.0, along: DVec3::ZERO };
-
-    fn of(face: &Face, f: &FaceAt) -> Self {
-        if f.rho == 0.0 {
-            return Self::NONE;
-        }
-        match *face {
-            Face::Plane { .. } => Self::NONE,
-            Face::Sphere { .. } => {
-                let each = 1.0 / f.rho;
-                Self { each, factor: -each, along: f.normal }
-            }
-            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => {
-                // The tangent across the axis is the same for the cone's normal and its radial direction.
-                Self { each: 0.0, factor: f.k / f.rho, along: axis.cross(f.normal).normalize_or_zero() }
-            }
-        }
-    }
-
-    fn matrix(&self) -> DMat3 {
-        outer(self.along, self.along * self.factor) + DMat3::from_diagonal(DVec3::splat(self.each))
-    }
-}
-
 /// Hessian of psi of a face at a point, in the face's own frame.
 pub(super) fn hessian(face: &Face, x: DVec3) -> DMat3 {
-    Curvature::of(face, &face.at(x)).matrix()
+    face.curvature(&face.at(x)).matrix()
 }
 
 impl Problem<'_> {
@@ -147,7 +110,7 @@ impl Problem<'_> {
         let (value, mut gradient, mut curvature) = match *c {
             Constraint::Literal(..) => {
                 let f = face.at(own);
-                let curvature = Curvature::of(face, &f);
+                let curvature = face.curvature(&f);
                 if id.sense() == Sense::Positive {
                     (f.value + level, f.normal, curvature)
                 } else {
@@ -156,11 +119,10 @@ impl Problem<'_> {
                 }
             }
             Constraint::Apex(_, _, k) => {
-                let Face::Cone { apex, axis, sin, .. } = *face else { unreachable!("apex of a cone") };
-                let u = crate::math::any_perpendicular(axis);
-                let n = [axis, u, axis.cross(u)][k as usize];
-                let shift = if k == 0 { level / sin } else { 0.0 };
-                (n.dot(own - apex) - shift, n, Curvature::NONE)
+                let apex = face.apex().expect("a constraint at an apex is of a face that has one");
+                let n = apex.directions()[k as usize];
+                let shift = if k == 0 { level / apex.sin } else { 0.0 };
+                (n.dot(own - apex.point) - shift, n, Curvature::NONE)
             }
         };
         let (mut rate, mut gradient_rate) = (0.0, DVec3::ZERO);

@@ -171,7 +171,7 @@ pub struct Outcome {
     /// A vertex met a vertex: the normal is the average of the adjacent normals.
     pub averaged_normal: bool,
     /// A point that lies `depth` deep in both bodies at `time_upper`, in the frame of a's model, which does not take part in a spin about
-    /// an axis of revolution of its own (`pair::without_own_spin`). Of contacts that a search has found.
+    /// an axis of revolution of its own (`query::without_own_spin`). Of contacts that a search has found.
     pub witness: Option<DVec3>,
     /// Contact point, or a point that proves an overlap: deeper than 2 delta in both. Meaningful for these two only.
     pub point: DVec3,

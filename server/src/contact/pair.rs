@@ -1,109 +1,30 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
-use super::asked::Asked;
+use super::cell::Ending;
 use super::clock::Stage;
 use super::depth;
 use super::direct::{self, Quick};
+use super::extent::{ACTIVE, INCIDENT, extent, note, noted, rank_of};
 use super::features::Features;
+use super::found::Found;
 use super::hole;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
-use super::propose::Found;
-use super::search::{Ending, Scratch, Search};
+use super::query::PairQuery;
+use super::search::{Scratch, Search};
 use super::separation;
-use super::task::{Task, witness_level};
+use super::task::{RAISES, Task, most_raised, raised, witness_level};
 use super::unbounded;
 use super::work::Work;
-use crate::eco::Model;
-use crate::math::tolerance;
-use crate::motion::{Instant, Placed, Relative};
-use crate::solid::{Face, Sense};
+use crate::motion::Instant;
+use crate::solid::Sense;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
-/// One body of a pair.
-#[derive(Clone, Copy, Debug)]
-pub struct Body<'a> {
-    /// Its model.
-    pub model: &'a Model,
-    /// Where it stands and how it moves.
-    pub placed: Placed,
-}
-
-/// A question: two bodies over one step.
-#[derive(Clone, Copy, Debug)]
-pub struct PairQuery<'a> {
-    /// The first body; normals point from it.
-    pub a: Body<'a>,
-    /// The second one.
-    pub b: Body<'a>,
-    /// Depth delta at which a contact is decided; see `default_resolution`. Raised to `LEAST_RESOLUTION` of the pair's
-    /// extent over the step; the outcome tells what was used.
-    pub resolution: f64,
-    /// Cells' worth of work (`Counters::spent`) before the answer is `undecided`.
-    pub cell_limit: u64,
-    /// Ideas of the search that are switched on: all, unless their worth is measured.
-    pub ideas: Ideas,
-    /// What is worked out beside whether they meet.
-    pub asked: Asked,
-}
-
-impl PairQuery<'_> {
-    /// True when b carries the cells: small and without cavities is cheap to cover. A round peg that spins about hardly another axis
-    /// than its own in a hole with flat walls does not: seen from it the walls rush by, seen from these it all but stands
-    /// (`fit::spun`).
-    pub(super) fn is_swapped(&self) -> bool {
-        let [a, b] = [&self.a, &self.b];
-        if turns_between_walls(a, b) {
-            return true;
-        }
-        if turns_between_walls(b, a) {
-            return false;
-        }
-        let weight = |m: &Model| m.radius * if m.hollow { HOLLOW } else { 1.0 };
-        weight(self.b.model) < weight(self.a.model)
-    }
-}
-
-/// The ideas of the search, each of which can be switched off. None changes what an answer promises, only the work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ideas {
-    /// Stage 1: the collision region by S-bounds.
-    pub region: bool,
-    /// Stage 2: candidates from the walk of both octrees.
-    pub walk: bool,
-    /// Several faces with multipliers bound a cell together; otherwise the best single one does. For measurements only: nearly
-    /// every search then runs into its limit of cells.
-    pub multipliers: bool,
-    /// Same-shape fits as bounds of their own.
-    pub fits: bool,
-    /// Curved faces touched where a contact was found.
-    pub hints: bool,
-    /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
-    /// last digits: both solve the same equations, from another guess.
-    pub direct: bool,
-    /// Convex primitives against solids with holes are answered in front of the search, with the same proviso.
-    pub holes: bool,
-}
-
-impl Default for Ideas {
-    fn default() -> Self {
-        Self { region: true, walk: true, multipliers: true, fits: true, hints: true, direct: true, holes: true }
-    }
-}
-
-/// A hollow body counts as this much larger when the carrier of the cells is chosen.
-const HOLLOW: f64 = 2.0;
-
-/// 1e-9 of the larger bounding radius of the two models.
-pub fn default_resolution(a: &Model, b: &Model) -> f64 {
-    tolerance::DEFAULT_RESOLUTION * a.radius.max(b.radius)
-}
-
 /// The resolution that a question's answer will tell: its own, or the least that its rounding allows.
 pub fn resolution_of(query: &PairQuery) -> f64 {
-    unbounded::resolution(query).unwrap_or_else(|| PairSearch::task(query).0.delta)
+    unbounded::resolution(query).unwrap_or_else(|| Task::of(query).0.delta)
 }
 
 /// Searches a pair to its end.
@@ -145,7 +66,7 @@ fn whole(query: &PairQuery, outcome: &mut Outcome) -> Quick {
 /// Answers what is not told without a search.
 #[inline(never)]
 fn search(query: &PairQuery, quick: Quick, outcome: &mut Outcome, scratch: &mut Scratch) {
-    let (task, swapped) = PairSearch::task(query);
+    let (task, swapped) = Task::of(query);
     let mut search = PairSearch::of_task(query, task, swapped, (quick, outcome), std::mem::take(scratch));
     *outcome = search.run(f64::INFINITY).expect("a search without a horizon ends");
     *scratch = search.into_scratch();
@@ -167,51 +88,6 @@ fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         }
         None => whole(query, outcome),
     }
-}
-
-/// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
-pub(super) fn without_own_spin(body: &Body) -> Placed {
-    let mut placed = body.placed;
-    let spin = placed.motion.spin;
-    if spin != DVec3::ZERO {
-        let model_from_world = (placed.motion.start.rotation * placed.place.rotation).conjugate();
-        let along = model_from_world * spin;
-        let center = placed.place.inverse().position;
-        let axis = body.model.axis_of_revolution(along);
-        if axis.is_some_and(|a| a.is_along(along) && a.passes(center, body.model.radius)) {
-            placed.motion.spin = DVec3::ZERO;
-        }
-    }
-    placed
-}
-
-/// A spin about an axis of revolution of a body, nearly: this much of it, radians, and off the axis by no more than this part.
-const SPINS: f64 = 0.1;
-const OFF_AXIS: f64 = 0.02;
-
-/// Cosine of the angle between a wall and an axis up to which the one is along the other.
-const ALONG: f64 = 0.1;
-
-/// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the other one, which is
-/// bounded, has subtracted planes along that axis.
-fn turns_between_walls(peg: &Body, hole: &Body) -> bool {
-    let spin = peg.placed.motion.spin;
-    let candidates = hole.model.hollow && !peg.model.hollow && hole.model.radius.is_finite();
-    if !candidates || spin.length_squared() < SPINS * SPINS {
-        return false;
-    }
-    let world_from_model = |body: &Body| body.placed.motion.start.rotation * body.placed.place.rotation;
-    let along = world_from_model(peg).conjugate() * spin;
-    let Some(axis) = peg.model.axis_of_revolution(along) else { return false };
-    if axis.is_along(along) || axis.direction.cross(along).length() > OFF_AXIS * along.length() {
-        return false;
-    }
-    let axis = world_from_model(hole).conjugate() * (world_from_model(peg) * axis.direction);
-    let solid = &hole.model.solid;
-    solid.faces.iter().zip(&solid.face_owner).any(|(face, owner)| {
-        let negative = solid.senses[*owner as usize] == Sense::Negative;
-        matches!(face, Face::Plane { normal, .. } if negative && normal.dot(axis).abs() <= ALONG)
-    })
 }
 
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
@@ -237,76 +113,7 @@ pub struct PairSearch<'a> {
     spent: u64,
 }
 
-/// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
-const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
-
-/// The resolution after a raise.
-fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
-    resolution + 2e-6 * resolution + more * rounding
-}
-
-/// The resolution, raised where a wall of a body is as thick as twice a depth that is searched: a point in its middle could
-/// neither be excluded nor confirmed.
-fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
-    let at_depth = |wall: f64, depth: f64| {
-        (2.0 * depth..=2.0 * (witness_level(depth, rounding) + NEARLY_DEEP * rounding)).contains(&wall)
-    };
-    for _ in 0..RAISES.len() {
-        let mut walls = models.iter().flat_map(|m| m.solid.alike.walls()).map(|above| -above);
-        if !walls.any(|wall| at_depth(wall, resolution) || at_depth(wall, 2.0 * resolution)) {
-            break;
-        }
-        resolution = raised(resolution, RAISES[0], rounding);
-    }
-    resolution
-}
-
-/// Roundings beyond a witness' depth up to which a wall counts as just that thick.
-const NEARLY_DEEP: f64 = 8.0;
-
-/// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
-pub(super) fn most_raised(resolution: f64, rounding: f64) -> f64 {
-    RAISES.iter().fold(resolution, |r, more| raised(r, *more, rounding))
-}
-
 impl<'a> PairSearch<'a> {
-    /// What is searched for a question, and whether its second body carries the cells.
-    pub(super) fn task(query: &PairQuery<'a>) -> (Task<'a>, bool) {
-        let swapped = query.is_swapped();
-        let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
-        let (model_a, model_b) = (carrier.model, other.model);
-        let (a, b) = (&model_a.solid, &model_b.solid);
-        let relative = Relative::new(without_own_spin(&carrier), without_own_spin(&other));
-        let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
-        let scale = model_a.radius.max(model_b.radius);
-        let extent = ball_a.center.length()
-            + ball_b.center.length()
-            + 2.0 * scale
-            + relative.center_a().length()
-            + relative.difference(0.0).length().max(relative.difference(1.0).length());
-        let rounding = super::rounding::of_literals(model_a, model_b, &relative);
-        let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
-        let resolution = clear_of_walls(query.resolution.max(least), rounding, [model_a, model_b]);
-        let task = Task {
-            a,
-            b,
-            model_a,
-            model_b,
-            ideas: query.ideas,
-            asked: query.asked,
-            relative,
-            delta: resolution,
-            past: 0.0,
-            rounding,
-            nearly: rounding,
-            scale,
-            lead: 0.0,
-            limit: query.cell_limit,
-            asked_limit: query.cell_limit,
-        };
-        (task, swapped)
-    }
-
     /// Runs as `run` does, but refines at most `cells` more cells: a search that would need more is undecided.
     pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
         if let Some(search) = &mut self.search {
@@ -320,7 +127,7 @@ impl<'a> PairSearch<'a> {
 
     /// Prepares the search of a pair.
     pub fn new(query: &PairQuery<'a>, scratch: Scratch) -> Self {
-        let (task, swapped) = Self::task(query);
+        let (task, swapped) = Task::of(query);
         let mut outcome = clear(query);
         let quick = quick(query, &mut outcome);
         if let Quick::Told = quick {
@@ -430,6 +237,8 @@ impl<'a> PairSearch<'a> {
         let work = Work::new(self.task.limit.min(depth::MOST_CELLS));
         let deepest = depth::at_most(&self.task, &self.task.relative.at(0.0), x, &work);
         self.outcome.counters.instant_cells += work.cells();
+        // Of the question's limit, too: a search that is run piece by piece works out anew what it may still spend.
+        self.spent += work.cells();
         let Some(deepest) = deepest else { return false };
         self.outcome.counters.past_overlaps += 1;
         (self.outcome.touching, self.outcome.past) = (true, true);
@@ -651,20 +460,6 @@ fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Soluti
     (held && values.iter().all(|v| v.abs() <= most)).then_some(s)
 }
 
-/// Adds a face to those of a contact, once, where there is room.
-pub(super) fn note(list: &mut [u32; 3], face: u32) {
-    if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
-        && !list.contains(&face)
-    {
-        list[slot] = face;
-    }
-}
-
-/// How many faces are told.
-pub(super) fn noted(list: &[u32; 3]) -> usize {
-    list.iter().filter(|f| **f != NO_FACE).count()
-}
-
 /// What a solution's multipliers say about the contact.
 struct Active {
     count: [usize; 2],
@@ -677,9 +472,6 @@ struct Active {
     apex: [bool; 2],
     extent: Extent,
 }
-
-/// A multiplier above this holds its face in the contact.
-pub(super) const ACTIVE: f64 = 1e-8;
 
 impl Active {
     /// What holds a solution at a point and an instant: its own constraints, as far as they are active there.
@@ -771,53 +563,6 @@ impl Active {
             sum += normals.normalize_or_zero() * sign;
         }
         self.average = sum.try_normalize();
-    }
-}
-
-/// A face within this many roundings of a contact point passes through it.
-pub(super) const INCIDENT: f64 = 16.0;
-
-/// How many tangent planes some unit normals make: at least one.
-fn rank_of(normals: &[DVec3]) -> usize {
-    match normals {
-        [] | [_] => 1,
-        _ => span_of(normals).len(),
-    }
-}
-
-/// Orthonormal basis of the span of some unit vectors (Gram-Schmidt).
-fn span_of(vectors: &[DVec3]) -> SmallVec<[DVec3; 3]> {
-    let mut span: SmallVec<[DVec3; 3]> = SmallVec::new();
-    for g in vectors {
-        let r = span.iter().fold(*g, |r, e| r - *e * e.dot(r));
-        if r.length() > 1e-6 && span.len() < 3 {
-            span.push(r.normalize());
-        }
-    }
-    span
-}
-
-/// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
-pub(super) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
-    let span = span_of(gradients);
-    let flat = |v: f64| v.abs() * scale < 1e-6;
-    match span.len() {
-        1 => {
-            let u = crate::math::any_perpendicular(span[0]);
-            let v = span[0].cross(u);
-            let (a, b, c) = (u.dot(curvature * u), u.dot(curvature * v), v.dot(curvature * v));
-            let (mean, spread) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
-            match (flat(mean - spread), flat(mean + spread)) {
-                (true, true) => Extent::Patch,
-                (false, false) => Extent::Point,
-                _ => Extent::Line,
-            }
-        }
-        2 => {
-            let u = span[0].cross(span[1]).normalize();
-            if flat(u.dot(curvature * u)) { Extent::Line } else { Extent::Point }
-        }
-        _ => Extent::Point,
     }
 }
 

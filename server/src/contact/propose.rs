@@ -6,23 +6,23 @@
 //! those in one bracket the one that touches first.
 //! The search asks for proposals and uses their time; it never believes one that is not confirmed here.
 
+use super::cell::Cell;
 use super::clause::{Advance, Hint};
 use super::depth;
 use super::fit;
+use super::found::{Found, SAME_TIME};
 use super::literal::{Faces, Side};
 use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution, Weights};
-use super::search::{Cell, Search};
+use super::search::Search;
 use super::separation;
 use super::task::witness_level;
 use super::work::Work;
 use crate::eco::Model;
 use crate::motion::Instant;
+use crate::solid::Sense;
 use crate::solid::local::{self, LiteralId};
-use crate::solid::{Face, Sense};
+use crate::solid::surface::Apex;
 use glam::DVec3;
-
-/// Witnesses this close in time are of one contact; touches this close are at the same time.
-const SAME_TIME: f64 = 1e-12;
 
 /// Witnesses this close, in scales of the pair, are one point.
 const SAME_POINT: f64 = 1e-6;
@@ -48,46 +48,6 @@ const LATER: i32 = 11;
 
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
-
-/// A confirmed contact.
-#[derive(Clone, Debug)]
-pub struct Found {
-    /// The witness of depth delta.
-    pub deep: Solution,
-    /// The same contact where the surfaces meet, when it could be continued back.
-    pub touch: Option<Solution>,
-    /// Time until which everything must be proven free.
-    pub goal: f64,
-    /// Earliest time of a witness of depth delta, this contact's or a rival's.
-    pub upper: f64,
-    /// That witness, in A's frame.
-    pub witness: DVec3,
-}
-
-impl Found {
-    /// Latest time at which a contact that touches earlier than this one may reach delta and still be preferred to it: its
-    /// witness comes later by no more than this one's own lag behind its touch.
-    pub(super) fn latest_rival(&self) -> f64 {
-        self.touch.as_ref().map_or(self.goal, |touch| 2.0 * self.deep.t - touch.t.max(0.0))
-    }
-
-    /// The contact to report of two: of those that reach delta at about the same time the one that touches first.
-    fn or(self, other: Self) -> Self {
-        let goal = self.goal.min(other.goal);
-        let (upper, witness) = self.earlier_witness(&other);
-        let (first, second) = if other.goal < self.goal { (other, self) } else { (self, other) };
-        let earlier = match (&first.touch, &second.touch) {
-            (Some(a), Some(b)) => b.t < a.t - SAME_TIME && second.deep.t <= first.latest_rival(),
-            _ => false,
-        };
-        Self { goal, upper, witness, ..if earlier { second } else { first } }
-    }
-
-    /// The earlier of two witnesses.
-    fn earlier_witness(&self, other: &Self) -> (f64, DVec3) {
-        if other.upper < self.upper { (other.upper, other.witness) } else { (self.upper, self.witness) }
-    }
-}
 
 impl Search<'_> {
     pub(super) fn problem(&self) -> Problem<'_> {
@@ -163,7 +123,7 @@ impl Search<'_> {
         // A cone whose apex is near: the apex is a vertex of its own.
         let apex_of = |l: &(Side, LiteralId, f64)| {
             let solid = if l.0 == Side::A { self.task.a } else { self.task.b };
-            let Face::Cone { apex, .. } = solid.faces[l.1.face() as usize] else { return None };
+            let apex = solid.faces[l.1.face() as usize].apex()?.point;
             let apex = if l.0 == Side::A { apex } else { at.a_point(apex) };
             let near = (apex - cell.center).length() <= 4.0 * cell.half.length();
             (l.1.sense() == Sense::Positive && near).then_some(apex)
@@ -219,7 +179,7 @@ impl Search<'_> {
         s.active.iter().all(|c| {
             let Constraint::Apex(side, id, 0) = *c else { return true };
             let solid = if side == Side::A { self.task.a } else { self.task.b };
-            let Face::Cone { axis, sin, .. } = solid.faces[id.face() as usize] else { return false };
+            let Some(Apex { axis, sin, .. }) = solid.faces[id.face() as usize].apex() else { return false };
             let axis = if side == Side::A { axis } else { at.a_vector(axis) };
             let same = s
                 .active
@@ -238,7 +198,7 @@ impl Search<'_> {
             return false;
         }
         self.counters.newton += 1;
-        self.stage2.all = true;
+        self.handed.all = true;
         let confirmed = match self.problem().refine(
             &active,
             x,
@@ -277,7 +237,7 @@ impl Search<'_> {
             },
             Err(false) => false,
         };
-        self.stage2.all = false;
+        self.handed.all = false;
         confirmed
     }
 
@@ -298,7 +258,7 @@ impl Search<'_> {
     /// multipliers was confirmed.
     fn polish(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, lambda: Vec<f64>) -> bool {
         // A whole-primitive guess that leads nowhere is given up early: the next one is from nearer.
-        let patient = !self.stage2.all;
+        let patient = !self.handed.all;
         self.polish_for(patient, active, x, t, lambda)
     }
 
@@ -314,7 +274,7 @@ impl Search<'_> {
         let level = witness_level(self.task.delta, self.task.rounding);
         for _ in 0..7 {
             debug_assert!(
-                active.iter().all(|c| self.stage2.knows(&self.task, c)),
+                active.iter().all(|c| self.handed.knows(&self.task, c)),
                 "stage 3 asks for a primitive that stage 2 has not handed over: {active:?}"
             );
             self.counters.newton += 1;
@@ -351,7 +311,7 @@ impl Search<'_> {
             // Something else decides there: it enters, the smallest multiplier leaves. A primitive that the walk has not
             // handed over is not asked.
             let entering = self.deciding(s.x, &at);
-            if active.contains(&entering) || !self.stage2.knows(&self.task, &entering) {
+            if active.contains(&entering) || !self.handed.knows(&self.task, &entering) {
                 return false;
             }
             if active.len() >= 4 {
@@ -432,7 +392,7 @@ impl Search<'_> {
         for c in &s.active {
             let Constraint::Literal(side, id) = *c else { continue };
             let (solid, point) = if side == Side::A { (self.task.a, s.x) } else { (self.task.b, at.b_point(s.x)) };
-            if id.sense() == Sense::Negative || matches!(solid.faces[id.face() as usize], Face::Plane { .. }) {
+            if id.sense() == Sense::Negative || solid.faces[id.face() as usize].is_flat() {
                 continue;
             }
             if self.scratch.hints.len() == MAX_HINTS {
@@ -472,7 +432,7 @@ impl Search<'_> {
         let problem = self.problem();
         let continues = self.task.continues();
         // A whole primitive's contact is regular as a rule: a plain step or two.
-        let plain = (continues && self.stage2.all)
+        let plain = (continues && self.handed.all)
             .then(|| problem.refine(&deep.active, deep.x, deep.t, deep.lambda.clone(), 0.0));
         let touch = match plain {
             Some(Ok(s)) if (s.x - deep.x).length() <= SAME_POINT * self.task.scale => Some(s),
@@ -620,7 +580,7 @@ impl Search<'_> {
     fn touch_beside(&self, s: Solution, latest: f64) -> Option<Solution> {
         let beside = self.deciding(s.x, &self.task.relative.at(s.t));
         let full = s.active.len() == MAX_ACTIVE;
-        if full || s.active.contains(&beside) || !self.stage2.knows(&self.task, &beside) {
+        if full || s.active.contains(&beside) || !self.handed.knows(&self.task, &beside) {
             return None;
         }
         let active: Vec<_> = s.active.iter().copied().chain([beside]).collect();

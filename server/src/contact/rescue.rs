@@ -9,22 +9,22 @@
 //! Either way the whole trees confirm the point, and everything before the goal must still be proven. A search that cannot
 //! do that in `LAST` cells ends with what it has: the time proven and the witness bracket the contact.
 
+use super::cell::{Cell, Ending};
 use super::depth;
 use super::fit;
+use super::found::Found;
 use super::literal::Side;
 use super::newton::{Constraint, HELD, MAX_ACTIVE, SETTLED, Solution};
-use super::propose::{Found, has_both_sides};
-use super::search::{Cell, Ending, Search};
-use super::separation::{self, Within};
+use super::propose::has_both_sides;
+use super::search::Search;
+use super::separation;
 use super::task::{Task, witness_level};
+use super::within::{Within, within};
 use super::work::Work;
 use crate::motion::Instant;
 use crate::solid::local::{self, LiteralId};
 use crate::solid::{Face, Sense, Solid};
 use glam::DVec3;
-
-/// Cells after which a witness is looked for; again whenever as many more were refined.
-pub(super) const FIRST_PROBE: u64 = 2_000;
 
 /// Cells after which a witness and what is proven by then are the answer.
 const LAST: u64 = 16_000;
@@ -43,8 +43,9 @@ const FINE: usize = 40;
 /// A climb's end that is this many roundings deep lies on both surfaces.
 const ON_SURFACE: f64 = 4.0;
 
-/// How deep the end of a climb may lie that is told as a touch, relative to the bodies.
-const TOUCHES: f64 = 2e-10;
+/// How far from either surface the end of a climb may lie that is told as a touch, relative to the bodies. Where none lies so near the
+/// witness alone is told (`Outcome::not_continued`).
+const TOUCHES: f64 = 1e-11;
 
 impl Search<'_> {
     /// Looks for a witness soon after a cell's time; an ending where nothing more is to be gained by further cells.
@@ -71,7 +72,7 @@ impl Search<'_> {
         if proven <= 0.0 {
             let at = self.task.relative.at(0.0);
             let work = Work::new(START);
-            let free = separation::within(&self.task, &at, -self.task.delta, &work);
+            let free = within(&self.task, &at, -self.task.delta, &work);
             self.counters.cells += work.cells();
             match free {
                 Within::Apart => {}
@@ -155,9 +156,9 @@ impl Search<'_> {
             return false;
         }
         // The trees name what decides: stage 2 is not asked.
-        let all = std::mem::replace(&mut self.stage2.all, true);
+        let all = std::mem::replace(&mut self.handed.all, true);
         let solved = self.polish_for(true, active, x, t, lambda);
-        self.stage2.all = all;
+        self.handed.all = all;
         solved
     }
 
@@ -205,7 +206,8 @@ impl Search<'_> {
         let goal = (0.5 * (touch.t + t)).max(f64::MIN_POSITIVE);
         // The climb may end elsewhere a moment before: then it has come to no touch.
         let at = self.task.relative.at(touch.t);
-        let off = separation::value(&self.task, &at, touch.x).abs();
+        let values = [self.task.model_a.value(touch.x), self.task.model_b.value(at.b_point(touch.x))];
+        let off = values[0].abs().max(values[1].abs());
         let touch = Some(touch).filter(|s| s.t == 0.0 || off <= TOUCHES * self.task.scale + 4.0 * least);
         self.found = Some(Found { deep: solution(t, x, support), touch, goal, upper: t, witness: x });
     }
@@ -227,10 +229,7 @@ const HEIGHTS: [f64; 7] = [0.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
 impl Fit<'_> {
     /// Where the positive face is on the wall of the other one first, on several heights of both, beside `x`.
     fn guesses(&self, task: &Task, at: &Instant, x: DVec3) -> impl Iterator<Item = DVec3> {
-        let axis = match *self.positive {
-            Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => axis,
-            _ => DVec3::ZERO,
-        };
+        let axis = self.positive.axis().map_or(DVec3::ZERO, |axis| axis.direction);
         let (axis, radius) = match self.side {
             Side::A => (axis, task.model_a.radius),
             Side::B => (at.a_vector(axis), task.model_b.radius),
@@ -249,7 +248,7 @@ fn alike<'a>(task: &Task<'a>) -> Vec<Fit<'a>> {
         ids.sort_unstable();
         ids.dedup();
         let faces = ids.into_iter().map(|id| &solid.faces[id.face() as usize]);
-        faces.filter(|face| !matches!(face, Face::Plane { .. })).take(FITS).collect()
+        faces.filter(|face| !face.is_flat()).take(FITS).collect()
     };
     let mut fits = Vec::new();
     for (side, own, other) in [(Side::A, task.a, task.b), (Side::B, task.b, task.a)] {

@@ -11,117 +11,24 @@
 //! was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for clearances, too. At t = 0 such cells are refined like any other, and a
 //! witness found there restarts the search at 2 delta, then means overlap.
 
+use super::cell::{Cell, Ending, Range, Source};
 use super::clause::{self, Advance, Hint};
 use super::clock::{Clock, Stage};
+use super::found::Found;
+use super::handed::Handed;
 use super::literal::{Side, View};
 use super::outcome::Counters;
-use super::propose::Found;
-use super::rescue;
-use super::stage2::Stage2;
 use super::task::Task;
-use crate::math::Aabb;
 use crate::math::halt::Halt;
 use crate::motion::Instant;
 use crate::solid::Face;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use glam::DVec3;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
-/// An expression in the token pool; `start == end` means true everywhere.
-pub(super) type Range = (u32, u32);
-
-/// What an item of the queue is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
-    /// A cell of stage 3.
-    Cell,
-    /// A slice of time for stages 1 and 2.
-    Slice,
-}
-
-/// An item: a box fixed in A with what is left there of both trees, or what such boxes come from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cell {
-    /// Proven free of contact before this time.
-    pub t: f64,
-    /// End of the slice of time that it stands for.
-    pub until: f64,
-    /// Order of creation: ties in time are popped in this order.
-    pub serial: u64,
-    pub center: DVec3,
-    pub half: DVec3,
-    pub a: Range,
-    /// B's expression at all times.
-    pub b_always: Range,
-    /// B's expression until `b_until`.
-    pub b: Range,
-    pub b_until: f64,
-    /// Length of a look ahead in units of radius / speed.
-    pub reach: f64,
-    /// What it is; only cells have a box and expressions.
-    pub source: Source,
-}
-
-impl Cell {
-    pub(super) fn new((t, until): (f64, f64), region: &Aabb, a: Range, b: Range) -> Self {
-        let (center, half) = (region.center(), region.half());
-        Self {
-            t,
-            until,
-            serial: 0,
-            center,
-            // Centre and half are rounded; the box they make must hold the region.
-            half: half + (center.abs() + half) * f64::EPSILON,
-            a,
-            b_always: b,
-            b,
-            b_until: f64::INFINITY,
-            reach: 2.0,
-            source: Source::Cell,
-        }
-    }
-
-    pub(super) fn source(t: f64, until: f64, source: Source) -> Self {
-        Self { source, ..Self::new((t, until), &Aabb::around(DVec3::ZERO, DVec3::ZERO), (0, 0), (0, 0)) }
-    }
-}
-
-impl PartialEq for Cell {
-    fn eq(&self, o: &Self) -> bool {
-        self.cmp(o) == Ordering::Equal
-    }
-}
-impl Eq for Cell {}
-impl PartialOrd for Cell {
-    fn partial_cmp(&self, o: &Self) -> Option<Ordering> {
-        Some(self.cmp(o))
-    }
-}
-impl Ord for Cell {
-    // The heap's greatest is the earliest.
-    fn cmp(&self, o: &Self) -> Ordering {
-        o.t.total_cmp(&self.t).then(o.serial.cmp(&self.serial))
-    }
-}
-
-/// How a search ended.
-// The contact is kept in place: one a query, and nothing allocated.
-#[allow(clippy::large_enum_variant)]
-#[derive(Clone, Debug)]
-pub enum Ending {
-    /// No contact within the step.
-    Clear,
-    /// The earliest contact.
-    Contact(Found),
-    /// A point of this depth exists at t = 0 (A's frame).
-    Deep(DVec3),
-    /// Free before this time; then, to within rounding, as deep as delta: neither excluded nor a contact.
-    Rounding(f64),
-    /// The work limit ran out; free before this time.
-    Limit(f64),
-}
+/// Cells after which a witness is looked for; again whenever as many more were refined.
+pub(super) const FIRST_PROBE: u64 = 2_000;
 
 /// Cells beyond the goal that are asked whether another contact touches earlier.
 const MAX_RIVALS: u32 = 16;
@@ -191,7 +98,7 @@ impl Scratch {
 pub struct Search<'a> {
     pub(super) task: Task<'a>,
     pub(super) scratch: Scratch,
-    pub(super) stage2: Stage2,
+    pub(super) handed: Handed,
     serial: u64,
     pub(super) found: Option<Found>,
     /// Cells beyond the goal that were asked for a rival.
@@ -218,12 +125,12 @@ impl<'a> Search<'a> {
         Self {
             task,
             scratch,
-            stage2: Stage2::default(),
+            handed: Handed::default(),
             serial: 0,
             found: None,
             rivals: 0,
             instant,
-            probe: rescue::FIRST_PROBE,
+            probe: FIRST_PROBE,
             stuck: None,
             counters: Counters::default(),
         }

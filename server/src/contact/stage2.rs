@@ -8,13 +8,12 @@
 //! down to the voxels it may meet (their hull's six planes keep the cell to it: guards).
 //! Stage 3 has no other source of primitives: `knows` tells which were handed over.
 
+use super::cell::{Cell, Range, Source};
 use super::clock::Stage;
 use super::literal::Side;
-use super::newton::Constraint;
 use super::roots;
 use super::roots::Root;
-use super::search::{Cell, Range, Search, Source};
-use super::task::Task;
+use super::search::Search;
 use crate::bound::Region;
 use crate::bound::pair::{Pruned, Side as Operand, locate};
 use crate::eco::span::primitive_span;
@@ -23,9 +22,10 @@ use crate::eco::{Kind, Node};
 use crate::math::Aabb;
 use crate::solid;
 use crate::solid::local::{self, LiteralId, Token, Truth};
-use crate::solid::{Face, NodeId, Sense, Solid};
+use crate::solid::surface::Plane;
+use crate::solid::{NodeId, Sense, Solid};
 use glam::DVec3;
-use std::collections::{HashSet, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Positive alternatives that a body may be split into.
@@ -38,24 +38,6 @@ const MOST_NODE_PAIRS: usize = 400;
 const SLICE_TRAVEL: f64 = 0.25;
 /// … down to this part of the step.
 const SLICE_LEAST: f64 = 1.0 / 64.0;
-
-/// What the first two stages have handed over so far.
-#[derive(Debug, Default)]
-pub struct Stage2 {
-    handed: [HashSet<u32>; 2],
-    /// Everything is known: a whole-primitive shortcut is at work.
-    pub(super) all: bool,
-    candidates: HashSet<(u32, u32)>,
-}
-
-impl Stage2 {
-    /// True when the constraint's primitive was handed to stage 3.
-    pub fn knows(&self, task: &Task, c: &Constraint) -> bool {
-        let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
-        let solid = if side == Side::A { task.a } else { task.b };
-        self.all || self.handed[side as usize].contains(&solid.face_owner[id.face() as usize])
-    }
-}
 
 impl<'a> Search<'a> {
     /// Queues the whole step.
@@ -222,7 +204,7 @@ impl<'a> Search<'a> {
                 let mut normal = DVec3::ZERO;
                 normal[k] = sign;
                 let id = (self.task.b.faces.len() + self.scratch.guards_b.len()) as u32;
-                self.scratch.guards_b.push(Face::Plane { normal, offset });
+                self.scratch.guards_b.push(Plane { normal, offset }.into());
                 tokens.push(local::literal_token(LiteralId::new(id, Sense::Positive)));
             }
         }
@@ -251,13 +233,13 @@ impl<'a> Search<'a> {
         let (a, b) = (owners(a, self.task.a), owners(b, self.task.b));
         for p in &a {
             for q in &b {
-                if self.stage2.candidates.insert((*p, *q)) {
+                if self.handed.candidates.insert((*p, *q)) {
                     self.counters.candidates += 1;
                 }
             }
         }
-        self.stage2.handed[0].extend(a);
-        self.stage2.handed[1].extend(b);
+        self.handed.primitives[0].extend(a);
+        self.handed.primitives[1].extend(b);
     }
 }
 
@@ -284,5 +266,5 @@ fn write_pruned(solid: &Solid, pruned: &Pruned, out: &mut Vec<Token>) -> Truth {
             Sense::Negative => Truth::True,
         });
     }
-    local::write_node(solid, solid.root, Sense::Positive, &|n: NodeId| pruned.node_alive(n), out)
+    solid::write_node(solid, solid.root, Sense::Positive, &|n: NodeId| pruned.node_alive(n), out)
 }

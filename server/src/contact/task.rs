@@ -3,8 +3,9 @@
 use super::asked::Asked;
 use super::literal::{Faces, View};
 use super::newton::Problem;
-use super::pair::Ideas;
+use super::query::{Ideas, PairQuery, without_own_spin};
 use crate::eco::Model;
+use crate::math::tolerance;
 use crate::motion::{Bounds, Instant, Relative};
 use crate::solid::{Face, Solid};
 use glam::DVec3;
@@ -48,6 +49,43 @@ pub struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
+    /// What is searched for a question, and whether its second body carries the cells.
+    pub(super) fn of(query: &PairQuery<'a>) -> (Task<'a>, bool) {
+        let swapped = query.is_swapped();
+        let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+        let (model_a, model_b) = (carrier.model, other.model);
+        let (a, b) = (&model_a.solid, &model_b.solid);
+        let relative = Relative::new(without_own_spin(&carrier), without_own_spin(&other));
+        let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
+        let scale = model_a.radius.max(model_b.radius);
+        let extent = ball_a.center.length()
+            + ball_b.center.length()
+            + 2.0 * scale
+            + relative.center_a().length()
+            + relative.difference(0.0).length().max(relative.difference(1.0).length());
+        let rounding = super::rounding::of_literals(model_a, model_b, &relative);
+        let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
+        let resolution = clear_of_walls(query.resolution.max(least), rounding, [model_a, model_b]);
+        let task = Task {
+            a,
+            b,
+            model_a,
+            model_b,
+            ideas: query.ideas,
+            asked: query.asked,
+            relative,
+            delta: resolution,
+            past: 0.0,
+            rounding,
+            nearly: rounding,
+            scale,
+            lead: 0.0,
+            limit: query.cell_limit,
+            asked_limit: query.cell_limit,
+        };
+        (task, swapped)
+    }
+
     /// A cell, by its centre and half extents, at an instant of its own time.
     pub(super) fn view<'v>(
         &self,
@@ -133,4 +171,36 @@ impl<'a> Task<'a> {
 pub(super) fn witness_level(delta: f64, rounding: f64) -> f64 {
     // Deep enough to be so after all rounding, with what Newton may leave.
     delta + 1e-6 * delta.abs() + 1.5 * rounding
+}
+
+/// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
+pub(super) const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
+
+/// The resolution after a raise.
+pub(super) fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
+    resolution + 2e-6 * resolution + more * rounding
+}
+
+/// The resolution, raised where a wall of a body is as thick as twice a depth that is searched: a point in its middle could
+/// neither be excluded nor confirmed.
+fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
+    let at_depth = |wall: f64, depth: f64| {
+        (2.0 * depth..=2.0 * (witness_level(depth, rounding) + NEARLY_DEEP * rounding)).contains(&wall)
+    };
+    for _ in 0..RAISES.len() {
+        let mut walls = models.iter().flat_map(|m| m.solid.alike.walls()).map(|above| -above);
+        if !walls.any(|wall| at_depth(wall, resolution) || at_depth(wall, 2.0 * resolution)) {
+            break;
+        }
+        resolution = raised(resolution, RAISES[0], rounding);
+    }
+    resolution
+}
+
+/// Roundings beyond a witness' depth up to which a wall counts as just that thick.
+const NEARLY_DEEP: f64 = 8.0;
+
+/// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
+pub(super) fn most_raised(resolution: f64, rounding: f64) -> f64 {
+    RAISES.iter().fold(resolution, |r, more| raised(r, *more, rounding))
 }

@@ -1,5 +1,6 @@
 //! Pairs with a right answer in closed form, each through the whole search.
 
+use super::task::Task;
 use super::*;
 use crate::contact::outcome::EVALUATIONS_PER_CELL;
 use crate::eco::Model;
@@ -271,7 +272,7 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             ideas: Ideas::default(),
             asked: Asked::DEPTH,
         };
-        let (task, _) = PairSearch::task(&query);
+        let (task, _) = Task::of(&query);
         let mut search = search::Search::new(task, Scratch::default());
         // A hull of voxels as a walk might leave it.
         let hull = Aabb::around(v(0.5 * r(0.137), 0.5 * r(0.291), 0.0), v(0.15, 0.2, 0.1));

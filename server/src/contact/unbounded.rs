@@ -5,7 +5,7 @@
 //! tells nothing is undecided, at once.
 
 use super::outcome::{Kind, Outcome, Status};
-use super::pair::{Body, PairQuery};
+use super::query::{Body, PairQuery};
 use crate::math::tolerance;
 use crate::solid::{Face, Node, Solid};
 use contactd_proto::Pose;
@@ -75,32 +75,25 @@ impl<'a> Side<'a> {
 
     /// Normals of its planes, world axes, out of what is solid there.
     fn normals(&self) -> impl Iterator<Item = DVec3> + '_ {
-        let planes = self.solid.faces.iter().filter_map(|face| match face {
-            Face::Plane { normal, .. } => Some(self.world_from_model.rotation * *normal),
-            _ => None,
-        });
+        let flat = self.solid.faces.iter().filter_map(Face::flat);
+        let planes = flat.map(|(normal, _)| self.world_from_model.rotation * normal);
         planes.flat_map(|n| [n, -n])
     }
 
     /// The outward normal and the offset of a solid that is one half-space, world axes.
     fn half_space(&self) -> Option<(DVec3, f64)> {
-        let (Node::Primitive(_), [Face::Plane { normal, offset }]) =
-            (&self.solid.nodes[self.solid.root as usize], self.solid.faces.as_slice())
+        let (Node::Primitive(_), [face]) = (&self.solid.nodes[self.solid.root as usize], self.solid.faces.as_slice())
         else {
             return None;
         };
-        let n = self.world_from_model.rotation * *normal;
+        let (normal, offset) = face.flat()?;
+        let n = self.world_from_model.rotation * normal;
         Some((n, n.dot(self.world_from_model.position) + offset))
     }
 
     /// A length by which far is measured.
     fn size(&self) -> f64 {
-        let reach = self.solid.faces.iter().map(|face| match *face {
-            Face::Plane { offset, .. } => offset.abs(),
-            Face::Sphere { center, radius } => center.length() + radius,
-            Face::Cylinder { origin, radius, .. } => origin.length() + radius,
-            Face::Cone { apex, .. } => apex.length(),
-        });
+        let reach = self.solid.faces.iter().map(Face::reach);
         self.world_from_model.position.length() + reach.fold(0.0, f64::max)
     }
 

@@ -28,8 +28,10 @@ use crate::bound::{SBounds, Volumes};
 use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};
 use crate::solid;
 use crate::solid::local::{LiteralId, Token, Truth};
-use crate::solid::revolution::{Axis, Revolution};
-use crate::solid::{Face, Parts, Primitive, Sense, Shape, Solid};
+use crate::solid::primitive::Form;
+use crate::solid::revolution::Revolution;
+use crate::solid::surface::Axis;
+use crate::solid::{Face, Parts, Sense, Solid};
 use glam::DVec3;
 use std::sync::OnceLock;
 
@@ -101,19 +103,19 @@ impl Model {
             [aabb.min.abs().max(aabb.max.abs()), aabb.half()].map(DVec3::length)
         };
         let ball = match solid.whole() {
-            Some(Primitive { shape: Shape::Sphere(ball), frame, first_face, .. }) if frame.position == DVec3::ZERO => {
-                Some((ball.radius, *first_face))
+            Some(p) if p.frame.position == DVec3::ZERO => {
+                if let Form::Ball(radius) = p.shape.form() {
+                    Some((radius, p.first_face))
+                } else {
+                    None
+                }
             }
             _ => None,
         };
         let hollow = solid.senses.contains(&Sense::Negative);
-        let radius_of = |(face, owner): (&Face, &u32)| match *face {
-            Face::Sphere { radius, .. } | Face::Cylinder { radius, .. }
-                if solid.senses[*owner as usize] == Sense::Negative =>
-            {
-                radius
-            }
-            _ => f64::INFINITY,
+        let radius_of = |(face, owner): (&Face, &u32)| {
+            let subtracted = solid.senses[*owner as usize] == Sense::Negative;
+            face.radius().filter(|_| subtracted).unwrap_or(f64::INFINITY)
         };
         let narrowest = solid.faces.iter().zip(&solid.face_owner).map(radius_of).fold(f64::INFINITY, f64::min);
         let parts = Parts::of(&solid);
@@ -239,7 +241,7 @@ impl Model {
             Kind::Full => Truth::True,
             Kind::Empty => Truth::False,
             _ if node.half.is_finite() => local::write_literals(&self.solid, node.terms(), &node.aabb(), delta, out),
-            _ => solid::local::write_tree(&self.solid, out),
+            _ => solid::write_tree(&self.solid, out),
         }
     }
 }

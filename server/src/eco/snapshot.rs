@@ -18,7 +18,7 @@ use super::tables::Kind;
 use super::{Eco, Model};
 use crate::bound::{Bound, SBounds, Volumes};
 use crate::math::{Aabb, Ball};
-use crate::solid::primitive::{Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Sphere};
+use crate::solid::primitive::{Checked, Sink, Source};
 use crate::solid::{self, Label, Op, Primitive, Shape, Solid};
 use bincode::{BorrowDecode, Encode};
 use contactd_proto::Pose;
@@ -109,33 +109,8 @@ impl Snapshot {
     }
 
     fn shape(&mut self, shape: &Shape) {
-        let tag = match shape {
-            Shape::Sphere(s) => {
-                self.number(s.radius);
-                SPHERE
-            }
-            Shape::Cylinder(s) => {
-                self.numbers([s.radius, s.half_height]);
-                CYLINDER
-            }
-            Shape::Cone(s) => {
-                self.numbers([s.bottom, s.top, s.half_height]);
-                CONE
-            }
-            Shape::Cuboid(s) => {
-                self.numbers(s.half.to_array());
-                CUBOID
-            }
-            Shape::Polyhedron(s) => {
-                self.word(s.vertices.len());
-                self.word(s.planes.len());
-                s.vertices.iter().for_each(|v| self.numbers(v.to_array()));
-                s.planes.iter().for_each(|(n, d)| self.numbers([n.x, n.y, n.z, *d]));
-                POLYHEDRON
-            }
-            Shape::HalfSpace(HalfSpace) => HALF_SPACE,
-        };
-        self.tags.push(tag);
+        shape.geometry().write(self);
+        self.tags.push(shape.tag());
     }
 
     fn tree_node(&mut self, node: &solid::Node) {
@@ -175,21 +150,11 @@ impl Snapshot {
     }
 }
 
-const SPHERE: u8 = 0;
-const CYLINDER: u8 = 1;
-const CONE: u8 = 2;
-const CUBOID: u8 = 3;
-const POLYHEDRON: u8 = 4;
-const HALF_SPACE: u8 = 5;
-
 const NOTHING: u8 = 0;
 const PRIMITIVE: u8 = 1;
 const UNION: u8 = 2;
 const INTERSECTION: u8 = 3;
 const DIFFERENCE: u8 = 4;
-
-/// What a model's bytes should have been.
-type Checked<T> = Result<T, &'static str>;
 
 impl SnapshotView<'_> {
     /// The model.
@@ -292,6 +257,30 @@ fn levels(nodes: &[solid::Node]) -> usize {
     height.into_iter().max().unwrap_or(0)
 }
 
+impl Sink for Snapshot {
+    fn word(&mut self, word: usize) {
+        self.word(word);
+    }
+
+    fn number(&mut self, number: f64) {
+        self.number(number);
+    }
+}
+
+impl Source for Streams<'_> {
+    fn word(&mut self) -> Checked<u32> {
+        self.word()
+    }
+
+    fn finite(&mut self) -> Checked<f64> {
+        self.finite()
+    }
+
+    fn left(&self) -> usize {
+        self.numbers.len() / size_of::<f64>()
+    }
+}
+
 /// What is still to be read.
 struct Streams<'a> {
     tags: &'a [u8],
@@ -357,25 +346,7 @@ impl<'a> Streams<'a> {
     }
 
     fn shape(&mut self) -> Checked<Shape> {
-        Ok(match self.tag()? {
-            SPHERE => Sphere { radius: self.finite()? }.into(),
-            CYLINDER => Cylinder { radius: self.finite()?, half_height: self.finite()? }.into(),
-            CONE => Cone { bottom: self.finite()?, top: self.finite()?, half_height: self.finite()? }.into(),
-            CUBOID => Cuboid { half: self.finite_vector()? }.into(),
-            POLYHEDRON => {
-                let (corners, faces) = (self.word()? as usize, self.word()? as usize);
-                // As many numbers must follow, so the memory is no more than what the bytes take.
-                let enough = corners.saturating_mul(24).saturating_add(faces.saturating_mul(32));
-                if enough > self.numbers.len() {
-                    return Err("more numbers");
-                }
-                let vertices = (0..corners).map(|_| self.finite_vector()).collect::<Checked<_>>()?;
-                let planes = (0..faces).map(|_| Ok((self.finite_vector()?, self.finite()?))).collect::<Checked<_>>()?;
-                Polyhedron { vertices, planes }.into()
-            }
-            HALF_SPACE => HalfSpace.into(),
-            _ => return Err("a kind of primitive"),
-        })
+        Shape::read(self.tag()?, self)
     }
 
     fn tree_node(&mut self) -> Checked<solid::Node> {

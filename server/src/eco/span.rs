@@ -26,22 +26,7 @@ pub fn primitive_span(p: &Primitive, center: DVec3, half: DVec3) -> (f64, f64) {
 
 /// (lower, upper) bound of a face's psi over the box center ± half.
 pub fn face_span(face: &Face, center: DVec3, half: DVec3) -> (f64, f64) {
-    let (lo, hi) = match *face {
-        Face::Plane { normal, .. } => {
-            let (v, tilt) = (face.value(center), normal.abs().dot(half));
-            (v - tilt, v + tilt)
-        }
-        Face::Sphere { center: o, radius } => {
-            let gap = ((center - o).abs() - half).max(DVec3::ZERO);
-            (gap.length() - radius, largest_corner(face, center, half))
-        }
-        Face::Cylinder { radius, .. } => (tangent(face, center, half).max(-radius), largest_corner(face, center, half)),
-        Face::Cone { apex, axis, sin, .. } => {
-            // rho cos − z sin >= −z sin, and z is largest at a corner.
-            let z = (center - apex).dot(axis) + axis.abs().dot(half);
-            (tangent(face, center, half).max(-z * sin), largest_corner(face, center, half))
-        }
-    };
+    let (lo, hi) = face.span(center, half);
     let pad = rounding(face, center, half);
     (lo - pad, hi + pad)
 }
@@ -49,28 +34,5 @@ pub fn face_span(face: &Face, center: DVec3, half: DVec3) -> (f64, f64) {
 /// What rounding may do to psi, its gradient times an offset and its bounds over the box center ± half, a length.
 pub fn rounding(face: &Face, center: DVec3, half: DVec3) -> f64 {
     let reach = center.abs().max_element() + half.max_element();
-    let scale = match *face {
-        Face::Plane { offset, .. } => offset.abs(),
-        Face::Sphere { center: o, radius } | Face::Cylinder { origin: o, radius, .. } => o.abs().max_element() + radius,
-        Face::Cone { apex, .. } => apex.abs().max_element(),
-    };
-    (reach + scale) * OUTWARD
-}
-
-fn tangent(face: &Face, center: DVec3, half: DVec3) -> f64 {
-    let at = face.at(center);
-    at.value - at.normal.abs().dot(half)
-}
-
-fn largest_corner(face: &Face, c: DVec3, e: DVec3) -> f64 {
-    let signs = [-1.0, 1.0];
-    let mut hi = f64::NEG_INFINITY;
-    for x in signs {
-        for y in signs {
-            for z in signs {
-                hi = hi.max(face.value(c + e * DVec3::new(x, y, z)));
-            }
-        }
-    }
-    hi
+    (reach + face.magnitude()) * OUTWARD
 }

@@ -8,7 +8,7 @@ use crate::eco::Model;
 use crate::eco::mass::mass_properties;
 use crate::import::{Note, Scene};
 use crate::math::Aabb;
-use crate::solid::{Node, NodeId, Op, Sense, Shape, Solid};
+use crate::solid::{Node, NodeId, Op, Sense, Solid};
 use contactd_proto::MassOptions;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -25,7 +25,7 @@ pub fn model(file: &str, model: &Model, notes: &[Note]) -> String {
     let mut out = String::new();
     let mut kinds: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for (p, sense) in solid.primitives.iter().zip(&solid.senses) {
-        let count = kinds.entry(kind(&p.shape)).or_default();
+        let count = kinds.entry(p.shape.geometry().kind()).or_default();
         match sense {
             Sense::Positive => count.0 += 1,
             Sense::Negative => count.1 += 1,
@@ -106,19 +106,6 @@ fn grouped(notes: &[Note]) -> Vec<String> {
     order.iter().map(line).collect()
 }
 
-/// The field's word for a shape.
-pub fn kind(shape: &Shape) -> &'static str {
-    match shape {
-        Shape::Sphere(_) => "sphere",
-        Shape::Cylinder(_) => "cylinder",
-        Shape::Cone(c) if c.bottom > 0.0 && c.top > 0.0 => "frustum",
-        Shape::Cone(_) => "cone",
-        Shape::Cuboid(_) => "box",
-        Shape::Polyhedron(_) => "polyhedron",
-        Shape::HalfSpace(_) => "half-space",
-    }
-}
-
 fn bounds(b: &Aabb) -> String {
     if b.is_empty() {
         return "none: it is empty".into();
@@ -193,7 +180,8 @@ fn tree(solid: &Solid) -> String {
             }
             Node::Primitive(i) => {
                 let p = &solid.primitives[*i as usize];
-                let words = [&p.label.name, kind(&p.shape), &size(&p.shape)];
+                let geometry = p.shape.geometry();
+                let words = [&p.label.name, geometry.kind(), &geometry.dimensions()];
                 let mut words: Vec<&str> = words.into_iter().filter(|w| !w.is_empty()).collect();
                 words.dedup();
                 writeln!(out, "{indent}{i} {} at {}:{}", words.join(" "), p.label.line, p.label.column)
@@ -201,15 +189,4 @@ fn tree(solid: &Solid) -> String {
         };
     }
     out
-}
-
-fn size(shape: &Shape) -> String {
-    match shape {
-        Shape::Sphere(s) => format!("r {}", s.radius),
-        Shape::Cylinder(c) => format!("r {}, h {}", c.radius, 2.0 * c.half_height),
-        Shape::Cone(c) => format!("r {} to {}, h {}", c.bottom, c.top, 2.0 * c.half_height),
-        Shape::Cuboid(c) => format!("{} x {} x {}", 2.0 * c.half.x, 2.0 * c.half.y, 2.0 * c.half.z),
-        Shape::Polyhedron(p) => format!("{} faces", p.planes.len()),
-        Shape::HalfSpace(_) => String::new(),
-    }
 }

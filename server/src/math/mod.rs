@@ -6,6 +6,7 @@ pub mod aabb;
 pub mod ball;
 pub mod ball_tree;
 pub mod halt;
+pub mod moments;
 pub mod oriented;
 #[cfg(test)]
 pub(crate) mod random;
@@ -15,6 +16,7 @@ pub mod twin;
 pub use aabb::Aabb;
 pub use ball::Ball;
 pub use ball_tree::BallTree;
+pub use moments::Moments;
 pub use oriented::Oriented;
 pub use twin::{Lanes, Twin};
 

@@ -61,10 +61,3 @@ pub const LEAST_ROUNDINGS: f64 = 4.0;
 
 /// Sine of an angle that a double cannot tell from 0: axes within it are one direction.
 pub const PARALLEL: f64 = 1e-15;
-
-/// Slack in the test whether a direction is a normal of an edge: a superfluous candidate does no harm, a missing one does.
-pub const NORMAL_SLACK: f64 = 1e-9;
-
-/// Separations of round bodies below this fraction of their heights are asked again by projection: Newton's climb may
-/// have stopped short of the summit.
-pub const NEARLY_TOUCHING: f64 = 1e-9;

@@ -7,7 +7,7 @@
 //! Not promised: skins thinner than `THIN`, and rays that graze a face, may go either way. Pictures only.
 
 use crate::math::Aabb;
-use crate::solid::{Face, Node, NodeId, Op, Primitive, Solid};
+use crate::solid::{Node, NodeId, Op, Primitive, Solid};
 use glam::DVec3;
 
 /// A line with unit direction; positions are lengths along it.
@@ -154,7 +154,7 @@ fn span_of(primitive: &Primitive, ray: &Ray) -> Option<Span> {
     let mut leave = Crossing { at: f64::INFINITY, ..enter };
     for (i, face) in primitive.faces.iter().enumerate() {
         let id = primitive.first_face + i as u32;
-        let (from, to) = inside_face(face, ray)?;
+        let (from, to) = face.inside(ray.origin, ray.direction)?;
         if from > enter.at {
             enter = Crossing { at: from, face: id, outward: true };
         }
@@ -163,73 +163,6 @@ fn span_of(primitive: &Primitive, ray: &Ray) -> Option<Span> {
         }
     }
     (leave.at - enter.at > THIN * enter.at.abs().min(leave.at.abs())).then_some((enter, leave))
-}
-
-/// Where psi <= 0 along the ray, ends infinite where it never ends.
-pub fn inside_face(face: &Face, ray: &Ray) -> Option<(f64, f64)> {
-    let d = ray.direction;
-    match *face {
-        Face::Plane { normal, offset } => half_line(normal.dot(d), normal.dot(ray.origin) - offset),
-        Face::Sphere { center, radius } => {
-            let o = ray.origin - center;
-            between_roots(1.0, o.dot(d), o.length_squared() - radius * radius)
-        }
-        Face::Cylinder { origin, axis, radius } => {
-            let o = ray.origin - origin;
-            let (p, e) = (o - axis * o.dot(axis), d - axis * d.dot(axis));
-            let c = p.length_squared() - radius * radius;
-            if e.length_squared() < 1e-24 {
-                return (c <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
-            }
-            between_roots(e.length_squared(), p.dot(e), c)
-        }
-        Face::Cone { apex, axis, sin, cos } => {
-            let o = ray.origin - apex;
-            let (z, dz) = (o.dot(axis), d.dot(axis));
-            let (p, e) = (o - axis * z, d - axis * dz);
-            let (cc, ss) = (cos * cos, sin * sin);
-            let a = cc * e.length_squared() - ss * dz * dz;
-            let b = cc * p.dot(e) - ss * z * dz;
-            let c = cc * p.length_squared() - ss * z * z;
-            let on_nappe = |t: f64| z + t * dz >= 0.0;
-            if a.abs() < 1e-14 {
-                // Parallel to a generator: one crossing.
-                let (from, to) = half_line(2.0 * b, c)?;
-                let probe = if from.is_finite() { from + 1.0 } else { to - 1.0 };
-                return on_nappe(probe).then_some((from, to));
-            }
-            if a > 0.0 {
-                let (from, to) = between_roots(a, b, c)?;
-                return on_nappe(0.5 * (from + to)).then_some((from, to));
-            }
-            // Steeper than the cone: the line is inside both nappes, beyond either root.
-            let (low, high) = between_roots(-a, -b, -c)?;
-            Some(if dz > 0.0 { (high, f64::INFINITY) } else { (f64::NEG_INFINITY, low) })
-        }
-    }
-}
-
-/// Where slope·t + value <= 0.
-fn half_line(slope: f64, value: f64) -> Option<(f64, f64)> {
-    if slope == 0.0 {
-        return (value <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
-    }
-    let at = -value / slope;
-    Some(if slope > 0.0 { (f64::NEG_INFINITY, at) } else { (at, f64::INFINITY) })
-}
-
-/// The roots of a t² + 2 b t + c for a > 0, without cancellation.
-fn between_roots(a: f64, b: f64, c: f64) -> Option<(f64, f64)> {
-    let discriminant = b * b - a * c;
-    if discriminant < 0.0 {
-        return None;
-    }
-    let q = -(b + discriminant.sqrt().copysign(b));
-    if q == 0.0 {
-        return Some((0.0, 0.0));
-    }
-    let (s, t) = (q / a, c / q);
-    Some((s.min(t), s.max(t)))
 }
 
 /// Combines the spans of several children; children without spans are left out of `lists` but counted in `arity`.

@@ -13,6 +13,7 @@
 //! twice a depth holds no point of that depth.
 
 use super::local::{self, Expression, LiteralId, Token, Truth};
+use super::surface::NUMBERS;
 use super::{Face, Sense};
 use crate::math::Aabb;
 use glam::DVec3;
@@ -58,46 +59,10 @@ impl Ball {
 }
 
 /// Lower bound of psi_p − psi_q over a ball, right after all rounding; `None` for faces of two kinds. A wall {psi_p <= 0 <= psi_q} is
-/// at most as thick as the negative of it.
-///
-/// With centres, points of the axes nearest to the ball's centre, or apexes o, and Δ = o_p − o_q:
-///
-/// ```text
-/// plane      psi_p(c) − psi_q(c) − |n_p − n_q| R
-/// sphere     r_q − r_p − |Δ|
-/// cylinder   r_q − r_p − |Δ| − |a_p − a_q| R            (a_q turned so that it points the way of a_p)
-/// cone       sin α Δ·a − cos α |Δ − (Δ·a)a| − |x − o_q| (|a_p − a_q|(sin α + cos α) + |α_p − α_q|),  a and α those of p
-/// ```
+/// at most as thick as the negative of it. Each kind has a formula of its own: `Surface::above`.
 pub fn above(p: &Face, q: &Face, ball: &Ball) -> Option<f64> {
     let (c, r) = (ball.center, ball.radius);
-    let (value, size) = match (*p, *q) {
-        (Face::Plane { normal: n, offset: d }, Face::Plane { normal: m, offset: e }) => {
-            let lean = (n - m).length();
-            let lean = if lean == 0.0 { 0.0 } else { lean * r };
-            ((n - m).dot(c) - (d - e) - lean, d.abs() + e.abs())
-        }
-        (Face::Sphere { center: o, radius: s }, Face::Sphere { center: u, radius: t }) => {
-            (t - s - (o - u).length(), o.length() + u.length() + s + t)
-        }
-        (Face::Cylinder { origin: o, axis: a, radius: s }, Face::Cylinder { origin: u, axis: b, radius: t }) => {
-            let b = if a.dot(b) < 0.0 { -b } else { b };
-            let (o, u) = (o + a * (c - o).dot(a), u + b * (c - u).dot(b));
-            let lean = (a - b).length();
-            let lean = if lean == 0.0 { 0.0 } else { lean * r };
-            (t - s - (o - u).length() - lean, o.length() + u.length() + s + t + 2.0 * c.length())
-        }
-        (Face::Cone { apex: o, axis: a, sin, cos }, Face::Cone { apex: u, axis: b, sin: sin_q, cos: cos_q }) => {
-            // |α_p − α_q| <= π/2·|sin(α_p − α_q)|, both between 0 and π/2.
-            let angle = (sin * cos_q - cos * sin_q).abs() * std::f64::consts::FRAC_PI_2;
-            let lean = (a - b).length() * (sin + cos) + angle;
-            let far = (c - u).length() + r;
-            let delta = o - u;
-            let along = delta.dot(a);
-            let tilt = if lean == 0.0 { 0.0 } else { lean * far };
-            (sin * along - cos * (delta - a * along).length() - tilt, o.length() + u.length() + 2.0 * far)
-        }
-        _ => return None,
-    };
+    let (value, size) = p.above(q, c, r)?;
     let lost = if p == q { 0.0 } else { LOST * f64::EPSILON * (size + c.length() + r) };
     let least = if p == q { 0.0 } else { value - lost };
     (!least.is_nan()).then_some(least)
@@ -105,31 +70,13 @@ pub fn above(p: &Face, q: &Face, ball: &Ball) -> Option<f64> {
 
 /// A number that differs by at most a few times what two faces of one kind differ over the ball.
 fn key(face: &Face, ball: &Ball) -> (u32, f64) {
-    // Any direction that no design has.
-    const V: DVec3 = DVec3::new(0.481_726_53, 0.663_114_9, 0.572_917_13);
-    let (c, r) = (ball.center, if ball.radius.is_finite() { ball.radius } else { 0.0 });
-    match *face {
-        Face::Plane { normal, offset } => (0, normal.dot(c) - offset + r * normal.dot(V)),
-        Face::Sphere { center, radius } => (1, center.dot(V) + radius),
-        Face::Cylinder { origin, axis, radius } => {
-            let foot = origin + axis * (c - origin).dot(axis);
-            (2, foot.dot(V) + radius + 0.5 * r * axis.dot(V) * axis.dot(V))
-        }
-        Face::Cone { apex, axis, sin, .. } => (3, apex.dot(V) + r * (axis.dot(V) + sin)),
-    }
+    let r = if ball.radius.is_finite() { ball.radius } else { 0.0 };
+    (face.rank(), face.key(ball.center, r))
 }
 
 /// The bits of a face: what is the same to the bit is one.
-fn bits(face: &Face) -> (u32, [u64; 8]) {
-    let mut words = [0; 8];
-    let mut put = |values: &[f64]| words.iter_mut().zip(values).for_each(|(w, v)| *w = (v + 0.0).to_bits());
-    let kind = match *face {
-        Face::Plane { normal: n, offset } => (put(&[n.x, n.y, n.z, offset]), 0).1,
-        Face::Sphere { center: o, radius } => (put(&[o.x, o.y, o.z, radius]), 1).1,
-        Face::Cylinder { origin: o, axis: a, radius } => (put(&[o.x, o.y, o.z, a.x, a.y, a.z, radius]), 2).1,
-        Face::Cone { apex: o, axis: a, sin, cos } => (put(&[o.x, o.y, o.z, a.x, a.y, a.z, sin, cos]), 3).1,
-    };
-    (kind, words)
+fn bits(face: &Face) -> (u32, [u64; NUMBERS]) {
+    (face.rank(), face.numbers().map(|v| (v + 0.0).to_bits()))
 }
 
 /// What is known of the faces of a solid that lie on or near each other.
@@ -152,7 +99,7 @@ impl Alike {
     pub fn of(faces: &[Face], senses: impl Fn(u32) -> Sense, aabb: &Aabb) -> Self {
         let ball = Ball::round(aabb);
         let mut first: Vec<u32> = (0..faces.len() as u32).collect();
-        let mut seen: HashMap<(u32, [u64; 8]), u32> = HashMap::with_capacity(faces.len());
+        let mut seen: HashMap<(u32, [u64; NUMBERS]), u32> = HashMap::with_capacity(faces.len());
         let mut distinct = Vec::with_capacity(faces.len());
         let mut any = false;
         for (i, face) in faces.iter().enumerate() {
@@ -231,7 +178,7 @@ impl Alike {
             return None;
         }
         let (one, other) = (faces.get(p as usize)?, faces.get(q as usize)?);
-        if matches!(one, Face::Plane { .. }) {
+        if one.is_flat() {
             return None;
         }
         above(one, other, self.ball.as_ref()?).filter(|least| *least > -2.0 * delta)
@@ -271,7 +218,7 @@ impl Alike {
 
 /// The pairs of like curved faces with a wall of at most `reach` between them.
 fn near_pairs(faces: &[Face], senses: &impl Fn(u32) -> Sense, ball: &Ball, reach: f64) -> Vec<(u32, u32, f64)> {
-    let curved = |f: &u32| !matches!(faces[*f as usize], Face::Plane { .. });
+    let curved = |f: &u32| !faces[*f as usize].is_flat();
     let all = |sense: Sense| (0..faces.len() as u32).filter(curved).filter(|f| senses(*f) == sense).collect::<Vec<_>>();
     let (positive, negative) = (all(Sense::Positive), all(Sense::Negative));
     if positive.is_empty() || negative.is_empty() {

@@ -9,7 +9,7 @@
 //! Invariant: no operator stands directly below one of its own kind, and none has fewer than two operands.
 
 use crate::math::Aabb;
-use crate::solid::{Face, Node, NodeId, Op, Sense, Solid};
+use crate::solid::{Face, Sense};
 use glam::DVec3;
 
 /// One token; see the module's head.
@@ -88,45 +88,6 @@ pub fn operands(mut body: &[Token]) -> impl Iterator<Item = Expression<'_>> {
 /// All literals of an expression, in order.
 pub fn literals(tokens: &[Token]) -> impl Iterator<Item = LiteralId> + '_ {
     tokens.iter().filter(|t| **t & KIND == 0).map(|t| LiteralId(*t))
-}
-
-/// Appends the whole tree of `solid` to `out`; `False` (and nothing appended) for an empty solid.
-pub fn write_tree(solid: &Solid, out: &mut Vec<Token>) -> Truth {
-    write_node(solid, solid.root, Sense::Positive, &|_| true, out)
-}
-
-/// Appends the tree below `node`, complemented where `sense` is negative; nodes that are not alive count as empty.
-pub fn write_node(
-    solid: &Solid,
-    node: NodeId,
-    sense: Sense,
-    alive: &impl Fn(NodeId) -> bool,
-    out: &mut Vec<Token>,
-) -> Truth {
-    let kept = if alive(node) { &solid.nodes[node as usize] } else { &Node::Empty };
-    match kept {
-        Node::Empty if sense == Sense::Positive => Truth::False,
-        Node::Empty => Truth::True,
-        Node::Primitive(p) => {
-            let p = &solid.primitives[*p as usize];
-            let kind = if sense == Sense::Positive { AND } else { OR };
-            let ids = (0..p.faces.len() as u32).map(|i| p.first_face + i);
-            fold(kind, ids, out, |face, out| {
-                out.push(LiteralId::new(face, sense).0);
-                Truth::Open
-            })
-        }
-        Node::Op(op, children) => {
-            let kind = match (op, sense) {
-                (Op::Union, Sense::Positive) | (Op::Intersection | Op::Difference, Sense::Negative) => OR,
-                _ => AND,
-            };
-            fold(kind, children.iter().enumerate(), out, |(i, child), out| {
-                let s = if *op == Op::Difference && i > 0 { sense.flipped() } else { sense };
-                write_node(solid, *child, s, alive, out)
-            })
-        }
-    }
 }
 
 /// Writes an operator over operands that `each` appends one by one, folding constants, single operands and operands of
@@ -314,7 +275,7 @@ pub fn prune_to_box(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solid::{Label, SolidBuilder, primitive::*};
+    use crate::solid::{Label, Op, Solid, SolidBuilder, primitive::*, write_tree};
     use contactd_proto::Pose;
 
     fn ring() -> Solid {

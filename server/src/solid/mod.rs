@@ -1,6 +1,6 @@
 //! Solids as they were designed: a tree of set operations over exact primitives.
 //!
-//! A primitive is an intersection of convex faces psi <= 0 (`face`), a solid is a tree of them (`tree`), and `f`
+//! A primitive is an intersection of convex faces psi <= 0 (`surface`), a solid is a tree of them (`tree`), and `f`
 //! (`classify`) is the tree's min/max: union = min, intersection = max, difference A - B = max(f_A, -f_B). f < 0 inside,
 //! > 0 outside, 1-Lipschitz.
 //!
@@ -11,14 +11,16 @@
 
 pub mod alike;
 pub mod classify;
-pub mod face;
 pub mod local;
 pub mod parts;
 pub mod primitive;
 pub mod revolution;
+pub mod sense;
+pub mod surface;
 pub mod tree;
 
-pub use face::Face;
 pub use parts::Parts;
 pub use primitive::{Primitive, Shape};
-pub use tree::{Label, Node, NodeId, Op, Sense, Solid, SolidBuilder};
+pub use sense::Sense;
+pub use surface::Face;
+pub use tree::{Label, Node, NodeId, Op, Solid, SolidBuilder, write_node, write_tree};

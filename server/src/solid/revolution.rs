@@ -1,31 +1,8 @@
 //! Solids of revolution: a spin about the own axis moves nothing of them.
 
-use crate::solid::{Face, Solid};
+use crate::solid::Solid;
+use crate::solid::surface::{Axis, Symmetry};
 use glam::DVec3;
-
-/// An axis: a point of it and its unit direction, model frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axis {
-    /// A point of the axis.
-    pub origin: DVec3,
-    /// Unit direction.
-    pub direction: DVec3,
-}
-
-/// Directions this close are one: a few units in the last place of a unit vector.
-const SAME: f64 = 8.0 * f64::EPSILON;
-
-impl Axis {
-    /// True when the axis passes through `point`, to a few units in the last place of `extent` (a length).
-    pub fn passes(&self, point: DVec3, extent: f64) -> bool {
-        (point - self.origin).cross(self.direction).length() <= SAME * extent
-    }
-
-    /// True when `v` (any length) is parallel to the axis.
-    pub fn is_along(&self, v: DVec3) -> bool {
-        v.cross(self.direction).length() <= SAME * v.length()
-    }
-}
 
 /// About what a solid may be symmetric.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,13 +19,10 @@ impl Revolution {
     pub fn of(solid: &Solid, extent: f64) -> Option<Self> {
         let mut center = None;
         for face in &solid.faces {
-            match *face {
-                Face::Cylinder { origin, axis: direction, .. } | Face::Cone { apex: origin, axis: direction, .. } => {
-                    let axis = Axis { origin, direction };
-                    return is_symmetric(solid, &axis, extent).then_some(Self::Axis(axis));
-                }
-                Face::Sphere { center: c, .. } => center = Some(c),
-                Face::Plane { .. } => {}
+            match face.symmetry() {
+                Symmetry::Axis(axis) => return is_symmetric(solid, &axis, extent).then_some(Self::Axis(axis)),
+                Symmetry::Center(c) => center = Some(c),
+                Symmetry::Normal(_) => {}
             }
         }
         center.map(Self::Center)
@@ -68,12 +42,10 @@ impl Revolution {
 
 /// True when every face of a solid of the size `extent` is symmetric about an axis.
 fn is_symmetric(solid: &Solid, axis: &Axis, extent: f64) -> bool {
-    solid.faces.iter().all(|f| match *f {
-        Face::Plane { normal, .. } => axis.is_along(normal),
-        Face::Sphere { center, .. } => axis.passes(center, extent),
-        Face::Cylinder { origin, axis: d, .. } | Face::Cone { apex: origin, axis: d, .. } => {
-            axis.is_along(d) && axis.passes(origin, extent)
-        }
+    solid.faces.iter().all(|f| match f.symmetry() {
+        Symmetry::Normal(normal) => axis.is_along(normal),
+        Symmetry::Center(center) => axis.passes(center, extent),
+        Symmetry::Axis(own) => axis.is_along(own.direction) && axis.passes(own.origin, extent),
     })
 }
 

@@ -2,7 +2,8 @@
 
 use crate::math::Aabb;
 use crate::solid::alike::Alike;
-use crate::solid::local::{self, Token, Truth};
+use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::sense::Sense;
 use crate::solid::{Face, Primitive, Shape};
 use contactd_proto::Pose;
 
@@ -29,25 +30,6 @@ pub enum Node {
     Primitive(u32),
     /// An operation on its children, in order.
     Op(Op, Vec<NodeId>),
-}
-
-/// How a primitive enters a solid: its volume (positive), or the complement of its volume (negative, subtracted).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sense {
-    /// The primitive's own volume.
-    Positive,
-    /// The complement of its volume.
-    Negative,
-}
-
-impl Sense {
-    /// The other one.
-    pub fn flipped(self) -> Self {
-        match self {
-            Sense::Positive => Sense::Negative,
-            Sense::Negative => Sense::Positive,
-        }
-    }
 }
 
 /// Where a primitive stands in its source.
@@ -124,7 +106,7 @@ impl Solid {
         let mut solid =
             Self { primitives, nodes, root, faces, face_owner, senses, normal_form, alike, simplified, vanishes };
         let mut whole = Vec::new();
-        local::write_tree(&solid, &mut whole);
+        write_tree(&solid, &mut whole);
         let sense = |f: u32| solid.senses[solid.face_owner[f as usize] as usize];
         solid.alike = Alike::of(&solid.faces, sense, &solid.aabb());
         if solid.alike.any_same() && !whole.is_empty() {
@@ -178,7 +160,7 @@ impl Solid {
         let mut out = self.normal_form.clone();
         if self.simplified {
             out.clear();
-            local::write_tree(self, &mut out);
+            write_tree(self, &mut out);
         }
         out
     }
@@ -242,5 +224,44 @@ impl SolidBuilder {
     fn push(&mut self, node: Node) -> NodeId {
         self.nodes.push(node);
         self.nodes.len() as NodeId - 1
+    }
+}
+
+/// Appends the whole tree of `solid` to `out`; `False` (and nothing appended) for an empty solid.
+pub fn write_tree(solid: &Solid, out: &mut Vec<Token>) -> Truth {
+    write_node(solid, solid.root, Sense::Positive, &|_| true, out)
+}
+
+/// Appends the tree below `node`, complemented where `sense` is negative; nodes that are not alive count as empty.
+pub fn write_node(
+    solid: &Solid,
+    node: NodeId,
+    sense: Sense,
+    alive: &impl Fn(NodeId) -> bool,
+    out: &mut Vec<Token>,
+) -> Truth {
+    let kept = if alive(node) { &solid.nodes[node as usize] } else { &Node::Empty };
+    match kept {
+        Node::Empty if sense == Sense::Positive => Truth::False,
+        Node::Empty => Truth::True,
+        Node::Primitive(p) => {
+            let p = &solid.primitives[*p as usize];
+            let kind = if sense == Sense::Positive { local::AND } else { local::OR };
+            let ids = (0..p.faces.len() as u32).map(|i| p.first_face + i);
+            local::fold(kind, ids, out, |face, out| {
+                out.push(local::literal_token(LiteralId::new(face, sense)));
+                Truth::Open
+            })
+        }
+        Node::Op(op, children) => {
+            let kind = match (op, sense) {
+                (Op::Union, Sense::Positive) | (Op::Intersection | Op::Difference, Sense::Negative) => local::OR,
+                _ => local::AND,
+            };
+            local::fold(kind, children.iter().enumerate(), out, |(i, child), out| {
+                let s = if *op == Op::Difference && i > 0 { sense.flipped() } else { sense };
+                write_node(solid, *child, s, alive, out)
+            })
+        }
     }
 }

@@ -33,7 +33,7 @@ impl Part {
         let aabb = model.solid.aabb();
         // An unbounded or empty solid has no size of its own: its partner's decides.
         let resolution =
-            Some(super::search::default_resolution(&model, &model)).filter(|r| r.is_finite()).unwrap_or(0.0);
+            Some(crate::contact::default_resolution(&model, &model)).filter(|r| r.is_finite()).unwrap_or(0.0);
         Self { model, aabb, resolution, smallest }
     }
 }

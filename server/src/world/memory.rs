@@ -7,113 +7,20 @@
 //! What a certificate says is checked by `tests/src/verifier/memory.rs` against the true motions of the step. Format and what
 //! follows from what: docs/certificate.md, "What is remembered".
 
-use super::body::Body;
 use super::coherence::Via;
+use super::notes::{Decided, Room, axis_between};
 use super::scene::World;
 use super::search::{self, PairJob};
-use super::step::StepOptions;
 use crate::contact::certificate::{self, Certificate};
 use crate::contact::clearance::{self, Distance};
-use crate::contact::{self, Asked, Glance, Outcome, PairQuery, Scratch, Status};
-use crate::math::Aabb;
+use crate::contact::{self, Asked, Outcome, PairQuery, Scratch, Status};
 use crate::motion::Placed;
 use contactd_proto::{Motion, Pose};
 use glam::DVec3;
-use std::collections::HashMap;
 use std::fmt::Write as _;
 
 /// The first line of every certificate of what is remembered.
 pub const HEADER: &str = "contactd-memory 1";
-
-/// How a pair was excluded before any job was made of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Decided {
-    /// Its odometers do not show its room.
-    Room,
-    /// Directions at both ends of the step.
-    Directions([DVec3; 2]),
-}
-
-impl Decided {
-    /// Two boxes that hold the bodies over the step share no point: the axis along which they are farthest apart.
-    pub fn boxes(a: Aabb, b: Aabb) -> Self {
-        Self::Directions([axis_between(&a, &b); 2])
-    }
-}
-
-/// The axis along which two boxes are farthest apart, from a to b.
-fn axis_between(a: &Aabb, b: &Aabb) -> DVec3 {
-    let (up, down) = (b.min - a.max, a.min - b.max);
-    let k = up.max(down).max_position();
-    let mut axis = DVec3::ZERO;
-    axis[k] = if up[k] >= down[k] { 1.0 } else { -1.0 };
-    axis
-}
-
-/// A distance at one moment: where the bodies stood, and the direction along which they were apart by that much.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Room {
-    /// The poses of both objects then.
-    pub poses: [Pose; 2],
-    /// Unit, world axes, from a to b.
-    pub along: DVec3,
-    /// How much farther than their touching distance they were apart, a length.
-    pub room: f64,
-}
-
-/// What is noted in the steps of a world that is asked for certificates.
-#[derive(Debug, Default)]
-pub(super) struct Notes {
-    options: StepOptions,
-    /// By ids: those stay when bodies go.
-    rooms: HashMap<(u32, u32), Room>,
-    /// By indices, of the last step.
-    decided: HashMap<(u32, u32), Decided>,
-}
-
-impl Notes {
-    /// A step begins.
-    pub fn begin(&mut self, options: StepOptions) {
-        self.options = options;
-        self.decided.clear();
-    }
-
-    /// A pair is excluded in this step.
-    pub fn decided(&mut self, pair: (u32, u32), how: Decided) {
-        self.decided.insert(pair, how);
-    }
-
-    /// A glance has measured a pair at the start of the step.
-    pub fn glanced(&mut self, pair: (u32, u32), bodies: &[Body], glance: &Glance) {
-        if glance.room > 0.0 {
-            self.note(pair, bodies, glance.along, glance.room);
-        }
-    }
-
-    /// Boxes that hold two bodies over the step have told their room.
-    pub fn apart_by(&mut self, pair: (u32, u32), bodies: &[Body], room: f64, boxes: [Aabb; 2]) {
-        if room > 0.0 {
-            self.note(pair, bodies, axis_between(&boxes[0], &boxes[1]), room);
-        }
-    }
-
-    /// The distance of two convex bodies where they are asked about has told their room: at the start of the step, and at its end
-    /// of a discrete pair.
-    pub fn measured(&mut self, job: &PairJob, bodies: &[Body], options: &StepOptions) {
-        let query = search::query(bodies, job, options);
-        if let (Some(along), true) = (clearance::direction_of_room(&query), job.found.room > 0.0) {
-            let poses = [&query.a, &query.b].map(|body| body.placed.motion.start);
-            let ids = [job.a, job.b].map(|i| bodies[i as usize].id);
-            self.rooms.insert(ids.into(), Room { poses, along, room: job.found.room });
-        }
-    }
-
-    fn note(&mut self, (i, j): (u32, u32), bodies: &[Body], along: DVec3, room: f64) {
-        let (a, b) = (&bodies[i as usize], &bodies[j as usize]);
-        let poses = [a, b].map(|body| body.track.motion.start);
-        self.rooms.insert((a.id, b.id), Room { poses, along, room });
-    }
-}
 
 /// What has answered for a pair in the last step.
 // One at a time, and only where somebody asks.

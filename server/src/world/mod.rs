@@ -17,11 +17,15 @@ mod coherence;
 pub mod heed;
 pub mod memory;
 mod neighbours;
+mod notes;
+pub mod options;
+pub mod outcome;
 pub mod plan;
 pub mod record;
 pub mod scene;
 mod search;
 mod stances;
+mod state;
 pub mod step;
 #[cfg(test)]
 mod tests;
@@ -29,6 +33,7 @@ mod touch;
 
 pub use body::{ObjectSpec, Part};
 pub use heed::{Crew, Heed, LONG_PRIORITY, yield_to_others};
+pub use options::{StepError, StepOptions};
+pub use outcome::{PairOutcome, StepOutcome};
 pub use plan::{PairPlan, Plans};
 pub use scene::{Refusal, World};
-pub use step::{PairOutcome, StepError, StepOptions, StepOutcome};

@@ -3,8 +3,8 @@
 //! Behind the records stand their further slots, pair by pair: the detail slot where asked for, then for each region its
 //! own slot and the points that bound it, four a slot.
 
-use super::World;
-use super::step::{PairOutcome, StepOutcome};
+use super::outcome::{PairOutcome, StepOutcome};
+use super::scene::World;
 use crate::contact::{Region, Status};
 use contactd_proto::contact_record::{self as wire, ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 use contactd_proto::step::{STEP_CLEAR, STEP_CONTACT, STEP_UNDECIDED, StepReply, WorkCounters};

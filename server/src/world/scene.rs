@@ -2,7 +2,7 @@
 
 use super::body::{Body, ObjectSpec};
 use super::plan::{PairPlan, Plans};
-use super::step::StepState;
+use super::state::StepState;
 use crate::math::tolerance;
 use contactd_proto::{Detect, ErrorCode, Pose, Rule, Track};
 use std::collections::HashMap;

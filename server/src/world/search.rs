@@ -10,8 +10,8 @@
 use super::body::Body;
 use super::coherence::{Finding, Knowledge, Question};
 use super::heed::Heed;
+use super::options::StepOptions;
 use super::plan::PairPlan;
-use super::step::StepOptions;
 use crate::contact::{self, Asked, Counters, Outcome, PairQuery, PairSearch, Scratch, Status};
 use crate::math::halt::Halt;
 use crate::math::tolerance;
@@ -22,8 +22,6 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
-
-pub(super) use crate::contact::default_resolution;
 
 /// With fewer pairs to ask about than this one thread is done before others wake up.
 const WORTH_SHARING: usize = 8;

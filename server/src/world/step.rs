@@ -6,208 +6,20 @@
 
 use super::body::Body;
 use super::heed::Heed;
-use super::memory::{Decided, Notes};
-use super::neighbours::{Neighbours, Sight};
+use super::neighbours::Sight;
+use super::notes::Decided;
+use super::options::{StepError, StepOptions};
+use super::outcome::{PairOutcome, StepOutcome};
 use super::plan::PairPlan;
 use super::scene::World;
 use super::search::{self, PairJob};
 use super::stances::Stances;
+use super::state::StepState;
 use super::touch;
-use crate::contact::{Counters, Glance, Glancing, Outcome, Region, Scratch, Status};
+use crate::contact::{Glance, Glancing, Outcome, Status};
 use crate::math::Aabb;
 use contactd_proto::pose_record::Order;
 use contactd_proto::{Detect, EffectCounters, ErrorCode, Pose, PoseRecord, Report, Track};
-use std::fmt;
-
-/// Why a batch was refused. The world is as it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StepError {
-    /// The code.
-    pub code: ErrorCode,
-    /// Index of the offending record; `None` when it is the batch or an option.
-    pub index: Option<u32>,
-}
-
-impl fmt::Display for StepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.index {
-            Some(index) => write!(f, "record {index}: {}", self.code),
-            None => write!(f, "{}", self.code),
-        }
-    }
-}
-
-impl std::error::Error for StepError {}
-
-/// What is asked of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepOptions {
-    /// Fraction of the previous step that is taken before this one, 0..1.
-    pub advance: f64,
-    /// Duration in seconds, for declared speeds; 0 when unknown.
-    pub dt: f64,
-    /// Only the pairs whose bracket meets the scene's earliest contact.
-    pub first: bool,
-    /// Tell clear pairs too, those that the broad phase excluded among them.
-    pub clear: bool,
-    /// Most pairs told, the earliest first; 0: all.
-    pub max_records: u32,
-    /// Most further slots for contact regions, those of the earliest pairs; 0: all.
-    pub max_patch_slots: u32,
-    /// Most cells' worth of work (`Counters::spent`) of one pair's search; 0: the default.
-    pub cell_limit: u64,
-    /// The same of the searches of the whole step, the pairs that may meet earliest first; 0: the default.
-    pub batch_limit: u64,
-}
-
-impl Default for StepOptions {
-    fn default() -> Self {
-        Self {
-            advance: 1.0,
-            dt: 0.0,
-            first: false,
-            clear: false,
-            max_records: 0,
-            max_patch_slots: 0,
-            cell_limit: 0,
-            batch_limit: 0,
-        }
-    }
-}
-
-/// The answer for one pair of a step, a < b.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PairOutcome {
-    /// Smaller object id.
-    pub a: u32,
-    /// Larger object id.
-    pub b: u32,
-    /// How it was searched.
-    pub plan: PairPlan,
-    /// What was found.
-    pub outcome: Outcome,
-    /// Index of its job.
-    pub(super) job: u32,
-    /// False when the work limit cut the search for its regions: there may be more, and whether it touches may be open.
-    pub regions_complete: bool,
-    /// Where its regions stand in `StepOutcome::regions`: the first one, and how many; none unless asked for.
-    pub regions: (u32, u32),
-    /// Further slots that the regions of the pairs before it take, and its own.
-    pub patch_slots: (u32, u32),
-}
-
-/// The answer of a step. Valid until the next one.
-#[derive(Clone, Debug, Default)]
-pub struct StepOutcome {
-    /// Told pairs in the order (time, a, b).
-    pub pairs: Vec<PairOutcome>,
-    /// The contact regions of told pairs, pair by pair.
-    pub regions: Vec<Region>,
-    /// More pairs would have been told without `max_records`.
-    pub truncated: bool,
-    /// Smallest time_lower over all pairs, told or not.
-    pub safe_time: f64,
-    /// Some pair was left undecided before the earliest contact.
-    pub undecided: bool,
-    /// Some pair meets or overlaps.
-    pub contact: bool,
-    /// Pairs that were searched, or answered by what was known of them.
-    pub searched: u32,
-    /// Those of them that what was known has answered. Pairs that their odometers prove apart are not even counted.
-    pub known: u32,
-    /// How often each effect was worked out.
-    pub effect_counters: EffectCounters,
-    /// Work of all searches.
-    pub counters: Counters,
-    /// Cells that one thread refined at most, of those that were shared out: how even the work was.
-    pub busiest_cells: u64,
-    /// Pairs of boxes compared.
-    pub box_tests: u64,
-    /// Discrete pairs that moved far enough to have passed through each other.
-    pub may_have_passed: u64,
-}
-
-/// Memory of the steps.
-#[derive(Debug)]
-pub struct StepState {
-    max_batch: usize,
-    serial: u64,
-    orders: Vec<(u32, Order)>,
-    /// Where bodies are put at the start of the step, by their indices.
-    put: Vec<(u32, Pose)>,
-    /// Bodies that moved in the last step.
-    moving: Vec<u32>,
-    /// When the step begins, in steps taken.
-    clock: f64,
-    neighbours: Neighbours,
-    /// Swept boxes, each with the serial of the step it was taken for.
-    boxes: Vec<(u64, Aabb)>,
-    stances: Stances,
-    /// Neighbours that their odometers don't prove apart.
-    asked: Vec<usize>,
-    /// How many of them a direction proved apart.
-    glanced: u32,
-    jobs: Vec<PairJob>,
-    /// Time (as a key), ids and job of each told pair, to be ordered, and whether its regions are complete.
-    order: Vec<(i64, u32, u32, u32, bool)>,
-    searches: search::Memory,
-    /// Memory of what is asked beside the searches.
-    scratch: Scratch,
-    outcome: StepOutcome,
-    /// What is noted for certificates of what is remembered, where somebody asks for them.
-    pub(super) notes: Option<Box<Notes>>,
-}
-
-impl StepState {
-    pub(super) fn new(max_batch: usize) -> Self {
-        Self {
-            max_batch,
-            serial: 0,
-            orders: Vec::new(),
-            put: Vec::new(),
-            moving: Vec::new(),
-            clock: 0.0,
-            neighbours: Neighbours::default(),
-            boxes: Vec::new(),
-            stances: Stances::default(),
-            asked: Vec::new(),
-            glanced: 0,
-            jobs: Vec::new(),
-            order: Vec::new(),
-            searches: search::Memory::default(),
-            scratch: Scratch::default(),
-            outcome: StepOutcome::default(),
-            notes: None,
-        }
-    }
-
-    /// The list of neighbours.
-    pub(super) fn neighbours(&self) -> &Neighbours {
-        &self.neighbours
-    }
-
-    /// When the last step began, in steps taken.
-    pub(super) fn clock(&self) -> f64 {
-        self.clock
-    }
-
-    /// The pairs that were asked about in the last step.
-    pub(super) fn jobs(&self) -> &[PairJob] {
-        &self.jobs
-    }
-
-    /// There are more bodies than before; what is known of the others stays true.
-    pub(super) fn extend(&mut self) {
-        self.neighbours.extend();
-    }
-
-    /// Bodies, their places or the rules have changed: nothing is known any more.
-    pub(super) fn forget(&mut self, bodies: &[Body]) {
-        self.neighbours.forget();
-        self.moving.clear();
-        self.moving.extend((0..bodies.len()).filter(|i| !bodies[*i].track.is_rest()).map(|i| i as u32));
-    }
-}
 
 impl World {
     /// One step: `records` name the objects that move (or are put somewhere), all others stay.
@@ -606,13 +418,6 @@ fn count_effects(job: &PairJob, bodies: &[Body], counters: &mut EffectCounters) 
 fn passes(job: &PairJob, bodies: &[Body]) -> bool {
     let (a, b) = (&bodies[job.a as usize], &bodies[job.b as usize]);
     a.speed(&a.track.motion) + b.speed(&b.track.motion) > a.part.smallest.min(b.part.smallest)
-}
-
-impl StepOutcome {
-    /// The contact regions of a told pair.
-    pub fn regions_of(&self, pair: &PairOutcome) -> &[Region] {
-        &self.regions[pair.regions.0 as usize..][..pair.regions.1 as usize]
-    }
 }
 
 fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {

@@ -6,11 +6,12 @@
 use super::body::Body;
 use super::coherence::Told;
 use super::heed::Heed;
+use super::options::StepOptions;
+use super::outcome::StepOutcome;
 use super::record;
 use super::search::{self, PairJob};
-use super::step::{StepOptions, StepOutcome};
 use crate::contact::clearance;
-use crate::contact::separation::Within;
+use crate::contact::within::Within;
 use crate::contact::{Outcome, PairQuery, Scratch, Status, region};
 use contactd_proto::{Detect, EffectCounters, Report};
 

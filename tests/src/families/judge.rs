@@ -227,7 +227,10 @@ impl Pair {
         let mut places: Vec<(f64, DVec3)> = places.into_iter().map(|x| (self.common(&m, x), x)).collect();
         places[1..].sort_by(|x, y| x.0.total_cmp(&y.0));
         places.truncate(24);
-        places.into_iter().any(|(_, x)| -self.deepen(0.0, x, None, 10.0 * delta, 600, draw).0 >= 0.9 * delta)
+        // Between like round faces the deepest place is far away and hardly downhill.
+        let firsts = [10.0, 1e3, 1e5, 1e7].map(|k| (k * delta).min(0.3 * self.size));
+        let mut is_deep = |x: DVec3, first: f64| -self.deepen(0.0, x, None, first, 600, draw).0 >= 0.9 * delta;
+        places.into_iter().any(|(_, x)| firsts.iter().any(|first| is_deep(x, *first)))
     }
 
     /// The deepest common point found at `time_upper`, near the contact first (x in a's frame), then anywhere; the search
@@ -362,7 +365,13 @@ pub fn judge(
                     let x = if of_a { x } else { m.a.transpose() * (m.b * x + m.apart) };
                     t <= o.time_upper && pair.common(&m, x) <= -0.98 * delta + pair.rounding
                 });
-                if !named {
+                // Where there is none, the answer's own: as the body turns, and without a spin about its own axis.
+                let m = pair.at(o.time_upper);
+                let told = o.witness.is_some_and(|x| {
+                    let places = [x, m.a.transpose() * (pair.at(0.0).a * x)];
+                    places.iter().any(|x| pair.common(&m, *x) <= -0.98 * delta + pair.rounding)
+                });
+                if !(named || told) {
                     let depth = -found / delta;
                     fault("witness", format!("at time_upper = {} no more than {depth:.4} delta", o.time_upper));
                 }

@@ -4,7 +4,7 @@
 //! De Morgan's laws, so that a subtracted primitive is the min of its −psi. Near a point most literals cannot decide f;
 //! `clauses` lists what can, as alternatives (min) of conjunctions (max).
 
-use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Solid};
+use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Solid, surface};
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -24,10 +24,12 @@ impl Literal {
     pub fn value(&self, x: DVec3) -> f64 {
         self.sign
             * match self.face {
-                Face::Plane { normal, offset } => normal.dot(x) - offset,
-                Face::Sphere { center, radius } => center.distance(x) - radius,
-                Face::Cylinder { origin, axis, radius } => axis.cross(x - origin).length() - radius,
-                Face::Cone { apex, axis, sin, cos } => axis.cross(x - apex).length() * cos - axis.dot(x - apex) * sin,
+                Face::Plane(surface::Plane { normal, offset }) => normal.dot(x) - offset,
+                Face::Sphere(surface::Sphere { center, radius }) => center.distance(x) - radius,
+                Face::Cylinder(surface::Cylinder { origin, axis, radius }) => axis.cross(x - origin).length() - radius,
+                Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
+                    axis.cross(x - apex).length() * cos - axis.dot(x - apex) * sin
+                }
             }
     }
 
@@ -36,17 +38,17 @@ impl Literal {
         let across = |o: DVec3, a: DVec3| (a.cross(x - o)).cross(a).normalize_or(a.any_orthonormal_vector());
         self.sign
             * match self.face {
-                Face::Plane { normal, .. } => normal,
-                Face::Sphere { center, .. } => (x - center).normalize_or(DVec3::Z),
-                Face::Cylinder { origin, axis, .. } => across(origin, axis),
-                Face::Cone { apex, axis, sin, cos } => across(apex, axis) * cos - axis * sin,
+                Face::Plane(surface::Plane { normal, .. }) => normal,
+                Face::Sphere(surface::Sphere { center, .. }) => (x - center).normalize_or(DVec3::Z),
+                Face::Cylinder(surface::Cylinder { origin, axis, .. }) => across(origin, axis),
+                Face::Cone(surface::Cone { apex, axis, sin, cos }) => across(apex, axis) * cos - axis * sin,
             }
     }
 
     /// Apex and axis, for the faces that have a point without gradient on the surface.
     pub fn apex(&self) -> Option<(DVec3, DVec3, f64)> {
         match self.face {
-            Face::Cone { apex, axis, sin, .. } if self.sign > 0.0 => Some((apex, axis, sin)),
+            Face::Cone(surface::Cone { apex, axis, sin, .. }) if self.sign > 0.0 => Some((apex, axis, sin)),
             _ => None,
         }
     }
@@ -161,12 +163,18 @@ fn moved(face: &Face, place: &Pose) -> Face {
     let point = |x: DVec3| place.rotation * x + place.position;
     let turned = |n: DVec3| (place.rotation * n).normalize();
     match *face {
-        Face::Plane { normal, offset } => {
+        Face::Plane(surface::Plane { normal, offset }) => {
             let normal = turned(normal);
-            Face::Plane { normal, offset: offset + normal.dot(place.position) }
+            Face::Plane(surface::Plane { normal, offset: offset + normal.dot(place.position) })
         }
-        Face::Sphere { center, radius } => Face::Sphere { center: point(center), radius },
-        Face::Cylinder { origin, axis, radius } => Face::Cylinder { origin: point(origin), axis: turned(axis), radius },
-        Face::Cone { apex, axis, sin, cos } => Face::Cone { apex: point(apex), axis: turned(axis), sin, cos },
+        Face::Sphere(surface::Sphere { center, radius }) => {
+            Face::Sphere(surface::Sphere { center: point(center), radius })
+        }
+        Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
+            Face::Cylinder(surface::Cylinder { origin: point(origin), axis: turned(axis), radius })
+        }
+        Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
+            Face::Cone(surface::Cone { apex: point(apex), axis: turned(axis), sin, cos })
+        }
     }
 }

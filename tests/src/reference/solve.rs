@@ -208,10 +208,7 @@ pub fn solve(
     let mut step = 1e-6;
     for row in rows {
         let (Row::A(i) | Row::B(i) | Row::ApexA(i) | Row::ApexB(i)) = *row;
-        use contactd::solid::Face::{Cylinder, Sphere};
-        if let Sphere { radius, .. } | Cylinder { radius, .. } =
-            fields[usize::from(!row.of_a())].literals[i as usize].face
-        {
+        if let Some(radius) = fields[usize::from(!row.of_a())].literals[i as usize].face.radius() {
             step = f64::min(step, 1e-6 * radius / size);
         }
     }

@@ -7,7 +7,7 @@
 
 use super::interval::{Interval, Jet, Vector, ZERO, dot, minus, place, point, times, unit, vector};
 use super::motion::{Motions, in_a};
-use contactd::solid::{Face, Solid};
+use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
 
 /// A face of a body with its sense.
@@ -244,12 +244,14 @@ impl Bounder<'_> {
 
     fn psi(&self, face: &Face, y: &[Jet; 3]) -> Jet {
         match *face {
-            Face::Plane { normal, offset } => linear(vector(normal.to_array()), y).plus(point(-offset)),
-            Face::Sphere { center, radius } => square_length(&offsets(y, center)).sqrt().plus(point(-radius)),
-            Face::Cylinder { origin, axis, radius } => {
+            Face::Plane(surface::Plane { normal, offset }) => linear(vector(normal.to_array()), y).plus(point(-offset)),
+            Face::Sphere(surface::Sphere { center, radius }) => {
+                square_length(&offsets(y, center)).sqrt().plus(point(-radius))
+            }
+            Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
                 square_length(&across(&offsets(y, origin), unit(vector(axis.to_array())))).sqrt().plus(point(-radius))
             }
-            Face::Cone { apex, axis, sin, cos } => {
+            Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
                 let (o, axis) = (offsets(y, apex), unit(vector(axis.to_array())));
                 let rho = square_length(&across(&o, axis)).sqrt();
                 rho.scaled(point(cos)) - linear(axis, &o).scaled(point(sin))
@@ -263,8 +265,10 @@ impl Bounder<'_> {
     /// which the jet says by unbounded derivatives.
     fn cones(&self, p: (&Literal, &Face), q: (&Literal, &Face), x: Vector, t: Interval) -> Option<Jet> {
         let (on_a, on_b) = if p.0.on_b { (q.1, p.1) } else { (p.1, q.1) };
-        let (Face::Cone { apex: o_a, axis: a, sin, cos }, Face::Cone { apex: o_b, axis: a_b, sin: sin_b, cos: cos_b }) =
-            (*on_a, *on_b)
+        let (
+            Face::Cone(surface::Cone { apex: o_a, axis: a, sin, cos }),
+            Face::Cone(surface::Cone { apex: o_b, axis: a_b, sin: sin_b, cos: cos_b }),
+        ) = (*on_a, *on_b)
         else {
             return None;
         };
@@ -293,17 +297,24 @@ impl Bounder<'_> {
         let place = |v: DVec3| vector(v.to_array());
         let far = |o: DVec3| length(std::array::from_fn(|i| y[i].v - point(o[i])));
         let least = match (*p, *q) {
-            (Face::Sphere { center: o, radius: r }, Face::Sphere { center: u, radius: s }) => {
-                point(s) - point(r) - length(minus(place(o), place(u)))
-            }
-            (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: u, axis: b, radius: s }) => {
+            (
+                Face::Sphere(surface::Sphere { center: o, radius: r }),
+                Face::Sphere(surface::Sphere { center: u, radius: s }),
+            ) => point(s) - point(r) - length(minus(place(o), place(u))),
+            (
+                Face::Cylinder(surface::Cylinder { origin: o, axis: a, radius: r }),
+                Face::Cylinder(surface::Cylinder { origin: u, axis: b, radius: s }),
+            ) => {
                 let (turned, own) = (if a.dot(b) < 0.0 { -b } else { b }, unit(place(a)));
                 let lean = length(minus(own, unit(place(turned))));
                 let delta = minus(place(o), place(u));
                 let across = length(minus(delta, times(dot(delta, own), own)));
                 point(s) - point(r) - across - lean * far(u)
             }
-            (Face::Cone { apex: o, axis: a, sin, cos }, Face::Cone { apex: u, axis: b, sin: sin_q, cos: cos_q }) => {
+            (
+                Face::Cone(surface::Cone { apex: o, axis: a, sin, cos }),
+                Face::Cone(surface::Cone { apex: u, axis: b, sin: sin_q, cos: cos_q }),
+            ) => {
                 let own = unit(place(a));
                 let (sin, cos) = (point(sin), point(cos));
                 let angle = (sin * point(cos_q) - cos * point(sin_q)).mag() * 1.58;
@@ -339,16 +350,18 @@ impl Bounder<'_> {
         }
         if p.0.on_b == q.0.on_b {
             let wall = self.wall(p.1, q.1, if p.0.on_b { b } else { a })?;
-            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone { .. }) {
+            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone(_)) {
                 return Some(wall);
             }
         }
-        if let (Face::Cone { .. }, Face::Cone { .. }) = (p.1, q.1) {
+        if let (Face::Cone(_), Face::Cone(_)) = (p.1, q.1) {
             return self.cones(p, q, x, t);
         }
         let round = |face: &Face| match *face {
-            Face::Sphere { center, radius } => Some((center, None, radius)),
-            Face::Cylinder { origin, axis, radius } => Some((origin, Some(unit(vector(axis.to_array()))), radius)),
+            Face::Sphere(surface::Sphere { center, radius }) => Some((center, None, radius)),
+            Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
+                Some((origin, Some(unit(vector(axis.to_array()))), radius))
+            }
             _ => None,
         };
         let square = |l: &Literal, face: &Face| {
@@ -369,7 +382,7 @@ impl Bounder<'_> {
         // A sphere in a cylinder leaves the square of the way along the axis: taken from the touched point, it is not
         // negative and can go, and what is left is linear in space.
         let along = match (p.1, q.1) {
-            (Face::Sphere { .. }, Face::Cylinder { axis, .. }) => {
+            (Face::Sphere(_), Face::Cylinder(surface::Cylinder { axis, .. })) => {
                 let from = self.fixed(q.0.on_b, vector(touched.to_array()), t);
                 let y = if q.0.on_b { b } else { a };
                 Some(linear(unit(vector(axis.to_array())), &std::array::from_fn(|i| y[i] - from[i])).square())
@@ -467,12 +480,14 @@ fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
         minus(m, times(dot(m, a), a))
     };
     match *face {
-        Face::Plane { normal, offset } => linear(vector(normal.to_array()), y).plus(point(-offset)),
-        Face::Sphere { center, radius } => linear(short(at - center), &offsets(y, center)).plus(point(-radius)),
-        Face::Cylinder { origin, axis, radius } => {
+        Face::Plane(surface::Plane { normal, offset }) => linear(vector(normal.to_array()), y).plus(point(-offset)),
+        Face::Sphere(surface::Sphere { center, radius }) => {
+            linear(short(at - center), &offsets(y, center)).plus(point(-radius))
+        }
+        Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
             linear(perpendicular(axis, origin), &offsets(y, origin)).plus(point(-radius))
         }
-        Face::Cone { apex, axis, sin, cos } => {
+        Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
             let a = unit(vector(axis.to_array()));
             let m = perpendicular(axis, apex);
             linear(minus(times(point(cos), m), times(point(sin), a)), &offsets(y, apex))

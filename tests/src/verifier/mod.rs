@@ -383,26 +383,29 @@ fn literal(s: &str) -> Result<Literal, String> {
 
 /// A box around all points with f <= `level` below a node: positive primitives as their operations join them.
 fn extent(solid: &Solid, node: NodeId, level: f64) -> Option<[Interval; 3]> {
+    extent_in(solid, node, level, [Interval::new(f64::NEG_INFINITY, f64::INFINITY); 3])
+}
+
+/// How often the operands of an intersection clip each other.
+const CLIPS: usize = 2;
+
+/// A box around those points with f <= `level` below a node that lie in a box: what stands beside it in an intersection clips every
+/// operand of a union by itself.
+fn extent_in(solid: &Solid, node: NodeId, level: f64, clip: [Interval; 3]) -> Option<[Interval; 3]> {
     match &solid.nodes[node as usize] {
         Node::Empty => None,
-        Node::Primitive(p) => Some(primitive_box(solid, *p, level)),
-        Node::Op(Op::Difference, children) => extent(solid, children[0], level),
+        Node::Primitive(p) => {
+            let own = primitive_box(solid, *p, level);
+            let common = std::array::from_fn(|k| (own[k].lo.max(clip[k].lo), own[k].hi.min(clip[k].hi)));
+            common.iter().all(|(lo, hi)| lo <= hi).then(|| common.map(|(lo, hi)| Interval::new(lo, hi)))
+        }
+        Node::Op(Op::Difference, children) => extent_in(solid, children[0], level, clip),
         Node::Op(Op::Union, children) => {
-            let each = children.iter().filter_map(|c| extent(solid, *c, level));
+            let each = children.iter().filter_map(|c| extent_in(solid, *c, level, clip));
             each.reduce(|a, b| std::array::from_fn(|k| a[k].hull(b[k])))
         }
         Node::Op(Op::Intersection, children) => {
-            let mut left = extent(solid, children[0], level)?;
-            for c in &children[1..] {
-                let o = extent(solid, *c, level)?;
-                for k in 0..3 {
-                    left[k] = Interval::new(left[k].lo.max(o[k].lo), left[k].hi.min(o[k].hi));
-                    if left[k].lo > left[k].hi {
-                        return None;
-                    }
-                }
-            }
-            Some(left)
+            (0..CLIPS).flat_map(|_| children).try_fold(clip, |left, c| extent_in(solid, *c, level, left))
         }
     }
 }

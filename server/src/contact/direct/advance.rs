@@ -2,18 +2,18 @@
 //!
 //! See `direct`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
 
+use super::super::cell::Ending;
 use super::super::literal::Side;
 use super::super::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
-use super::super::search::{Ending, Search};
+use super::super::search::Search;
 use super::super::task::Task;
 use super::gjk::{GOOD, Nearest, nearest};
 use super::proof::{Gap, Pace};
 use super::support::Body;
-use super::{APART, body_of, excluded};
-use crate::math::any_perpendicular;
+use super::whole::{APART, body_of, excluded};
 use crate::motion::Instant;
 use crate::solid::local::LiteralId;
-use crate::solid::{Face, Primitive, Sense};
+use crate::solid::{Primitive, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
@@ -333,12 +333,11 @@ pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &m
     let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
     for (i, face) in p.faces.iter().enumerate() {
         let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
-        if let Face::Cone { apex, axis, .. } = *face
-            && (x - apex).length() <= tol
+        if let Some(apex) = face.apex()
+            && (x - apex.point).length() <= tol
         {
             // An apex holds every direction of its normal cone.
-            let u = any_perpendicular(axis);
-            let along = [axis, u, axis.cross(u)];
+            let along = apex.directions();
             out.extend((0..3).map(|k| (Constraint::Apex(side, id, k), n.dot(along[usize::from(k)]))));
             return;
         }

@@ -14,11 +14,12 @@
 //! Balls in the origins of their objects, the common case, need nothing else of a pair (`quick`).
 
 use super::super::asked::Asked;
+use super::super::extent::INCIDENT;
 use super::super::outcome::{Counters, NO_FACE, Outcome, Status};
-use super::super::pair::{self, INCIDENT, PairQuery};
+use super::super::query::{self, PairQuery};
 use super::super::rounding;
 use super::super::task::witness_level;
-use super::{APART, Pair, excluded};
+use super::whole::{APART, Pair, excluded};
 use crate::math::tolerance;
 use crate::motion::Rounding;
 use glam::DVec3;
@@ -152,7 +153,7 @@ fn no_shorter(v: DVec3) -> f64 {
 
 /// The radius and the face of a body that is a ball about its object's origin and does not turn.
 #[inline(always)] // Its answer passes through memory otherwise: a quarter of the time that two balls take.
-fn centered(body: &pair::Body) -> Option<(f64, u32)> {
+fn centered(body: &query::Body) -> Option<(f64, u32)> {
     let placed = &body.placed;
     // Zeros of either sign: one comparison for six numbers.
     let bits = |v: DVec3| v.x.to_bits() | v.y.to_bits() | v.z.to_bits();

@@ -12,10 +12,10 @@
 //! simple, edges in faces and what starts near, is left to others.
 
 use super::super::asked::Asked;
+use super::super::extent::INCIDENT;
 use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::super::pair::INCIDENT;
 use super::slabs::{Across, Boxes, Features, Passage};
-use super::{APART, Pair, excluded};
+use super::whole::{APART, Pair, excluded};
 use glam::{DMat3, DVec3};
 
 /// A face lies no flatter on another than this (radians): its neighbours are told apart.

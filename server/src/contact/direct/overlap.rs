@@ -12,10 +12,10 @@
 
 use super::super::asked::Asked;
 use super::super::outcome::{Outcome, Status};
-use super::super::pair::most_raised;
-use super::Pair;
+use super::super::task::most_raised;
 use super::gjk::{self, Meeting};
 use super::support::{Body, Slope};
+use super::whole::Pair;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 

@@ -5,9 +5,9 @@
 
 use super::super::literal::Side;
 use super::super::newton::Constraint;
-use crate::math::any_perpendicular;
 use crate::solid::local::LiteralId;
-use crate::solid::{Face, Primitive, Sense, Shape};
+use crate::solid::primitive::Form;
+use crate::solid::{Primitive, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
@@ -59,12 +59,11 @@ impl<'a> Part<'a> {
             let lean = if drop == 0.0 { 0.0 } else { drop / (drop * drop + 4.0 * half * half).sqrt() };
             Core::Round { radii: [bottom, top], half, lean }
         };
-        let core = match &primitive.shape {
-            Shape::Sphere(s) => Core::Ball(s.radius),
-            Shape::Cuboid(c) => Core::Cuboid(c.half),
-            Shape::Cylinder(c) => round(c.radius, c.radius, c.half_height),
-            Shape::Cone(c) => round(c.bottom, c.top, c.half_height),
-            Shape::Polyhedron(_) | Shape::HalfSpace(_) => return None,
+        let core = match primitive.shape.form() {
+            Form::Ball(radius) => Core::Ball(radius),
+            Form::Cuboid(half) => Core::Cuboid(half),
+            Form::Round { bottom, top, half } => round(bottom, top, half),
+            Form::Corners(_) | Form::Unbounded => return None,
         };
         Some(Self { primitive, axes, core })
     }
@@ -146,9 +145,8 @@ impl<'a> Part<'a> {
                     let on_side = ((l.x * l.x + l.y * l.y) / (1.0 - lean * lean)).sqrt();
                     out.push((literal(0), on_side));
                     out.push((disc, (l.z - on_side * lean).abs()));
-                } else if let Face::Cone { axis, .. } = self.primitive.faces[0] {
-                    let u = any_perpendicular(axis);
-                    let along = [axis, u, axis.cross(u)];
+                } else if let Some(apex) = self.primitive.faces[0].apex() {
+                    let along = apex.directions();
                     out.extend((0..3).map(|k| (Constraint::Apex(side, id(0), k), along[usize::from(k)].dot(own))));
                 }
             }

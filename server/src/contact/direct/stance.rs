@@ -16,12 +16,12 @@
 //! farther at corners than their distance: so what encloses a tree encloses all of its {f <= level}, and a pair that is
 //! asked about beyond that level has no glance.
 
-use super::form::Form;
+use super::gjk;
 use super::support::Body;
-use super::{body_of, gjk};
+use super::whole::body_of;
 use crate::eco::Model;
 use crate::math::{Lanes, Twin};
-use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
+use crate::solid::primitive::{Cuboid, Form};
 use crate::solid::{Node, Op, Primitive, Shape};
 use contactd_proto::{Pose, Track};
 use glam::{DMat3, DQuat, DVec3};
@@ -100,12 +100,12 @@ impl Hull {
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
         let (around, level, form, frame, ball) = if let Some(p) = model.solid.whole() {
             body_of(p)?;
-            (None, f64::INFINITY, Form::of(&p.shape).of_few(), p.frame, p.ball)
+            (None, f64::INFINITY, p.shape.form().of_few(), p.frame, p.ball)
         } else {
             let (shape, frame) = enclosing(model)?;
             let mut ball = shape.geometry().ball();
             ball.center = frame.point(ball.center);
-            let form = Form::of(&shape).of_few();
+            let form = shape.form().of_few();
             (Some(shape), model.bounds.margin(), form, frame, ball)
         };
         let rho = (place.point(ball.center).length() + ball.radius) * (1.0 + 1e-14);
@@ -174,15 +174,8 @@ fn enclosing(model: &Model) -> Option<(Shape, Pose)> {
             Node::Op(Op::Union, children) if children.len() == 1 => n = children[0],
             Node::Primitive(p) => {
                 let Primitive { shape, frame, .. } = &solid.primitives[*p as usize];
-                let grown = match shape {
-                    Shape::Sphere(s) => Sphere { radius: s.radius + margin }.into(),
-                    Shape::Cylinder(c) => {
-                        Cylinder { radius: c.radius + margin, half_height: c.half_height + margin }.into()
-                    }
-                    Shape::Cuboid(c) => Cuboid { half: c.half + margin }.into(),
-                    // Sharp edges reach out farther: the box of the bounds knows how far.
-                    Shape::Cone(_) | Shape::Polyhedron(_) | Shape::HalfSpace(_) => break,
-                };
+                // Sharp edges reach out farther: the box of the bounds knows how far.
+                let Some(grown) = shape.geometry().grown(margin) else { break };
                 return Some((grown, *frame));
             }
             Node::Op(Op::Union, _) | Node::Empty => break,
@@ -213,7 +206,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
         if 0.5 * touch > a.level.min(b.level) {
             return None;
         }
-        let form = |k: usize| stances[k].form.or_else(|| shapes(k).map(Form::of));
+        let form = |k: usize| stances[k].form.or_else(|| shapes(k).map(Shape::form));
         let forms = [form(0)?, form(1)?];
         let ways = [b.center[0] - a.center[0], b.center[1] - a.center[1], b.center[2] - a.center[2]];
         let [first, last] = (ways[0].abs() + ways[1].abs() + ways[2].abs()).0;
@@ -314,7 +307,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
         let sides = match self.forms[k] {
             Form::Cuboid(_) => [x, y, z],
             Form::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
-            Form::Ball(_) | Form::Corners(_) => [DVec3::ZERO; 3],
+            Form::Ball(_) | Form::Corners(_) | Form::Unbounded => [DVec3::ZERO; 3],
         };
         let towards = move |n: DVec3| if n.dot(way) < 0.0 { -n } else { n };
         sides.into_iter().filter(|n| *n != DVec3::ZERO).map(towards)

@@ -25,7 +25,7 @@ use super::overlap::Start;
 use super::part::{Part, Shown};
 use super::steer::steer;
 use super::touch::Stand;
-use super::{APART, Pair, excluded};
+use super::whole::{APART, Pair, excluded};
 use crate::math::any_perpendicular;
 use glam::{DVec2, DVec3};
 

@@ -3,9 +3,8 @@
 //! Static dispatch on the shape, nothing allocated: this is the innermost loop of the advance.
 //! A ball is its centre and a margin: then the distance of two balls is that of two points, found at once.
 
-use super::form::Form;
 use crate::solid::Shape;
-use crate::solid::primitive::Geometry;
+use crate::solid::primitive::Form;
 use glam::{DMat3, DVec3};
 
 /// How deep a point is.
@@ -22,7 +21,7 @@ pub struct Slope {
 /// A bounded convex primitive in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Body<'s> {
-    shape: &'s Shape,
+    form: Form<'s>,
     axes: DMat3,
     origin: DVec3,
     /// What the primitive is thicker than its core: a ball's radius, else 0.
@@ -32,12 +31,13 @@ pub struct Body<'s> {
 impl<'s> Body<'s> {
     /// A primitive's shape with its own frame; `None` for one without bounds.
     pub fn new(shape: &'s Shape, axes: DMat3, origin: DVec3) -> Option<Self> {
-        let margin = match shape {
-            Shape::HalfSpace(_) => return None,
-            Shape::Sphere(s) => s.radius,
-            _ => 0.0,
+        let form = shape.form();
+        let margin = match form {
+            Form::Unbounded => return None,
+            Form::Ball(radius) => radius,
+            Form::Cuboid(_) | Form::Round { .. } | Form::Corners(_) => 0.0,
         };
-        Some(Self { shape, axes, origin, margin })
+        Some(Self { form, axes, origin, margin })
     }
 
     /// The same body in a frame that sees its own by `axes` and `origin`.
@@ -47,9 +47,9 @@ impl<'s> Body<'s> {
 
     /// The centre of its frame, a point inside.
     pub fn center(&self) -> DVec3 {
-        match self.shape {
-            Shape::Polyhedron(p) => self.origin + self.axes * p.interior_point(),
-            _ => self.origin,
+        match self.form {
+            Form::Corners(_) => self.origin + self.axes * self.form.middle(),
+            Form::Ball(_) | Form::Cuboid(_) | Form::Round { .. } | Form::Unbounded => self.origin,
         }
     }
 
@@ -64,14 +64,13 @@ impl<'s> Body<'s> {
             let k = if len > 0.0 { r / len } else { 0.0 };
             DVec3::new(k * m.x, k * m.y, z)
         };
-        let local = match self.shape {
-            Shape::Sphere(_) | Shape::HalfSpace(_) => return self.origin,
-            Shape::Cylinder(c) => round(c.radius, c.radius, c.half_height),
-            Shape::Cone(c) => round(c.bottom, c.top, c.half_height),
-            Shape::Cuboid(c) => DVec3::new(c.half.x.copysign(m.x), c.half.y.copysign(m.y), c.half.z.copysign(m.z)),
-            Shape::Polyhedron(p) => {
-                let mut best = (f64::NEG_INFINITY, p.vertices[0]);
-                for v in &p.vertices {
+        let local = match self.form {
+            Form::Ball(_) | Form::Unbounded => return self.origin,
+            Form::Round { bottom, top, half } => round(bottom, top, half),
+            Form::Cuboid(half) => DVec3::new(half.x.copysign(m.x), half.y.copysign(m.y), half.z.copysign(m.z)),
+            Form::Corners(corners) => {
+                let mut best = (f64::NEG_INFINITY, corners[0]);
+                for v in corners {
                     let d = m.dot(*v);
                     if d > best.0 {
                         best = (d, *v);
@@ -86,11 +85,10 @@ impl<'s> Body<'s> {
     /// Largest n·x over the body.
     #[inline]
     pub fn reach(&self, n: DVec3) -> f64 {
-        let form = Form::of(self.shape);
-        let own = if let Form::Ball(radius) = form {
+        let own = if let Form::Ball(radius) = self.form {
             radius * n.length()
         } else {
-            form.extent([self.axes.x_axis.dot(n), self.axes.y_axis.dot(n), self.axes.z_axis.dot(n)])
+            self.form.extent([self.axes.x_axis.dot(n), self.axes.y_axis.dot(n), self.axes.z_axis.dot(n)])
         };
         n.dot(self.origin) + own
     }
@@ -107,23 +105,23 @@ impl<'s> Body<'s> {
             if rho > 0.0 { self.axes.x_axis * (l.x / rho) + self.axes.y_axis * (l.y / rho) } else { self.axes.x_axis }
         };
         let told = |f, normal, face: usize| Slope { f, normal, face: face as u32 };
-        Some(match self.shape {
-            Shape::Sphere(s) => {
+        Some(match self.form {
+            Form::Ball(radius) => {
                 let length = from.length();
-                told(length - s.radius, if length > 0.0 { from / length } else { DVec3::X }, 0)
+                told(length - radius, if length > 0.0 { from / length } else { DVec3::X }, 0)
             }
-            Shape::Cuboid(c) => {
+            Form::Cuboid(half) => {
                 let l = own();
-                let beyond = l.abs() - c.half;
+                let beyond = l.abs() - half;
                 let axis = beyond.max_position();
                 let below = l[axis].is_sign_negative();
                 let normal = self.axes.col(axis);
                 told(beyond[axis], if below { -normal } else { normal }, 2 * axis + usize::from(below))
             }
-            Shape::Cylinder(c) => {
+            Form::Round { bottom, top, half } if bottom == top => {
                 let l = own();
                 let rho = across(l);
-                let (side, end) = (rho - c.radius, l.z.abs() - c.half_height);
+                let (side, end) = (rho - bottom, l.z.abs() - half);
                 let below = l.z.is_sign_negative();
                 if side >= end {
                     told(side, radial(l, rho), 0)
@@ -131,24 +129,25 @@ impl<'s> Body<'s> {
                     told(end, if below { -self.axes.z_axis } else { self.axes.z_axis }, 1 + usize::from(below))
                 }
             }
-            Shape::Cone(c) => {
+            Form::Round { bottom, top, half } => {
                 let l = own();
-                let (rho, half) = (across(l), c.half_height);
-                let slope = (c.bottom - c.top) / (2.0 * half);
+                let rho = across(l);
+                let (at_bottom, at_top) = (bottom, top);
+                let slope = (at_bottom - at_top) / (2.0 * half);
                 let tilt = (1.0 + slope * slope).sqrt();
-                let side = (rho - 0.5 * (c.bottom + c.top) + slope * l.z) / tilt;
+                let side = (rho - 0.5 * (at_bottom + at_top) + slope * l.z) / tilt;
                 // An end without a disc has no face there.
                 let disc = |radius: f64, beyond: f64| if radius > 0.0 { beyond } else { f64::NEG_INFINITY };
-                let (top, bottom) = (disc(c.top, l.z - half), disc(c.bottom, -l.z - half));
+                let (top, bottom) = (disc(at_top, l.z - half), disc(at_bottom, -l.z - half));
                 if side >= top.max(bottom) {
                     told(side, (radial(l, rho) + self.axes.z_axis * slope) / tilt, 0)
                 } else if top > bottom {
                     told(top, self.axes.z_axis, 1)
                 } else {
-                    told(bottom, -self.axes.z_axis, 1 + usize::from(c.top > 0.0))
+                    told(bottom, -self.axes.z_axis, 1 + usize::from(at_top > 0.0))
                 }
             }
-            Shape::Polyhedron(_) | Shape::HalfSpace(_) => return None,
+            Form::Corners(_) | Form::Unbounded => return None,
         })
     }
 
@@ -157,18 +156,18 @@ impl<'s> Body<'s> {
     pub fn corner(&self, n: DVec3) -> usize {
         const FLAT: f64 = 1e-6;
         let m = self.axes.transpose() * n;
-        match self.shape {
-            Shape::Cuboid(_) => m.to_array().iter().filter(|c| c.abs() > FLAT).count(),
-            Shape::Polyhedron(p) => {
-                let reach = p.vertices.iter().fold(f64::NEG_INFINITY, |d, v| d.max(m.dot(*v)));
-                let slack = FLAT * p.vertices[0].distance(p.vertices[1]);
-                match p.vertices.iter().filter(|v| m.dot(**v) > reach - slack).count() {
+        match self.form {
+            Form::Cuboid(_) => m.to_array().iter().filter(|c| c.abs() > FLAT).count(),
+            Form::Corners(corners) => {
+                let reach = corners.iter().fold(f64::NEG_INFINITY, |d, v| d.max(m.dot(*v)));
+                let slack = FLAT * corners[0].distance(corners[1]);
+                match corners.iter().filter(|v| m.dot(**v) > reach - slack).count() {
                     1 => 3,
                     2 => 2,
                     _ => 1,
                 }
             }
-            _ => 0,
+            Form::Ball(_) | Form::Round { .. } | Form::Unbounded => 0,
         }
     }
 }

@@ -1,15 +1,17 @@
 //! What two boxes are told by their slabs, against the ways that know nothing of slabs.
 
-use super::super::pair::{default_resolution, earliest_contact};
+use super::super::pair::earliest_contact;
+use super::super::query::{self, default_resolution};
 use super::*;
 use crate::contact::{Asked, DEFAULT_CELL_LIMIT, Extent, Ideas, Kind, Scratch};
 use crate::eco::Model;
 use crate::math::random::Random;
 use crate::motion::Placed;
 use crate::solid::primitive::Cuboid;
-use crate::solid::{Label, SolidBuilder};
+use crate::solid::{Label, Shape, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
+use glam::DQuat;
 use std::f64::consts::FRAC_PI_2;
 
 /// Two models of one primitive each, and how they move.
@@ -31,7 +33,7 @@ impl Bodies {
     }
 
     fn query(&self) -> PairQuery<'_> {
-        let [a, b] = [0, 1].map(|k| pair::Body { model: &self.models[k], placed: self.placed[k] });
+        let [a, b] = [0, 1].map(|k| query::Body { model: &self.models[k], placed: self.placed[k] });
         PairQuery {
             a,
             b,

@@ -5,15 +5,13 @@
 //! more than its features tell is left to others.
 
 use super::super::asked::Asked;
+use super::super::extent::{self, INCIDENT};
 use super::super::literal::Side;
 use super::super::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
 use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::super::pair::{self, INCIDENT};
-use super::Pair;
 use super::part::{Active, Core, Part, Shown};
-use super::turning::Turns;
-use crate::math::any_perpendicular;
-use crate::solid::Face;
+use super::turns::Turns;
+use super::whole::Pair;
 use glam::{DMat3, DQuat, DVec3};
 use smallvec::SmallVec;
 
@@ -209,7 +207,7 @@ impl<'a> Stand<'a> {
             faces: [[NO_FACE; 3]; 2],
         };
         touch.describe(&active, of_a, &rows, pair.scale);
-        let noted = [0, 1].map(|k| pair::noted(&touch.faces[k]));
+        let noted = [0, 1].map(|k| extent::noted(&touch.faces[k]));
         // Faces that pass through the point and hold nothing are the search's to tell.
         if touch.kind == Kind::VertexVertex || (touch.extent == Extent::Point && passing != noted) {
             return None;
@@ -299,26 +297,20 @@ impl<'a> Stand<'a> {
             let (primitive, own) = (self.parts[side as usize].primitive, own[side as usize]);
             let face = &primitive.faces[(id.face() - primitive.first_face) as usize];
             let axes = &self.models[side as usize];
-            match (*constraint, face) {
-                (_, Face::Plane { normal, offset }) => {
-                    (row.value, row.normal, row.sinks, row.bend) =
-                        (normal.dot(own) - offset, *axes * *normal, 1.0, 0.0);
-                }
-                (Constraint::Apex(_, _, i), Face::Cone { apex, axis, sin, .. }) => {
-                    let u = any_perpendicular(*axis);
-                    let n = [*axis, u, axis.cross(u)][i as usize];
-                    (row.value, row.normal) = (n.dot(own - *apex), *axes * n);
-                    row.sinks = if i == 0 { -1.0 / sin } else { 0.0 };
-                }
-                _ => {
-                    let f = face.at(own);
-                    (row.value, row.normal, row.sinks) = (f.value, *axes * f.normal, 1.0);
-                    row.bend = if f.rho > 0.0 { f.k / f.rho } else { 0.0 };
-                    (row.axis, row.all) = match face {
-                        Face::Cylinder { axis, .. } | Face::Cone { axis, .. } => (*axes * *axis, false),
-                        _ => (DVec3::ZERO, true),
-                    };
-                }
+            if let Some((normal, offset)) = face.flat() {
+                (row.value, row.normal, row.sinks, row.bend) = (normal.dot(own) - offset, *axes * normal, 1.0, 0.0);
+            } else if let (Constraint::Apex(_, _, i), Some(apex)) = (*constraint, face.apex()) {
+                let n = apex.directions()[i as usize];
+                (row.value, row.normal) = (n.dot(own - apex.point), *axes * n);
+                row.sinks = if i == 0 { -1.0 / apex.sin } else { 0.0 };
+            } else {
+                let f = face.at(own);
+                (row.value, row.normal, row.sinks) = (f.value, *axes * f.normal, 1.0);
+                row.bend = if f.rho > 0.0 { f.k / f.rho } else { 0.0 };
+                (row.axis, row.all) = match face.developable() {
+                    Some(axis) => (*axes * axis, false),
+                    None => (DVec3::ZERO, true),
+                };
             }
             row.rate = -row.normal.dot(carried[side as usize]);
         }
@@ -381,13 +373,13 @@ impl Touch {
             if row.bend != 0.0 {
                 curvature += row.hessian() * (weight / sum);
             }
-            if !literal(c) || weight / sum > pair::ACTIVE {
+            if !literal(c) || weight / sum > extent::ACTIVE {
                 gradients.push(row.normal);
                 count[side] += 1;
-                pair::note(&mut self.faces[side], id.face());
+                extent::note(&mut self.faces[side], id.face());
             }
         }
-        self.extent = pair::extent(&gradients, curvature, scale);
+        self.extent = extent::extent(&gradients, curvature, scale);
         self.kind = Kind::of_active(count[0], count[1]);
     }
 }

@@ -17,7 +17,6 @@
 
 use super::super::asked::Asked;
 use super::super::outcome::Outcome;
-use super::form::Form;
 use super::gjk::nearest;
 use super::overlap::Start;
 use super::part::{Part, Shown};
@@ -25,7 +24,8 @@ use super::proof::{Gap, Pace};
 use super::steer::steer;
 use super::support::Body;
 use super::touch::{Stand, Touch};
-use super::{APART, Pair, excluded};
+use super::turns::{Posed, Turns};
+use super::whole::{APART, Pair, excluded};
 use glam::{DMat3, DVec3};
 
 /// Distance evaluations before a pair is left to others.
@@ -45,70 +45,6 @@ const ASTRAY: f64 = 0.5;
 const NEAR: f64 = 0.01;
 /// Gap that the direction may leave at the time of contact, in sizes of the pair.
 const CLOSED: f64 = 1e-13;
-
-/// How a pair turns.
-pub struct Turns {
-    /// Rotation vectors over the step, world axes; none for a spin that moves nothing of its body.
-    pub spins: [DVec3; 2],
-    rates: [f64; 2],
-    /// World from primitive: what lies along the axis of rotation, across it, and that a quarter turn on.
-    axes: [[DMat3; 3]; 2],
-    /// From the centres of rotation to the primitives', along the primitives' axes.
-    offsets: [DVec3; 2],
-    /// From A's centre of rotation to B's at the start.
-    pivots: DVec3,
-    /// Of A against B.
-    velocity: DVec3,
-}
-
-/// Two bodies at one time; world axes.
-#[derive(Clone, Copy)]
-pub struct Posed {
-    /// The time.
-    pub t: f64,
-    /// World from primitive.
-    pub axes: [DMat3; 2],
-    /// From the centres of rotation to the primitives'.
-    pub offsets: [DVec3; 2],
-    /// From A's centre to B's.
-    pub way: DVec3,
-}
-
-impl Turns {
-    /// Of primitives that stand with these axes at the start.
-    fn new(pair: &Pair, axes: [DMat3; 2], spins: [DVec3; 2]) -> Self {
-        let rates = spins.map(DVec3::length);
-        let split = |k: usize| {
-            if rates[k] == 0.0 {
-                return [axes[k], DMat3::ZERO, DMat3::ZERO];
-            }
-            let u = spins[k] / rates[k];
-            let part =
-                |f: &dyn Fn(DVec3) -> DVec3| DMat3::from_cols(f(axes[k].x_axis), f(axes[k].y_axis), f(axes[k].z_axis));
-            let along = part(&|v| u * u.dot(v));
-            [along, axes[k] - along, part(&|v| u.cross(v))]
-        };
-        let offsets = [0, 1]
-            .map(|k| if pair.offsets[k] == DVec3::ZERO { DVec3::ZERO } else { axes[k].transpose() * pair.offsets[k] });
-        let pivots = pair.way - pair.offsets[1] + pair.offsets[0];
-        Self { spins, rates, axes: [split(0), split(1)], offsets, pivots, velocity: pair.velocity }
-    }
-
-    /// The bodies at a time.
-    pub fn at(&self, t: f64) -> Posed {
-        let axes = [0, 1].map(|k| {
-            let [along, across, ahead] = &self.axes[k];
-            if self.rates[k] == 0.0 {
-                return *along;
-            }
-            let (s, c) = libm::sincos(self.rates[k] * t);
-            *along + *across * c + *ahead * s
-        });
-        let offsets =
-            [0, 1].map(|k| if self.offsets[k] == DVec3::ZERO { DVec3::ZERO } else { axes[k] * self.offsets[k] });
-        Posed { t, axes, offsets, way: self.pivots - self.velocity * t + (offsets[1] - offsets[0]) }
-    }
-}
 
 /// A pair of which one body turns at least.
 pub struct Turning<'a> {
@@ -150,7 +86,7 @@ impl<'a> Turning<'a> {
 
     /// φ along a unit direction.
     fn gap(&self, m: &Posed, n: DVec3) -> Gap {
-        let [a, b] = [0, 1].map(|k| Form::of(&self.parts[k].primitive.shape));
+        let [a, b] = [0, 1].map(|k| self.parts[k].primitive.shape.form());
         Gap { t: m.t, n, phi: n.dot(m.way) - a.reach(&m.axes[0], n) - b.reach(&m.axes[1], -n) }
     }
 

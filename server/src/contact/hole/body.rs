@@ -1,7 +1,7 @@
 //! A convex body as the hull of discs of one axis, and how far it reaches when cut by one plane.
 //!
-//! A cylinder or frustum is the hull of its two rims, a ball one disc without an axis (all directions count), a box eight
-//! discs of radius 0. Along w the disc about c with radius r reaches c·w + r|w⊥|, w⊥ the part of w across the axis.
+//! A cylinder or frustum is the hull of its two rims, a ball one disc without an axis (all directions count), a box or a polyhedron
+//! of its corners: discs of radius 0. Along w the disc about c with radius r reaches c·w + r|w⊥|, w⊥ the part of w across the axis.
 //!
 //! Of a body P cut by half-spaces n_k·x <= d_k no point reaches farther along u than
 //!
@@ -15,7 +15,8 @@
 
 use crate::math::any_perpendicular;
 use crate::motion::Instant;
-use crate::solid::{Primitive, Shape};
+use crate::solid::Primitive;
+use crate::solid::primitive::Form;
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -24,8 +25,16 @@ const MOST: f64 = 4096.0;
 /// Steps of the search for one multiplier.
 const STEPS: usize = 8;
 
+/// Corners of a polyhedron up to which each is a disc.
+const MOST_CORNERS: usize = 32;
+
 /// Discs: centres and radii.
 pub(super) type Discs = SmallVec<[(DVec3, f64); 8]>;
+
+/// True when three faces meet in every corner of a polyhedron: 2E = 3V, and V − E + F = 2 (Euler).
+fn is_simple(p: &Primitive, corners: &[DVec3]) -> bool {
+    corners.len() + 4 == 2 * p.faces.len()
+}
 
 /// A convex body in its model's frame.
 #[derive(Clone, Debug)]
@@ -36,28 +45,27 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// `None` for a polyhedron and for what has no bounds.
+    /// `None` for what has no bounds, and for a polyhedron of many corners or with one in which more than three faces meet: which of
+    /// them hold it is for the search to say.
     pub fn of(p: &Primitive) -> Option<Self> {
         let (at, z) = (&p.frame, p.frame.vector(DVec3::Z).normalize());
         let rim = |h: f64, r: f64| (at.point(DVec3::Z * h), r);
-        Some(match &p.shape {
-            Shape::Sphere(s) => Self { discs: SmallVec::from_slice(&[(at.position, s.radius)]), axis: None },
-            Shape::Cylinder(c) => Self {
-                discs: SmallVec::from_slice(&[rim(-c.half_height, c.radius), rim(c.half_height, c.radius)]),
-                axis: Some(z),
-            },
-            Shape::Cone(c) => Self {
-                discs: SmallVec::from_slice(&[rim(-c.half_height, c.bottom), rim(c.half_height, c.top)]),
-                axis: Some(z),
-            },
-            Shape::Cuboid(c) => {
+        Some(match p.shape.form() {
+            Form::Ball(radius) => Self { discs: SmallVec::from_slice(&[(at.position, radius)]), axis: None },
+            Form::Round { bottom, top, half } => {
+                Self { discs: SmallVec::from_slice(&[rim(-half, bottom), rim(half, top)]), axis: Some(z) }
+            }
+            Form::Cuboid(half) => {
                 let corner = |k: usize| {
                     let sign = |bit: usize| if k & bit == 0 { -1.0 } else { 1.0 };
-                    (at.point(c.half * DVec3::new(sign(1), sign(2), sign(4))), 0.0)
+                    (at.point(half * DVec3::new(sign(1), sign(2), sign(4))), 0.0)
                 };
                 Self { discs: (0..8).map(corner).collect(), axis: Some(z) }
             }
-            Shape::Polyhedron(_) | Shape::HalfSpace(_) => return None,
+            Form::Corners(c) if c.len() <= MOST_CORNERS && is_simple(p, c) => {
+                Self { discs: c.iter().map(|v| (at.point(*v), 0.0)).collect(), axis: Some(z) }
+            }
+            Form::Corners(_) | Form::Unbounded => return None,
         })
     }
 }

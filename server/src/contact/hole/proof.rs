@@ -25,10 +25,19 @@
 //! In time, for every material point of P, (w·x)'' is at most 2|Δw|/h·V + |w·x''|, so between two moments φ is above the
 //! line through its values there, less ½ Q s(1−s) h²; positive throughout where ½ Q h² <= (√φ₀ + √φ₁)².
 //! A flat wall is one direction, and a plane that keeps P out is a bound with u = 0: for those D = 0.
+//!
+//! A disc that spins about its own axis stays what it is, though its points go round. So where the hole does not turn and w stays,
+//! Q is also taken from its centre c and axis a, with ω fixed to P: of the reach c·w + r G, G = |w⊥| = √(|w|² − s²), s = w·a,
+//!
+//! ```text
+//! |c''·w| <= |w×ω| |ω×(c − o)|,    −G'' = s'² |w|²/G³ + s s''/G,    |s'| <= |w×ω| |ω×a|/|ω|,    |s''| <= |w×ω| |ω×a|,
+//! ```
+//!
+//! o a point of P's axis of rotation: next to nothing where P spins nearly about its own axis.
 //! Source: the duality is that of `body`; the rest is derived here.
 
-use super::Pair;
 use super::body::{Best, Bound, Moment};
+use super::pierced::{Pair, Wall};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -39,6 +48,9 @@ const NARROWEST: f64 = 1e-4;
 const SHORTEST: f64 = 1e-6;
 /// Part of a sector in which it is not divided.
 const MARGIN: f64 = 0.02;
+/// Least part of |w|² across a disc's axis for which its wobble is worked out; the rounding of what it adds up.
+const LEANS: f64 = 1e-4;
+const ROUNDED: f64 = 1.0 + 1e-12;
 /// Least part of what is proven that is claimed: rounding of the few sums.
 const CLAIMED: f64 = 1.0 - 1e-12;
 
@@ -50,15 +62,6 @@ pub(super) enum Verdict {
     Met(f64, Wall),
     /// Neither shown.
     Open,
-}
-
-/// One direction of a wall.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Wall {
-    /// The round wall in a direction from its axis.
-    Round(DVec3),
-    /// One of the flat walls.
-    Flat(usize),
 }
 
 /// Two directions and two moments, with the best bounds at each: `[time][direction]`.
@@ -142,6 +145,7 @@ impl Pair<'_> {
             }
         }
         let mut worth = Worth::All;
+        let stays = turned == 0.0 && half_q > 0.0 && moments[0].at.spin_b == DVec3::ZERO;
         for i in 0..moments[0].discs.len() {
             let radius = moments[0].discs[i].1;
             let mut ends = [[0.0; 2]; 2];
@@ -158,6 +162,12 @@ impl Pair<'_> {
                     ends[1][e] = sagging(phi, bend(self.radius(), radius, chord, across[e], lengths[e]));
                 }
             }
+            let mut half_q = half_q;
+            // Worked out where the way that points go takes too much, and only then.
+            let takes = |ends: [f64; 2], half_q: f64| ends[0].min(ends[1]) > 0.0 && !holds(ends, half_q);
+            if stays && (takes(ends[0], half_q) || takes(ends[1], half_q)) {
+                half_q = half_q.min(self.wobble(moments, i, w[0]));
+            }
             if !holds(ends[0], half_q) {
                 return Worth::None;
             }
@@ -166,6 +176,34 @@ impl Pair<'_> {
             }
         }
         worth
+    }
+
+    /// ½ Q h² of one disc between two moments, by its centre and axis, for directions w on the segment between two.
+    fn wobble(&self, moments: [&Moment; 2], i: usize, w: [DVec3; 2]) -> f64 {
+        let at = &moments[0].at;
+        let h = moments[1].at.t - at.t;
+        let (center, radius) = self.body.discs[i];
+        let omega = at.b_from_a * at.omega;
+        let most = |f: &dyn Fn(DVec3) -> f64| f(w[0]).max(f(w[1]));
+        let (length, across) = (most(&|w| w.length()), most(&|w| w.cross(omega).length()));
+        let mut pull = across * at.omega.cross(center - at.center_a).length();
+        if let Some(axis) = self.body.axis.filter(|_| radius > 0.0) {
+            let (turning, spin) = (at.omega.cross(axis).length(), at.omega.length());
+            let (first, second) = (across * turning / spin, across * turning);
+            let seen = |m: &Moment| m.axis.map_or(0.0, |a| most(&|w| w.dot(a).abs()));
+            let along = seen(moments[0]).max(seen(moments[1])) + 0.5 * h * first;
+            // No shorter than the segment's distance from 0.
+            let (from, way) = (w[0], w[1] - w[0]);
+            let foot = if way == DVec3::ZERO { 0.0 } else { (-from.dot(way) / way.length_squared()).clamp(0.0, 1.0) };
+            let room = (from + way * foot).length_squared() - along * along;
+            if room <= LEANS * length * length {
+                return f64::INFINITY;
+            }
+            let g = room.sqrt();
+            pull += radius * (first * first * length * length / (g * g * g) + along * second / g);
+        }
+        let motion = self.relative.bounds(at.t, h, self.reach);
+        0.5 * h * h * (pull * ROUNDED + 2.0 * motion.bend * length)
     }
 
     /// The worth of the best of a few ways to take multipliers over a rectangle: those of its end, of its start, or from

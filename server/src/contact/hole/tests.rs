@@ -1,12 +1,11 @@
 //! The shortcut against the search without it: the same answers on random placements of pegs, balls and boxes in holes.
 
-use super::Pair;
 use super::body::{Moment, Plane};
-use super::proof::{Verdict, Wall};
+use super::pierced::{Pair, Wall};
+use super::proof::Verdict;
 use crate::contact::literal::Side;
-use crate::contact::{
-    Asked, Body, Ideas, Outcome, PairQuery, PairSearch, Scratch, Status, default_resolution, earliest_contact,
-};
+use crate::contact::task::Task;
+use crate::contact::{Asked, Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
 use crate::eco::Model;
 use crate::eco::testing::{pierced, simple};
 use crate::math::random::Random;
@@ -291,7 +290,7 @@ fn a_proof_does_not_jump_over_an_arc() {
             ideas: Ideas::default(),
             asked: Asked::DEPTH,
         };
-        let (task, swapped) = PairSearch::task(&query);
+        let (task, swapped) = Task::of(&query);
         let (placed_a, placed_b) = task.relative.placed();
         let seen = Relative::new(placed_b, placed_a);
         let (of_pipe, of_ball, side, relative) = if swapped {
@@ -324,7 +323,7 @@ fn a_best_bound_is_the_reach_of_the_cut_body() {
         let relative = Relative::new(placed(motion), placed(rest()));
         let primitive = &model.solid.primitives[0];
         let planes = [Plane { normal: DVec3::Z, offset: r.within(-0.2, 0.2), face: 0 }];
-        let m = Moment::new(&super::Body::of(primitive).expect("bounded"), relative.at(0.0), &planes);
+        let m = Moment::new(&super::body::Body::of(primitive).expect("bounded"), relative.at(0.0), &planes);
         let u = across(&mut r, 1.0);
         let best = m.best(u, 0.0, &planes);
         let mut reach = f64::NEG_INFINITY;

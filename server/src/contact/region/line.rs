@@ -11,7 +11,7 @@ use super::patch::{Corner, key_of};
 use super::surface::{Pair, Standing, is_convex, standing};
 use crate::contact::literal::Side;
 use crate::contact::separation::Place;
-use crate::solid::Face;
+use crate::solid::surface::curve::{self, Nearness, Outward};
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
@@ -44,6 +44,16 @@ pub struct Run {
 }
 
 impl Curve {
+    /// A curve of faces, its zero fixed in the body on `side`.
+    fn of(bodies: &Bodies, side: Side, curve: curve::Curve) -> Self {
+        match curve {
+            curve::Curve::Line { origin, along } => Curve::Line { origin, along },
+            curve::Curve::Circle { center, axis, radius } => {
+                Curve::Circle { center, axis, zero: bodies.material(side, axis), radius }
+            }
+        }
+    }
+
     pub fn point(&self, s: f64) -> DVec3 {
         match *self {
             Curve::Line { origin, along } => origin + along * s,
@@ -96,127 +106,16 @@ fn edges(bodies: &Bodies, lits: &[Lit], out: &mut Vec<Candidate>) {
 
 /// Straight and circular curves that two faces have in common.
 fn edge(bodies: &Bodies, p: Lit, q: Lit, found: &mut impl FnMut(Curve)) {
-    const PARALLEL: f64 = 1e-9;
-    let side = p.0;
-    let mut circle = |center: DVec3, axis: DVec3, squared: f64| {
-        if squared > (bodies.eps * bodies.eps).max(0.0) {
-            let zero = bodies.material(side, axis);
-            found(Curve::Circle { center, axis, zero, radius: squared.sqrt() });
-        }
-    };
-    match (*bodies.face(p), *bodies.face(q)) {
-        (Face::Plane { normal: m, offset: d }, Face::Plane { normal: n, offset: e }) => {
-            let w = m.cross(n);
-            if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
-                let origin = (n.cross(w) * d + w.cross(m) * e) / w.length_squared();
-                found(Curve::Line { origin, along });
-            }
-        }
-        (Face::Plane { normal, offset }, Face::Sphere { center, radius }) => {
-            let h = normal.dot(center) - offset;
-            circle(center - normal * h, normal, (radius - h) * (radius + h));
-        }
-        (Face::Plane { normal, offset }, Face::Cylinder { origin, axis, radius }) => {
-            let h = normal.dot(origin) - offset;
-            if normal.cross(axis).length() <= PARALLEL {
-                circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
-            } else if normal.dot(axis).abs() <= PARALLEL {
-                let half = (radius - h) * (radius + h);
-                if half > 0.0 {
-                    let w = normal.cross(axis).normalize() * half.sqrt();
-                    found(Curve::Line { origin: origin - normal * h + w, along: axis });
-                    found(Curve::Line { origin: origin - normal * h - w, along: axis });
-                }
-            }
-        }
-        (Face::Plane { normal, offset }, Face::Cone { apex, axis, sin, cos }) => {
-            let z = (offset - normal.dot(apex)) / normal.dot(axis);
-            if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
-                circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
-            }
-        }
-        (Face::Sphere { center: o, radius: r }, Face::Sphere { center: c, radius: s }) => {
-            let d = (c - o).length();
-            if d > PARALLEL * bodies.size {
-                let x = (d * d + (r - s) * (r + s)) / (2.0 * d);
-                circle(o + (c - o) * (x / d), (c - o) / d, (r - x) * (r + x));
-            }
-        }
-        (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: c, axis: b, radius: s }) => {
-            let w = (c - o) - a * (c - o).dot(a);
-            let d = w.length();
-            if a.cross(b).length() <= PARALLEL && d > PARALLEL * bodies.size {
-                let x = (d * d + (r - s) * (r + s)) / (2.0 * d);
-                let half = (r - x) * (r + x);
-                if half > 0.0 {
-                    let v = a.cross(w / d) * half.sqrt();
-                    found(Curve::Line { origin: o + w * (x / d) + v, along: a });
-                    found(Curve::Line { origin: o + w * (x / d) - v, along: a });
-                }
-            }
-        }
-        (Face::Sphere { center, radius: s }, Face::Cylinder { origin, axis, radius }) => {
-            let off = (center - origin) - axis * (center - origin).dot(axis);
-            let h = (s - radius) * (s + radius);
-            if off.length() <= PARALLEL * bodies.size && h > 0.0 {
-                circle(center + axis * h.sqrt(), axis, radius * radius);
-                circle(center - axis * h.sqrt(), axis, radius * radius);
-            }
-        }
-        (Face::Cylinder { origin, axis: a, radius }, Face::Cone { apex, axis, sin, cos }) => {
-            let off = (apex - origin) - a * (apex - origin).dot(a);
-            if a.cross(axis).length() <= PARALLEL && off.length() <= PARALLEL * bodies.size {
-                circle(apex + axis * (radius * cos / sin), axis, radius * radius);
-            }
-        }
-        // The same pairs the other way round; two cones, and a cone and a sphere, share no line or circle that is looked for.
-        (_, Face::Plane { .. })
-        | (Face::Cylinder { .. }, Face::Sphere { .. })
-        | (Face::Cone { .. }, Face::Cylinder { .. }) => edge(bodies, q, p, found),
-        _ => {}
-    }
+    let mut carried = |curve| found(Curve::of(bodies, p.0, curve));
+    curve::common(bodies.face(p), bodies.face(q), bodies.size, bodies.eps, &mut carried);
 }
 
 /// The curve along which a face of one body touches one of the other without lying on it.
 fn tangent(bodies: &Bodies, p: Lit, q: Lit) -> Option<Curve> {
-    let near = |d: f64| d.abs() <= bodies.tau;
-    let parallel = |sine: f64| (sine * bodies.size).abs() <= bodies.lie;
-    match (*bodies.face(p), *bodies.face(q)) {
-        (Face::Cylinder { origin, axis, radius }, Face::Plane { .. }) if is_convex(p) => {
-            let g = bodies.look(q, origin).normal;
-            let u = -(g - axis * g.dot(axis)).try_normalize()?;
-            let line = Curve::Line { origin: origin + u * radius, along: axis };
-            parallel(g.dot(axis)).then_some(line)
-        }
-        (Face::Cone { apex, axis, sin, cos }, Face::Plane { .. }) if is_convex(p) => {
-            let g = bodies.look(q, apex).normal;
-            let u = -(g - axis * g.dot(axis)).try_normalize()?;
-            parallel(g.dot(axis) - sin).then_some(Curve::Line { origin: apex, along: axis * cos + u * sin })
-        }
-        (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: c, axis: b, radius: s })
-            if is_convex(p) =>
-        {
-            let u = ((c - o) - a * (c - o).dot(a)).try_normalize()?;
-            let d = (c - o).dot(u);
-            let (gap, u) = if is_convex(q) { (d - r - s, u) } else { (s - r - d, -u) };
-            (near(gap) && parallel(a.cross(b).length())).then_some(Curve::Line { origin: o + u * r, along: a })
-        }
-        (Face::Sphere { center, radius }, Face::Cylinder { origin, axis, radius: s })
-            if is_convex(p) && !is_convex(q) =>
-        {
-            let off = (center - origin) - axis * (center - origin).dot(axis);
-            let zero = bodies.material(q.0, axis);
-            near(off.length() + (radius - s).abs()).then_some(Curve::Circle { center, axis, zero, radius })
-        }
-        (Face::Sphere { center, radius }, Face::Cone { apex, axis, sin, cos }) if is_convex(p) && !is_convex(q) => {
-            let z = (center - apex).dot(axis);
-            let off = (center - apex) - axis * z;
-            let zero = bodies.material(q.0, axis);
-            let circle = Curve::Circle { center: center - axis * (radius * sin), axis, zero, radius: radius * cos };
-            (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
-        }
-        _ => None,
-    }
+    let [out_p, out_q] = [p, q].map(|l| Outward { face: bodies.face(l), is_convex: is_convex(l) });
+    let within = Nearness { near: bodies.tau, lie: bodies.lie, size: bodies.size };
+    let found = curve::tangent(out_p, out_q, |x| bodies.look(q, x).normal, &within);
+    found.map(|curve| Curve::of(bodies, q.0, curve))
 }
 
 /// The candidates among the faces of a box.
@@ -346,8 +245,8 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
     }
     for lit in &c.faces {
         // A ruling ends at its apex.
-        if let (Face::Cone { apex, .. }, Curve::Line { .. }) = (bodies.face(*lit), c.curve) {
-            stops.push(c.curve.nearest(*apex).0);
+        if let (Some(apex), Curve::Line { .. }) = (bodies.face(*lit).apex(), c.curve) {
+            stops.push(c.curve.nearest(apex.point).0);
         }
     }
     stops.sort_by(f64::total_cmp);

@@ -54,19 +54,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     /// Separations up to `tau` count, and up to `REACH`.
     pub fn new(task: &'t Task<'a>, at: &'t Instant, tau: f64, work: &'t Work) -> Self {
         let size = 2.0 * task.model_a.radius.min(task.model_b.radius);
-        let carried = |f: &Face| match *f {
-            Face::Plane { normal, offset } => {
-                let n = at.a_vector(normal).normalize();
-                Face::Plane { normal: n, offset: n.dot(at.a_point(normal * offset)) }
-            }
-            Face::Sphere { center, radius } => Face::Sphere { center: at.a_point(center), radius },
-            Face::Cylinder { origin, axis, radius } => {
-                Face::Cylinder { origin: at.a_point(origin), axis: at.a_vector(axis).normalize(), radius }
-            }
-            Face::Cone { apex, axis, sin, cos } => {
-                Face::Cone { apex: at.a_point(apex), axis: at.a_vector(axis).normalize(), sin, cos }
-            }
-        };
+        let carried = |f: &Face| f.moved(|x| at.a_point(x), |v| at.a_vector(v));
         Self {
             task,
             at,
@@ -160,11 +148,9 @@ impl<'t, 'a> Bodies<'t, 'a> {
 
     /// Direction in which a literal rises at `x`; away from the cone along the axis at an apex, and whether it is one.
     pub fn rise(&self, lit: Lit, x: DVec3) -> (DVec3, bool) {
-        match *self.face(lit) {
-            Face::Cone { apex, axis, .. } if (x - apex).length() <= self.eps => {
-                (if lit.1.sense() == Sense::Positive { -axis } else { axis }, true)
-            }
-            _ => (self.look(lit, x).normal, false),
+        match self.face(lit).apex().filter(|apex| (x - apex.point).length() <= self.eps) {
+            Some(apex) => (if lit.1.sense() == Sense::Positive { -apex.axis } else { apex.axis }, true),
+            None => (self.look(lit, x).normal, false),
         }
     }
 

@@ -24,10 +24,10 @@ mod surface;
 use super::depth;
 use super::literal::Side;
 use super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::pair::{PairQuery, PairSearch};
+use super::query::PairQuery;
 use super::separation::{Cover, Place};
+use super::task::Task;
 use super::work::Work;
-use crate::solid::Face;
 use glam::DVec3;
 use line::Candidate;
 use local::{Bodies, Lit};
@@ -94,7 +94,7 @@ fn limit(query: &PairQuery) -> u64 {
 /// All regions in which the bodies of a question touch at `time`: surfaces within `threshold` of each other. Where
 /// none is found, since all are farther apart than `local::REACH` of the smaller body, the nearest place is the one region.
 pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
-    let (task, swapped) = PairSearch::task(query);
+    let (task, swapped) = Task::of(query);
     if task.a.is_empty() || task.b.is_empty() {
         return Regions { complete: true, ..Regions::default() };
     }
@@ -253,7 +253,7 @@ fn cover(bodies: &Bodies) -> (Vec<Place>, bool) {
             continue;
         }
         let few = sides[0].len() + sides[1].len() <= FEW_FACES;
-        let is_flat = sides.iter().flatten().all(|l| matches!(bodies.face(*l), Face::Plane { .. }));
+        let is_flat = sides.iter().flatten().all(|l| bodies.face(*l).is_flat());
         let simple = few && (is_flat || radius <= ROUND * 0.5 * bodies.size || is_simple(bodies, &place));
         if simple || radius <= smallest {
             places.push(place);
@@ -322,7 +322,7 @@ fn apart(bodies: &Bodies, pair: &Pair, places: &[&Place], corners: Vec<Corner>) 
         return Vec::new();
     }
     // Fewer points than two triangles have make no two pieces.
-    if corners.len() < 6 || !matches!(bodies.face(pair.alpha), Face::Plane { .. }) {
+    if corners.len() < 6 || !bodies.face(pair.alpha).is_flat() {
         return vec![corners];
     }
     let mut lits: Vec<Lit> = Vec::new();

@@ -9,7 +9,7 @@ use super::local::{Bodies, Lit};
 use super::surface::{Pair, Standing, axis_of_curve, same_surface, standing};
 use crate::contact::literal::Side;
 use crate::contact::separation::Place;
-use crate::solid::{Face, local};
+use crate::solid::{local, surface::Plane};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
@@ -44,13 +44,13 @@ impl Cut {
     fn span(&self, bodies: &Bodies, center: DVec3, half: DVec3) -> local::Span {
         match *self {
             Cut::Face(lit) => bodies.span(bodies.face(lit), center, half),
-            Cut::Plane(normal, offset) => bodies.span(&Face::Plane { normal, offset }, center, half),
+            Cut::Plane(normal, offset) => bodies.span(&Plane { normal, offset }.into(), center, half),
         }
     }
 
     fn is_flat(&self, bodies: &Bodies) -> bool {
         match self {
-            Cut::Face(lit) => matches!(bodies.face(*lit), Face::Plane { .. }),
+            Cut::Face(lit) => bodies.face(*lit).is_flat(),
             Cut::Plane(..) => true,
         }
     }
@@ -59,7 +59,7 @@ impl Cut {
 /// The points of a pair's surface within some boxes that two cuts pass through.
 fn meet(bodies: &Bodies, pair: &Pair, cuts: [&Cut; 2], places: &[&Place]) -> Vec<(DVec3, u64)> {
     let slack = bodies.tau + bodies.eps;
-    if matches!(bodies.face(pair.alpha), Face::Plane { .. }) && cuts.iter().all(|c| c.is_flat(bodies)) {
+    if bodies.face(pair.alpha).is_flat() && cuts.iter().all(|c| c.is_flat(bodies)) {
         // Three planes have one point in common, wherever it is looked for.
         let found = newton(bodies, pair, cuts, places[0].center);
         return found.filter(|f| places.iter().any(|p| p.holds(f.0, bodies.eps))).into_iter().collect();
@@ -199,7 +199,7 @@ pub fn corners(bodies: &Bodies, pair: &Pair, places: &[&Place]) -> Vec<Corner> {
         }
     }
     if found.is_empty()
-        && let Face::Sphere { center, radius } = *bodies.face(pair.alpha)
+        && let Some((center, radius)) = bodies.face(pair.alpha).ball()
     {
         // A whole sphere has no boundary: its points along three axes fixed in A.
         for (k, d) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
@@ -230,7 +230,7 @@ pub fn order(bodies: &Bodies, pair: &Pair, points: &mut [Corner]) {
         p.0.cmp(&q.0).then(p.1.total_cmp(&q.1))
     };
     points.sort_by(first);
-    if !matches!(bodies.face(pair.alpha), Face::Plane { .. }) || points.len() < 3 {
+    if !bodies.face(pair.alpha).is_flat() || points.len() < 3 {
         return;
     }
     // Rings within rings have no order round the middle.

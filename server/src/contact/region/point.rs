@@ -11,7 +11,8 @@ use crate::contact::depth::Deepest;
 use crate::contact::literal::Side;
 use crate::contact::newton::{MAX_UNKNOWNS, cholesky_solve, damped_step};
 use crate::contact::separation::Place;
-use crate::solid::{Face, Sense};
+use crate::solid::Sense;
+use crate::solid::surface::Apex;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -43,7 +44,7 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
     let mut out = Vec::new();
     for (lits, of) in systems(bodies, places) {
         // Planes balance nowhere, in one place, or all along a flat of which the trees choose a part.
-        let is_flat = lits.iter().all(|l| matches!(bodies.face(*l), Face::Plane { .. }));
+        let is_flat = lits.iter().all(|l| bodies.face(*l).is_flat());
         let mut last: Option<DVec3> = None;
         for place in of {
             if bodies.work.is_spent() {
@@ -67,7 +68,7 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
     for place in places {
         for (side, other) in [(Side::A, Side::B), (Side::B, Side::A)] {
             for lit in place.lits(side) {
-                let Face::Cone { apex, .. } = *bodies.face(lit) else { continue };
+                let Some(Apex { point: apex, .. }) = bodies.face(lit).apex() else { continue };
                 if lit.1.sense() == Sense::Positive && place.holds(apex, bodies.tau) {
                     out.extend(at_apex(bodies, side, apex, &place.lits(other)));
                 }

@@ -8,8 +8,9 @@
 use super::local::{ANGLE, At, Bodies, Lit, holds};
 use crate::contact::literal::Side;
 use crate::math::any_perpendicular;
+use crate::solid::Sense;
 use crate::solid::local::{LiteralId, Truth};
-use crate::solid::{Face, Sense};
+use crate::solid::surface::{Axis, Symmetry};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -30,32 +31,20 @@ impl Pair {
     /// The pair of two literals, if they lie on each other.
     pub fn of(bodies: &Bodies, alpha: Lit, beta: Lit) -> Option<Self> {
         let (tau, size) = (bodies.tau, bodies.size);
-        let near = |d: f64| d.abs() <= tau;
         let opposite = alpha.1.sense() != beta.1.sense();
-        let found = match (*bodies.face(alpha), *bodies.face(beta)) {
-            (Face::Plane { .. }, Face::Plane { .. }) => {
-                let (a, b) = (bodies.look(alpha, DVec3::ZERO), bodies.look(beta, DVec3::ZERO));
-                let lean = a.normal + b.normal;
-                let tilt = lean.length();
-                if tilt * size > LEAN * bodies.lie {
-                    return None;
-                }
-                // gap(x) = a(x) + b(x): both are distances from their bodies.
-                let limit = (tilt * size > 0.25 * tau).then(|| (lean / tilt, (tau - a.value - b.value) / tilt));
-                return Some(Self { alpha, beta, limit });
+        let (face_a, face_b) = (bodies.face(alpha), bodies.face(beta));
+        if face_a.is_flat() && face_b.is_flat() {
+            let (a, b) = (bodies.look(alpha, DVec3::ZERO), bodies.look(beta, DVec3::ZERO));
+            let lean = a.normal + b.normal;
+            let tilt = lean.length();
+            if tilt * size > LEAN * bodies.lie {
+                return None;
             }
-            (Face::Sphere { center: o, radius: r }, Face::Sphere { center: p, radius: s }) => {
-                near((o - p).length() + (r - s).abs())
-            }
-            (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: p, axis: b, radius: s }) => {
-                let lean = a.cross(b).length() * size;
-                near(lean + (o - p).cross(a).length() + (r - s).abs())
-            }
-            (Face::Cone { apex: o, axis: a, sin: r, .. }, Face::Cone { apex: p, axis: b, sin: s, .. }) => {
-                a.dot(b) > 0.0 && near(a.cross(b).length() * size + (o - p).length() + (r - s).abs() * size)
-            }
-            _ => false,
-        };
+            // gap(x) = a(x) + b(x): both are distances from their bodies.
+            let limit = (tilt * size > 0.25 * tau).then(|| (lean / tilt, (tau - a.value - b.value) / tilt));
+            return Some(Self { alpha, beta, limit });
+        }
+        let found = face_a.deviation(face_b, size).is_some_and(|d| d <= tau);
         (found && opposite).then_some(Self { alpha, beta, limit: None })
     }
 
@@ -190,43 +179,35 @@ pub fn same_surface(bodies: &Bodies, p: Lit, q: Lit) -> bool {
     }
     let near = |d: f64| d <= bodies.eps;
     let size = bodies.size;
-    let sense = p.0 == q.0 && p.1.sense() == q.1.sense();
-    match (*bodies.face(p), *bodies.face(q)) {
-        (Face::Plane { .. }, Face::Plane { .. }) if p.0 == q.0 => {
-            let (a, b) = (bodies.look(p, DVec3::ZERO), bodies.look(q, DVec3::ZERO));
-            near((a.normal - b.normal).length() * size) && near((a.value - b.value).abs())
-        }
-        (Face::Sphere { center: o, radius: r }, Face::Sphere { center: c, radius: s }) => {
-            sense && near((o - c).length() + (r - s).abs())
-        }
-        (Face::Cylinder { origin: o, axis: a, radius: r }, Face::Cylinder { origin: c, axis: b, radius: s }) => {
-            sense && near(a.cross(b).length() * size + (o - c).cross(a).length() + (r - s).abs())
-        }
-        (Face::Cone { apex: o, axis: a, sin: r, .. }, Face::Cone { apex: c, axis: b, sin: s, .. }) => {
-            sense && near((a - b).length() * size + (o - c).length() + (r - s).abs() * size)
-        }
-        _ => false,
+    if p.0 != q.0 {
+        return false;
     }
+    let (face_p, face_q) = (bodies.face(p), bodies.face(q));
+    if face_p.is_flat() && face_q.is_flat() {
+        // Planes of either sense, by how they look out of the body.
+        let (a, b) = (bodies.look(p, DVec3::ZERO), bodies.look(q, DVec3::ZERO));
+        return near((a.normal - b.normal).length() * size) && near((a.value - b.value).abs());
+    }
+    p.1.sense() == q.1.sense() && face_p.difference(face_q, size).is_some_and(near)
 }
 
 /// The axis about which the curve of two faces is symmetric, if it has one: a point, a direction, and a perpendicular
 /// that moves with the body.
 pub fn axis_of_curve(bodies: &Bodies, p: Lit, q: Lit) -> Option<(DVec3, DVec3, DVec3)> {
-    let (origin, axis, side) = match (*bodies.face(p), *bodies.face(q)) {
-        (Face::Cylinder { origin, axis, .. } | Face::Cone { apex: origin, axis, .. }, other) => {
-            let along = matches!(other, Face::Plane { normal, .. } if normal.dot(axis).abs() < 1e-6);
-            let parallel = matches!(other, Face::Cylinder { axis: b, .. } if axis.cross(b).length() < 1e-6);
-            if along || parallel {
+    let other = bodies.face(q);
+    let (origin, axis, side) = match (bodies.face(p).symmetry(), other.symmetry()) {
+        (Symmetry::Axis(Axis { origin, direction }), _) => {
+            if other.slides_along(direction, 1e-6) {
                 return None;
             }
-            (origin, axis, p.0)
+            (origin, direction, p.0)
         }
-        (Face::Sphere { center, .. }, Face::Plane { normal, .. }) => (center, normal, p.0),
-        (Face::Sphere { center, .. }, Face::Sphere { center: other, .. }) => {
-            (center, (other - center).try_normalize()?, p.0)
+        (Symmetry::Center(center), Symmetry::Normal(normal)) => (center, normal, p.0),
+        (Symmetry::Center(center), Symmetry::Center(other)) => (center, (other - center).try_normalize()?, p.0),
+        (Symmetry::Center(_) | Symmetry::Normal(_), Symmetry::Axis(_)) | (Symmetry::Normal(_), Symmetry::Center(_)) => {
+            return axis_of_curve(bodies, q, p);
         }
-        (_, Face::Cylinder { .. } | Face::Cone { .. } | Face::Sphere { .. }) => return axis_of_curve(bodies, q, p),
-        _ => return None,
+        (Symmetry::Normal(_), Symmetry::Normal(_)) => return None,
     };
     Some((origin, axis, bodies.material(side, axis)))
 }

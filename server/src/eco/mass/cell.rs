@@ -8,7 +8,7 @@
 //! way, and a cut point lies on its edge and within 4 ε of the plane, for planes with Σ|g| <= 1. Whoever cuts keeps that
 //! distance (`slab`).
 
-use super::moments::{Moments, PAIRS};
+use crate::math::moments::{Moments, PAIRS};
 use glam::DVec3;
 use smallvec::SmallVec;
 

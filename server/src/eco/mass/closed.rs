@@ -1,7 +1,7 @@
 //! Moments in closed form: primitives, and trees in which primitives provably keep clear of each other.
 //!
-//! Of a primitive around the middle of its own frame, h its height, V its volume. All follow from discs across the axis: one
-//! of radius ρ has ∫ 1 = πρ² and ∫ x² = ∫ y² = πρ⁴/4; the frustum's have ρ = a + (b − a) s, 0 <= s <= 1.
+//! Of a primitive around the middle of its own frame (`Geometry::moments`), h its height, V its volume. All follow from discs
+//! across the axis: one of radius ρ has ∫ 1 = πρ² and ∫ x² = ∫ y² = πρ⁴/4; the frustum's have ρ = a + (b − a) s, 0 <= s <= 1.
 //!
 //! | primitive | V | ∫ x², ∫ y² | ∫ z² | ∫ z |
 //! |---|---|---|---|---|
@@ -17,16 +17,15 @@
 //! A union is the sum of its operands where their boxes are apart; a difference subtracts operands that are apart from each
 //! other and whose boxes lie inside the first, a convex primitive, with all eight corners.
 
-use super::moments::{Moments, PAIRS};
 use super::voxel::Evaluator;
 use crate::eco::span::rounding;
 use crate::math::Aabb;
+use crate::math::moments::{Moments, PAIRS};
 use crate::math::tolerance::BOX_ROUNDING;
-use crate::solid::local::write_node;
-use crate::solid::{Node, NodeId, Op, Primitive, Sense, Shape, Solid};
+use crate::solid::write_node;
+use crate::solid::{Face, Node, NodeId, Op, Primitive, Sense, Solid};
 use contactd_proto::Pose;
 use glam::{DMat3, DVec3};
-use std::f64::consts::PI;
 
 /// Rounding of a primitive's moments, as a fraction of its volume times its extents: some thirty products and sums in the
 /// formulas, the rotation and the shift.
@@ -100,34 +99,11 @@ fn holds(p: &Primitive, b: &Aabb) -> bool {
 }
 
 fn of_primitive(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> Option<(Moments, f64)> {
-    let own = match &p.shape {
-        Shape::Sphere(s) => {
-            let volume = 4.0 / 3.0 * PI * s.radius.powi(3);
-            diagonal(volume, 0.0, DVec3::splat(0.2 * volume * s.radius * s.radius))
-        }
-        Shape::Cylinder(c) => {
-            let (rr, h) = (c.radius * c.radius, 2.0 * c.half_height);
-            let volume = PI * rr * h;
-            diagonal(volume, 0.0, DVec3::new(rr / 4.0, rr / 4.0, h * h / 12.0) * volume)
-        }
-        Shape::Cone(c) => {
-            let (a, b, h) = (c.bottom, c.top, 2.0 * c.half_height);
-            let volume = PI * h * (a * a + a * b + b * b) / 3.0;
-            let across = PI * h * (a.powi(4) + a.powi(3) * b + a * a * b * b + a * b.powi(3) + b.powi(4)) / 20.0;
-            let along = PI * h.powi(3) * (a * a + 3.0 * a * b + 6.0 * b * b) / 30.0;
-            let first = PI * h * h * (a * a + 2.0 * a * b + 3.0 * b * b) / 12.0;
-            diagonal(volume, first, DVec3::new(across, across, along)).moved(DVec3::new(0.0, 0.0, -c.half_height))
-        }
-        Shape::Cuboid(c) => Moments::of_box(c.half),
-        Shape::Polyhedron(_) => return of_polyhedron(solid, node, p, origin),
-        Shape::HalfSpace(_) => return None,
+    let Some(own) = p.shape.geometry().moments() else {
+        let is_polyhedron = p.aabb.is_finite() && p.faces.iter().all(Face::is_flat);
+        return if is_polyhedron { of_polyhedron(solid, node, p, origin) } else { None };
     };
     Some((placed(&own, &p.frame, origin), FORMULA_ROUNDING * own.volume()))
-}
-
-/// Moments of a body with ∫ z = `first` and a diagonal ∫ xxᵀ.
-fn diagonal(volume: f64, first: f64, squares: DVec3) -> Moments {
-    Moments([volume, 0.0, 0.0, first, squares.x, squares.y, squares.z, 0.0, 0.0, 0.0])
 }
 
 /// A body's moments about a point of the parent of `frame`. One shift: there and back again would cancel.

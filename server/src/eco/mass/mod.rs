@@ -25,7 +25,6 @@
 
 mod cell;
 mod closed;
-mod moments;
 mod slab;
 #[cfg(test)]
 mod tests;
@@ -33,9 +32,9 @@ mod voxel;
 
 use super::Model;
 use crate::math::Aabb;
+use crate::math::moments::{MomentSums, Moments, PAIRS, Sum};
 use contactd_proto::{ErrorCode, MassOptions, MassProperties};
 use glam::DVec3;
-use moments::{MomentSums, Moments, PAIRS, Sum};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

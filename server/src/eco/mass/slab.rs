@@ -23,22 +23,9 @@
 
 use super::cell::{Cell, Plane};
 use crate::eco::span::rounding;
-use crate::math::any_perpendicular;
+use crate::solid::surface::{Bend, Law};
 use crate::solid::{Face, Sense};
 use glam::DVec3;
-
-/// How a face curves.
-#[derive(Clone, Copy, Debug)]
-enum Kind {
-    Plane,
-    /// Sphere or cylinder.
-    Round {
-        radius: f64,
-    },
-    Cone {
-        cos: f64,
-    },
-}
 
 /// Range of κ over a box, and the largest τ.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +39,7 @@ pub struct Curve {
 /// A face's two planes in the coordinates u of a box, x = c + E u.
 #[derive(Clone, Copy, Debug)]
 pub struct Slab {
-    kind: Kind,
+    law: Law,
     /// E n.
     gradient: DVec3,
     value: f64,
@@ -76,28 +63,15 @@ impl Slab {
     /// The slab of a face over the box center ± half.
     pub fn new(face: &Face, center: DVec3, half: DVec3) -> Self {
         let at = face.at(center);
-        let (kind, radial, tangents) = match *face {
-            Face::Plane { .. } => (Kind::Plane, DVec3::ZERO, [DVec3::ZERO; 2]),
-            Face::Sphere { radius, .. } => {
-                let t = any_perpendicular(at.normal);
-                (Kind::Round { radius }, at.normal, [t, at.normal.cross(t)])
-            }
-            Face::Cylinder { axis, radius, .. } => {
-                (Kind::Round { radius }, at.normal, [axis.cross(at.normal), DVec3::ZERO])
-            }
-            Face::Cone { axis, sin, cos, .. } => {
-                let radial = (at.normal + axis * sin) / cos;
-                (Kind::Cone { cos }, radial, [axis.cross(radial), DVec3::ZERO])
-            }
-        };
+        let Bend { law, radial, tangents } = face.bend(&at);
         let mut slab = Self {
-            kind,
+            law,
             gradient: at.normal * half,
             value: at.value,
             pad: rounding(face, center, half),
             tangents: tangents.map(|t| t * half),
             radial: (at.rho, radial * half),
-            along: if let Kind::Cone { .. } = kind { at.normal.cross(tangents[0]) * half } else { DVec3::ZERO },
+            along: if law.changes_along() { at.normal.cross(tangents[0]) * half } else { DVec3::ZERO },
             curve: None,
         };
         let widest = slab.radial.1.abs().element_sum();
@@ -114,14 +88,7 @@ impl Slab {
     fn curvature(&self, reach: f64, [least, most]: [f64; 2]) -> Option<Curve> {
         // T and q are right to a few units in the last place of what they come from.
         let t = reach * (1.0 + 64.0 * f64::EPSILON);
-        let range = match self.kind {
-            Kind::Plane => [0.0; 2],
-            Kind::Round { radius: r } if t < r && least >= 0.0 => [1.0 / r, 2.0 / (r + ((r - t) * (r + t)).sqrt())],
-            Kind::Cone { cos } if least > 16.0 * self.pad => {
-                [2.0 * cos / (most + most.hypot(t)), cos / (least - self.pad)]
-            }
-            _ => return None,
-        };
+        let range = self.law.range(t, [least, most], self.pad)?;
         let outward = 8.0 * f64::EPSILON;
         Some(Curve { range: [range[0] * (1.0 - outward), range[1] * (1.0 + outward)], reach: t })
     }
@@ -161,7 +128,7 @@ impl Slab {
 
     /// True when refining the box would bring nothing but rounding.
     pub fn is_flat(&self) -> bool {
-        matches!(self.kind, Kind::Plane)
+        self.law.is_straight()
     }
 
     /// How much each direction of the box adds to the planes' distance, in comparison.
@@ -205,6 +172,7 @@ impl Slab {
 mod tests {
     use super::*;
     use crate::math::random::Random;
+    use crate::solid::surface::{Cone, Cylinder, Plane, Sphere};
 
     #[test]
     fn the_surface_lies_between_the_planes() {
@@ -213,12 +181,12 @@ mod tests {
         for i in 0..6000 {
             let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
             let face = match i % 4 {
-                0 => Face::Plane { normal: n, offset: r.within(-1.0, 1.0) },
-                1 => Face::Sphere { center: o, radius: r.within(0.2, 2.0) },
-                2 => Face::Cylinder { origin: o, axis: n, radius: r.within(0.2, 2.0) },
+                0 => Plane { normal: n, offset: r.within(-1.0, 1.0) }.into(),
+                1 => Sphere { center: o, radius: r.within(0.2, 2.0) }.into(),
+                2 => Cylinder { origin: o, axis: n, radius: r.within(0.2, 2.0) }.into(),
                 _ => {
                     let (sin, cos) = r.within(0.1, 1.4).sin_cos();
-                    Face::Cone { apex: o, axis: n, sin, cos }
+                    Face::from(Cone { apex: o, axis: n, sin, cos })
                 }
             };
             let half = DVec3::new(r.within(0.01, 0.4), r.within(0.01, 0.4), r.within(0.01, 0.4));

@@ -1,14 +1,14 @@
 //! One face in a box is off by its bound at most; a model that is moved has its mass properties moved along.
 
 use super::mass_properties;
-use super::moments::Moments;
 use super::voxel::Evaluator;
 use crate::eco::Model;
 use crate::math::Aabb;
+use crate::math::moments::Moments;
 use crate::math::random::Random;
 use crate::solid::local::{LiteralId, Token, literal_token};
 use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
-use crate::solid::{Face, Label, Op, Sense, Shape, SolidBuilder};
+use crate::solid::{Face, Label, Op, Sense, Shape, SolidBuilder, surface};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{MassOptions, MassProperties, Pose};
 use glam::DVec3;
@@ -37,9 +37,9 @@ fn one_face_in_a_box_is_off_by_its_bound_at_most() {
     for i in 0..1500 {
         let n = r.vector(1.0).normalize();
         let face = match i % 3 {
-            0 => Face::Sphere { center: DVec3::ZERO, radius: 1.0 },
-            1 => Face::Cylinder { origin: DVec3::ZERO, axis: n, radius: 1.0 },
-            _ => Face::Cone { apex: n * -1.5, axis: n, sin: 0.6, cos: 0.8 },
+            0 => Face::from(surface::Sphere { center: DVec3::ZERO, radius: 1.0 }),
+            1 => surface::Cylinder { origin: DVec3::ZERO, axis: n, radius: 1.0 }.into(),
+            _ => surface::Cone { apex: n * -1.5, axis: n, sin: 0.6, cos: 0.8 }.into(),
         };
         let size = [0.05, 0.2, 0.5][i / 3 % 3];
         let half = r.vector(size).abs() + DVec3::splat(0.1 * size);

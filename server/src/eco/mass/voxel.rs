@@ -20,9 +20,9 @@
 //! *Moments.* ∫ φ is off by |φ(c)| e + osc φ · s, where s bounds ∫ |1_S − w| over U: 2 w (1 − w) |U| + e, for the mean g/2.
 
 use super::cell::Cell;
-use super::moments::Moments;
 use super::slab::{Curve, Slab};
 use crate::eco::span::face_span;
+use crate::math::moments::Moments;
 use crate::math::{Aabb, halt};
 use crate::solid::local::{LiteralId, Token, Truth, literals, prune, truth_of};
 use crate::solid::{Face, Sense};

@@ -12,6 +12,7 @@ use super::syntax::{Call, CallId, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
 use crate::import::Note;
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
+use crate::solid::primitive::Form;
 use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -21,6 +22,11 @@ type Result<T> = std::result::Result<T, (Place, Problem)>;
 /// From this `$fn` on a curved primitive is taken as exact (`Facets::Auto`).
 const EXACT_FROM: f64 = 9.0;
 
+/// True for a primitive that is meant to reach to infinity.
+fn is_unbounded(shape: &Shape) -> bool {
+    matches!(shape.form(), Form::Unbounded)
+}
+
 /// Makes a solid of a parsed file.
 pub fn lower(file: &File, facets: Facets, limits: &Limits) -> Result<Import> {
     let mut lowering = Lowering { file, facets, limits, notes: Vec::new(), parts: Vec::new(), faces: 0 };
@@ -28,7 +34,7 @@ pub fn lower(file: &File, facets: Facets, limits: &Limits) -> Result<Import> {
     let mut notes = lowering.notes;
     let solid = emit(lowering.parts, root, &mut notes);
     notes.sort_by_key(|n| (n.at.line, n.at.column));
-    let unbounded = solid.primitives.iter().find(|p| matches!(p.shape, Shape::HalfSpace(_)));
+    let unbounded = solid.primitives.iter().find(|p| is_unbounded(&p.shape));
     if let Some(p) = unbounded
         && !solid.aabb().is_empty()
         && !solid.aabb().is_finite()
@@ -447,7 +453,7 @@ impl<'a> Lowering<'a> {
         if self.faces > self.limits.faces {
             return Err((call.at, Problem::Limit { what: "faces", limit: self.limits.faces }));
         }
-        let bounded = matches!(shape, Shape::HalfSpace(_)) || geometry.aabb(&frame).is_finite();
+        let bounded = is_unbounded(&shape) || geometry.aabb(&frame).is_finite();
         if !(bounded && frame.position.is_finite()) {
             return Err((call.at, Problem::syntax("coordinates that a double can hold", "an overflow")));
         }

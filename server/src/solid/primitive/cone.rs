@@ -1,10 +1,12 @@
 //! Right circular cone or frustum along z.
 
-use super::{Geometry, cylinder::disc_half_extents};
-use crate::math::{Aabb, Ball};
+use super::{Checked, Form, Geometry, Shape, Sink, Source, cylinder::disc_half_extents};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
+use crate::solid::surface::{self, Plane};
 use contactd_proto::Pose;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// A right circular cone or frustum, axis z, centred at the origin of its frame. The two radii differ; one may be 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,12 +38,12 @@ impl Geometry for Cone {
         } else {
             (DVec3::new(0.0, 0.0, self.half_height - to_apex), DVec3::Z)
         };
-        let mut faces = vec![Face::Cone { apex, axis, sin: drop / slant, cos: h / slant }];
+        let mut faces: Vec<Face> = vec![surface::Cone { apex, axis, sin: drop / slant, cos: h / slant }.into()];
         if self.has_top() {
-            faces.push(Face::Plane { normal: DVec3::Z, offset: self.half_height });
+            faces.push(Plane { normal: DVec3::Z, offset: self.half_height }.into());
         }
         if self.bottom > 0.0 {
-            faces.push(Face::Plane { normal: -DVec3::Z, offset: self.half_height });
+            faces.push(Plane { normal: -DVec3::Z, offset: self.half_height }.into());
         }
         faces
     }
@@ -71,5 +73,36 @@ impl Geometry for Cone {
     fn interior_point(&self) -> DVec3 {
         let z = if self.bottom > self.top { -0.5 } else { 0.5 };
         DVec3::new(0.0, 0.0, z * self.half_height)
+    }
+    #[inline]
+    fn form(&self) -> Form<'_> {
+        Form::Round { bottom: self.bottom, top: self.top, half: self.half_height }
+    }
+    fn moments(&self) -> Option<Moments> {
+        let (a, b, h) = (self.bottom, self.top, 2.0 * self.half_height);
+        let volume = PI * h * (a * a + a * b + b * b) / 3.0;
+        let across = PI * h * (a.powi(4) + a.powi(3) * b + a * a * b * b + a * b.powi(3) + b.powi(4)) / 20.0;
+        let along = PI * h.powi(3) * (a * a + 3.0 * a * b + 6.0 * b * b) / 30.0;
+        let first = PI * h * h * (a * a + 2.0 * a * b + 3.0 * b * b) / 12.0;
+        let on_bottom = Moments::diagonal(volume, first, DVec3::new(across, across, along));
+        Some(on_bottom.moved(DVec3::new(0.0, 0.0, -self.half_height)))
+    }
+    fn grown(&self, _: f64) -> Option<Shape> {
+        // Its rims are sharper than a right angle, and so is an apex.
+        None
+    }
+    fn kind(&self) -> &'static str {
+        if self.bottom > 0.0 && self.top > 0.0 { "frustum" } else { "cone" }
+    }
+    fn dimensions(&self) -> String {
+        format!("r {} to {}, h {}", self.bottom, self.top, 2.0 * self.half_height)
+    }
+    fn write(&self, out: &mut dyn Sink) {
+        out.number(self.bottom);
+        out.number(self.top);
+        out.number(self.half_height);
+    }
+    fn read(from: &mut dyn Source) -> Checked<Self> {
+        Ok(Self { bottom: from.finite()?, top: from.finite()?, half_height: from.finite()? })
     }
 }

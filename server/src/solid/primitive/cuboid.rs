@@ -1,8 +1,9 @@
 //! Rectangular box.
 
-use super::Geometry;
-use crate::math::{Aabb, Ball};
+use super::{Checked, Form, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
+use crate::solid::surface::Plane;
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -18,7 +19,7 @@ impl Geometry for Cuboid {
         let h = self.half;
         [(DVec3::X, h.x), (-DVec3::X, h.x), (DVec3::Y, h.y), (-DVec3::Y, h.y), (DVec3::Z, h.z), (-DVec3::Z, h.z)]
             .into_iter()
-            .map(|(normal, offset)| Face::Plane { normal, offset })
+            .map(|(normal, offset)| Plane { normal, offset }.into())
             .collect()
     }
     fn face_name(&self, index: usize) -> String {
@@ -37,5 +38,30 @@ impl Geometry for Cuboid {
     }
     fn interior_point(&self) -> DVec3 {
         DVec3::ZERO
+    }
+    #[inline]
+    fn form(&self) -> Form<'_> {
+        Form::Cuboid(self.half)
+    }
+    fn moments(&self) -> Option<Moments> {
+        Some(Moments::of_box(self.half))
+    }
+    fn grown(&self, margin: f64) -> Option<Shape> {
+        Some(Self { half: self.half + margin }.into())
+    }
+    fn mirrored_face(&self, index: usize) -> usize {
+        if index < 2 { 1 - index } else { index }
+    }
+    fn kind(&self) -> &'static str {
+        "box"
+    }
+    fn dimensions(&self) -> String {
+        format!("{} x {} x {}", 2.0 * self.half.x, 2.0 * self.half.y, 2.0 * self.half.z)
+    }
+    fn write(&self, out: &mut dyn Sink) {
+        write_vector(out, self.half);
+    }
+    fn read(from: &mut dyn Source) -> Checked<Self> {
+        Ok(Self { half: read_vector(from)? })
     }
 }

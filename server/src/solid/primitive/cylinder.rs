@@ -1,10 +1,12 @@
 //! Right circular cylinder along z.
 
-use super::Geometry;
-use crate::math::{Aabb, Ball};
+use super::{Checked, Form, Geometry, Shape, Sink, Source};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
+use crate::solid::surface::{self, Plane};
 use contactd_proto::Pose;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// A right circular cylinder, axis z, centred at the origin of its frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,9 +31,9 @@ pub(super) fn disc_half_extents(axis: DVec3, r: f64) -> DVec3 {
 impl Geometry for Cylinder {
     fn faces(&self) -> Vec<Face> {
         vec![
-            Face::Cylinder { origin: DVec3::ZERO, axis: DVec3::Z, radius: self.radius },
-            Face::Plane { normal: DVec3::Z, offset: self.half_height },
-            Face::Plane { normal: -DVec3::Z, offset: self.half_height },
+            surface::Cylinder { origin: DVec3::ZERO, axis: DVec3::Z, radius: self.radius }.into(),
+            Plane { normal: DVec3::Z, offset: self.half_height }.into(),
+            Plane { normal: -DVec3::Z, offset: self.half_height }.into(),
         ]
     }
     fn face_name(&self, index: usize) -> String {
@@ -49,5 +51,30 @@ impl Geometry for Cylinder {
     }
     fn interior_point(&self) -> DVec3 {
         DVec3::ZERO
+    }
+    #[inline]
+    fn form(&self) -> Form<'_> {
+        Form::Round { bottom: self.radius, top: self.radius, half: self.half_height }
+    }
+    fn moments(&self) -> Option<Moments> {
+        let (rr, h) = (self.radius * self.radius, 2.0 * self.half_height);
+        let volume = PI * rr * h;
+        Some(Moments::diagonal(volume, 0.0, DVec3::new(rr / 4.0, rr / 4.0, h * h / 12.0) * volume))
+    }
+    fn grown(&self, margin: f64) -> Option<Shape> {
+        Some(Self { radius: self.radius + margin, half_height: self.half_height + margin }.into())
+    }
+    fn kind(&self) -> &'static str {
+        "cylinder"
+    }
+    fn dimensions(&self) -> String {
+        format!("r {}, h {}", self.radius, 2.0 * self.half_height)
+    }
+    fn write(&self, out: &mut dyn Sink) {
+        out.number(self.radius);
+        out.number(self.half_height);
+    }
+    fn read(from: &mut dyn Source) -> Checked<Self> {
+        Ok(Self { radius: from.finite()?, half_height: from.finite()? })
     }
 }

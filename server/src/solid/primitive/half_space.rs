@@ -1,8 +1,9 @@
 //! Half-space z <= 0: only as an operand that something bounded cuts down.
 
-use super::Geometry;
-use crate::math::{Aabb, Ball};
+use super::{Checked, Form, Geometry, Shape, Sink, Source};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
+use crate::solid::surface::Plane;
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -12,7 +13,7 @@ pub struct HalfSpace;
 
 impl Geometry for HalfSpace {
     fn faces(&self) -> Vec<Face> {
-        vec![Face::Plane { normal: DVec3::Z, offset: 0.0 }]
+        vec![Plane { normal: DVec3::Z, offset: 0.0 }.into()]
     }
     fn face_name(&self, _: usize) -> String {
         "plane".into()
@@ -37,5 +38,25 @@ impl Geometry for HalfSpace {
     }
     fn interior_point(&self) -> DVec3 {
         -DVec3::Z
+    }
+    #[inline]
+    fn form(&self) -> Form<'_> {
+        Form::Unbounded
+    }
+    fn moments(&self) -> Option<Moments> {
+        None
+    }
+    fn grown(&self, _: f64) -> Option<Shape> {
+        None
+    }
+    fn kind(&self) -> &'static str {
+        "half-space"
+    }
+    fn dimensions(&self) -> String {
+        String::new()
+    }
+    fn write(&self, _: &mut dyn Sink) {}
+    fn read(_: &mut dyn Source) -> Checked<Self> {
+        Ok(Self)
     }
 }

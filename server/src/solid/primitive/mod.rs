@@ -1,8 +1,9 @@
-//! The primitives, one file each: shape in its own frame, faces, bounds, names.
+//! The primitives, one file each: shape in its own frame, faces, bounds, moments, names, bytes.
 //!
-//! Adding a primitive: a file here, and one row in the `shapes!` table below, which writes the enum and its dispatch.
+//! Adding a primitive: a file here, and one row in the `shapes!` table below, which writes the enum and its dispatch. Nobody
+//! outside of this folder asks of what kind a primitive is: [`Form`] tells what a convex one is to those who compute with it.
 
-use crate::math::{Aabb, Ball};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::{Face, Label};
 use contactd_proto::Pose;
 use glam::DVec3;
@@ -10,6 +11,7 @@ use glam::DVec3;
 mod cone;
 mod cuboid;
 mod cylinder;
+mod form;
 mod half_space;
 mod polyhedron;
 mod sphere;
@@ -17,6 +19,7 @@ mod sphere;
 pub use cone::Cone;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use form::Form;
 pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use sphere::Sphere;
@@ -35,10 +38,69 @@ pub trait Geometry {
     fn smallest_dimension(&self) -> f64;
     /// A point in its interior, in its frame.
     fn interior_point(&self) -> DVec3;
+    /// What it is to those who compute with convex bodies, in its frame.
+    fn form(&self) -> Form<'_>;
+    /// Its moments in its frame, by a formula (`eco::mass::closed` has them all); `None` where there is none.
+    fn moments(&self) -> Option<Moments>;
+    /// A primitive of its kind and in its frame that holds all points at which f of it is at most `margin` (a length);
+    /// `None` where edges or corners reach out farther than that.
+    fn grown(&self, margin: f64) -> Option<Shape>;
+    /// Where the source finds the face `index` of a primitive that it mirrors along x.
+    fn mirrored_face(&self, index: usize) -> usize {
+        index
+    }
+    /// The field's word for it.
+    fn kind(&self) -> &'static str;
+    /// Its sizes in words, lengths as in the source; empty where it has none.
+    fn dimensions(&self) -> String;
+    /// Writes what tells it from others of its kind.
+    fn write(&self, out: &mut dyn Sink);
+    /// Reads what `write` has written.
+    ///
+    /// # Errors
+    /// What was expected of the bytes.
+    fn read(from: &mut dyn Source) -> Checked<Self>
+    where
+        Self: Sized;
+}
+
+/// What should have been in some bytes.
+pub type Checked<T> = Result<T, &'static str>;
+
+/// Where a primitive is written to.
+pub trait Sink {
+    /// Writes a count.
+    fn word(&mut self, word: usize);
+    /// Writes a number.
+    fn number(&mut self, number: f64);
+}
+
+/// Where a primitive is read from. Its numbers are finite.
+pub trait Source {
+    /// The next count.
+    ///
+    /// # Errors
+    /// There is none.
+    fn word(&mut self) -> Checked<u32>;
+    /// The next number.
+    ///
+    /// # Errors
+    /// There is none, or it is not finite.
+    fn finite(&mut self) -> Checked<f64>;
+    /// Numbers that are left.
+    fn left(&self) -> usize;
+}
+
+fn write_vector(out: &mut dyn Sink, v: DVec3) {
+    v.to_array().into_iter().for_each(|x| out.number(x));
+}
+
+fn read_vector(from: &mut dyn Source) -> Checked<DVec3> {
+    Ok(DVec3::new(from.finite()?, from.finite()?, from.finite()?))
 }
 
 macro_rules! shapes {
-    ($($variant:ident),+ $(,)?) => {
+    ($($variant:ident = $tag:literal),+ $(,)?) => {
         /// The kinds of primitives, each in its own frame.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Shape { $(#[doc = concat!("See [`", stringify!($variant), "`].")] $variant($variant)),+ }
@@ -48,6 +110,28 @@ macro_rules! shapes {
             pub fn geometry(&self) -> &dyn Geometry {
                 match self { $(Shape::$variant(s) => s),+ }
             }
+
+            /// What it is to those who compute with convex bodies, in its frame.
+            #[inline]
+            pub fn form(&self) -> Form<'_> {
+                match self { $(Shape::$variant(s) => s.form()),+ }
+            }
+
+            /// The byte that tells its kind in a kept model.
+            pub fn tag(&self) -> u8 {
+                match self { $(Shape::$variant(_) => $tag),+ }
+            }
+
+            /// Reads a primitive of the kind `tag`.
+            ///
+            /// # Errors
+            /// What was expected of the bytes.
+            pub fn read(tag: u8, from: &mut dyn Source) -> Checked<Self> {
+                match tag {
+                    $($tag => Ok($variant::read(from)?.into()),)+
+                    _ => Err("a kind of primitive"),
+                }
+            }
         }
 
         $(impl From<$variant> for Shape {
@@ -56,7 +140,7 @@ macro_rules! shapes {
     };
 }
 
-shapes!(Sphere, Cylinder, Cone, Cuboid, Polyhedron, HalfSpace);
+shapes!(Sphere = 0, Cylinder = 1, Cone = 2, Cuboid = 3, Polyhedron = 4, HalfSpace = 5);
 
 /// A primitive placed in a model.
 #[derive(Clone, Debug)]
@@ -91,9 +175,8 @@ impl Primitive {
     /// Name of face `index` of its faces, in the words of its source: of a box that is mirrored there ±x are exchanged against
     /// its frame.
     pub fn face_name(&self, index: usize) -> String {
-        let is_box = matches!(self.shape, Shape::Cuboid(_));
-        let index = if self.label.mirrored && is_box && index < 2 { 1 - index } else { index };
-        self.shape.geometry().face_name(index)
+        let geometry = self.shape.geometry();
+        geometry.face_name(if self.label.mirrored { geometry.mirrored_face(index) } else { index })
     }
 
     /// psi of the whole primitive: the largest of its faces' values. 1-Lipschitz, negative inside.

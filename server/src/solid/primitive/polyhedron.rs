@@ -2,9 +2,10 @@
 //!
 //! The tetrahedron, octahedron, dodecahedron and icosahedron of the paper are of this kind.
 
-use super::Geometry;
-use crate::math::{Aabb, Ball};
+use super::{Checked, Form, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
+use crate::solid::surface::Plane;
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -87,9 +88,14 @@ impl Polyhedron {
     }
 }
 
+/// The mean of some corners.
+pub(super) fn middle(vertices: &[DVec3]) -> DVec3 {
+    vertices.iter().copied().sum::<DVec3>() / vertices.len() as f64
+}
+
 impl Geometry for Polyhedron {
     fn faces(&self) -> Vec<Face> {
-        self.planes.iter().map(|&(normal, offset)| Face::Plane { normal, offset }).collect()
+        self.planes.iter().map(|&(normal, offset)| Plane { normal, offset }.into()).collect()
     }
     fn face_name(&self, index: usize) -> String {
         format!("face {index}")
@@ -110,6 +116,42 @@ impl Geometry for Polyhedron {
             .fold(f64::INFINITY, f64::min)
     }
     fn interior_point(&self) -> DVec3 {
-        self.vertices.iter().copied().sum::<DVec3>() / self.vertices.len() as f64
+        middle(&self.vertices)
+    }
+    #[inline]
+    fn form(&self) -> Form<'_> {
+        Form::Corners(&self.vertices)
+    }
+    fn moments(&self) -> Option<Moments> {
+        None
+    }
+    fn grown(&self, _: f64) -> Option<Shape> {
+        // Sharp edges reach out farther.
+        None
+    }
+    fn kind(&self) -> &'static str {
+        "polyhedron"
+    }
+    fn dimensions(&self) -> String {
+        format!("{} faces", self.planes.len())
+    }
+    fn write(&self, out: &mut dyn Sink) {
+        out.word(self.vertices.len());
+        out.word(self.planes.len());
+        self.vertices.iter().for_each(|v| write_vector(out, *v));
+        for (n, d) in &self.planes {
+            write_vector(out, *n);
+            out.number(*d);
+        }
+    }
+    fn read(from: &mut dyn Source) -> Checked<Self> {
+        let (corners, faces) = (from.word()? as usize, from.word()? as usize);
+        // As many numbers must follow, so the memory is no more than what the bytes take.
+        if corners.saturating_mul(3).saturating_add(faces.saturating_mul(4)) > from.left() {
+            return Err("more numbers");
+        }
+        let vertices = (0..corners).map(|_| read_vector(from)).collect::<Checked<_>>()?;
+        let planes = (0..faces).map(|_| Ok((read_vector(from)?, from.finite()?))).collect::<Checked<_>>()?;
+        Ok(Self { vertices, planes })
     }
 }

@@ -1,10 +1,11 @@
 //! Ball of radius r around the origin.
 
-use super::Geometry;
-use crate::math::{Aabb, Ball};
-use crate::solid::Face;
+use super::{Checked, Form, Geometry, Shape, Sink, Source};
+use crate::math::{Aabb, Ball, Moments};
+use crate::solid::{Face, surface};
 use contactd_proto::Pose;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// A ball around the origin of its frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +16,7 @@ pub struct Sphere {
 
 impl Geometry for Sphere {
     fn faces(&self) -> Vec<Face> {
-        vec![Face::Sphere { center: DVec3::ZERO, radius: self.radius }]
+        vec![surface::Sphere { center: DVec3::ZERO, radius: self.radius }.into()]
     }
     fn face_name(&self, _: usize) -> String {
         "surface".into()
@@ -31,5 +32,28 @@ impl Geometry for Sphere {
     }
     fn interior_point(&self) -> DVec3 {
         DVec3::ZERO
+    }
+    #[inline]
+    fn form(&self) -> Form<'_> {
+        Form::Ball(self.radius)
+    }
+    fn moments(&self) -> Option<Moments> {
+        let volume = 4.0 / 3.0 * PI * self.radius.powi(3);
+        Some(Moments::diagonal(volume, 0.0, DVec3::splat(0.2 * volume * self.radius * self.radius)))
+    }
+    fn grown(&self, margin: f64) -> Option<Shape> {
+        Some(Self { radius: self.radius + margin }.into())
+    }
+    fn kind(&self) -> &'static str {
+        "sphere"
+    }
+    fn dimensions(&self) -> String {
+        format!("r {}", self.radius)
+    }
+    fn write(&self, out: &mut dyn Sink) {
+        out.number(self.radius);
+    }
+    fn read(from: &mut dyn Source) -> Checked<Self> {
+        Ok(Self { radius: from.finite()? })
     }
 }

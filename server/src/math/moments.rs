@@ -20,6 +20,11 @@ impl Moments {
         Self([volume, 0.0, 0.0, 0.0, x, y, z, 0.0, 0.0, 0.0])
     }
 
+    /// Those of a body with ∫ z = `first` and a diagonal ∫ xxᵀ.
+    pub fn diagonal(volume: f64, first: f64, squares: DVec3) -> Self {
+        Self([volume, 0.0, 0.0, first, squares.x, squares.y, squares.z, 0.0, 0.0, 0.0])
+    }
+
     /// Volume.
     pub fn volume(&self) -> f64 {
         self.0[0]

@@ -19,7 +19,7 @@
 //! directions they stay well conditioned when the bodies touch, where the difference of the witnesses vanishes.
 //! Does not promise: to find the global maximum for bodies that overlap deeply.
 
-use crate::math::any_perpendicular;
+use contactd::math::any_perpendicular;
 use glam::DVec3;
 use std::f64::consts::TAU;
 

@@ -1,33 +1,38 @@
-//! How far a convex shape reaches along a direction, in the few numbers that tell it.
+//! What a convex primitive is to those who compute with it: the few numbers that tell it, and how far it reaches along a direction.
 
+use super::polyhedron::middle;
 use crate::math::Lanes;
-use crate::solid::Shape;
 use glam::{DMat3, DVec3};
 
-/// How far a shape reaches from its centre: the few numbers that tell it, or its corners.
+/// A convex shape in its own frame, centred there but for corners: the few numbers that tell it, or its corners. Two kinds of
+/// primitives may be of one form; a cylinder is round with equal radii, which a frustum never has.
 #[derive(Clone, Copy, Debug)]
 pub enum Form<'a> {
-    /// Radius; infinite for what has no bounds.
+    /// Radius.
     Ball(f64),
     /// Half sizes.
     Cuboid(DVec3),
-    /// Radii of the ends, and the half height.
-    Round { bottom: f64, top: f64, half: f64 },
+    /// A solid of revolution about z between two discs.
+    Round {
+        /// Radius at z = −half.
+        bottom: f64,
+        /// Radius at z = +half.
+        top: f64,
+        /// Half the height.
+        half: f64,
+    },
     /// The corners.
     Corners(&'a [DVec3]),
+    /// It has no bounds.
+    Unbounded,
 }
 
-impl<'a> Form<'a> {
-    /// Of a shape.
-    #[inline]
-    pub fn of(shape: &'a Shape) -> Self {
-        match shape {
-            Shape::Sphere(s) => Form::Ball(s.radius),
-            Shape::Cuboid(c) => Form::Cuboid(c.half),
-            Shape::Cylinder(c) => Form::Round { bottom: c.radius, top: c.radius, half: c.half_height },
-            Shape::Cone(c) => Form::Round { bottom: c.bottom, top: c.top, half: c.half_height },
-            Shape::Polyhedron(p) => Form::Corners(&p.vertices),
-            Shape::HalfSpace(_) => Form::Ball(f64::INFINITY),
+impl Form<'_> {
+    /// A point inside a bounded one.
+    pub fn middle(&self) -> DVec3 {
+        match self {
+            Form::Corners(corners) => middle(corners),
+            Form::Ball(_) | Form::Cuboid(_) | Form::Round { .. } | Form::Unbounded => DVec3::ZERO,
         }
     }
 
@@ -37,6 +42,7 @@ impl<'a> Form<'a> {
             Form::Ball(radius) => Some(Form::Ball(radius)),
             Form::Cuboid(half) => Some(Form::Cuboid(half)),
             Form::Round { bottom, top, half } => Some(Form::Round { bottom, top, half }),
+            Form::Unbounded => Some(Form::Unbounded),
             Form::Corners(_) => None,
         }
     }
@@ -54,6 +60,7 @@ impl<'a> Form<'a> {
             Form::Corners(corners) => {
                 corners.iter().fold(T::all(f64::NEG_INFINITY), |far, v| far.max(m[0] * v.x + m[1] * v.y + m[2] * v.z))
             }
+            Form::Unbounded => T::all(f64::INFINITY),
         }
     }
 

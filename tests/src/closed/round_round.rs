@@ -6,9 +6,13 @@
 
 use super::directions::{Rim, rim_point, rim_rim, ruled_point, ruled_rim, ruled_ruled};
 use super::{Best, Convex, Round};
-use crate::math::{any_perpendicular, tolerance::NEARLY_TOUCHING};
+use contactd::math::any_perpendicular;
 use glam::DVec3;
 use std::f64::consts::TAU;
+
+/// Separations of round bodies below this fraction of their heights are asked again by projection: Newton's climb may
+/// have stopped short of the summit.
+const NEARLY_TOUCHING: f64 = 1e-9;
 
 /// Offers every configuration of a pair in general position.
 pub(super) fn general(a: &Round, b: &Round, best: &mut Best) {

@@ -8,12 +8,13 @@
 //! Invariant: normals and axes are unit vectors. A half-space is no bounded body and has no record here.
 
 use super::directions::{Rim, Ruled};
-use crate::math::{
-    any_perpendicular,
-    tolerance::{CARRIED, NORMAL_SLACK},
-};
-use crate::solid::{Shape, primitive::Geometry};
+use contactd::math::{any_perpendicular, tolerance::CARRIED};
+use contactd::solid::primitive::Form;
+use contactd::solid::{Face, Shape};
 use glam::{DMat3, DVec3};
+
+/// Slack in the test whether a direction is a normal of an edge: a superfluous candidate does no harm, a missing one does.
+const NORMAL_SLACK: f64 = 1e-9;
 
 /// Where a primitive stands: its frame seen from the common frame.
 #[derive(Clone, Copy, Debug)]
@@ -313,20 +314,17 @@ impl Convex {
             axis: DVec3::Z,
             lean: (r0 - r1) / (r0 - r1).hypot(2.0 * h),
         };
-        Some(match shape {
-            Shape::Sphere(s) => Convex::Ball(Ball { center: DVec3::ZERO, radius: s.radius }),
-            Shape::Cylinder(c) => Convex::Cylinder(round(c.radius, c.radius, c.half_height)),
-            Shape::Cone(c) => Convex::Cone(round(c.bottom, c.top, c.half_height)),
-            Shape::Polyhedron(p) => Convex::Poly(Poly::new(p.vertices.clone(), p.planes.clone())),
-            Shape::Cuboid(c) => {
-                let corners = crate::math::Aabb::around(DVec3::ZERO, c.half).corners();
-                let planes = c.faces().into_iter().filter_map(|f| match f {
-                    crate::solid::Face::Plane { normal, offset } => Some((normal, offset)),
-                    _ => None,
-                });
-                Convex::Poly(Poly::new(corners.to_vec(), planes.collect()))
+        let planes = || shape.geometry().faces().iter().filter_map(Face::flat).collect();
+        Some(match shape.form() {
+            Form::Ball(radius) => Convex::Ball(Ball { center: DVec3::ZERO, radius }),
+            Form::Round { bottom, top, half } if bottom == top => Convex::Cylinder(round(bottom, top, half)),
+            Form::Round { bottom, top, half } => Convex::Cone(round(bottom, top, half)),
+            Form::Corners(corners) => Convex::Poly(Poly::new(corners.to_vec(), planes())),
+            Form::Cuboid(half) => {
+                let corners = contactd::math::Aabb::around(DVec3::ZERO, half).corners();
+                Convex::Poly(Poly::new(corners.to_vec(), planes()))
             }
-            Shape::HalfSpace(_) => return None,
+            Form::Unbounded => return None,
         })
     }
 

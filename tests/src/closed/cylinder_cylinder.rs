@@ -6,7 +6,7 @@
 //! against side, rim against rim (`round_round`). Source: Zeiller 1993, stage 3 (centres, axes and radii).
 
 use super::{Best, Round, round_round};
-use crate::math::{any_perpendicular, tolerance::PARALLEL};
+use contactd::math::{any_perpendicular, tolerance::PARALLEL};
 use glam::DVec3;
 
 /// Direction from a to b of the largest separation.

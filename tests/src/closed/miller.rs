@@ -19,8 +19,8 @@
 
 use super::Round;
 use super::trig::Trig;
-use crate::math::any_perpendicular;
-use crate::math::tolerance::CARRIED;
+use contactd::math::any_perpendicular;
+use contactd::math::tolerance::CARRIED;
 use glam::DVec3;
 
 /// A cone's side, from its apex.

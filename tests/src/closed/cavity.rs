@@ -23,7 +23,7 @@
 use super::directions::Rim;
 use super::trig::Trig;
 use super::{Convex, Round, separation_only};
-use crate::math::any_perpendicular;
+use contactd::math::any_perpendicular;
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_2;
 

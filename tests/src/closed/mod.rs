@@ -35,7 +35,7 @@ pub use advance::{Bracket, Meeting, time_of_contact, time_of_leaving};
 pub use body::{Ball, Convex, Edge, Feature, Poly, Round, Stand};
 pub use cavity::{Clearance, clearance, tangency_of_cavities};
 
-use crate::math::tolerance::ROUNDING;
+use contactd::math::tolerance::ROUNDING;
 use glam::DVec3;
 
 /// How two bodies stand to each other.
@@ -100,9 +100,11 @@ macro_rules! pairs {
     ($($a:ident $b:ident => $module:ident),+ $(,)?) => {
         /// Direction from a to b of the largest separation, no worse than `hint`.
         fn direction(a: &Convex, b: &Convex, hint: Option<DVec3>) -> DVec3 {
+            // A pair of one form stands in both lists, where the first counts; a pair in neither does not compile.
+            #[allow(unreachable_patterns)]
             match (a, b) {
                 $((Convex::$a(p), Convex::$b(q)) => $module::direction(p, q, &mut Best::new(a, b, hint)),)+
-                _ => -direction(b, a, hint.map(|n| -n)),
+                $((Convex::$b(_), Convex::$a(_)))|+ => -direction(b, a, hint.map(|n| -n)),
             }
         }
         /// The rows, for the tests that count them.

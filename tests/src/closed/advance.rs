@@ -11,8 +11,8 @@
 
 use super::miller::{Side, critical_generators};
 use super::{Convex, Separation, Stand, clearance, separation, separation_only};
-use crate::motion::{Instant, Relative};
-use crate::solid::Primitive;
+use contactd::motion::{Instant, Relative};
+use contactd::solid::Primitive;
 use glam::DVec3;
 
 /// When two bodies meet, fractions of the step.
@@ -216,13 +216,12 @@ impl<'m> Advance<'m> {
         let middles = [self.a.ball().0, self.b_at(at).ball().0];
         let [p, q] = s.points;
         // Where the sides of two cones cross, what one cuts out of the other's generators lies inside it.
-        let chords: Vec<DVec3> = match (&self.a, &self.b_at(at)) {
-            (Convex::Cone(p), Convex::Cone(q)) => Side::of(p)
-                .zip(Side::of(q))
-                .map(|(p, q)| critical_generators(&p, &q).iter().map(|g| g.point).collect())
-                .unwrap_or_default(),
-            _ => Vec::new(),
-        };
+        let mut chords: Vec<DVec3> = Vec::new();
+        if let (Convex::Cone(p), Convex::Cone(q)) = (&self.a, &self.b_at(at))
+            && let Some((p, q)) = Side::of(p).zip(Side::of(q))
+        {
+            chords.extend(critical_generators(&p, &q).iter().map(|g| g.point));
+        }
         [0.5 * (p + q), p, q].into_iter().chain(chords).any(|x| {
             let [to_a, to_b] = middles.map(|m| (m - x).normalize_or_zero() * s.value.abs());
             PULLS.iter().any(|f| {

@@ -6,7 +6,7 @@
 //! Source: elementary; the uniqueness from the concavity of the separation.
 
 use super::{Best, Round};
-use crate::math::{any_perpendicular, tolerance::PARALLEL};
+use contactd::math::{any_perpendicular, tolerance::PARALLEL};
 
 /// Offers every configuration of a pair with parallel axes; false if they are not, exactly.
 pub(super) fn parallel(a: &Round, b: &Round, best: &mut Best) -> bool {

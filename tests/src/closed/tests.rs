@@ -1,10 +1,27 @@
 //! Separations against their own optimality: disjoint bodies are proven by a slab and by witnesses of equal distance.
 
 use super::*;
-use crate::math::random::Random;
-use crate::solid::{Shape, primitive as shape};
+use contactd::solid::{Shape, primitive as shape};
 use contactd_proto::motion::quat_of_rotation_vector;
 use glam::{DMat3, DVec3};
+
+/// Pseudo-random numbers (splitmix64), the same ones for the same seed.
+struct Random(u64);
+
+impl Random {
+    /// A number of [lo, hi).
+    fn within(&mut self, lo: f64, hi: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        lo + (hi - lo) * (((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64)
+    }
+    /// A point of the cube of half side `size` around the origin.
+    fn vector(&mut self, size: f64) -> DVec3 {
+        DVec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
+    }
+}
 
 /// Random numbers, bodies and where they stand.
 struct Dice(Random);
@@ -277,7 +294,7 @@ fn the_clearance_in_a_cavity_is_that_of_its_nearest_point() {
                 if let Convex::Cylinder(p) | Convex::Cone(p) = &a {
                     for rim in p.rims() {
                         for n in 0..400 {
-                            let e = crate::math::any_perpendicular(rim.axis);
+                            let e = contactd::math::any_perpendicular(rim.axis);
                             let (sin, cos) = (f64::from(n) * std::f64::consts::TAU / 400.0).sin_cos();
                             let x = rim.center + (e * cos + rim.axis.cross(e) * sin) * rim.radius;
                             least = least.min(-b.distance(x).0);

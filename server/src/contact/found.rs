@@ -1,0 +1,47 @@
+//! A contact that was found, and what stands beside it.
+
+use super::newton::Solution;
+use glam::DVec3;
+
+/// Witnesses this close in time are of one contact; touches this close are at the same time.
+pub(super) const SAME_TIME: f64 = 1e-12;
+
+/// A confirmed contact.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The witness of depth delta.
+    pub deep: Solution,
+    /// The same contact where the surfaces meet, when it could be continued back.
+    pub touch: Option<Solution>,
+    /// Time until which everything must be proven free.
+    pub goal: f64,
+    /// Earliest time of a witness of depth delta, this contact's or a rival's.
+    pub upper: f64,
+    /// That witness, in A's frame.
+    pub witness: DVec3,
+}
+
+impl Found {
+    /// Latest time at which a contact that touches earlier than this one may reach delta and still be preferred to it: its
+    /// witness comes later by no more than this one's own lag behind its touch.
+    pub(super) fn latest_rival(&self) -> f64 {
+        self.touch.as_ref().map_or(self.goal, |touch| 2.0 * self.deep.t - touch.t.max(0.0))
+    }
+
+    /// The contact to report of two: of those that reach delta at about the same time the one that touches first.
+    pub(super) fn or(self, other: Self) -> Self {
+        let goal = self.goal.min(other.goal);
+        let (upper, witness) = self.earlier_witness(&other);
+        let (first, second) = if other.goal < self.goal { (other, self) } else { (self, other) };
+        let earlier = match (&first.touch, &second.touch) {
+            (Some(a), Some(b)) => b.t < a.t - SAME_TIME && second.deep.t <= first.latest_rival(),
+            _ => false,
+        };
+        Self { goal, upper, witness, ..if earlier { second } else { first } }
+    }
+
+    /// The earlier of two witnesses.
+    pub(super) fn earlier_witness(&self, other: &Self) -> (f64, DVec3) {
+        if other.upper < self.upper { (other.upper, other.witness) } else { (self.upper, self.witness) }
+    }
+}

@@ -1,0 +1,132 @@
+//! A question: two bodies over one step, what is asked of them, and which of them carries the cells.
+
+use super::asked::Asked;
+use crate::eco::Model;
+use crate::math::tolerance;
+use crate::motion::Placed;
+use crate::solid::Sense;
+use glam::DVec3;
+
+/// One body of a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Body<'a> {
+    /// Its model.
+    pub model: &'a Model,
+    /// Where it stands and how it moves.
+    pub placed: Placed,
+}
+
+/// A question: two bodies over one step.
+#[derive(Clone, Copy, Debug)]
+pub struct PairQuery<'a> {
+    /// The first body; normals point from it.
+    pub a: Body<'a>,
+    /// The second one.
+    pub b: Body<'a>,
+    /// Depth delta at which a contact is decided; see `default_resolution`. Raised to `LEAST_RESOLUTION` of the pair's
+    /// extent over the step; the outcome tells what was used.
+    pub resolution: f64,
+    /// Cells' worth of work (`Counters::spent`) before the answer is `undecided`.
+    pub cell_limit: u64,
+    /// Ideas of the search that are switched on: all, unless their worth is measured.
+    pub ideas: Ideas,
+    /// What is worked out beside whether they meet.
+    pub asked: Asked,
+}
+
+impl PairQuery<'_> {
+    /// True when b carries the cells: small and without cavities is cheap to cover. A round peg that spins about hardly another axis
+    /// than its own in a hole with flat walls does not: seen from it the walls rush by, seen from these it all but stands
+    /// (`fit::spun`).
+    pub(super) fn is_swapped(&self) -> bool {
+        let [a, b] = [&self.a, &self.b];
+        if turns_between_walls(a, b) {
+            return true;
+        }
+        if turns_between_walls(b, a) {
+            return false;
+        }
+        let weight = |m: &Model| m.radius * if m.hollow { HOLLOW } else { 1.0 };
+        weight(self.b.model) < weight(self.a.model)
+    }
+}
+
+/// The ideas of the search, each of which can be switched off. None changes what an answer promises, only the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ideas {
+    /// Stage 1: the collision region by S-bounds.
+    pub region: bool,
+    /// Stage 2: candidates from the walk of both octrees.
+    pub walk: bool,
+    /// Several faces with multipliers bound a cell together; otherwise the best single one does. For measurements only: nearly
+    /// every search then runs into its limit of cells.
+    pub multipliers: bool,
+    /// Same-shape fits as bounds of their own.
+    pub fits: bool,
+    /// Curved faces touched where a contact was found.
+    pub hints: bool,
+    /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
+    /// last digits: both solve the same equations, from another guess.
+    pub direct: bool,
+    /// Convex primitives against solids with holes are answered in front of the search, with the same proviso.
+    pub holes: bool,
+}
+
+impl Default for Ideas {
+    fn default() -> Self {
+        Self { region: true, walk: true, multipliers: true, fits: true, hints: true, direct: true, holes: true }
+    }
+}
+
+/// A hollow body counts as this much larger when the carrier of the cells is chosen.
+const HOLLOW: f64 = 2.0;
+
+/// 1e-9 of the larger bounding radius of the two models.
+pub fn default_resolution(a: &Model, b: &Model) -> f64 {
+    tolerance::DEFAULT_RESOLUTION * a.radius.max(b.radius)
+}
+
+/// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
+pub(super) fn without_own_spin(body: &Body) -> Placed {
+    let mut placed = body.placed;
+    let spin = placed.motion.spin;
+    if spin != DVec3::ZERO {
+        let model_from_world = (placed.motion.start.rotation * placed.place.rotation).conjugate();
+        let along = model_from_world * spin;
+        let center = placed.place.inverse().position;
+        let axis = body.model.axis_of_revolution(along);
+        if axis.is_some_and(|a| a.is_along(along) && a.passes(center, body.model.radius)) {
+            placed.motion.spin = DVec3::ZERO;
+        }
+    }
+    placed
+}
+
+/// A spin about an axis of revolution of a body, nearly: this much of it, radians, and off the axis by no more than this part.
+const SPINS: f64 = 0.1;
+const OFF_AXIS: f64 = 0.02;
+
+/// Cosine of the angle between a wall and an axis up to which the one is along the other.
+const ALONG: f64 = 0.1;
+
+/// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the other one, which is
+/// bounded, has subtracted planes along that axis.
+fn turns_between_walls(peg: &Body, hole: &Body) -> bool {
+    let spin = peg.placed.motion.spin;
+    let candidates = hole.model.hollow && !peg.model.hollow && hole.model.radius.is_finite();
+    if !candidates || spin.length_squared() < SPINS * SPINS {
+        return false;
+    }
+    let world_from_model = |body: &Body| body.placed.motion.start.rotation * body.placed.place.rotation;
+    let along = world_from_model(peg).conjugate() * spin;
+    let Some(axis) = peg.model.axis_of_revolution(along) else { return false };
+    if axis.is_along(along) || axis.direction.cross(along).length() > OFF_AXIS * along.length() {
+        return false;
+    }
+    let axis = world_from_model(hole).conjugate() * (world_from_model(peg) * axis.direction);
+    let solid = &hole.model.solid;
+    solid.faces.iter().zip(&solid.face_owner).any(|(face, owner)| {
+        let negative = solid.senses[*owner as usize] == Sense::Negative;
+        negative && face.flat().is_some_and(|(normal, _)| normal.dot(axis).abs() <= ALONG)
+    })
+}

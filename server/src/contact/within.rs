@@ -1,0 +1,46 @@
+//! Whether two bodies come within a distance of each other at an instant: proven, witnessed or open.
+
+use super::depth;
+use super::separation::{Cover, value};
+use super::task::Task;
+use super::work::Work;
+use crate::motion::Instant;
+use glam::DVec3;
+
+/// Whether two bodies are within a threshold of each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Within {
+    /// A point with F <= level, A's frame.
+    Witness(DVec3),
+    /// Proven: no point is within `level` of both, and the bodies' distance exceeds twice that.
+    Apart,
+    /// The limit ran out before either was found.
+    Open,
+}
+
+/// Decides whether a point with F <= level exists.
+pub(super) fn within(task: &Task, at: &Instant, level: f64, work: &Work) -> Within {
+    let mut cover = Cover::new(task, at, 2.0 * level, 2.0 * level, work);
+    let smallest = task.scale * f64::EPSILON;
+    let mut boxes = 0u64;
+    while let Some(place) = cover.next(level) {
+        for x in [place.lowest, place.center] {
+            if value(task, at, x) <= level {
+                return Within::Witness(x);
+            }
+        }
+        // A curved valley is followed down; each box deserves one climb while boxes are few.
+        boxes += 1;
+        if boxes.is_power_of_two() {
+            let (x, _, depth, _) = depth::climb(task, at, place.lowest, work);
+            if -depth <= level {
+                return Within::Witness(x);
+            }
+        }
+        if place.half.max_element() <= smallest {
+            return Within::Open;
+        }
+        cover.split(place);
+    }
+    if cover.is_done() { Within::Apart } else { Within::Open }
+}

@@ -1,0 +1,61 @@
+//! How a face bends away from its tangent plane over a box: bounds of the second derivatives there.
+
+use glam::DVec3;
+
+/// How a face bends where its tangent plane is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend {
+    /// How the curvature ranges over a box.
+    pub law: Law,
+    /// Unit direction away from the centre or axis; zero for a plane.
+    pub radial: DVec3,
+    /// Unit vectors along which the face curves, zero where there are fewer.
+    pub tangents: [DVec3; 2],
+}
+
+/// The range of κ: the surface lies between ½ κ⁻ τ² and ½ κ⁺ τ² below its tangent plane, τ the offset along the tangents.
+/// Formulas and their derivation: `eco::mass::slab`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// κ = 0.
+    Straight,
+    /// A sphere's, or a cylinder's in its cross-section.
+    Round {
+        /// Radius, a length.
+        radius: f64,
+    },
+    /// A cone's: κ falls along its lines through the apex.
+    Conical {
+        /// cos α of the half angle.
+        cos: f64,
+    },
+}
+
+impl Law {
+    /// True for a face that does not bend.
+    #[inline]
+    pub fn is_straight(&self) -> bool {
+        matches!(self, Law::Straight)
+    }
+
+    /// True where κ changes along the direction normal × tangent.
+    #[inline]
+    pub fn changes_along(&self) -> bool {
+        matches!(self, Law::Conical { .. })
+    }
+
+    /// κ⁻ and κ⁺, per length, where τ is at most `t` and the distance from the centre or axis along the radial direction from
+    /// `least` to `most`, each of them known to `pad`; all lengths. `None` where the surface is not held by two parallel planes.
+    #[inline]
+    pub fn range(&self, t: f64, [least, most]: [f64; 2], pad: f64) -> Option<[f64; 2]> {
+        match *self {
+            Law::Straight => Some([0.0; 2]),
+            Law::Round { radius: r } => {
+                (t < r && least >= 0.0).then(|| [1.0 / r, 2.0 / (r + ((r - t) * (r + t)).sqrt())])
+            }
+            Law::Conical { cos } => {
+                (least > 16.0 * pad).then(|| [2.0 * cos / (most + most.hypot(t)), cos / (least - pad)])
+            }
+        }
+    }
+}

@@ -1,0 +1,541 @@
+//! Surfaces of faces: the convex, 1-Lipschitz functions psi whose common negative part is a primitive, one file each.
+//!
+//! | face | psi |
+//! |---|---|
+//! | plane | n·x − d |
+//! | sphere | \|x − o\| − r |
+//! | cylinder | ρ − r, ρ the distance from the axis |
+//! | cone | ρ cos α − z sin α, z along the axis from the apex into the cone, α the half angle |
+//!
+//! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
+//! functions. Nobody outside of this folder asks of what kind a face is, only what it can tell: whether it is flat, about what
+//! it is symmetric, whether it has an apex. A capability that a kind does not have is `None`, and whoever asks then takes
+//! the way that is right for every face.
+//!
+//! Adding a kind: a file here, a variant of [`Face`], a row in `each!` and in `like!`, its pairs in `curve`. What is missing does
+//! not compile.
+//!
+//! On an axis the radial direction is undefined: closer than `ON_AXIS` any exact perpendicular stands in, elsewhere the
+//! direction is re-orthogonalised against the axis. Where it stands in, the tangent plane lies above the face by up to the
+//! distance from the axis, so `ON_AXIS` is rounding and no more.
+
+mod bend;
+mod cone;
+pub mod curve;
+mod cylinder;
+mod plane;
+mod sphere;
+mod symmetry;
+#[cfg(test)]
+mod tests;
+
+pub use bend::{Bend, Law};
+pub use cone::{Apex, Cone};
+pub use curve::Curve;
+pub use cylinder::Cylinder;
+pub use plane::Plane;
+pub use sphere::Sphere;
+pub use symmetry::{Axis, Symmetry};
+
+use crate::math::{any_perpendicular, tolerance::ON_AXIS};
+use contactd_proto::Pose;
+use glam::{DMat3, DVec3};
+
+/// A face at a point: psi, its gradient, and how it curves there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceAt {
+    /// psi(x): signed distance-like value, length.
+    pub value: f64,
+    /// Gradient of psi, a unit vector.
+    pub normal: DVec3,
+    /// Curvature factor k: 0 plane, 1 sphere and cylinder, cos α cone.
+    pub k: f64,
+    /// Distance from the centre or axis (infinite for a plane, where k is 0).
+    pub rho: f64,
+}
+
+/// The Hessian of psi of a face at a point, `each`·I + `factor`·`along`⊗`along`, in the face's own frame: a form that
+/// turns by turning one vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curvature {
+    /// Curvature in all directions, per length.
+    pub each: f64,
+    /// What is added to that along `along`, per length.
+    pub factor: f64,
+    /// A unit vector, or zero.
+    pub along: DVec3,
+}
+
+impl Curvature {
+    /// Of what is straight.
+    pub const NONE: Self = Self { each: 0.0, factor: 0.0, along: DVec3::ZERO };
+
+    /// The form as a matrix, per length.
+    pub fn matrix(&self) -> DMat3 {
+        outer(self.along, self.along * self.factor) + DMat3::from_diagonal(DVec3::splat(self.each))
+    }
+}
+
+/// u vᵀ.
+fn outer(u: DVec3, v: DVec3) -> DMat3 {
+    DMat3::from_cols(u * v.x, u * v.y, u * v.z)
+}
+
+/// A face that is a quadric of revolution: Q = |u|² − ρ² with s = x − origin, z = s·axis, u = s − z axis (a sphere has no
+/// axis: u = s) and ρ = radius + slope·z; psi <= 0 where Q <= 0 (and ρ >= 0).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quadric {
+    /// Centre, a point of the axis, or the apex; the face's own frame.
+    pub origin: DVec3,
+    /// Unit axis; `None` for a sphere.
+    pub axis: Option<DVec3>,
+    /// R, a length; 0 for a cone.
+    pub radius: f64,
+    /// tan α; 0 unless a cone.
+    pub slope: f64,
+}
+
+/// The cross-section of a round face at the height of a point: a circle square to the axis, or any great circle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// Centre of a sphere, any point of an axis; the face's own frame.
+    pub origin: DVec3,
+    /// Unit axis; `None` for a sphere.
+    pub axis: Option<DVec3>,
+    /// Radius there, a length.
+    pub radius: f64,
+}
+
+/// What every kind of face tells of itself. Points and directions are in the face's own frame, lengths in that of the model.
+pub trait Surface: Copy {
+    /// Size of the numbers that psi is computed from, beside those of the point: |d|, |o| + r, |apex|. A length.
+    fn reach(&self) -> f64;
+
+    /// The same by the largest coordinate of a point: with it, what rounding may do to psi is told (`eco::span`). A length.
+    fn magnitude(&self) -> f64;
+
+    /// psi at `x`.
+    fn value(&self, x: DVec3) -> f64;
+
+    /// psi at `x` with gradient and curvature.
+    fn at(&self, x: DVec3) -> FaceAt;
+
+    /// The Hessian of psi where `at` was taken, off the axis and the centre.
+    fn curvature(&self, at: &FaceAt) -> Curvature;
+
+    /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
+    fn span(&self, center: DVec3, half: DVec3) -> (f64, f64);
+
+    /// How it bends away from its tangent plane, as `at` has it.
+    fn bend(&self, at: &FaceAt) -> Bend;
+
+    /// The face moved by a rigid motion that is given by what it does to points and to vectors.
+    fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self;
+
+    /// The same face seen from the parent of `frame`.
+    #[inline]
+    fn placed(&self, frame: &Pose) -> Self {
+        self.moved(|x| frame.point(x), |v| frame.vector(v))
+    }
+
+    /// About what it is symmetric.
+    fn symmetry(&self) -> Symmetry;
+
+    /// Unit normal and offset of a flat face: psi = n·x − d everywhere.
+    #[inline]
+    fn flat(&self) -> Option<(DVec3, f64)> {
+        None
+    }
+
+    /// Centre and radius of a ball that the face bounds by itself: a closed surface.
+    #[inline]
+    fn ball(&self) -> Option<(DVec3, f64)> {
+        None
+    }
+
+    /// The radius of a round face that has the same one everywhere, a length.
+    #[inline]
+    fn radius(&self) -> Option<f64> {
+        None
+    }
+
+    /// Axis of a face that is developable and round, which is to say straight along one tangent at each point: it curves along
+    /// axis × normal alone. A unit vector.
+    #[inline]
+    fn developable(&self) -> Option<DVec3> {
+        None
+    }
+
+    /// The apex of a circular cone: the point at which every direction around is a normal.
+    #[inline]
+    fn apex(&self) -> Option<Apex> {
+        None
+    }
+
+    /// True where the face is the same when it is moved along the unit vector `d`, to within `tolerance` (a sine).
+    #[inline]
+    fn slides_along(&self, _d: DVec3, _tolerance: f64) -> bool {
+        false
+    }
+
+    /// The quadric of the face offset inwards by `inset` (a length, negative for outwards): its points of depth `inset`.
+    /// `None` for what is none, or loses too many digits as one.
+    #[inline]
+    fn quadric(&self, _inset: f64) -> Option<Quadric> {
+        None
+    }
+
+    /// The cross-section at the height of the point `y`; `None` for what is not round.
+    fn section(&self, y: DVec3) -> Option<Section>;
+
+    /// The foot of a tangent plane: a point of the surface at which it has the unit normal `normal` that `at(point)` gave, next to
+    /// `point`. `size` (a length) is how far along an apex' ruling it is at least.
+    fn foot(&self, point: DVec3, normal: DVec3, size: f64) -> DVec3;
+
+    /// Lower bound of psi of this less that of `q` over the ball of radius `r` around `c`, and the size of the numbers at hand
+    /// beside those of the ball; both lengths (`alike::above`).
+    fn above(&self, q: &Self, c: DVec3, r: f64) -> (f64, f64);
+
+    /// How far the surface lies off `other` over a body of the diameter `size`, a length; infinite where they look opposite ways.
+    fn deviation(&self, other: &Self, size: f64) -> f64;
+
+    /// The same for faces of one body, which are all the closer alike: an axis is off by the chord between unit vectors where
+    /// its direction counts.
+    #[inline]
+    fn difference(&self, other: &Self, size: f64) -> f64 {
+        self.deviation(other, size)
+    }
+
+    /// A number that differs by at most a few times what two faces of this kind differ over the ball of radius `r` around `c`.
+    fn key(&self, c: DVec3, r: f64) -> f64;
+
+    /// All that tells it from others of its kind, the rest 0.
+    fn numbers(&self) -> [f64; NUMBERS];
+
+    /// Where psi <= 0 along the ray origin + t·direction (a unit vector), ends infinite where it never ends; `None` nowhere.
+    fn inside(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)>;
+}
+
+/// Most numbers that tell a face.
+pub const NUMBERS: usize = 8;
+
+/// Any direction that no design has: what faces are sorted along.
+const SKEW: DVec3 = DVec3::new(0.481_726_53, 0.663_114_9, 0.572_917_13);
+
+/// One face of a primitive. Normals and axes are unit vectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Face {
+    /// Half-space n·x <= d.
+    Plane(Plane),
+    /// Ball around a centre.
+    Sphere(Sphere),
+    /// Infinite cylinder.
+    Cylinder(Cylinder),
+    /// Infinite single-napped cone.
+    Cone(Cone),
+}
+
+/// The answer of the face's own kind.
+macro_rules! each {
+    ($face:expr, $own:ident => $answer:expr) => {
+        match $face {
+            Face::Plane($own) => $answer,
+            Face::Sphere($own) => $answer,
+            Face::Cylinder($own) => $answer,
+            Face::Cone($own) => $answer,
+        }
+    };
+}
+
+/// The answer of the kind of two faces; `None` for faces of two kinds.
+macro_rules! like {
+    ($p:expr, $q:expr, $a:ident, $b:ident => $answer:expr) => {
+        match $p {
+            Face::Plane($a) => {
+                if let Face::Plane($b) = $q {
+                    Some($answer)
+                } else {
+                    None
+                }
+            }
+            Face::Sphere($a) => {
+                if let Face::Sphere($b) = $q {
+                    Some($answer)
+                } else {
+                    None
+                }
+            }
+            Face::Cylinder($a) => {
+                if let Face::Cylinder($b) = $q {
+                    Some($answer)
+                } else {
+                    None
+                }
+            }
+            Face::Cone($a) => {
+                if let Face::Cone($b) = $q {
+                    Some($answer)
+                } else {
+                    None
+                }
+            }
+        }
+    };
+}
+
+macro_rules! from_kinds {
+    ($($kind:ident),+) => {
+        $(impl From<$kind> for Face {
+            #[inline]
+            fn from(face: $kind) -> Self {
+                Face::$kind(face)
+            }
+        })+
+    };
+}
+
+from_kinds!(Plane, Sphere, Cylinder, Cone);
+
+impl Face {
+    /// See [`Surface::reach`].
+    pub fn reach(&self) -> f64 {
+        each!(self, f => f.reach())
+    }
+
+    /// See [`Surface::magnitude`].
+    #[inline]
+    pub fn magnitude(&self) -> f64 {
+        each!(self, f => f.magnitude())
+    }
+
+    /// psi at `x`.
+    pub fn value(&self, x: DVec3) -> f64 {
+        each!(self, f => f.value(x))
+    }
+
+    /// psi at `x` with gradient and curvature.
+    pub fn at(&self, x: DVec3) -> FaceAt {
+        each!(self, f => f.at(x))
+    }
+
+    /// The Hessian of psi at the point that `at` was taken at; none on the axis and in the centre, where there is none.
+    #[inline]
+    pub fn curvature(&self, at: &FaceAt) -> Curvature {
+        if at.rho == 0.0 {
+            return Curvature::NONE;
+        }
+        each!(self, f => f.curvature(at))
+    }
+
+    /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
+    #[inline]
+    pub fn span(&self, center: DVec3, half: DVec3) -> (f64, f64) {
+        each!(self, f => f.span(center, half))
+    }
+
+    /// See [`Surface::bend`].
+    #[inline]
+    pub fn bend(&self, at: &FaceAt) -> Bend {
+        each!(self, f => f.bend(at))
+    }
+
+    /// The same face seen from the parent of `frame`.
+    pub fn placed(&self, frame: &Pose) -> Self {
+        each!(self, f => f.placed(frame).into())
+    }
+
+    /// See [`Surface::moved`].
+    #[inline]
+    pub fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {
+        each!(self, f => f.moved(point, vector).into())
+    }
+
+    /// About what the face is symmetric.
+    #[inline]
+    pub fn symmetry(&self) -> Symmetry {
+        each!(self, f => f.symmetry())
+    }
+
+    /// The axis of a surface of revolution that has one alone: not of a sphere nor of a plane.
+    #[inline]
+    pub fn axis(&self) -> Option<Axis> {
+        match self.symmetry() {
+            Symmetry::Axis(axis) => Some(axis),
+            Symmetry::Center(_) | Symmetry::Normal(_) => None,
+        }
+    }
+
+    /// Unit normal and offset of a flat face: psi = n·x − d everywhere.
+    #[inline]
+    pub fn flat(&self) -> Option<(DVec3, f64)> {
+        each!(self, f => f.flat())
+    }
+
+    /// True for a flat face.
+    #[inline]
+    pub fn is_flat(&self) -> bool {
+        self.flat().is_some()
+    }
+
+    /// See [`Surface::ball`].
+    #[inline]
+    pub fn ball(&self) -> Option<(DVec3, f64)> {
+        each!(self, f => f.ball())
+    }
+
+    /// See [`Surface::radius`].
+    #[inline]
+    pub fn radius(&self) -> Option<f64> {
+        each!(self, f => f.radius())
+    }
+
+    /// See [`Surface::developable`].
+    #[inline]
+    pub fn developable(&self) -> Option<DVec3> {
+        each!(self, f => f.developable())
+    }
+
+    /// See [`Surface::apex`].
+    #[inline]
+    pub fn apex(&self) -> Option<Apex> {
+        each!(self, f => f.apex())
+    }
+
+    /// See [`Surface::slides_along`].
+    #[inline]
+    pub fn slides_along(&self, d: DVec3, tolerance: f64) -> bool {
+        each!(self, f => f.slides_along(d, tolerance))
+    }
+
+    /// See [`Surface::quadric`].
+    #[inline]
+    pub fn quadric(&self, inset: f64) -> Option<Quadric> {
+        each!(self, f => f.quadric(inset))
+    }
+
+    /// See [`Surface::section`].
+    #[inline]
+    pub fn section(&self, y: DVec3) -> Option<Section> {
+        each!(self, f => f.section(y))
+    }
+
+    /// See [`Surface::foot`].
+    #[inline]
+    pub fn foot(&self, point: DVec3, normal: DVec3, size: f64) -> DVec3 {
+        each!(self, f => f.foot(point, normal, size))
+    }
+
+    /// See [`Surface::above`]; `None` for faces of two kinds.
+    #[inline]
+    pub fn above(&self, q: &Self, c: DVec3, r: f64) -> Option<(f64, f64)> {
+        like!(self, q, a, b => a.above(b, c, r))
+    }
+
+    /// See [`Surface::deviation`]; `None` for faces of two kinds.
+    #[inline]
+    pub fn deviation(&self, other: &Self, size: f64) -> Option<f64> {
+        like!(self, other, a, b => a.deviation(b, size))
+    }
+
+    /// See [`Surface::difference`]; `None` for faces of two kinds.
+    #[inline]
+    pub fn difference(&self, other: &Self, size: f64) -> Option<f64> {
+        like!(self, other, a, b => a.difference(b, size))
+    }
+
+    /// The place of its kind among the kinds: what faces are sorted by first.
+    #[inline]
+    pub fn rank(&self) -> u32 {
+        match self {
+            Face::Plane(_) => 0,
+            Face::Sphere(_) => 1,
+            Face::Cylinder(_) => 2,
+            Face::Cone(_) => 3,
+        }
+    }
+
+    /// See [`Surface::key`]; to be compared among faces of one `rank`.
+    #[inline]
+    pub fn key(&self, c: DVec3, r: f64) -> f64 {
+        each!(self, f => f.key(c, r))
+    }
+
+    /// See [`Surface::numbers`]; to be compared among faces of one `rank`.
+    #[inline]
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        each!(self, f => f.numbers())
+    }
+
+    /// See [`Surface::inside`].
+    #[inline]
+    pub fn inside(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
+        each!(self, f => f.inside(origin, direction))
+    }
+}
+
+/// Radial part of `x − origin` against `axis`: (distance from the axis, unit radial direction).
+fn radial(offset: DVec3, axis: DVec3) -> (f64, DVec3) {
+    let z = offset.dot(axis);
+    let p = offset - axis * z;
+    let rho = p.length();
+    if rho <= ON_AXIS * offset.length() || rho == 0.0 {
+        let u = any_perpendicular(axis);
+        // Of its two signs the one towards the point: half as far off.
+        return (rho, if u.dot(p) < 0.0 { -u } else { u });
+    }
+    let u = p / rho;
+    let u = u - axis * u.dot(axis);
+    (rho, u.normalize())
+}
+
+/// The curvature of a face of revolution about `axis` that is straight along its rulings.
+#[inline]
+fn around(axis: DVec3, at: &FaceAt) -> Curvature {
+    // The tangent across the axis is the same for the cone's normal and its radial direction.
+    Curvature { each: 0.0, factor: at.k / at.rho, along: axis.cross(at.normal).normalize_or_zero() }
+}
+
+/// The lowest value of the tangent plane at the centre of a box over it: psi is convex and lies above.
+#[inline]
+fn tangent(face: &impl Surface, center: DVec3, half: DVec3) -> f64 {
+    let at = face.at(center);
+    at.value - at.normal.abs().dot(half)
+}
+
+/// The largest value at a corner of a box c ± e: psi is convex and largest there.
+#[inline]
+fn largest_corner(face: &impl Surface, c: DVec3, e: DVec3) -> f64 {
+    let signs = [-1.0, 1.0];
+    let mut hi = f64::NEG_INFINITY;
+    for x in signs {
+        for y in signs {
+            for z in signs {
+                hi = hi.max(face.value(c + e * DVec3::new(x, y, z)));
+            }
+        }
+    }
+    hi
+}
+
+/// Where slope·t + value <= 0.
+fn half_line(slope: f64, value: f64) -> Option<(f64, f64)> {
+    if slope == 0.0 {
+        return (value <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
+    }
+    let at = -value / slope;
+    Some(if slope > 0.0 { (f64::NEG_INFINITY, at) } else { (at, f64::INFINITY) })
+}
+
+/// The roots of a t² + 2 b t + c for a > 0, without cancellation.
+fn between_roots(a: f64, b: f64, c: f64) -> Option<(f64, f64)> {
+    let discriminant = b * b - a * c;
+    if discriminant < 0.0 {
+        return None;
+    }
+    let q = -(b + discriminant.sqrt().copysign(b));
+    if q == 0.0 {
+        return Some((0.0, 0.0));
+    }
+    let (s, t) = (q / a, c / q);
+    Some((s.min(t), s.max(t)))
+}

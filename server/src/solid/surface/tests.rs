@@ -1,0 +1,128 @@
+//! What the contract promises of every kind.
+
+use super::*;
+use crate::math::random::Random;
+use glam::DQuat;
+
+/// One face of each kind, somewhere.
+fn faces(r: &mut Random) -> [Face; 4] {
+    let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
+    let radius = r.within(0.2, 2.0);
+    let (sin, cos) = r.within(0.1, 1.2).sin_cos();
+    [
+        Plane { normal: n, offset: r.within(-1.0, 1.0) }.into(),
+        Sphere { center: o, radius }.into(),
+        Cylinder { origin: o, axis: n, radius }.into(),
+        Cone { apex: o, axis: n, sin, cos }.into(),
+    ]
+}
+
+#[test]
+fn a_face_at_a_point_is_its_value_with_its_derivatives() {
+    let mut r = Random(3);
+    for _ in 0..500 {
+        for face in faces(&mut r) {
+            let x = r.vector(2.0);
+            let at = face.at(x);
+            assert!((at.value - face.value(x)).abs() < 1e-14 && (at.normal.length() - 1.0).abs() < 1e-14);
+            // Near an axis or a centre the third derivative is large.
+            if at.rho < 0.2 {
+                continue;
+            }
+            let (h, d) = (1e-5, r.vector(1.0).normalize());
+            let slope = (face.value(x + d * h) - face.value(x - d * h)) / (2.0 * h);
+            assert!((slope - at.normal.dot(d)).abs() < 1e-8, "{face:?}");
+            let turn = (face.at(x + d * h).normal - face.at(x - d * h).normal) / (2.0 * h);
+            assert!((turn - face.curvature(&at).matrix() * d).length() < 1e-7, "{face:?}");
+        }
+    }
+}
+
+#[test]
+fn spans_hold_the_values_and_rays_end_where_psi_changes_its_sign() {
+    let mut r = Random(5);
+    for _ in 0..500 {
+        for face in faces(&mut r) {
+            let (c, half) = (r.vector(2.0), r.vector(0.5).abs());
+            let (lo, hi) = face.span(c, half);
+            let d = r.vector(1.0).normalize();
+            let inside = face.inside(c, d);
+            for _ in 0..20 {
+                let v = face.value(c + half * r.vector(1.0).clamp(-DVec3::ONE, DVec3::ONE));
+                assert!(lo - 1e-14 <= v && v <= hi + 1e-14, "{face:?}");
+                let t = r.within(-4.0, 4.0);
+                let v = face.value(c + d * t);
+                assert!(v.abs() < 1e-9 || (v < 0.0) == inside.is_some_and(|(s, e)| s <= t && t <= e), "{face:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_moved_face_has_its_values_moved_and_its_own_symmetry_changes_none() {
+    let mut r = Random(7);
+    for _ in 0..200 {
+        let turn = DQuat::from_xyzw(r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0), 1.5).normalize();
+        let frame = Pose::new(r.vector(1.0), turn);
+        for face in faces(&mut r) {
+            let (placed, moved) = (face.placed(&frame), face.moved(|x| frame.point(x), |v| frame.vector(v)));
+            let (origin, axis) = match face.symmetry() {
+                Symmetry::Axis(Axis { origin, direction }) => (origin, direction),
+                Symmetry::Center(center) => (center, r.vector(1.0).normalize()),
+                Symmetry::Normal(normal) => (r.vector(1.0), normal),
+            };
+            let spin = DQuat::from_axis_angle(axis, r.within(-3.0, 3.0));
+            for _ in 0..10 {
+                let x = r.vector(2.0);
+                assert!((placed.value(frame.point(x)) - face.value(x)).abs() < 1e-13);
+                assert!((moved.value(frame.point(x)) - face.value(x)).abs() < 1e-13);
+                assert!((face.value(origin + spin * (x - origin)) - face.value(x)).abs() < 1e-13, "{face:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn capabilities_agree_with_psi() {
+    let mut r = Random(11);
+    for _ in 0..300 {
+        for face in faces(&mut r) {
+            for _ in 0..10 {
+                let x = r.vector(2.0);
+                let (v, at) = (face.value(x), face.at(x));
+                if let Some((normal, offset)) = face.flat() {
+                    assert_eq!(v, normal.dot(x) - offset);
+                }
+                if let Some((center, radius)) = face.ball() {
+                    assert_eq!(v, center.distance(x) - radius);
+                }
+                let inset = r.within(0.0, 0.1);
+                if let Some(q) = face.quadric(inset) {
+                    let s = x - q.origin;
+                    let z = q.axis.map_or(0.0, |a| s.dot(a));
+                    let u = s - q.axis.map_or(DVec3::ZERO, |a| a * z);
+                    let rho = q.radius + q.slope * z;
+                    let inside = rho >= 0.0 && u.length_squared() <= rho * rho;
+                    assert!((v + inset).abs() < 1e-9 || inside == (v <= -inset), "{face:?} {x}");
+                }
+                if let Some(axis) = face.developable() {
+                    // Straight along the tangent that the axis lies over.
+                    let along = at.normal.cross(axis.cross(at.normal)).normalize();
+                    assert!((face.curvature(&at).matrix() * along).length() < 1e-9, "{face:?}");
+                }
+                if let Some(apex) = face.apex() {
+                    assert!(face.value(apex.point).abs() < 1e-14 && at.normal.dot(apex.axis) + apex.sin < 1e-12);
+                }
+                if !face.is_flat() {
+                    let foot = face.foot(x, at.normal, 1.0);
+                    assert!(face.value(foot).abs() < 1e-13, "{face:?}");
+                    assert!((face.at(foot).normal - at.normal).length() < 1e-12, "{face:?}");
+                }
+            }
+            assert_eq!(face.deviation(&face, 3.0), Some(0.0));
+            assert_eq!(face.difference(&face, 3.0), Some(0.0));
+        }
+        let [p, s, ..] = faces(&mut r);
+        assert_eq!((p.above(&s, DVec3::ZERO, 1.0), p.deviation(&s, 1.0)), (None, None));
+    }
+}

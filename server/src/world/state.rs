@@ -1,0 +1,94 @@
+//! What a world keeps from step to step, and the memory that its steps use again.
+
+use super::body::Body;
+use super::neighbours::Neighbours;
+use super::notes::Notes;
+use super::outcome::StepOutcome;
+use super::search::{self, PairJob};
+use super::stances::Stances;
+use crate::contact::Scratch;
+use crate::math::Aabb;
+use contactd_proto::Pose;
+use contactd_proto::pose_record::Order;
+
+/// Memory of the steps.
+#[derive(Debug)]
+pub struct StepState {
+    pub(super) max_batch: usize,
+    pub(super) serial: u64,
+    pub(super) orders: Vec<(u32, Order)>,
+    /// Where bodies are put at the start of the step, by their indices.
+    pub(super) put: Vec<(u32, Pose)>,
+    /// Bodies that moved in the last step.
+    pub(super) moving: Vec<u32>,
+    /// When the step begins, in steps taken.
+    pub(super) clock: f64,
+    pub(super) neighbours: Neighbours,
+    /// Swept boxes, each with the serial of the step it was taken for.
+    pub(super) boxes: Vec<(u64, Aabb)>,
+    pub(super) stances: Stances,
+    /// Neighbours that their odometers don't prove apart.
+    pub(super) asked: Vec<usize>,
+    /// How many of them a direction proved apart.
+    pub(super) glanced: u32,
+    pub(super) jobs: Vec<PairJob>,
+    /// Time (as a key), ids and job of each told pair, to be ordered, and whether its regions are complete.
+    pub(super) order: Vec<(i64, u32, u32, u32, bool)>,
+    pub(super) searches: search::Memory,
+    /// Memory of what is asked beside the searches.
+    pub(super) scratch: Scratch,
+    pub(super) outcome: StepOutcome,
+    /// What is noted for certificates of what is remembered, where somebody asks for them.
+    pub(super) notes: Option<Box<Notes>>,
+}
+
+impl StepState {
+    pub(super) fn new(max_batch: usize) -> Self {
+        Self {
+            max_batch,
+            serial: 0,
+            orders: Vec::new(),
+            put: Vec::new(),
+            moving: Vec::new(),
+            clock: 0.0,
+            neighbours: Neighbours::default(),
+            boxes: Vec::new(),
+            stances: Stances::default(),
+            asked: Vec::new(),
+            glanced: 0,
+            jobs: Vec::new(),
+            order: Vec::new(),
+            searches: search::Memory::default(),
+            scratch: Scratch::default(),
+            outcome: StepOutcome::default(),
+            notes: None,
+        }
+    }
+
+    /// The list of neighbours.
+    pub(super) fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// When the last step began, in steps taken.
+    pub(super) fn clock(&self) -> f64 {
+        self.clock
+    }
+
+    /// The pairs that were asked about in the last step.
+    pub(super) fn jobs(&self) -> &[PairJob] {
+        &self.jobs
+    }
+
+    /// There are more bodies than before; what is known of the others stays true.
+    pub(super) fn extend(&mut self) {
+        self.neighbours.extend();
+    }
+
+    /// Bodies, their places or the rules have changed: nothing is known any more.
+    pub(super) fn forget(&mut self, bodies: &[Body]) {
+        self.neighbours.forget();
+        self.moving.clear();
+        self.moving.extend((0..bodies.len()).filter(|i| !bodies[*i].track.is_rest()).map(|i| i as u32));
+    }
+}
