@@ -390,12 +390,15 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     // What starts in touch, or was not continued, is told where it is deep.
     let at_depth = o.not_continued || o.time == 0.0;
     let near = (1e-11 * size).max(rounding);
-    let off = if at_depth { near + 2.001 * o.resolution } else { near };
+    // What was not continued is told how deep it is.
+    let told = if o.not_continued { -0.5 * o.separation } else { 0.0 };
+    let off = if at_depth { near + told.max(2.001 * o.resolution) } else { near };
     if values.iter().any(|v| v.abs() > off) {
         out.push((Lie::Point, format!("f {:e} {:e} at {}, within {off:e}", values[0], values[1], o.point)));
     }
     let apart = values[0].max(values[1]);
-    if !o.past && (o.separation - 2.0 * apart.min(0.0)).abs() > 2.0 * off {
+    let exactly = if o.not_continued { near } else { off };
+    if !o.past && (o.separation - 2.0 * apart.min(0.0)).abs() > 2.0 * exactly {
         out.push((Lie::Separation, format!("{:e}, f {apart:e}", o.separation)));
     }
     let closing = (sides[0].velocity(o.point) - sides[1].velocity(o.point)).dot(o.normal);
@@ -423,9 +426,13 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let most = if at_depth { off } else { 1e-9 * size + rounding };
     let mut doubts: Option<Vec<(Lie, String)>> = None;
     let measures = [4, 0, 2, 6, 8, 10, 12, 14, 16, 18, 20].map(|k| least * f64::from(1 << k));
-    for tau in measures.into_iter().filter(|t| *t < most).chain([most]) {
+    let measures: Vec<f64> = measures.into_iter().filter(|t| *t < most).chain([most]).collect();
+    // A point that is deep may lie deeper in the one than in the other: then each has a measure of its own.
+    let same = measures.iter().map(|tau| [*tau; 2]);
+    let each = measures.iter().flat_map(|a| measures.iter().map(|b| [*a, *b])).filter(|_| at_depth);
+    for taus in same.chain(each) {
         let mut wrong = vec![];
-        features(sides, &points, &normals, tau, o, &mut wrong);
+        features(sides, &points, &normals, taus, o, &mut wrong);
         if wrong.is_empty() {
             return;
         }
@@ -440,17 +447,18 @@ fn features(
     sides: &[Side; 2],
     points: &[DVec3; 2],
     normals: &[DVec3; 2],
-    tau: f64,
+    taus: [f64; 2],
     o: &Outcome,
     out: &mut Vec<(Lie, String)>,
 ) {
-    let spots: [Spot; 2] = std::array::from_fn(|k| Spot::of(&sides[k], points[k], tau, sides[k].turned(normals[k])));
+    let spots: [Spot; 2] =
+        std::array::from_fn(|k| Spot::of(&sides[k], points[k], taus[k], sides[k].turned(normals[k])));
     let at_depth = o.not_continued || o.time == 0.0;
     // Of a round feature the gradient turns while a point moves: by its rounding, or, of one that is told where it is
     // deep, by how deep it is; then both sides' gradients are what the normal lies between.
     let turns: [f64; 2] = std::array::from_fn(|k| {
         let (side, point) = (&sides[k], points[k]);
-        let moves = 64.0 * f64::EPSILON * side.extent + if at_depth { tau } else { 0.0 };
+        let moves = 64.0 * f64::EPSILON * side.extent + if at_depth { taus[k] } else { 0.0 };
         let each = spots[k].active.iter().map(|i| match side.literals[*i].face {
             Face::Plane(_) => 0.0,
             Face::Sphere(surface::Sphere { center, .. }) => moves / point.distance(center).max(f64::MIN_POSITIVE),
@@ -464,7 +472,7 @@ fn features(
     let mut together = vec![];
     let mut ranks = [None; 2];
     for (k, (side, spot)) in sides.iter().zip(&spots).enumerate() {
-        let name = ["a", "b"][k];
+        let (name, tau) = (["a", "b"][k], taus[k]);
         let named: Vec<u32> = [o.faces_a, o.faces_b][k].into_iter().filter(|f| *f != NO_FACE).collect();
         if named.is_empty() || spot.active.is_empty() {
             out.push((Lie::FaceInactive, format!("{name}: {named:?} named, {} active", spot.active.len())));
@@ -518,8 +526,11 @@ fn features(
         out.push((Lie::Normal, format!("the averaged {} is not between the faces", o.normal)));
     }
     let kind = Kind::of_active(spots[0].rank, spots[1].rank);
+    // A point that is deep beside an apex may be of the apex or of the face around it.
+    let of = |spot: &Spot| if at_depth && spot.apex { [spot.rank, 1] } else { [spot.rank; 2] };
+    let kinds = of(&spots[0]).map(|a| of(&spots[1]).map(|b| Kind::of_active(a, b)));
     let fits = match o.extent {
-        Extent::Point => o.kind == kind,
+        Extent::Point => kinds.as_flattened().contains(&o.kind),
         // Any point of a line or a patch, its border included.
         Extent::Line => {
             let has_vertex = matches!(o.kind, Kind::VertexFace | Kind::VertexEdge | Kind::VertexVertex);

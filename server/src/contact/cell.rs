@@ -97,4 +97,7 @@ pub enum Ending {
     Rounding(f64),
     /// The work limit ran out; free before this time.
     Limit(f64),
+    /// The search took long enough for another resolution to be tried (`Search::patience`); free before this time. The contact that is
+    /// known, if any, comes much later.
+    Long(f64, Option<Found>),
 }

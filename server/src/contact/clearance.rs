@@ -134,7 +134,7 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
     let until = match ending {
         Some(Ending::Clear) | None => 1.0,
         Some(Ending::Contact(found)) => (found.goal - lead).max(0.0),
-        Some(Ending::Limit(t) | Ending::Rounding(t)) => t,
+        Some(Ending::Limit(t) | Ending::Long(t, _) | Ending::Rounding(t)) => t,
         Some(Ending::Deep(_)) => 0.0,
     };
     Kept { until, room, counters }
@@ -166,7 +166,7 @@ pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (
         Some(Ending::Clear) | None => (1.0, true),
         Some(Ending::Contact(found)) => (found.goal.min(1.0), true),
         Some(Ending::Rounding(t)) => (t, true),
-        Some(Ending::Limit(t)) => (t, false),
+        Some(Ending::Limit(t) | Ending::Long(t, _)) => (t, false),
         Some(Ending::Deep(_)) => (0.0, true),
     };
     (until, known, counters)
@@ -241,7 +241,7 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
     let within = match ending {
         Some(Ending::Clear) | None => Within::Apart,
         Some(Ending::Deep(x)) => Within::Witness(x),
-        Some(Ending::Contact(_) | Ending::Limit(_) | Ending::Rounding(_)) => Within::Open,
+        Some(Ending::Contact(_) | Ending::Limit(_) | Ending::Long(..) | Ending::Rounding(_)) => Within::Open,
     };
     (within, counters.cells)
 }

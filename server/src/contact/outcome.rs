@@ -177,7 +177,7 @@ pub struct Outcome {
     pub point: DVec3,
     /// Unit normal from a to b. Meaningful for contact and overlap.
     pub normal: DVec3,
-    /// Signed separation at `time`: 0 at contact, at overlap minus what `point` proves of the depth; at the start for a
+    /// Signed separation at `time`: 0 at contact, twice the point's depth where the time was not continued, at overlap minus what `point` proves of the depth; at the start for a
     /// touching clear pair. Of an overlap that was searched past the depth at `time`, negative.
     pub separation: f64,
     /// Approach speed along the normal at `time`, length per step, positive = approaching.

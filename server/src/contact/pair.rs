@@ -14,10 +14,10 @@ use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
 use super::query::PairQuery;
 use super::search::{Scratch, Search};
 use super::separation;
-use super::task::{RAISES, Task, most_raised, raised, witness_level};
+use super::task::{RAISES, Task, clear_of_walls, most_raised, raised, witness_level};
 use super::unbounded;
 use super::work::Work;
-use crate::motion::Instant;
+use crate::motion::{Instant, Placed};
 use crate::solid::Sense;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -90,6 +90,27 @@ fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     }
 }
 
+/// Cells' worth of work after which a coarser resolution is tried.
+const PATIENCE: u64 = 100_000;
+
+/// How much coarser, and how often.
+const COARSER: f64 = 32.0;
+const COARSENINGS: usize = 3;
+
+/// The largest that a resolution becomes by that, relative to the smallest primitive.
+const LARGEST_COARSE: f64 = 1e-3;
+
+/// What a search that took too long has proven: no point is `depth` deep in both bodies before `free_until`, or before the contact found's
+/// own goal.
+#[derive(Debug)]
+struct Open {
+    resolution: f64,
+    depth: f64,
+    free_until: f64,
+    /// A contact that is known, much later.
+    found: Option<Found>,
+}
+
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
 /// further than the earliest contact known.
 pub struct PairSearch<'a> {
@@ -107,6 +128,12 @@ pub struct PairSearch<'a> {
     resolution: f64,
     /// How often the resolution was raised since rounding left its depth untold.
     raised: usize,
+    /// How often the resolution was made coarser since a search took too long, and what the first of these had proven.
+    coarser: usize,
+    open: Option<Box<Open>>,
+    /// The bodies of the question as they move, where the search leaves out a spin that moves nothing: what closes in along a normal is
+    /// told of these.
+    spun: Option<Box<[Placed; 2]>>,
     /// Cells that the question allows.
     limit: u64,
     /// Cells' worth of work of the searches that have ended: at other depths.
@@ -143,6 +170,9 @@ impl<'a> PairSearch<'a> {
                 outcome,
                 resolution,
                 raised: 0,
+                coarser: 0,
+                open: None,
+                spun: None,
                 limit,
                 spent: 0,
             };
@@ -178,7 +208,11 @@ impl<'a> PairSearch<'a> {
         if ending.is_none() && overlap.is_none() && some {
             search.start();
         }
+        search.patience = PATIENCE;
         let (search, limit) = (Some(search), query.cell_limit);
+        let spins = |(a, b): (Placed, Placed)| [a.motion.spin, b.motion.spin];
+        let moving = if swapped { (query.b.placed, query.a.placed) } else { (query.a.placed, query.b.placed) };
+        let spun = (spins(moving) != spins(task.relative.placed())).then(|| Box::new([query.a.placed, query.b.placed]));
         let mut pair = Self {
             task,
             swapped,
@@ -189,6 +223,9 @@ impl<'a> PairSearch<'a> {
             outcome,
             resolution,
             raised: 0,
+            coarser: 0,
+            open: None,
+            spun,
             limit,
             spent: 0,
         };
@@ -286,25 +323,25 @@ impl<'a> PairSearch<'a> {
             self.outcome.counters += search.counters;
             search.counters = Default::default();
             match ending {
+                // What a finer search has found is there all the same.
+                Ending::Clear if self.open.as_ref().is_some_and(|open| open.found.is_some()) => self.leave_open(0.0),
                 Ending::Clear => {}
-                Ending::Contact(found) => {
-                    fill_contact(&mut self.outcome, &self.task, &found);
-                    let x = found.witness;
-                    let x = if self.swapped { self.task.relative.at(found.upper).b_point(x) } else { x };
-                    self.outcome.witness = Some(x);
-                }
-                Ending::Limit(t) => {
-                    self.outcome.status = Status::Undecided;
-                    self.outcome.time_lower = t;
-                }
-                Ending::Rounding(t) => {
-                    // A depth that the motion comes to and stays at is told apart from a slightly larger one.
-                    if self.raise() {
+                Ending::Contact(found) => self.meets(&found),
+                Ending::Long(t, found) => {
+                    if self.coarsen(t, found) {
                         self.restart(cells);
                         continue;
                     }
-                    self.outcome.status = Status::Undecided;
-                    self.outcome.time_lower = t;
+                    self.leave_open(t);
+                }
+                Ending::Limit(t) => self.leave_open(t),
+                Ending::Rounding(t) => {
+                    // A depth that the motion comes to and stays at is told apart from a slightly larger one.
+                    if self.raise() || self.coarsen(t, None) {
+                        self.restart(cells);
+                        continue;
+                    }
+                    self.leave_open(t);
                 }
                 Ending::Deep(x) => {
                     self.outcome.touching = true;
@@ -336,6 +373,66 @@ impl<'a> PairSearch<'a> {
         }
     }
 
+    /// The answer that a contact was found.
+    fn meets(&mut self, found: &Found) {
+        fill_contact(&mut self.outcome, &self.task, found);
+        let x = found.witness;
+        let x = if self.swapped { self.task.relative.at(found.upper).b_point(x) } else { x };
+        self.outcome.witness = Some(x);
+        if let Some(bodies) = &self.spun
+            && self.task.asked.point()
+        {
+            let o = &mut self.outcome;
+            let velocity = |body: &Placed| {
+                let motion = &body.motion;
+                motion.velocity + motion.spin.cross(o.point - motion.at(o.time).position)
+            };
+            // The normal still points from the carrier.
+            let sign = if self.swapped { -1.0 } else { 1.0 };
+            o.normal_speed = sign * (velocity(&bodies[0]) - velocity(&bodies[1])).dot(o.normal);
+        }
+    }
+
+    /// The answer that nothing more is known than that nothing is met before `t`, or what a finer search has proven and found.
+    fn leave_open(&mut self, t: f64) {
+        let here = Open { resolution: self.resolution, depth: self.task.delta, free_until: t, found: None };
+        let open = self.open.take().map_or(here, |open| *open);
+        self.outcome.resolution = open.resolution;
+        self.task.delta = open.depth;
+        match open.found {
+            Some(found) => self.meets(&found),
+            None => {
+                self.outcome.status = Status::Undecided;
+                self.outcome.time_lower = open.free_until;
+            }
+        }
+    }
+
+    /// Makes the resolution coarser, where a search has proven that nothing is met before `t` and would take too long to tell more.
+    /// False where that was done often enough, and where a primitive would be hardly more than that large.
+    fn coarsen(&mut self, t: f64, found: Option<Found>) -> bool {
+        let models = [self.task.model_a, self.task.model_b];
+        let resolution = clear_of_walls(COARSER * self.resolution, self.task.rounding, models);
+        let primitives = self.task.a.primitives.iter().chain(&self.task.b.primitives);
+        let smallest = primitives.map(|p| p.shape.geometry().smallest_dimension()).fold(f64::INFINITY, f64::min);
+        // What is proven at the finest resolution is worth most, but for a contact that was found.
+        if self.open.as_ref().is_none_or(|open| open.found.is_none() && found.is_some()) {
+            let (resolution, depth) = (self.resolution, self.task.delta);
+            self.open = Some(Box::new(Open { resolution, depth, free_until: t, found }));
+        }
+        if self.coarser == COARSENINGS || resolution > LARGEST_COARSE * smallest {
+            return false;
+        }
+        self.coarser += 1;
+        self.raised = 0;
+        self.resolution = resolution;
+        self.outcome.resolution = resolution;
+        if self.task.past == 0.0 {
+            (self.level, self.task.nearly) = (1.0, self.task.rounding);
+        }
+        true
+    }
+
     /// Raises the resolution, unless that was done often enough.
     fn raise(&mut self) -> bool {
         let Some(more) = RAISES.get(self.raised) else { return false };
@@ -351,7 +448,13 @@ impl<'a> PairSearch<'a> {
         self.task.limit = self.task.limit.saturating_sub(cells);
         let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
         let mut search = Search::new(self.task, scratch);
-        search.start();
+        if self.coarser > 0 && self.task.ideas.holes {
+            self.ending = hole::answer(&mut search);
+        }
+        if self.ending.is_none() {
+            search.start();
+        }
+        search.patience = if self.coarser < COARSENINGS { PATIENCE } else { u64::MAX };
         self.search = Some(search);
     }
 
@@ -429,7 +532,11 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     o.normal = (at.world_from_a * normal).normalize();
     o.normal_speed = at.velocity(x).dot(normal);
     // Of an overlap that is searched past: how deep the bodies then are.
-    o.separation = if task.past > 0.0 { -2.0 * task.delta } else { 0.0 };
+    o.separation = match () {
+        () if task.past > 0.0 => -2.0 * task.delta,
+        () if o.not_continued => 2.0 * common(x).min(0.0),
+        () => 0.0,
+    };
 }
 
 /// Gradients that miss each other by more than this are not of the point where the bodies hold each other.

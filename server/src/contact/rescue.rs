@@ -29,6 +29,9 @@ use glam::DVec3;
 /// Cells after which a witness and what is proven by then are the answer.
 const LAST: u64 = 16_000;
 
+/// A bracket this wide, a fraction of the step, is told where no coarser resolution has a narrower one.
+const WIDE: f64 = 1e-3;
+
 /// Cells' worth of work to prove that nothing is deep at the start.
 const START: u64 = 20_000;
 
@@ -55,7 +58,27 @@ impl Search<'_> {
             return None;
         }
         self.probe(cell.t, cell.center);
-        (self.counters.cells >= LAST).then(|| self.bracket(cell.t)).flatten()
+        (self.counters.cells >= LAST).then(|| self.bracket_or_long(cell.t)).flatten()
+    }
+
+    /// The ending of a search whose patience is at its end: a witness not long after a cell's time, or none.
+    pub(super) fn impatient(&mut self, cell: &Cell) -> Ending {
+        let long = Ending::Long(cell.t, None);
+        if !self.task.continues() {
+            return long;
+        }
+        self.probe(cell.t, cell.center);
+        self.bracket_or_long(cell.t).unwrap_or(long)
+    }
+
+    /// As `bracket`; where a coarser resolution may be tried, and may tell more, that is said.
+    fn bracket_or_long(&mut self, proven: f64) -> Option<Ending> {
+        match self.bracket(proven)? {
+            Ending::Contact(found) if found.upper - proven > WIDE && self.patience < u64::MAX => {
+                Some(Ending::Long(proven, Some(found)))
+            }
+            ending => Some(ending),
+        }
     }
 
     /// The answer of a search that rounding has stopped: a witness behind what is proven.

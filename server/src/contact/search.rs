@@ -17,7 +17,7 @@ use super::clock::{Clock, Stage};
 use super::found::Found;
 use super::handed::Handed;
 use super::literal::{Side, View};
-use super::outcome::Counters;
+use super::outcome::{Counters, DEFAULT_CELL_LIMIT};
 use super::task::Task;
 use crate::math::halt::Halt;
 use crate::motion::Instant;
@@ -106,6 +106,8 @@ pub struct Search<'a> {
     instant: Instant,
     /// Cells after which a witness is looked for where the search has come to.
     probe: u64,
+    /// Cells' worth of work after which the search ends as `Ending::Long`.
+    pub(super) patience: u64,
     /// Where the search came to its end without an answer: time and place.
     pub(super) stuck: Option<(f64, DVec3)>,
     /// Work done so far.
@@ -131,6 +133,7 @@ impl<'a> Search<'a> {
             rivals: 0,
             instant,
             probe: FIRST_PROBE,
+            patience: u64::MAX,
             stuck: None,
             counters: Counters::default(),
         }
@@ -219,6 +222,10 @@ impl<'a> Search<'a> {
                 && (self.counters.spent(self.task.asked_limit) >= self.task.limit || self.is_halted())
             {
                 return Some(Ending::Limit(cell.t));
+            }
+            // Counted as the default limit counts, so that no other limit changes an answer that it does not cut.
+            if cell.source == Source::Cell && self.counters.spent(DEFAULT_CELL_LIMIT) >= self.patience {
+                return Some(self.impatient(&cell));
             }
             if cell.source == Source::Cell && self.counters.cells >= self.probe {
                 self.probe = 2 * self.counters.cells;

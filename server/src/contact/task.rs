@@ -183,7 +183,7 @@ pub(super) fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
 
 /// The resolution, raised where a wall of a body is as thick as twice a depth that is searched: a point in its middle could
 /// neither be excluded nor confirmed.
-fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
+pub(super) fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
     let at_depth = |wall: f64, depth: f64| {
         (2.0 * depth..=2.0 * (witness_level(depth, rounding) + NEARLY_DEEP * rounding)).contains(&wall)
     };

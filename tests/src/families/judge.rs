@@ -219,14 +219,19 @@ impl Pair {
 
     /// Is there a common point about as deep as `delta` at the start? Looked for from x first, then everywhere.
     fn starts_within(&self, x: DVec3, delta: f64, draw: &mut Draw) -> bool {
+        // Few places show it as a rule; a contradiction must have looked at many.
+        [(90, 24), (4000, 400)].into_iter().any(|(points, kept)| self.starts_within_of(x, delta, points, kept, draw))
+    }
+
+    fn starts_within_of(&self, x: DVec3, delta: f64, points: usize, kept: usize, draw: &mut Draw) -> bool {
         let m = self.at(0.0);
         let mut places = vec![x];
-        places.extend(self.a.surface_points(90, draw));
+        places.extend(self.a.surface_points(points, draw));
         let seen = |x: DVec3| m.a.transpose() * (m.b * x + m.apart);
-        places.extend(self.b.surface_points(90, draw).into_iter().map(seen));
+        places.extend(self.b.surface_points(points, draw).into_iter().map(seen));
         let mut places: Vec<(f64, DVec3)> = places.into_iter().map(|x| (self.common(&m, x), x)).collect();
         places[1..].sort_by(|x, y| x.0.total_cmp(&y.0));
-        places.truncate(24);
+        places.truncate(kept);
         // Between like round faces the deepest place is far away and hardly downhill.
         let firsts = [10.0, 1e3, 1e5, 1e7].map(|k| (k * delta).min(0.3 * self.size));
         let mut is_deep = |x: DVec3, first: f64| -self.deepen(0.0, x, None, first, 600, draw).0 >= 0.9 * delta;

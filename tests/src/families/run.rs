@@ -4,7 +4,7 @@ use super::{Effort, Fault, Scene, judge};
 use crate::record_judge::{Lie, lies};
 use crate::reference::Moving;
 use contactd::check::Check;
-use contactd::contact::Status;
+use contactd::contact::{Status, default_resolution};
 use contactd::eco::Model;
 use contactd::import::{self, Facets, Limits, import_csg};
 use contactd::world::{PairOutcome, StepOptions, StepOutcome};
@@ -20,6 +20,8 @@ pub struct Answer {
     pub pair: PairOutcome,
     /// The world before the step.
     pub check: Check,
+    /// The resolution that was asked for.
+    pub asked: f64,
     /// Seconds that the step took, reading and preprocessing not counted.
     pub seconds: f64,
 }
@@ -63,6 +65,8 @@ pub fn ask(scene: &Scene, cells: u64) -> Result<Answer, String> {
         Ok::<_, String>(Arc::new(Model::new(import.solid)))
     };
     let models = [model("a.csg", &scene.a.text())?, model("b.csg", &scene.b.text())?];
+    let own = models.iter().map(|m| default_resolution(m, m)).fold(0.0, f64::max);
+    let asked = parsed.resolution.unwrap_or(own);
     let mut check = Check::new(&parsed, &models, None).map_err(|e| e.to_string())?;
     let options = StepOptions { clear: true, cell_limit: cells, batch_limit: cells, ..StepOptions::default() };
     let started = Instant::now();
@@ -70,7 +74,7 @@ pub fn ask(scene: &Scene, cells: u64) -> Result<Answer, String> {
     let seconds = started.elapsed().as_secs_f64();
     let [pair] = step.pairs.as_slice() else { return Err(format!("{} pairs told", step.pairs.len())) };
     let pair = *pair;
-    Ok(Answer { pair, check, seconds })
+    Ok(Answer { pair, check, asked, seconds })
 }
 
 /// Writes a scene as a folder that `contactd check FOLDER/scene.toml` reads, with a note beside it.
