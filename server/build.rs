@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Floors up to the octree, poses, and the versions of the packages. What is missing in a packaged crate is named by the
 /// crate's version.
 const SOURCES: [&str; 8] =
-    ["src/math", "src/motion", "src/solid", "src/import", "src/bound", "src/eco", "../proto/src", "../Cargo.lock"];
+    ["src/math", "src/motion", "src/solid", "src/import", "src/bound", "src/octree", "../proto/src", "../Cargo.lock"];
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

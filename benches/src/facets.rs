@@ -3,7 +3,7 @@
 //! Every circle becomes the regular N-gon with its corners on the circle, as OpenSCAD and the usual CAD exporters write
 //! it. A curved surface is then off by up to r(1 − cos π/N) ~ 5 r/N²: a hole is too narrow, a shaft too thin.
 
-use contactd::eco::Model;
+use contactd::octree::Model;
 use glam::{DVec2, DVec3};
 use parry3d_f64::math::{Pose, Vec3};
 use parry3d_f64::shape::{SharedShape, TriMesh};

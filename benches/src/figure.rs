@@ -88,7 +88,7 @@ impl Axis {
     }
 
     /// A value in words.
-    fn told(&self, v: f64) -> String {
+    fn reported(&self, v: f64) -> String {
         match self {
             Axis::Rows(names) => names.get(v.round() as usize).cloned().unwrap_or_default(),
             Axis::Log(label) | Axis::Linear(label) => format!("{label}: {}", shown(v)),
@@ -238,7 +238,7 @@ impl Figure {
         for (i, s) in self.series.iter().enumerate() {
             for p in self.shown(s) {
                 let [x, y] = layout.at(self, i, p);
-                let tip = format!("{}\n{}\n{}", s.name, self.axes[0].told(p[0]), self.axes[1].told(p[1]));
+                let tip = format!("{}\n{}\n{}", s.name, self.axes[0].reported(p[0]), self.axes[1].reported(p[1]));
                 let _ = writeln!(
                     svg,
                     "<circle class=\"hit\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\" data-tip=\"{0}\"><title>{0}</title></circle>",

@@ -9,7 +9,7 @@ use crate::row;
 use crate::table::Cell;
 use crate::workload::{Case, Class, Truth};
 use contactd::contact::{
-    Asked, Body, DEFAULT_CELL_LIMIT, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact, rounding,
+    Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact, rounding,
 };
 use contactd::motion::{Placed, Relative};
 use contactd_tests::reference::{self, Effort, Moving, Verdict};
@@ -23,14 +23,14 @@ pub struct Setting {
     /// Resolution, in sizes.
     pub resolution: f64,
     /// What is switched on.
-    pub ideas: Ideas,
+    pub strategies: Strategies,
     /// Cells that a question may take.
     pub limit: u64,
 }
 
 impl Default for Setting {
     fn default() -> Self {
-        Self { resolution: DEFAULT, ideas: Ideas::default(), limit: DEFAULT_CELL_LIMIT / 10 }
+        Self { resolution: DEFAULT, strategies: Strategies::default(), limit: DEFAULT_CELL_LIMIT / 10 }
     }
 }
 
@@ -42,7 +42,7 @@ impl Setting {
 
     /// The search alone: nothing is answered in front of it.
     pub fn search_alone() -> Self {
-        Self { ideas: Ideas { direct: false, holes: false, ..Ideas::default() }, ..Self::default() }
+        Self { strategies: Strategies { convex: false, cavities: false, ..Strategies::default() }, ..Self::default() }
     }
 
     /// False where the world would refuse the resolution: a primitive is hardly larger.
@@ -65,8 +65,8 @@ pub fn ask(case: &Case, setting: &Setting, scratch: &mut Scratch) -> Outcome {
         b: Body { model: &case.b, placed: b },
         resolution: setting.resolution * case.size(),
         cell_limit: setting.limit,
-        ideas: setting.ideas,
-        asked: Asked::CONTACT,
+        strategies: setting.strategies,
+        query_options: QueryOptions::CONTACT,
     };
     earliest_contact(&query, scratch)
 }

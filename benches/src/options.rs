@@ -1,12 +1,12 @@
 //! The command line that all benchmarks share.
 
 use clap::{Parser, ValueEnum};
-use contactd::contact::Ideas;
+use contactd::contact::Strategies;
 use std::path::PathBuf;
 
-/// An idea of the search that can be switched off.
+/// A strategy of the search that can be switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Idea {
+pub enum Strategy {
     /// Stage 1: the collision region by S-bounds.
     Region,
     /// Stage 2: candidates from the walk of both octrees.
@@ -18,9 +18,11 @@ pub enum Idea {
     /// Curved faces touched where a contact was found.
     Hints,
     /// Whole convex primitives answered in front of the search.
-    Direct,
+    Convex,
     /// Convex primitives against solids with holes answered in front of the search.
-    Holes,
+    Cavities,
+    /// A coarser resolution where a search takes too long.
+    Coarser,
 }
 
 /// Options of a benchmark.
@@ -32,27 +34,28 @@ pub struct Options {
     /// Folder for the CSV file; by default `benches` in cargo's target folder.
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
-    /// An idea of the search to switch off; may be given several times.
-    #[arg(long, value_name = "IDEA")]
-    pub without: Vec<Idea>,
+    /// A strategy of the search to switch off; may be given several times.
+    #[arg(long, value_name = "STRATEGY")]
+    pub without: Vec<Strategy>,
 }
 
 impl Options {
-    /// The ideas that are left on.
-    pub fn ideas(&self) -> Ideas {
-        let mut ideas = Ideas::default();
-        for idea in &self.without {
-            match idea {
-                Idea::Region => ideas.region = false,
-                Idea::Walk => ideas.walk = false,
-                Idea::Multipliers => ideas.multipliers = false,
-                Idea::Fits => ideas.fits = false,
-                Idea::Hints => ideas.hints = false,
-                Idea::Direct => ideas.direct = false,
-                Idea::Holes => ideas.holes = false,
+    /// The strategies that are left on.
+    pub fn strategies(&self) -> Strategies {
+        let mut strategies = Strategies::default();
+        for strategy in &self.without {
+            match strategy {
+                Strategy::Region => strategies.region = false,
+                Strategy::Walk => strategies.walk = false,
+                Strategy::Multipliers => strategies.multipliers = false,
+                Strategy::Fits => strategies.fits = false,
+                Strategy::Hints => strategies.hints = false,
+                Strategy::Convex => strategies.convex = false,
+                Strategy::Cavities => strategies.cavities = false,
+                Strategy::Coarser => strategies.coarser = false,
             }
         }
-        ideas
+        strategies
     }
 
     /// `full`, or `quick` in the short form.

@@ -1,10 +1,11 @@
 //! The engine's side of a race: models built beforehand, one scratch for all queries.
 
 use contactd::contact::{
-    Asked, Body, DEFAULT_CELL_LIMIT, Ideas, Outcome, PairQuery, Scratch, default_resolution, earliest_contact,
+    Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Strategies, default_resolution,
+    earliest_contact,
 };
-use contactd::eco::Model;
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd_proto::{Motion, Pose};
 
 /// A prepared question: cold, as nothing of an earlier answer is kept.
@@ -13,15 +14,15 @@ pub struct Question<'a>(PairQuery<'a>);
 
 impl<'a> Question<'a> {
     /// Two moving models, at the default resolution of 1e-9 of the larger radius.
-    pub fn new((a, motion_a): (&'a Model, Motion), (b, motion_b): (&'a Model, Motion), ideas: Ideas) -> Self {
+    pub fn new((a, motion_a): (&'a Model, Motion), (b, motion_b): (&'a Model, Motion), strategies: Strategies) -> Self {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         Self(PairQuery {
             a: Body { model: a, placed: placed(motion_a) },
             b: Body { model: b, placed: placed(motion_b) },
             resolution: default_resolution(a, b),
             cell_limit: DEFAULT_CELL_LIMIT,
-            ideas,
-            asked: Asked::DEPTH,
+            strategies,
+            query_options: QueryOptions::DEPTH,
         })
     }
 

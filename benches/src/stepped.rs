@@ -9,7 +9,7 @@
 //! that does not.
 
 use contactd::contact::Status;
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, Part, StepError, StepOptions, World};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
@@ -92,10 +92,10 @@ pub struct Walked {
     /// Cells in all.
     pub cells: [u64; 2],
     /// Pairs told, asked about, and known without a search, in all.
-    pub told: usize,
-    /// See `told`.
-    pub asked: u32,
-    /// See `told`.
+    pub reported: usize,
+    /// See `reported`.
+    pub query_options: u32,
+    /// See `reported`.
     pub known: u32,
 }
 
@@ -129,8 +129,8 @@ pub fn walk(scene: &Scene, steps: usize) -> Result<Walked, Box<dyn std::error::E
         if !same || warm.safe_time != cold.safe_time {
             return Err(format!("{}: step {step} has another answer when all is forgotten", scene.name).into());
         }
-        walked.told += warm.pairs.len();
-        walked.asked += warm.searched;
+        walked.reported += warm.pairs.len();
+        walked.query_options += warm.searched;
         walked.known += warm.known;
     }
     Ok(walked)
@@ -179,14 +179,14 @@ pub fn approach(approach: &Approach, steps: usize, times: usize) -> Result<Appro
     let n = steps as f64;
     let turn = |to: f64, part: f64| PoseRecord::turn(1, approach.motion.at(to).position, approach.motion.spin * part);
     let start = PoseRecord::start(1, &approach.motion.start);
-    let mut told = Approached::default();
+    let mut reported = Approached::default();
     for _ in 0..times {
         timed(&mut world, start)?;
-        told.met = false;
+        reported.met = false;
         for k in 1..=steps {
             let (met, cost) = timed(&mut world, turn(k as f64 / n, 1.0 / n))?;
-            told.steps.push(cost);
-            told.met = met;
+            reported.steps.push(cost);
+            reported.met = met;
             if met {
                 break;
             }
@@ -194,12 +194,12 @@ pub fn approach(approach: &Approach, steps: usize, times: usize) -> Result<Appro
         timed(&mut world, start)?;
         world.forget();
         let (met, cost) = timed(&mut world, turn(1.0, 1.0))?;
-        told.query.push(cost);
-        if met != told.met {
-            return Err(format!("{}: met in steps: {}, at once: {met}", approach.name, told.met).into());
+        reported.query.push(cost);
+        if met != reported.met {
+            return Err(format!("{}: met in steps: {}, at once: {met}", approach.name, reported.met).into());
         }
     }
-    Ok(told)
+    Ok(reported)
 }
 
 /// A step of one record: whether it has a contact; its seconds and cells.

@@ -7,8 +7,8 @@
 use crate::facets::{Drilled, Outline, compound, mesh};
 use crate::peer;
 use contactd::check::Check;
-use contactd::eco::Model;
 use contactd::import::{self, Facets, Limits, read_csg};
+use contactd::octree::Model;
 use contactd::solid::primitive::{Cone, Cylinder, Sphere};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
@@ -414,9 +414,9 @@ fn of_scene(path: &Path) -> Result<Vec<Case>, Box<dyn Error>> {
         let [a, b] = [p.a, p.b].map(|id| &bodies[id as usize]);
         Case {
             a: a.part.model.clone(),
-            motion_a: a.track.motion,
+            motion_a: a.motion_state.motion,
             b: b.part.model.clone(),
-            motion_b: b.track.motion,
+            motion_b: b.motion_state.motion,
             places: [a.place, b.place],
             truth: Truth::Unknown,
         }

@@ -1,12 +1,12 @@
 //! What a session told its server, kept so that a successor can be told again.
 //!
-//! Tracks are mirrored with the server's own arithmetic (`Track`), so a replayed session continues bit for bit. Most batches name
+//! Tracks are mirrored with the server's own arithmetic (`MotionState`), so a replayed session continues bit for bit. Most batches name
 //! the objects of the one before, each with its end alone, and take all of the last step: then the end of an object is what that
 //! batch says, and only the last two have anything to tell. They are kept as they are, and worked out when somebody asks.
 
 use contactd_proto::control::{Command, Facets, ObjectSpec, WireRule, WireTrack};
-use contactd_proto::pose_record::Order;
-use contactd_proto::{PoseRecord, Rule, Track};
+use contactd_proto::pose_record::PoseCommand;
+use contactd_proto::{MotionState, PoseRecord, Rule};
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ struct ModelEntry {
 #[derive(Clone, Debug)]
 struct Entry {
     spec: ObjectSpec,
-    track: Track,
+    motion_state: MotionState,
 }
 
 /// Everything that makes a session, in the order in which it can be replayed.
@@ -47,7 +47,7 @@ impl Journal {
     pub fn object(&mut self, spec: ObjectSpec) {
         // The server accepted the pose, so it is one.
         if let Ok(pose) = spec.pose.checked() {
-            self.objects.insert(spec.id, Entry { spec, track: Track::resting(pose) });
+            self.objects.insert(spec.id, Entry { spec, motion_state: MotionState::resting(pose) });
         }
     }
 
@@ -95,18 +95,18 @@ impl Journal {
     fn take(&mut self, records: &[PoseRecord], advance: f64) {
         for id in self.moving.drain(..) {
             if let Some(entry) = self.objects.get_mut(&id) {
-                entry.track = Track::resting(entry.track.at(advance));
+                entry.motion_state = MotionState::resting(entry.motion_state.at(advance));
             }
         }
         // Starts come before motions, wherever they stand in the batch.
         for starts in [true, false] {
             for record in records {
-                let (Ok(order), Some(entry)) = (record.decode(), self.objects.get_mut(&record.object)) else {
+                let (Ok(command), Some(entry)) = (record.decode(), self.objects.get_mut(&record.object)) else {
                     continue;
                 };
-                if matches!(order, Order::Start(_)) == starts {
-                    entry.track = Track::ordered(entry.track.end, order);
-                    if !entry.track.is_rest() {
+                if matches!(command, PoseCommand::Start(_)) == starts {
+                    entry.motion_state = MotionState::ordered(entry.motion_state.end, command);
+                    if !entry.motion_state.is_rest() {
                         self.moving.push(record.object);
                     }
                 }
@@ -124,11 +124,11 @@ impl Journal {
             facets: m.facets,
         });
         let objects = self.objects.values().map(|e| Command::AddObject(e.spec.clone()));
-        let tracks = self.objects.iter().map(|(id, e)| WireTrack::of(*id, &e.track)).collect();
+        let motion_states = self.objects.iter().map(|(id, e)| WireTrack::of(*id, &e.motion_state)).collect();
         let rest = [
             Command::SetRules(self.rules.iter().map(WireRule::from).collect()),
             Command::SetResolution(self.resolution),
-            Command::Restore(tracks),
+            Command::Restore(motion_states),
         ];
         models.chain(objects).chain(rest).collect()
     }
@@ -161,7 +161,7 @@ mod tests {
 
     /// Tracks of batches like the last one are worked out late; they are those that are worked out at once.
     #[test]
-    fn what_is_worked_out_late_is_what_was_told() {
+    fn what_is_worked_out_late_is_what_was_reported() {
         let mut r = Numbers(7);
         let (mut late, mut at_once) = (Journal::default(), Journal::default());
         for id in 1..=6 {
@@ -179,7 +179,7 @@ mod tests {
             late.object(spec.clone());
             at_once.object(spec);
         }
-        let tracks = |j: &Journal| j.objects.iter().map(|(id, e)| (*id, e.track)).collect::<Vec<_>>();
+        let motion_states = |j: &Journal| j.objects.iter().map(|(id, e)| (*id, e.motion_state)).collect::<Vec<_>>();
         let (mut alike, mut named) = ([0; 3], vec![1, 2, 3]);
         for step in 0..3000 {
             if r.below(6) == 0 {
@@ -206,11 +206,11 @@ mod tests {
                 late.removed(id);
                 at_once.removed(id);
             }
-            let mut asked = late.clone();
-            asked.settle();
-            assert_eq!(tracks(&asked), tracks(&at_once), "after step {step}");
+            let mut query_options = late.clone();
+            query_options.settle();
+            assert_eq!(motion_states(&query_options), motion_states(&at_once), "after step {step}");
             if r.below(9) == 0 {
-                late = asked;
+                late = query_options;
             }
         }
         assert!(alike.iter().all(|n| *n > 200), "{alike:?}");

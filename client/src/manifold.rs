@@ -164,7 +164,7 @@ impl Manifolds {
     pub fn update(&mut self, reply: &Reply, pose: impl Fn(u32, f64) -> Pose) {
         self.start();
         for record in reply.records() {
-            let time = told_at(record);
+            let time = reported_at(record);
             self.add(reply, record, &pose(record.a, time), &pose(record.b, time));
         }
         self.finish();
@@ -375,6 +375,6 @@ impl Told {
 }
 
 /// The fraction of the step that a record tells of: its time where the bodies meet, else the start.
-pub fn told_at(record: &ContactRecord) -> f64 {
+pub fn reported_at(record: &ContactRecord) -> f64 {
     if matches!(record.status, CONTACT | OVERLAP) { record.time } else { 0.0 }
 }

@@ -125,11 +125,11 @@ fn step(session: &mut Session<Scripted>, script: &RefCell<Script>, n: u32, answe
 /// Where the last replay put the ball at the end of its motion.
 fn replayed(script: &RefCell<Script>) -> [f64; 3] {
     let restored = |said: &Said| match said {
-        Said::Command(Command::Restore(tracks)) => tracks.first().map(WireTrack::checked),
+        Said::Command(Command::Restore(motion_states)) => motion_states.first().map(WireTrack::checked),
         _ => None,
     };
-    let track = script.borrow().log.iter().rev().find_map(restored).expect("a replay").expect("a track");
-    track.at(1.0).position.to_array()
+    let motion_state = script.borrow().log.iter().rev().find_map(restored).expect("a replay").expect("a motion_state");
+    motion_state.at(1.0).position.to_array()
 }
 
 /// Every way in which a step stays without an answer: the replay stands before it, and it can be sent again.
@@ -244,7 +244,7 @@ fn closing_waits_for_the_step_in_flight() {
     let waited = Said::Waited(Duration::from_secs(1));
     let close = Said::Command(Command::Close);
     let refusal = Error::refused(ErrorCode::Busy);
-    for (answer, told) in [
+    for (answer, reported) in [
         (Ok(()), vec![waited.clone(), close.clone()]),
         (Err(refusal), vec![waited.clone(), close.clone()]),
         (Err(Error::System("no room".into())), vec![waited.clone(), close.clone()]),
@@ -257,7 +257,7 @@ fn closing_waits_for_the_step_in_flight() {
         session.send().unwrap();
         script.borrow_mut().answers.push_back(answer);
         assert_eq!(session.close(), Ok(()));
-        assert_eq!(script.borrow().log[1..], told);
+        assert_eq!(script.borrow().log[1..], reported);
     }
     // Without one the server is told at once.
     let (mut session, script) = scripted();

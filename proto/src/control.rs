@@ -2,7 +2,7 @@
 //!
 //! Both sides bound what they decode by [`DECODE_LIMIT`], so a forged length cannot make them allocate.
 
-use crate::{Detect, ErrorCode, InitialOverlap, MassProperties, Motion, Pose, Report, Rule, Track};
+use crate::{Detect, ErrorCode, InitialOverlap, MassProperties, Motion, MotionState, Pose, Report, Rule};
 use bincode::{Decode, Encode, config};
 use glam::DVec3;
 use iceoryx2::prelude::ZeroCopySend;
@@ -134,13 +134,13 @@ pub struct WireTrack {
 
 impl WireTrack {
     /// Packs a track.
-    pub fn of(object: u32, track: &Track) -> Self {
+    pub fn of(object: u32, motion_state: &MotionState) -> Self {
         Self {
             object,
-            start: track.motion.start.into(),
-            velocity: track.motion.velocity.to_array(),
-            spin: track.motion.spin.to_array(),
-            end: track.end.into(),
+            start: motion_state.motion.start.into(),
+            velocity: motion_state.motion.velocity.to_array(),
+            spin: motion_state.motion.spin.to_array(),
+            end: motion_state.end.into(),
         }
     }
 
@@ -148,14 +148,14 @@ impl WireTrack {
     ///
     /// # Errors
     /// `NotFinite`, `BadQuaternion`.
-    pub fn checked(&self) -> Result<Track, ErrorCode> {
+    pub fn checked(&self) -> Result<MotionState, ErrorCode> {
         let velocity = DVec3::from_array(self.velocity);
         let spin = DVec3::from_array(self.spin);
         if !velocity.is_finite() || !spin.length_squared().is_finite() {
             return Err(ErrorCode::NotFinite);
         }
         let motion = Motion { start: self.start.checked()?, velocity, spin };
-        Ok(Track { motion, end: self.end.checked()? })
+        Ok(MotionState { motion, end: self.end.checked()? })
     }
 }
 

@@ -75,8 +75,8 @@ mod tests {
         sum += step;
         assert_eq!((sum.continuous, sum.sensors, sum.times), (6, 2, 0));
         assert_eq!(sum.bits(), EFFECT_CONTINUOUS | EFFECT_SENSOR);
-        let told: Vec<_> = sum.each().filter(|(_, n)| *n > 0).collect();
-        assert_eq!(told, [("continuous", 6), ("sensor", 2)]);
+        let reported: Vec<_> = sum.each().filter(|(_, n)| *n > 0).collect();
+        assert_eq!(reported, [("continuous", 6), ("sensor", 2)]);
         assert!(sum.each().enumerate().all(|(i, (_, n))| (sum.bits() >> i & 1 == 1) == (n > 0)));
     }
 }

@@ -43,7 +43,7 @@ const _: () = assert!(std::mem::offset_of!(PoseRecord, rotation) == 32);
 
 /// What a valid record asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
+pub enum PoseCommand {
     /// Set the pose before the step.
     Start(Pose),
     /// Move to this pose the shortest way.
@@ -83,7 +83,7 @@ impl PoseRecord {
     /// # Errors
     /// `BadCount` for flags out of the protocol and for a [`TURN`] whose last number is not 0, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
     /// `BadQuaternion`.
-    pub fn decode(&self) -> Result<Order, ErrorCode> {
+    pub fn decode(&self) -> Result<PoseCommand, ErrorCode> {
         let position = DVec3::from_array(self.position);
         check_position(position)?;
         if self.rotation.iter().any(|c| !c.is_finite()) {
@@ -100,10 +100,10 @@ impl PoseRecord {
                 if w != 0.0 {
                     return Err(ErrorCode::BadCount);
                 }
-                Ok(Order::Turn(position, vector))
+                Ok(PoseCommand::Turn(position, vector))
             }
-            END => Ok(Order::End(Pose::new(position, unit_quaternion(self.rotation)?))),
-            START => Ok(Order::Start(Pose::new(position, unit_quaternion(self.rotation)?))),
+            END => Ok(PoseCommand::End(Pose::new(position, unit_quaternion(self.rotation)?))),
+            START => Ok(PoseCommand::Start(Pose::new(position, unit_quaternion(self.rotation)?))),
             _ => Err(ErrorCode::BadCount),
         }
     }
@@ -184,6 +184,6 @@ mod tests {
     #[test]
     fn a_rough_quaternion_is_normalised() {
         let rough = PoseRecord { rotation: [0.0, 0.0, 0.0, 1.0004], ..PoseRecord::end(1, &Pose::IDENTITY) };
-        assert_eq!(rough.decode(), Ok(Order::End(Pose::IDENTITY)));
+        assert_eq!(rough.decode(), Ok(PoseCommand::End(Pose::IDENTITY)));
     }
 }

@@ -3,10 +3,10 @@
 //! Object ids are the objects' indices in the file. Every pair that the rules allow is told, clear ones too, in the order
 //! (time, a, b); with `first` only those whose bracket meets the earliest contact's.
 
-use crate::contact::{self, Body, Clock, Ideas, PairQuery, Scratch, certificate};
-use crate::eco::Model;
+use crate::contact::{self, Body, Clock, PairQuery, Scratch, Strategies, certificate};
 use crate::import::{Place, Scene};
 use crate::motion::Placed;
+use crate::octree::Model;
 use crate::world::{ObjectSpec, PairOutcome, Part, Refusal, StepOptions, StepOutcome, World};
 use contactd_proto::{Detect, ErrorCode, InitialOverlap, Motion, PoseRecord, Report};
 use std::sync::Arc;
@@ -153,7 +153,7 @@ impl Check {
         let side = |id: u32| {
             let body = self.world.body(id)?;
             let discrete = p.plan.detect == Detect::Discrete;
-            let motion = if discrete { Motion::resting(body.track.end) } else { body.track.motion };
+            let motion = if discrete { Motion::resting(body.motion_state.end) } else { body.motion_state.motion };
             Some(Body { model: &body.part.model, placed: Placed { place: body.place, motion } })
         };
         let (a, b) = (side(p.a)?, side(p.b)?);
@@ -162,8 +162,8 @@ impl Check {
             b,
             resolution: p.outcome.resolution,
             cell_limit,
-            ideas: Ideas::default(),
-            asked: p.plan.asked(),
+            strategies: Strategies::default(),
+            query_options: p.plan.query_options(),
         })
     }
 }

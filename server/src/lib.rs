@@ -15,7 +15,7 @@
 //!    slice of time [t0, t1]                                                     |
 //!      stage 1  S-bounds of A ∩ B: where can they meet at all?   bound::pair    |
 //!        nowhere -> gone;   a long way through a large region -> two halves ----+
-//!      stage 2  both octrees, walked together in that region     eco::walk,     |
+//!      stage 2  both octrees, walked together in that region     octree::walk,     |
 //!               by table 4: which primitives, where, when        contact::stage2|
 //!        nothing -> gone;   else a cell per alternative of the carrier ---------+
 //!             |                                                                 |
@@ -29,12 +29,12 @@
 //! ```
 //!
 //! In front of the queue stand two proofs that need no cells: two convex primitives (`contact::direct`), convex bodies at
-//! solids with holes (`contact::hole`). What they do not settle is queued.
+//! solids with holes (`contact::cavity`). What they do not settle is queued.
 //!
 //! It ends when the earliest item lies beyond the confirmed contact: then all that is still queued is the proof that
 //! nothing came before (`contact`). An empty queue is `clear`; a spent work limit is `undecided`, with the time up to
 //! which the proof reached. Inside both bodies at the start is `overlap`. No stage knows the next one's answer, so each can
-//! be switched off ([`contact::Ideas`]) without changing what is promised, only what it costs.
+//! be switched off ([`contact::Strategies`]) without changing what is promised, only what it costs.
 //!
 //! # The floors
 //!
@@ -47,7 +47,7 @@
 //! | 2 | [`solid`] | faces ψ <= 0, primitives, trees, f at a point, what is left of a tree in a small box |
 //! | 3 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
 //! | 4 | [`bound`] | stage 1 |
-//! | 5 | [`eco`] | stage 2: extended CSG octrees and their walk |
+//! | 5 | [`octree`] | stage 2: extended CSG octrees and their walk |
 //! | 6 | [`contact`] | stage 3 and the queue: the answer for a pair |
 //! | 6 | [`cache`] | preprocessed models kept on disk |
 //! | 7 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
@@ -87,12 +87,12 @@ pub mod cache;
 pub mod check;
 pub mod contact;
 pub mod demo;
-pub mod eco;
 pub mod import;
 pub mod inspect;
 pub mod ipc;
 pub mod math;
 pub mod motion;
+pub mod octree;
 pub mod picture;
 pub mod report;
 pub mod solid;

@@ -5,10 +5,10 @@ use clap::{Parser, Subcommand};
 use contactd::cache::{self, Cache, Prepared};
 use contactd::check::Check;
 use contactd::contact::Status;
-use contactd::eco::Model;
 use contactd::import::{self, Facets, Limits, Scene};
 use contactd::inspect;
 use contactd::ipc::{CacheFolder, ServerConfig};
+use contactd::octree::Model;
 use contactd::picture::{
     self,
     drawing::Drawing,

@@ -206,9 +206,9 @@ impl std::fmt::Display for Feature {
 impl PairAnswer {
     fn of_pair(pair: &PairReport<'_>) -> Self {
         let o = pair.outcome;
-        let told = |least| pair.report >= least;
-        let meets = matches!(o.status, Status::Contact | Status::Overlap) && told(Report::Contact);
-        let met = o.status == Status::Contact && told(Report::Contact);
+        let reported = |least| pair.report >= least;
+        let meets = matches!(o.status, Status::Contact | Status::Overlap) && reported(Report::Contact);
+        let met = o.status == Status::Contact && reported(Report::Contact);
         // A clear pair that touches has the fields of its nearest region.
         let rests = o.status == Status::Clear && !pair.regions.is_empty();
         let features = |solid: &Solid, faces: &[u32; 3]| {
@@ -218,11 +218,11 @@ impl PairAnswer {
             a: pair.names[0].to_owned(),
             b: pair.names[1].to_owned(),
             status: o.status.name(),
-            time: told(Report::Time).then_some(o.time),
-            time_lower: told(Report::Time).then_some(o.time_lower),
-            time_upper: told(Report::Time).then_some(o.time_upper),
+            time: reported(Report::Time).then_some(o.time),
+            time_lower: reported(Report::Time).then_some(o.time_lower),
+            time_upper: reported(Report::Time).then_some(o.time_upper),
             touching: o.touching,
-            not_continued: o.not_continued && told(Report::Time),
+            not_continued: o.not_continued && reported(Report::Time),
             point: (meets || rests).then(|| o.point.to_array()),
             normal: (meets || rests).then(|| o.normal.to_array()),
             separation: (meets || rests).then_some(o.separation),
@@ -266,7 +266,7 @@ pub fn work_table(pairs: &[PairReport<'_>], clocks: &[Option<Clock>]) -> String 
     let header = [
         "a",
         "b",
-        "told by",
+        "reported by",
         "primitives",
         "after stage 1",
         "node pairs",
@@ -289,7 +289,7 @@ pub fn work_table(pairs: &[PairReport<'_>], clocks: &[Option<Clock>]) -> String 
             after_stage1, node_pairs, candidates, cells, clauses, newton, closed_forms, instant_cells, ..
         } = p.outcome.counters;
         let primitives: usize = p.solids.iter().map(|s| s.primitives.len()).sum();
-        let told = clock.as_ref().map_or("boxes", |c| c.last().name());
+        let reported = clock.as_ref().map_or("boxes", |c| c.last().name());
         let searched = clock.as_ref().is_some_and(|c| c.last() != Stage::Front);
         // What is answered in front never comes to stage 1.
         let left = if searched { after_stage1.to_string() } else { String::new() };
@@ -304,7 +304,7 @@ pub fn work_table(pairs: &[PairReport<'_>], clocks: &[Option<Clock>]) -> String 
             *sum += clock.as_ref().map_or(Duration::ZERO, |c| c.of(s));
         }
         let primitives = primitives.to_string();
-        rows.push([a, b, told.into(), primitives, left, c0, c1, c2, c3, c4, c5, c6, t0, t1, t2, t3, total]);
+        rows.push([a, b, reported.into(), primitives, left, c0, c1, c2, c3, c4, c5, c6, t0, t1, t2, t3, total]);
     }
     let mut out = aligned(&rows);
     let total: Duration = sums.iter().sum();

@@ -158,7 +158,7 @@ fn bad_input_is_one_line_and_status_2() {
 }
 
 #[test]
-fn a_cache_changes_nothing_that_is_told() {
+fn a_cache_changes_nothing_that_is_reported() {
     let folder = folder(&[("ball.csg", BALL), ("s.toml", &scene(4.0))]);
     let kept = || {
         let files = std::fs::read_dir(folder.path().join("kept")).into_iter().flatten().flatten();

@@ -128,7 +128,7 @@ fn a_deadline_leaves_undecided_what_is_not_known_by_then() {
         let mut session = Session::connect_to(server.address.clone()).unwrap();
         let ids = crowd(&mut session, BALL, 1000, &[]);
         begin(&mut session, &ids, 1);
-        let (undecided, told) = {
+        let (undecided, reported) = {
             let reply = session.finish(LONG).unwrap();
             (reply.records().iter().filter(|r| r.status == UNDECIDED).count(), reply.records().len())
         };
@@ -137,10 +137,10 @@ fn a_deadline_leaves_undecided_what_is_not_known_by_then() {
         session.finish(LONG).unwrap();
         session.close().unwrap();
         assert!(server.stop().success());
-        (undecided, told)
+        (undecided, reported)
     });
     let pairs = 1000 * 999 / 2;
-    assert_eq!(answers.map(|(_, told)| told), [pairs; 2], "each pair is told, decided or not");
+    assert_eq!(answers.map(|(_, reported)| reported), [pairs; 2], "each pair is reported, decided or not");
     assert!(answers[0].0 == 0 && answers[1].0 > 0, "{answers:?}");
 }
 

@@ -121,7 +121,7 @@ fn a_killed_server_is_noticed_and_its_successor_continues_bit_for_bit() {
 }
 
 #[test]
-fn a_killed_client_loses_its_session_and_a_stopped_server_is_told() {
+fn a_killed_client_loses_its_session_and_a_stopped_server_is_reported() {
     let mut server = ServerProcess::start("widow", "");
     let mut survivor = Session::connect_to(server.address.clone()).unwrap();
     let ids = build(&mut survivor, 1);
@@ -354,7 +354,7 @@ fn bad_input_is_refused_each_with_its_sentence() {
         (StepRequest { version: 2, ..plain }, ErrorCode::Version),
         (StepRequest { records: 9, ..plain }, ErrorCode::TooMany),
         (StepRequest { records: 10, ..plain }, ErrorCode::BadCount),
-        (StepRequest { asked: ASK_ALL + 1, ..plain }, ErrorCode::BadNumber),
+        (StepRequest { query_options: ASK_ALL + 1, ..plain }, ErrorCode::BadNumber),
         (StepRequest { session: opened.session + 5, ..plain }, ErrorCode::SessionGone),
         (StepRequest { epoch: opened.epoch + 1, ..plain }, ErrorCode::SessionGone),
     ] {

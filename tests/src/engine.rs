@@ -2,10 +2,10 @@
 
 use crate::scenes::Scene;
 use contactd::contact::{
-    Asked, Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+    Body, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
-use contactd::eco::Model;
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::Solid;
 use contactd_proto::Pose;
 
@@ -19,52 +19,60 @@ pub fn ask_solids(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64
 
 /// Asks about two placed models.
 pub fn ask_models(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64>) -> Outcome {
-    ask_with(a, b, resolution, Ideas::default())
+    ask_with(a, b, resolution, Strategies::default())
 }
 
 /// Asks about two placed models with some ideas of the search switched off.
-pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64>, ideas: Ideas) -> Outcome {
+pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64>, strategies: Strategies) -> Outcome {
     let query = PairQuery {
         resolution: resolution.unwrap_or_else(|| default_resolution(a.0, b.0)),
-        ideas,
-        ..question(a, b, Asked::DEPTH)
+        strategies,
+        ..question(a, b, QueryOptions::DEPTH)
     };
     earliest_contact(&query, &mut Scratch::default())
 }
 
 /// A question about two placed models, at the default resolution, all ideas on.
-pub fn question<'a>(a: (&'a Model, Placed), b: (&'a Model, Placed), asked: Asked) -> PairQuery<'a> {
+pub fn question<'a>(a: (&'a Model, Placed), b: (&'a Model, Placed), query_options: QueryOptions) -> PairQuery<'a> {
     PairQuery {
         a: Body { model: a.0, placed: a.1 },
         b: Body { model: b.0, placed: b.1 },
         resolution: default_resolution(a.0, b.0),
         cell_limit: CELL_LIMIT,
-        ideas: Ideas::default(),
-        asked,
+        strategies: Strategies::default(),
+        query_options,
     }
 }
 
 /// A scene's question about its models, as `question`; its own resolution is not looked at.
-pub fn question_of<'a>(scene: &Scene, models: [&'a Model; 2], asked: Asked) -> PairQuery<'a> {
+pub fn question_of<'a>(scene: &Scene, models: [&'a Model; 2], query_options: QueryOptions) -> PairQuery<'a> {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
-    question((models[0], placed(scene.motion_a)), (models[1], placed(scene.motion_b)), asked)
+    question((models[0], placed(scene.motion_a)), (models[1], placed(scene.motion_b)), query_options)
 }
 
 /// Asks about a scene.
 pub fn ask(scene: &Scene) -> Outcome {
-    ask_scene_with(scene, Ideas::default())
+    ask_scene_with(scene, Strategies::default())
 }
 
 /// Asks about a scene with some ideas of the search switched off.
-pub fn ask_scene_with(scene: &Scene, ideas: Ideas) -> Outcome {
+pub fn ask_scene_with(scene: &Scene, strategies: Strategies) -> Outcome {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
     let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
-    ask_with((&a, placed(scene.motion_a)), (&b, placed(scene.motion_b)), scene.resolution, ideas)
+    ask_with((&a, placed(scene.motion_a)), (&b, placed(scene.motion_b)), scene.resolution, strategies)
 }
 
 /// The search alone, without whole-primitive answers in front of it.
-pub const SEARCH_ALONE: Ideas =
-    Ideas { region: true, walk: true, multipliers: true, fits: true, hints: true, direct: false, holes: false };
+pub const SEARCH_ALONE: Strategies = Strategies {
+    region: true,
+    walk: true,
+    multipliers: true,
+    fits: true,
+    hints: true,
+    convex: false,
+    cavities: false,
+    coarser: true,
+};
 
 /// In which fields two answers to one question differ, counters apart; times and places by more than rounding: times
 /// weigh with the closing speed, in units of the pair's size. Where a contact is a line or a patch any of its points will do.

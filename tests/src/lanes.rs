@@ -9,7 +9,7 @@ use crate::primitive_pairs::{FAMILIES, rows};
 use crate::random_solids::Random;
 use crate::scenes::{self, Recipe, Scene};
 use contactd::contact::Status;
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World, record};
 use contactd_proto::{Detect, EffectCounters, InitialOverlap, Motion, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3, dvec3};

@@ -391,8 +391,8 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let at_depth = o.not_continued || o.time == 0.0;
     let near = (1e-11 * size).max(rounding);
     // What was not continued is told how deep it is.
-    let told = if o.not_continued { -0.5 * o.separation } else { 0.0 };
-    let off = if at_depth { near + told.max(2.001 * o.resolution) } else { near };
+    let reported = if o.not_continued { -0.5 * o.separation } else { 0.0 };
+    let off = if at_depth { near + reported.max(2.001 * o.resolution) } else { near };
     if values.iter().any(|v| v.abs() > off) {
         out.push((Lie::Point, format!("f {:e} {:e} at {}, within {off:e}", values[0], values[1], o.point)));
     }

@@ -9,7 +9,7 @@ use crate::scenes::{self, Recipe};
 use contactd::solid::Op;
 use contactd::solid::primitive::HalfSpace;
 use contactd::world::{ObjectSpec, Part, StepOptions, World};
-use contactd_proto::{Detect, InitialOverlap, Motion, Pose, PoseRecord, Report, Rule, Track};
+use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -191,7 +191,7 @@ impl Play {
         };
         play.stops = play.rng.chance(0.4);
         play.unrest = [0.0, 0.02, 0.1, 0.3][play.rng.below(4)];
-        play.options = play.asked();
+        play.options = play.query_options();
         for k in 0..count {
             let thing = play.thing(k);
             play.enter(thing);
@@ -278,7 +278,7 @@ impl Play {
         rules
     }
 
-    fn asked(&mut self) -> StepOptions {
+    fn query_options(&mut self) -> StepOptions {
         let r = &mut self.rng;
         StepOptions {
             advance: 1.0,
@@ -296,7 +296,7 @@ impl Play {
     pub fn follow(&mut self, world: &World) {
         for actor in &mut self.actors {
             if let Some(body) = world.body(actor.thing.id) {
-                actor.pose = body.track.end;
+                actor.pose = body.motion_state.end;
             }
         }
     }
@@ -328,7 +328,7 @@ impl Play {
                 changes.push(Change::Remove(self.actors.remove(k).thing.id));
             }
             if self.rng.chance(self.unrest) {
-                self.options = self.asked();
+                self.options = self.query_options();
             }
         }
         let mut records = Vec::new();
@@ -400,6 +400,6 @@ impl Play {
 }
 
 /// The tracks of a world's bodies, to be restored in another one.
-pub fn tracks(world: &World) -> Vec<(u32, Track)> {
-    world.bodies().iter().map(|b| (b.id, b.track)).collect()
+pub fn motion_states(world: &World) -> Vec<(u32, MotionState)> {
+    world.bodies().iter().map(|b| (b.id, b.motion_state)).collect()
 }

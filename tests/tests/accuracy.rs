@@ -4,11 +4,11 @@
 use contactd::cache::prepare_scene;
 use contactd::check::Check;
 use contactd::contact::{
-    Asked, Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
-use contactd::eco::Model;
 use contactd::import::{self, Limits};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World};
 use contactd_proto::{Motion, Pose, PoseRecord};
 use contactd_tests::engine::{CELL_LIMIT, ask};
@@ -181,7 +181,7 @@ fn positions_that_cannot_hold_the_offset_cost_what_they_lost_over_the_closing_sp
 }
 
 #[test]
-fn of_two_contacts_within_one_bracket_the_one_that_touches_first_is_told() {
+fn of_two_contacts_within_one_bracket_the_one_that_touches_first_is_reported() {
     // A ball, and beside it an edge of 90° that reaches lower by less than a resolution: the ball is deep first.
     let wedge = Recipe::cuboid(0.2, 0.2, 0.2).moved(&Pose::new(DVec3::ZERO, DQuat::from_rotation_x(FRAC_PI_4)));
     let down = 0.08f64.sqrt();
@@ -241,8 +241,8 @@ fn a_pair_stops_at_its_limit_with_what_is_proven_by_then() {
             b: Body { model: &models[1], placed: placed(motion) },
             resolution: default_resolution(&models[0], &models[1]),
             cell_limit: limit,
-            ideas: Ideas::default(),
-            asked: Asked::DEPTH,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
         };
         earliest_contact(&query, &mut Scratch::default())
     };
@@ -307,7 +307,7 @@ fn a_batch_spends_its_limit_on_what_meets_first() {
         let options = StepOptions { batch_limit: limit, ..StepOptions::default() };
         let out = stepped(&options);
         assert!(out.counters.cells <= limit, "{} cells of {limit}", out.counters.cells);
-        assert_eq!(out.pairs.len(), 4, "every pair is told");
+        assert_eq!(out.pairs.len(), 4, "every pair is reported");
         let decided = out.pairs.iter().filter(|p| p.outcome.status == Status::Contact).count();
         // The earliest are decided, with the answers that they have without a limit; the latest are given up.
         for (i, p) in whole.pairs.iter().enumerate() {

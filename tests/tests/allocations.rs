@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use contactd::contact::Status;
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Pose, PoseRecord};
@@ -61,17 +61,19 @@ fn a_warm_step_allocates_nothing() {
         Recipe::cylinder(0.3, 0.4),
         Recipe::cylinder(0.4, 0.3).minus(Recipe::cylinder(0.2, 0.5)),
     ];
-    let (mut warm, mut kept, mut asked) = (0, 0, 0);
+    let (mut warm, mut kept, mut query_options) = (0, 0, 0);
     walk(1.3, &recipes, |step, out, allocations| {
         assert!(!out.contact && !out.undecided, "they keep apart");
         if step > WARM && out.known == out.searched {
             warm += 1;
-            asked += usize::from(out.searched > 0);
+            query_options += usize::from(out.searched > 0);
             kept += usize::from(allocations == 0);
         }
     });
-    println!("{warm} of 300 steps needed no search, {asked} of them asked about a pair; {kept} allocated nothing");
-    assert!(warm > 150 && asked > 20, "the scene says little");
+    println!(
+        "{warm} of 300 steps needed no search, {query_options} of them query_options about a pair; {kept} allocated nothing"
+    );
+    assert!(warm > 150 && query_options > 20, "the scene says little");
     assert_eq!(kept, warm);
 }
 
@@ -80,11 +82,11 @@ fn a_warm_step_of_bodies_that_meet_allocates_nothing() {
     let recipes = [Recipe::sphere(0.4), Recipe::cuboid(0.3, 0.35, 0.3), Recipe::cylinder(0.3, 0.4)];
     let (mut warm, mut kept, mut contacts, mut overlaps) = (0, 0, 0, 0);
     walk(0.75, &recipes, |step, out, allocations| {
-        let told = |status: Status| out.pairs.iter().filter(|p| p.outcome.status == status).count();
+        let reported = |status: Status| out.pairs.iter().filter(|p| p.outcome.status == status).count();
         if step > WARM && out.counters.after_stage1 == 0 {
             warm += 1;
-            contacts += told(Status::Contact);
-            overlaps += told(Status::Overlap);
+            contacts += reported(Status::Contact);
+            overlaps += reported(Status::Overlap);
             kept += usize::from(allocations == 0);
         }
     });

@@ -4,8 +4,8 @@
 
 use contactd::cache::{decode, encode};
 use contactd::contact::Outcome;
-use contactd::eco::{Limits, Model, Node};
 use contactd::import::{self, Facets, read_csg};
+use contactd::octree::{Limits, Model, Node};
 use contactd::solid::{Op, Solid, SolidBuilder};
 use contactd::world::{ObjectSpec, Part, World};
 use contactd_proto::Pose;
@@ -130,11 +130,11 @@ fn a_kept_octree_goes_on_refining_like_a_fresh_one() {
             model.expand(node).into_iter().flatten().for_each(|c| expand(model, c, depth));
         }
     }
-    let before = nodes(back.eco.root());
+    let before = nodes(back.octree.root());
     for model in [&fresh, &back] {
-        expand(model, model.eco.root(), 4);
+        expand(model, model.octree.root(), 4);
     }
-    assert!(nodes(back.eco.root()) > 2 * before);
+    assert!(nodes(back.octree.root()) > 2 * before);
     assert!(all(&fresh) == all(&back));
 }
 
@@ -158,7 +158,7 @@ fn what_searches_make_on_demand_is_made_without_other_threads() {
     let (done, finished) = channel();
     std::thread::spawn(move || {
         let wide = model.bounds_for(0.5 * model.radius);
-        let children = model.expand(model.eco.root()).expect("a mixed root");
+        let children = model.expand(model.octree.root()).expect("a mixed root");
         let deeper = children.iter().filter_map(|c| model.expand(c)).count();
         done.send((wide.margin() > model.margin(), wide.primitives_left(&model.solid), deeper)).expect("the test");
     });

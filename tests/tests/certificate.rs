@@ -3,9 +3,11 @@
 #![allow(missing_docs)]
 
 use contactd::contact::certificate::certify;
-use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{
+    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::Solid;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::judge::cases;
@@ -33,8 +35,8 @@ fn certified(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>, ce
         b: Body { model: &model_b, placed: b.1 },
         resolution: resolution.unwrap_or_else(|| default_resolution(&model_a, &model_b)),
         cell_limit,
-        ideas: Default::default(),
-        asked: Asked::DEPTH,
+        strategies: Default::default(),
+        query_options: QueryOptions::DEPTH,
     };
     let outcome = earliest_contact(&query, &mut Scratch::default());
     let text = certify(&PairQuery { cell_limit: CELLS, ..query }, &outcome).map(|c| {
@@ -217,13 +219,13 @@ fn a_deleted_or_altered_exclusion_is_caught() {
         let mut altered = Altered { name: &case.name, of: &c, lines: lines.clone(), caught: BTreeMap::new() };
         let head: Vec<&str> = lines[0].split(' ').collect();
         let number = |words: &[&str], k: usize| words[k].parse::<f64>().expect("a number");
-        // The head: each side of the box a little less, another carrier, a later end, a smaller depth.
+        // The head: each side of the box a little less, another reference body, a later end, a smaller depth.
         for k in 0..6 {
             let at = head.len() - 6 + k;
             let (v, sign) = (number(&head, at), if k < 3 { 1.0 } else { -1.0 });
             altered.word("a side of the box", 0, at, &format!("{:e}", v + sign * (0.01 * v.abs() + 1e-3)));
         }
-        altered.word("the carrier", 0, 4, if head[4] == "0" { "1" } else { "0" });
+        altered.word("the reference", 0, 4, if head[4] == "0" { "1" } else { "0" });
         altered.word("a smaller depth", 0, 6, &format!("{:e}", number(&head, 6) * 1e-3));
         if c.outcome.time_upper < 1.0 {
             altered.word("a later end", 0, 8, &format!("{:e}", 0.5 * (c.outcome.time_upper + 1.0)));
@@ -307,7 +309,7 @@ fn a_deleted_or_altered_exclusion_is_caught() {
             if let Some(at) = [k + 2, k + 3].into_iter().find(|at| value(words[*at]) > 0.0) {
                 altered.word("a multiplier negated", i, at, &format!("-{}", words[at]));
             }
-            // Literals of both bodies over the whole of the carrier: the carrier's own hold somewhere in it, alone or with
+            // Literals of both bodies over the whole of the reference body: the reference body's own hold somewhere in it, alone or with
             // far more weight than is theirs.
             let whole = words[k + 1..].iter().take_while(|w| **w != "|").count();
             let terms: Vec<&[&str]> = words[k + 1..k + 1 + whole].chunks(6).collect();
@@ -318,8 +320,8 @@ fn a_deleted_or_altered_exclusion_is_caught() {
                 let kept = terms.iter().filter(|t| of_a(t)).flat_map(|t| t.iter().copied());
                 let line: Vec<&str> = words[..=k].iter().copied().chain(kept).chain(rest).collect();
                 altered.line("missing literals", i, Some(line.join(" ")));
-                let carrier = terms.iter().position(|t| t[0].starts_with('a')).expect("a literal of the carrier");
-                altered.word("a multiplier", i, k + 2 + 6 * carrier, "1e9");
+                let reference = terms.iter().position(|t| t[0].starts_with('a')).expect("a literal of the reference");
+                altered.word("a multiplier", i, k + 2 + 6 * reference, "1e9");
             }
         }
         for (what, n) in altered.caught {
@@ -329,7 +331,7 @@ fn a_deleted_or_altered_exclusion_is_caught() {
     println!("caught: {caught:?}");
     let kinds = [
         ("a side of the box", 30),
-        ("the carrier", 5),
+        ("the reference", 5),
         ("a smaller depth", 5),
         ("a later end", 3),
         ("the number of cells", 5),

@@ -8,8 +8,8 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{Outcome, Status, default_resolution};
-use contactd::eco::Model;
 use contactd::motion::{Placed, Relative};
+use contactd::octree::Model;
 use contactd::solid::Primitive;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::closed::{Meeting, time_of_contact, time_of_leaving};

@@ -5,7 +5,7 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{Counters, Outcome, Region, Status};
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World};
 use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
 use contactd_tests::random_solids::Random;
@@ -23,7 +23,7 @@ fn part(recipe: &Recipe) -> Arc<Part> {
 /// What a caller sees of an answer; work may differ.
 type Told = (Vec<(u32, u32, bool, Outcome)>, Vec<Region>, [u64; 2], [bool; 3]);
 
-fn told(out: &StepOutcome) -> Told {
+fn reported(out: &StepOutcome) -> Told {
     let without_work =
         |p: &PairOutcome| (p.a, p.b, p.regions_complete, Outcome { counters: Counters::default(), ..p.outcome });
     let pairs = out.pairs.iter().map(without_work).collect();
@@ -111,12 +111,12 @@ fn run(seed: u64) -> Work {
         cold.forget();
         let expected = cold.step(&records, &options).expect("a step").clone();
         let answer = warm.step(&records, &options).expect("a step");
-        if told(answer) != told(&expected) {
+        if reported(answer) != reported(&expected) {
             let text = format!(
                 "seed {seed}, step {k}, {}: {:?}\nforgetting: {:?}",
                 scene.class,
-                told(answer),
-                told(&expected)
+                reported(answer),
+                reported(&expected)
             );
             work.differences.push(text);
             break;
@@ -228,7 +228,7 @@ impl Twins {
         cold.forget();
         let expected = cold.step(records, options).expect("a step");
         let answer = warm.step(records, options).expect("a step");
-        assert_eq!(told(answer), told(expected), "what is remembered, and forgetting");
+        assert_eq!(reported(answer), reported(expected), "what is remembered, and forgetting");
         answer.pairs.clone()
     }
 }
@@ -274,7 +274,7 @@ fn what_rounding_does_to_a_step_that_is_taken_in_part_is_counted() {
     for k in 1..=2400 {
         let at = start - f64::from(k) * ulp;
         met += u32::from(!twins.step(&[to(2, DVec3::X * at)], &options).is_empty());
-        assert!((twins.0[0].body(2).expect("a body").track.end.position.x - at).abs() < 0.1 * ulp);
+        assert!((twins.0[0].body(2).expect("a body").motion_state.end.position.x - at).abs() < 0.1 * ulp);
     }
     assert!(met > 300, "{met}: they meet, and sink in");
 }
@@ -317,8 +317,8 @@ fn an_answer_that_took_more_work_than_is_allowed_is_not_repeated() {
         let again = StepOptions { advance: 0.0, cell_limit, ..StepOptions::default() };
         let [warm, _] = &mut twins.0;
         warm.step(&down, &StepOptions { advance: 0.0, ..StepOptions::default() }).expect("a step");
-        let answer = told(warm.step(&down, &again).expect("a step"));
+        let answer = reported(warm.step(&down, &again).expect("a step"));
         warm.forget();
-        assert_eq!(answer, told(warm.step(&down, &again).expect("a step")), "{cell_limit} of {cells} cells");
+        assert_eq!(answer, reported(warm.step(&down, &again).expect("a step")), "{cell_limit} of {cells} cells");
     }
 }

@@ -7,7 +7,7 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{DEFAULT_CELL_LIMIT, Outcome, PairQuery, Scratch, Status, earliest_contact};
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere};
 use contactd::solid::{Shape, Solid};
 use contactd_proto::{Motion, Pose};
@@ -190,7 +190,7 @@ fn lattice(rng: &mut Random) -> Known {
 
 fn ask(scene: &Scene, limit: u64) -> Outcome {
     let models = [Model::new(scene.a.build()), Model::new(scene.b.build())];
-    let query = question_of(scene, [&models[0], &models[1]], contactd::contact::Asked::DEPTH);
+    let query = question_of(scene, [&models[0], &models[1]], contactd::contact::QueryOptions::DEPTH);
     let resolution = scene.resolution.unwrap_or(query.resolution);
     earliest_contact(&PairQuery { resolution, cell_limit: limit, ..query }, &mut Scratch::default())
 }

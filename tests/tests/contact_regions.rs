@@ -6,11 +6,11 @@ use contactd::contact::clearance::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::within::Within;
 use contactd::contact::{
-    Asked, Body, DEFAULT_CELL_LIMIT, Extent, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution,
-    earliest_contact,
+    Body, DEFAULT_CELL_LIMIT, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies,
+    default_resolution, earliest_contact,
 };
-use contactd::eco::Model;
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::scenes::Recipe;
@@ -42,8 +42,8 @@ impl Rest {
             b: Body { model: &self.b, placed: placed(Motion { start: self.pose_b, velocity, spin: DVec3::ZERO }) },
             resolution: default_resolution(&self.a, &self.b),
             cell_limit: 100_000,
-            ideas: Ideas::default(),
-            asked: Asked::DEPTH,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
         }
     }
 
@@ -444,8 +444,8 @@ fn any_margin_has_its_answer_within_bounded_work() {
                 if limit == DEFAULT_CELL_LIMIT {
                     missing += usize::from(!found.complete);
                     assert_eq!(!found.regions.is_empty(), matches!(within, Within::Witness(_)), "{says}");
-                    let told = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
-                    let fits = |gap: f64| told == f64::INFINITY || (told - gap).abs() < 1e-9;
+                    let reported = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
+                    let fits = |gap: f64| reported == f64::INFINITY || (reported - gap).abs() < 1e-9;
                     assert!(nearest.is_none_or(fits), "{says}");
                 }
             }

@@ -90,10 +90,10 @@ fn effects_of_bystanders_cost_the_others_nothing() {
 /// contact whose time is told whether the pair touches at the start.
 fn alone(bodies: &[world::body::Body], plan: &PairPlan) -> Counters {
     let side = |k: usize| {
-        let placed = Placed { place: bodies[k].place, motion: bodies[k].track.motion };
+        let placed = Placed { place: bodies[k].place, motion: bodies[k].motion_state.motion };
         (&*bodies[k].part.model, placed)
     };
-    let query = PairQuery { cell_limit: DEFAULT_CELL_LIMIT, ..question(side(0), side(1), plan.asked()) };
+    let query = PairQuery { cell_limit: DEFAULT_CELL_LIMIT, ..question(side(0), side(1), plan.query_options()) };
     let mut outcome = earliest_contact(&query, &mut Scratch::default());
     let flagged = outcome.status == Status::Contact && plan.report >= Report::Time || plan.margin > 0.0;
     if flagged && !outcome.touching && (outcome.status != Status::Contact || outcome.time > 0.0) {

@@ -4,9 +4,9 @@
 #![allow(missing_docs)]
 
 use contactd::contact::clearance::{MARGIN_SLACK, apart_until};
-use contactd::contact::{Asked, Scratch, Status, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{QueryOptions, Scratch, Status, earliest_contact};
 use contactd::ipc::{Embedded, ServerConfig};
+use contactd::octree::Model;
 use contactd_client::{Error, Object, Session};
 use contactd_proto::contact_record::{
     CLEAR, CONTACT, OVERLAP, SENSOR, TOUCHING, VALID_NORMAL, VALID_POINT, VALID_TIME, WITHIN_MARGIN,
@@ -216,9 +216,9 @@ fn an_overlap_that_separates_can_be_ignored() {
         let mut cell = Cell::new(&bodies, &[rule(|r| r.initial_overlap = initial_overlap)]);
         cell.step(&[down(0, 0.0, 3.0), down(1, 4.0, 0.4)])
     };
-    let (told, ignored) = (run(InitialOverlap::Report), run(InitialOverlap::IgnoreIfSeparating));
-    assert_eq!(told.statuses(), [(1, 2, OVERLAP), (1, 3, OVERLAP), (1, 4, OVERLAP)]);
-    assert_eq!(told.effects().past_overlaps, 0);
+    let (reported, ignored) = (run(InitialOverlap::Report), run(InitialOverlap::IgnoreIfSeparating));
+    assert_eq!(reported.statuses(), [(1, 2, OVERLAP), (1, 3, OVERLAP), (1, 4, OVERLAP)]);
+    assert_eq!(reported.effects().past_overlaps, 0);
     assert_eq!(ignored.effects().past_overlaps, 3);
     // What sinks is deeper than it started at once: by 1e-6 of a depth of .05 and a few resolutions, at half a length a step.
     assert_eq!(ignored.statuses(), [(1, 3, CONTACT)]);
@@ -301,7 +301,7 @@ fn the_motion_itself_rules_effects_out() {
     let answer = Cell::new(&resting, &[rule(|_| ())]).step(&[]);
     assert_eq!((answer.effects(), answer.records.len()), (EffectCounters::default(), 0));
     let still = Cell::new(&resting, &[rule(|r| r.report = Report::Patch)]).step(&[]);
-    assert_eq!(still.effects(), only(|c| c.patches = 1), "resting bodies are asked about their start alone");
+    assert_eq!(still.effects(), only(|c| c.patches = 1), "resting bodies are query_options about their start alone");
     assert_eq!((still.statuses(), still.regions), (vec![(1, 2, CLEAR)], 1));
 }
 
@@ -388,14 +388,14 @@ fn asking_for_less_changes_no_bit_of_what_remains() {
             }
         }
         let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
-        let ask = |asked| {
-            let query = question_of(&scene, [&a, &b], asked);
+        let ask = |query_options| {
+            let query = question_of(&scene, [&a, &b], query_options);
             earliest_contact(&query, &mut Scratch::default())
         };
-        let full = ask(Asked::DEPTH);
-        let plain = ask(Asked::CONTACT);
-        let time = ask(Asked { report: Report::Time, ..Asked::CONTACT });
-        let hit = ask(Asked { report: Report::Hit, ..Asked::CONTACT });
+        let full = ask(QueryOptions::DEPTH);
+        let plain = ask(QueryOptions::CONTACT);
+        let time = ask(QueryOptions { report: Report::Time, ..QueryOptions::CONTACT });
+        let hit = ask(QueryOptions { report: Report::Hit, ..QueryOptions::CONTACT });
         match full.status {
             Status::Contact => contacts += 1,
             Status::Overlap => overlaps += 1,
@@ -408,10 +408,10 @@ fn asking_for_less_changes_no_bit_of_what_remains() {
         };
         assert_eq!(fields(&full), fields(&plain), "{i}");
         assert_eq!(fields(&plain), fields(&time), "{i}");
-        let told = contactd::contact::Outcome { counters: full.counters, ..plain };
+        let reported = contactd::contact::Outcome { counters: full.counters, ..plain };
         let less =
             contactd::contact::Outcome { penetration: 0.0, deepest: DVec3::ZERO, direction: DVec3::ZERO, ..full };
-        assert_eq!(told, less, "{i}");
+        assert_eq!(reported, less, "{i}");
         assert!(hit.time_lower <= full.time_upper && hit.touching == full.touching, "{i}: {hit:?} and {full:?}");
         assert!(hit.counters.cells <= full.counters.cells, "{i}: a hit takes no more than its time");
         assert_eq!((hit.counters.times, hit.counters.contacts, time.counters.contacts), (0, 0, 0), "{i}");
@@ -438,7 +438,7 @@ fn a_hit_is_told_only_once_the_start_is_free() {
         let scene = scenes::Scene::new("feet", slab, Motion::resting(Pose::IDENTITY), feet, down);
         let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
         for report in [Report::Hit, Report::Time] {
-            let query = question_of(&scene, [&a, &b], Asked { report, ..Asked::CONTACT });
+            let query = question_of(&scene, [&a, &b], QueryOptions { report, ..QueryOptions::CONTACT });
             let o = earliest_contact(&query, &mut Scratch::default());
             assert_eq!(o.status, Status::Overlap, "{i}, {report:?}: {o:?}");
         }
@@ -464,7 +464,7 @@ fn a_margins_time_is_never_late_and_hardly_early() {
         if lowest(0.0) <= 0.6 * margin {
             continue;
         }
-        let query = question_of(&scene, [&a, &b], Asked::CONTACT);
+        let query = question_of(&scene, [&a, &b], QueryOptions::CONTACT);
         let (until, known, _) = apart_until(&query, margin, &mut Scratch::default());
         for k in 0..4 {
             let t = until * f64::from(k) / 4.0;
@@ -477,6 +477,6 @@ fn a_margins_time_is_never_late_and_hardly_early() {
             _ => short += 1,
         }
     }
-    println!("{entered} entered their margin, {never} never, {short} told too early");
+    println!("{entered} entered their margin, {never} never, {short} reported too early");
     assert!(entered > 20 && never > 20 && short <= entered / 20, "{entered} entered, {never} never, {short} too early");
 }

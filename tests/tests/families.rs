@@ -35,12 +35,12 @@ fn nothing_is_wrong_and_nothing_undecided() {
     let sum = |x: [usize; 3], y: [usize; 3]| [0, 1, 2].map(|k| x[k] + y[k]);
     let [met, open, wrong] = (0..NAMES.len()).map(of_family).fold([0; 3], sum);
     println!(
-        "{met} of {} scenes meet; {open} are undecided or told of wrongly, {wrong} wrong",
+        "{met} of {} scenes meet; {open} are undecided or reported of wrongly, {wrong} wrong",
         scenes * NAMES.len() as u64
     );
     assert!(met as u64 * 10 >= 3 * scenes * NAMES.len() as u64, "too few meet: {met}");
     assert_eq!(wrong, 0);
-    assert_eq!(open, 0, "undecided or told of wrongly");
+    assert_eq!(open, 0, "undecided or reported of wrongly");
 }
 
 #[test]
@@ -110,10 +110,10 @@ fn a_peg_that_hardly_leans_meets_its_hole() {
                 ask(&Scene { a, b, courses: [still, moving], resolution: None }, 0).expect("an answer").pair.outcome;
             // At the mouth the peg's axis is off by way·t + lean·height; half of what is beyond the gap is common to both.
             let known = (2.0 * o.resolution + gap - lean * height) / way;
-            let told = (o.status, o.time_lower, o.time, o.time_upper);
-            assert_eq!(o.status, Status::Contact, "lean {lean:e}, angle {angle}: {told:?}, known {known}");
-            assert!(o.time_lower <= known + 1e-6, "lean {lean:e}, angle {angle}: {told:?}, known {known}");
-            assert!((o.time_upper - known).abs() < 0.02, "lean {lean:e}, angle {angle}: {told:?}, known {known}");
+            let reported = (o.status, o.time_lower, o.time, o.time_upper);
+            assert_eq!(o.status, Status::Contact, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
+            assert!(o.time_lower <= known + 1e-6, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
+            assert!((o.time_upper - known).abs() < 0.02, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
         }
     }
 }
@@ -121,14 +121,14 @@ fn a_peg_that_hardly_leans_meets_its_hole() {
 /// Bodies that spin in holes of nearly their own shape, where a search at the resolution asked for takes too long: a coarser one
 /// answers, says so, and no point contradicts it.
 #[test]
-fn long_searches_are_answered_at_a_coarser_resolution_that_is_told() {
+fn long_searches_are_answered_at_a_coarser_resolution_that_is_reported() {
     for (family, index, met) in [(7, 1541, true), (7, 12880, false), (6, 13401, false), (6, 13532, false)] {
         let scene = scene(1, family, index);
         let answer = ask(&scene, 0).expect("a scene");
         let o = &answer.pair.outcome;
         let name = format!("{} {index}", NAMES[family]);
         assert_eq!(o.status, if met { Status::Contact } else { Status::Clear }, "{name}");
-        let coarser = o.resolution / answer.asked;
+        let coarser = o.resolution / answer.query_options;
         assert!((16.0..=4e4).contains(&coarser), "{name}: {coarser} times as coarse");
         assert!(o.counters.cells < 200_000, "{name}: {} cells", o.counters.cells);
         let faults = judge(&scene, o, Effort::Thorough, || answer.witness());

@@ -54,8 +54,7 @@ impl Cost {
         body: &Recipe,
         motion: Motion,
         (time, speed): (f64, f64),
-        up: DVec3,
-        least: f64,
+        (up, least): (DVec3, f64),
     ) {
         let o = self.ask(what, hole, body, motion);
         assert_eq!(o.status, Status::Contact, "{} {what}: {o:?}", self.kind);
@@ -94,7 +93,7 @@ fn a_ball_in_a_socket() {
     for gap in CLEARANCES.map(|c| c * r) {
         let ball = Recipe::sphere(r - gap);
         let drop = moving(DVec3::Z * 0.9, -DVec3::Z);
-        cost.meets(&format!("drop {gap}"), &socket, &ball, drop, (0.9 + gap, 1.0), DVec3::Z, 0.0);
+        cost.meets(&format!("drop {gap}"), &socket, &ball, drop, (0.9 + gap, 1.0), (DVec3::Z, 0.0));
         for way in [DVec3::X, dvec3(0.6, 0.0, -0.8)] {
             let press = moving(DVec3::ZERO, way * PRESSING);
             cost.meets(
@@ -103,8 +102,7 @@ fn a_ball_in_a_socket() {
                 &ball,
                 press,
                 (gap / PRESSING, PRESSING),
-                -way,
-                (1.0 - 4e-9 / gap).max(0.0),
+                (-way, (1.0 - 4e-9 / gap).max(0.0)),
             );
         }
         cost.clear(&format!("spin {gap}"), &socket, &ball, spinning(dvec3(1.0, 2.0, -1.5)));
@@ -129,7 +127,7 @@ fn in_a_straight_hole(
     let screw = Motion { start: Pose::at(DVec3::Z * 0.1), velocity: -DVec3::Z * 0.3, spin: DVec3::Z };
     for way in ways {
         let press = moving(DVec3::ZERO, *way * PRESSING);
-        cost.meets(&say("press"), hole, body, press, (gap / PRESSING, PRESSING), -*way, 0.7);
+        cost.meets(&say("press"), hole, body, press, (gap / PRESSING, PRESSING), (-*way, 0.7));
     }
     match turned {
         None => {
@@ -138,8 +136,8 @@ fn in_a_straight_hole(
         }
         // The angle at which its edges meet the walls, and how fast they go then.
         Some((angle, speed)) => {
-            cost.meets(&say("spin"), hole, body, spinning(DVec3::Z), (angle, speed), DVec3::Z, -1e-9);
-            cost.meets(&say("screw"), hole, body, screw, (angle, speed), DVec3::Z, -1e-9);
+            cost.meets(&say("spin"), hole, body, spinning(DVec3::Z), (angle, speed), (DVec3::Z, -1e-9));
+            cost.meets(&say("screw"), hole, body, screw, (angle, speed), (DVec3::Z, -1e-9));
         }
     }
 }
@@ -207,7 +205,7 @@ fn a_cone_in_a_cone() {
         let drop = moving(DVec3::Z * 0.5, -DVec3::Z);
         // Down by h the gap at equal height shrinks by h/2; across the surfaces they close by sin(half angle).
         let speed = 1.0 / 5f64.sqrt();
-        cost.meets(&format!("drop {gap}"), &hole, &cone, drop, (0.5 + 2.0 * gap, speed), DVec3::Z, 0.0);
+        cost.meets(&format!("drop {gap}"), &hole, &cone, drop, (0.5 + 2.0 * gap, speed), (DVec3::Z, 0.0));
         let across = 2.0 / 5f64.sqrt();
         let press = moving(DVec3::ZERO, DVec3::X * PRESSING);
         cost.meets(
@@ -216,8 +214,7 @@ fn a_cone_in_a_cone() {
             &cone,
             press,
             (gap / PRESSING, PRESSING * across),
-            -DVec3::X,
-            (0.89 - 4e-9 / gap).max(0.0),
+            (-DVec3::X, (0.89 - 4e-9 / gap).max(0.0)),
         );
         cost.clear(&format!("spin {gap}"), &hole, &cone, spinning(DVec3::Z));
         cost.clear(&format!("lift {gap}"), &hole, &cone, moving(DVec3::ZERO, DVec3::Z));

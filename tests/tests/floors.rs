@@ -113,9 +113,9 @@ fn every_folder_imports_only_from_floors_below() {
 
 #[test]
 fn imports_are_read_from_lists_and_paths() {
-    let text = "use crate::math::Aabb;\nuse crate::{solid::{Face, Node}, eco};\n// crate::world\nlet x = crate::bound::f();\n#[cfg(test)]\nuse crate::ipc::Y;";
+    let text = "use crate::math::Aabb;\nuse crate::{solid::{Face, Node}, octree};\n// crate::world\nlet x = crate::bound::f();\n#[cfg(test)]\nuse crate::ipc::Y;";
     let found: Vec<String> = imports(text).into_iter().collect();
-    assert_eq!(found, ["bound", "eco", "math", "solid"]);
+    assert_eq!(found, ["bound", "math", "octree", "solid"]);
 }
 
 #[test]

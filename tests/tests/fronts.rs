@@ -42,7 +42,7 @@ fn what_is_told_in_front_of_the_search_is_what_the_search_says() {
     let in_front = all.iter().filter(|a| a.0).count();
     let undecided = all.iter().filter(|a| a.1).count();
     let wrong: Vec<&String> = all.iter().filter_map(|a| a.2.as_ref()).collect();
-    println!("{count} scenes: {in_front} told without a cell, {undecided} undecided, {} differ", wrong.len());
+    println!("{count} scenes: {in_front} reported without a cell, {undecided} undecided, {} differ", wrong.len());
     assert!(wrong.is_empty(), "{}", wrong.iter().take(3).map(|w| w.as_str()).collect::<Vec<_>>().join("\n"));
     assert!(
         4 * in_front > count as usize && 200 * undecided <= count as usize,

@@ -4,9 +4,11 @@
 //! `cell_ceilings.toml` holds twice the cells each cost when it was recorded: `CONTACTD_RECORD=1` prints new lines for it.
 #![allow(missing_docs)]
 
-use contactd::contact::{Asked, Body, Extent, Ideas, Outcome, PairQuery, Scratch, Status, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{
+    Body, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
+};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences};
 use contactd_tests::scenes::{Recipe, Scene};
@@ -36,8 +38,8 @@ fn answer_or(name: &str, scene: &Scene, mirrored: impl Fn(Outcome) -> Outcome) -
     let o = ask_scene_with(scene, SEARCH_ALONE);
     let fronted = ask(scene);
     let differ = differences(&o, &fronted, scene.delta() / 1e-9);
-    let twin = differences(&o, &mirrored(fronted), scene.delta() / 1e-9);
-    assert!(differ.is_empty() || twin.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
+    let f64x2 = differences(&o, &mirrored(fronted), scene.delta() / 1e-9);
+    assert!(differ.is_empty() || f64x2.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
     assert_ne!(o.status, Status::Undecided, "{name}: {o:?}");
     assert!(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0, "{o:?}");
     if std::env::var_os("CONTACTD_RECORD").is_some() {
@@ -538,8 +540,8 @@ fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
             b: Body { model: &models[1], placed: bodies[1] },
             resolution: 1e-9,
             cell_limit: contactd_tests::engine::CELL_LIMIT,
-            ideas: Ideas { region: false, walk: false, ..Ideas::default() },
-            asked: Asked::DEPTH,
+            strategies: Strategies { region: false, walk: false, ..Strategies::default() },
+            query_options: QueryOptions::DEPTH,
         };
         let o = earliest_contact(&query, &mut Scratch::default());
         let time = (angle - 0.15f64.asin()) / spin.z;

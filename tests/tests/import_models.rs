@@ -55,7 +55,7 @@ fn models_have_the_primitives_that_their_sources_have() {
 }
 
 #[test]
-fn a_polyhedron_given_inside_out_is_flipped_and_told() {
+fn a_polyhedron_given_inside_out_is_flipped_and_reported() {
     let import = read_csg(&root().join("openscad/dovetail_b.csg"), Facets::Auto, &Limits::default()).expect("readable");
     assert_eq!(import.notes.len(), 1);
     assert!(import.notes[0].text.contains("flipped"), "{}", import.notes[0]);

@@ -5,9 +5,11 @@
 //! `CONTACTD_LAW_SCENES=2000 cargo test --release -p contactd-tests --test laws -- --nocapture`
 #![allow(missing_docs)]
 
-use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{
+    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::primitive::HalfSpace;
 use contactd::world::{ObjectSpec, Part, StepOptions, World};
 use contactd_proto::{Motion, Pose, PoseRecord};
@@ -35,14 +37,14 @@ thread_local! {
 
 fn ask(scene: &Scene) -> Outcome {
     let o = engine::ask(scene);
-    let (asked, undecided) = ASKED.get();
-    ASKED.set((asked + 1, undecided + usize::from(o.status == Status::Undecided)));
+    let (query_options, undecided) = ASKED.get();
+    ASKED.set((query_options + 1, undecided + usize::from(o.status == Status::Undecided)));
     if o.status == Status::Undecided {
         let (place, first) = SCENE.with_borrow(Clone::clone);
         let cells = o.counters.cells;
         println!(
             "UNDECIDED {place}, ask {} ({}): free before {}, {cells} cells",
-            asked - first,
+            query_options - first,
             scene.class,
             o.time_lower
         );
@@ -83,9 +85,9 @@ fn hold_over(
         }
     }
     share.assert_enough(name);
-    let (asked, undecided) = ASKED.get();
-    println!("{name}: {undecided} of {asked} answers undecided");
-    assert_eq!(undecided, 0, "{name}: of {asked}");
+    let (query_options, undecided) = ASKED.get();
+    println!("{name}: {undecided} of {query_options} answers undecided");
+    assert_eq!(undecided, 0, "{name}: of {query_options}");
     assert!(wrong.is_empty(), "{name}: {} of {count} scenes break it\n{}", wrong.len(), wrong.join("\n"));
 }
 
@@ -498,8 +500,8 @@ fn memory_that_was_used_before_changes_no_bit() {
             b: Body { model: &b, placed: placed(scene.motion_b) },
             resolution: scene.resolution.unwrap_or_else(|| default_resolution(&a, &b)),
             cell_limit: engine::CELL_LIMIT,
-            ideas: Default::default(),
-            asked: Asked::DEPTH,
+            strategies: Default::default(),
+            query_options: QueryOptions::DEPTH,
         };
         same_bits(o, &earliest_contact(&query, &mut scratch.borrow_mut()), "warm")
     });

@@ -58,13 +58,13 @@ impl Scene {
         assert!(found.is_complete);
         assert_eq!(self.manifolds.pairs().len(), 1);
         let record = &reply.records()[0];
-        let told: Vec<DVec3> = reply
+        let reported: Vec<DVec3> = reply
             .regions(record)
             .flat_map(|(_, slots)| slots.flat_map(|s| s.points[..s.count as usize].iter()))
             .map(|p| DVec3::from_array(*p))
             .collect();
         for p in found.points {
-            assert!(found.status == OVERLAP || told.contains(&p.position), "{p:?} is not told: {told:?}");
+            assert!(found.status == OVERLAP || reported.contains(&p.position), "{p:?} is not reported: {reported:?}");
             // Its two surface points are where the bodies' frames say.
             let on = [Pose::at(DVec3::NEG_Z).point(p.on_a), pose.point(p.on_b)];
             assert!((on[1] - on[0]).distance(p.normal * p.separation) < 1e-12);

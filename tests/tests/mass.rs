@@ -1,9 +1,9 @@
 //! Laws of mass properties: every bound holds, against closed forms, rays and each other; what bounds cost in boxes.
 
-use contactd::eco::Model;
-use contactd::eco::mass::{MassError, mass_properties};
 use contactd::import;
 use contactd::ipc::ServerConfig;
+use contactd::octree::Model;
+use contactd::octree::mass::{MassError, mass_properties};
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Shape, Sphere};
 use contactd::solid::{Label, Op, Solid, SolidBuilder};
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, Pose};
@@ -182,7 +182,7 @@ fn bounds_are_true_where_the_volume_is_known() {
 #[test]
 fn bounds_are_true_for_random_trees() {
     let mut r = Random::new(2);
-    let (mut told, mut empty) = (0, 0);
+    let (mut reported, mut empty) = (0, 0);
     for i in 0..40 {
         let solid: Solid = solid(&mut r, 1 + i % 3);
         let around = solid.aabb();
@@ -204,11 +204,11 @@ fn bounds_are_true_for_random_trees() {
             let doubt =
                 (0..10).map(|k| doubt[k] / fine[0]).fold(0.0, f64::max) * (1.0 + around.half().length_squared());
             agree(&m, &rays, doubt, &format!("solid {i}, tolerance {tolerance}"));
-            told += usize::from(m.volume_error > doubt * fine[0]);
+            reported += usize::from(m.volume_error > doubt * fine[0]);
         }
     }
     // Where the bound is wider than the doubt about the rays it is the bound that was tested.
-    assert!(told > 20 && empty < 20, "{told} {empty}");
+    assert!(reported > 20 && empty < 20, "{reported} {empty}");
 }
 
 #[test]

@@ -5,15 +5,15 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{Counters, Outcome, Status};
-use contactd::eco::Model;
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::world::memory::Remembered;
 use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World, record};
 use contactd_proto::contact_record::{ContactRecord, DETAIL_SLOT, DetailSlot};
-use contactd_proto::{Detect, InitialOverlap, Motion, Pose, PoseRecord, Rule, Track};
+use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
-use contactd_tests::stepped::{Act, Change, Play, Thing, block, plate, tracks};
+use contactd_tests::stepped::{Act, Change, Play, Thing, block, motion_states, plate};
 use contactd_tests::verifier::UNSHOWN;
 use contactd_tests::verifier::memory::{Proven, Truth, check};
 use glam::DVec3;
@@ -25,7 +25,7 @@ fn part(recipe: &Recipe) -> Arc<Part> {
 }
 
 /// The reply to a step as its caller reads it, to the bit: header and all slots, work left out.
-fn told(world: &World) -> (String, Vec<ContactRecord>) {
+fn reported(world: &World) -> (String, Vec<ContactRecord>) {
     let out = world.outcome();
     let r = record::reply(out, true);
     let header = format!(
@@ -82,7 +82,7 @@ struct Fresh {
     things: Vec<Thing>,
     rules: Vec<Rule>,
     resolution: Option<f64>,
-    tracks: Vec<(u32, Track)>,
+    motion_states: Vec<(u32, MotionState)>,
 }
 
 impl Fresh {
@@ -93,7 +93,7 @@ impl Fresh {
         }
         world.set_rules(self.rules.clone()).expect("rules");
         world.set_resolution(self.resolution).expect("a resolution");
-        world.restore(&self.tracks).expect("tracks");
+        world.restore(&self.motion_states).expect("motion_states");
         world
     }
 
@@ -102,7 +102,7 @@ impl Fresh {
             Change::Add(thing) => self.things.push(thing.clone()),
             Change::Remove(id) => {
                 self.things.retain(|t| t.id != *id);
-                self.tracks.retain(|t| t.0 != *id);
+                self.motion_states.retain(|t| t.0 != *id);
             }
             Change::Rules(rules) => self.rules.clone_from(rules),
             Change::Resolution(resolution) => self.resolution = *resolution,
@@ -130,7 +130,7 @@ struct Work {
     known: usize,
     /// Steps that only a session without memory had to leave open.
     open: usize,
-    /// Certificates that hold, by kind: room, directions, course, answer, overlap.
+    /// Certificates that hold, by kind: clearance, directions, predicted motion, answer, overlap.
     proven: [usize; 5],
     /// Answers of memory without a certificate, and pairs whose certificate does not hold.
     unproven: usize,
@@ -141,7 +141,7 @@ struct Work {
     large: usize,
 }
 
-/// Cells that the proof of a course or an answer may take.
+/// Cells that the proof of a predicted motion or an answer may take.
 const CELLS: u64 = 4_000;
 
 /// Asks a world for a certificate of each pair that it has answered without a search, and checks it against the motions that
@@ -151,7 +151,7 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
     let truths: Vec<Truth> = cold
         .bodies()
         .iter()
-        .map(|b| Truth::new(&b.part.model.solid, Placed { place: b.place, motion: b.track.motion }))
+        .map(|b| Truth::new(&b.part.model.solid, Placed { place: b.place, motion: b.motion_state.motion }))
         .collect();
     for (i, a) in ids.iter().enumerate() {
         for (j, b) in ids.iter().enumerate().skip(i + 1) {
@@ -165,26 +165,26 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
                 continue;
             };
             let bodies = [i, j].map(|k| match plan.detect {
-                Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].track.end)),
+                Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].motion_state.end)),
                 _ => truths[k],
             });
             let own = |id: u32| cold.body(id).expect("a body").part.resolution;
             let resolution = own(*a).max(own(*b));
             let kind = match check(&text, (*a, *b), bodies, resolution) {
-                Ok(Proven::Room) => 0,
+                Ok(Proven::Clearance) => 0,
                 Ok(Proven::Directions) => 1,
-                Ok(Proven::Course) => 2,
+                Ok(Proven::PredictedMotion) => 2,
                 Ok(Proven::Answer(checked)) => {
                     // Of later pairs than the first contact nothing need be told.
                     let Remembered::Answer { outcome, .. } = remembered else {
-                        return Err(format!("{a}, {b}: {remembered:?} is told as an answer"));
+                        return Err(format!("{a}, {b}: {remembered:?} is reported as an answer"));
                     };
                     let lower = outcome.time_lower;
                     if warm.outcome().pairs.iter().any(|p| (p.a, p.b) == (*a, *b) && p.outcome.time_lower != lower) {
-                        return Err(format!("{a}, {b}: remembered until {lower}, told otherwise"));
+                        return Err(format!("{a}, {b}: remembered until {lower}, reported otherwise"));
                     }
                     if checked.until < lower && plan.detect != Detect::Discrete {
-                        return Err(format!("{a}, {b}: proven until {}, told {lower}", checked.until));
+                        return Err(format!("{a}, {b}: proven until {}, reported {lower}", checked.until));
                     }
                     3
                 }
@@ -195,8 +195,11 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
                     continue;
                 }
                 Err(e) => {
-                    let tracks = [i, j].map(|k| cold.bodies()[k].track);
-                    return Err(format!("{a}, {b}: {e}\n{}\n{plan:?}\n{tracks:?}", &text[..text.len().min(600)]));
+                    let motion_states = [i, j].map(|k| cold.bodies()[k].motion_state);
+                    return Err(format!(
+                        "{a}, {b}: {e}\n{}\n{plan:?}\n{motion_states:?}",
+                        &text[..text.len().min(600)]
+                    ));
                 }
             };
             work.proven[kind] += 1;
@@ -211,7 +214,8 @@ fn run(seed: u64, steps: usize) -> Work {
     let parts: Vec<Arc<Part>> = play.recipes.iter().map(part).collect();
     // Octrees are refined by searches: the fresh worlds have models of their own.
     let own: Vec<Arc<Part>> = play.recipes.iter().map(part).collect();
-    let mut fresh = Fresh { parts: own, things: Vec::new(), rules: Vec::new(), resolution: None, tracks: Vec::new() };
+    let mut fresh =
+        Fresh { parts: own, things: Vec::new(), rules: Vec::new(), resolution: None, motion_states: Vec::new() };
     let mut warm = World::new(256, 256);
     warm.certify(true);
     let mut work = Work::default();
@@ -226,7 +230,7 @@ fn run(seed: u64, steps: usize) -> Work {
         cold.step(&records, &options).expect("a step");
         warm.step(&records, &options).expect("a step");
         let (expected, answer) = (cold.outcome(), warm.outcome());
-        if !same(&told(&warm), &told(&cold)) {
+        if !same(&reported(&warm), &reported(&cold)) {
             // What a limit left open may be known; then it is what no limit leaves open.
             // An overlap that was to be searched past, too: how deep it is was not proven.
             let is_left = |p: &PairOutcome| match p.outcome.status {
@@ -260,7 +264,7 @@ fn run(seed: u64, steps: usize) -> Work {
                     "seed {seed}, step {k}, {options:?}\nremembers: {:#?}\nfresh: {:#?}\n{}",
                     differs(&mine, &other),
                     differs(&other, &mine),
-                    differing(&told(&warm), &told(&cold))
+                    differing(&reported(&warm), &reported(&cold))
                 ));
                 break;
             }
@@ -280,7 +284,7 @@ fn run(seed: u64, steps: usize) -> Work {
         }
         work.large += usize::from(answer.counters.primitives > 12);
         free = expected.safe_time;
-        fresh.tracks = tracks(&cold);
+        fresh.motion_states = motion_states(&cold);
         play.follow(&cold);
     }
     work
@@ -313,7 +317,7 @@ fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
     let proven: [usize; 5] = std::array::from_fn(|k| all.iter().map(|w| w.proven[k]).sum());
     let (unproven, unshown) = (sum(|w| w.unproven), sum(|w| w.unshown));
     println!(
-        "certificates that hold: {} rooms, {} by directions, {} courses, {} answers, {} overlaps; {unproven} without one, {unshown} that \
+        "certificates that hold: {} clearances, {} by directions, {} predictions, {} answers, {} overlaps; {unproven} without one, {unshown} that \
          the checker's budget left open",
         proven[0], proven[1], proven[2], proven[3], proven[4]
     );
@@ -351,7 +355,7 @@ fn two(parts: [&Arc<Part>; 2], poses: [Pose; 2], margin: f64) -> World {
     world
 }
 
-/// Boxes, L's and prisms fall on plates with 4 to 16 holes: the step in which they meet is told as by a fresh world. A course is a
+/// Boxes, L's and prisms fall on plates with 4 to 16 holes: the step in which they meet is told as by a fresh world. A predicted motion is a
 /// search at a negative depth, whose boxes must reach as far as its level does.
 #[test]
 fn what_falls_on_a_plate_with_holes_is_told_in_the_step_in_which_it_meets() {
@@ -373,18 +377,18 @@ fn what_falls_on_a_plate_with_holes_is_told_in_the_step_in_which_it_meets() {
                 let end = motion.at(1.0);
                 let record = [PoseRecord::end(2, &end)];
                 let mut cold = two([&below, &above], [Pose::IDENTITY, pose], 0.0);
-                cold.restore(&[(2, Track::resting(pose))]).expect("a track");
+                cold.restore(&[(2, MotionState::resting(pose))]).expect("a motion_state");
                 cold.step(&record, &options).expect("a step");
                 warm.step(&record, &options).expect("a step");
                 assert!(
-                    same(&told(&warm), &told(&cold)),
+                    same(&reported(&warm), &reported(&cold)),
                     "seed {seed}, step {step}: {}",
-                    differing(&told(&warm), &told(&cold))
+                    differing(&reported(&warm), &reported(&cold))
                 );
                 if warm.outcome().contact {
                     return Some(step);
                 }
-                pose = warm.body(2).expect("a body").track.end;
+                pose = warm.body(2).expect("a body").motion_state.end;
             }
             None
         })

@@ -14,7 +14,7 @@ const PROMISED: f64 = 1.0 - 2e-3;
 
 /// Depth that is told of two bodies that overlap at the start, held against the trees' own value at the told point.
 #[track_caller]
-fn told(scene: &Scene) -> (f64, DVec3) {
+fn reported(scene: &Scene) -> (f64, DVec3) {
     let o = ask(scene);
     assert_eq!(o.status, Status::Overlap, "{o:?}");
     assert!((o.normal.length() - 1.0).abs() < 1e-9 && (o.time_lower, o.time, o.time_upper) == (0.0, 0.0, 0.0), "{o:?}");
@@ -33,7 +33,7 @@ fn told(scene: &Scene) -> (f64, DVec3) {
 /// A body on many feet stands in a slab, each foot as deep as a random number says: the deepest counts, wherever the search
 /// happens to begin.
 #[test]
-fn of_many_feet_the_deepest_is_told() {
+fn of_many_feet_the_deepest_is_reported() {
     let mut r = Random::new(61);
     for _ in 0..20 {
         let feet: Vec<(f64, f64)> = (0..7).map(|i| (2.0 * f64::from(i) - 6.0, r.within(0.05, 0.4))).collect();
@@ -49,7 +49,7 @@ fn of_many_feet_the_deepest_is_told() {
         let body = shapes.into_iter().reduce(Recipe::union).expect("seven feet");
         let slab = Recipe::cuboid(9.0, 3.0, 2.0).at(0.0, 0.0, -2.0);
         let still = Motion::resting(Pose::IDENTITY);
-        let (depth, point) = told(&Scene::new("feet", slab, still, body, still));
+        let (depth, point) = reported(&Scene::new("feet", slab, still, body, still));
         let most = depths.iter().copied().fold(0.0, f64::max);
         assert!(depth >= most * PROMISED && depth <= most * (1.0 + 1e-9), "{depth} of {most} at {point}");
     }
@@ -73,7 +73,7 @@ fn the_reference_finds_nothing_deeper_in_random_trees() {
             continue;
         }
         seen += 1;
-        let (depth, x) = told(&scene);
-        assert!(depth >= -value * PROMISED, "{seen}: told {depth} at {x}, and {} at {point}", -value);
+        let (depth, x) = reported(&scene);
+        assert!(depth >= -value * PROMISED, "{seen}: reported {depth} at {x}, and {} at {point}", -value);
     }
 }

@@ -126,7 +126,7 @@ fn parallel_cylinders_touch_when_their_axes_say_so() {
             let radii = [&scene.a, &scene.b].map(|r| r.build().aabb().half().x).iter().sum::<f64>();
             (between - axis * axis.dot(between)).length() - radii
         };
-        assert!(gap(o.time).abs() <= 1e-14, "row {i}: the gap at the time told is {:e}", gap(o.time));
+        assert!(gap(o.time).abs() <= 1e-14, "row {i}: the gap at the time reported is {:e}", gap(o.time));
         if gap(known) < -5e-10 {
             late.push(i);
         }

@@ -8,9 +8,9 @@
 
 use contactd::check::Check;
 use contactd::contact::{Extent, Kind, Outcome, Status};
-use contactd::eco::Model;
 use contactd::import::{Facets, Limits, import_csg, read_scene};
 use contactd::ipc::ServerConfig;
+use contactd::octree::Model;
 use contactd::solid::{Face, Sense, Solid, surface};
 use contactd::world::{ObjectSpec, Part, StepOptions, World};
 use contactd_client::Object;
@@ -143,21 +143,21 @@ fn the_judge_notices_every_kind_of_lie() {
     let turned =
         Recipe::cuboid(0.25, 0.25, 0.25).moved(&Pose::new(DVec3::ZERO, quat_of_rotation_vector(DVec3::X * 0.4)));
     let edge = falls(turned, DVec3::new(-0.5, 0.0, 1.25));
-    let told = |scene: &Scene| {
+    let reported = |scene: &Scene| {
         let (o, found) = judged(scene);
         assert!(o.status == Status::Contact && found.is_empty(), "{found:?}");
         o
     };
     let is_noticed = |scene: &Scene, lie: Lie, change: &dyn Fn(&mut Outcome, &mut Solid)| {
         let (mut a, b) = (scene.a.build(), scene.b.build());
-        let mut o = told(scene);
+        let mut o = reported(scene);
         change(&mut o, &mut a);
         let found = lies(&moving(&a, scene.motion_a), &moving(&b, scene.motion_b), &o);
         assert!(found.iter().any(|(l, _)| *l == lie), "{lie:?} is not noticed: {found:?}");
     };
     // Face ids of the plate: +x −x +y −y +z −z, then those of the cube that is taken out.
     let (top, bottom, phantom) = (4, 5, 6 + 3);
-    assert_eq!(told(&ball).faces_a[0], top);
+    assert_eq!(reported(&ball).faces_a[0], top);
     is_noticed(&ball, Lie::Bracket, &|o, _| o.time_lower = o.time_upper);
     is_noticed(&ball, Lie::Bracket, &|o, _| o.time_upper = 1.5);
     is_noticed(&ball, Lie::Point, &|o, _| o.point.z += 1e-7);
@@ -351,7 +351,7 @@ fn unit(rng: &mut Random) -> DQuat {
 #[test]
 fn a_pose_is_one_to_the_bit_whichever_way_it_comes_in() {
     let mut rng = Random::new(1);
-    let mut told = 0;
+    let mut reported = 0;
     for round in 0..rounds(100) {
         let (q, mut r, p) = (unit(&mut rng), unit(&mut rng), rng.vector(0.3));
         if round % 4 == 3 {
@@ -368,7 +368,7 @@ fn a_pose_is_one_to_the_bit_whichever_way_it_comes_in() {
             batches.iter().map(|records| bits(&mut s, records)).last().unwrap()
         };
         let added = ask(pose, &[vec![]]);
-        told += usize::from(!added.is_empty());
+        reported += usize::from(!added.is_empty());
         let b = 2;
         assert_eq!(ask(elsewhere, &[vec![PoseRecord::start(b, &pose)]]), added, "START, {round}");
         assert_eq!(
@@ -379,7 +379,7 @@ fn a_pose_is_one_to_the_bit_whichever_way_it_comes_in() {
         let twice = vec![PoseRecord::start(b, &pose), PoseRecord::end(b, &pose)];
         assert_eq!(ask(elsewhere, &[twice, vec![]]), added, "START and END, {round}");
     }
-    assert!(told > 30, "{told} steps told something");
+    assert!(reported > 30, "{reported} steps reported something");
 }
 
 #[test]
@@ -396,12 +396,15 @@ fn an_end_that_differs_by_its_last_bit_is_where_the_next_step_starts() {
         world.add_object(ObjectSpec::new(1, &part, Pose::new(p, q))).unwrap();
         world.step(&[PoseRecord::end(1, &end)], &StepOptions::default()).unwrap();
         let same = |pose: &Pose| pose.rotation.to_array().map(f64::to_bits) == turned.map(f64::to_bits);
-        assert!(same(&world.bodies()[0].track.end));
+        assert!(same(&world.bodies()[0].motion_state.end));
         // Not named any more: it rests where it was told to go. A part of the step that is taken changes nothing of that.
         for advance in [1.0, 0.5, 0.0] {
             world.step(&[], &StepOptions { advance, ..StepOptions::default() }).unwrap();
-            let track = world.bodies()[0].track;
-            assert!(same(&track.end) && same(&track.motion.start) && track.is_rest(), "round {round}: {track:?}");
+            let motion_state = world.bodies()[0].motion_state;
+            assert!(
+                same(&motion_state.end) && same(&motion_state.motion.start) && motion_state.is_rest(),
+                "round {round}: {motion_state:?}"
+            );
         }
     }
 }
@@ -424,7 +427,7 @@ fn fields_that_are_not_asked_for_are_plus_zero() {
 fn a_world_that_is_restored_goes_on_with_the_same_bits() {
     let mut rng = Random::new(5);
     let part = Arc::new(Part::new(Arc::new(Model::new(plate().scaled(0.5).build()))));
-    let mut told = 0;
+    let mut reported = 0;
     for round in 0..rounds(40) {
         let mut first = World::new(3, 6);
         let mut poses = vec![];
@@ -466,17 +469,19 @@ fn a_world_that_is_restored_goes_on_with_the_same_bits() {
             first.step(&records, &StepOptions { advance, ..StepOptions::default() }).unwrap();
         }
         // As a client tells a successor of the server: every track in bytes.
-        let tracks: Vec<_> = first
+        let motion_states: Vec<_> = first
             .bodies()
             .iter()
-            .map(|body| (body.id, WireTrack::of(body.id, &body.track).checked().expect("an accepted track")))
+            .map(|body| {
+                (body.id, WireTrack::of(body.id, &body.motion_state).checked().expect("an accepted motion_state"))
+            })
             .collect();
-        for (body, (_, track)) in first.bodies().iter().zip(&tracks) {
+        for (body, (_, motion_state)) in first.bodies().iter().zip(&motion_states) {
             let bits = |p: &Pose| (p.position.to_array().map(f64::to_bits), p.rotation.to_array().map(f64::to_bits));
-            assert_eq!(bits(&body.track.end), bits(&track.end), "round {round}");
-            assert_eq!(bits(&body.track.motion.start), bits(&track.motion.start), "round {round}");
+            assert_eq!(bits(&body.motion_state.end), bits(&motion_state.end), "round {round}");
+            assert_eq!(bits(&body.motion_state.motion.start), bits(&motion_state.motion.start), "round {round}");
         }
-        second.restore(&tracks).unwrap();
+        second.restore(&motion_states).unwrap();
         for advance in [0.5, 1.0, 0.75] {
             let records = [PoseRecord::turn(1, rng.vector(0.8), rng.vector(1.0))];
             let options = StepOptions { advance, clear: true, ..StepOptions::default() };
@@ -485,11 +490,11 @@ fn a_world_that_is_restored_goes_on_with_the_same_bits() {
                 out.pairs.iter().map(|p| (p.a, p.b, outcome_bits(&p.outcome))).collect::<Vec<_>>()
             };
             let (one, other) = (seen(&mut first), seen(&mut second));
-            told += one.len();
+            reported += one.len();
             assert_eq!(one, other, "round {round}");
         }
     }
-    assert!(told > 200);
+    assert!(reported > 200);
 }
 
 /// What is told of a pair, to the bit.

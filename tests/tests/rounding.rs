@@ -6,11 +6,11 @@
 //! `CONTACTD_EVALUATIONS=10000000 cargo test --release -p contactd-tests --test rounding -- --nocapture`
 #![allow(missing_docs)]
 
-use contactd::contact::clause::{self, Pair};
+use contactd::contact::clause::{self, Expressions};
 use contactd::contact::literal::{Faces, Side, View};
 use contactd::contact::{fit, rounding};
-use contactd::eco::Model;
 use contactd::motion::{Placed, Relative};
+use contactd::octree::Model;
 use contactd::solid::local::{LiteralId, literal_token};
 use contactd::solid::primitive::{Cone, Cylinder, Sphere};
 use contactd::solid::{Face, Label, Sense, Shape, SolidBuilder, surface};
@@ -300,8 +300,8 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
             let x_max = (center - at.center_a).length() + half.length();
             let h = r.within(0.0, 1.0 - t);
             let view = View {
-                a: Faces { solid: &a.solid, guards: &[] },
-                b: Faces { solid: &b.solid, guards: &[] },
+                a: Faces { solid: &a.solid, clip_planes: &[] },
+                b: Faces { solid: &b.solid, clip_planes: &[] },
                 at: &at,
                 motion: relative.bounds(t, h, x_max),
                 center,
@@ -381,7 +381,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
             let (on_a, on_b) = (pick(&mut r, a), pick(&mut r, b));
             let pool = [literal_token(on_a), literal_token(on_b)];
             let alone = r.chance(0.5);
-            let pair = Pair { pool: &pool, a: if alone { (0, 0) } else { (0, 1) }, b: (1, 2) };
+            let pair = Expressions { pool: &pool, a: if alone { (0, 0) } else { (0, 1) }, b: (1, 2) };
             let free = clause::advance(&view, &pair, &[], budget, 0.0, &mut clause::Scratch::default()).dt;
             if free > 0.0 && r.chance(0.5) {
                 let later = t + free.min(h);

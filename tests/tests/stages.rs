@@ -2,14 +2,14 @@
 //! `cargo test -p contactd-tests --test stages -- --nocapture` prints the table.
 #![allow(missing_docs)]
 
-use contactd::contact::{Counters, Ideas, Status};
-use contactd::eco::Model;
+use contactd::contact::{Counters, Status, Strategies};
+use contactd::octree::Model;
 use contactd_tests::engine::ask_with;
 use contactd_tests::judge::{Case, cases};
 
-fn work(case: &Case, ideas: Ideas) -> Counters {
+fn work(case: &Case, strategies: Strategies) -> Counters {
     let (a, b) = (Model::new(case.a.0.clone()), Model::new(case.b.0.clone()));
-    let o = ask_with((&a, case.a.1), (&b, case.b.1), case.resolution, ideas);
+    let o = ask_with((&a, case.a.1), (&b, case.b.1), case.resolution, strategies);
     assert_ne!(o.status, Status::Undecided, "{}", case.name);
     assert!(case.known.judge(&o, 1e-8).is_ok(), "{}: {o:?}", case.name);
     o.counters
@@ -24,7 +24,7 @@ fn median(mut v: Vec<f64>) -> f64 {
 fn every_case_by_stage() {
     println!("case                          tree  stage 1  pairs  cells");
     for case in cases() {
-        let c = work(&case, Ideas::default());
+        let c = work(&case, Strategies::default());
         println!("{:28} {:5} {:8} {:6} {:6}", case.name, c.primitives, c.after_stage1, c.candidates, c.cells);
         assert!(c.after_stage1 <= c.primitives);
         // Stage 3 works on what stage 2 handed over: cells without a candidate pair would have another source.
@@ -34,13 +34,14 @@ fn every_case_by_stage() {
 
 #[test]
 fn without_stage_1_or_stage_2_the_cells_of_a_part_of_forty_and_forty_double() {
-    let all = Ideas::default();
+    // The cells at the resolution asked for, however many.
+    let all = Strategies { coarser: false, ..Strategies::default() };
     let (mut without_1, mut without_2) = (vec![], vec![]);
     println!("case      all  no stage 1  no stage 2");
     for case in cases().iter().filter(|c| c.name.starts_with("part_")) {
         let cells = work(case, all).cells;
-        let no_1 = work(case, Ideas { region: false, ..all }).cells;
-        let no_2 = work(case, Ideas { walk: false, ..all }).cells;
+        let no_1 = work(case, Strategies { region: false, ..all }).cells;
+        let no_2 = work(case, Strategies { walk: false, ..all }).cells;
         println!("{:8} {cells:5} {no_1:11} {no_2:11}", case.name);
         without_1.push(no_1 as f64 / cells as f64);
         without_2.push(no_2 as f64 / cells as f64);

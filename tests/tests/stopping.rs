@@ -10,11 +10,11 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{
-    Asked, Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
-use contactd::eco::Model;
 use contactd::math::any_perpendicular;
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere};
 use contactd_proto::{Motion, Pose};
@@ -52,8 +52,8 @@ impl Table {
             b: Body { model: &self.moving, placed: at(motion) },
             resolution: self.delta,
             cell_limit: CELLS,
-            ideas: Ideas::default(),
-            asked: Asked::DEPTH,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
         };
         let o = earliest_contact(&query, &mut self.scratch);
         assert!(

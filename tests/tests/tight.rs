@@ -8,10 +8,10 @@
 #![allow(missing_docs)]
 
 use contactd::contact::{
-    Asked, Body, Ideas, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact,
+    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
-use contactd::eco::Model;
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::local;
 use contactd::solid::primitive::Polyhedron;
 use contactd::solid::{Sense, Solid};
@@ -325,18 +325,18 @@ fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -> Option<St
 }
 
 fn ask(scene: &Scene, models: [&Model; 2]) -> Outcome {
-    ask_with(scene, models, Ideas::default())
+    ask_with(scene, models, Strategies::default())
 }
 
-fn ask_with(scene: &Scene, models: [&Model; 2], ideas: Ideas) -> Outcome {
+fn ask_with(scene: &Scene, models: [&Model; 2], strategies: Strategies) -> Outcome {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
     let query = PairQuery {
         a: Body { model: models[0], placed: placed(scene.motion_a) },
         b: Body { model: models[1], placed: placed(scene.motion_b) },
         resolution: scene.resolution.unwrap_or_else(|| default_resolution(models[0], models[1])),
         cell_limit: contactd::contact::DEFAULT_CELL_LIMIT,
-        ideas,
-        asked: Asked::CONTACT,
+        strategies,
+        query_options: QueryOptions::CONTACT,
     };
     earliest_contact(&query, &mut Scratch::default())
 }
@@ -348,13 +348,13 @@ fn still() -> Motion {
 /// The answer of a scene that was undecided once; at most `cells`.
 #[track_caller]
 fn decided(name: &str, scene: &Scene, cells: u64) -> Outcome {
-    decided_with(name, scene, cells, Ideas::default())
+    decided_with(name, scene, cells, Strategies::default())
 }
 
 #[track_caller]
-fn decided_with(name: &str, scene: &Scene, cells: u64, ideas: Ideas) -> Outcome {
+fn decided_with(name: &str, scene: &Scene, cells: u64, strategies: Strategies) -> Outcome {
     let models = [&Model::new(scene.a.build()), &Model::new(scene.b.build())];
-    let o = ask_with(scene, models, ideas);
+    let o = ask_with(scene, models, strategies);
     let pair = Pair { models, motions: [scene.motion_a, scene.motion_b] };
     assert_eq!(judge(&mut Random::new(1), scene, &o, &pair), None, "{name}: {o:?}");
     assert!(o.counters.cells <= cells, "{name}: {} cells", o.counters.cells);
@@ -507,7 +507,7 @@ fn a_round_peg_turns_in_a_hole_with_flat_walls() {
     for k in 0..120 {
         let Some((scene, what)) = turning_peg(rng, 1.0) else { continue };
         // By the search alone.
-        let o = decided_with(&format!("peg {k}"), &scene, 400, Ideas { holes: false, ..Ideas::default() });
+        let o = decided_with(&format!("peg {k}"), &scene, 400, Strategies { cavities: false, ..Strategies::default() });
         assert_eq!(o.status, Status::Clear, "{k}: {what}");
     }
 }
@@ -580,8 +580,8 @@ fn tight_and_tiny_scenes_are_decided() {
                 Status::Overlap => 2,
                 Status::Undecided => 3,
             }] += 1;
-            let asked = scene.resolution.unwrap_or_else(|| default_resolution(models[0], models[1]));
-            raised += u64::from(o.resolution > 1.5 * asked);
+            let query_options = scene.resolution.unwrap_or_else(|| default_resolution(models[0], models[1]));
+            raised += u64::from(o.resolution > 1.5 * query_options);
             dearest = dearest.max(o.counters.cells);
             cells.push(o.counters.cells);
             let wrong = judge(&mut Random::new(own), &scene, &o, &pair)

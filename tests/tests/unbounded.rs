@@ -1,9 +1,9 @@
 //! Pairs of unbounded bodies: answered at once, with a point that is in both, or clear where their planes look at each other.
 #![allow(missing_docs)]
 
-use contactd::contact::{Asked, Scratch, Status, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{QueryOptions, Scratch, Status, earliest_contact};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::primitive::HalfSpace;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::question;
@@ -34,7 +34,7 @@ fn unbounded_bodies_overlap_far_out_and_are_told_so_at_once() {
             let spin = if r.chance(0.5) { DVec3::ZERO } else { r.vector(1.0) };
             Placed { place: Pose::IDENTITY, motion: Motion { start, velocity: r.vector(1.0), spin } }
         });
-        let query = question((&models[0], placed[0]), (&models[1], placed[1]), Asked::DEPTH);
+        let query = question((&models[0], placed[0]), (&models[1], placed[1]), QueryOptions::DEPTH);
         let o = earliest_contact(&query, &mut Scratch::default());
         assert_eq!((o.status, o.counters.cells), (Status::Overlap, 0), "{k}");
         for i in 0..2 {
@@ -61,7 +61,7 @@ fn half_spaces_that_look_at_each_other_are_clear_while_their_planes_are_apart() 
         let placed = [motion(start, DVec3::ZERO), motion(other, up * speed)]
             .map(|motion| Placed { place: Pose::IDENTITY, motion });
         let o = earliest_contact(
-            &question((&half, placed[0]), (&half, placed[1]), Asked::CONTACT),
+            &question((&half, placed[0]), (&half, placed[1]), QueryOptions::CONTACT),
             &mut Scratch::default(),
         );
         assert_eq!(o.counters.cells, 0, "{k}");

@@ -1,8 +1,8 @@
 //! Laws of stage 2's walk: when cubes can meet, and that no pair of surfaces that meets is missed.
 
 use contactd::bound::{Region, Side, locate};
-use contactd::eco::{Approach, Detail, Model, PairKind, Walk};
 use contactd::motion::{Placed, Relative};
+use contactd::octree::{Approach, Detail, Model, PairKind, Walk};
 use contactd::solid::primitive::{Cuboid, Cylinder};
 use contactd::solid::{Label, Node, Op, Sense, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};

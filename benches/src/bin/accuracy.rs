@@ -9,7 +9,7 @@ use contactd_benches::measure::Known;
 use contactd_benches::options::Options;
 use contactd_benches::page::{made_by, publish};
 use contactd_benches::race::Plan;
-use contactd_benches::report::{Context, ideas, octree, resolution, today, volumes};
+use contactd_benches::report::{Context, octree, resolution, strategies, today, volumes};
 use contactd_benches::workload::classes;
 use std::error::Error;
 use std::path::Path;
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let context = Context { classes, known, plan, quick: options.quick };
     let mut sections = resolution(&context);
     sections.push(today(&context));
-    sections.push(ideas(&context)?);
+    sections.push(strategies(&context)?);
     sections.push(volumes(&context));
     sections.push(octree(&context));
     let text = format!(

@@ -10,10 +10,10 @@
 
 use clap::Parser;
 use contactd::check::Check;
-use contactd::contact::{Asked, Outcome, Region, Scratch, Status, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{Outcome, QueryOptions, Region, Scratch, Status, earliest_contact};
 use contactd::import::{Facets, Limits, read_scene};
 use contactd::ipc::ServerConfig;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World};
 use contactd_benches::options::Options;
 use contactd_benches::row;
@@ -188,10 +188,10 @@ fn together(parts: Vec<([u8; 32], [u64; 4])>) -> Golden {
 /// One answer about two models, everything asked of it.
 fn pair(scene: &Scene) -> ([u8; 32], [u64; 4]) {
     let models = [&scene.a, &scene.b].map(|recipe| Model::new(recipe.build()));
-    let query = engine::question_of(scene, [&models[0], &models[1]], Asked::DEPTH);
-    let mut told = Told::default();
-    told.outcome(&earliest_contact(&query, &mut Scratch::default()));
-    told.end()
+    let query = engine::question_of(scene, [&models[0], &models[1]], QueryOptions::DEPTH);
+    let mut reported = Told::default();
+    reported.outcome(&earliest_contact(&query, &mut Scratch::default()));
+    reported.end()
 }
 
 /// `count` random pairs of a class.
@@ -213,11 +213,11 @@ fn case(folder: &Path) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
     let scene = read_scene(&folder.join("scene.toml"))?;
     let models = scene.load_models(Facets::Auto, &Limits::default())?;
     let models: Vec<Arc<Model>> = models.into_iter().map(|m| Arc::new(Model::new(m.solid))).collect();
-    let mut told = Told::default();
+    let mut reported = Told::default();
     for first in [false, true] {
-        told.step(Check::new(&scene, &models, None)?.step(first)?);
+        reported.step(Check::new(&scene, &models, None)?.step(first)?);
     }
-    Ok(told.end())
+    Ok(reported.end())
 }
 
 /// The rows of the 18 families of pairs of primitives.
@@ -266,7 +266,7 @@ fn stepped(seed: u64) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
         ..StepOptions::default()
     };
     let (stops, jitter) = (r.chance(0.3), if r.chance(0.5) { 0.0 } else { 10f64.powf(r.within(-9.0, -2.0)) });
-    let (mut told, mut advance) = (Told::default(), 1.0);
+    let (mut reported, mut advance) = (Told::default(), 1.0);
     for k in 1..=STEPS {
         let mut records = Vec::new();
         for (i, way) in ways.iter().enumerate().filter(|(i, _)| !(crowd && i % 7 == 3)) {
@@ -282,10 +282,10 @@ fn stepped(seed: u64) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
             records.push(PoseRecord::end(i as u32, &pose));
         }
         let out = world.step(&records, &StepOptions { advance, ..options })?;
-        told.step(out);
+        reported.step(out);
         advance = if stops { out.safe_time.clamp(0.0, 1.0) } else { 1.0 };
     }
-    Ok(told.end())
+    Ok(reported.end())
 }
 
 /// No rules, or those of two groups.
@@ -315,21 +315,21 @@ fn rules(r: &mut Random) -> Vec<Rule> {
 fn demo() -> Result<Golden, Box<dyn Error>> {
     let mut session = contactd::embedded(&ServerConfig::default())?;
     let run = contactd::demo::play(&mut session, |_, _| {})?;
-    let mut told = Told::default();
-    [run.steps, run.steps_with_contact, run.undecided].into_iter().for_each(|n| told.word(n as u64));
+    let mut reported = Told::default();
+    [run.steps, run.steps_with_contact, run.undecided].into_iter().for_each(|n| reported.word(n as u64));
     for row in &run.rows {
-        told.word(row.step as u64);
+        reported.word(row.step as u64);
         let overlap = row.record.status == contactd_proto::contact_record::OVERLAP;
-        told.statuses[if overlap { Status::Overlap } else { Status::Contact } as usize] += 1;
-        told.hash.update(bytemuck::bytes_of(&row.record));
+        reported.statuses[if overlap { Status::Overlap } else { Status::Contact } as usize] += 1;
+        reported.hash.update(bytemuck::bytes_of(&row.record));
     }
-    Ok(together(vec![told.end()]))
+    Ok(together(vec![reported.end()]))
 }
 
 /// The run of this process, a line for each family.
 fn alone(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let pick = |[full, quick]: [u64; 2]| if arguments.options.quick { quick } else { full };
-    let tell = |name: &str, work: &dyn Fn() -> Result<Golden, Box<dyn Error>>| -> Result<(), Box<dyn Error>> {
+    let report = |name: &str, work: &dyn Fn() -> Result<Golden, Box<dyn Error>>| -> Result<(), Box<dyn Error>> {
         if arguments.family.as_deref().is_some_and(|only| only != name) {
             return Ok(());
         }
@@ -337,16 +337,16 @@ fn alone(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         println!("{name},{answers},{contact},{clear},{overlap},{undecided},{hash}");
         Ok(())
     };
-    tell("cases", &cases)?;
-    tell("primitive_pairs", &|| Ok(known_pairs()))?;
+    report("cases", &cases)?;
+    report("primitive_pairs", &|| Ok(known_pairs()))?;
     for (name, class) in CLASSES {
-        tell(name, &|| Ok(pairs(class, pick(PAIRS))))?;
+        report(name, &|| Ok(pairs(class, pick(PAIRS))))?;
     }
-    tell("stepped", &|| {
+    report("stepped", &|| {
         let each = (0..pick(STEPPED)).into_par_iter().map(|s| stepped(s).map_err(|e| format!("stepped {s}: {e}")));
         Ok(together(each.collect::<Result<_, String>>()?))
     })?;
-    tell("demo", &demo)
+    report("demo", &demo)
 }
 
 /// A family of a run, or of an earlier one's file.
@@ -373,22 +373,22 @@ fn compare(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
         command.spawn()
     };
     let runs = [start("1")?, start("2")?];
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for run in runs {
         let out = run.wait_with_output()?;
         if !out.status.success() {
             return Err(format!("a run ended with {}", out.status).into());
         }
-        told.push(String::from_utf8(out.stdout)?);
+        reported.push(String::from_utf8(out.stdout)?);
     }
-    let [one, two] = [read(&told[0])?, read(&told[1])?];
+    let [one, two] = [read(&reported[0])?, read(&reported[1])?];
     let before = match &arguments.against {
         None => None,
         Some(path) => Some(read(&std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?)?),
     };
     let mut table = Table::new(&["family", "answers", "contact", "clear", "overlap", "undecided", "hash"]);
     let mut moved = Vec::new();
-    for line in told[0].lines() {
+    for line in reported[0].lines() {
         let name = line.split(',').next().unwrap_or_default();
         let g = &one[name];
         let [contact, clear, overlap, undecided] = g.statuses;

@@ -3,14 +3,14 @@
 //! parry answers a translating pair by `cast_shapes`, a turning one by `cast_shapes_nonlinear`, on its exact spheres,
 //! cylinders, cones and boxes. Errors are |time − known time| over the contacts that both found. The known times come from
 //! 128-bit arithmetic, but not all are as good as that: where ours differs by more than 1e-10 the reference of the tests, which
-//! shares no code with the engine, decides, and `known_off` tells the largest correction. `--without direct` leaves the search
+//! shares no code with the engine, decides, and `known_off` tells the largest correction. `--without convex` leaves the search
 //! alone to answer.
 //! `ratio_hits` and `ratio_misses` are medians over the cases that meet and over those that do not. Tails of ratios are
 //! of each case's fastest blocks; with 200 cases the p99.9 is the worst case.
 
 use clap::{Parser, ValueEnum};
 use contactd::contact::{Outcome, Scratch, Status};
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd_benches::options::Options;
 use contactd_benches::race::{Lap, Plan, median, quantile, race, worst};
 use contactd_benches::table::Table;
@@ -50,7 +50,7 @@ const DOUBTFUL: f64 = 1e-10;
 
 fn main() -> std::io::Result<()> {
     let Arguments { options, family: only, alone, which } = Arguments::parse();
-    let ideas = options.ideas();
+    let strategies = options.strategies();
     let plan = Plan { blocks: options.pick(9, 3), least: Duration::from_micros(options.pick(20, 10)) };
     let mut table = Table::new(&[
         "family",
@@ -78,15 +78,15 @@ fn main() -> std::io::Result<()> {
         "parry_error_worst",
     ]);
     for family in FAMILIES.into_iter().filter(|f| only.as_deref().is_none_or(|only| *f == only)) {
-        let asked = |time: f64| which == Which::All || (time >= 0.0) == (which == Which::Hits);
-        let cases = rows(family).into_iter().filter(|(_, time)| asked(*time)).step_by(options.pick(1, 10));
+        let query_options = |time: f64| which == Which::All || (time >= 0.0) == (which == Which::Hits);
+        let cases = rows(family).into_iter().filter(|(_, time)| query_options(*time)).step_by(options.pick(1, 10));
         let cases: Vec<(Scene, f64)> = cases.collect();
         let models: Vec<[Model; 2]> =
             cases.iter().map(|(s, _)| [Model::new(s.a.build()), Model::new(s.b.build())]).collect();
         let own: Vec<queries::Question> = cases
             .iter()
             .zip(&models)
-            .map(|((s, _), [a, b])| queries::Question::new((a, s.motion_a), (b, s.motion_b), ideas))
+            .map(|((s, _), [a, b])| queries::Question::new((a, s.motion_a), (b, s.motion_b), strategies))
             .collect();
         let other: Vec<peer::Question> = cases.iter().map(|(s, _)| peer::Question::of_scene(s)).collect();
 

@@ -11,8 +11,8 @@
 use clap::Parser;
 use contactd::cache::{self, Cache, Key, Origin, Prepared};
 use contactd::contact::{Outcome, Scratch, Status};
-use contactd::eco::Model;
 use contactd::import::{Facets, Limits, import_csg};
+use contactd::octree::Model;
 use contactd::solid::primitive::Cylinder;
 use contactd_benches::facets::{Drilled, Outline};
 use contactd_benches::options::Options;
@@ -152,7 +152,7 @@ fn loading(options: &Options) -> std::io::Result<()> {
             assert_eq!((first.value.origin, cached.value.origin), (Origin::Built, Origin::Kept));
             let expected = bytes(&cold.value);
             assert!([&parallel, &first, &cached].iter().all(|m| bytes(&m.value) == expected), "the same model");
-            nodes = cached.value.model.eco.census().nodes();
+            nodes = cached.value.model.octree.census().nodes();
             let [import, cold, parallel] = [import.seconds, cold.seconds, parallel.seconds];
             laps.push([import, cold, parallel, first.seconds, cached.seconds, shared.seconds / alone.seconds]);
         }
@@ -181,7 +181,7 @@ fn loading(options: &Options) -> std::io::Result<()> {
 fn main() -> std::io::Result<()> {
     let options = Options::parse();
     loading(&options)?;
-    let ideas = options.ideas();
+    let strategies = options.strategies();
     let plan = Plan { blocks: options.pick(7, 3), least: Duration::from_micros(20) };
     let peg = Model::new(Recipe::cylinder(0.24, 0.5).build());
     let shaft = peer::Body::of(&Cylinder { radius: 0.24, half_height: 0.5 }.into(), &Pose::IDENTITY);
@@ -226,7 +226,7 @@ fn main() -> std::io::Result<()> {
             .collect();
         let rest = Motion::resting(Pose::IDENTITY);
         let own: Vec<queries::Question> =
-            steps.iter().map(|m| queries::Question::new((&model.value, rest), (&peg, *m), ideas)).collect();
+            steps.iter().map(|m| queries::Question::new((&model.value, rest), (&peg, *m), strategies)).collect();
         let other: Vec<peer::Question> =
             steps.iter().map(|m| peer::Question::new(compound.value.clone(), &rest, shaft.clone(), m)).collect();
         let mut scratch = Scratch::default();

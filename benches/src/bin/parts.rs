@@ -7,8 +7,8 @@
 
 use clap::Parser;
 use contactd::contact::{Outcome, Scratch, Status};
-use contactd::eco::Model;
 use contactd::import::{Facets, Limits, read_csg};
+use contactd::octree::Model;
 use contactd::solid::primitive::{Cylinder, Sphere};
 use contactd_benches::facets::{Drilled, Outline, compound, mesh, sampled};
 use contactd_benches::options::Options;
@@ -215,7 +215,7 @@ fn part(cases: usize, turning: bool) -> Class {
 
 fn main() -> std::io::Result<()> {
     let Arguments { options, only } = Arguments::parse();
-    let ideas = options.ideas();
+    let strategies = options.strategies();
     let plan = Plan { blocks: options.pick(5, 3), least: Duration::from_micros(20) };
     let cases = options.pick(50, 6);
     let mut classes = peg_classes(cases);
@@ -247,8 +247,11 @@ fn main() -> std::io::Result<()> {
     // A row may take so long, with fewer cases if need be; a peer whose one answer takes longer gets no more facets.
     let budget = options.pick(2.0, 0.3);
     for class in &classes {
-        let own: Vec<queries::Question> =
-            class.steps.iter().map(|[m, n]| queries::Question::new((&class.a, *m), (&class.b, *n), ideas)).collect();
+        let own: Vec<queries::Question> = class
+            .steps
+            .iter()
+            .map(|[m, n]| queries::Question::new((&class.a, *m), (&class.b, *n), strategies))
+            .collect();
         let mut scratch = Scratch::default();
         let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
         let cells = || answers.iter().map(|o| o.counters.cells as f64);

@@ -74,18 +74,20 @@ impl Probe {
             let group = if i % 2 == 0 { "near" } else { "far" };
             ids.push(session.add_object(Object::new("body", model).group(group).at(Pose::at(at(i, 0))))?);
         }
-        let mut asked = 0;
+        let mut query_options = 0;
         for k in 1..=self.steps {
             for (i, slot) in session.begin_step(ids.len())?.iter_mut().enumerate() {
                 *slot = PoseRecord::end(ids[i], &Pose::at(at(i, k)));
             }
             let reply = session.finish(Duration::from_secs(60))?;
             if k > STEPS[0] {
-                asked += reply.header().pairs;
+                query_options += reply.header().pairs;
             }
         }
-        if asked > 0 {
-            return Err(format!("{asked} pairs were asked about: they are not within their clearance").into());
+        if query_options > 0 {
+            return Err(
+                format!("{query_options} pairs were query_options about: they are not within their clearance").into()
+            );
         }
         Ok(())
     }
@@ -110,8 +112,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         "scene",
         "objects",
         "steps",
-        "told",
-        "asked",
+        "reported",
+        "query_options",
         "known",
         "cells",
         "cells_cold",
@@ -127,8 +129,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             scene.name,
             scene.recipes.len(),
             steps,
-            walked.told as f64 / n,
-            f64::from(walked.asked) / n,
+            walked.reported as f64 / n,
+            f64::from(walked.query_options) / n,
             f64::from(walked.known) / n,
             walked.cells[0] as f64 / n,
             walked.cells[1] as f64 / n,
@@ -142,13 +144,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut table =
         Table::new(&["approach", "met", "steps", "cells", "cells_worst", "query_cells", "us", "query_us", "ratio"]);
     for way in approaches() {
-        let told = approach(&way, WAY, options.pick(101, 21))?;
-        let [cost, query] = [&told.steps, &told.query].map(|costs| {
+        let reported = approach(&way, WAY, options.pick(101, 21))?;
+        let [cost, query] = [&reported.steps, &reported.query].map(|costs| {
             let (times, cells): (Vec<f64>, Vec<f64>) = costs.iter().copied().unzip();
             (1e6 * median(times), median(cells.clone()), worst(cells))
         });
-        let steps = told.steps.len() / told.query.len();
-        let met = if told.met { "yes" } else { "no" };
+        let steps = reported.steps.len() / reported.query.len();
+        let met = if reported.met { "yes" } else { "no" };
         table.push(row![way.name, met, steps, cost.1, cost.2, query.1, cost.0, query.0, cost.0 / query.0]);
     }
     println!("a peg's way into its hole: the median step of {WAY} / all of it as one question");

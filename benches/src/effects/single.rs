@@ -90,7 +90,7 @@ pub fn single(context: &Context) -> Section {
         title: "One effect at a time".into(),
         text: format!(
             "Every pair has the effect against no pair has it, in blocks that alternate. Margins: {NARROW} and {WIDE}, of bodies of \
-             size 1. The rows \"the plain rule\" against itself tell what the ratios are good for."
+             size 1. The rows \"the plain rule\" against itself report what the ratios are good for."
         ),
         figures: vec![],
         summary: table.clone(),

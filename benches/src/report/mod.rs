@@ -1,14 +1,14 @@
 //! The report of what accuracy costs: one section for each knob, and one for what a user would do today.
 
-mod ideas;
 mod octree;
 mod resolution;
+mod strategies;
 mod today;
 mod volumes;
 
-pub use ideas::ideas;
 pub use octree::octree;
 pub use resolution::resolution;
+pub use strategies::strategies;
 pub use today::today;
 pub use volumes::volumes;
 

@@ -7,7 +7,7 @@ use crate::page::Section;
 use crate::race::{median, quantile};
 use crate::row;
 use crate::table::Table;
-use contactd::eco::{Limits, Model};
+use contactd::octree::{Limits, Model};
 use std::cell::Cell;
 
 /// Loads of a model, the fastest of which counts: single ones are short and noisy.
@@ -75,8 +75,8 @@ pub fn octree(context: &Context) -> Section {
                     least = load().0.min(least);
                 }
                 seconds.set(seconds.get() + least);
-                nodes.set(nodes.get() + made.eco.census().nodes());
-                built.set(built.get().max(usize::from(made.eco.depth())));
+                nodes.set(nodes.get() + made.octree.census().nodes());
+                built.set(built.get().max(usize::from(made.octree.depth())));
                 made
             };
             let own = class.remade(remake);
@@ -142,7 +142,7 @@ pub fn octree(context: &Context) -> Section {
             " From the third on a level takes {middle} times the one above in the median, eight in ten {low} to {high}."
         )
     };
-    let told = |k: usize, q: f64| times(quantile(pooled[k].iter().copied(), q));
+    let reported = |k: usize, q: f64| times(quantile(pooled[k].iter().copied(), q));
     let axes = |label: &str| [Axis::Linear("levels below the root".into()), Axis::Log(label.into())];
     Section {
         name: "accuracy_octree",
@@ -159,12 +159,12 @@ pub fn octree(context: &Context) -> Section {
                     "Median time of a question, search alone. The answer and its accuracy do not depend on the depth, and the \
                      time hardly: over all questions an undivided octree takes {} times the default's time in the median ({} at the \
                      1st percentile, {} at the 99th, {} at most), the deepest {} times. On parts like these stage 1 and the alternatives \
-                     of the tree have told apart most of what an octree could.",
-                    told(0, 0.5),
-                    told(0, 0.01),
-                    told(0, 0.99),
-                    told(0, 1.0),
-                    told(1, 0.5),
+                     of the tree have reported apart most of what an octree could.",
+                    reported(0, 0.5),
+                    reported(0, 0.01),
+                    reported(0, 0.99),
+                    reported(0, 1.0),
+                    reported(1, 0.5),
                 ),
                 axes: axes("microseconds a question"),
                 series: curves,

@@ -184,7 +184,7 @@ pub fn resolution(context: &Context) -> Vec<Section> {
         caption: format!(
             "A contact's time is solved to the last digits whatever the resolution: from 1e-6 down it is off by at most {} of the \
              size (solid; of pairs {}, which is what their tables are good for). At coarser ones a first touch that never becomes as \
-             deep as the resolution does not count, and a later contact is told instead (up to {} later). What the resolution \
+             deep as the resolution does not count, and a later contact is reported instead (up to {} later). What the resolution \
              sets is the bracket between proof and witness (dashed): twice the resolution for smooth faces, more at edges. The \
              grey line is the rounding budget, below which nothing can be proven. Errors of 0 are drawn at 1e-17.",
             shown(fine_error),

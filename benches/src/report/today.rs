@@ -29,8 +29,8 @@ struct Way {
 /// Errors (lengths, in sizes) and how many answers are wrong: a contact where none is, or none where one is.
 fn judged(class: &Class, known: &Known, speeds: &[f64], times: &[Option<f64>]) -> (Vec<f64>, usize) {
     let (mut errors, mut wrong) = (Vec::new(), 0);
-    for ((i, told), truth) in times.iter().enumerate().zip(&known.truths) {
-        match (told, truth) {
+    for ((i, reported), truth) in times.iter().enumerate().zip(&known.truths) {
+        match (reported, truth) {
             (Some(t), Truth::Meets(u)) => errors.push((t - u).abs() * speeds[i] / class.cases[i].size()),
             (None, Truth::Clear) | (_, Truth::Unknown) => {}
             _ => wrong += 1,
@@ -44,7 +44,7 @@ fn question(case: &Case, peer: &Peer, drilled: &SharedShape) -> peer::Question {
 }
 
 /// Rows that a text shows: some of each way.
-fn is_told(row: &[Cell]) -> bool {
+fn is_reported(row: &[Cell]) -> bool {
     let (Cell::Text(knob), Cell::Number(value)) = (&row[2], &row[3]) else { return false };
     let of: &[f64] = match knob.as_str() {
         "N" => &[16.0, 64.0, 256.0, 1024.0],
@@ -265,7 +265,7 @@ pub fn today(context: &Context) -> Section {
                Ratios are to this engine at its default resolution, measured in the same blocks."
             .into(),
         figures,
-        summary: table.chosen(is_told),
+        summary: table.chosen(is_reported),
         table,
     }
 }

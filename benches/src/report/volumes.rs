@@ -10,7 +10,7 @@ use crate::row;
 use crate::table::{Cell, Table};
 use contactd::bound::Volumes;
 use contactd::contact::{Clock, Outcome, Scratch, Stage, Status};
-use contactd::eco::{Limits, Model};
+use contactd::octree::{Limits, Model};
 
 const ALL: [(Volumes, &str); 4] = [
     (Volumes::Balls, "balls"),
@@ -35,7 +35,7 @@ pub fn volumes(context: &Context) -> Section {
         "stage_1_p99_us",
         "stage_1_max_us",
         "left_percent",
-        "told_by_stage_1_percent",
+        "reported_by_stage_1_percent",
         "cells_p50",
         "cells_p99",
         "cells_max",
@@ -92,7 +92,7 @@ pub fn volumes(context: &Context) -> Section {
             let spent = |q: f64| 1e6 * quantile(timed.iter().map(|(_, c)| c.of(Stage::Region).as_secs_f64()), q);
             let sum = |of: fn(&Outcome) -> u64| timed.iter().map(|(o, _)| of(o) as f64).sum::<f64>();
             let left = 100.0 * sum(|o| o.counters.after_stage1) / sum(|o| o.counters.primitives);
-            let told = timed.iter().filter(|(o, c)| o.status == Status::Clear && c.last() == Stage::Region).count();
+            let reported = timed.iter().filter(|(o, c)| o.status == Status::Clear && c.last() == Stage::Region).count();
             let us = |q: f64| 1e6 * quantile(m.laps.iter().map(|l| l.least[0]), q);
             let ratio = |q: f64| quantile(m.laps.iter().map(|l| l.least_ratio()), q);
             let cells = |q: f64| quantile(m.answers.iter().map(|o| o.counters.cells as f64), q);
@@ -110,7 +110,7 @@ pub fn volumes(context: &Context) -> Section {
                 spent(0.99),
                 spent(1.0),
                 left,
-                100.0 * told as f64 / own.cases.len().max(1) as f64,
+                100.0 * reported as f64 / own.cases.len().max(1) as f64,
                 cells(0.5),
                 cells(0.99),
                 cells(1.0),

@@ -81,7 +81,7 @@ impl Failure {
 
     /// Keeps the sentence for `contactd_error_message`; returns the code.
     #[cold]
-    pub(crate) fn told(self) -> i32 {
+    pub(crate) fn reported(self) -> i32 {
         let Self { code, index, mut sentence } = self;
         // A sentence ends at a zero byte, whatever text it quotes.
         sentence.truncate(sentence.find('\0').unwrap_or(sentence.len()));

@@ -51,8 +51,8 @@ pub fn hand_over(transport: Box<dyn Transport>) -> Result<*mut Session, Error> {
 pub(crate) fn free(call: impl FnOnce() -> Result<(), Failure>) -> i32 {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => crate::error::OK,
-        Ok(Err(failure)) => failure.told(),
-        Err(payload) => panicked(payload).told(),
+        Ok(Err(failure)) => failure.reported(),
+        Err(payload) => panicked(payload).reported(),
     }
 }
 
@@ -63,10 +63,10 @@ pub(crate) fn free(call: impl FnOnce() -> Result<(), Failure>) -> i32 {
 pub(crate) unsafe fn on(session: *mut Session, call: impl FnOnce(&mut State) -> Result<(), Failure>) -> i32 {
     // SAFETY: NULL or a live handle; shared, since a call may be under way in it.
     let Some(session) = (unsafe { session.as_ref() }) else {
-        return Failure::null("the session (closed, or never opened)").told();
+        return Failure::null("the session (closed, or never opened)").reported();
     };
     if let Err(failure) = session.enter() {
-        return failure.told();
+        return failure.reported();
     }
     // SAFETY: `enter` lets one call at a time through, of one thread: nothing else refers to the state.
     let state = unsafe { &mut *session.state.get() };
@@ -103,15 +103,15 @@ impl State {
     fn run(&mut self, call: impl FnOnce(&mut Self) -> Result<(), Failure>) -> i32 {
         if self.panicked {
             let sentence = "contactd failed internally within this session: close it";
-            return Failure::new(crate::error::ERROR_PANIC, sentence).told();
+            return Failure::new(crate::error::ERROR_PANIC, sentence).reported();
         }
         // What a panic leaves half done is never looked at again: the session is closed to all calls but its end.
         match catch_unwind(AssertUnwindSafe(|| call(self))) {
             Ok(Ok(())) => crate::error::OK,
-            Ok(Err(failure)) => failure.told(),
+            Ok(Err(failure)) => failure.reported(),
             Err(payload) => {
                 self.panicked = true;
-                panicked(payload).told()
+                panicked(payload).reported()
             }
         }
     }

@@ -80,7 +80,7 @@ impl Manifolds {
         }
     }
 
-    fn told(&self, pair: &Told, first: usize) -> Manifold {
+    fn reported(&self, pair: &Told, first: usize) -> Manifold {
         let points = &self.points[first..first + pair.points.len()];
         Manifold {
             a: pair.a,
@@ -191,7 +191,7 @@ pub unsafe extern "C" fn contactd_manifolds_get(manifolds: *mut Manifolds, index
         let Some((pair, first)) = manifolds.kept.pairs().zip(&manifolds.first).nth(index) else {
             return Err(Failure::argument(format!("pair {index}: there are {}", manifolds.first.len())));
         };
-        out.write(manifolds.told(&pair, *first));
+        out.write(manifolds.reported(&pair, *first));
         Ok(())
     })
 }
@@ -206,7 +206,7 @@ pub unsafe extern "C" fn contactd_manifolds_find(manifolds: *mut Manifolds, a: u
         let out = unsafe { place(out, "out")? };
         let found = manifolds.kept.pairs().zip(&manifolds.first).find(|(pair, _)| (pair.a, pair.b) == (a, b));
         out.write(match found {
-            Some((pair, first)) => manifolds.told(&pair, *first),
+            Some((pair, first)) => manifolds.reported(&pair, *first),
             None => Manifold { a, b, status: 0, is_complete: 1, points: null(), point_count: 0 },
         });
         Ok(())

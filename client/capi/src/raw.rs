@@ -104,13 +104,13 @@ mod tests {
         unsafe {
             assert_eq!(row(numbers.as_ptr(), 3, "numbers").unwrap(), [1, 2, 3]);
             assert!(row::<u64>(std::ptr::null(), 0, "numbers").unwrap().is_empty());
-            assert_eq!(row::<u64>(std::ptr::null(), 1, "numbers").unwrap_err().told(), ERROR_NULL);
-            assert_eq!(row(numbers.as_ptr(), usize::MAX, "numbers").unwrap_err().told(), ERROR_ARGUMENT);
-            assert_eq!(given(odd, "a number").unwrap_err().told(), ERROR_ARGUMENT);
-            assert_eq!(place(odd.cast_mut(), "a number").unwrap_err().told(), ERROR_ARGUMENT);
+            assert_eq!(row::<u64>(std::ptr::null(), 1, "numbers").unwrap_err().reported(), ERROR_NULL);
+            assert_eq!(row(numbers.as_ptr(), usize::MAX, "numbers").unwrap_err().reported(), ERROR_ARGUMENT);
+            assert_eq!(given(odd, "a number").unwrap_err().reported(), ERROR_ARGUMENT);
+            assert_eq!(place(odd.cast_mut(), "a number").unwrap_err().reported(), ERROR_ARGUMENT);
             place(&raw mut numbers[1], "a number").unwrap().write(7);
             assert_eq!(text(c"straße".as_ptr(), "a word").unwrap(), "straße");
-            assert_eq!(text(c"\xff".as_ptr(), "a word").unwrap_err().told(), ERROR_ARGUMENT);
+            assert_eq!(text(c"\xff".as_ptr(), "a word").unwrap_err().reported(), ERROR_ARGUMENT);
         }
         assert_eq!(numbers, [1, 7, 3]);
     }
@@ -120,9 +120,9 @@ mod tests {
         assert_eq!(seconds(0.5, "a timeout").unwrap(), Duration::from_millis(500));
         assert_eq!(seconds(f64::INFINITY, "a timeout").unwrap(), Duration::from_secs(1_000_000_000));
         for bad in [-1e-9, f64::NAN, f64::NEG_INFINITY] {
-            assert_eq!(seconds(bad, "a timeout").unwrap_err().told(), ERROR_ARGUMENT, "{bad}");
+            assert_eq!(seconds(bad, "a timeout").unwrap_err().reported(), ERROR_ARGUMENT, "{bad}");
         }
-        assert_eq!(flag(2, "a flag").unwrap_err().told(), ERROR_ARGUMENT);
+        assert_eq!(flag(2, "a flag").unwrap_err().reported(), ERROR_ARGUMENT);
         assert!(flag(1, "a flag").unwrap() && !flag(0, "a flag").unwrap());
     }
 }

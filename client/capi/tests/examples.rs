@@ -78,13 +78,13 @@ fn the_points_of_the_manifold_slide_with_the_cube() {
     // Step, id, then position, normal and distance.
     let numbers =
         |line: &str| -> Vec<f64> { line.split([' ', ',', ':']).filter_map(|word| word.parse().ok()).collect() };
-    let told: Vec<Vec<f64>> = lines.lines().map(numbers).collect();
+    let reported: Vec<Vec<f64>> = lines.lines().map(numbers).collect();
     assert_eq!(
-        told.iter().map(|n| (n[0], n[1])).collect::<Vec<_>>(),
+        reported.iter().map(|n| (n[0], n[1])).collect::<Vec<_>>(),
         [0.0, 1.0].map(|step| [0.0, 1.0, 2.0, 3.0].map(|id| (step, id))).concat()
     );
     let mut corners = std::collections::BTreeSet::new();
-    for (first, second) in told[..4].iter().zip(&told[4..]) {
+    for (first, second) in reported[..4].iter().zip(&reported[4..]) {
         let [x, y, z] = [first[2], first[3] - 0.25, first[4]];
         assert!(x.abs() == 2.0 && y.abs() == 2.0 && z == 2.0005, "{lines}");
         corners.insert((x > 0.0, y > 0.0));

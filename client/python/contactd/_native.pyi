@@ -134,11 +134,8 @@ class Session:
         name: str,
         model: int,
         group: str,
-        fixed: bool,
-        rotates: bool,
-        max_speed: float,
-        place: _Pose,
-        at: _Pose,
+        moves: tuple[bool, bool, float],
+        poses: tuple[_Pose, _Pose],
     ) -> int: ...
     def _set_rules(self, rules: list) -> None: ...
     def remove_object(self, object: int) -> None:

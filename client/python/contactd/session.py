@@ -205,7 +205,7 @@ class Session(_native.Session):
         point of it is ever faster, length per second; steps then need ``options.dt``. ``place``: the model in the object's
         frame. ``at``: where the object stands. Poses are a ``Pose``, a pair of position and quaternion x y z w, or a position.
         """
-        return self._add_object(name, _id(model), group, fixed, rotates, max_speed, pose(place), pose(at))
+        return self._add_object(name, _id(model), group, (fixed, rotates, max_speed), (pose(place), pose(at)))
 
     def set_rules(self, rules: Iterable[Rule]) -> None:
         """Replaces the session's rules; ``Refused`` with the index of a bad one."""

@@ -2,7 +2,7 @@
 
 use crate::errors;
 use crate::reply::Reply;
-use contactd_client::manifold::{Manifolds as Kept, Point, told_at};
+use contactd_client::manifold::{Manifolds as Kept, Point, reported_at};
 use contactd_client::{Error, Reply as Answer};
 use contactd_proto::Pose;
 use contactd_proto::control::WirePose;
@@ -42,10 +42,10 @@ impl Manifolds {
     /// Takes the answer to a step; `placed(object, time)` says where an object stood.
     fn _update(&mut self, reply: &Bound<'_, Reply>, placed: &Bound<'_, PyAny>) -> PyResult<()> {
         let py = reply.py();
-        let told = |r: &contactd_proto::ContactRecord| (r.a, r.b, told_at(r));
-        let told: Vec<_> = Reply::read(reply, |answer| answer.records().iter().map(told).collect())?;
-        let mut poses = Vec::with_capacity(told.len());
-        for (a, b, time) in told {
+        let reported = |r: &contactd_proto::ContactRecord| (r.a, r.b, reported_at(r));
+        let reported: Vec<_> = Reply::read(reply, |answer| answer.records().iter().map(reported).collect())?;
+        let mut poses = Vec::with_capacity(reported.len());
+        for (a, b, time) in reported {
             let at = |object: u32| pose(py, placed.call1((object, time))?.extract()?);
             poses.push((at(a)?, at(b)?));
         }

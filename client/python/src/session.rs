@@ -5,7 +5,7 @@ use crate::errors;
 use crate::lease::{Lease, What};
 use crate::mass::MassProperties;
 use crate::options::Options;
-use crate::pose::pose;
+use crate::pose::{PoseFields, pose};
 use crate::reply::Reply;
 use crate::rules::RuleFields;
 use crate::slots::{Batch, Slots, references};
@@ -269,12 +269,10 @@ impl Session {
         name: &str,
         model: u32,
         group: &str,
-        fixed: bool,
-        rotates: bool,
-        max_speed: f64,
-        place: ([f64; 3], [f64; 4]),
-        at: ([f64; 3], [f64; 4]),
+        moves: (bool, bool, f64),
+        poses: (PoseFields, PoseFields),
     ) -> PyResult<u32> {
+        let ((fixed, rotates, max_speed), (place, at)) = (moves, poses);
         let mut object = Object::new(name, model).group(group).max_speed(max_speed);
         object = object.place(pose(place.0, place.1)).at(pose(at.0, at.1));
         object = if fixed { object.fixed() } else { object };

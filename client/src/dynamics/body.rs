@@ -2,7 +2,7 @@
 
 use super::{Inertia, spin};
 use crate::Object;
-use contactd_proto::{Pose, Track};
+use contactd_proto::{MotionState, Pose};
 use glam::{DMat3, DVec3};
 
 /// A body to be added to a world: an object with what physics needs of it.
@@ -137,7 +137,7 @@ pub struct Entry {
     /// Coefficient of restitution.
     pub restitution: f64,
     /// Its motion as the engine has it.
-    pub track: Track,
+    pub motion_state: MotionState,
     /// Where it stands.
     pub pose: Pose,
     /// Its velocity now.
@@ -189,7 +189,7 @@ impl Entry {
             radius: inertia.radius(),
             friction: body.friction,
             restitution: body.restitution,
-            track: Track::resting(body.pose),
+            motion_state: MotionState::resting(body.pose),
             pose: body.pose,
             now: Twist { v: body.velocity, w: body.omega },
             momentum: DVec3::ZERO,

@@ -7,7 +7,7 @@ use super::solver::Ends;
 use super::{Point, World, arc, impact};
 use crate::{Error, Transport};
 use contactd_proto::contact_record::{CONTACT, ContactRecord, SENSOR, UNDECIDED};
-use contactd_proto::{Motion, Pose, PoseRecord, Track};
+use contactd_proto::{Motion, MotionState, Pose, PoseRecord};
 use glam::DVec3;
 
 /// Most chords proposed to find where an arc meets; the last one is taken where it stops.
@@ -196,7 +196,7 @@ impl<T: Transport> World<T> {
         for (slot, e) in slots.iter_mut().zip(self.entries.iter_mut().filter(|e| e.plan.moves)) {
             *slot = PoseRecord::turn(e.id, e.pose.position + e.plan.mean.v * t, e.plan.mean.w * t);
             if let Ok(order) = slot.decode() {
-                e.track = Track::ordered(e.pose, order);
+                e.motion_state = MotionState::ordered(e.pose, order);
             }
         }
         // An overlap meets first, always: the others are then searched to their ends.
@@ -289,7 +289,7 @@ impl<T: Transport> World<T> {
         }
         for e in &mut self.entries {
             if e.plan.moves {
-                e.pose = e.track.at(s);
+                e.pose = e.motion_state.at(s);
             }
             if !e.is_active() {
                 continue;
@@ -308,7 +308,7 @@ impl<T: Transport> World<T> {
     fn undo(&mut self) {
         self.taken = 0.0;
         for e in self.entries.iter_mut().filter(|e| e.plan.moves) {
-            e.pose = e.track.at(0.0);
+            e.pose = e.motion_state.at(0.0);
         }
     }
 
@@ -334,7 +334,7 @@ impl<T: Transport> World<T> {
                 let Twist { v, w } = e.plan.mean;
                 let motion = Motion::turning(e.pose, e.pose.position + v * t, w * t);
                 e.pose = Pose::new(e.pose.position + v * t, motion.at(1.0).rotation);
-                e.track = Track::resting(e.pose);
+                e.motion_state = MotionState::resting(e.pose);
             }
             if e.is_active() {
                 (e.now.v, e.momentum) = (e.plan.end.v, e.plan.momentum);

@@ -6,7 +6,7 @@ use super::islands::Islands;
 use super::{Body, Effects, Energy, Frame, Overlap, Point, State, impact, solver};
 use crate::{Error, Session, Transport};
 use contactd_proto::pose_record::unit_quaternion;
-use contactd_proto::{Pose, Report, Rule, Track};
+use contactd_proto::{MotionState, Pose, Report, Rule};
 use glam::DVec3;
 use std::time::Duration;
 
@@ -147,7 +147,7 @@ impl<T: Transport> World<T> {
         // As the engine keeps it.
         if let Ok(rotation) = unit_quaternion(body.pose.rotation.to_array()) {
             entry.pose.rotation = rotation;
-            entry.track = Track::resting(entry.pose);
+            entry.motion_state = MotionState::resting(entry.pose);
             entry.refresh();
         }
         let at = self.entries.len();

@@ -10,8 +10,8 @@
 //! | rest | the content, bincode |
 
 use super::Key;
-use crate::eco::{Model, Snapshot, SnapshotView};
 use crate::import::{Note, Place};
+use crate::octree::{Model, Snapshot, SnapshotView};
 use bincode::{BorrowDecode, Encode, config};
 use std::io;
 

@@ -2,14 +2,14 @@
 //!
 //! A cache is a folder with a file for each text, named by its key: a hash of the text and of whatever else decides what an
 //! import makes of it (`key`). A file is used only when its format, its checksum, the program that wrote it and its key
-//! are right and its content is consistent (`file`, `eco::snapshot`); any other is built anew and replaced. So a kept model has
+//! are right and its content is consistent (`file`, `octree::snapshot`); any other is built anew and replaced. So a kept model has
 //! the bits of a fresh one, and what lies in the folder decides nothing but the time that loading takes.
 //!
 //! Files are written beside their place and renamed into it: several processes may share a folder, and readers see a whole
 //! file or none. They are not forced to the disk; what a power failure leaves is found by the checksum. Nothing here
 //! fails: a folder that cannot be used is a sentence to be told, and models are imported as without one.
 //!
-//! Floor 6: imports `eco`, `import`, `math`.
+//! Floor 6: imports `octree`, `import`, `math`.
 
 mod file;
 mod key;
@@ -19,8 +19,8 @@ mod tests;
 pub use file::{Flaw, decode, encode};
 pub use key::Key;
 
-use crate::eco::Model;
 use crate::import::{self, Facets, ImportError, Limits, Note, Scene, SceneError};
+use crate::octree::Model;
 use std::collections::HashMap;
 use std::fs::{self, DirBuilder, File};
 use std::io::{self, Read as _, Write as _};
@@ -46,7 +46,7 @@ pub struct Cache {
     folder: PathBuf,
     bytes: u64,
     /// It was told already that nothing can be written.
-    told: AtomicBool,
+    reported: AtomicBool,
 }
 
 /// A model, ready to be used.
@@ -86,7 +86,7 @@ impl Cache {
         if mode & 0o002 != 0 {
             return Err(unusable("one that all users may write to".into()));
         }
-        let this = Self { folder: folder.into(), bytes, told: AtomicBool::new(false) };
+        let this = Self { folder: folder.into(), bytes, reported: AtomicBool::new(false) };
         this.sweep();
         Ok(this)
     }
@@ -196,7 +196,7 @@ pub fn prepare(
     });
     let (model, notes) = build()?;
     if let Err(e) = cache.write(&key, &model, &notes)
-        && !cache.told.swap(true, Ordering::Relaxed)
+        && !cache.reported.swap(true, Ordering::Relaxed)
     {
         trouble = Some(format!("{}: expected to keep a model, found {e}", cache.folder.display()));
     }

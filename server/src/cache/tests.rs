@@ -52,7 +52,7 @@ fn a_kept_model_is_the_built_one_bit_for_bit() {
     let folder = folder();
     let cache = cache(&folder.path().join("not/there/yet"));
     let fresh = prepared(None, PART);
-    let nodes = fresh.model.eco.census().nodes();
+    let nodes = fresh.model.octree.census().nodes();
     assert!(!fresh.notes.is_empty() && nodes > 1000, "{:?}, {nodes} nodes", fresh.notes);
     let (first, second) = (prepared(Some(&cache), PART), prepared(Some(&cache), PART));
     assert_eq!((first.origin, second.origin), (Origin::Built, Origin::Kept));
@@ -163,8 +163,8 @@ fn bad_files_of_all_kinds_are_replaced() {
 }
 
 /// Asks a model that was read whatever would follow an index of it.
-fn asked(model: &Model) {
-    fn visit(model: &Model, node: &crate::eco::Node, out: &mut Vec<u32>) {
+fn query_options(model: &Model) {
+    fn visit(model: &Model, node: &crate::octree::Node, out: &mut Vec<u32>) {
         out.clear();
         let mut tokens = vec![];
         model.literals(node, 0.0, &mut tokens);
@@ -175,16 +175,16 @@ fn asked(model: &Model) {
     }
     for x in [DVec3::ZERO, DVec3::new(0.3, -1.0, 0.2)] {
         model.solid.value(x);
-        model.eco.locate(x);
+        model.octree.locate(x);
     }
-    visit(model, model.eco.root(), &mut vec![]);
+    visit(model, model.octree.root(), &mut vec![]);
 }
 
 #[test]
 fn well_sealed_nonsense_is_refused_or_a_model_that_can_be_asked() {
     // Few levels, so that every byte can be tried.
     let p = prepared(None, "difference() { cube(size = [4, 4, 1], center = true); sphere(r = 1); }");
-    let shallow = Model::with_limits(p.model.solid.clone(), crate::eco::Limits::to_depth(1));
+    let shallow = Model::with_limits(p.model.solid.clone(), crate::octree::Limits::to_depth(1));
     let content = encode(&shallow, &prepared(None, PART).notes).expect("a content");
     let (mut refused, mut read) = (0, 0);
     for at in 0..content.len() {
@@ -193,7 +193,7 @@ fn well_sealed_nonsense_is_refused_or_a_model_that_can_be_asked() {
             other[at] = value;
             match decode(&other) {
                 Ok((model, _)) => {
-                    asked(&model);
+                    query_options(&model);
                     read += 1;
                 }
                 Err(Flaw::Content(_)) => refused += 1,
@@ -341,7 +341,7 @@ fn a_tree_too_deep_to_be_read_again_is_not_kept() {
             // Alternating, so that no level is folded away; what is subtracted leaves nothing to decompose.
             root = b.operation(if level % 2 == 0 { Op::Union } else { Op::Difference }, &[other, root]);
         }
-        Model::with_limits(b.finish(root), crate::eco::Limits::to_depth(0))
+        Model::with_limits(b.finish(root), crate::octree::Limits::to_depth(0))
     };
     let work = move || (encode(&built(100), &[]).is_some(), encode(&built(2001), &[]).is_some());
     let thread = std::thread::Builder::new().stack_size(256 << 20).spawn(work).expect("a thread");

@@ -1,7 +1,7 @@
 //! A certificate: the proof that a pair stays free of contact until `time_lower`, to be checked by another program.
 //!
 //! It is made after the answer is known, by a second, simpler pass: no slices of time, no octrees, no candidates, one tree
-//! of cells that starts with the carrier's whole box. A cell is proven free for spans of time, one after the other; where
+//! of cells that starts with the reference body's whole box. A cell is proven free for spans of time, one after the other; where
 //! its bounds do not advance it is split into halves, which go on from there. Each span lists the combinations of
 //! literals that cannot hold together; the cell's expression is closed when no clause is left. Source: the bounds of
 //! `clause`, taken over a slightly larger cell, for a little less time and depth, so that a checker with bounds of its own
@@ -25,7 +25,7 @@ use crate::solid::{Node, NodeId, Op, Sense, Solid};
 use glam::DVec3;
 use std::fmt::Write as _;
 
-/// A literal with the body it belongs to; A is the carrier of the cells.
+/// A literal with the body it belongs to; A is the reference body of the cells.
 type Key = (Side, LiteralId);
 
 /// Room left for a checker: depth proven, relative to the depth claimed.
@@ -54,9 +54,9 @@ pub struct Certificate {
     pub depth: f64,
     /// Free of contact until then.
     pub until: f64,
-    /// The box that is covered, in the carrier's frame.
+    /// The box that is covered, in the reference body's frame.
     pub root: Aabb,
-    /// For a contact: `time_upper`, and the point that is at the depth in both bodies then, in the carrier's frame.
+    /// For a contact: `time_upper`, and the point that is at the depth in both bodies then, in the reference body's frame.
     pub witness: Option<(f64, DVec3)>,
     /// Cells in preorder.
     pub cells: Vec<CellProof>,
@@ -88,7 +88,7 @@ pub enum Rest {
     /// Its spans reach the end of the proof, or its expression is false.
     #[default]
     Done,
-    /// It lies inside the carrier: the first contact would be on both surfaces.
+    /// It lies inside the reference body: the first contact would be on both surfaces.
     Inside,
     /// Two halves follow: axis and coordinate.
     Split(usize, f64),
@@ -102,9 +102,9 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     let (mut task, swapped) = Task::of(query);
     let depth = outcome.depth;
     // In the frames of the bodies as they move: the search may leave out a spin that moves nothing.
-    let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+    let (reference, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
     let still = task.relative;
-    task.relative = Relative::new(carrier.placed, other.placed);
+    task.relative = Relative::new(reference.placed, other.placed);
     task.delta = DEPTH * depth;
     let hull = task.a.aabb();
     // Coordinates of the box and of what it holds are right to a few units in the last place.
@@ -140,10 +140,10 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
 /// a little more than that, which leaves a checker room. `None` when the limit of cells is reached.
 pub fn certify_level(query: &PairQuery, level: f64, made: f64, until: f64) -> Option<Certificate> {
     let (mut task, swapped) = Task::of(query);
-    let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
-    task.relative = Relative::new(carrier.placed, other.placed);
+    let (reference, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+    task.relative = Relative::new(reference.placed, other.placed);
     task.delta = -made;
-    task.ideas.fits &= made < task.fits_below();
+    task.strategies.fits &= made < task.fits_below();
     // A checker has bounds of its own of how far {f <= level} reaches beyond a cone or a polyhedron.
     let hull = extent(task.a, task.a.root, ROOM * level);
     let slack = hull.half() * 1e-9 + DVec3::splat(level);
@@ -213,7 +213,7 @@ fn witness(task: &Task, (swapped, still): (bool, &Relative), o: &Outcome, depth:
     found.map(|x| (o.time_upper, x))
 }
 
-/// The contact's point in the carrier's frame.
+/// The contact's point in the reference body's frame.
 fn carried(task: &Task, o: &Outcome) -> DVec3 {
     let at = task.relative.at(o.time);
     at.world_from_a.transpose() * (o.point - task.relative.world_point(&at, DVec3::ZERO))
@@ -364,7 +364,7 @@ impl<'a> Maker<'a> {
         let mut pool = open.a.clone();
         let split = pool.len() as u32;
         pool.extend_from_slice(&b);
-        let pair = clause::Pair { pool: &pool, a: (0, split), b: (split, pool.len() as u32) };
+        let pair = clause::Expressions { pool: &pool, a: (0, split), b: (split, pool.len() as u32) };
         if let Some(record) = &mut self.scratch.record {
             record.clear();
         }
@@ -390,15 +390,15 @@ impl<'a> Maker<'a> {
         (h, Some(thinned(close, &open.a, &open.b)), dt, found.cost)
     }
 
-    fn at(&self, t: f64, h: f64, center: DVec3, half: DVec3) -> Placed<'a> {
+    fn at(&self, t: f64, h: f64, center: DVec3, half: DVec3) -> PlacedTree<'a> {
         let at = self.task.relative.at(t);
         let x_max = (center - at.center_a).length() + half.length();
-        Placed { task: self.task, at, motion: self.task.relative.bounds(t, h, x_max), center, half }
+        PlacedTree { task: self.task, at, motion: self.task.relative.bounds(t, h, x_max), center, half }
     }
 }
 
 /// What a view is made of.
-struct Placed<'a> {
+struct PlacedTree<'a> {
     task: &'a Task<'a>,
     at: crate::motion::Instant,
     motion: crate::motion::Bounds,
@@ -406,11 +406,11 @@ struct Placed<'a> {
     half: DVec3,
 }
 
-impl Placed<'_> {
+impl PlacedTree<'_> {
     fn view(&self) -> View<'_> {
         View {
-            a: Faces { solid: self.task.a, guards: &[] },
-            b: Faces { solid: self.task.b, guards: &[] },
+            a: Faces { solid: self.task.a, clip_planes: &[] },
+            b: Faces { solid: self.task.b, clip_planes: &[] },
             at: &self.at,
             motion: self.motion,
             center: self.center,
@@ -421,7 +421,7 @@ impl Placed<'_> {
             delta: self.task.delta,
             wall: self.task.delta * (WALL / DEPTH),
             rounding: self.task.rounding,
-            fits: self.task.ideas.fits,
+            fits: self.task.strategies.fits,
             multipliers: true,
             curved: false,
         }
@@ -550,10 +550,10 @@ impl Certificate {
     /// The certificate as text; `a` and `b` are the indices of the query's objects in the scene. Format:
     /// docs/certificate.md.
     pub fn write(&self, (a, b): (usize, usize), out: &mut String) {
-        let (r, carrier) = (&self.root, if self.swapped { b } else { a });
+        let (r, reference) = (&self.root, if self.swapped { b } else { a });
         let _ = writeln!(
             out,
-            "pair {a} {b} carrier {carrier} depth {:e} until {:e} cells {} box {}",
+            "pair {a} {b} reference {reference} depth {:e} until {:e} cells {} box {}",
             self.depth,
             self.until,
             self.cells.len(),
@@ -605,4 +605,4 @@ fn numbers(points: &[DVec3]) -> String {
 }
 
 /// The first line of every certificate.
-pub const HEADER: &str = "contactd-certificate 1";
+pub const HEADER: &str = "contactd-certificate 2";

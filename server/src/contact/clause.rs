@@ -51,7 +51,7 @@ const LOOK_BEYOND: f64 = 0.02;
 pub struct Advance {
     /// The cell is free of contact for this long from the view's instant (inclusive); negative: nothing proven.
     pub dt: f64,
-    /// Literals with positive multipliers in the weakest clause, guards left out.
+    /// Literals with positive multipliers in the weakest clause, clip planes left out.
     pub support: Vec<(Side, LiteralId, f64)>,
     /// Where the linear bounds of that clause are lowest: offset from the cell's centre.
     pub y: DVec3,
@@ -132,7 +132,7 @@ pub struct Term {
 
 /// The expressions of both bodies over a cell, as ranges of one token pool.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair<'p> {
+pub struct Expressions<'p> {
     /// The pool.
     pub pool: &'p [Token],
     /// A's expression: start and end; empty when it is true everywhere.
@@ -144,7 +144,7 @@ pub struct Pair<'p> {
 /// Bounds the cell over all clauses of `pair`; stops early once `dt` falls below `useless`.
 pub fn advance(
     view: &View,
-    pair: &Pair,
+    pair: &Expressions,
     hints: &[Hint],
     rounding: f64,
     useless: f64,

@@ -6,13 +6,13 @@
 //! so bodies displaced by d_A and d_B do not meet while d_A + d_B < 2g: a common point x would lie within (d_A + d_B)/2 of
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
-use super::asked::Asked;
 use super::cell::Ending;
 use super::certificate::{self, Certificate};
+use super::convex::Convex;
 use super::depth;
-use super::direct::Convex;
 use super::outcome::Counters;
 use super::query::{Body, PairQuery};
+use super::query_options::QueryOptions;
 use super::region;
 use super::search::{Scratch, Search};
 use super::task::Task;
@@ -29,7 +29,7 @@ pub struct Kept {
     /// Time, fraction of the motion, until which it does; 0 when nothing was proven.
     pub until: f64,
     /// By how much the bodies may be displaced together until then before they can be within `touch` of each other.
-    pub room: f64,
+    pub clearance: f64,
     /// Work done.
     pub counters: Counters,
 }
@@ -58,7 +58,7 @@ fn reach(task: &Task) -> f64 {
 /// shortcuts in front of the search, made for depths, are not asked.
 fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>, Counters) {
     task.delta = -level;
-    task.ideas.fits &= level < task.fits_below();
+    task.strategies.fits &= level < task.fits_below();
     let is_empty = task.a.is_empty() || task.b.is_empty();
     let mut search = Search::new(task, std::mem::take(scratch));
     if !is_empty {
@@ -72,13 +72,13 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
 
 /// A lower bound of the distance of two whole convex primitives at the start of the motion, less their touching
 /// distance (`margin`, at least 2 delta); `None` for anything else. A length; negative when they may touch.
-pub fn room(query: &PairQuery, margin: f64) -> Option<f64> {
+pub fn at_start(query: &PairQuery, margin: f64) -> Option<f64> {
     let (task, _) = Task::of(query);
     Some(Convex::new(task)?.distance() - touch(&task, margin) - 8.0 * task.rounding)
 }
 
-/// The direction that proves `room`: unit, world axes, from the query's first body to its second.
-pub fn direction_of_room(query: &PairQuery) -> Option<DVec3> {
+/// The direction that proves `clearance`: unit, world axes, from the query's first body to its second.
+pub fn direction_of_clearance(query: &PairQuery) -> Option<DVec3> {
     let (task, swapped) = Task::of(query);
     let n = Convex::new(task)?.direction().normalize();
     Some(if swapped { -n } else { n })
@@ -93,51 +93,51 @@ pub enum Distance {
 }
 
 /// The proof that a pair keeps a distance until `until` over the query's motion: one in which bodies displaced together by `way`
-/// are farther than their touching distance apart, where `keep` has proven as much for `room`, which is more. `None` where it
-/// takes more cells than the query allows, or the two are too near each other to leave a checker room.
-pub fn certify_kept(query: &PairQuery, margin: f64, (way, room): (f64, f64), until: f64) -> Option<Distance> {
+/// are farther than their touching distance apart, where `keep` has proven as much for `clearance`, which is more. `None` where it
+/// takes more cells than the query allows, or the two are too near each other to leave a checker clearance.
+pub fn certify_kept(query: &PairQuery, margin: f64, (way, clearance): (f64, f64), until: f64) -> Option<Distance> {
     let (task, swapped) = Task::of(query);
     let touch = touch(&task, margin);
     if let Some(pair) = Convex::new(task) {
         let sign = if swapped { -1.0 } else { 1.0 };
-        let all = pair.directions(room + touch + 8.0 * task.rounding);
+        let all = pair.directions(clearance + touch + 8.0 * task.rounding);
         return Some(Distance::Directions(all.into_iter().map(|(t, n)| (t, n * sign)).collect()));
     }
-    let [needed, proven] = [way, room].map(|d| 0.5 * (d + touch));
+    let [needed, proven] = [way, clearance].map(|d| 0.5 * (d + touch));
     let spare = proven - needed;
     certificate::certify_level(query, needed + 0.1 * spare, needed + 0.9 * spare, until).map(Distance::Cells)
 }
 
-/// Until when a pair keeps its surfaces a distance apart that leaves `room` (a length) for displacements, or as much of it
+/// Until when a pair keeps its surfaces a distance apart that leaves `clearance` (a length) for displacements, or as much of it
 /// as the models' bounds can tell. The query's limit bounds the work; what was proven when it ran out counts. What comes
 /// within `lead` (fraction of the motion) of the end of that time need not be told exactly.
-pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut Scratch) -> Kept {
+pub fn keep(query: &PairQuery, margin: f64, clearance: f64, proof_slack: f64, scratch: &mut Scratch) -> Kept {
     let (mut task, _) = Task::of(query);
-    task.asked = Asked::CONTACT;
+    task.query_options = QueryOptions::CONTACT;
     if let Some(pair) = Convex::new(task) {
-        let (until, count) = pair.keeps(room + touch(&task, margin) + 8.0 * task.rounding);
-        return Kept { until, room, counters: Counters { closed_forms: count, ..Counters::default() } };
+        let (until, count) = pair.keeps(clearance + touch(&task, margin) + 8.0 * task.rounding);
+        return Kept { until, clearance, counters: Counters { closed_forms: count, ..Counters::default() } };
     }
     if Convex::are_two(&task) {
         // No direction separates them: there is no distance to keep.
-        return Kept { until: 0.0, room, counters: Counters { closed_forms: 1, ..Counters::default() } };
+        return Kept { until: 0.0, clearance, counters: Counters { closed_forms: 1, ..Counters::default() } };
     }
     // Half of the distance on either side, with more than rounding to spare.
-    let wanted = 0.5 * (room + touch(&task, margin)) * (1.0 + 1e-9) + 8.0 * task.rounding;
+    let wanted = 0.5 * (clearance + touch(&task, margin)) * (1.0 + 1e-9) + 8.0 * task.rounding;
     let level = wanted.min(0.99 * reach(&task));
-    let room = room.min(2.0 * (level - 8.0 * task.rounding) * (1.0 - 2e-9) - touch(&task, margin));
-    if !(room > 0.0 && level.is_finite()) {
-        return Kept { until: 0.0, room, counters: Counters::default() };
+    let clearance = clearance.min(2.0 * (level - 8.0 * task.rounding) * (1.0 - 2e-9) - touch(&task, margin));
+    if !(clearance > 0.0 && level.is_finite()) {
+        return Kept { until: 0.0, clearance, counters: Counters::default() };
     }
-    task.lead = lead;
+    task.proof_slack = proof_slack;
     let (ending, counters) = nearing(task, level, scratch);
     let until = match ending {
         Some(Ending::Clear) | None => 1.0,
-        Some(Ending::Contact(found)) => (found.goal - lead).max(0.0),
+        Some(Ending::Contact(found)) => (found.goal - proof_slack).max(0.0),
         Some(Ending::Limit(t) | Ending::Long(t, _) | Ending::Rounding(t)) => t,
         Some(Ending::Deep(_)) => 0.0,
     };
-    Kept { until, room, counters }
+    Kept { until, clearance, counters }
 }
 
 /// Until when the bodies of a question are proven to stay farther apart than `distance` (a length), 1 when they do so over
@@ -146,7 +146,7 @@ pub fn keep(query: &PairQuery, margin: f64, room: f64, lead: f64, scratch: &mut 
 /// of that negative depth; farther, the whole trees tell how near the bodies are, and their speed how long that lasts.
 pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (f64, bool, Counters) {
     let (mut task, _) = Task::of(query);
-    task.asked = Asked::CONTACT;
+    task.query_options = QueryOptions::CONTACT;
     if task.a.is_empty() || task.b.is_empty() {
         return (1.0, true, Counters::default());
     }

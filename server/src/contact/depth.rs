@@ -8,7 +8,7 @@
 //! Either way its depth g is a proven lower bound: a ball of radius g is common to both bodies, so no translation
 //! shorter than 2g takes them apart.
 
-use super::clause::{self, Pair};
+use super::clause::{self, Expressions};
 use super::literal::{Faces, Side, View};
 use super::separation::{self, Cover};
 use super::task::Task;
@@ -142,8 +142,8 @@ fn ascend(rounds: usize, enough: f64, task: &Task, at: &Instant, start: DVec3, w
         work.bound();
         // Literals decided against the present depth over the trust box fold away.
         let view = View {
-            a: Faces { solid: task.a, guards: &[] },
-            b: Faces { solid: task.b, guards: &[] },
+            a: Faces { solid: task.a, clip_planes: &[] },
+            b: Faces { solid: task.b, clip_planes: &[] },
             at,
             motion: task.relative.bounds(0.0, 0.0, 0.0),
             center: x,
@@ -167,7 +167,7 @@ fn ascend(rounds: usize, enough: f64, task: &Task, at: &Instant, start: DVec3, w
             size *= 0.5;
             continue;
         }
-        let pair = Pair { pool: &pool, a: (0, middle), b: (middle, end) };
+        let pair = Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
         let step = clause::advance(&view, &pair, &[], 0.0, f64::INFINITY, &mut scratch);
         if !step.support.is_empty() {
             support = step.support.clone();

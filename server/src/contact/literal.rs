@@ -31,13 +31,13 @@ pub enum Side {
     B,
 }
 
-/// The faces of one body: those of its solid, then the search's guards.
+/// The faces of one body: those of its solid, then the search's clip planes.
 #[derive(Clone, Copy, Debug)]
 pub struct Faces<'a> {
     /// The solid.
     pub solid: &'a Solid,
     /// Planes of octree voxels, in the solid's frame; id = number of the solid's faces + index.
-    pub guards: &'a [Face],
+    pub clip_planes: &'a [Face],
 }
 
 impl Faces<'_> {
@@ -46,7 +46,7 @@ impl Faces<'_> {
         let own = self.solid.faces.len();
         match self.solid.faces.get(id as usize) {
             Some(f) => f,
-            None => &self.guards[id as usize - own],
+            None => &self.clip_planes[id as usize - own],
         }
     }
     /// True for a voxel's plane.

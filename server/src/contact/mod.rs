@@ -1,21 +1,20 @@
 //! Stage 3 and the queue that orders all three stages: earliest contact of one pair over one step.
 //!
-//! Floor 6: imports `eco`, `bound`, `motion`, `solid`, `math`, `proto`.
+//! Floor 6: imports `octree`, `bound`, `motion`, `solid`, `math`, `proto`.
 
-pub mod asked;
+mod cavity;
 mod cell;
 pub mod certificate;
 pub mod clause;
 pub mod clearance;
 pub mod clock;
+mod convex;
 mod depth;
-mod direct;
 mod extent;
 mod features;
 pub mod fit;
 mod found;
 mod handed;
-mod hole;
 pub mod literal;
 pub mod lp;
 pub mod newton;
@@ -23,6 +22,7 @@ pub mod outcome;
 pub mod pair;
 mod propose;
 pub mod query;
+pub mod query_options;
 pub mod region;
 mod rescue;
 pub mod roots;
@@ -37,11 +37,11 @@ mod unbounded;
 pub mod within;
 mod work;
 
-pub use asked::Asked;
 pub use clock::{Clock, Stage};
-pub(crate) use direct::{Glance, Glancing, Hull, Stance};
+pub(crate) use convex::{Glancing, Hull, SeparatingAxisTest, SweptShape};
 pub use outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
 pub use pair::{PairSearch, earliest_contact, find_earliest, resolution_of};
-pub use query::{Body, Ideas, PairQuery, default_resolution};
+pub use query::{Body, PairQuery, Strategies, default_resolution};
+pub use query_options::QueryOptions;
 pub use region::{Region, RegionPoint, Regions};
 pub use search::Scratch;

@@ -210,14 +210,14 @@ impl Problem<'_> {
         let (mut x, mut t, mut lambda) = (x, t, Weights::from_slice(lambda));
         let mut f = [0.0; MAX_UNKNOWNS];
         let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
-        let mut best: f64 = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+        let mut best: f64 = self.fill(active, (x, t), &lambda, level, (&mut f, &mut jac));
         if self.time_scale > SLOW {
             // Multipliers first: in the time that a slow pair takes to turn its normals towards wrong ones it is far away.
             let mut still = jac;
             still.iter_mut().for_each(|row| row[..4].fill(0.0));
             let step = damped_step(&still, &f, n, LEAST_DAMPING)?;
             lambda.iter_mut().zip(&step[4..n]).for_each(|(l, s)| *l += s);
-            best = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+            best = self.fill(active, (x, t), &lambda, level, (&mut f, &mut jac));
         }
         let mut damping = 1.0;
         let far = FARTHEST.max(HARDLY * self.time_scale);
@@ -251,7 +251,7 @@ impl Problem<'_> {
                 }
                 continue;
             }
-            let next = self.fill(active, nx, nt, &nl, level, &mut nf, &mut nj);
+            let next = self.fill(active, (nx, nt), &nl, level, (&mut nf, &mut nj));
             if next < best {
                 let stalled = next > 0.25 * best && best < 1e-26;
                 (x, t, lambda, f, jac, best) = (nx, nt, nl, nf, nj, next);
@@ -295,7 +295,7 @@ impl Problem<'_> {
         let mut last = f64::INFINITY;
         for _ in 0..STEPS {
             let mut jac = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
-            let square = self.fill(active, x, t, &lambda, level, &mut f, &mut jac);
+            let square = self.fill(active, (x, t), &lambda, level, (&mut f, &mut jac));
             if square <= MET || (square <= SMALL && square > 1e-3 * last) {
                 if square > MET {
                     (x, t) = self.meet(active, x, t, level).ok_or(false)?;
@@ -380,12 +380,10 @@ impl Problem<'_> {
     fn fill(
         &self,
         active: &[Constraint],
-        x: DVec3,
-        t: f64,
+        (x, t): (DVec3, f64),
         lambda: &[f64],
         level: f64,
-        f: &mut [f64; MAX_UNKNOWNS],
-        jac: &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+        (f, jac): (&mut [f64; MAX_UNKNOWNS], &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS]),
     ) -> f64 {
         let m = active.len();
         let at = self.relative.at(t);

@@ -1,13 +1,13 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
+use super::cavity;
 use super::cell::Ending;
 use super::clock::Stage;
+use super::convex::{self, Quick};
 use super::depth;
-use super::direct::{self, Quick};
 use super::extent::{ACTIVE, INCIDENT, extent, note, noted, rank_of};
 use super::features::Features;
 use super::found::Found;
-use super::hole;
 use super::literal::{Faces, Side};
 use super::newton::{Constraint, Problem, Solution};
 use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
@@ -37,7 +37,7 @@ pub fn earliest_contact(query: &PairQuery, scratch: &mut Scratch) -> Outcome {
 /// The same, written to a place: of thousands of pairs copies would take as long as the easiest of them.
 pub fn find_earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
     scratch.enter(Stage::Front);
-    match direct::balls(query) {
+    match convex::balls(query) {
         Some(passage) => *outcome = passage.outcome(query),
         None => earliest(query, scratch, outcome),
     }
@@ -56,11 +56,11 @@ fn earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
 
 /// What is told without a search of a pair that is no pair of balls; `outcome` is clear before.
 fn whole(query: &PairQuery, outcome: &mut Outcome) -> Quick {
-    if let Some(told) = unbounded::answer(query) {
-        *outcome = told;
+    if let Some(reported) = unbounded::answer(query) {
+        *outcome = reported;
         return Quick::Told;
     }
-    direct::quick(query, outcome)
+    convex::quick(query, outcome)
 }
 
 /// Answers what is not told without a search.
@@ -81,7 +81,7 @@ fn clear(query: &PairQuery) -> Outcome {
 
 /// What is told of two whole primitives without a search; `outcome` is clear before.
 fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
-    match direct::balls(query) {
+    match convex::balls(query) {
         Some(passage) => {
             *outcome = passage.outcome(query);
             Quick::Told
@@ -123,7 +123,7 @@ pub struct PairSearch<'a> {
     /// The ending that a shortcut in front of the search has found.
     ending: Option<Ending>,
     /// The answer of two whole primitives, found without a search.
-    told: Option<Outcome>,
+    reported: Option<Outcome>,
     outcome: Outcome,
     resolution: f64,
     /// How often the resolution was raised since rounding left its depth untold.
@@ -159,14 +159,14 @@ impl<'a> PairSearch<'a> {
         let quick = quick(query, &mut outcome);
         if let Quick::Told = quick {
             let (resolution, limit) = (task.delta, query.cell_limit);
-            let told = Some(outcome);
+            let reported = Some(outcome);
             return Self {
                 task,
                 swapped,
                 level: 1.0,
                 search: None,
                 ending: None,
-                told,
+                reported,
                 outcome,
                 resolution,
                 raised: 0,
@@ -199,16 +199,18 @@ impl<'a> PairSearch<'a> {
         let some = !a.is_empty() && !b.is_empty();
         match quick {
             Quick::Overlap(x) => overlap = Some(x),
-            Quick::Open(along) if query.ideas.direct => ending = direct::answer(&mut search, along),
+            Quick::Open(along) if query.strategies.convex => ending = convex::answer(&mut search, along),
             _ => {}
         }
-        if ending.is_none() && overlap.is_none() && some && query.ideas.holes {
-            ending = hole::answer(&mut search);
+        if ending.is_none() && overlap.is_none() && some && query.strategies.cavities {
+            ending = cavity::answer(&mut search);
         }
         if ending.is_none() && overlap.is_none() && some {
             search.start();
         }
-        search.patience = PATIENCE;
+        if query.strategies.coarser {
+            search.patience = PATIENCE;
+        }
         let (search, limit) = (Some(search), query.cell_limit);
         let spins = |(a, b): (Placed, Placed)| [a.motion.spin, b.motion.spin];
         let moving = if swapped { (query.b.placed, query.a.placed) } else { (query.a.placed, query.b.placed) };
@@ -219,7 +221,7 @@ impl<'a> PairSearch<'a> {
             level: 1.0,
             search,
             ending,
-            told: None,
+            reported: None,
             outcome,
             resolution,
             raised: 0,
@@ -232,17 +234,17 @@ impl<'a> PairSearch<'a> {
         if let Some(x) = overlap
             && !pair.goes_past(x, 0)
         {
-            pair.told = Some(pair.overlaps(x, Some(before)));
+            pair.reported = Some(pair.overlaps(x, Some(before)));
         }
         pair
     }
 
     /// The answer for an overlap at the start with the common point x, of which something may have been told.
-    fn overlaps(&self, x: DVec3, told: Option<&Outcome>) -> Outcome {
+    fn overlaps(&self, x: DVec3, reported: Option<&Outcome>) -> Outcome {
         let (task, mut outcome) = (&self.task, self.outcome);
-        if let Some(told) = told {
+        if let Some(reported) = reported {
             let counters = outcome.counters;
-            outcome = Outcome { resolution: outcome.resolution, counters: told.counters, ..*told };
+            outcome = Outcome { resolution: outcome.resolution, counters: reported.counters, ..*reported };
             outcome.counters += Counters { primitives: 0, closed_forms: 0, ..counters };
         } else {
             fill_overlap(&mut outcome, task, x);
@@ -250,7 +252,7 @@ impl<'a> PairSearch<'a> {
                 outcome.swap_sides();
             }
         }
-        if task.asked.penetration {
+        if task.query_options.penetration {
             let at = task.relative.at(0.0);
             let work = Work::new(task.limit.min(depth::MOST_CELLS));
             let (deepest, direction, depth, _) = depth::deepest(task, &at, x, &work);
@@ -268,7 +270,7 @@ impl<'a> PairSearch<'a> {
     /// than the start by delta; `cells` were spent. False when it is not, or when the work allowed does not prove how deep the
     /// start is.
     fn goes_past(&mut self, x: DVec3, cells: u64) -> bool {
-        if !self.task.asked.past_overlap || self.task.past > 0.0 {
+        if !self.task.query_options.past_overlap || self.task.ignored_depth > 0.0 {
             return false;
         }
         let work = Work::new(self.task.limit.min(depth::MOST_CELLS));
@@ -279,10 +281,10 @@ impl<'a> PairSearch<'a> {
         let Some(deepest) = deepest else { return false };
         self.outcome.counters.past_overlaps += 1;
         (self.outcome.touching, self.outcome.past) = (true, true);
-        self.task.past = deepest;
+        self.task.ignored_depth = deepest;
         // What fits say holds for depths that are small against the bodies.
-        self.task.ideas.fits = false;
-        self.task.nearly = 0.0;
+        self.task.strategies.fits = false;
+        self.task.start_tolerance = 0.0;
         self.level = 1.0;
         self.restart(cells + work.cells());
         true
@@ -290,8 +292,8 @@ impl<'a> PairSearch<'a> {
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
-        if let Some(told) = &self.told {
-            return if told.status == Status::Clear { f64::INFINITY } else { told.time_lower };
+        if let Some(reported) = &self.reported {
+            return if reported.status == Status::Clear { f64::INFINITY } else { reported.time_lower };
         }
         match &self.ending {
             Some(Ending::Contact(found)) => found.goal,
@@ -302,8 +304,8 @@ impl<'a> PairSearch<'a> {
 
     /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Outcome> {
-        if let Some(told) = self.told {
-            return (told.status == Status::Clear || told.time_lower <= until).then_some(told);
+        if let Some(reported) = self.reported {
+            return (reported.status == Status::Clear || reported.time_lower <= until).then_some(reported);
         }
         loop {
             let search = self.search.as_mut()?;
@@ -345,17 +347,17 @@ impl<'a> PairSearch<'a> {
                 }
                 Ending::Deep(x) => {
                     self.outcome.touching = true;
-                    if self.level == 1.0 && self.task.past == 0.0 {
+                    if self.level == 1.0 && self.task.ignored_depth == 0.0 {
                         // A body that was stopped at its contact starts at depth 0 ± rounding: search at twice the depth.
                         self.level = 2.0;
-                        self.task.nearly = 0.0;
+                        self.task.start_tolerance = 0.0;
                         self.restart(cells);
                         continue;
                     }
                     // A step that raised the resolution may have left the bodies a little deeper than 2 delta.
                     let most = 2.0 * most_raised(self.resolution, self.task.rounding);
                     let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x);
-                    if self.task.past == 0.0 && depth <= most && self.raise() {
+                    if self.task.ignored_depth == 0.0 && depth <= most && self.raise() {
                         self.restart(cells);
                         continue;
                     }
@@ -380,14 +382,14 @@ impl<'a> PairSearch<'a> {
         let x = if self.swapped { self.task.relative.at(found.upper).b_point(x) } else { x };
         self.outcome.witness = Some(x);
         if let Some(bodies) = &self.spun
-            && self.task.asked.point()
+            && self.task.query_options.point()
         {
             let o = &mut self.outcome;
             let velocity = |body: &Placed| {
                 let motion = &body.motion;
                 motion.velocity + motion.spin.cross(o.point - motion.at(o.time).position)
             };
-            // The normal still points from the carrier.
+            // The normal still points from the reference body.
             let sign = if self.swapped { -1.0 } else { 1.0 };
             o.normal_speed = sign * (velocity(&bodies[0]) - velocity(&bodies[1])).dot(o.normal);
         }
@@ -420,15 +422,16 @@ impl<'a> PairSearch<'a> {
             let (resolution, depth) = (self.resolution, self.task.delta);
             self.open = Some(Box::new(Open { resolution, depth, free_until: t, found }));
         }
-        if self.coarser == COARSENINGS || resolution > LARGEST_COARSE * smallest {
+        let allowed = self.task.strategies.coarser && self.coarser < COARSENINGS;
+        if !allowed || resolution > LARGEST_COARSE * smallest {
             return false;
         }
         self.coarser += 1;
         self.raised = 0;
         self.resolution = resolution;
         self.outcome.resolution = resolution;
-        if self.task.past == 0.0 {
-            (self.level, self.task.nearly) = (1.0, self.task.rounding);
+        if self.task.ignored_depth == 0.0 {
+            (self.level, self.task.start_tolerance) = (1.0, self.task.rounding);
         }
         true
     }
@@ -444,17 +447,18 @@ impl<'a> PairSearch<'a> {
 
     /// Searches anew, at the depth that is to be searched by now; `cells` were spent.
     fn restart(&mut self, cells: u64) {
-        self.task.delta = self.task.past + self.level * self.resolution;
+        self.task.delta = self.task.ignored_depth + self.level * self.resolution;
         self.task.limit = self.task.limit.saturating_sub(cells);
         let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
         let mut search = Search::new(self.task, scratch);
-        if self.coarser > 0 && self.task.ideas.holes {
-            self.ending = hole::answer(&mut search);
+        if self.coarser > 0 && self.task.strategies.cavities {
+            self.ending = cavity::answer(&mut search);
         }
         if self.ending.is_none() {
             search.start();
         }
-        search.patience = if self.coarser < COARSENINGS { PATIENCE } else { u64::MAX };
+        let tries = self.task.strategies.coarser && self.coarser < COARSENINGS;
+        search.patience = if tries { PATIENCE } else { u64::MAX };
         self.search = Some(search);
     }
 
@@ -489,15 +493,15 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     o.time = found.touch.as_ref().map_or(found.upper, |s| s.t.clamp(0.0, found.upper));
     o.not_continued = found.touch.is_none();
     o.time_lower = o.time.min(found.goal.max(0.0));
-    o.counters.times += u64::from(task.asked.time());
-    if !task.asked.point() {
+    o.counters.times += u64::from(task.query_options.time());
+    if !task.query_options.point() {
         return;
     }
     o.counters.contacts += 1;
     let at = task.relative.at(o.time);
     let problem = Problem {
-        a: Faces { solid: task.a, guards: &[] },
-        b: Faces { solid: task.b, guards: &[] },
+        a: Faces { solid: task.a, clip_planes: &[] },
+        b: Faces { solid: task.b, clip_planes: &[] },
         relative: &task.relative,
         scale: task.scale,
         time_scale: 1.0,
@@ -518,7 +522,7 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let is_touch = found.touch.as_ref().is_some_and(|touch| touch.t >= 0.0);
     let off = if is_touch { 0.0 } else { task.model_a.value(x).abs().max(task.model_b.value(at.b_point(x)).abs()) };
     // Deep in each other bodies show no faces in one point: those of the solution are told.
-    let features = Features::at(task, x, &at, (task.past == 0.0).then_some(off + INCIDENT * task.rounding));
+    let features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(off + INCIDENT * task.rounding));
     let mut active = Active::of(&problem, s, (x, &at), &features);
     if active.extent == Extent::Point {
         active.add_incident(&features);
@@ -533,7 +537,7 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     o.normal_speed = at.velocity(x).dot(normal);
     // Of an overlap that is searched past: how deep the bodies then are.
     o.separation = match () {
-        () if task.past > 0.0 => -2.0 * task.delta,
+        () if task.ignored_depth > 0.0 => -2.0 * task.delta,
         () if o.not_continued => 2.0 * common(x).min(0.0),
         () => 0.0,
     };
@@ -678,7 +682,7 @@ fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     o.status = Status::Overlap;
     (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
     o.touching = true;
-    if !task.asked.point() {
+    if !task.query_options.point() {
         return;
     }
     o.counters.contacts += 1;

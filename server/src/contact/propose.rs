@@ -17,8 +17,8 @@ use super::search::Search;
 use super::separation;
 use super::task::witness_level;
 use super::work::Work;
-use crate::eco::Model;
 use crate::motion::Instant;
+use crate::octree::Model;
 use crate::solid::Sense;
 use crate::solid::local::{self, LiteralId};
 use crate::solid::surface::Apex;
@@ -61,8 +61,8 @@ impl Search<'_> {
         let mut support = advance.support.clone();
         // A thin cell is held by one body alone: what decides of the other there stands beside it.
         let bodies = [
-            (Side::A, Faces { solid: self.task.a, guards: &[] }, cell.a, x),
-            (Side::B, Faces { solid: self.task.b, guards: &self.scratch.guards_b }, cell.b, at.b_point(x)),
+            (Side::A, Faces { solid: self.task.a, clip_planes: &[] }, cell.a, x),
+            (Side::B, Faces { solid: self.task.b, clip_planes: &self.scratch.clip_planes_b }, cell.b, at.b_point(x)),
         ];
         for (side, faces, range, y) in bodies {
             if support.iter().all(|l| l.0 != side) {
@@ -414,7 +414,7 @@ impl Search<'_> {
     /// Keeps a confirmed witness if it is the earliest; continues it back to the touch.
     fn accept(&mut self, deep: Solution) -> bool {
         self.hint(&deep);
-        if !self.task.asked.time() {
+        if !self.task.query_options.time() {
             // A witness is all of a hit, once the start is known to be free: what is left to refine is what lies there.
             let goal = self.now().max(f64::MIN_POSITIVE);
             self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal });

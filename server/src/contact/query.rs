@@ -1,9 +1,9 @@
 //! A question: two bodies over one step, what is asked of them, and which of them carries the cells.
 
-use super::asked::Asked;
-use crate::eco::Model;
+use super::query_options::QueryOptions;
 use crate::math::tolerance;
 use crate::motion::Placed;
+use crate::octree::Model;
 use crate::solid::Sense;
 use glam::DVec3;
 
@@ -29,9 +29,9 @@ pub struct PairQuery<'a> {
     /// Cells' worth of work (`Counters::spent`) before the answer is `undecided`.
     pub cell_limit: u64,
     /// Ideas of the search that are switched on: all, unless their worth is measured.
-    pub ideas: Ideas,
+    pub strategies: Strategies,
     /// What is worked out beside whether they meet.
-    pub asked: Asked,
+    pub query_options: QueryOptions,
 }
 
 impl PairQuery<'_> {
@@ -53,7 +53,7 @@ impl PairQuery<'_> {
 
 /// The ideas of the search, each of which can be switched off. None changes what an answer promises, only the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ideas {
+pub struct Strategies {
     /// Stage 1: the collision region by S-bounds.
     pub region: bool,
     /// Stage 2: candidates from the walk of both octrees.
@@ -67,18 +67,29 @@ pub struct Ideas {
     pub hints: bool,
     /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
     /// last digits: both solve the same equations, from another guess.
-    pub direct: bool,
+    pub convex: bool,
     /// Convex primitives against solids with holes are answered in front of the search, with the same proviso.
-    pub holes: bool,
+    pub cavities: bool,
+    /// A search that takes too long is begun anew at a coarser resolution, which the answer tells; otherwise it goes on to its limit.
+    pub coarser: bool,
 }
 
-impl Default for Ideas {
+impl Default for Strategies {
     fn default() -> Self {
-        Self { region: true, walk: true, multipliers: true, fits: true, hints: true, direct: true, holes: true }
+        Self {
+            region: true,
+            walk: true,
+            multipliers: true,
+            fits: true,
+            hints: true,
+            convex: true,
+            cavities: true,
+            coarser: true,
+        }
     }
 }
 
-/// A hollow body counts as this much larger when the carrier of the cells is chosen.
+/// A hollow body counts as this much larger when the reference body of the cells is chosen.
 const HOLLOW: f64 = 2.0;
 
 /// 1e-9 of the larger bounding radius of the two models.

@@ -11,8 +11,8 @@
 //! docs/accuracy.md counts the constants. A tangent taken far outside the cell, and a same-shape fit, subtract what they
 //! have beyond E from their own bounds.
 
-use crate::eco::Model;
 use crate::motion::{Relative, Rounding};
+use crate::octree::Model;
 
 /// Half a unit in the last place, with the room that products of errors need.
 const U: f64 = 0.5 * f64::EPSILON * (1.0 + 1e-6);
@@ -36,7 +36,7 @@ pub fn of_literals(a: &Model, b: &Model, relative: &Relative) -> f64 {
 pub fn of_motion(a: &Model, b: &Model, [offset_a, offset_b]: [f64; 2], apart: f64, rounding: &Rounding) -> f64 {
     let ([mut reach, mut radius], [reach_b, radius_b]) = (a.extents, b.extents);
     if !reach.is_finite() {
-        // An unbounded carrier has cells only where the other body can be.
+        // An unbounded reference body has cells only where the other body can be.
         reach = offset_a + apart + offset_b + reach_b;
         radius = reach + radius_b;
     }

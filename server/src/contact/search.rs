@@ -1,6 +1,6 @@
 //! The search: one queue ordered by the earliest time at which an item could hold a contact.
 //!
-//! Items are slices of time (`stage2`) and cells: boxes fixed in the carrier A with what is left there of both trees. The
+//! Items are slices of time (`stage2`) and cells: boxes fixed in the reference body A with what is left there of both trees. The
 //! earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a slice into
 //! smaller ones or into cells, a cell into its halves. Where a cell's bounds point to a contact, one is proposed and
 //! confirmed (`propose`). When the earliest item lies beyond the verified contact, all that was
@@ -61,7 +61,7 @@ const NEARLY: f64 = 8.0;
 pub struct Scratch {
     heap: BinaryHeap<Cell>,
     pub(super) pool: Vec<Token>,
-    pub(super) guards_b: Vec<Face>,
+    pub(super) clip_planes_b: Vec<Face>,
     pub(super) clause: clause::Scratch,
     pub(super) hints: Vec<Hint>,
     pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
@@ -119,7 +119,7 @@ impl<'a> Search<'a> {
     pub fn new(task: Task<'a>, mut scratch: Scratch) -> Self {
         scratch.heap.clear();
         scratch.pool.clear();
-        scratch.guards_b.clear();
+        scratch.clip_planes_b.clear();
         scratch.tried.clear();
         scratch.hints.clear();
         (scratch.clause.clauses, scratch.clause.evaluations) = (0, 0);
@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
     /// The ending of a search that asks for a hit alone, once a contact is known; nothing is met before `proven`. Only where
     /// the start is known to be free.
     pub(super) fn hit(&mut self, proven: f64) -> Option<Ending> {
-        if self.task.asked.time() {
+        if self.task.query_options.time() {
             return None;
         }
         let found = self.found.take()?;
@@ -183,7 +183,7 @@ impl<'a> Search<'a> {
     }
 
     pub(super) fn goal(&self) -> f64 {
-        self.found.as_ref().map_or(f64::INFINITY, |f| f.goal - self.task.lead)
+        self.found.as_ref().map_or(f64::INFINITY, |f| f.goal - self.task.proof_slack)
     }
 
     /// Time until which a rival of the contact found may come; the goal or later.
@@ -292,8 +292,8 @@ impl<'a> Search<'a> {
 
         let scratch = &mut self.scratch;
         let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
-        let hints: &[Hint] = if self.task.ideas.hints { &scratch.hints } else { &[] };
-        let view = self.task.view((cell.center, cell.half), &at, motion, &scratch.guards_b);
+        let hints: &[Hint] = if self.task.strategies.hints { &scratch.hints } else { &[] };
+        let view = self.task.view((cell.center, cell.half), &at, motion, &scratch.clip_planes_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
         let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
         let b = match b_truth {
@@ -317,7 +317,7 @@ impl<'a> Search<'a> {
         let found = if b_full && cell.a.0 == cell.a.1 {
             Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 }
         } else {
-            let pair = clause::Pair { pool, a: cell.a, b };
+            let pair = clause::Expressions { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
         };
         let still = self.task.relative.bounds(cell.t, 0.0, x_max);
@@ -325,7 +325,7 @@ impl<'a> Search<'a> {
         // the lowest point of a later time misses.
         let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
             let view = View { motion: still, ..view };
-            let pair = clause::Pair { pool, a: cell.a, b };
+            let pair = clause::Expressions { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch).y
         } else {
             found.y
@@ -372,8 +372,8 @@ impl<'a> Search<'a> {
             }
             if found.cost.element_sum() <= fine {
                 // The bound is as good as rounding lets it be, and its faces may be those of a later time: what of now?
-                let view = self.task.view((cell.center, cell.half), &at, still, &self.scratch.guards_b);
-                let pair = clause::Pair { pool: &self.scratch.pool, a: cell.a, b };
+                let view = self.task.view((cell.center, cell.half), &at, still, &self.scratch.clip_planes_b);
+                let pair = clause::Expressions { pool: &self.scratch.pool, a: cell.a, b };
                 let now = clause::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch.clause);
                 self.attempt(&cell, &now, &at);
                 if cell.t >= self.goal() {
@@ -410,7 +410,7 @@ impl<'a> Search<'a> {
         let at = self.task.relative.at(cell.t);
         let x_max = (cell.center - at.center_a).length() + cell.half.length();
         let motion = self.task.relative.bounds(cell.t, cell.until - cell.t, x_max);
-        let view = self.task.view((cell.center, cell.half), &at, motion, &self.scratch.guards_b);
+        let view = self.task.view((cell.center, cell.half), &at, motion, &self.scratch.clip_planes_b);
         let tokens = &self.scratch.pool[cell.b.0 as usize..cell.b.1 as usize];
         tokens.is_empty() || local::prune(tokens, &mut Vec::new(), &mut |id| view.truth(Side::B, id)) != Truth::False
     }

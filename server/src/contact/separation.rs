@@ -108,8 +108,8 @@ impl<'t, 'a> Cover<'t, 'a> {
 
     fn view(&self, place: &Place, delta: f64) -> View<'t> {
         View {
-            a: Faces { solid: self.task.a, guards: &[] },
-            b: Faces { solid: self.task.b, guards: &[] },
+            a: Faces { solid: self.task.a, clip_planes: &[] },
+            b: Faces { solid: self.task.b, clip_planes: &[] },
             at: self.at,
             motion: self.task.relative.bounds(self.at.t, 0.0, 0.0),
             center: place.center,
@@ -157,7 +157,7 @@ impl<'t, 'a> Cover<'t, 'a> {
             place.a = pool[..middle as usize].to_vec();
             place.b = pool[middle as usize..].to_vec();
             if end > 0 {
-                let pair = clause::Pair { pool: &pool, a: (0, middle), b: (middle, end) };
+                let pair = clause::Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
                 let view = self.view(&place, -level);
                 let found = clause::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch);
                 if found.dt >= 0.0 {

@@ -2,10 +2,10 @@
 //!
 //! A slice [t0, t1] of the step is located by S-bounds (`bound::pair`): empty, it is done; while the bodies move far
 //! across what is left and much is left, it is halved, so that the region of the half in which they first meet is small.
-//! In the region both octrees are walked by table 4 (`eco::walk`), the larger node of a pair decomposed, until few
+//! In the region both octrees are walked by table 4 (`octree::walk`), the larger node of a pair decomposed, until few
 //! terms are left in a pair or a number of pairs is reached. The pairs of voxels at which the walk ends say which positive
 //! alternatives of A can meet anything, where, and when at the earliest; each becomes one cell of stage 3, with B cut
-//! down to the voxels it may meet (their hull's six planes keep the cell to it: guards).
+//! down to the voxels it may meet (their hull's six planes keep the cell to it: clip planes).
 //! Stage 3 has no other source of primitives: `knows` tells which were handed over.
 
 use super::cell::{Cell, Range, Source};
@@ -16,10 +16,10 @@ use super::roots::Root;
 use super::search::Search;
 use crate::bound::Region;
 use crate::bound::pair::{Pruned, Side as Operand, locate};
-use crate::eco::span::primitive_span;
-use crate::eco::walk::{Detail, Next, NodePair, Walk};
-use crate::eco::{Kind, Node};
 use crate::math::Aabb;
+use crate::octree::span::primitive_span;
+use crate::octree::walk::{Detail, Next, NodePair, Walk};
+use crate::octree::{Kind, Node};
 use crate::solid;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::surface::Plane;
@@ -54,7 +54,7 @@ impl<'a> Search<'a> {
         // hold {f <= −delta} whatever the sign is: at −g what is left of f reaches g beyond the surface, at corners further.
         let level = self.task.delta.abs();
         let mut region = None;
-        if self.task.ideas.region {
+        if self.task.strategies.region {
             let a = Operand { solid: self.task.a, bounds: model_a.bounds_for(level), placed: placed_a };
             let b = Operand { solid: self.task.b, bounds: model_b.bounds_for(level), placed: placed_b };
             let Some(found) = locate(&a, &b, t0, t1, level) else { return };
@@ -84,8 +84,8 @@ impl<'a> Search<'a> {
             region.as_ref().map_or(Aabb::ALL, |r| r.b.aabb).intersection(&model_b.bounds_for(level).root().aabb);
         // Octree and bounds keep f only up to their margin; a coarser resolution works on whole trees.
         let fine = level <= model_a.margin() && level <= model_b.margin();
-        let finite = model_a.eco.root().half.is_finite() && model_b.eco.root().half.is_finite();
-        if !(self.task.ideas.walk && fine && finite) {
+        let finite = model_a.octree.root().half.is_finite() && model_b.octree.root().half.is_finite();
+        if !(self.task.strategies.walk && fine && finite) {
             // Without stage 2 the region as a whole is all that stage 3 knows.
             self.hand_over((t0, t1), &box_a, &box_b, &a, &b);
             return;
@@ -183,9 +183,9 @@ impl<'a> Search<'a> {
         if t > 0.0 && (truth_a == Truth::True || truth_b == Truth::True) {
             return;
         }
-        let guards = self.guards(in_b);
+        let clip_planes = self.clip_planes(in_b);
         let range_a = self.store_and(&of_a, &[]);
-        let range_b = self.store_and(&of_b, &guards);
+        let range_b = self.store_and(&of_b, &clip_planes);
         let cell = Cell::new((t, until), in_a, range_a, range_b);
         if self.may_meet(&cell) {
             self.note(&of_a, &of_b);
@@ -194,7 +194,7 @@ impl<'a> Search<'a> {
     }
 
     /// The planes that keep B's points to a box of its frame.
-    fn guards(&mut self, region: &Aabb) -> Vec<Token> {
+    fn clip_planes(&mut self, region: &Aabb) -> Vec<Token> {
         let mut tokens = Vec::new();
         for k in 0..3 {
             for (sign, offset) in [(1.0, region.max[k]), (-1.0, -region.min[k])] {
@@ -203,21 +203,21 @@ impl<'a> Search<'a> {
                 }
                 let mut normal = DVec3::ZERO;
                 normal[k] = sign;
-                let id = (self.task.b.faces.len() + self.scratch.guards_b.len()) as u32;
-                self.scratch.guards_b.push(Plane { normal, offset }.into());
+                let id = (self.task.b.faces.len() + self.scratch.clip_planes_b.len()) as u32;
+                self.scratch.clip_planes_b.push(Plane { normal, offset }.into());
                 tokens.push(local::literal_token(LiteralId::new(id, Sense::Positive)));
             }
         }
         tokens
     }
 
-    /// Stores the conjunction of an expression and some guards.
-    fn store_and(&mut self, tokens: &[Token], guards: &[Token]) -> Range {
-        if tokens.is_empty() && guards.is_empty() {
+    /// Stores the conjunction of an expression and some clip planes.
+    fn store_and(&mut self, tokens: &[Token], clip_planes: &[Token]) -> Range {
+        if tokens.is_empty() && clip_planes.is_empty() {
             return (0, 0);
         }
         let mut joined = Vec::new();
-        let parts = (!tokens.is_empty()).then_some(tokens).into_iter().chain(guards.chunks(1));
+        let parts = (!tokens.is_empty()).then_some(tokens).into_iter().chain(clip_planes.chunks(1));
         local::write_and(parts, &mut joined);
         self.store(&joined)
     }

@@ -1,12 +1,12 @@
 //! What is searched: two solids, their motion, a depth, a limit; and a cell of it as its bounds see it.
 
-use super::asked::Asked;
 use super::literal::{Faces, View};
 use super::newton::Problem;
-use super::query::{Ideas, PairQuery, without_own_spin};
-use crate::eco::Model;
+use super::query::{PairQuery, Strategies, without_own_spin};
+use super::query_options::QueryOptions;
 use crate::math::tolerance;
 use crate::motion::{Bounds, Instant, Relative};
+use crate::octree::Model;
 use crate::solid::{Face, Solid};
 use glam::DVec3;
 
@@ -16,7 +16,7 @@ const SLOWEST: f64 = 1e12;
 /// What to search: two solids, their motion, a depth, a limit.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
-    /// The carrier of the cells.
+    /// The reference body of the cells.
     pub a: &'a Solid,
     /// The other solid.
     pub b: &'a Solid,
@@ -25,23 +25,23 @@ pub struct Task<'a> {
     /// B's octree and bounds.
     pub model_b: &'a Model,
     /// Ideas of the search that are switched on.
-    pub ideas: Ideas,
+    pub strategies: Strategies,
     /// What is told of what is found.
-    pub asked: Asked,
+    pub query_options: QueryOptions,
     /// Motion of the pair.
     pub relative: Relative,
     /// Depth at which a contact is decided.
     pub delta: f64,
     /// Depth of an overlap at the start that the search goes on past; 0 otherwise.
-    pub past: f64,
+    pub ignored_depth: f64,
     /// What rounding may do to one bound: E of docs/accuracy.md, a length.
     pub rounding: f64,
     /// What is this near to delta at the start counts as that deep: rounding, where a second search follows; else 0.
-    pub nearly: f64,
+    pub start_tolerance: f64,
     /// Length scale of the pair.
     pub scale: f64,
     /// Everything is proven up to this long before the contact, a fraction of the step: 0 for an answer.
-    pub lead: f64,
+    pub proof_slack: f64,
     /// Cells' worth of work that may be done (`Counters::spent`).
     pub limit: u64,
     /// The limit that the question gives; `limit` may be lowered for a part of the search.
@@ -52,10 +52,10 @@ impl<'a> Task<'a> {
     /// What is searched for a question, and whether its second body carries the cells.
     pub(super) fn of(query: &PairQuery<'a>) -> (Task<'a>, bool) {
         let swapped = query.is_swapped();
-        let (carrier, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
-        let (model_a, model_b) = (carrier.model, other.model);
+        let (reference, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+        let (model_a, model_b) = (reference.model, other.model);
         let (a, b) = (&model_a.solid, &model_b.solid);
-        let relative = Relative::new(without_own_spin(&carrier), without_own_spin(&other));
+        let relative = Relative::new(without_own_spin(&reference), without_own_spin(&other));
         let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
         let scale = model_a.radius.max(model_b.radius);
         let extent = ball_a.center.length()
@@ -71,15 +71,15 @@ impl<'a> Task<'a> {
             b,
             model_a,
             model_b,
-            ideas: query.ideas,
-            asked: query.asked,
+            strategies: query.strategies,
+            query_options: query.query_options,
             relative,
             delta: resolution,
-            past: 0.0,
+            ignored_depth: 0.0,
             rounding,
-            nearly: rounding,
+            start_tolerance: rounding,
             scale,
-            lead: 0.0,
+            proof_slack: 0.0,
             limit: query.cell_limit,
             asked_limit: query.cell_limit,
         };
@@ -92,14 +92,14 @@ impl<'a> Task<'a> {
         (center, half): (DVec3, DVec3),
         at: &'v Instant,
         motion: Bounds,
-        guards_b: &'v [Face],
+        clip_planes_b: &'v [Face],
     ) -> View<'v>
     where
         'a: 'v,
     {
         View {
-            a: Faces { solid: self.a, guards: &[] },
-            b: Faces { solid: self.b, guards: guards_b },
+            a: Faces { solid: self.a, clip_planes: &[] },
+            b: Faces { solid: self.b, clip_planes: clip_planes_b },
             at,
             motion,
             center,
@@ -110,8 +110,8 @@ impl<'a> Task<'a> {
             delta: self.delta,
             wall: self.delta,
             rounding: self.rounding,
-            fits: self.ideas.fits,
-            multipliers: self.ideas.multipliers,
+            fits: self.strategies.fits,
+            multipliers: self.strategies.multipliers,
             curved: true,
         }
     }
@@ -120,8 +120,8 @@ impl<'a> Task<'a> {
     pub(super) fn problem(&self) -> Problem<'_> {
         let speed = self.relative.bounds(0.0, 1.0, self.scale).speed;
         Problem {
-            a: Faces { solid: self.a, guards: &[] },
-            b: Faces { solid: self.b, guards: &[] },
+            a: Faces { solid: self.a, clip_planes: &[] },
+            b: Faces { solid: self.b, clip_planes: &[] },
             relative: &self.relative,
             scale: self.scale,
             // However slow the pair: else equations that only time can meet look as if they had no solution.
@@ -138,7 +138,7 @@ impl<'a> Task<'a> {
     /// True when a witness is to be continued back to where the surfaces meet: they did so before the start if it was an
     /// overlap, and do so later than bodies are near each other.
     pub(super) fn continues(&self) -> bool {
-        self.asked.time() && self.past == 0.0 && self.delta > 0.0
+        self.query_options.time() && self.ignored_depth == 0.0 && self.delta > 0.0
     }
 
     /// The largest f that a point searched for may have in a body: 0 at depths, the distance at a clearance.
@@ -162,7 +162,7 @@ impl<'a> Task<'a> {
     /// takes for deep is searched again at twice the depth.
     /// At a negative depth −g that is a point hardly farther than g: what keeps a distance is told to be nearer, never the contrary.
     pub(super) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
-        let level = (8.0 * self.nearly).min(0.5 * self.delta.abs()) - self.delta;
+        let level = (8.0 * self.start_tolerance).min(0.5 * self.delta.abs()) - self.delta;
         self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level
     }
 }

@@ -3,9 +3,9 @@
 use super::task::Task;
 use super::*;
 use crate::contact::outcome::EVALUATIONS_PER_CELL;
-use crate::eco::Model;
-use crate::eco::testing::{pierced, simple};
 use crate::motion::Placed;
+use crate::octree::Model;
+use crate::octree::testing::{pierced, simple};
 use crate::solid::{Shape, primitive::*};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
@@ -33,8 +33,8 @@ fn tilt(v: DVec3) -> glam::DQuat {
 
 /// The answer of the search alone; a whole-primitive answer in front of it must say the same.
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
-    let o = ask_with(name, a, ma, b, mb, Ideas { direct: false, holes: false, ..Ideas::default() });
-    let fronted = ask_with(name, a, ma, b, mb, Ideas::default());
+    let o = ask_with(name, a, ma, b, mb, Strategies { convex: false, cavities: false, ..Strategies::default() });
+    let fronted = ask_with(name, a, ma, b, mb, Strategies::default());
     assert_eq!(o.status, fronted.status, "{name}");
     if o.status != Status::Overlap {
         assert_eq!((o.kind, o.extent), (fronted.kind, fronted.extent), "{name}");
@@ -53,15 +53,15 @@ fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
     o
 }
 
-fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, ideas: Ideas) -> Outcome {
+fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, strategies: Strategies) -> Outcome {
     let place = Pose::IDENTITY;
     let q = PairQuery {
         a: Body { model: a, placed: Placed { place, motion: ma } },
         b: Body { model: b, placed: Placed { place, motion: mb } },
         resolution: default_resolution(a, b),
         cell_limit: 300_000,
-        ideas,
-        asked: Asked::DEPTH,
+        strategies,
+        query_options: QueryOptions::DEPTH,
     };
     let began = std::time::Instant::now();
     let o = earliest_contact(&q, &mut Scratch::default());
@@ -244,7 +244,7 @@ fn overlaps_and_cavities() {
     assert!((o.time - 0.00919978651).abs() < 1e-10, "{}", o.time);
 }
 
-/// A cell takes over what a few voxels leave of B. Beyond their hull that is another solid, and only the guards keep a cell
+/// A cell takes over what a few voxels leave of B. Beyond their hull that is another solid, and only the clip planes keep a cell
 /// from it: without them no contact would be missed, but the search would not come to an end where the other solid is met.
 #[test]
 fn no_cell_holds_where_the_whole_trees_do_not() {
@@ -269,8 +269,8 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             b: Body { model: &plate, placed: Placed { place, motion: rest() } },
             resolution: default_resolution(&fork, &plate),
             cell_limit: 1000,
-            ideas: Ideas::default(),
-            asked: Asked::DEPTH,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
         };
         let (task, _) = Task::of(&query);
         let mut search = search::Search::new(task, Scratch::default());
@@ -294,7 +294,7 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
                 let own = task.b.faces.len();
                 let f_a = value(tokens(cell.a), &mut |f| task.a.faces[f as usize].value(x));
                 let of_b = |f: u32| task.b.faces.get(f as usize).map(|face| face.value(y));
-                let guarded = |f: u32| of_b(f).unwrap_or_else(|| scratch.guards_b[f as usize - own].value(y));
+                let guarded = |f: u32| of_b(f).unwrap_or_else(|| scratch.clip_planes_b[f as usize - own].value(y));
                 let f_b = value(tokens(cell.b), &mut |f| guarded(f));
                 let unguarded = value(tokens(cell.b), &mut |f| of_b(f).unwrap_or(f64::NEG_INFINITY));
                 let whole = task.a.value(x).max(task.b.value(y));
@@ -310,7 +310,7 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             }
         }
     }
-    println!("{held} points in a cell's solids, {kept_out} kept out by guards alone");
+    println!("{held} points in a cell's solids, {kept_out} kept out by clip_planes alone");
     assert!(held > 100 && kept_out > 100, "{held} {kept_out}");
 }
 
@@ -320,30 +320,30 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
     let (plate, block) =
         (pierced(Cuboid { half: v(1.0, 1.0, 0.2) }, vec![hole]), simple(Cuboid { half: v(0.3, 0.2, 0.4) }));
     let down = turn(Pose::new(v(0.1, 0.05, 2.0), tilt(v(0.3, 0.2, 0.1))), v(0.0, 0.0, -2.5), v(0.2, 0.1, 0.3));
-    let asked = |a: &Model, motion: Motion, ideas: Ideas, scratch: &mut Scratch| {
+    let query_options = |a: &Model, motion: Motion, strategies: Strategies, scratch: &mut Scratch| {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let query = PairQuery {
             a: Body { model: a, placed: placed(rest()) },
             b: Body { model: &block, placed: placed(motion) },
             resolution: default_resolution(a, &block),
             cell_limit: 300_000,
-            ideas,
-            asked: Asked::DEPTH,
+            strategies,
+            query_options: QueryOptions::DEPTH,
         };
         earliest_contact(&query, scratch)
     };
-    let search = Ideas { direct: false, holes: false, ..Ideas::default() };
+    let search = Strategies { convex: false, cavities: false, ..Strategies::default() };
     let mut timed = Scratch::timed();
-    let own = asked(&plate, down, search, &mut Scratch::default());
+    let own = query_options(&plate, down, search, &mut Scratch::default());
     assert!(own.status == Status::Contact && own.counters.cells > 0, "{own:?}");
-    assert_eq!(asked(&plate, down, search, &mut timed), own);
+    assert_eq!(query_options(&plate, down, search, &mut timed), own);
     let clock = timed.take_clock().expect("a clock");
     assert!([Stage::Region, Stage::Walk, Stage::Cells].iter().all(|s| !clock.of(*s).is_zero()), "{clock:?}");
     assert_eq!(clock.last(), Stage::Cells);
     assert_eq!(clock.total(), Stage::ALL.iter().map(|s| clock.of(*s)).sum());
     // Convex bodies are told in front; what was told before is not in it.
     let ball = simple(Sphere { radius: 0.5 });
-    let met = asked(&ball, down, Ideas::default(), &mut timed);
+    let met = query_options(&ball, down, Strategies::default(), &mut timed);
     let clock = timed.take_clock().expect("a clock");
     assert!(met.counters.cells == 0 && clock.last() == Stage::Front && !clock.total().is_zero(), "{met:?} {clock:?}");
     assert!(Scratch::default().take_clock().is_none());
@@ -389,8 +389,8 @@ fn a_limit_of_cells_cuts_the_same_bits() {
             b: Body { model: &plate, placed: Placed { place, motion: rest() } },
             resolution: default_resolution(&fork, &plate),
             cell_limit: LIMIT,
-            ideas: Ideas { direct: false, holes: false, ..Ideas::default() },
-            asked: Asked::CONTACT,
+            strategies: Strategies { convex: false, cavities: false, ..Strategies::default() },
+            query_options: QueryOptions::CONTACT,
         };
         let o = earliest_contact(&query, &mut Scratch::default());
         assert_eq!(o, earliest_contact(&query, &mut Scratch::default()));

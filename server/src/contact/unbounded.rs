@@ -37,7 +37,7 @@ pub fn answer(query: &PairQuery) -> Option<Outcome> {
     };
     o.status = Status::Overlap;
     (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
-    if query.asked.point() {
+    if query.query_options.point() {
         o.counters.contacts += 1;
         o.point = x;
         o.separation = -2.0 * depth;
@@ -45,7 +45,7 @@ pub fn answer(query: &PairQuery) -> Option<Outcome> {
         // No translation takes them apart: any direction is as good as the one that the point was found along.
         o.normal = bodies[0].normals().next().unwrap_or(DVec3::Z);
     }
-    if query.asked.penetration {
+    if query.query_options.penetration {
         (o.penetration, o.deepest, o.direction) = (2.0 * depth, x, bodies[0].normals().next().unwrap_or(DVec3::Z));
         o.counters.penetrations += 1;
     }

@@ -8,7 +8,7 @@
 use super::csg::{import_csg, read_text};
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
-use contactd_proto::{Detect, InitialOverlap, Motion, Pose, Report, Rule, Track};
+use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, Report, Rule};
 use glam::DVec3;
 use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
@@ -367,10 +367,11 @@ impl Checker<'_> {
             },
         };
         // The numbers were checked one by one: what a step would refuse has been refused.
-        let track = record.decode().map_or(Track::resting(start.pose), |order| Track::ordered(start.pose, order));
-        let motion = track.motion;
-        let record = (!track.is_rest()).then_some(record);
-        if is_static && !track.is_rest() {
+        let motion_state =
+            record.decode().map_or(MotionState::resting(start.pose), |order| MotionState::ordered(start.pose, order));
+        let motion = motion_state.motion;
+        let record = (!motion_state.is_rest()).then_some(record);
+        if is_static && !motion_state.is_rest() {
             return Err(self.wrong(&o.name, &format!("a static object \"{name}\" that rests"), "one that moves"));
         }
         if o.rotates == Some(false) && motion.spin != DVec3::ZERO {
@@ -578,7 +579,7 @@ mod tests {
             object("start = { rotation = [0.1, 0.2, 0.3, 0.927] }\nend = { position = [1, 2, 3] }").expect("a scene");
         let o = &scene.objects[0];
         let order = o.record.expect("it moves").decode().expect("a good record");
-        assert_eq!(Track::ordered(o.motion.start, order).motion, o.motion);
+        assert_eq!(MotionState::ordered(o.motion.start, order).motion, o.motion);
         assert_eq!(o.motion.spin, DVec3::ZERO);
     }
 
@@ -659,7 +660,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_effect_is_told() {
+    fn what_has_no_effect_is_reported() {
         let objects = "[[object]]\nname = \"a\"\nmodel = \"m\"\ngroup = \"cell\"\n[[object]]\nname = \"b\"\nmodel = \"m\"\n\
             group = \"robot\"\n[[object]]\nname = \"c\"\nmodel = \"m\"\ngroup = \"robot\"\n";
         let notes = |rest: &str| -> Vec<String> {

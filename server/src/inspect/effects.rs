@@ -90,7 +90,7 @@ pub fn effects(scene: &Scene) -> String {
     }
     let _ = writeln!(
         out,
-        "  of the objects, in this step: at rest {rest} (two of them: asked about the start alone), translating {slide} (no \
+        "  of the objects, in this step: at rest {rest} (two of them: query_options about the start alone), translating {slide} (no \
          bounds of rotation), turning {turn}"
     );
     out
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    fn told(rules: &str) -> String {
+    fn reported(rules: &str) -> String {
         let mut text = String::from("[[model]]\nname = \"m\"\nfile = \"m.csg\"\n");
         for (name, group, motion) in [
             ("plate", "cell", "motion = \"static\""),
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn without_rules_every_pair_is_told_in_full() {
-        let text = told("");
+        let text = reported("");
         assert!(text.contains("9 pairs are searched when they are near, 1 never"), "{text}");
         assert!(text.contains("cell - robot: 4 pairs: the whole motion; time, point, normal, kind\n"), "{text}");
         assert!(text.contains("cell - cell: 1 pair: never searched: both are static"), "{text}");
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn each_pair_has_the_plan_that_the_world_gives_it() {
-        let text = told(
+        let text = reported(
             "[[rule]]\nbetween = [\"robot\", \"cell\"]\nexcept = [[\"gripper\", \"plate\"]]\nreport = \"hit\"\nmargin = 2.5\n\
              [[rule]]\nbetween = [\"robot\", \"part\"]\ndetect = \"off\"\n",
         );

@@ -4,10 +4,10 @@ mod effects;
 
 pub use effects::effects;
 
-use crate::eco::Model;
-use crate::eco::mass::mass_properties;
 use crate::import::{Note, Scene};
 use crate::math::Aabb;
+use crate::octree::Model;
+use crate::octree::mass::mass_properties;
 use crate::solid::{Node, NodeId, Op, Sense, Solid};
 use contactd_proto::MassOptions;
 use std::collections::BTreeMap;

@@ -210,7 +210,7 @@ mod tests {
         fs::write(&shm, "x").unwrap();
         let root = Root::take(&address).unwrap();
         assert!(root.epoch() > future && !shm.exists() && !address.shared_folder().join("services").exists());
-        assert_eq!(address.current(), None, "nobody is told before it serves");
+        assert_eq!(address.current(), None, "nobody is reported before it serves");
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::config::ServerConfig;
 use super::models::Loaded;
-use crate::eco::mass::mass_properties;
 use crate::math::halt;
+use crate::octree::mass::mass_properties;
 use crate::world::{Heed, ObjectSpec, Refusal, StepOptions, World, record};
 use contactd_proto::control::{Answer, Command, Facets, ObjectSpec as WireObject, WireMass};
 use contactd_proto::names::PROTOCOL_VERSION;
@@ -131,11 +131,11 @@ impl Scene {
                 self.world.set_rules(rules.collect::<Result<_, _>>()?)?;
             }
             Command::SetResolution(resolution) => self.world.set_resolution(resolution)?,
-            Command::Restore(tracks) => {
-                let each = tracks.iter().enumerate();
-                let tracks =
+            Command::Restore(motion_states) => {
+                let each = motion_states.iter().enumerate();
+                let motion_states =
                     each.map(|(i, t)| Ok((t.object, t.checked().map_err(|code| Refusal::new(code, "").at(i))?)));
-                self.world.restore(&tracks.collect::<Result<Vec<_>, Refusal>>()?)?;
+                self.world.restore(&motion_states.collect::<Result<Vec<_>, Refusal>>()?)?;
             }
             Command::MassProperties { model, tolerance, boxes } => {
                 let Some(loaded) = self.models.get(&model) else {
@@ -188,21 +188,21 @@ impl Scene {
         if request.version != PROTOCOL_VERSION {
             return write(0, refuse(ErrorCode::Version, None), &none);
         }
-        if request.asked & !ASK_ALL != 0 {
+        if request.query_options & !ASK_ALL != 0 {
             return write(0, refuse(ErrorCode::BadNumber, None), &none);
         }
         if n > records.len() {
             return write(0, refuse(ErrorCode::BadCount, None), &none);
         }
-        let details = request.asked & ASK_DETAILS != 0;
+        let details = request.query_options & ASK_DETAILS != 0;
         // Room for the records and, where asked for, a detail slot each.
         let room = self.max_records / if details { 2 } else { 1 };
         let cap = if request.max_records == 0 { room } else { room.min(request.max_records as usize) };
         let options = StepOptions {
             advance: request.advance,
             dt: request.dt,
-            first: request.asked & ASK_FIRST != 0,
-            clear: request.asked & ASK_CLEAR != 0,
+            first: request.query_options & ASK_FIRST != 0,
+            clear: request.query_options & ASK_CLEAR != 0,
             max_records: cap.max(1) as u32,
             max_patch_slots: u32::try_from(self.max_records).unwrap_or(u32::MAX),
             cell_limit: request.cell_limit.into(),

@@ -98,7 +98,7 @@ struct Session {
 }
 
 impl Session {
-    fn asked(&mut self) {
+    fn query_options(&mut self) {
         (self.last_request, self.arrived) = (Instant::now(), true);
     }
 
@@ -130,13 +130,13 @@ impl Drop for Session {
 
 /// What other threads tell the leader, and its bell.
 struct Desk {
-    told: Sender<(u64, Told)>,
+    reported: Sender<(u64, Told)>,
     bell: Notifier<Shared>,
 }
 
 impl Desk {
-    fn tell(&self, session: u64, told: Told) {
-        if self.told.send((session, told)).is_ok() {
+    fn report(&self, session: u64, reported: Told) {
+        if self.reported.send((session, reported)).is_ok() {
             // Where the bell does not ring the next beat finds it.
             let _ = self.bell.notify();
         }
@@ -185,7 +185,7 @@ impl Task {
         thread: Option<Sender<Task>>,
     ) {
         let Self { session, scene, request, call, wake, desk, .. } = self;
-        desk.tell(session, Told::Stepped { scene, effects, short, thread });
+        desk.report(session, Told::Stepped { scene, effects, short, thread });
         send_step(response, call, &request, &wake);
     }
 }
@@ -196,7 +196,7 @@ fn send_step(response: Option<StepResponse>, call: StepCall, request: &StepReque
     let _ = response.map(StepResponse::send);
     // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
     drop(call);
-    if request.asked & ASK_POLLING == 0 {
+    if request.query_options & ASK_POLLING == 0 {
         wake.notify();
     }
 }
@@ -205,7 +205,7 @@ fn send_step(response: Option<StepResponse>, call: StepCall, request: &StepReque
 struct Lead {
     pending: BTreeMap<u64, (ControlCall, Job)>,
     sessions: BTreeMap<u64, Session>,
-    told: Receiver<(u64, Told)>,
+    reported: Receiver<(u64, Told)>,
     desk: Arc<Desk>,
     services: Services,
     models: Arc<Models>,
@@ -241,14 +241,14 @@ impl Server {
         let root = Root::take(address)?;
         ready_threads().map_err(ServeError::Threads)?;
         let (services, bell) = Services::create(address, root.epoch(), &config, status(&root, &config, 0, 0))?;
-        let (told, hears) = channel();
+        let (reported, hears) = channel();
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         root.publish()?;
         let lead = Lead {
             pending: BTreeMap::new(),
             sessions: BTreeMap::new(),
-            told: hears,
-            desk: Arc::new(Desk { told, bell }),
+            reported: hears,
+            desk: Arc::new(Desk { reported, bell }),
             services,
             models: Arc::new(Models::new(&config)),
             config,
@@ -401,9 +401,9 @@ impl Lead {
     /// Takes what other threads tell; true when there was something.
     fn hear(&mut self) -> bool {
         let mut heard = false;
-        while let Ok((session, told)) = self.told.try_recv() {
+        while let Ok((session, reported)) = self.reported.try_recv() {
             heard = true;
-            match told {
+            match reported {
                 Told::Job(finished) => self.finished(session, finished),
                 Told::Stepped { scene, effects, short, thread } => {
                     self.effects += effects;
@@ -455,8 +455,8 @@ impl Lead {
             refuse(&call, code);
             return None;
         };
-        session.asked();
-        session.polls = request.asked & ASK_POLLING != 0;
+        session.query_options();
+        session.polls = request.query_options & ASK_POLLING != 0;
         self.steps += 1;
         let scene = if session.waiting { None } else { session.scene.take() };
         let Some(scene) = scene else {
@@ -511,7 +511,7 @@ impl Lead {
         let Some(session) = session else {
             return answer(&call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
         };
-        session.asked();
+        session.query_options();
         // Whatever is under way: what comes of it has nobody to go to.
         if envelope.command == Command::Close {
             self.remove(id);
@@ -539,7 +539,7 @@ impl Lead {
         let desk: Weak<Desk> = Arc::downgrade(&self.desk);
         let done = move |finished| {
             if let Some(desk) = desk.upgrade() {
-                desk.tell(id, Told::Job(finished));
+                desk.report(id, Told::Job(finished));
             }
         };
         match Job::start(work, threads, self.models.clone(), done) {
@@ -657,9 +657,9 @@ impl Lead {
         let mut left: usize = self.pending.len();
         self.pending.clear();
         while left > 0
-            && let Ok((_, told)) = self.told.recv_timeout(until.saturating_duration_since(Instant::now()))
+            && let Ok((_, reported)) = self.reported.recv_timeout(until.saturating_duration_since(Instant::now()))
         {
-            left -= usize::from(matches!(told, Told::Job(_)));
+            left -= usize::from(matches!(reported, Told::Job(_)));
         }
     }
 
@@ -717,8 +717,8 @@ fn write_step(
         // The step was taken, its records cannot be told: the client learns that they are cut off.
         Err(_) => (call.loan_slice_uninit(1).ok()?, StepReply { records: 0, slots: 0, truncated: 1, ..reply }),
     };
-    let told = (reply.records + reply.slots) as usize;
-    let mut response = loan.write_from_fn(|i| if i < told { slot(i) } else { ContactRecord::default() });
+    let reported = (reply.records + reply.slots) as usize;
+    let mut response = loan.write_from_fn(|i| if i < reported { slot(i) } else { ContactRecord::default() });
     *response.user_header_mut() = reply;
     Some(response)
 }

@@ -5,20 +5,20 @@
 pub mod aabb;
 pub mod ball;
 pub mod ball_tree;
+pub mod f64x2;
 pub mod halt;
 pub mod moments;
 pub mod oriented;
 #[cfg(test)]
 pub(crate) mod random;
 pub mod tolerance;
-pub mod twin;
 
 pub use aabb::Aabb;
 pub use ball::Ball;
 pub use ball_tree::BallTree;
+pub use f64x2::{F64x2, Lanes};
 pub use moments::Moments;
 pub use oriented::Oriented;
-pub use twin::{Lanes, Twin};
 
 use glam::DVec3;
 

@@ -13,7 +13,7 @@ pub mod slice;
 pub mod tree;
 pub mod view;
 
-use crate::eco::Model;
+use crate::octree::Model;
 use drawing::Drawing;
 
 /// All about one model: its tree with S-bounds, and slices of its octree.

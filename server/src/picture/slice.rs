@@ -5,7 +5,7 @@
 
 use super::drawing::{Anchor, Color, Drawing, GREY, INK, Size, text_width};
 use super::ray::{Ray, Traced};
-use crate::eco::{Kind, Model, Node};
+use crate::octree::{Kind, Model, Node};
 use glam::DVec3;
 
 /// Side of a panel, pixels.
@@ -25,12 +25,12 @@ const KINDS: [(Kind, &str, Color); 5] = [
 /// Two slices through the middle of `model`: one upright (y constant), one level, low enough to cut
 /// what is sunk into the upper side of most parts (z constant).
 pub fn slice(name: &str, model: &Model) -> Drawing {
-    let root = model.eco.root();
+    let root = model.octree.root();
     let (head, foot, gap) = (56.0, 96.0, 24.0);
     let width = 3 * gap as usize + 2 * PANEL;
     let mut d = Drawing::new(width, (head + PANEL as f64 + foot) as usize);
-    let census = model.eco.census();
-    let title = format!("{name}: octree of {} levels, {} nodes", model.eco.depth(), census.nodes());
+    let census = model.octree.census();
+    let title = format!("{name}: octree of {} levels, {} nodes", model.octree.depth(), census.nodes());
     d.bold([gap, 30.0], &title, Size::Large, Anchor::Left, INK);
     if root.half.is_finite() && root.half > 0.0 {
         for (i, (axis, at)) in [(1, 0.503), (2, 0.27)].into_iter().enumerate() {
@@ -52,7 +52,7 @@ pub fn slice(name: &str, model: &Model) -> Drawing {
 const ALPHA: f64 = 0.72;
 
 fn panel(d: &mut Drawing, model: &Model, at: [f64; 2], axis: usize, fraction: f64) {
-    let root = model.eco.root();
+    let root = model.octree.root();
     // Through the solid's own box, a little off the middle where the middle is a seam of cells.
     let b = model.bounds.root().aabb;
     let level = b.min[axis] + fraction * (b.max[axis] - b.min[axis]);
@@ -97,7 +97,7 @@ fn collect<'a>(model: &'a Model, node: &'a Node, axis: usize, level: f64, scale:
 
 /// The exact section: ink at its outline, a tint inside.
 fn section(model: &Model, [u, v, axis]: [usize; 3], level: f64, scale: f64) -> Vec<[u8; 3]> {
-    let root = model.eco.root();
+    let root = model.octree.root();
     let traced = Traced::new(&model.solid);
     let low = root.center - DVec3::splat(root.half);
     let mut inside = vec![false; PANEL * PANEL];

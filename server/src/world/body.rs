@@ -6,9 +6,9 @@
 //! these bounds is taken, side by side.
 
 use crate::contact::Hull;
-use crate::eco::Model;
 use crate::math::{Aabb, tolerance};
-use contactd_proto::{Motion, Pose, Track};
+use crate::octree::Model;
+use contactd_proto::{Motion, MotionState, Pose};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -97,7 +97,7 @@ pub struct Body {
     /// Largest distance of a corner from the object's origin.
     reach: f64,
     /// Where it stands and how it came there.
-    pub track: Track,
+    pub motion_state: MotionState,
     /// The body as one convex primitive, or one around it; `None` for a body without bounds.
     pub(super) hull: Option<Hull>,
     /// Its model.
@@ -128,7 +128,7 @@ impl Body {
             rotates: spec.rotates,
             max_speed: spec.max_speed,
             place: spec.place,
-            track: Track::resting(spec.pose),
+            motion_state: MotionState::resting(spec.pose),
             hull,
             corners,
             reach,
@@ -163,7 +163,7 @@ impl Body {
     /// How far the farthest of its points gets in the first part `s` of its motion, at most: |v|·s along, and the chord of
     /// the angle around, 2 sin(θ/2) <= min(θ, 2).
     pub fn travel(&self, s: f64) -> f64 {
-        let m = &self.track.motion;
+        let m = &self.motion_state.motion;
         let angle = m.spin.length() * s;
         let turning = if angle == 0.0 { 0.0 } else { angle.min(2.0) * self.reach };
         (m.velocity.length() * s + turning) * (1.0 + 1e-15)
@@ -172,10 +172,10 @@ impl Body {
     /// How much farther than `travel` tells the farthest of its points may be from where it was, once the first part `s` of its
     /// motion is taken: what rounding does to the pose in which that is kept. An end that is taken whole is kept as it was given.
     pub fn rounding_at(&self, s: f64) -> f64 {
-        let start = &self.track.motion.start;
+        let start = &self.motion_state.motion.start;
         if s < 1.0 {
-            self.rounding(start, &self.track.at(s))
-        } else if self.track.end.rotation == start.rotation {
+            self.rounding(start, &self.motion_state.at(s))
+        } else if self.motion_state.end.rotation == start.rotation {
             0.0
         } else {
             self.reach * tolerance::BOX_ROUNDING
@@ -198,7 +198,7 @@ impl Body {
 
     /// A box that holds the body at the start of its motion.
     pub fn still(&self) -> Aabb {
-        let start = self.track.motion.start;
+        let start = self.motion_state.motion.start;
         self.around(Aabb::of_points(self.corners.iter().map(|c| start.point(*c))))
     }
 
@@ -216,14 +216,14 @@ impl Body {
 
     /// A box that holds the body over the whole of its last motion.
     pub fn swept(&self) -> Aabb {
-        let m = &self.track.motion;
+        let m = &self.motion_state.motion;
         let (first, last) = (m.at(0.0), m.at(1.0));
         let theta = m.spin.length();
         let still = Aabb::of_points(self.corners.iter().map(|c| first.point(*c)));
         let ends = still.union(&Aabb::of_points(self.corners.iter().map(|c| last.point(*c))));
         let arcs = ends.grown(self.reach * theta * theta / 8.0);
         let balls = Aabb::of_points([first.position, last.position]).grown(self.reach);
-        // No farther than the odometer counts, so that what it has excluded once it need not be asked about again.
+        // No farther than the path length counts, so that what it has excluded once it need not be asked about again.
         let near = still.grown(self.travel(1.0));
         self.around(if theta == 0.0 { ends } else { arcs.intersection(&balls).intersection(&near) })
     }
@@ -253,7 +253,7 @@ mod tests {
             let start = Pose::new(DVec3::new(5.0, -2.0, 1.0), quat_of_rotation_vector(DVec3::new(1.0, 0.2, 0.0)));
             let axis = DVec3::new(0.6, -0.8, 0.0);
             let motion = Motion::turning(start, DVec3::new(2.0, 9.0, 1.0), axis * spin);
-            body.track = Track { motion, end: motion.at(1.0) };
+            body.motion_state = MotionState { motion, end: motion.at(1.0) };
             let swept = body.swept();
             for k in 0..=200 {
                 let pose = motion.at(k as f64 / 200.0);

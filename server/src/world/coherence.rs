@@ -1,43 +1,43 @@
 //! What is known of a pair from earlier steps, so that the next one need not be searched.
 //!
 //! Three kinds of knowledge, each a proof, the cheapest first:
-//! * room: apart by that much when it was measured. While the ways that both bodies have gone since (their odometers)
+//! * clearance: apart by that much when it was measured. While the ways that both bodies have gone since (their path lengths)
 //!   stay below it they cannot meet: one comparison (`neighbours`);
-//! * a course: both bodies were proven to keep a distance if they go on as they went. While their true motions stray from
+//! * a predicted motion: both bodies were proven to keep a distance if they go on as they went. While their true motions stray from
 //!   it by less than the distance leaves room for they cannot meet, however far they go (`contact::clearance`);
 //! * the last question: asked again to the bit, it has the same answer.
 //!
 //! Knowledge only says "clear", or repeats an answer; everything else is searched as if nothing were known. So the
 //! answers are the same bits without it, and what was learned in which step never shows in them.
-//! Source of the odometer: B. Mirtich, Impulse-based Dynamic Simulation (1996), section 2.4, its queue of times to impact;
-//! that of a course is worked out in `contact::clearance` and `Course::strays`.
+//! Source of the path length: B. Mirtich, Impulse-based Dynamic Simulation (1996), section 2.4, its queue of times to impact;
+//! that of a predicted motion is worked out in `contact::clearance` and `PredictedMotion::strays`.
 
 use super::body::Body;
-use crate::contact::{Asked, Counters, Outcome, PairQuery, Region, Scratch, Status, clearance};
+use crate::contact::{Counters, Outcome, PairQuery, QueryOptions, Region, Scratch, Status, clearance};
 use contactd_proto::Motion;
 use glam::{DQuat, DVec3};
 
-/// Longest course proven ahead, in steps.
+/// Longest predicted motion proven ahead, in steps.
 const LONGEST: f64 = 64.0;
-/// Convex bodies whose distance they could cover in no fewer steps than this need no course; what part of a shorter
-/// distance a course leaves for straying.
+/// Convex bodies whose distance they could cover in no fewer steps than this need no predicted motion; what part of a shorter
+/// distance a predicted motion leaves for straying.
 const LONG: f64 = 6.0;
 const HALF: f64 = 0.5;
-/// First course of a pair, in steps.
+/// First predicted motion of a pair, in steps.
 const FIRST: f64 = 4.0;
-/// Room of a pair's first course, relative to the smaller of both radii …
-const FIRST_ROOM: f64 = 1e-3;
+/// Clearance of a pair's first predicted motion, relative to the smaller of both radii …
+const FIRST_CLEARANCE: f64 = 1e-3;
 /// … the most …
-const MOST_ROOM: f64 = 1.0 / 80.0;
+const MOST_CLEARANCE: f64 = 1.0 / 80.0;
 /// … and the least that is tried, in resolutions.
-const LEAST_ROOM: f64 = 64.0;
-/// A course may cost this many cells …
+const LEAST_CLEARANCE: f64 = 64.0;
+/// A predicted motion may cost this many cells …
 const CELLS: u64 = 64;
 /// … or this many times what the pair's last search did.
 const CELLS_FACTOR: u64 = 4;
-/// The end of a course is found to this part of a step.
-const LEAD: f64 = 0.25;
-/// Failed courses double the steps that pass before the next one is tried, up to two to this power.
+/// The end of a predicted motion is found to this part of a step.
+const PROOF_SLACK: f64 = 0.25;
+/// Failed predicted motions double the steps that pass before the next one is tried, up to two to this power.
 const MOST_WAIT: u32 = 6;
 
 /// Which kind of knowledge has answered last.
@@ -48,15 +48,15 @@ pub enum Via {
     Search,
     /// The same question.
     Answer,
-    /// A course.
-    Course,
+    /// A predicted motion.
+    PredictedMotion,
     /// The distance at the start of the step.
-    Room,
+    Clearance,
 }
 
 /// Two bodies as they were expected to go.
 #[derive(Clone, Copy, Debug)]
-pub struct Course {
+pub struct PredictedMotion {
     /// Their motions over the step with which it begins.
     pub motions: [Motion; 2],
     /// When that step began, in steps.
@@ -66,7 +66,7 @@ pub struct Course {
     /// Until then, in steps, they keep their distance; infinite: standing, too.
     pub until: f64,
     /// How far they may stray together.
-    pub room: f64,
+    pub clearance: f64,
 }
 
 /// A question and its answer.
@@ -74,7 +74,7 @@ pub struct Course {
 struct Answer {
     motions: [Motion; 2],
     /// Of the first contact alone more is asked than of others.
-    asked: Asked,
+    query_options: QueryOptions,
     /// Work that it might take. Another limit has the same answer where none of both cuts it.
     limit: u64,
     outcome: Outcome,
@@ -82,7 +82,7 @@ struct Answer {
 
 /// What was told of an answer beside it: whether the pair touches, and where.
 #[derive(Debug)]
-pub struct Told {
+pub struct Reported {
     /// The outcome with it.
     pub outcome: Outcome,
     /// All of the regions; none where they were not looked for.
@@ -91,19 +91,19 @@ pub struct Told {
 
 /// What is known of one pair.
 #[derive(Debug, Default)]
-pub struct Knowledge {
-    course: Option<Box<Course>>,
-    /// The course still holds.
-    on_course: bool,
+pub struct PairCache {
+    prediction: Option<Box<PredictedMotion>>,
+    /// The predicted motion still holds.
+    on_prediction: bool,
     answer: Option<Box<Answer>>,
     /// The answer is still that of the last question.
     answered: bool,
     /// What was told of that answer, if all of it could be found out.
-    told: Option<Box<Told>>,
-    /// Steps and room of the next course; 0 until there was one.
+    reported: Option<Box<Reported>>,
+    /// Steps and clearance of the next predicted motion; 0 until there was one.
     steps: f64,
-    room: f64,
-    /// Failed courses in a row, and steps to let pass before the next one.
+    clearance: f64,
+    /// Failed predicted motions in a row, and steps to let pass before the next one.
     failures: u32,
     wait: u32,
     /// Cells of the last search; `None` before the first one and after any that was not clear.
@@ -118,7 +118,7 @@ pub struct Finding {
     /// The answer.
     pub outcome: Outcome,
     /// Apart by more than the touching distance at the start of the step, by this much at least; not positive: unknown.
-    pub room: f64,
+    pub clearance: f64,
     /// No search was needed.
     pub known: bool,
     /// Known to stay farther apart than the touching distance.
@@ -137,15 +137,15 @@ pub struct Question<'a> {
     pub clock: f64,
 }
 
-impl Knowledge {
+impl PairCache {
     /// Forgets everything but the memory it took.
     pub fn empty(&mut self) {
-        *self = Self { course: self.course.take(), answer: self.answer.take(), ..Self::default() };
+        *self = Self { prediction: self.prediction.take(), answer: self.answer.take(), ..Self::default() };
     }
 
     /// True when nothing in it could answer a question.
     pub fn is_blank(&self) -> bool {
-        !self.answered && !self.on_course && self.cells.is_none()
+        !self.answered && !self.on_prediction && self.cells.is_none()
     }
 
     /// Answers from what is known, or from what little work makes known; `None`: search. `counters` counts the work.
@@ -157,113 +157,114 @@ impl Knowledge {
     ) -> Option<(Outcome, Option<f64>)> {
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
             && last.motions == q.motions()
-            && last.asked == q.query.asked
+            && last.query_options == q.query.query_options
             && (last.limit == q.query.cell_limit || last.outcome.counters.fits(q.query.cell_limit.min(last.limit)))
         {
             self.via = Via::Answer;
             return Some((last.outcome, None));
         }
         let clear = || Outcome::clear(q.query.resolution);
-        if let Some(course) = self.course.as_ref().filter(|_| self.on_course) {
-            match course.strays(q) {
-                Some(way) if way < course.room => {
-                    self.via = Via::Course;
+        if let Some(prediction) = self.prediction.as_ref().filter(|_| self.on_prediction) {
+            match prediction.strays(q) {
+                Some(way) if way < prediction.clearance => {
+                    self.via = Via::PredictedMotion;
                     return Some((clear(), Some(0.0)));
                 }
-                Some(_) if !course.is_over(q) => {
-                    // They stray: less far ahead, with more room.
+                Some(_) if !prediction.is_over(q) => {
+                    // They stray: less far ahead, with more clearance.
                     self.steps = (0.5 * self.steps).max(1.0);
-                    self.room = (4.0 * self.room).min(MOST_ROOM * q.size());
+                    self.clearance = (4.0 * self.clearance).min(MOST_CLEARANCE * q.size());
                 }
                 _ => self.steps = (2.0 * self.steps).min(LONGEST),
             }
-            self.on_course = false;
+            self.on_prediction = false;
         }
         // A pair that was never searched, or that met something, is searched first.
         let cells = self.cells?;
-        if let Some(room) = clearance::room(&q.query, q.margin) {
+        if let Some(clearance) = clearance::at_start(&q.query, q.margin) {
             counters.closed_forms += 1;
             let travel = q.travel();
-            self.via = Via::Room;
-            if room > LONG * travel || room > travel && self.wait > 0 {
+            self.via = Via::Clearance;
+            if clearance > LONG * travel || clearance > travel && self.wait > 0 {
                 self.wait = self.wait.saturating_sub(1);
-                return Some((clear(), Some(room)));
+                return Some((clear(), Some(clearance)));
             }
             // They will be near soon: how they go on is worth more than how far apart they are.
-            self.room = HALF * room;
-            if room > 0.0 && self.try_course(q, cells, scratch, counters) {
+            self.clearance = HALF * clearance;
+            if clearance > 0.0 && self.try_prediction(q, cells, scratch, counters) {
                 return Some((clear(), Some(0.0)));
             }
-            return (room > travel).then(|| (clear(), Some(room)));
+            return (clearance > travel).then(|| (clear(), Some(clearance)));
         }
-        self.try_course(q, cells, scratch, counters).then(|| (clear(), Some(0.0)))
+        self.try_prediction(q, cells, scratch, counters).then(|| (clear(), Some(0.0)))
     }
 
     /// What was told of the answer that was recalled.
-    pub fn told(&self) -> Option<&Told> {
-        self.told.as_deref()
+    pub fn reported(&self) -> Option<&Reported> {
+        self.reported.as_deref()
     }
 
     /// Remembers what is told of the last answer.
-    pub fn tell(&mut self, told: Told) {
-        self.told = self.answered.then(|| Box::new(told));
+    pub fn report(&mut self, reported: Reported) {
+        self.reported = self.answered.then(|| Box::new(reported));
     }
 
-    /// Plans a course, unless others have failed of late.
-    fn try_course(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
+    /// Plans a predicted motion, unless others have failed of late.
+    fn try_prediction(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
         if self.wait > 0 {
             self.wait -= 1;
             return false;
         }
-        self.plan_course(q, cells, scratch, counters)
+        self.plan_prediction(q, cells, scratch, counters)
     }
 
     /// The answer to a question: what is known, or what little work makes known; `counters` (0 before) counts that work. `None`:
     /// it takes a search, whose outcome is to be learned.
     pub fn ask(&mut self, q: &Question, scratch: &mut Scratch, counters: &mut Counters) -> Option<Finding> {
-        let (outcome, room) = self.recall(q, scratch, counters)?;
+        let (outcome, clearance) = self.recall(q, scratch, counters)?;
         let outcome = Outcome { counters: *counters, ..outcome };
-        Some(Finding { outcome, room: room.unwrap_or(0.0), known: true, apart: room.is_some() })
+        Some(Finding { outcome, clearance: clearance.unwrap_or(0.0), known: true, apart: clearance.is_some() })
     }
 
-    /// Tries to prove a course from here; true when it holds over this step at least.
-    fn plan_course(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
+    /// Tries to prove a predicted motion from here; true when it holds over this step at least.
+    fn plan_prediction(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
         let size = q.size();
         if self.steps == 0.0 {
             self.steps = FIRST;
         }
-        if self.room == 0.0 {
-            self.room = FIRST_ROOM * size;
+        if self.clearance == 0.0 {
+            self.clearance = FIRST_CLEARANCE * size;
         }
-        self.room = self.room.max(LEAST_ROOM * q.query.resolution);
+        self.clearance = self.clearance.max(LEAST_CLEARANCE * q.query.resolution);
         let mut query = q.query;
         for body in [&mut query.a, &mut query.b] {
             body.placed.motion.velocity *= self.steps;
             body.placed.motion.spin *= self.steps;
         }
         query.cell_limit = CELLS.max(CELLS_FACTOR * cells).min(query.cell_limit);
-        let kept = clearance::keep(&query, q.margin, self.room, LEAD / self.steps, scratch);
+        let kept = clearance::keep(&query, q.margin, self.clearance, PROOF_SLACK / self.steps, scratch);
         *counters += kept.counters;
         let until = if kept.until >= 1.0 { f64::INFINITY } else { kept.until * self.steps };
         if until < 1.0 {
             self.failures += 1;
             self.wait = 1 << self.failures.min(MOST_WAIT);
             self.steps = (0.5 * self.steps).max(1.0);
-            self.room *= 0.25;
+            self.clearance *= 0.25;
             return false;
         }
         self.failures = 0;
         let motions = q.motions();
-        let course = Course { motions, begin: q.clock, steps: self.steps, until, room: kept.room };
-        put(&mut self.course, course);
-        self.on_course = true;
-        self.via = Via::Course;
+        let prediction =
+            PredictedMotion { motions, begin: q.clock, steps: self.steps, until, clearance: kept.clearance };
+        put(&mut self.prediction, prediction);
+        self.on_prediction = true;
+        self.via = Via::PredictedMotion;
         true
     }
 
-    /// What has answered last, and the course it was.
-    pub fn via(&self) -> (Via, Option<&Course>) {
-        (self.via, self.course.as_deref())
+    /// What has answered last, and the predicted motion it was.
+    pub fn via(&self) -> (Via, Option<&PredictedMotion>) {
+        (self.via, self.prediction.as_deref())
     }
 
     /// Learns from a search that was allowed so much work.
@@ -271,15 +272,15 @@ impl Knowledge {
         self.via = Via::Search;
         self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
         // More work might tell an overlap that was to be searched past.
-        let open = outcome.status == Status::Overlap && q.query.asked.past_overlap;
+        let open = outcome.status == Status::Overlap && q.query.query_options.past_overlap;
         // What moves is hardly ever asked the same again, and what took no search is found as quickly as it is kept.
         let cheap = outcome.counters.cells + outcome.counters.instant_cells == 0;
         let moves = || [&q.query.a, &q.query.b].iter().any(|body| !body.placed.motion.is_rest());
         self.answered = outcome.status != Status::Undecided && !open && !(cheap && moves());
         if self.answered {
-            let (motions, asked) = (q.motions(), q.query.asked);
-            put(&mut self.answer, Answer { motions, asked, limit, outcome: *outcome });
-            self.told = None;
+            let (motions, query_options) = (q.motions(), q.query.query_options);
+            put(&mut self.answer, Answer { motions, query_options, limit, outcome: *outcome });
+            self.reported = None;
         }
     }
 }
@@ -308,7 +309,7 @@ impl Question<'_> {
     }
 }
 
-impl Course {
+impl PredictedMotion {
     /// True once the bodies are expected to stand.
     fn is_over(&self, q: &Question) -> bool {
         q.clock - self.begin >= self.steps
@@ -335,14 +336,14 @@ impl Course {
             // Chords of the angle at the start and of what it grows by, at the farthest point.
             let turning = 2.0 * turned + (motion.spin - spin).length();
             let size = motion.start.position.abs().max_element() + pose.position.abs().max_element() + body.reach();
-            let arm = body.reach() + self.room;
+            let arm = body.reach() + self.clearance;
             sum += off.length().max(later.length()) + turning.min(2.0) * arm + size * ROUNDING;
         }
         Some(sum)
     }
 }
 
-/// Relative rounding of a pose that is carried over a course, against the one that is given.
+/// Relative rounding of a pose that is carried over a predicted motion, against the one that is given.
 const ROUNDING: f64 = 1e-13;
 
 /// Sine of half the angle between two rotations.

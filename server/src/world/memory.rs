@@ -8,19 +8,19 @@
 //! follows from what: docs/certificate.md, "What is remembered".
 
 use super::coherence::Via;
-use super::notes::{Decided, Room, axis_between};
+use super::notes::{Clearance, Decided, axis_between};
 use super::scene::World;
 use super::search::{self, PairJob};
 use crate::contact::certificate::{self, Certificate};
 use crate::contact::clearance::{self, Distance};
-use crate::contact::{self, Asked, Outcome, PairQuery, Scratch, Status};
+use crate::contact::{self, Outcome, PairQuery, QueryOptions, Scratch, Status};
 use crate::motion::Placed;
 use contactd_proto::{Motion, Pose};
 use glam::DVec3;
 use std::fmt::Write as _;
 
 /// The first line of every certificate of what is remembered.
-pub const HEADER: &str = "contactd-memory 1";
+pub const HEADER: &str = "contactd-memory 2";
 
 /// What has answered for a pair in the last step.
 // One at a time, and only where somebody asks.
@@ -31,11 +31,11 @@ pub enum Remembered {
     Nothing,
     /// A distance measured before, of which the bodies have not gone as much since. Of pairs beyond each other's boxes, too: these
     /// stood as far apart when the list of neighbours was taken.
-    Room(Room),
+    Clearance(Clearance),
     /// Directions at the start and at the end of the step, one going over into the other.
     Directions([DVec3; 2]),
-    /// A course.
-    Course {
+    /// A predicted motion.
+    PredictedMotion {
         /// The motions over the step with which it began.
         motions: [Motion; 2],
         /// Steps since then.
@@ -45,7 +45,7 @@ pub enum Remembered {
         /// Steps until which they were proven to keep their distance; infinite: standing afterwards, too.
         until: f64,
         /// How far they may stray together.
-        room: f64,
+        clearance: f64,
         /// How far they stray in this step, at most.
         strays: f64,
     },
@@ -58,7 +58,7 @@ pub enum Remembered {
     },
 }
 
-/// Parts of a course's room for which its proof is made: the smallest that holds what the bodies stray serves many steps.
+/// Parts of a predicted motion's room for which its proof is made: the smallest that holds what the bodies stray serves many steps.
 const SHARES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
 
 impl World {
@@ -76,34 +76,34 @@ impl World {
         self.plan_of(a, b)?;
         let pair = (*self.by_id.get(&a)?, *self.by_id.get(&b)?);
         let neighbours = self.state.neighbours();
-        let room = || notes.rooms.get(&(a, b)).copied().map_or(Remembered::Nothing, Remembered::Room);
+        let clearance = || notes.clearances.get(&(a, b)).copied().map_or(Remembered::Nothing, Remembered::Clearance);
         match notes.decided.get(&pair) {
-            Some(Decided::Room) => return Some(room()),
+            Some(Decided::Clearance) => return Some(clearance()),
             Some(Decided::Directions(n)) => return Some(Remembered::Directions(*n)),
             None => {}
         }
         let Some(place) = neighbours.find(pair.0, pair.1) else {
             let ((p, own), (q, other)) = (neighbours.home(pair.0), neighbours.home(pair.1));
             let along = axis_between(own, other);
-            return Some(Remembered::Room(Room { poses: [*p, *q], along, room: own.gap(other) }));
+            return Some(Remembered::Clearance(Clearance { poses: [*p, *q], along, clearance: own.gap(other) }));
         };
-        let Some(job) = self.job(pair) else { return Some(room()) };
-        let (Some(knowledge), true) = (neighbours.knowledge(place), job.found.known) else {
+        let Some(job) = self.job(pair) else { return Some(clearance()) };
+        let (Some(pair_cache), true) = (neighbours.pair_cache(place), job.found.known) else {
             return Some(Remembered::Nothing);
         };
         let q = job.question(&self.bodies, &notes.options, self.state.clock());
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
-        Some(match knowledge.via() {
-            (Via::Search, _) | (Via::Course, None) => Remembered::Nothing,
+        Some(match pair_cache.via() {
+            (Via::Search, _) | (Via::PredictedMotion, None) => Remembered::Nothing,
             (Via::Answer, _) => Remembered::Answer { motions, outcome: job.found.outcome },
-            (Via::Room, _) => room(),
-            (Via::Course, Some(course)) => Remembered::Course {
-                motions: course.motions,
-                since: self.state.clock() - course.begin,
-                steps: course.steps,
-                until: course.until,
-                room: course.room,
-                strays: course.strays(&q).unwrap_or(f64::INFINITY),
+            (Via::Clearance, _) => clearance(),
+            (Via::PredictedMotion, Some(prediction)) => Remembered::PredictedMotion {
+                motions: prediction.motions,
+                since: self.state.clock() - prediction.begin,
+                steps: prediction.steps,
+                until: prediction.until,
+                clearance: prediction.clearance,
+                strays: prediction.strays(&q).unwrap_or(f64::INFINITY),
             },
         })
     }
@@ -112,7 +112,7 @@ impl World {
         self.state.jobs().iter().find(|job| (job.a, job.b) == (i, j) && job.pair.is_some())
     }
 
-    /// The certificate of what has answered for a pair (see [`World::remembered`]) as text; proofs of courses and answers may
+    /// The certificate of what has answered for a pair (see [`World::remembered`]) as text; proofs of predicted motions and answers may
     /// take `cells` cells. `None` where there is nothing to certify or the proof takes more.
     pub fn certificate_of(&self, a: u32, b: u32, cells: u64) -> Option<String> {
         let (a, b) = (a.min(b), a.max(b));
@@ -120,22 +120,22 @@ impl World {
         let mut out = String::new();
         match self.remembered(a, b)? {
             Remembered::Nothing => return None,
-            Remembered::Room(Room { poses, along, room }) => {
-                let _ = write!(out, "pair {a} {b} room {room:e} along {}", numbers(&[along]));
+            Remembered::Clearance(Clearance { poses, along, clearance }) => {
+                let _ = write!(out, "pair {a} {b} clearance {clearance:e} along {}", numbers(&[along]));
                 poses.iter().for_each(|p| write_pose(&mut out, p));
                 out.push('\n');
             }
             Remembered::Directions([n0, n1]) => {
                 let _ = writeln!(out, "pair {a} {b} directions {} {}", numbers(&[n0]), numbers(&[n1]));
             }
-            Remembered::Course { motions, since, steps, until, room, strays } => {
+            Remembered::PredictedMotion { motions, since, steps, until, clearance, strays } => {
                 let job = self.job((*self.by_id.get(&a)?, *self.by_id.get(&b)?))?;
                 let q = job.question(&self.bodies, &notes.options, self.state.clock());
-                let share = SHARES.into_iter().find(|share| strays <= share * room)?;
+                let share = SHARES.into_iter().find(|share| strays <= share * clearance)?;
                 let part = if until.is_finite() { until / steps } else { 1.0 };
                 let query = over(&q.query, motions, steps, cells);
-                let proof = clearance::certify_kept(&query, q.margin, (share * room, room), part)?;
-                let _ = write!(out, "pair {a} {b} course since {since:e} steps {steps:e} until {until:e}");
+                let proof = clearance::certify_kept(&query, q.margin, (share * clearance, clearance), part)?;
+                let _ = write!(out, "pair {a} {b} prediction since {since:e} steps {steps:e} until {until:e}");
                 motions.iter().for_each(|m| write_motion(&mut out, m));
                 out.push('\n');
                 match proof {
@@ -152,7 +152,7 @@ impl World {
             Remembered::Answer { motions, outcome } => {
                 let job = self.job((*self.by_id.get(&a)?, *self.by_id.get(&b)?))?;
                 let query = search::query(&self.bodies, job, &notes.options);
-                let query = PairQuery { cell_limit: cells, asked: Asked::CONTACT, ..query };
+                let query = PairQuery { cell_limit: cells, query_options: QueryOptions::CONTACT, ..query };
                 let _ = write!(out, "pair {a} {b} answer");
                 motions.iter().for_each(|m| write_motion(&mut out, m));
                 out.push('\n');
@@ -169,7 +169,7 @@ impl World {
     }
 }
 
-/// A question about the motions of a course, all of its steps taken as one.
+/// A question about the motions of a predicted motion, all of its steps taken as one.
 fn over<'a>(query: &PairQuery<'a>, motions: [Motion; 2], steps: f64, cells: u64) -> PairQuery<'a> {
     let mut query = PairQuery { cell_limit: cells, ..*query };
     for (body, motion) in [&mut query.a, &mut query.b].into_iter().zip(motions) {

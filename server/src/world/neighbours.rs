@@ -5,16 +5,16 @@
 //! boxes share no point need not be looked at while both stay within theirs: the broad phase runs again only when one leaves.
 //! The pairs it lets through are a list; what is known of each stays with it.
 //!
-//! Odometers count how far the farthest point of a body may have gone; each sum is rounded up. A pair that was `room`
-//! apart when its odometers stood at p and q cannot meet before they show p' + q' > p + q + room: the one comparison
+//! Path lengths count how far the farthest point of a body may have gone; each sum is rounded up. A pair that was `clearance`
+//! apart when its path lengths stood at p and q cannot meet before they show p' + q' > p + q + clearance: the one comparison
 //! that such a pair costs a step.
 //! Invariant: the list holds every pair that may come within its touching distance in this step, in the order of ids.
 
 use super::body::Body;
 use super::broad::BroadPhase;
-use super::coherence::Knowledge;
+use super::coherence::PairCache;
 use super::plan::PairPlan;
-use crate::contact::Glance;
+use crate::contact::SeparatingAxisTest;
 use crate::math::Aabb;
 use contactd_proto::{Detect, Pose};
 use glam::DVec3;
@@ -28,7 +28,7 @@ const LEAST: f64 = 0.02;
 /// The part of it that is used: the rest is far more than what rounding does to sums of ways.
 const SAFE: f64 = 0.999_999;
 
-/// Two bodies, the smaller index first, and the sum of odometers up to which they are known to stay apart.
+/// Two bodies, the smaller index first, and the sum of path lengths up to which they are known to stay apart.
 #[derive(Clone, Copy, Debug)]
 struct Near {
     a: u32,
@@ -36,9 +36,9 @@ struct Near {
     limit: f64,
 }
 
-/// What a glance at a pair needs of it. There are many pairs of which no more is ever asked.
+/// What a separating-axis test at a pair needs of it. There are many pairs of which no more is ever asked.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight {
+pub struct PairHint {
     /// A direction along which its bodies were apart; 0 where none is known.
     pub along: DVec3,
     /// Up to this distance they may touch, or matter to each other otherwise.
@@ -55,33 +55,33 @@ pub struct Sight {
 struct Entry {
     resolution: f64,
     /// What earlier steps have proven, if it has been asked about at all.
-    knowledge: Option<Box<Knowledge>>,
+    pair_cache: Option<Box<PairCache>>,
 }
 
 /// How far a body may have gone: before the step, and with it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Odometer {
+pub struct PathLength {
     /// At the start of the step.
     pub start: f64,
     /// At its end.
     pub end: f64,
 }
 
-/// The list, and the odometers that keep it true.
+/// The list, and the path lengths that keep it true.
 #[derive(Debug, Default)]
 pub struct Neighbours {
     pairs: Vec<Near>,
     /// One for each of them.
-    sights: Vec<Sight>,
+    sights: Vec<PairHint>,
     /// One for each of them.
     entries: Vec<Entry>,
     old_pairs: Vec<Near>,
-    old_sights: Vec<Sight>,
+    old_sights: Vec<PairHint>,
     old_entries: Vec<Entry>,
     /// The memory of pairs that have left the list, empty.
     #[expect(clippy::vec_box, reason = "it is handed on as it is")]
-    spare: Vec<Box<Knowledge>>,
-    odometers: Vec<Odometer>,
+    spare: Vec<Box<PairCache>>,
+    path_lengths: Vec<PathLength>,
     /// Odometer up to which a body stays in its grown box.
     fences: Vec<f64>,
     /// Where a body stood when its box was taken, and by how much it was grown for the body's motion.
@@ -123,10 +123,10 @@ fn by_ids(pairs: &mut Vec<(u32, u32)>, sorted: &mut Vec<(u32, u32)>, counts: &mu
 }
 
 impl Neighbours {
-    /// Forgets the list and what is known of its pairs: bodies or rules have changed. Odometers begin anew: nothing refers to them,
+    /// Forgets the list and what is known of its pairs: bodies or rules have changed. Path lengths begin anew: nothing refers to them,
     /// and a body may have another one's place.
     pub fn forget(&mut self) {
-        self.odometers.clear();
+        self.path_lengths.clear();
         self.pairs.clear();
         self.sights.clear();
         self.entries.clear();
@@ -140,7 +140,7 @@ impl Neighbours {
 
     /// A body was displaced by as much between two steps, and goes as far in this one.
     pub fn moved(&mut self, body: u32, before: f64, now: f64) {
-        let o = &mut self.odometers[body as usize];
+        let o = &mut self.path_lengths[body as usize];
         o.start = up(o.start, before);
         o.end = up(o.start, now);
     }
@@ -148,8 +148,8 @@ impl Neighbours {
     /// A part of a body's last motion is taken.
     pub fn taken(&mut self, index: u32, body: &Body, part: f64) {
         let way = if part == 1.0 {
-            // All of it, which the odometer shows already.
-            let o = &mut self.odometers[index as usize];
+            // All of it, which the path length shows already.
+            let o = &mut self.path_lengths[index as usize];
             o.start = o.end;
             body.rounding_at(part)
         } else {
@@ -158,9 +158,9 @@ impl Neighbours {
         self.moved(index, way, 0.0);
     }
 
-    /// Readies the odometers for as many bodies.
+    /// Readies the path lengths for as many bodies.
     pub fn count(&mut self, bodies: usize) {
-        self.odometers.resize(bodies, Odometer::default());
+        self.path_lengths.resize(bodies, PathLength::default());
         self.box_tests = 0;
     }
 
@@ -177,26 +177,26 @@ impl Neighbours {
             return;
         }
         self.stale = false;
-        // An odometer that has gone beyond all numbers begins anew, and what was noted by it is forgotten.
+        // A path length that has gone beyond all numbers begins anew, and what was noted by it is forgotten.
         let mut anew = Vec::new();
-        for (i, (body, odometer)) in bodies.iter().zip(&mut self.odometers).enumerate() {
-            if !odometer.end.is_finite() && body.reach().is_finite() {
-                *odometer = Odometer { start: 0.0, end: body.travel(1.0) };
+        for (i, (body, path_length)) in bodies.iter().zip(&mut self.path_lengths).enumerate() {
+            if !path_length.end.is_finite() && body.reach().is_finite() {
+                *path_length = PathLength { start: 0.0, end: body.travel(1.0) };
                 anew.push(i as u32);
             }
         }
         self.boxes.clear();
         self.fences.clear();
         self.homes.clear();
-        for (body, odometer) in bodies.iter().zip(&self.odometers) {
-            let way = odometer.end - odometer.start;
+        for (body, path_length) in bodies.iter().zip(&self.path_lengths) {
+            let way = path_length.end - path_length.start;
             let more =
                 if body.is_static { 0.0 } else { (STEPS * way).min(MOST * body.reach()).max(LEAST * body.reach()) };
             // What turns without bounds has no way that could be told.
-            let room = if way.is_finite() { way + more } else { 0.0 };
-            self.boxes.push(if way.is_finite() { body.still().grown(room + touch(body)) } else { Aabb::ALL });
-            self.fences.push(odometer.start + SAFE * room);
-            self.homes.push((body.track.motion.start, room));
+            let clearance = if way.is_finite() { way + more } else { 0.0 };
+            self.boxes.push(if way.is_finite() { body.still().grown(clearance + touch(body)) } else { Aabb::ALL });
+            self.fences.push(path_length.start + SAFE * clearance);
+            self.homes.push((body.motion_state.motion.start, clearance));
         }
         let (found, boxes) = (&mut self.found, &self.boxes);
         found.clear();
@@ -211,9 +211,9 @@ impl Neighbours {
         self.sights.clear();
         let spare = &mut self.spare;
         let mut leaves = |entry: Entry| {
-            if let Some(mut knowledge) = entry.knowledge {
-                knowledge.empty();
-                spare.push(knowledge);
+            if let Some(mut pair_cache) = entry.pair_cache {
+                pair_cache.empty();
+                spare.push(pair_cache);
             }
         };
         let of_bodies = self.old_pairs.iter().zip(&self.old_sights);
@@ -222,44 +222,44 @@ impl Neighbours {
             while let Some((_, entry)) = old.next_if(|((n, _), _)| (n.a, n.b) < (a, b)) {
                 leaves(entry);
             }
-            if let Some(((near, sight), entry)) = old.next_if(|((n, _), _)| (n.a, n.b) == (a, b)) {
+            if let Some(((near, pair_hint), entry)) = old.next_if(|((n, _), _)| (n.a, n.b) == (a, b)) {
                 let limit = if anew.iter().any(|i| *i == a || *i == b) { f64::NEG_INFINITY } else { near.limit };
                 self.pairs.push(Near { limit, ..*near });
-                self.sights.push(*sight);
+                self.sights.push(*pair_hint);
                 self.entries.push(entry);
                 continue;
             }
             let Some((plan_index, plan, resolution)) = plan(a, b) else { continue };
             self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
-            self.sights.push(Sight {
+            self.sights.push(PairHint {
                 along: DVec3::ZERO,
                 touch: plan.reach().max(2.0 * resolution),
                 discrete: plan.detect == Detect::Discrete,
                 met: false,
                 plan_index,
             });
-            self.entries.push(Entry { resolution, knowledge: None });
+            self.entries.push(Entry { resolution, pair_cache: None });
         }
         old.for_each(|(_, entry)| leaves(entry));
     }
 
-    /// True when a body stays in its grown box over this step: as its odometer tells, or because it has come back.
+    /// True when a body stays in its grown box over this step: as its path length tells, or because it has come back.
     fn stays(&mut self, index: usize, body: &Body) -> bool {
-        let odometer = self.odometers[index];
-        if !odometer.end.is_finite() {
+        let path_length = self.path_lengths[index];
+        if !path_length.end.is_finite() {
             // Only a body without bounds is everywhere.
             return body.reach().is_infinite();
         }
-        if odometer.end <= self.fences[index] {
+        if path_length.end <= self.fences[index] {
             return true;
         }
-        let (home, room) = &self.homes[index];
-        let start = &body.track.motion.start;
-        let fence = odometer.start + (SAFE * room - body.displacement(home, start));
-        if odometer.end <= fence {
+        let (home, clearance) = &self.homes[index];
+        let start = &body.motion_state.motion.start;
+        let fence = path_length.start + (SAFE * clearance - body.displacement(home, start));
+        if path_length.end <= fence {
             self.fences[index] = fence;
         }
-        odometer.end <= fence
+        path_length.end <= fence
     }
 
     /// The two bodies of a pair.
@@ -272,14 +272,14 @@ impl Neighbours {
         self.pairs.binary_search_by_key(&(a, b), |n| (n.a, n.b)).ok()
     }
 
-    /// What a glance needs of a pair.
-    pub fn sight(&self, pair: usize) -> &Sight {
+    /// What a separating-axis test needs of a pair.
+    pub fn pair_hint(&self, pair: usize) -> &PairHint {
         &self.sights[pair]
     }
 
     /// What is known of a pair.
-    pub fn knowledge(&self, pair: usize) -> Option<&Knowledge> {
-        self.entries[pair].knowledge.as_deref()
+    pub fn pair_cache(&self, pair: usize) -> Option<&PairCache> {
+        self.entries[pair].pair_cache.as_deref()
     }
 
     /// Where a body stood when the list was taken last, its box there grown for the time since, and by how much.
@@ -294,30 +294,30 @@ impl Neighbours {
 
     /// Notes what was seen of a pair at the start of this step.
     #[inline]
-    pub fn noticed(&mut self, pair: usize, glance: &Glance) {
-        self.sights[pair].along = glance.along;
-        if glance.room > 0.0 {
-            self.note(pair, glance.room);
+    pub fn noticed(&mut self, pair: usize, axis_test: &SeparatingAxisTest) {
+        self.sights[pair].along = axis_test.along;
+        if axis_test.clearance > 0.0 {
+            self.note(pair, axis_test.clearance);
         }
     }
 
     /// The resolution of a pair; and gives what is known of it away, until `learned`.
-    pub fn lend(&mut self, pair: usize) -> (f64, Box<Knowledge>) {
+    pub fn lend(&mut self, pair: usize) -> (f64, Box<PairCache>) {
         let entry = &mut self.entries[pair];
-        (entry.resolution, entry.knowledge.take().or_else(|| self.spare.pop()).unwrap_or_default())
+        (entry.resolution, entry.pair_cache.take().or_else(|| self.spare.pop()).unwrap_or_default())
     }
 
-    /// Takes it back; with the room found at the start of this step, if it is positive, and whether the bodies met.
-    pub fn learned(&mut self, pair: usize, knowledge: Option<Box<Knowledge>>, room: f64, met: bool) {
-        self.entries[pair].knowledge = knowledge;
+    /// Takes it back; with the clearance found at the start of this step, if it is positive, and whether the bodies met.
+    pub fn learned(&mut self, pair: usize, pair_cache: Option<Box<PairCache>>, clearance: f64, met: bool) {
+        self.entries[pair].pair_cache = pair_cache;
         self.sights[pair].met = met;
-        if room > 0.0 {
-            self.note(pair, room);
+        if clearance > 0.0 {
+            self.note(pair, clearance);
         }
     }
 
-    /// Calls `ask` for every pair that its odometers don't prove apart over this step.
-    pub fn asked(&self, mut ask: impl FnMut(usize)) {
+    /// Calls `ask` for every pair that its path lengths don't prove apart over this step.
+    pub fn query_options(&self, mut ask: impl FnMut(usize)) {
         for (i, near) in self.pairs.iter().enumerate() {
             if !self.apart(near) {
                 ask(i);
@@ -325,22 +325,22 @@ impl Neighbours {
         }
     }
 
-    /// True when the odometers prove a pair apart over this step.
+    /// True when the path lengths prove a pair apart over this step.
     pub fn is_apart(&self, pair: usize) -> bool {
         self.apart(&self.pairs[pair])
     }
 
     fn apart(&self, near: &Near) -> bool {
-        self.odometers[near.a as usize].end + self.odometers[near.b as usize].end <= near.limit
+        self.path_lengths[near.a as usize].end + self.path_lengths[near.b as usize].end <= near.limit
     }
 
-    /// Notes that a pair is `room` farther apart than its touching distance at the start of this step.
+    /// Notes that a pair is `clearance` farther apart than its touching distance at the start of this step.
     #[inline]
-    pub fn note(&mut self, pair: usize, room: f64) {
+    pub fn note(&mut self, pair: usize, clearance: f64) {
         let near = &mut self.pairs[pair];
-        let sum = self.odometers[near.a as usize].start + self.odometers[near.b as usize].start;
+        let sum = self.path_lengths[near.a as usize].start + self.path_lengths[near.b as usize].start;
         // More than the roundings of both sums, of this product and of the sum that it is compared with.
-        let limit = (sum + room) * (1.0 - 4.0 * f64::EPSILON);
+        let limit = (sum + clearance) * (1.0 - 4.0 * f64::EPSILON);
         near.limit = if limit.is_finite() { limit } else { f64::NEG_INFINITY };
     }
 }

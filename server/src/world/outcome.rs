@@ -42,7 +42,7 @@ pub struct StepOutcome {
     pub contact: bool,
     /// Pairs that were searched, or answered by what was known of them.
     pub searched: u32,
-    /// Those of them that what was known has answered. Pairs that their odometers prove apart are not even counted.
+    /// Those of them that what was known has answered. Pairs that their path lengths prove apart are not even counted.
     pub known: u32,
     /// How often each effect was worked out.
     pub effect_counters: EffectCounters,

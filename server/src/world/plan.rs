@@ -6,7 +6,7 @@
 //! The first rule that names a pair decides (effects of a scene); an exception passes the pair on to the rules behind. A
 //! pair that no rule names is off once there are rules; without rules every pair has the default plan.
 
-use crate::contact::{Asked, clearance};
+use crate::contact::{QueryOptions, clearance};
 use contactd_proto::{Detect, InitialOverlap, Report, Rule};
 use std::collections::HashMap;
 
@@ -39,8 +39,8 @@ impl PairPlan {
     };
 
     /// What it asks of a search. Regions are asked for beside it.
-    pub fn asked(&self) -> Asked {
-        Asked {
+    pub fn query_options(&self) -> QueryOptions {
+        QueryOptions {
             report: self.report.min(Report::Contact),
             penetration: self.penetration,
             past_overlap: self.initial_overlap == InitialOverlap::IgnoreIfSeparating,
@@ -53,12 +53,12 @@ impl PairPlan {
     }
 
     /// True when it is told of a clear pair that it is near.
-    pub fn tells_nearness(&self) -> bool {
+    pub fn reports_nearness(&self) -> bool {
         self.margin > 0.0 || self.report >= Report::Patch
     }
 
     /// True when contact regions are told: for patches, and of pairs within a margin whose contacts are told.
-    pub fn tells_regions(&self) -> bool {
+    pub fn reports_regions(&self) -> bool {
         self.report >= Report::Patch || (self.margin > 0.0 && self.report >= Report::Contact)
     }
 

@@ -162,9 +162,9 @@ fn detail(world: &World, p: &PairOutcome) -> DetailSlot {
     let meets = matches!(o.status, Status::Contact | Status::Overlap);
     // The point that is told: of an overlap the deepest one, where it was asked for.
     let measured = o.penetration > 0.0;
-    let told = measured || (meets && p.plan.report >= Report::Contact);
-    let point_a = world.body(p.a).filter(|_| told).map(|body| {
-        let pose = body.track.motion.at(o.time);
+    let reported = measured || (meets && p.plan.report >= Report::Contact);
+    let point_a = world.body(p.a).filter(|_| reported).map(|body| {
+        let pose = body.motion_state.motion.at(o.time);
         pose.rotation.conjugate() * (if measured { o.deepest } else { o.point } - pose.position)
     });
     DetailSlot {

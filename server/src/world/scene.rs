@@ -4,7 +4,7 @@ use super::body::{Body, ObjectSpec};
 use super::plan::{PairPlan, Plans};
 use super::state::StepState;
 use crate::math::tolerance;
-use contactd_proto::{Detect, ErrorCode, Pose, Rule, Track};
+use contactd_proto::{Detect, ErrorCode, MotionState, Pose, Rule};
 use std::collections::HashMap;
 use std::fmt;
 
@@ -184,21 +184,21 @@ impl World {
     ///
     /// # Errors
     /// `UnknownObject`, `StaticObject`, `NotFinite`, `BadQuaternion`, at the index of the track.
-    pub fn restore(&mut self, tracks: &[(u32, Track)]) -> Result<(), Refusal> {
-        let mut places = Vec::with_capacity(tracks.len());
-        for (i, (id, track)) in tracks.iter().enumerate() {
+    pub fn restore(&mut self, motion_states: &[(u32, MotionState)]) -> Result<(), Refusal> {
+        let mut places = Vec::with_capacity(motion_states.len());
+        for (i, (id, motion_state)) in motion_states.iter().enumerate() {
             let Some(index) = self.by_id.get(id) else {
                 return Err(Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")).at(i));
             };
             let refuse = |code| Refusal::new(code, format!("object id {id}")).at(i);
-            check_pose(&track.motion.start).and(check_pose(&track.end)).map_err(refuse)?;
-            if self.bodies[*index as usize].is_static && !track.is_rest() {
+            check_pose(&motion_state.motion.start).and(check_pose(&motion_state.end)).map_err(refuse)?;
+            if self.bodies[*index as usize].is_static && !motion_state.is_rest() {
                 return Err(refuse(ErrorCode::StaticObject));
             }
             places.push(*index);
         }
-        for (index, (_, track)) in places.into_iter().zip(tracks) {
-            self.bodies[index as usize].track = *track;
+        for (index, (_, motion_state)) in places.into_iter().zip(motion_states) {
+            self.bodies[index as usize].motion_state = *motion_state;
         }
         self.forget();
         Ok(())

@@ -8,11 +8,11 @@
 //! comes first, and the latest pairs stay undecided, each with the time up to which it is proven free.
 
 use super::body::Body;
-use super::coherence::{Finding, Knowledge, Question};
+use super::coherence::{Finding, PairCache, Question};
 use super::heed::Heed;
 use super::options::StepOptions;
 use super::plan::PairPlan;
-use crate::contact::{self, Asked, Counters, Outcome, PairQuery, PairSearch, Scratch, Status};
+use crate::contact::{self, Counters, Outcome, PairQuery, PairSearch, QueryOptions, Scratch, Status};
 use crate::math::halt::Halt;
 use crate::math::tolerance;
 use crate::motion::Placed;
@@ -44,7 +44,7 @@ pub struct PairJob {
     /// Its place in the list of neighbours; `None`: proven clear without being asked about.
     pub pair: Option<usize>,
     /// What earlier steps have proven, of a pair with a place; lent by the list of neighbours.
-    pub knowledge: Option<Box<Knowledge>>,
+    pub pair_cache: Option<Box<PairCache>>,
     /// Nothing is known that could answer it.
     is_blank: bool,
     /// Its answer was found, but for what a queue over all pairs adds.
@@ -60,14 +60,14 @@ impl PairJob {
         (plan_index, plan): (u32, PairPlan),
         resolution: f64,
         near: bool,
-        pair: Option<(usize, Box<Knowledge>)>,
+        pair: Option<(usize, Box<PairCache>)>,
     ) -> Self {
         let known = pair.is_none();
-        let found = Finding { outcome: Outcome::clear(resolution), room: 0.0, known, apart: known };
-        let (pair, knowledge): (_, Option<Box<Knowledge>>) = pair.unzip();
+        let found = Finding { outcome: Outcome::clear(resolution), clearance: 0.0, known, apart: known };
+        let (pair, pair_cache): (_, Option<Box<PairCache>>) = pair.unzip();
         // Looked up here, where many jobs are made in a row and the memory can answer several at a time.
-        let is_blank = knowledge.as_deref().is_none_or(Knowledge::is_blank);
-        Self { a, b, plan, plan_index, resolution, near, pair, knowledge, is_blank, is_done: false, found }
+        let is_blank = pair_cache.as_deref().is_none_or(PairCache::is_blank);
+        Self { a, b, plan, plan_index, resolution, near, pair, pair_cache, is_blank, is_done: false, found }
     }
 
     pub(super) fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
@@ -79,10 +79,10 @@ impl PairJob {
     /// Takes the outcome of a search that was allowed so much work, which has been written into `found`.
     fn take(&mut self, q: &Question, limit: u64) {
         let found = &mut self.found;
-        if let Some(knowledge) = &mut self.knowledge {
-            knowledge.learn(q, limit, &found.outcome);
+        if let Some(pair_cache) = &mut self.pair_cache {
+            pair_cache.learn(q, limit, &found.outcome);
         }
-        (found.room, found.known, found.apart) = (0.0, false, false);
+        (found.clearance, found.known, found.apart) = (0.0, false, false);
         finish(&self.plan, &mut found.outcome);
     }
 }
@@ -91,36 +91,38 @@ impl PairJob {
 #[derive(Debug, Default)]
 pub struct Memory {
     /// One for each thread.
-    seats: Vec<Mutex<Seat>>,
+    thread_scratches: Vec<Mutex<ThreadScratch>>,
 }
 
 /// A thread's scratch, and the cells that it has refined in this step.
 #[derive(Debug, Default)]
-struct Seat {
+struct ThreadScratch {
     scratch: Scratch,
     cells: u64,
 }
 
 impl Memory {
     /// The calling thread's seat.
-    fn with<T>(&self, work: impl FnOnce(&mut Seat) -> T) -> T {
+    fn with<T>(&self, work: impl FnOnce(&mut ThreadScratch) -> T) -> T {
         let own = rayon::current_thread_index().map_or(0, |i| i + 1);
-        let mut seat = self.seats[own].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        work(&mut seat)
+        let mut thread_scratch = self.thread_scratches[own].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        work(&mut thread_scratch)
     }
 
     /// Makes a seat for each thread.
     fn ready(&mut self) {
         let threads = rayon::current_num_threads();
-        if self.seats.len() <= threads {
-            self.seats.resize_with(threads + 1, Mutex::default);
+        if self.thread_scratches.len() <= threads {
+            self.thread_scratches.resize_with(threads + 1, Mutex::default);
         }
     }
 
     /// Cells that the busiest thread has refined in the last step.
     pub fn busiest(&mut self) -> u64 {
-        let cells = |seat: &mut Mutex<Seat>| seat.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells;
-        self.seats.iter_mut().map(cells).max().unwrap_or(0)
+        let cells = |thread_scratch: &mut Mutex<ThreadScratch>| {
+            thread_scratch.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells
+        };
+        self.thread_scratches.iter_mut().map(cells).max().unwrap_or(0)
     }
 }
 
@@ -136,8 +138,8 @@ pub fn run(
     memory: &mut Memory,
     heed: Option<&Heed>,
 ) {
-    for seat in &mut memory.seats {
-        seat.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
+    for thread_scratch in &mut memory.thread_scratches {
+        thread_scratch.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
     }
     let is_over = || heed.is_some_and(Heed::is_over);
     let first = options.first && !options.clear;
@@ -148,14 +150,14 @@ pub fn run(
             return;
         }
         let mut q = job.question(bodies, options, clock);
-        let cells = memory.with(|seat| {
-            seat.scratch.halt = halt.cloned();
+        let cells = memory.with(|thread_scratch| {
+            thread_scratch.scratch.halt = halt.cloned();
             let mut counters = Counters::default();
-            let knowledge = job.knowledge.as_mut().filter(|_| !job.is_blank);
-            if let Some(finding) = knowledge.and_then(|k| k.ask(&q, &mut seat.scratch, &mut counters)) {
+            let pair_cache = job.pair_cache.as_mut().filter(|_| !job.is_blank);
+            if let Some(finding) = pair_cache.and_then(|k| k.ask(&q, &mut thread_scratch.scratch, &mut counters)) {
                 job.found = finding;
                 finish(&job.plan, &mut job.found.outcome);
-                seat.cells += job.found.outcome.counters.cells;
+                thread_scratch.cells += job.found.outcome.counters.cells;
                 job.is_done = true;
                 return 0;
             }
@@ -168,7 +170,7 @@ pub fn run(
             q.query.cell_limit = q.query.cell_limit.min(most);
             // Outcomes are large: it is written where it is to be.
             let outcome = &mut job.found.outcome;
-            contact::find_earliest(&q.query, &mut seat.scratch, outcome);
+            contact::find_earliest(&q.query, &mut thread_scratch.scratch, outcome);
             if outcome.status == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
                 if !is_over() {
                     // Cut short, perhaps, to be searched elsewhere: it counts for nothing.
@@ -185,7 +187,7 @@ pub fn run(
                 beyond.store(true, Relaxed);
             }
             outcome.counters += counters;
-            seat.cells += outcome.counters.cells;
+            thread_scratch.cells += outcome.counters.cells;
             job.take(&q, q.query.cell_limit);
             job.is_done = true;
             cells
@@ -292,7 +294,7 @@ pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions
     let side = |index: u32| {
         let body = &bodies[index as usize];
         let discrete = job.plan.detect == Detect::Discrete;
-        let motion = if discrete { Motion::resting(body.track.end) } else { body.track.motion };
+        let motion = if discrete { Motion::resting(body.motion_state.end) } else { body.motion_state.motion };
         contact::Body { model: &body.part.model, placed: Placed { place: body.place, motion } }
     };
     PairQuery {
@@ -300,16 +302,16 @@ pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions
         b: side(job.b),
         resolution: job.resolution,
         cell_limit: if options.cell_limit == 0 { contact::DEFAULT_CELL_LIMIT } else { options.cell_limit },
-        ideas: contact::Ideas::default(),
-        asked: asked(&job.plan, options),
+        strategies: contact::Strategies::default(),
+        query_options: query_options(&job.plan, options),
     }
 }
 
 /// What is asked of a search. The scene's first contact is the earliest: a mere hit needs its time, too.
-fn asked(plan: &PairPlan, options: &StepOptions) -> Asked {
-    let asked = plan.asked();
-    let report = if options.first { asked.report.max(Report::Time) } else { asked.report };
-    Asked { report, ..asked }
+fn query_options(plan: &PairPlan, options: &StepOptions) -> QueryOptions {
+    let query_options = plan.query_options();
+    let report = if options.first { query_options.report.max(Report::Time) } else { query_options.report };
+    QueryOptions { report, ..query_options }
 }
 
 /// A discrete pair's answer is about the end of the step.

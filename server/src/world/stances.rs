@@ -1,21 +1,21 @@
-//! The stances of the bodies in a step (`contact::Stance`), each taken when it is first looked at.
+//! The swept shapes of the bodies in a step (`contact::SweptShape`), each taken when it is first looked at.
 //!
-//! What was looked at in one step mostly will be in the next one: such a body's stance is taken as soon as its track is known,
+//! What was looked at in one step mostly will be in the next one: such a body's swept shape is taken as soon as its track is known,
 //! while both are at hand. Thousands of bodies later they would have to be fetched from far away again.
 
 use super::body::Body;
-use crate::contact::Stance;
+use crate::contact::SweptShape;
 
 /// Stances by bodies' indices.
 #[derive(Debug, Default)]
 pub struct Stances {
-    stances: Vec<Stance>,
+    stances: Vec<SweptShape>,
     uses: Vec<Use>,
     /// The step that they are of.
     serial: u64,
 }
 
-/// Steps, by their serials: that for which the stance was taken, and the last one in which it was looked at.
+/// Steps, by their serials: that for which the swept shape was taken, and the last one in which it was looked at.
 #[derive(Clone, Copy, Debug, Default)]
 struct Use {
     taken: u64,
@@ -26,7 +26,7 @@ impl Stances {
     /// A step of so many bodies begins; serials go up by one and begin with 1.
     pub fn begin(&mut self, serial: u64, bodies: usize) {
         self.serial = serial;
-        self.stances.resize(bodies, Stance::default());
+        self.stances.resize(bodies, SweptShape::default());
         self.uses.resize(bodies, Use::default());
     }
 
@@ -40,7 +40,7 @@ impl Stances {
 
     /// A look at some bodies; `None` where one has no hull.
     #[inline]
-    pub fn look<const N: usize>(&mut self, indices: [usize; N], bodies: &[Body]) -> Option<[&Stance; N]> {
+    pub fn look<const N: usize>(&mut self, indices: [usize; N], bodies: &[Body]) -> Option<[&SweptShape; N]> {
         for i in indices {
             if self.uses[i].taken != self.serial {
                 self.take(i, &bodies[i])?;
@@ -52,7 +52,7 @@ impl Stances {
 
     #[inline]
     fn take(&mut self, index: usize, body: &Body) -> Option<()> {
-        self.stances[index] = body.hull.as_ref()?.stance(&body.track);
+        self.stances[index] = body.hull.as_ref()?.swept_shape(&body.motion_state);
         self.uses[index].taken = self.serial;
         Some(())
     }

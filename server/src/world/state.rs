@@ -9,14 +9,14 @@ use super::stances::Stances;
 use crate::contact::Scratch;
 use crate::math::Aabb;
 use contactd_proto::Pose;
-use contactd_proto::pose_record::Order;
+use contactd_proto::pose_record::PoseCommand;
 
 /// Memory of the steps.
 #[derive(Debug)]
 pub struct StepState {
     pub(super) max_batch: usize,
     pub(super) serial: u64,
-    pub(super) orders: Vec<(u32, Order)>,
+    pub(super) commands: Vec<(u32, PoseCommand)>,
     /// Where bodies are put at the start of the step, by their indices.
     pub(super) put: Vec<(u32, Pose)>,
     /// Bodies that moved in the last step.
@@ -27,13 +27,13 @@ pub struct StepState {
     /// Swept boxes, each with the serial of the step it was taken for.
     pub(super) boxes: Vec<(u64, Aabb)>,
     pub(super) stances: Stances,
-    /// Neighbours that their odometers don't prove apart.
-    pub(super) asked: Vec<usize>,
+    /// Neighbours that their path lengths don't prove apart.
+    pub(super) query_options: Vec<usize>,
     /// How many of them a direction proved apart.
     pub(super) glanced: u32,
     pub(super) jobs: Vec<PairJob>,
     /// Time (as a key), ids and job of each told pair, to be ordered, and whether its regions are complete.
-    pub(super) order: Vec<(i64, u32, u32, u32, bool)>,
+    pub(super) command: Vec<(i64, u32, u32, u32, bool)>,
     pub(super) searches: search::Memory,
     /// Memory of what is asked beside the searches.
     pub(super) scratch: Scratch,
@@ -47,17 +47,17 @@ impl StepState {
         Self {
             max_batch,
             serial: 0,
-            orders: Vec::new(),
+            commands: Vec::new(),
             put: Vec::new(),
             moving: Vec::new(),
             clock: 0.0,
             neighbours: Neighbours::default(),
             boxes: Vec::new(),
             stances: Stances::default(),
-            asked: Vec::new(),
+            query_options: Vec::new(),
             glanced: 0,
             jobs: Vec::new(),
-            order: Vec::new(),
+            command: Vec::new(),
             searches: search::Memory::default(),
             scratch: Scratch::default(),
             outcome: StepOutcome::default(),
@@ -89,6 +89,6 @@ impl StepState {
     pub(super) fn forget(&mut self, bodies: &[Body]) {
         self.neighbours.forget();
         self.moving.clear();
-        self.moving.extend((0..bodies.len()).filter(|i| !bodies[*i].track.is_rest()).map(|i| i as u32));
+        self.moving.extend((0..bodies.len()).filter(|i| !bodies[*i].motion_state.is_rest()).map(|i| i as u32));
     }
 }

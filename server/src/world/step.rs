@@ -6,7 +6,7 @@
 
 use super::body::Body;
 use super::heed::Heed;
-use super::neighbours::Sight;
+use super::neighbours::PairHint;
 use super::notes::Decided;
 use super::options::{StepError, StepOptions};
 use super::outcome::{PairOutcome, StepOutcome};
@@ -16,10 +16,10 @@ use super::search::{self, PairJob};
 use super::stances::Stances;
 use super::state::StepState;
 use super::touch;
-use crate::contact::{Glance, Glancing, Outcome, Status};
+use crate::contact::{Glancing, Outcome, SeparatingAxisTest, Status};
 use crate::math::Aabb;
-use contactd_proto::pose_record::Order;
-use contactd_proto::{Detect, EffectCounters, ErrorCode, Pose, PoseRecord, Report, Track};
+use contactd_proto::pose_record::PoseCommand;
+use contactd_proto::{Detect, EffectCounters, ErrorCode, MotionState, Pose, PoseRecord, Report};
 
 impl World {
     /// One step: `records` name the objects that move (or are put somewhere), all others stay.
@@ -64,7 +64,7 @@ impl World {
             return refuse(ErrorCode::BadNumber);
         }
         self.state.serial += 1;
-        self.state.orders.clear();
+        self.state.commands.clear();
         let mut expected = 0;
         for (i, record) in records.iter().enumerate() {
             // One copy: another process may write to the slot while it is read.
@@ -76,17 +76,17 @@ impl World {
                 return Err(refuse(ErrorCode::UnknownObject));
             };
             expected = index + 1;
-            let order = record.decode().map_err(refuse)?;
+            let command = record.decode().map_err(refuse)?;
             let body = &mut self.bodies[index as usize];
             if body.is_static {
                 return Err(refuse(ErrorCode::StaticObject));
             }
-            let slot = usize::from(!matches!(order, Order::Start(_)));
+            let slot = usize::from(!matches!(command, PoseCommand::Start(_)));
             if body.named[slot] == self.state.serial {
                 return Err(refuse(ErrorCode::DuplicateObject));
             }
             body.named[slot] = self.state.serial;
-            self.state.orders.push((index, order));
+            self.state.commands.push((index, command));
         }
         Ok(())
     }
@@ -95,22 +95,22 @@ impl World {
     fn stage(&mut self, options: &StepOptions) -> Result<(), StepError> {
         let Self { bodies, state, .. } = self;
         state.put.clear();
-        for (index, order) in &state.orders {
-            if let Order::Start(pose) = order {
+        for (index, command) in &state.commands {
+            if let PoseCommand::Start(pose) = command {
                 state.put.push((*index, *pose));
             }
         }
         state.put.sort_unstable_by_key(|(index, _)| *index);
-        for (i, (index, order)) in state.orders.iter().enumerate() {
+        for (i, (index, command)) in state.commands.iter().enumerate() {
             let body = &bodies[*index as usize];
-            let (Order::End(Pose { position, .. }) | Order::Turn(position, _)) = order else { continue };
-            let start = place_of(&state.put, *index).unwrap_or_else(|| body.track.at(options.advance));
+            let (PoseCommand::End(Pose { position, .. }) | PoseCommand::Turn(position, _)) = command else { continue };
+            let start = place_of(&state.put, *index).unwrap_or_else(|| body.motion_state.at(options.advance));
             let refuse = |code| Err(StepError { code, index: Some(i as u32) });
             if !(*position - start.position).length_squared().is_finite() {
                 return refuse(ErrorCode::NotFinite);
             }
             // Of most bodies nothing is declared, and their motion is worked out once.
-            if body.is_declared() && !body.keeps(&Track::ordered(start, *order).motion, options.dt) {
+            if body.is_declared() && !body.keeps(&MotionState::ordered(start, *command).motion, options.dt) {
                 return refuse(ErrorCode::Declaration);
             }
         }
@@ -120,32 +120,32 @@ impl World {
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
         let Self { bodies, state, .. } = self;
-        let StepState { neighbours, moving, orders, put, serial, stances, .. } = state;
+        let StepState { neighbours, moving, commands, put, serial, stances, .. } = state;
         state.clock += options.advance;
         neighbours.count(bodies.len());
         stances.begin(*serial, bodies.len());
         // What moved and is not named comes to rest.
         moving.retain(|index| {
             let body = &mut bodies[*index as usize];
-            if !body.named.contains(serial) && !body.track.is_rest() {
+            if !body.named.contains(serial) && !body.motion_state.is_rest() {
                 neighbours.taken(*index, body, options.advance);
-                body.track = Track::resting(body.track.at(options.advance));
+                body.motion_state = MotionState::resting(body.motion_state.at(options.advance));
             }
             false
         });
-        for (index, order) in orders.iter() {
+        for (index, command) in commands.iter() {
             let index = *index;
             let body = &mut bodies[index as usize];
-            if matches!(order, Order::Start(_)) && body.named[1] == *serial {
+            if matches!(command, PoseCommand::Start(_)) && body.named[1] == *serial {
                 // Its motion begins there.
                 continue;
             }
-            let was = body.track.at(options.advance);
-            if !body.track.is_rest() {
+            let was = body.motion_state.at(options.advance);
+            if !body.motion_state.is_rest() {
                 neighbours.taken(index, body, options.advance);
             }
             let start = place_of(put, index);
-            body.track = Track::ordered(start.unwrap_or(was), *order);
+            body.motion_state = MotionState::ordered(start.unwrap_or(was), *command);
             let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
             neighbours.moved(index, jump, body.travel(1.0));
             moving.push(index);
@@ -158,7 +158,7 @@ impl World {
         let mut neighbours = std::mem::take(&mut self.state.neighbours);
         let mut boxes = std::mem::take(&mut self.state.boxes);
         let mut stances = std::mem::take(&mut self.state.stances);
-        let mut asked = std::mem::take(&mut self.state.asked);
+        let mut query_options = std::mem::take(&mut self.state.query_options);
         let mut jobs = std::mem::take(&mut self.state.jobs);
         let mut notes = std::mem::take(&mut self.state.notes);
         if let Some(notes) = &mut notes {
@@ -193,7 +193,7 @@ impl World {
                 let pair = found.filter(|pair| near && !neighbours.is_apart(*pair));
                 if let (Some(notes), None) = (&mut notes, pair) {
                     let apart = found.is_some_and(|pair| neighbours.is_apart(pair));
-                    notes.decided((i, j), if apart { Decided::Room } else { Decided::boxes(swept(i), swept(j)) });
+                    notes.decided((i, j), if apart { Decided::Clearance } else { Decided::boxes(swept(i), swept(j)) });
                 }
                 let pair = pair.map(|pair| (pair, neighbours.lend(pair).1));
                 jobs.push(PairJob::new((i, j), (index, plan), resolution, near, pair));
@@ -202,35 +202,38 @@ impl World {
                 jobs.sort_unstable_by_key(|job| (job.plan_index, job.a, job.b));
             }
         } else {
-            asked.clear();
-            neighbours.asked(|pair| asked.push(pair));
+            query_options.clear();
+            neighbours.query_options(|pair| query_options.push(pair));
             if self.plans.count() > 1 {
-                asked.sort_unstable_by_key(|pair| (neighbours.plan(*pair), *pair));
+                query_options.sort_unstable_by_key(|pair| (neighbours.plan(*pair), *pair));
             }
-            asked.retain(|&pair| {
+            query_options.retain(|&pair| {
                 let (i, j) = neighbours.bodies(pair);
-                let sight = *neighbours.sight(pair);
+                let pair_hint = *neighbours.pair_hint(pair);
                 // What met mostly does so again: no look is worth its while.
-                let look = !sight.met && !sight.discrete;
-                let glance = if look { self.glance((i, j), &sight, &mut stances) } else { None };
-                if let Some(glance) = glance {
+                let look = !pair_hint.met && !pair_hint.discrete;
+                let axis_test = if look { self.axis_test((i, j), &pair_hint, &mut stances) } else { None };
+                if let Some(axis_test) = axis_test {
                     if let Some(notes) = &mut notes {
-                        notes.glanced((i, j), &self.bodies, &glance);
-                        if glance.apart {
-                            let last = self.glance_to((i, j), &sight, &mut stances).unwrap_or([glance.along; 2]);
+                        notes.glanced((i, j), &self.bodies, &axis_test);
+                        if axis_test.apart {
+                            let last = self.glance_to((i, j), &pair_hint, &mut stances).unwrap_or([axis_test.along; 2]);
                             notes.decided((i, j), Decided::Directions(last));
                         }
                     }
-                    neighbours.noticed(pair, &glance);
-                    glanced += u32::from(glance.apart);
-                    return !glance.apart;
+                    neighbours.noticed(pair, &axis_test);
+                    glanced += u32::from(axis_test.apart);
+                    return !axis_test.apart;
                 }
                 // Where nothing is glanced at the swept boxes decide what is asked about, whether the bodies have met or not:
                 // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
                 // depend on what is remembered. Without a margin or regions nothing is.
                 let plan = self.plans.plan(neighbours.plan(pair));
                 // Of discrete pairs those are counted that may have passed through each other: by their boxes alone.
-                if sight.met && !sight.discrete && (!plan.tells_nearness() || self.can_glance((i, j), &sight)) {
+                if pair_hint.met
+                    && !pair_hint.discrete
+                    && (!plan.reports_nearness() || self.can_glance((i, j), &pair_hint))
+                {
                     return true;
                 }
                 neighbours.box_tests += 1;
@@ -238,23 +241,23 @@ impl World {
                 let meet = boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach));
                 if let (Some(notes), false) = (&mut notes, meet) {
                     notes.decided((i, j), Decided::boxes(boxes[0], boxes[1]));
-                    if !sight.discrete {
+                    if !pair_hint.discrete {
                         notes.apart_by((i, j), &self.bodies, boxes[0].gap(&boxes[1]) - reach, boxes);
                     }
                 }
-                if !meet && !sight.discrete {
+                if !meet && !pair_hint.discrete {
                     // Side by side, as they are compared: boxes whose corners are farther apart may meet sooner.
                     neighbours.note(pair, boxes[0].gap(&boxes[1]) - reach);
                 }
                 meet
             });
             // In a loop of its own: what is known of pairs lies all over the memory, which answers several at a time.
-            for &pair in &asked {
+            for &pair in &query_options {
                 let plan_index = neighbours.plan(pair);
                 let plan = (plan_index, *self.plans.plan(plan_index));
-                let (resolution, knowledge) = neighbours.lend(pair);
+                let (resolution, pair_cache) = neighbours.lend(pair);
                 let bodies = neighbours.bodies(pair);
-                jobs.push(PairJob::new(bodies, plan, resolution, true, Some((pair, knowledge))));
+                jobs.push(PairJob::new(bodies, plan, resolution, true, Some((pair, pair_cache))));
             }
         }
         self.state.notes = notes;
@@ -262,37 +265,37 @@ impl World {
         self.state.boxes = boxes;
         self.state.stances = stances;
         self.state.glanced = glanced;
-        self.state.asked = asked;
+        self.state.query_options = query_options;
         self.state.jobs = jobs;
     }
 
     /// True when a pair is one that is glanced at: both bodies have hulls, out as far as they matter to each other.
-    fn can_glance(&self, (i, j): (u32, u32), sight: &Sight) -> bool {
-        let holds = |k: u32| self.bodies[k as usize].hull.as_ref().is_some_and(|hull| hull.holds(sight.touch));
-        !sight.discrete && holds(i) && holds(j)
+    fn can_glance(&self, (i, j): (u32, u32), pair_hint: &PairHint) -> bool {
+        let holds = |k: u32| self.bodies[k as usize].hull.as_ref().is_some_and(|hull| hull.holds(pair_hint.touch));
+        !pair_hint.discrete && holds(i) && holds(j)
     }
 
     /// What a direction tells of a pair of convex bodies.
     #[inline]
-    fn glance(&self, (i, j): (u32, u32), sight: &Sight, stances: &mut Stances) -> Option<Glance> {
+    fn axis_test(&self, (i, j): (u32, u32), pair_hint: &PairHint, stances: &mut Stances) -> Option<SeparatingAxisTest> {
         let indices = [i as usize, j as usize];
         let seen = stances.look(indices, &self.bodies)?;
         let shapes = |k: usize| {
             let body = &self.bodies[indices[k]];
             body.hull.as_ref()?.shape(&body.part.model)
         };
-        Some(Glancing::new(seen, shapes, sight.touch)?.look(sight.along))
+        Some(Glancing::new(seen, shapes, pair_hint.touch)?.look(pair_hint.along))
     }
 
-    /// The directions by which a glance keeps a pair apart.
-    fn glance_to(&self, (i, j): (u32, u32), sight: &Sight, stances: &mut Stances) -> Option<[glam::DVec3; 2]> {
+    /// The directions by which a separating-axis test keeps a pair apart.
+    fn glance_to(&self, (i, j): (u32, u32), pair_hint: &PairHint, stances: &mut Stances) -> Option<[glam::DVec3; 2]> {
         let indices = [i as usize, j as usize];
         let seen = stances.look(indices, &self.bodies)?;
         let shapes = |k: usize| {
             let body = &self.bodies[indices[k]];
             body.hull.as_ref()?.shape(&body.part.model)
         };
-        Glancing::new(seen, shapes, sight.touch)?.directions(sight.along)
+        Glancing::new(seen, shapes, pair_hint.touch)?.directions(pair_hint.along)
     }
 
     /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for
@@ -320,7 +323,7 @@ impl World {
         };
         out.pairs.clear();
         out.regions.clear();
-        state.order.clear();
+        state.command.clear();
         let mut earliest = f64::INFINITY;
         // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
         let mut left = search::batch_limit(options);
@@ -350,17 +353,17 @@ impl World {
                         earliest = earliest.min(outcome.time);
                     }
                 }
-                if is_told(&plan, outcome, options) {
+                if is_reported(&plan, outcome, options) {
                     let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
-                    state.order.push((key_of(&plan, outcome), a, b, i, complete));
+                    state.command.push((key_of(&plan, outcome), a, b, i, complete));
                 }
             }
             before += jobs.len() as u32;
         }
         out.undecided = state.jobs.iter().any(|job| is_undecided_before(&job.found.outcome, earliest));
         // Outcomes are large: their keys are sorted, and each is moved once.
-        state.order.sort_unstable();
-        out.pairs.extend(state.order.iter().map(|&(_, a, b, i, regions_complete)| {
+        state.command.sort_unstable();
+        out.pairs.extend(state.command.iter().map(|&(_, a, b, i, regions_complete)| {
             let PairJob { plan, found, .. } = &state.jobs[i as usize];
             let (regions, patch_slots) = ((0, 0), (0, 0));
             PairOutcome { a, b, plan: *plan, outcome: found.outcome, job: i, regions_complete, regions, patch_slots }
@@ -376,13 +379,13 @@ impl World {
         touch::find_regions(bodies, &mut state.jobs, options, left, out, heed);
         for job in &mut state.jobs {
             if let Some(pair) = job.pair {
-                let room = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.room };
+                let clearance = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.clearance };
                 if let Some(notes) = &mut state.notes {
                     notes.measured(job, bodies, options);
                 }
                 // What meets now will mostly do so in the next step: no look is worth its while.
                 let met = job.found.outcome.status != Status::Clear;
-                state.neighbours.learned(pair, job.knowledge.take(), room, met);
+                state.neighbours.learned(pair, job.pair_cache.take(), clearance, met);
             }
         }
     }
@@ -399,12 +402,12 @@ fn place_of(put: &[(u32, Pose)], index: u32) -> Option<Pose> {
 /// Counts what was worked out for a pair in this step; what was known of it costs nothing.
 fn count_effects(job: &PairJob, bodies: &[Body], counters: &mut EffectCounters) {
     if job.near && !job.found.known {
-        let tracks = [job.a, job.b].map(|i| &bodies[i as usize].track);
+        let motion_states = [job.a, job.b].map(|i| &bodies[i as usize].motion_state);
         if job.plan.detect == Detect::Discrete {
             counters.discrete += 1;
-        } else if tracks.iter().any(|t| !t.is_rest()) {
+        } else if motion_states.iter().any(|t| !t.is_rest()) {
             counters.continuous += 1;
-            counters.turning += u64::from(tracks.iter().any(|t| t.motion.spin != glam::DVec3::ZERO));
+            counters.turning += u64::from(motion_states.iter().any(|t| t.motion.spin != glam::DVec3::ZERO));
         }
     }
     let c = &job.found.outcome.counters;
@@ -417,14 +420,14 @@ fn count_effects(job: &PairJob, bodies: &[Body], counters: &mut EffectCounters) 
 /// True when a discrete pair moved by more than the smaller body's smallest dimension.
 fn passes(job: &PairJob, bodies: &[Body]) -> bool {
     let (a, b) = (&bodies[job.a as usize], &bodies[job.b as usize]);
-    a.speed(&a.track.motion) + b.speed(&b.track.motion) > a.part.smallest.min(b.part.smallest)
+    a.speed(&a.motion_state.motion) + b.speed(&b.motion_state.motion) > a.part.smallest.min(b.part.smallest)
 }
 
-fn is_told(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
+fn is_reported(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
     match o.status {
         Status::Contact | Status::Overlap | Status::Undecided => true,
         Status::Clear => {
-            let near = o.touching && plan.tells_nearness();
+            let near = o.touching && plan.reports_nearness();
             options.clear || near || o.margin_time < 1.0
         }
     }
@@ -437,8 +440,8 @@ fn is_undecided_before(o: &Outcome, earliest: f64) -> bool {
 /// The time that is told of a pair, ordered as `f64::total_cmp` does.
 fn key_of(plan: &PairPlan, o: &Outcome) -> i64 {
     // A mere hit has no time that is told: its field is 0.
-    let is_told = plan.report >= Report::Time || o.status == Status::Clear;
-    let bits = if is_told { o.time.to_bits() as i64 } else { 0 };
+    let is_reported = plan.report >= Report::Time || o.status == Status::Clear;
+    let bits = if is_reported { o.time.to_bits() as i64 } else { 0 };
     bits ^ (((bits >> 63) as u64) >> 1) as i64
 }
 

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::contact::{Counters, Outcome, Status};
-use crate::eco::Model;
-use crate::eco::testing::{pierced, simple};
+use crate::octree::Model;
+use crate::octree::testing::{pierced, simple};
 use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
 use crate::solid::{Label, Op, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -123,11 +123,11 @@ fn a_refused_batch_changes_nothing() {
     ];
     for (batch, code, index) in table {
         let mut world = balls(2);
-        let before: Vec<_> = world.bodies().iter().map(|b| b.track).collect();
+        let before: Vec<_> = world.bodies().iter().map(|b| b.motion_state).collect();
         let error = world.step(&batch, &StepOptions::default()).unwrap_err();
         assert_eq!(error, StepError { code, index });
         assert!(error.to_string().len() > 20, "{error}");
-        assert_eq!(before, world.bodies().iter().map(|b| b.track).collect::<Vec<_>>(), "{code:?}");
+        assert_eq!(before, world.bodies().iter().map(|b| b.motion_state).collect::<Vec<_>>(), "{code:?}");
         // And the next good batch is answered as if the bad one had never been.
         let after = world.step(&[good], &StepOptions::default()).unwrap().clone();
         assert_eq!(after.pairs, balls(2).step(&[good], &StepOptions::default()).unwrap().pairs);
@@ -168,17 +168,19 @@ fn steps_continue_where_the_last_one_ended_or_was_stopped() {
     // Stopped half-way: the ball stands at x = 4 and falls from there.
     let half = StepOptions { advance: 0.5, ..StepOptions::default() };
     world.step(&[to(2, 4.0, 0.0)], &half).unwrap();
-    assert_eq!(world.body(2).unwrap().track.motion.start.position, DVec3::new(4.0, 0.0, 3.0));
+    assert_eq!(world.body(2).unwrap().motion_state.motion.start.position, DVec3::new(4.0, 0.0, 3.0));
     // Not named: it stays where the stopped step left it.
     let out = world.step(&[], &StepOptions { advance: 1.0 / 3.0, ..StepOptions::default() }).unwrap();
     assert!(!out.contact && out.safe_time == 1.0);
     let body = world.body(2).unwrap();
-    assert!(body.track.is_rest() && (body.track.end.position - DVec3::new(4.0, 0.0, 2.0)).length() < 1e-15);
+    assert!(
+        body.motion_state.is_rest() && (body.motion_state.end.position - DVec3::new(4.0, 0.0, 2.0)).length() < 1e-15
+    );
     // Put elsewhere and moved in the same batch, in whichever order.
     let start = PoseRecord { flags: START, ..to(2, 100.0, 5.0) };
     world.step(&[to(2, 100.0, 1.5), start], &StepOptions::default()).unwrap();
-    assert_eq!(world.body(2).unwrap().track.motion.start.position.x, 100.0);
-    assert_eq!(world.body(2).unwrap().track.end.position, DVec3::new(100.0, 0.0, 1.5));
+    assert_eq!(world.body(2).unwrap().motion_state.motion.start.position.x, 100.0);
+    assert_eq!(world.body(2).unwrap().motion_state.end.position, DVec3::new(100.0, 0.0, 1.5));
 }
 
 #[test]
@@ -357,17 +359,17 @@ fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
     }
     // At rest, and put at its own place again: the same bits from step to step.
     let mut world = resting(Some(rule(Report::Patch, 0.0)));
-    let mut told = |records: &[PoseRecord]| {
+    let mut reported = |records: &[PoseRecord]| {
         let out = world.step(records, &StepOptions::default()).unwrap();
         // What they cost may differ: it is remembered that nothing has changed.
         let free =
             |p: &PairOutcome| PairOutcome { outcome: Outcome { counters: Counters::default(), ..p.outcome }, ..*p };
         (out.pairs.iter().map(free).collect::<Vec<_>>(), out.regions.clone())
     };
-    let first = told(&[]);
+    let first = reported(&[]);
     for k in 0..4 {
         let again = [to(2, 0.0, 1.0), to(3, 3.0, 1.0)];
-        assert_eq!(told(&again[..k % 3]), first, "step {k}");
+        assert_eq!(reported(&again[..k % 3]), first, "step {k}");
     }
     assert_eq!(world.outcome().counters, Counters::default(), "nothing has changed, nothing is looked for");
     // No room for all of them: the earliest pairs keep theirs, and the header says that some are missing.

@@ -4,7 +4,7 @@
 //! last, of the told pairs alone and in their order, so that the work that the batch's limit left is spent on the earliest.
 
 use super::body::Body;
-use super::coherence::Told;
+use super::coherence::Reported;
 use super::heed::Heed;
 use super::options::StepOptions;
 use super::outcome::StepOutcome;
@@ -18,7 +18,7 @@ use contactd_proto::{Detect, EffectCounters, Report};
 /// True when regions are told of a pair. A step that asks for its first contact has no use for clear pairs.
 fn is_asked(job: &PairJob, options: &StepOptions, outcome: &Outcome) -> bool {
     // Where bodies are in each other their surfaces cut: no place in which they touch.
-    job.near && job.plan.tells_regions() && !outcome.past && (outcome.status == Status::Contact || !options.first)
+    job.near && job.plan.reports_regions() && !outcome.past && (outcome.status == Status::Contact || !options.first)
 }
 
 /// A question about a pair beside its search, and what may be spent on it: the pair's limit once more, whatever its search has
@@ -52,11 +52,11 @@ pub(super) fn decide(
     if outcome.touching || job.found.apart || job.plan.report < Report::Time && !margin {
         return true;
     }
-    let is_told = match status {
+    let is_reported = match status {
         Status::Contact | Status::Undecided => true,
         _ => options.clear && !options.first,
     };
-    if !(is_told || margin || is_asked(job, options, &job.found.outcome)) {
+    if !(is_reported || margin || is_asked(job, options, &job.found.outcome)) {
         return true;
     }
     let outcome = &mut job.found.outcome;
@@ -64,7 +64,9 @@ pub(super) fn decide(
         outcome.touching = true;
         return true;
     }
-    if let Some((touching, margin_time)) = told(job).map(|told| (told.outcome.touching, told.outcome.margin_time)) {
+    if let Some((touching, margin_time)) =
+        reported(job).map(|reported| (reported.outcome.touching, reported.outcome.margin_time))
+    {
         (job.found.outcome.touching, job.found.outcome.margin_time) = (touching, margin_time);
         return true;
     }
@@ -97,16 +99,16 @@ pub(super) fn decide(
     }
     if within == Within::Apart
         && clear
-        && let Some(knowledge) = &mut job.knowledge
+        && let Some(pair_cache) = &mut job.pair_cache
     {
-        knowledge.tell(Told { outcome: job.found.outcome, regions: Vec::new() });
+        pair_cache.report(Reported { outcome: job.found.outcome, regions: Vec::new() });
     }
     within != Within::Open
 }
 
 /// What an earlier step told of the same answer.
-fn told(job: &PairJob) -> Option<&Told> {
-    job.knowledge.as_ref()?.told().filter(|_| job.found.known && !job.found.apart)
+fn reported(job: &PairJob) -> Option<&Reported> {
+    job.pair_cache.as_ref()?.reported().filter(|_| job.found.known && !job.found.apart)
 }
 
 /// Finds the regions of the told pairs and gives each its slots.
@@ -124,10 +126,10 @@ pub(super) fn find_regions(
         p.regions = (out.regions.len() as u32, 0);
         if !is_asked(job, options, &p.outcome) {
             // Nothing more is told.
-        } else if let Some(told) = told(job) {
-            p.outcome = Outcome { counters: p.outcome.counters, ..told.outcome };
-            p.regions.1 = told.regions.len() as u32;
-            out.regions.extend_from_slice(&told.regions);
+        } else if let Some(reported) = reported(job) {
+            p.outcome = Outcome { counters: p.outcome.counters, ..reported.outcome };
+            p.regions.1 = reported.regions.len() as u32;
+            out.regions.extend_from_slice(&reported.regions);
         } else {
             if heed.is_some_and(Heed::is_over) {
                 left = 0;
@@ -143,8 +145,8 @@ pub(super) fn find_regions(
             p.regions_complete &= found.complete;
             p.regions.1 = found.regions.len() as u32;
             out.regions.extend_from_slice(&found.regions);
-            if let Some(knowledge) = job.knowledge.as_mut().filter(|_| p.regions_complete) {
-                knowledge.tell(Told { outcome: p.outcome, regions: found.regions });
+            if let Some(pair_cache) = job.pair_cache.as_mut().filter(|_| p.regions_complete) {
+                pair_cache.report(Reported { outcome: p.outcome, regions: found.regions });
             }
         }
         let own = record::patch_slots(&out.regions[p.regions.0 as usize..]);

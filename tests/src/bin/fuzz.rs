@@ -28,15 +28,15 @@ fn main() -> Result<(), String> {
     // Findings are told below; the panic's own text would drown them.
     std::panic::set_hook(Box::new(|_| {}));
     let mut campaign = Campaign::new(target, &corpus, seed);
-    let mut told = 0;
+    let mut reported = 0;
     while campaign.runs < runs {
         campaign.step();
         // At once: a run that is cut short has told what it found.
-        for finding in &campaign.findings[told..] {
+        for finding in &campaign.findings[reported..] {
             let hex: String = finding.input.iter().map(|b| format!("{b:02x}")).collect();
             println!("FOUND after {} runs: {}\n  input {hex}", campaign.runs, finding.what);
         }
-        told = campaign.findings.len();
+        reported = campaign.findings.len();
         if campaign.runs.is_multiple_of(100_000) {
             eprintln!(
                 "{name}: {} runs, {} new, {} found",

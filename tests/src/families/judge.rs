@@ -372,11 +372,11 @@ pub fn judge(
                 });
                 // Where there is none, the answer's own: as the body turns, and without a spin about its own axis.
                 let m = pair.at(o.time_upper);
-                let told = o.witness.is_some_and(|x| {
+                let reported = o.witness.is_some_and(|x| {
                     let places = [x, m.a.transpose() * (pair.at(0.0).a * x)];
                     places.iter().any(|x| pair.common(&m, *x) <= -0.98 * delta + pair.rounding)
                 });
-                if !(named || told) {
+                if !(named || reported) {
                     let depth = -found / delta;
                     fault("witness", format!("at time_upper = {} no more than {depth:.4} delta", o.time_upper));
                 }
@@ -388,7 +388,7 @@ pub fn judge(
             let far = scene.courses[0].start.length() * f64::EPSILON * 4.0;
             let g = pair.common(&m, x);
             if -g < 2.0 * delta * (1.0 - 1e-2) - pair.rounding - far {
-                fault("overlap", format!("depth {:e} at the told point, {:.3} delta", -g, -g / delta));
+                fault("overlap", format!("depth {:e} at the reported point, {:.3} delta", -g, -g / delta));
             }
         }
         Status::Clear | Status::Undecided => {}

@@ -5,8 +5,8 @@ use crate::record_judge::{Lie, lies};
 use crate::reference::Moving;
 use contactd::check::Check;
 use contactd::contact::{Status, default_resolution};
-use contactd::eco::Model;
 use contactd::import::{self, Facets, Limits, import_csg};
+use contactd::octree::Model;
 use contactd::world::{PairOutcome, StepOptions, StepOutcome};
 use glam::DVec3;
 use std::path::Path;
@@ -21,7 +21,7 @@ pub struct Answer {
     /// The world before the step.
     pub check: Check,
     /// The resolution that was asked for.
-    pub asked: f64,
+    pub query_options: f64,
     /// Seconds that the step took, reading and preprocessing not counted.
     pub seconds: f64,
 }
@@ -31,7 +31,7 @@ impl Answer {
     fn lies(&self) -> Vec<(Lie, String)> {
         let moving = |id: u32| {
             let body = self.check.world.body(id).expect("a body of the pair");
-            (body.part.model.clone(), body.place, body.track.motion)
+            (body.part.model.clone(), body.place, body.motion_state.motion)
         };
         let ((a, place_a, motion_a), (b, place_b, motion_b)) = (moving(self.pair.a), moving(self.pair.b));
         lies(
@@ -46,10 +46,10 @@ impl Answer {
         let step = StepOutcome { pairs: vec![self.pair], ..StepOutcome::default() };
         let (text, _) = self.check.certificates(&step);
         let line = |name: &str| text.lines().find(|l| l.starts_with(name)).map(|l| l.split(' ').collect::<Vec<_>>());
-        let carrier = line("pair ")?.get(4)?.parse::<usize>().ok()?;
+        let reference = line("pair ")?.get(4)?.parse::<usize>().ok()?;
         let numbers: Vec<f64> = line("witness ")?.iter().skip(1).filter_map(|w| w.parse().ok()).collect();
         let [t, x, y, z] = numbers[..] else { return None };
-        Some((carrier == 0, t, DVec3::new(x, y, z)))
+        Some((reference == 0, t, DVec3::new(x, y, z)))
     }
 }
 
@@ -66,15 +66,15 @@ pub fn ask(scene: &Scene, cells: u64) -> Result<Answer, String> {
     };
     let models = [model("a.csg", &scene.a.text())?, model("b.csg", &scene.b.text())?];
     let own = models.iter().map(|m| default_resolution(m, m)).fold(0.0, f64::max);
-    let asked = parsed.resolution.unwrap_or(own);
+    let query_options = parsed.resolution.unwrap_or(own);
     let mut check = Check::new(&parsed, &models, None).map_err(|e| e.to_string())?;
     let options = StepOptions { clear: true, cell_limit: cells, batch_limit: cells, ..StepOptions::default() };
     let started = Instant::now();
     let step = check.world.step(&check.records, &options).map_err(|e| e.to_string())?;
     let seconds = started.elapsed().as_secs_f64();
-    let [pair] = step.pairs.as_slice() else { return Err(format!("{} pairs told", step.pairs.len())) };
+    let [pair] = step.pairs.as_slice() else { return Err(format!("{} pairs reported", step.pairs.len())) };
     let pair = *pair;
-    Ok(Answer { pair, check, asked, seconds })
+    Ok(Answer { pair, check, query_options, seconds })
 }
 
 /// Writes a scene as a folder that `contactd check FOLDER/scene.toml` reads, with a note beside it.

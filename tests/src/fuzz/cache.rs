@@ -3,8 +3,8 @@
 
 use super::Target;
 use contactd::cache::{Flaw, decode, encode};
-use contactd::eco::{Limits, Model, Node};
 use contactd::import::{self, Facets, import_csg};
+use contactd::octree::{Limits, Model, Node};
 use glam::DVec3;
 
 pub(super) const TARGET: Target = Target { name: "cache", run, seeds, words: &[], longest: 4000, thorough_every: 64 };
@@ -35,20 +35,20 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
     if encode(&back, &back_notes).as_ref() != Some(&again) {
         return Err("another model came back".into());
     }
-    asked(&model, model.eco.root());
+    query_options(&model, model.octree.root());
     for x in [DVec3::ZERO, DVec3::new(0.1, 0.2, 0.3)] {
         model.solid.value(x);
-        model.eco.locate(x);
+        model.octree.locate(x);
     }
-    let kinds: Vec<usize> = contactd::eco::Kind::ALL.map(|k| model.eco.census().of(k).min(2)).into();
+    let kinds: Vec<usize> = contactd::octree::Kind::ALL.map(|k| model.octree.census().of(k).min(2)).into();
     Ok(format!("read {} {kinds:?} {}", model.solid.primitives.len().min(4), notes.len().min(2)))
 }
 
 /// Follows all that a node points to.
-fn asked(model: &Model, node: &Node) {
+fn query_options(model: &Model, node: &Node) {
     model.literals(node, 0.0, &mut vec![]);
     for p in node.refs() {
         let _ = model.solid.primitives[*p as usize].value(DVec3::ONE);
     }
-    node.children().into_iter().flatten().for_each(|c| asked(model, c));
+    node.children().into_iter().flatten().for_each(|c| query_options(model, c));
 }

@@ -4,7 +4,7 @@ use super::Target;
 use contactd_proto::control::{
     Answer, Command, Envelope, Facets, ObjectSpec, WireMass, WireRule, WireTrack, decode, encode,
 };
-use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, Pose, Rule, Track};
+use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, MotionState, Pose, Rule};
 use glam::DVec3;
 
 pub(super) const TARGET: Target =
@@ -14,7 +14,7 @@ const WORDS: [&str; 4] = ["\0\0\0\0\0\0\0\0", "\0\0\0\0\0\0", "\u{7f}", "name"];
 
 fn seeds() -> Vec<Vec<u8>> {
     let rule = Rule { except: vec![["a".into(), "b".into()]], margin: 0.5, ..Rule::new(["x".into(), "y".into()]) };
-    let track = Track::resting(Pose::at(DVec3::new(1.0, -2.0, 0.25)));
+    let motion_state = MotionState::resting(Pose::at(DVec3::new(1.0, -2.0, 0.25)));
     let object = ObjectSpec {
         id: 7,
         model: 1,
@@ -35,7 +35,7 @@ fn seeds() -> Vec<Vec<u8>> {
         Command::RemoveObject(7),
         Command::SetRules(vec![WireRule::from(&rule)]),
         Command::SetResolution(Some(1e-9)),
-        Command::Restore(vec![WireTrack::of(7, &track), WireTrack::of(8, &track)]),
+        Command::Restore(vec![WireTrack::of(7, &motion_state), WireTrack::of(8, &motion_state)]),
         Command::MassProperties { model: 1, tolerance: 1e-6, boxes: 1_000_000 },
     ];
     let envelope = |command| encode(&Envelope { epoch: 9, session: 3, command });
@@ -87,14 +87,14 @@ fn taken(command: Command) -> Result<String, String> {
             let refused: Vec<_> = rules.into_iter().take(3).map(|r| r.checked().err()).collect();
             format!("{count} rules {refused:?}")
         }
-        Command::Restore(tracks) => {
-            let checked: Vec<_> = tracks.iter().take(3).map(WireTrack::checked).collect();
-            for track in checked.iter().flatten() {
-                unit(&track.end)?;
-                let Motion { start, velocity, spin } = track.motion;
+        Command::Restore(motion_states) => {
+            let checked: Vec<_> = motion_states.iter().take(3).map(WireTrack::checked).collect();
+            for motion_state in checked.iter().flatten() {
+                unit(&motion_state.end)?;
+                let Motion { start, velocity, spin } = motion_state.motion;
                 unit(&start)?;
                 if !(velocity.is_finite() && spin.is_finite()) {
-                    return Err(format!("a track that is not finite: {track:?}"));
+                    return Err(format!("a motion_state that is not finite: {motion_state:?}"));
                 }
             }
             format!("restore {:?}", checked.iter().map(|t| t.as_ref().err()).collect::<Vec<_>>())

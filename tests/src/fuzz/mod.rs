@@ -51,8 +51,8 @@ fn sound(o: &Outcome) -> Result<(), String> {
     if numbers.iter().any(|n| n.is_nan()) || !o.point.is_finite() {
         return Err(format!("a NaN in {o:?}"));
     }
-    let told = matches!(o.status, contactd::contact::Status::Contact | contactd::contact::Status::Overlap);
-    if told && (o.normal.length() - 1.0).abs() > 1e-9 {
+    let reported = matches!(o.status, contactd::contact::Status::Contact | contactd::contact::Status::Overlap);
+    if reported && (o.normal.length() - 1.0).abs() > 1e-9 {
         return Err(format!("a normal of length {}", o.normal.length()));
     }
     Ok(())

@@ -4,9 +4,11 @@
 use super::{Reader, Target, sound};
 use crate::reference::{self, Effort, Moving, Verdict};
 use crate::scenes::Recipe;
-use contactd::contact::{Asked, Body, Outcome, PairQuery, Scratch, Status, default_resolution, earliest_contact};
-use contactd::eco::Model;
+use contactd::contact::{
+    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::Op;
 use contactd_proto::{Motion, Pose};
 use glam::DVec3;
@@ -112,8 +114,8 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
         b: Body { model: &b, placed: placed_b },
         resolution,
         cell_limit: CELLS,
-        ideas: Default::default(),
-        asked: Asked::DEPTH,
+        strategies: Default::default(),
+        query_options: QueryOptions::DEPTH,
     };
     let o = earliest_contact(&query, &mut Scratch::default());
     sound(&o)?;
@@ -151,9 +153,9 @@ fn witness(o: &Outcome, query: &PairQuery) -> Result<(), String> {
 
 /// Nothing that the reference has proven or has seen contradicts the answer.
 fn unrefuted(o: &Outcome, truth: &reference::Truth) -> Result<(), String> {
-    let told = format!("{} {:?}", o.status.name(), [o.time_lower, o.time, o.time_upper]);
+    let reported = format!("{} {:?}", o.status.name(), [o.time_lower, o.time, o.time_upper]);
     if o.status != Status::Clear && o.time_upper < truth.lower - SAME {
-        return Err(format!("{told}, but nothing is common before {}", truth.lower));
+        return Err(format!("{reported}, but nothing is common before {}", truth.lower));
     }
     let seen = match truth.verdict {
         Verdict::Contact => truth.upper,
@@ -162,7 +164,7 @@ fn unrefuted(o: &Outcome, truth: &reference::Truth) -> Result<(), String> {
     };
     let free = if o.status == Status::Clear { 1.0 } else { o.time_lower };
     if free > seen + SAME && seen < 1.0 - SAME {
-        return Err(format!("{told}, but {:?} with depth at {seen} ({})", truth.verdict, truth.point));
+        return Err(format!("{reported}, but {:?} with depth at {seen} ({})", truth.verdict, truth.point));
     }
     Ok(())
 }

@@ -3,10 +3,10 @@
 use super::{Reader, Target, sound};
 use crate::scenes::Recipe;
 use contactd::contact::Status;
-use contactd::eco::Model;
+use contactd::octree::Model;
 use contactd::world::{ObjectSpec, Part, StepOptions, World};
 use contactd_proto::pose_record::{END, START, TURN};
-use contactd_proto::{Pose, PoseRecord, Rule, Track};
+use contactd_proto::{MotionState, Pose, PoseRecord, Rule};
 use glam::DVec3;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -109,12 +109,12 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
 }
 
 fn taken(world: &mut World, records: &[PoseRecord], options: &StepOptions) -> Result<String, String> {
-    let tracks = |w: &World| w.bodies().iter().map(|b| b.track).collect::<Vec<Track>>();
-    let before = tracks(world);
+    let motion_states = |w: &World| w.bodies().iter().map(|b| b.motion_state).collect::<Vec<MotionState>>();
+    let before = motion_states(world);
     let out = match world.step(records, options) {
         Ok(out) => out.clone(),
         Err(e) => {
-            if tracks(world) != before {
+            if motion_states(world) != before {
                 return Err(format!("refused ({e}), and yet the world changed"));
             }
             if e.index.is_some_and(|i| i as usize >= records.len()) {
@@ -125,8 +125,8 @@ fn taken(world: &mut World, records: &[PoseRecord], options: &StepOptions) -> Re
     };
     let fine = |p: &Pose| p.position.is_finite() && (p.rotation.length() - 1.0).abs() < 1e-9;
     for body in world.bodies() {
-        if !(fine(&body.track.end) && fine(&body.track.motion.start)) {
-            return Err(format!("object {} stands at {:?}", body.id, body.track));
+        if !(fine(&body.motion_state.end) && fine(&body.motion_state.motion.start)) {
+            return Err(format!("object {} stands at {:?}", body.id, body.motion_state));
         }
     }
     let mut earliest = f64::INFINITY;

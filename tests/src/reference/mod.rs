@@ -278,12 +278,13 @@ impl Search<'_> {
     fn verified(&self, rows: &[Row], x: DVec3, t: f64, speed: f64, reach: f64) -> Option<Candidate> {
         let extent = self.pair.a.radius + self.pair.b.radius;
         let slack = 1e-10 * self.size + 1e-13 * extent;
-        let touch = solve::solve(self.pair, rows, x, t, Unknown::Time { level: 0.0 }, self.size, speed, reach)?;
+        let scales = |near: f64| solve::Scales { size: self.size, speed, near };
+        let touch = solve::solve(self.pair, rows, (x, t), Unknown::Time { level: 0.0 }, scales(reach))?;
         if !(-1e-3..=1.0).contains(&touch.t) || self.pair.value(&self.pair.at(touch.t), touch.x) > slack {
             return None;
         }
         let deep = Unknown::Time { level: -self.delta };
-        let deep = solve::solve(self.pair, rows, touch.x, touch.t, deep, self.size, speed, self.size)?;
+        let deep = solve::solve(self.pair, rows, (touch.x, touch.t), deep, scales(self.size))?;
         let confirmed =
             self.pair.value(&self.pair.at(deep.t), deep.x) <= -self.delta + 1e-3 * self.delta + 1e-14 * extent;
         // A body on its way out reaches depth before touch.
@@ -432,6 +433,7 @@ fn deepest_point(pair: &Pair, f: &Frame) -> (DVec3, f64) {
     let mut starts: Vec<(f64, DVec3)> = open.iter().map(|c| (pair.value(f, c.center), c.center)).collect();
     starts.push((best.1, best.0));
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let scales = solve::Scales { size, speed: size, near: size };
     let mut tried: HashMap<Vec<Row>, u32> = HashMap::new();
     for (_, x) in starts.iter().take(40) {
         for rows in candidate_rows(pair, f, *x, 4e-3 * size) {
@@ -440,7 +442,7 @@ fn deepest_point(pair: &Pair, f: &Frame) -> (DVec3, f64) {
             if *attempts > 3 {
                 continue;
             }
-            if let Some(root) = solve::solve(pair, &rows, *x, f.t, Unknown::Level { t: f.t }, size, size, size) {
+            if let Some(root) = solve::solve(pair, &rows, (*x, f.t), Unknown::Level { t: f.t }, scales) {
                 let v = pair.value(f, root.x);
                 if v < best.1 {
                     best = (root.x, v);

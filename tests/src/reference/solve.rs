@@ -166,17 +166,24 @@ fn scalars(pair: &Pair, rows: &[Row], f: &Frame, x: DVec3, level: f64) -> Scalar
     s
 }
 
-/// Solves the equations from the start (x, t); `size` is the unit of length, `speed` one of length per step. Gives up
-/// when the point wanders much farther than `near` from where it started: another start finds that solution.
+/// What a solution is measured by.
+#[derive(Clone, Copy, Debug)]
+pub struct Scales {
+    /// The unit of length.
+    pub size: f64,
+    /// One of length per step.
+    pub speed: f64,
+    /// A point that wanders much farther than this from where it started is given up: another start finds that solution.
+    pub near: f64,
+}
+
+/// Solves the equations from the start (x, t).
 pub fn solve(
     pair: &Pair,
     rows: &[Row],
-    x: DVec3,
-    t: f64,
+    (x, t): (DVec3, f64),
     unknown: Unknown,
-    size: f64,
-    speed: f64,
-    near: f64,
+    Scales { size, speed, near }: Scales,
 ) -> Option<Root> {
     let unit_t = size / speed.max(size * 1e-12);
     let n = scalars(pair, rows, &pair.at(t), x, 0.0).values.len();

@@ -30,13 +30,13 @@ pub struct Term {
     pub other: Option<Literal>,
     /// Multiplier at the start and the end of the span; linear between.
     pub lambda: [f64; 2],
-    /// Point of contact of the tangent, frame of the literal's body; of a fit's convex part in the carrier's frame.
+    /// Point of contact of the tangent, frame of the literal's body; of a fit's convex part in the reference body's frame.
     pub point: DVec3,
 }
 
 /// What is bounded.
 pub struct Bounder<'a> {
-    /// The carrier.
+    /// The reference body.
     pub a: &'a Solid,
     /// The other body.
     pub b: &'a Solid,

@@ -17,11 +17,11 @@ use glam::{DQuat, DVec3};
 #[derive(Clone, Copy, Debug)]
 pub enum Proven {
     /// Apart over the whole step by a distance measured before.
-    Room,
+    Clearance,
     /// Apart over the whole step along directions.
     Directions,
-    /// Apart over the whole step since they keep to a course.
-    Course,
+    /// Apart over the whole step since they keep to a predicted motion.
+    PredictedMotion,
     /// The same question: what its certificate proves.
     Answer(Checked),
     /// The same question: in each other at the start.
@@ -288,9 +288,9 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
     }
     let motions = [bodies[0].placed.motion, bodies[1].placed.motion];
     match *kind {
-        "room" => {
+        "clearance" => {
             let mut numbers = Numbers::of(words)?;
-            let room = numbers.next()?;
+            let clearance = numbers.next()?;
             let along = numbers.vector()?;
             let poses = [numbers.pose()?, numbers.pose()?];
             let then = poses.map(Motion::resting);
@@ -298,20 +298,20 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
             let gone = strays(&bodies[0], &then[0]) + strays(&bodies[1], &then[1]);
             let size = 1e-12 * (bodies[0].reach + bodies[1].reach + gone);
             let n = vector(along.to_array());
-            let least = (room - size).max((gone + resolution) * (1.0 + 1e-8));
+            let least = (clearance - size).max((gone + resolution) * (1.0 + 1e-8));
             let mut apart = f64::NEG_INFINITY;
             for by in [By::Box, By::Tree, By::Split] {
                 if apart <= least {
                     apart = apart.max(gap(&bodies, &then, n, 0.0, by));
                 }
             }
-            if !unit || apart < room - size {
-                return Err(format!("the bodies were {apart:e} apart, not {room:e}"));
+            if !unit || apart < clearance - size {
+                return Err(format!("the bodies were {apart:e} apart, not {clearance:e}"));
             }
             if apart * (1.0 - 2e-9) - gone <= resolution {
                 return Err(format!("{apart:e} apart, they may have gone {gone:e} since"));
             }
-            Ok(Proven::Room)
+            Ok(Proven::Clearance)
         }
         "directions" => {
             let mut numbers = Numbers::of(words)?;
@@ -322,11 +322,11 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
                 Err("the directions do not keep the bodies apart".into())
             }
         }
-        "course" => course(words, rest, &bodies, resolution),
+        "prediction" => prediction(words, rest, &bodies, resolution),
         "answer" => {
             let mut numbers = Numbers::of(words)?;
-            let asked = [numbers.motion()?, numbers.motion()?];
-            if asked != motions {
+            let query_options = [numbers.motion()?, numbers.motion()?];
+            if query_options != motions {
                 return Err("another question".into());
             }
             let [a, b] = &bodies;
@@ -352,14 +352,14 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
     }
 }
 
-/// A course: the bodies were proven to keep a distance over motions, and stray from these by less.
-fn course(words: &[&str], rest: &str, bodies: &[Truth; 2], resolution: f64) -> Result<Proven, String> {
+/// A predicted motion: the bodies were proven to keep a distance over motions, and stray from these by less.
+fn prediction(words: &[&str], rest: &str, bodies: &[Truth; 2], resolution: f64) -> Result<Proven, String> {
     let mut numbers = Numbers::of(words)?;
     let (since, steps, until) = (numbers.next()?, numbers.next()?, numbers.next()?);
     let expected = [numbers.motion()?, numbers.motion()?];
     let stands = since >= steps;
     if !(since >= 0.0 && steps >= 1.0) || !stands && since + 1.0 > steps.min(until) || stands && until < f64::INFINITY {
-        return Err("the step is not within the course".into());
+        return Err("the step is not within the prediction".into());
     }
     // As the bodies were expected to go in this step.
     let now = expected.map(|m| {
@@ -368,7 +368,7 @@ fn course(words: &[&str], rest: &str, bodies: &[Truth; 2], resolution: f64) -> R
     });
     let astray = strays(&bodies[0], &now[0]) + strays(&bodies[1], &now[1]);
     let whole = expected.map(|m| Motion { velocity: m.velocity * steps, spin: m.spin * steps, ..m });
-    // This step's part of the course, as a fraction of it.
+    // This step's part of the predicted motion, as a fraction of it.
     let (from, to) = if stands { (1.0, 1.0) } else { (since / steps, (since + 1.0) / steps) };
     if rest.starts_with("from ") {
         let mut turns = Vec::new();
@@ -383,23 +383,27 @@ fn course(words: &[&str], rest: &str, bodies: &[Truth; 2], resolution: f64) -> R
             let (t0, t1) = (begin.max(from), end.min(to));
             let here = if i == 0 { t0 <= from || t0 <= t1 } else { t0 <= t1 };
             if here && t0 <= t1 && !apart(bodies, &whole, (t0, *n), (t1, *n), least) {
-                return Err(format!("direction {i} does not keep the bodies {least:e} apart on their course"));
+                return Err(format!("direction {i} does not keep the bodies {least:e} apart on their prediction"));
             }
         }
         let begins = turns.first().is_some_and(|t| t.0 <= from);
         let ordered = turns.windows(2).all(|w| w[0].0 <= w[1].0);
-        return if begins && ordered { Ok(Proven::Course) } else { Err("the directions leave time out".into()) };
+        return if begins && ordered {
+            Ok(Proven::PredictedMotion)
+        } else {
+            Err("the directions leave time out".into())
+        };
     }
     let [a, b] = [0, 1].map(|k| Placed { motion: whole[k], ..bodies[k].placed });
     let checked = check_level(rest, (0, 1), (bodies[0].solid, &a), (bodies[1].solid, &b))?;
     if checked.until < to * (1.0 - 1e-12) {
-        return Err(format!("the course is proven until {}, the step ends at {to} of it", checked.until));
+        return Err(format!("the prediction is proven until {}, the step ends at {to} of it", checked.until));
     }
     // Every point x of both bodies would lie within half of what they stray of both as they were expected.
     if -2.0 * checked.depth - astray <= resolution {
         return Err(format!("proven to keep f above {:e}, they stray {astray:e}", -checked.depth));
     }
-    Ok(Proven::Course)
+    Ok(Proven::PredictedMotion)
 }
 
 /// The numbers of a line, words between them left out.

@@ -1,7 +1,7 @@
 //! Checks a certificate (docs/certificate.md) without any of the server's bounds: the text, the solids and their motion
 //! in, an error or what was checked out.
 //!
-//! What is proven when it accepts: the box holds every point of the carrier at the certificate's depth; over it and
+//! What is proven when it accepts: the box holds every point of the reference body at the certificate's depth; over it and
 //! [0, until] no point is at that depth in both bodies at t = 0, and none is at exactly that depth in both afterwards.
 //! The first contact would be on both surfaces (a point strictly inside one body that just reaches the depth in the
 //! other reached it before, carried along by the other), so none is there. Each combination of literals is bounded by
@@ -169,36 +169,36 @@ fn check_level(
 ) -> Result<Checked, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>())).peekable();
     let (_, head) = lines.next().ok_or("empty certificate")?;
-    let [_, a, b, _, carrier, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
+    let [_, a, b, _, reference, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
         return Err("line 1: not the head of a pair".into());
     };
     let index = |s: &str| s.parse::<usize>().map_err(|_| format!("line 1: {s:?} is no index"));
     if (index(a)?, index(b)?) != names {
         return Err("line 1: another pair".into());
     }
-    let swapped = match index(carrier)? {
+    let swapped = match index(reference)? {
         c if c == names.0 => false,
         c if c == names.1 => true,
-        _ => return Err("line 1: the carrier is none of the pair".into()),
+        _ => return Err("line 1: the reference is none of the pair".into()),
     };
-    let (carrier, other) = if swapped { (second, first) } else { (first, second) };
+    let (reference, other) = if swapped { (second, first) } else { (first, second) };
     let (depth, until, count) = (number(depth)?, number(until)?, index(cells)?);
     if !(depth != 0.0 && (0.0..=1.0).contains(&until)) {
         return Err("line 1: depth or time out of range".into());
     }
     let mut checked = Checked { until, depth, ..Checked::default() };
-    if carrier.0.is_void() || other.0.is_void() {
+    if reference.0.is_void() || other.0.is_void() {
         return Ok(checked);
     }
     let corners: Vec<f64> = corners.iter().map(|s| number(s)).collect::<Result<_, _>>()?;
     let [x0, y0, z0, x1, y1, z1] = corners.as_slice() else { return Err("line 1: a box has six numbers".into()) };
     let root = [(*x0, *x1), (*y0, *y1), (*z0, *z1)];
-    if !holds_solid(&root, carrier.0, (-depth).max(0.0)) {
-        return Err("line 1: the box does not hold the carrier".into());
+    if !holds_solid(&root, reference.0, (-depth).max(0.0)) {
+        return Err("line 1: the box does not hold the reference".into());
     }
-    let motions = Motions::new(carrier.1, other.1);
-    let mut bounder = Bounder { a: carrier.0, b: other.0, motions, depth, evaluations: 0, exhausted: false };
-    let a = expression(carrier.0, carrier.0.root, false, false);
+    let motions = Motions::new(reference.1, other.1);
+    let mut bounder = Bounder { a: reference.0, b: other.0, motions, depth, evaluations: 0, exhausted: false };
+    let a = expression(reference.0, reference.0.root, false, false);
     let b = expression(other.0, other.0.root, false, true);
     if let Some((line, words)) = lines.next_if(|(_, words)| words[0] == "witness") {
         let numbers: Vec<f64> = words[1..].iter().map(|s| number(s)).collect::<Result<_, _>>()?;
@@ -289,7 +289,7 @@ fn check_level(
                 ["inside"] => {
                     let inside = cell.a.as_ref().is_some_and(|a| certain(&mut bounder, a, region(0.0, 0.0)));
                     if !(cell.started || cell.t > 0.0) || !inside {
-                        return wrong("the cell may not lie inside the carrier");
+                        return wrong("the cell may not lie inside the reference");
                     }
                 }
                 ["split", axis, at] => {

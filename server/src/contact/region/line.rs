@@ -8,7 +8,7 @@
 
 use super::local::{Bodies, Lit};
 use super::patch::{Corner, key_of};
-use super::surface::{Pair, Standing, is_convex, standing};
+use super::surface::{FacePair, Standing, is_convex, standing};
 use crate::contact::literal::Side;
 use crate::contact::separation::Place;
 use crate::solid::surface::curve::{self, Nearness, Outward};
@@ -160,7 +160,7 @@ fn lies_in(bodies: &Bodies, curve: &Curve, (from, to): (f64, f64), lit: Lit) -> 
 }
 
 /// True when the straight way between two points of a pair's flat patch leaves it nowhere.
-pub fn sees(bodies: &Bodies, pair: &Pair, lits: &[Lit], x: DVec3, y: DVec3) -> bool {
+pub fn sees(bodies: &Bodies, pair: &FacePair, lits: &[Lit], x: DVec3, y: DVec3) -> bool {
     let Some(along) = (y - x).try_normalize() else { return true };
     let (curve, length) = (Curve::Line { origin: x, along }, (y - x).length());
     let mut stops = vec![0.0, length];

@@ -33,7 +33,7 @@ use line::Candidate;
 use local::{Bodies, Lit};
 use patch::Corner;
 use std::collections::BTreeMap;
-use surface::{Pair, Standing, same_surface};
+use surface::{FacePair, Standing, same_surface};
 
 /// A point of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -267,12 +267,12 @@ fn cover(bodies: &Bodies) -> (Vec<Place>, bool) {
 /// True when faces touch in a box over an area or along a line: halving it would only cut that up.
 fn is_simple(bodies: &Bodies, place: &Place) -> bool {
     let b = place.lits(Side::B);
-    let pairs = place.lits(Side::A).iter().any(|p| b.iter().any(|q| Pair::of(bodies, *p, *q).is_some()));
+    let pairs = place.lits(Side::A).iter().any(|p| b.iter().any(|q| FacePair::of(bodies, *p, *q).is_some()));
     pairs || line::has_line(bodies, place)
 }
 
 /// The pairs of surfaces that lie on each other, and the boxes in which they do.
-fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<(Pair, Vec<usize>)> {
+fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<(FacePair, Vec<usize>)> {
     let mut boxes: BTreeMap<(Lit, Lit), Vec<usize>> = BTreeMap::new();
     for (i, place) in places.iter().enumerate() {
         let b = place.lits(Side::B);
@@ -280,12 +280,12 @@ fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<(Pair, Vec<usize>)> {
             b.iter().for_each(|q| boxes.entry((p, *q)).or_default().push(i));
         }
     }
-    let mut found: Vec<(Pair, Vec<usize>)> = Vec::new();
+    let mut found: Vec<(FacePair, Vec<usize>)> = Vec::new();
     for ((p, q), of) in boxes {
         let known = found.iter_mut().find(|(k, _)| same_surface(bodies, k.alpha, p) && same_surface(bodies, k.beta, q));
         match known {
             Some((_, all)) => all.extend(of),
-            None => found.extend(Pair::of(bodies, p, q).map(|pair| (pair, of))),
+            None => found.extend(FacePair::of(bodies, p, q).map(|pair| (pair, of))),
         }
     }
     for (_, of) in &mut found {
@@ -317,7 +317,7 @@ fn parts<'p>(bodies: &Bodies, places: &'p [Place], of: &[usize]) -> Vec<Vec<&'p 
 }
 
 /// The points of a flat patch in groups that see each other: one a piece. Curved ones stay as they are.
-fn apart(bodies: &Bodies, pair: &Pair, places: &[&Place], corners: Vec<Corner>) -> Vec<Vec<Corner>> {
+fn apart(bodies: &Bodies, pair: &FacePair, places: &[&Place], corners: Vec<Corner>) -> Vec<Vec<Corner>> {
     if corners.is_empty() {
         return Vec::new();
     }
@@ -387,7 +387,7 @@ fn points_of(corners: &[Corner]) -> Vec<RegionPoint> {
     corners.iter().map(|c| RegionPoint { point: c.x, separation: c.gap }).collect()
 }
 
-fn patch_region(bodies: &Bodies, pair: &Pair, corners: &[Corner]) -> Region {
+fn patch_region(bodies: &Bodies, pair: &FacePair, corners: &[Corner]) -> Region {
     let normals = corners.iter().map(|c| bodies.look(pair.alpha, c.x).normal);
     let mean = normals.clone().sum::<DVec3>();
     let normal = if mean.length() > 1e-3 { mean.normalize() } else { normals.clone().next().unwrap_or(DVec3::Z) };

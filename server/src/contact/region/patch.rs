@@ -6,7 +6,7 @@
 //! method starts in those that stay.
 
 use super::local::{Bodies, Lit};
-use super::surface::{Pair, Standing, axis_of_curve, same_surface, standing};
+use super::surface::{FacePair, Standing, axis_of_curve, same_surface, standing};
 use crate::contact::literal::Side;
 use crate::contact::separation::Place;
 use crate::solid::{local, surface::Plane};
@@ -57,7 +57,7 @@ impl Cut {
 }
 
 /// The points of a pair's surface within some boxes that two cuts pass through.
-fn meet(bodies: &Bodies, pair: &Pair, cuts: [&Cut; 2], places: &[&Place]) -> Vec<(DVec3, u64)> {
+fn meet(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], places: &[&Place]) -> Vec<(DVec3, u64)> {
     let slack = bodies.tau + bodies.eps;
     if bodies.face(pair.alpha).is_flat() && cuts.iter().all(|c| c.is_flat(bodies)) {
         // Three planes have one point in common, wherever it is looked for.
@@ -96,7 +96,7 @@ fn meet(bodies: &Bodies, pair: &Pair, cuts: [&Cut; 2], places: &[&Place]) -> Vec
 
 /// Newton's method for a point of a pair's surface on two cuts, and in which sense the three faces turn there: of two
 /// points that a straight and a round one have in common each has its own.
-fn newton(bodies: &Bodies, pair: &Pair, cuts: [&Cut; 2], mut x: DVec3) -> Option<(DVec3, u64)> {
+fn newton(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], mut x: DVec3) -> Option<(DVec3, u64)> {
     let mut turn = 0;
     for _ in 0..40 {
         let (m, n) = pair.middle(bodies, x);
@@ -152,7 +152,7 @@ const MARK: u64 = u64::MAX - 4;
 
 /// The pairs of cuts that come together in some box, each once with the boxes, the smaller name first: the sense in which
 /// they turn must not depend on a box's list.
-fn crossings<'p>(bodies: &Bodies, pair: &Pair, places: &[&'p Place]) -> Vec<([(u64, Cut); 2], Vec<&'p Place>)> {
+fn crossings<'p>(bodies: &Bodies, pair: &FacePair, places: &[&'p Place]) -> Vec<([(u64, Cut); 2], Vec<&'p Place>)> {
     let mut found: BTreeMap<[u64; 2], ([(u64, Cut); 2], Vec<&'p Place>)> = BTreeMap::new();
     let mut add = |p: (u64, Cut), q: (u64, Cut), place: &'p Place| {
         let entry = found.entry([p.0, q.0]).or_insert_with(|| ([p, q], Vec::new()));
@@ -180,7 +180,7 @@ fn crossings<'p>(bodies: &Bodies, pair: &Pair, places: &[&'p Place]) -> Vec<([(u
 }
 
 /// The points that bound the part of a pair's patch that lies in some boxes.
-pub fn corners(bodies: &Bodies, pair: &Pair, places: &[&Place]) -> Vec<Corner> {
+pub fn corners(bodies: &Bodies, pair: &FacePair, places: &[&Place]) -> Vec<Corner> {
     let mut found: Vec<Corner> = Vec::new();
     let mut add = |x: DVec3, key: [u64; 3], on_boundary: bool| {
         let stands = standing(bodies, pair, x);
@@ -219,7 +219,7 @@ pub fn corners(bodies: &Bodies, pair: &Pair, places: &[&Place]) -> Vec<Corner> {
 const LEAST_ANGLE: f64 = 1e-3;
 
 /// Flat patches run round their middle, starting at the point with the smallest key; others go by keys alone.
-pub fn order(bodies: &Bodies, pair: &Pair, points: &mut [Corner]) {
+pub fn order(bodies: &Bodies, pair: &FacePair, points: &mut [Corner]) {
     let n = bodies.look(pair.alpha, points.first().map_or(DVec3::ZERO, |c| c.x)).normal;
     let u = bodies.material(Side::A, n);
     let v = n.cross(u);

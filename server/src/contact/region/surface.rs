@@ -16,7 +16,7 @@ use std::f64::consts::{PI, TAU};
 
 /// A face of A and one of B that coincide within the threshold of touching, facing each other.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair {
+pub struct FacePair {
     pub alpha: Lit,
     pub beta: Lit,
     /// Where flat faces lean against each other: the half-space in which their gap is within the threshold.
@@ -27,7 +27,7 @@ pub struct Pair {
 /// over an area.
 const LEAN: f64 = 4.0;
 
-impl Pair {
+impl FacePair {
     /// The pair of two literals, if they lie on each other.
     pub fn of(bodies: &Bodies, alpha: Lit, beta: Lit) -> Option<Self> {
         let (tau, size) = (bodies.tau, bodies.size);
@@ -77,7 +77,7 @@ pub enum Standing {
 }
 
 /// A literal's part in the tangent plane of a point.
-struct Part {
+struct SurfacePart {
     side: Side,
     id: LiteralId,
     at: At,
@@ -86,7 +86,7 @@ struct Part {
 }
 
 /// What the point `x` of a pair's surface is to its patch.
-pub fn standing(bodies: &Bodies, pair: &Pair, x: DVec3) -> Standing {
+pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
     let (x_a, x_b, n) = pair.feet(bodies, x);
     let ((truth_a, tokens_a), (truth_b, tokens_b)) = (bodies.open(Side::A, x_a), bodies.open(Side::B, x_b));
     if truth_a != Truth::Open || truth_b != Truth::Open || (x_b - x_a).dot(n) > bodies.tau * (1.0 + 1e-9) {
@@ -101,7 +101,7 @@ pub fn standing(bodies: &Bodies, pair: &Pair, x: DVec3) -> Standing {
             // Leaning faces of a pair count as parallel.
             let flat = ANGLE.max(2.0 * LEAN * bodies.lie / bodies.size);
             let across = if across.length() <= flat { DVec3::ZERO } else { across.normalize() };
-            parts.push(Part { side, id, at, across });
+            parts.push(SurfacePart { side, id, at, across });
         }
     }
     let limit = pair.limit.map(|(m, offset)| ((m - n * m.dot(n)).normalize_or_zero(), m.dot(x) - offset));

@@ -235,8 +235,11 @@ fn every_other_kind_is_refused_with_its_place_and_what_to_do() {
                 let error = read(&words).err().unwrap_or_else(|| panic!("{words}: was read"));
                 let expected = format!("m.csg:2:1: expected a supported construct, found {name}");
                 assert!(error.starts_with(&expected), "{words}: {error}");
-                let told = error.contains("not supported (");
-                assert!(told || ["cgaladv", "subdiv", "glide"].contains(&name) || name.starts_with("dxf"), "{error}");
+                let reported = error.contains("not supported (");
+                assert!(
+                    reported || ["cgaladv", "subdiv", "glide"].contains(&name) || name.starts_with("dxf"),
+                    "{error}"
+                );
             }
         }
     }
@@ -255,7 +258,7 @@ fn the_experimental_curve_setting_counts_where_curves_are_cut() {
 }
 
 #[test]
-fn what_is_left_out_is_told() {
+fn what_is_left_out_is_reported() {
     for (text, note) in [
         ("%sphere(r = 1);cube(1);", "1:2: sphere after %: left out, as OpenSCAD does"),
         ("cube(1);\n*hull() { sphere(r = 1); }", "2:2: hull after *: left out, as OpenSCAD does"),

@@ -53,7 +53,7 @@ pub fn lower(file: &File, facets: Facets, limits: &Limits) -> Result<Import> {
 type PartId = usize;
 
 /// What a call became, before it is known which primitives stay.
-enum Part {
+enum Operand {
     Empty,
     Leaf(Shape, Pose, Label),
     /// An operation, where it stands, and its operands.
@@ -88,7 +88,7 @@ struct Open<'a> {
 
 /// What a call is at first sight.
 enum Step {
-    Leaf(Part),
+    Leaf(Operand),
     Open(Op, Context),
 }
 
@@ -97,7 +97,7 @@ struct Lowering<'a> {
     facets: Facets,
     limits: &'a Limits,
     notes: Vec<Note>,
-    parts: Vec<Part>,
+    parts: Vec<Operand>,
     faces: usize,
 }
 
@@ -145,7 +145,7 @@ impl<'a> Lowering<'a> {
             }
             let (op, at, built) = (current.op, current.at, std::mem::take(&mut current.built));
             open.pop();
-            let part = self.push(Part::Op(op, at, built));
+            let part = self.push(Operand::Op(op, at, built));
             match open.last_mut() {
                 Some(parent) => parent.built.push(part),
                 None => return Ok(part),
@@ -167,7 +167,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn push(&mut self, part: Part) -> PartId {
+    fn push(&mut self, part: Operand) -> PartId {
         self.parts.push(part);
         self.parts.len() - 1
     }
@@ -186,7 +186,7 @@ impl<'a> Lowering<'a> {
                 if call.children.is_empty() {
                     Extrusion::arguments(call)?;
                     self.note(call.at, "linear_extrude without a shape inside: nothing is there".into(), None);
-                    return Ok(Step::Leaf(Part::Empty));
+                    return Ok(Step::Leaf(Operand::Empty));
                 }
                 let extrusion = Extrusion::new(call)?;
                 let outline = Some(Outline { extrusion, inner: DAffine3::IDENTITY, overshoot: 0 });
@@ -261,7 +261,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn sphere(&mut self, call: &Call, outer: &DAffine3) -> Result<Part> {
+    fn sphere(&mut self, call: &Call, outer: &DAffine3) -> Result<Operand> {
         let arguments = Arguments::new(call, &["r"])?;
         let r = arguments.finite_positive("r")?;
         match self.fragments(&arguments, r)? {
@@ -275,7 +275,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn cylinder(&mut self, call: &Call, outer: &DAffine3) -> Result<Part> {
+    fn cylinder(&mut self, call: &Call, outer: &DAffine3) -> Result<Operand> {
         let arguments = Arguments::new(call, &["h", "r1", "r2", "center"])?;
         let h = arguments.positive("h")?;
         let (r1, r2) = (arguments.not_negative("r1")?, arguments.not_negative("r2")?);
@@ -306,7 +306,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn cube(&mut self, call: &Call, outer: &DAffine3) -> Result<Part> {
+    fn cube(&mut self, call: &Call, outer: &DAffine3) -> Result<Operand> {
         let arguments = Arguments::new(call, &["size", "center"])?;
         let size = arguments.positive_sizes("size")?;
         let center = arguments.bool_or("center", false)?;
@@ -319,7 +319,7 @@ impl<'a> Lowering<'a> {
 
     /// A box with infinite sides: an intersection of half-spaces. A centred infinite side has no ends, any other begins
     /// at 0.
-    fn infinite_box(&mut self, call: &Call, outer: &DAffine3, size: DVec3, center: [bool; 3]) -> Result<Part> {
+    fn infinite_box(&mut self, call: &Call, outer: &DAffine3, size: DVec3, center: [bool; 3]) -> Result<Operand> {
         let mut ends: Vec<(DVec3, f64)> = Vec::new();
         for k in 0..3 {
             let axis = DVec3::AXES[k];
@@ -340,10 +340,10 @@ impl<'a> Lowering<'a> {
             let part = self.leaf(call, Ok(place::half_space(outer, n, d)))?;
             parts.push(self.push(part));
         }
-        Ok(Part::Op(Op::Intersection, call.at, parts))
+        Ok(Operand::Op(Op::Intersection, call.at, parts))
     }
 
-    fn polyhedron(&mut self, call: &Call, outer: &DAffine3) -> Result<Part> {
+    fn polyhedron(&mut self, call: &Call, outer: &DAffine3) -> Result<Operand> {
         let arguments = Arguments::new(call, &["points", "faces"])?;
         let points: Vec<DVec3> = arguments.points::<3>("points")?.into_iter().map(DVec3::from_array).collect();
         let faces = arguments.index_lists("faces", points.len())?;
@@ -365,7 +365,7 @@ impl<'a> Lowering<'a> {
         self.leaf(call, Ok(placed))
     }
 
-    fn outline(&mut self, call: &Call, outer: &DAffine3, o: &Outline) -> Result<Part> {
+    fn outline(&mut self, call: &Call, outer: &DAffine3, o: &Outline) -> Result<Operand> {
         let Outline { extrusion, inner, overshoot } = *o;
         let placed = match call.name.as_str() {
             "circle" => {
@@ -446,7 +446,7 @@ impl<'a> Lowering<'a> {
         Ok(())
     }
 
-    fn leaf(&mut self, call: &Call, placed: std::result::Result<Placed, Problem>) -> Result<Part> {
+    fn leaf(&mut self, call: &Call, placed: std::result::Result<Placed, Problem>) -> Result<Operand> {
         let Placed { shape, frame, mirrored, notes } = placed.map_err(|p| (call.at, p))?;
         let geometry = shape.geometry();
         self.faces += geometry.faces().len();
@@ -461,7 +461,7 @@ impl<'a> Lowering<'a> {
             self.note(call.at, text, amount);
         }
         let label = Label { name: call.name.clone(), line: call.at.line, column: call.at.column, mirrored };
-        Ok(Part::Leaf(shape, frame, label))
+        Ok(Operand::Leaf(shape, frame, label))
     }
 }
 
@@ -554,17 +554,17 @@ fn faceted_sphere(r: f64, n: u32, rings: u32) -> (Vec<DVec3>, Vec<Vec<u32>>) {
 }
 
 /// Builds the solid of `root`, leaving out what cannot contribute; where that is more than nothing, a note tells.
-fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid {
+fn emit(mut parts: Vec<Operand>, root: PartId, notes: &mut Vec<Note>) -> Solid {
     let mut empty = vec![false; parts.len()];
     for (i, part) in parts.iter().enumerate() {
         empty[i] = match part {
-            Part::Empty => true,
-            Part::Leaf(..) => false,
-            Part::Op(Op::Union, _, c) => c.iter().all(|c| empty[*c]),
-            Part::Op(Op::Intersection, _, c) => c.is_empty() || c.iter().any(|c| empty[*c]),
-            Part::Op(Op::Difference, _, c) => c.first().is_none_or(|c| empty[*c]),
+            Operand::Empty => true,
+            Operand::Leaf(..) => false,
+            Operand::Op(Op::Union, _, c) => c.iter().all(|c| empty[*c]),
+            Operand::Op(Op::Intersection, _, c) => c.is_empty() || c.iter().any(|c| empty[*c]),
+            Operand::Op(Op::Difference, _, c) => c.first().is_none_or(|c| empty[*c]),
         };
-        if let Part::Op(op, at, c) = part
+        if let Operand::Op(op, at, c) = part
             && empty[i]
             && c.iter().any(|c| !empty[*c])
         {
@@ -586,10 +586,10 @@ fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid {
     while let Some(visit) = visits.pop() {
         match visit {
             Visit::Enter(p) if empty[p] => built.push(builder.empty()),
-            Visit::Enter(p) => match std::mem::replace(&mut parts[p], Part::Empty) {
-                Part::Empty => built.push(builder.empty()),
-                Part::Leaf(shape, frame, label) => built.push(builder.primitive(shape, frame, label)),
-                Part::Op(op, _, children) => {
+            Visit::Enter(p) => match std::mem::replace(&mut parts[p], Operand::Empty) {
+                Operand::Empty => built.push(builder.empty()),
+                Operand::Leaf(shape, frame, label) => built.push(builder.primitive(shape, frame, label)),
+                Operand::Op(op, _, children) => {
                     let kept: Vec<PartId> = children.into_iter().filter(|c| !empty[*c]).collect();
                     visits.push(Visit::Leave(op, kept.len()));
                     visits.extend(kept.into_iter().rev().map(Visit::Enter));

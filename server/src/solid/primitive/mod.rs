@@ -40,7 +40,7 @@ pub trait Geometry {
     fn interior_point(&self) -> DVec3;
     /// What it is to those who compute with convex bodies, in its frame.
     fn form(&self) -> Form<'_>;
-    /// Its moments in its frame, by a formula (`eco::mass::closed` has them all); `None` where there is none.
+    /// Its moments in its frame, by a formula (`octree::mass::closed` has them all); `None` where there is none.
     fn moments(&self) -> Option<Moments>;
     /// A primitive of its kind and in its frame that holds all points at which f of it is at most `margin` (a length);
     /// `None` where edges or corners reach out farther than that.

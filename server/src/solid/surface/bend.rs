@@ -14,7 +14,7 @@ pub struct Bend {
 }
 
 /// The range of κ: the surface lies between ½ κ⁻ τ² and ½ κ⁺ τ² below its tangent plane, τ the offset along the tangents.
-/// Formulas and their derivation: `eco::mass::slab`.
+/// Formulas and their derivation: `octree::mass::slab`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// κ = 0.

@@ -111,7 +111,7 @@ pub trait Surface: Copy {
     /// Size of the numbers that psi is computed from, beside those of the point: |d|, |o| + r, |apex|. A length.
     fn reach(&self) -> f64;
 
-    /// The same by the largest coordinate of a point: with it, what rounding may do to psi is told (`eco::span`). A length.
+    /// The same by the largest coordinate of a point: with it, what rounding may do to psi is told (`octree::span`). A length.
     fn magnitude(&self) -> f64;
 
     /// psi at `x`.

@@ -1,0 +1,104 @@
+//! Where an object stands between steps: its last accepted motion and the pose that motion ended at.
+//!
+//! The server and the client's journal run the same arithmetic on it, so a replayed session continues bit for bit.
+//! The end is kept as it was given: it is not recomputed from the motion, so that nothing creeps over many steps.
+
+use crate::pose_record::PoseCommand;
+use crate::{Motion, Pose};
+
+/// An object's last accepted motion and where it ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionState {
+    /// Motion over the last accepted step.
+    pub motion: Motion,
+    /// Pose at its end.
+    pub end: Pose,
+}
+
+impl MotionState {
+    /// An object that was put at `pose`.
+    pub fn resting(pose: Pose) -> Self {
+        Self { motion: Motion::resting(pose), end: pose }
+    }
+
+    /// The pose from which the next step starts when `advance` (0..1) of the last one is taken.
+    pub fn at(&self, advance: f64) -> Pose {
+        if advance == 1.0 { self.end } else { self.motion.at(advance) }
+    }
+
+    /// The track of the next step, of an object that stands at `start`.
+    pub fn ordered(start: Pose, command: PoseCommand) -> Self {
+        match command {
+            PoseCommand::Start(pose) => Self::resting(pose),
+            // Equal rotations mean no rotation, whatever the last bit of their product says.
+            PoseCommand::End(end) if end.rotation == start.rotation => {
+                Self { motion: Motion::turning(start, end.position, glam::DVec3::ZERO), end }
+            }
+            PoseCommand::End(end) => Self { motion: Motion::between(start, end), end },
+            PoseCommand::Turn(position, vector) => {
+                let motion = Motion::turning(start, position, vector);
+                Self { motion, end: Pose::new(position, motion.at(1.0).rotation) }
+            }
+        }
+    }
+
+    /// True when the object did not move, not even by a last bit of its pose: what did comes to rest at its end.
+    pub fn is_rest(&self) -> bool {
+        self.motion.is_rest() && same_bits(&self.motion.start, &self.end)
+    }
+}
+
+/// True for poses that are one to the bit; zeros of either sign are two.
+fn same_bits(a: &Pose, b: &Pose) -> bool {
+    let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+    same(&a.position.to_array(), &b.position.to_array()) && same(&a.rotation.to_array(), &b.rotation.to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::quat_of_rotation_vector;
+    use glam::DVec3;
+
+    #[test]
+    fn an_end_is_kept_to_the_last_bit() {
+        let start = Pose::new(DVec3::new(0.1, 0.7, 1e3), quat_of_rotation_vector(DVec3::new(0.1, 0.2, 0.3)));
+        let end = Pose::new(DVec3::new(1.0 / 3.0, 1e-9, 7.0), quat_of_rotation_vector(DVec3::new(2.0, -0.2, 0.3)));
+        assert_eq!(MotionState::ordered(start, PoseCommand::End(end)).at(1.0), end);
+        assert_eq!(MotionState::ordered(start, PoseCommand::End(end)).at(0.0).position, start.position);
+    }
+
+    #[test]
+    fn an_end_that_is_another_pose_by_a_bit_alone_is_no_rest() {
+        let q = quat_of_rotation_vector(DVec3::new(0.4, -1.1, 2.0));
+        let start = Pose::new(DVec3::new(1.0, 0.0, -2.0), q);
+        assert!(MotionState::ordered(start, PoseCommand::End(start)).is_rest());
+        let other = glam::DQuat::from_xyzw(f64::from_bits(q.x.to_bits() + 1), q.y, q.z, q.w);
+        for end in
+            [Pose::new(start.position, other), Pose::new(DVec3::new(1.0, -0.0, -2.0), q), Pose::new(start.position, -q)]
+        {
+            let motion_state = MotionState::ordered(start, PoseCommand::End(end));
+            assert!(!motion_state.is_rest(), "{end:?}");
+            let next = motion_state.at(1.0);
+            assert_eq!(next.rotation.to_array().map(f64::to_bits), end.rotation.to_array().map(f64::to_bits));
+            assert_eq!(next.position.to_array().map(f64::to_bits), end.position.to_array().map(f64::to_bits));
+        }
+    }
+
+    #[test]
+    fn what_does_not_turn_keeps_its_rotation_at_any_part_of_a_step() {
+        let q = quat_of_rotation_vector(DVec3::new(0.4, -1.1, 2.0));
+        let off = glam::DQuat::from_xyzw(f64::from_bits(q.x.to_bits() + 2), q.y, q.z, q.w);
+        for q in [q, off] {
+            assert_eq!(MotionState::resting(Pose::new(DVec3::X, q)).at(0.3).rotation, q);
+        }
+    }
+
+    #[test]
+    fn equal_rotations_do_not_turn() {
+        let q = quat_of_rotation_vector(DVec3::new(0.4, -1.1, 2.0));
+        let motion_state = MotionState::ordered(Pose::new(DVec3::ZERO, q), PoseCommand::End(Pose::new(DVec3::X, q)));
+        assert_eq!(motion_state.motion.spin, DVec3::ZERO);
+        assert!(!motion_state.is_rest());
+    }
+}

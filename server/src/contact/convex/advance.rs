@@ -1,0 +1,399 @@
+//! Two convex primitives by an advance: as far as the direction of their nearest points proves, and again from there.
+//!
+//! See `direct`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
+
+use super::super::cell::Ending;
+use super::super::literal::Side;
+use super::super::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
+use super::super::search::Search;
+use super::super::task::Task;
+use super::gjk::{GOOD, Nearest, nearest};
+use super::proof::{Gap, Pace};
+use super::support::Body;
+use super::whole::{APART, body_of, excluded};
+use crate::motion::Instant;
+use crate::solid::local::LiteralId;
+use crate::solid::{Primitive, Sense};
+use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
+
+/// Distance evaluations before a pair is left to the search.
+const ROUNDS: usize = 24;
+/// Distance evaluations that a proof of a kept distance may take.
+const KEPT: u64 = 6;
+/// The same for the time at which a distance is reached.
+const NEARED: u64 = 200;
+/// The shortest time that another one is worth.
+const SHORT: f64 = 1.0 / 32.0;
+/// Resolutions by which bodies that lie in each other are set apart to find what separates them.
+const OFF: f64 = 64.0;
+/// Gap, relative to the pair's scale, below which a contact is looked for.
+const NEAR: f64 = 0.3;
+/// A contact that the closing speed puts later than this is not looked for: speeds grow, but not by that much.
+const LATEST: f64 = 1.25;
+/// Imbalance of the multiplied unit normals that rounding leaves at a contact.
+const BALANCED: f64 = 1e-12;
+/// Gap, relative to the pair's scale, or rounds, from which faces that do not hold the contact are mended one by one:
+/// farther off the next round's faces are the cheaper try.
+const MEND: (f64, usize) = (0.01, 4);
+/// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
+const ACTIVE: [f64; 2] = [1e-7, 1e-3];
+
+/// The answer for two solids that are one convex primitive each; `None` leaves them to the search. The distance at the
+/// start is looked for along a direction of the world first, if one is given.
+pub fn answer(search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
+    let task = search.task;
+    let (a, b) = (task.a.whole()?, task.b.whole()?);
+    let (body_a, body_b) = (body_of(a)?, body_of(b)?);
+    let advance = Advance::new(task, (a, body_a), (b, body_b));
+    if advance.never_near() { Some(Ending::Clear) } else { advance.run(search, along) }
+}
+
+/// Two solids that are one convex primitive each, to be asked how far apart they are.
+pub struct Convex<'a> {
+    advance: Advance<'a>,
+    /// The distance at the start, in its direction.
+    start: Gap,
+}
+
+impl<'a> Convex<'a> {
+    /// `None` for other solids, and where no direction is found that separates them.
+    pub fn new(task: Task<'a>) -> Option<Self> {
+        let (a, b) = (task.a.whole()?, task.b.whole()?);
+        let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
+        let m = advance.moment(0.0);
+        let start = advance.widest(&m, m.b.support(DVec3::ZERO) - a.ball.center)?;
+        Some(Self { advance, start })
+    }
+
+    /// True for two solids that are one convex primitive each, whether a direction separates them or not.
+    pub fn are_two(task: &Task) -> bool {
+        [task.a, task.b].iter().all(|solid| solid.whole().is_some_and(|p| body_of(p).is_some()))
+    }
+
+    /// A lower bound of the distance at the start, but for rounding.
+    pub fn distance(&self) -> f64 {
+        self.start.phi
+    }
+
+    /// Time until which the distance stays above `least` (a length), at least; of how many evaluations it took.
+    pub fn keeps(self, least: f64) -> (f64, u64) {
+        let (until, _, count) = self.advance_to(least, KEPT, SHORT, &mut |_| {});
+        (until, count)
+    }
+
+    /// The direction, from the reference body and in the world's axes, that proves the distance at the start.
+    pub fn direction(&self) -> DVec3 {
+        self.start.n
+    }
+
+    /// The directions by which the distance was found to stay above `least`, each from its time on: what `keeps` proves.
+    pub fn directions(self, least: f64) -> Vec<(f64, DVec3)> {
+        let mut all = Vec::new();
+        self.advance_to(least, KEPT, SHORT, &mut |gap| all.push((gap.t, gap.n)));
+        all
+    }
+
+    /// The same to the end: where it stops short of 1 the distance then, a lower bound, is hardly above `least`, or what may
+    /// be spent has run out.
+    pub fn nears(self, least: f64) -> (f64, f64, u64) {
+        self.advance_to(least, NEARED, 0.0, &mut |_| {})
+    }
+
+    fn advance_to(mut self, least: f64, most: u64, shortest: f64, step: &mut impl FnMut(&Gap)) -> (f64, f64, u64) {
+        self.advance.pace.least = least;
+        let (mut here, mut count) = (self.start, 1);
+        while here.phi > least && count < most {
+            step(&here);
+            let m = self.advance.moment(1.0);
+            let until = self.advance.pace.proven(&here, &self.advance.gap(&m, here.n));
+            if until >= 1.0 {
+                return (1.0, here.phi, count);
+            }
+            // From where this direction gives out another one.
+            let m = self.advance.moment(until);
+            let Some(next) = self.advance.widest(&m, m.at.world_from_a.transpose() * here.n) else { break };
+            count += 1;
+            let short = next.t - here.t <= shortest;
+            here = next;
+            if short {
+                break;
+            }
+        }
+        (here.t, here.phi, count)
+    }
+}
+
+/// An instant with B as A sees it.
+struct Moment<'a> {
+    at: Instant,
+    b: Body<'a>,
+}
+
+struct Advance<'a> {
+    task: Task<'a>,
+    a: (&'a Primitive, Body<'a>),
+    b: (&'a Primitive, Body<'a>),
+    pace: Pace,
+    /// ρ_A + ρ_B.
+    reach: f64,
+}
+
+impl<'a> Advance<'a> {
+    fn new(task: Task<'a>, a: (&'a Primitive, Body<'a>), b: (&'a Primitive, Body<'a>)) -> Self {
+        let (pa, pb) = task.relative.placed();
+        let far = |p: &Primitive, center: DVec3| (p.ball.center - center).length() + p.ball.radius;
+        let rho_a = far(a.0, task.relative.center_a());
+        let rho_b = far(b.0, pb.place.inverse().position);
+        let (wa, wb) = (pa.motion.spin.length(), pb.motion.spin.length());
+        let v0 = (pa.motion.velocity - pb.motion.velocity).length();
+        Self {
+            task,
+            a,
+            b,
+            pace: Pace {
+                speed: v0 + wa * rho_a + wb * rho_b,
+                pull: wa * wa * rho_a + wb * wb * rho_b,
+                least: excluded(task.delta, task.rounding),
+            },
+            reach: rho_a + rho_b,
+        }
+    }
+
+    /// True when the balls about the two centres of rotation that hold the bodies stay apart: these centres move straight.
+    fn never_near(&self) -> bool {
+        let d = self.task.relative.difference(0.0);
+        let v = self.task.relative.difference(1.0) - d;
+        let square = v.length_squared();
+        let s = if square > 0.0 { (-d.dot(v) / square).clamp(0.0, 1.0) } else { 0.0 };
+        (d + v * s).length() > self.reach + APART * self.task.delta
+    }
+
+    fn moment(&self, t: f64) -> Moment<'a> {
+        let at = self.task.relative.at(t);
+        let axes = at.b_from_a.transpose();
+        Moment { at, b: self.b.1.seen(&axes, at.a_point(DVec3::ZERO)) }
+    }
+
+    /// B a few resolutions off: of bodies that lie in each other by less a direction is found that separates them, but for
+    /// that much.
+    fn set_off(&self, m: &Moment<'a>) -> Body<'a> {
+        let way = m.b.support(DVec3::ZERO) - self.a.0.ball.center;
+        m.b.seen(&DMat3::IDENTITY, way.normalize_or(DVec3::X) * (OFF * self.task.delta))
+    }
+
+    /// The gap along the line of nearest points, looked for from a direction along A's axes.
+    fn widest(&self, m: &Moment, first: DVec3) -> Option<Gap> {
+        let found = nearest(&self.a.1, &m.b, first, GOOD)?;
+        Some(self.gap(m, (m.at.world_from_a * found.normal).normalize()))
+    }
+
+    /// φ along a world direction.
+    fn gap(&self, m: &Moment, n: DVec3) -> Gap {
+        let along = m.at.world_from_a.transpose() * n;
+        Gap { t: m.at.t, n, phi: -m.b.reach(-along) - self.a.1.reach(along) }
+    }
+
+    /// True when the way between the centres, without a distance, keeps the bodies apart for the whole step.
+    fn frees_all(&self, m: &Moment, end: &Moment) -> bool {
+        let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.a.0.ball.center);
+        let Some(n) = way.try_normalize() else { return false };
+        let here = self.gap(m, n);
+        here.phi > APART * self.task.delta && self.pace.proven(&here, &self.gap(end, n)) >= 1.0
+    }
+
+    fn run(&self, search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
+        let scale = self.task.scale;
+        let mut t = 0.0;
+        let mut near = false;
+        let mut contact: Option<Gap> = None;
+        let end_of_step = self.moment(1.0);
+        let mut along = along;
+        for round in 0..ROUNDS {
+            let m = self.moment(t);
+            if round == 0 && self.frees_all(&m, &end_of_step) {
+                return Some(Ending::Clear);
+            }
+            let first = along
+                .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
+            search.counters.closed_forms += 1;
+            let seen = |b: &Body| {
+                let found = nearest(&self.a.1, b, first, GOOD)?;
+                let n = (m.at.world_from_a * found.normal).normalize();
+                Some((found, self.gap(&m, n))).filter(|(_, gap)| gap.phi > self.pace.least)
+            };
+            let (found, here) = match seen(&m.b) {
+                Some(seen) => seen,
+                None if round == 0 || near => {
+                    near = true;
+                    seen(&self.set_off(&m))?
+                }
+                None => return None,
+            };
+            // What may be touching is told by the search; that nothing comes of it, here.
+            near |= round == 0 && found.distance <= APART * self.task.delta;
+            let n = here.n;
+            along = Some(n);
+            let last = self.gap(&end_of_step, n);
+            if contact.is_none() && self.pace.proven(&here, &last) >= 1.0 {
+                return Some(Ending::Clear);
+            }
+            let closing = found.normal.dot(m.at.velocity(found.a));
+            let guess = t + found.distance.max(0.0) / closing;
+            if contact.is_none() && !near && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
+                let mend = found.distance <= MEND.0 * scale || round >= MEND.1;
+                contact = self.contact(search, &m, &found, guess.min(1.0), mend);
+                if let Some(hit) = search.hit(t) {
+                    return Some(hit);
+                }
+            }
+            let goal = contact.map_or(1.0, |c| c.t);
+            if let Some(c) = contact {
+                // With the contact's own normal: of what does not turn it proves all there is, at once.
+                let fixed = self.gap(&m, c.n);
+                let proven =
+                    fixed.phi > self.pace.least && c.phi > self.pace.least && self.pace.proven(&fixed, &c) >= c.t;
+                if proven || self.pace.prove(here, c, |t, n| self.gap(&self.moment(t), n)) >= c.t {
+                    return search.found.take().map(Ending::Contact);
+                }
+            }
+            // As far as this direction proves; a nearer end tightens the bound.
+            let mut end = goal;
+            let mut until = t;
+            for _ in 0..6 {
+                let there = if end == 1.0 { last } else { self.gap(&self.moment(end), n) };
+                let proven = self.pace.proven(&here, &there);
+                until = until.max(proven);
+                if proven >= end {
+                    break;
+                }
+                if proven - t > 0.25 * (end - t) {
+                    break;
+                }
+                end = (t + 2.0 * (proven - t)).min(end);
+                if end <= t {
+                    break;
+                }
+            }
+            if until >= 1.0 {
+                return if contact.is_none() { Some(Ending::Clear) } else { None };
+            }
+            if until <= t {
+                return None;
+            }
+            t = until;
+        }
+        None
+    }
+
+    /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees
+    /// confirm it.
+    fn contact(&self, search: &mut Search, m: &Moment, found: &Nearest, guess: f64, mend: bool) -> Option<Gap> {
+        let b = m.at.b_point(found.b);
+        let normal_b = m.at.b_from_a * -found.normal;
+        let x = 0.5 * (found.a + found.b);
+        let mut tried = Actives::new();
+        for tolerance in ACTIVE {
+            let tol = tolerance * self.task.scale + found.distance.abs() * 1e-3;
+            let mut active: SmallVec<[(Constraint, f64); 8]> = SmallVec::new();
+            faces_at(Side::A, self.a.0, found.a, found.normal, tol, &mut active);
+            let of_a = active.len();
+            faces_at(Side::B, self.b.0, b, normal_b, tol, &mut active);
+            let of_b = active.len() - of_a;
+            // A corner that two faces hold against n, as two opposite ones of four may: they alone leave a line open.
+            let loose = of_a < self.a.1.corner(found.normal) || of_b < self.b.1.corner(normal_b);
+            if loose || active.len() > MAX_ACTIVE {
+                continue;
+            }
+            let (constraints, lambda): (Actives, Weights) = active.iter().map(|(c, l)| (*c, 0.5 * l)).unzip();
+            if constraints == tried {
+                break;
+            }
+            tried.clone_from(&constraints);
+            if search.confirm(constraints, x, guess, lambda, mend) {
+                if search.found.as_ref().is_some_and(|f| f.deep.stationarity > BALANCED) {
+                    // Balanced but for a slight tilt: which end of the line comes first is not told.
+                    search.found = None;
+                    continue;
+                }
+                let f = search.found.as_ref()?;
+                let s = f.touch.as_ref().filter(|s| s.t >= 0.0)?;
+                let normal = search.normal(s)?;
+                let at = self.task.relative.at(s.t);
+                let n = (at.world_from_a * normal).normalize();
+                return Some(self.gap(&self.moment(s.t), n));
+            }
+        }
+        None
+    }
+}
+
+/// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
+pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
+    let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
+    for (i, face) in p.faces.iter().enumerate() {
+        let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
+        if let Some(apex) = face.apex()
+            && (x - apex.point).length() <= tol
+        {
+            // An apex holds every direction of its normal cone.
+            let along = apex.directions();
+            out.extend((0..3).map(|k| (Constraint::Apex(side, id, k), n.dot(along[usize::from(k)]))));
+            return;
+        }
+        let f = face.at(x);
+        if f.value.abs() <= tol && f.normal.dot(n) > -0.99 {
+            near.push((id, f.normal));
+        }
+    }
+    // The least set of them whose normals hold n between them: one, two, then three.
+    let mut best: (f64, SmallVec<[(usize, f64); 3]>) = (f64::INFINITY, SmallVec::new());
+    let mut offer = |set: &[usize]| {
+        let Some(weights) = weights(set, &near, n) else { return };
+        let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| near[*i].1 * *w).sum();
+        // A larger set must be better by more than rounding.
+        let off = (sum - n).length() + 1e-7 * set.len() as f64;
+        if off < 0.5 * best.0 || (off < best.0 && set.len() == best.1.len()) {
+            best = (off, set.iter().copied().zip(weights).collect());
+        }
+    };
+    for i in 0..near.len() {
+        offer(&[i]);
+    }
+    for i in 0..near.len() {
+        for j in i + 1..near.len() {
+            offer(&[i, j]);
+        }
+    }
+    for i in 0..near.len() {
+        for j in i + 1..near.len() {
+            for k in j + 1..near.len() {
+                offer(&[i, j, k]);
+            }
+        }
+    }
+    out.extend(best.1.iter().map(|(i, w)| (Constraint::Literal(side, near[*i].0), *w)));
+}
+
+/// Least-squares weights of some unit vectors for n; `None` if one is negative or they are dependent.
+fn weights(set: &[usize], near: &[(LiteralId, DVec3)], n: DVec3) -> Option<SmallVec<[f64; 3]>> {
+    let g = |i: usize| near[set[i]].1;
+    let w: SmallVec<[f64; 3]> = match set.len() {
+        1 => SmallVec::from_slice(&[g(0).dot(n)]),
+        2 => {
+            let c = g(0).dot(g(1));
+            let det = 1.0 - c * c;
+            let (p, q) = (g(0).dot(n), g(1).dot(n));
+            SmallVec::from_slice(&[(p - c * q) / det, (q - c * p) / det])
+        }
+        _ => {
+            let m = glam::DMat3::from_cols(g(0), g(1), g(2));
+            let det = m.determinant();
+            if det.abs() < 1e-9 {
+                return None;
+            }
+            SmallVec::from_slice(&(m.inverse() * n).to_array())
+        }
+    };
+    w.iter().all(|w| w.is_finite() && *w > 0.0).then_some(w)
+}
