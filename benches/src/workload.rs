@@ -7,7 +7,7 @@
 use crate::facets::{Drilled, Outline, compound, mesh};
 use crate::peer;
 use contactd::check::Check;
-use contactd::import::{self, Facets, Limits, read_csg};
+use contactd::import::{self, Facets, Limits, read_model};
 use contactd::octree::Model;
 use contactd::solid::primitive::{Cone, Cylinder, Sphere};
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -362,7 +362,7 @@ pub fn models(count: usize) -> Result<Vec<Class>, Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let read = |name: &str| -> Result<Arc<Model>, Box<dyn Error>> {
         let path = root.join("tests/models").join(name).with_extension("csg");
-        Ok(Arc::new(Model::new(read_csg(&path, Facets::Auto, &Limits::default())?.solid)))
+        Ok(Arc::new(Model::new(read_model(&path, Facets::Auto, &Limits::default())?.solid)))
     };
     let case = |a: &Arc<Model>, motion_a: Motion, b: &Arc<Model>, motion_b: Motion| Case {
         a: a.clone(),

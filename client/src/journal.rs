@@ -4,15 +4,14 @@
 //! the objects of the one before, each with its end alone, and take all of the last step: then the end of an object is what that
 //! batch says, and only the last two have anything to tell. They are kept as they are, and worked out when somebody asks.
 
-use contactd_proto::control::{Command, Facets, ObjectSpec, WireRule, WireTrack};
+use contactd_proto::control::{Command, Facets, ModelFile, ObjectSpec, WireRule, WireTrack};
 use contactd_proto::pose_record::PoseCommand;
 use contactd_proto::{MotionState, PoseRecord, Rule};
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug)]
 struct ModelEntry {
-    name: String,
-    text: String,
+    file: ModelFile,
     facets: Facets,
 }
 
@@ -39,8 +38,8 @@ pub struct Journal {
 
 impl Journal {
     /// A model was loaded.
-    pub fn model(&mut self, id: u32, name: &str, text: &str, facets: Facets) {
-        self.models.insert(id, ModelEntry { name: name.into(), text: text.into(), facets });
+    pub fn model(&mut self, id: u32, file: ModelFile, facets: Facets) {
+        self.models.insert(id, ModelEntry { file, facets });
     }
 
     /// An object was added.
@@ -117,12 +116,8 @@ impl Journal {
     /// The commands that rebuild the session on a server that knows nothing of it.
     pub fn replay(&mut self) -> Vec<Command> {
         self.settle();
-        let models = self.models.iter().map(|(id, m)| Command::LoadModel {
-            model: *id,
-            name: m.name.clone(),
-            text: m.text.clone(),
-            facets: m.facets,
-        });
+        let models =
+            self.models.iter().map(|(id, m)| Command::LoadModel { model: *id, file: m.file.clone(), facets: m.facets });
         let objects = self.objects.values().map(|e| Command::AddObject(e.spec.clone()));
         let motion_states = self.objects.iter().map(|(id, e)| WireTrack::of(*id, &e.motion_state)).collect();
         let rest = [

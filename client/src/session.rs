@@ -11,7 +11,7 @@ pub use options::StepOptions;
 use crate::journal::Journal;
 use crate::transport::{Opened, Transport};
 use crate::{Error, ModelInfo, Object, SharedMemory};
-use contactd_proto::control::{Answer, Command, Facets, WireRule};
+use contactd_proto::control::{Answer, Command, Facets, ModelFile, WireRule};
 use contactd_proto::names::Address;
 use contactd_proto::step::NO_INDEX;
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, PoseRecord, Rule};
@@ -100,13 +100,20 @@ impl<T: Transport> Session<T> {
     /// # Errors
     /// As `load_model`.
     pub fn load_model_with(&mut self, name: &str, text: &str, facets: Facets) -> Result<ModelInfo, Error> {
+        self.load_model_file(ModelFile { name: name.into(), format: "csg".into(), bytes: text.into() }, facets)
+    }
+
+    /// Loads a model from a file's bytes, in any format that the server reads.
+    ///
+    /// # Errors
+    /// As `load_model`; a format that is not read is refused by its name.
+    pub fn load_model_file(&mut self, file: ModelFile, facets: Facets) -> Result<ModelInfo, Error> {
         let model = self.last_model + 1;
-        let command = Command::LoadModel { model, name: name.into(), text: text.into(), facets };
-        match self.command(command)? {
+        match self.command(Command::LoadModel { model, file: file.clone(), facets })? {
             Answer::Loaded { faces, warnings } => {
                 self.last_model = model;
                 if self.transport.may_lose_server() {
-                    self.journal.model(model, name, text, facets);
+                    self.journal.model(model, file, facets);
                 }
                 Ok(ModelInfo { id: model, faces, warnings })
             }

@@ -187,6 +187,17 @@ impl From<&WireMass> for MassProperties {
     }
 }
 
+/// A model as a file has it.
+#[derive(Clone, Debug, PartialEq, Eq, Encode, Decode)]
+pub struct ModelFile {
+    /// Its name, for error sentences.
+    pub name: String,
+    /// What the bytes are: the name of a format that the server reads, such as "csg"; empty: as the name ends, "csg" where that says nothing.
+    pub format: String,
+    /// What the file has in it.
+    pub bytes: Vec<u8>,
+}
+
 /// What a client asks of the server beside steps.
 #[derive(Clone, Debug, PartialEq, Encode, Decode)]
 pub enum Command {
@@ -203,10 +214,8 @@ pub enum Command {
     LoadModel {
         /// Its id, larger than every model id the session has seen.
         model: u32,
-        /// Its name, for error sentences.
-        name: String,
-        /// OpenSCAD CSG text.
-        text: String,
+        /// What it is made of.
+        file: ModelFile,
         /// How curved primitives are taken.
         facets: Facets,
     },

@@ -14,7 +14,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Version of the protocol; part of every service name but the status service's.
-pub const PROTOCOL_VERSION: u32 = 1;
+pub const PROTOCOL_VERSION: u32 = 2;
 /// The service whose layout never changes.
 pub const STATUS_SERVICE: &str = "contactd/status";
 /// Request-response service of steps.

@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use contactd::cache::{self, Cache, Prepared};
 use contactd::check::Check;
 use contactd::contact::Status;
-use contactd::import::{self, Facets, Limits, Scene};
+use contactd::import::{self, Facets, Limits, Scene, Source};
 use contactd::inspect;
 use contactd::ipc::{CacheFolder, ServerConfig};
 use contactd::octree::Model;
@@ -282,8 +282,8 @@ fn inspect_file(
         text
     } else {
         let (limits, name) = (Limits::default(), file.display().to_string());
-        let text = import::read_text(file, &limits)?;
-        let prepared = cache::prepare(cache.open().as_ref(), &name, &text, facets, &limits)?;
+        let bytes = import::read_bytes(file, &limits)?;
+        let prepared = cache::prepare(cache.open().as_ref(), &Source::named(&name, &bytes), facets, &limits)?;
         prepared.trouble.as_deref().into_iter().for_each(warn);
         let text = inspect::model(&name, &prepared.model, &prepared.notes);
         if let Some(to) = picture {

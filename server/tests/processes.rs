@@ -159,7 +159,10 @@ fn a_killed_client_loses_its_session_and_a_stopped_server_is_reported() {
         step(&mut survivor, &ids, k, 1).unwrap();
     }
     let status = SharedMemory::status(&server.address).unwrap();
-    assert_eq!((status.version_min, status.version_max, status.iceoryx2), (1, 1, [0, 10, 0]));
+    assert_eq!(
+        (status.version_min, status.version_max, status.iceoryx2),
+        (names::PROTOCOL_VERSION, names::PROTOCOL_VERSION, [0, 10, 0])
+    );
     shows(&|s| s.steps > 0 && s.effects.continuous > 0);
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new(), "a client that still lives holds nothing by name");
@@ -348,10 +351,15 @@ fn bad_input_is_refused_each_with_its_sentence() {
 
     // Past the client's own checks, as a peer that has none would send it.
     let opened = session.opened();
-    let plain =
-        StepRequest { version: 1, session: opened.session, epoch: opened.epoch, advance: 1.0, ..Default::default() };
+    let plain = StepRequest {
+        version: names::PROTOCOL_VERSION,
+        session: opened.session,
+        epoch: opened.epoch,
+        advance: 1.0,
+        ..Default::default()
+    };
     for (request, code) in [
-        (StepRequest { version: 2, ..plain }, ErrorCode::Version),
+        (StepRequest { version: names::PROTOCOL_VERSION + 1, ..plain }, ErrorCode::Version),
         (StepRequest { records: 9, ..plain }, ErrorCode::TooMany),
         (StepRequest { records: 10, ..plain }, ErrorCode::BadCount),
         (StepRequest { query_options: ASK_ALL + 1, ..plain }, ErrorCode::BadNumber),

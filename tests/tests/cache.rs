@@ -4,7 +4,7 @@
 
 use contactd::cache::{decode, encode};
 use contactd::contact::Outcome;
-use contactd::import::{self, Facets, read_csg};
+use contactd::import::{self, Facets, read_model};
 use contactd::octree::{Limits, Model, Node};
 use contactd::solid::{Op, Solid, SolidBuilder};
 use contactd::world::{ObjectSpec, Part, World};
@@ -47,7 +47,7 @@ fn the_projects_models_come_back_bit_for_bit() {
         files.sort();
         for path in files.iter().filter(|f| f.extension().is_some_and(|e| e == "csg")) {
             for facets in [Facets::Auto, Facets::Exact, Facets::AsWritten] {
-                let Ok(import) = read_csg(path, facets, &import::Limits::default()) else { continue };
+                let Ok(import) = read_model(path, facets, &import::Limits::default()) else { continue };
                 let model = Model::new(import.solid);
                 assert!(all(&kept(&model, &import.notes)) == all(&model), "{}, {facets:?}", path.display());
                 models += 1;

@@ -1,7 +1,7 @@
 //! Real models load, with the counts that their sources have.
 #![allow(missing_docs)]
 
-use contactd::import::{Facets, Limits, read_csg};
+use contactd::import::{Facets, Limits, read_model};
 use contactd::solid::{Sense, Shape};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ fn every_model_of_the_project_loads_in_every_way() {
     assert!(files.len() >= 20, "{files:?}");
     for file in files {
         for facets in [Facets::Exact, Facets::Auto, Facets::AsWritten] {
-            let import = read_csg(&file, facets, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+            let import = read_model(&file, facets, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
             let solid = &import.solid;
             assert!(!solid.is_empty() && solid.aabb().is_finite(), "{}", file.display());
             let curved = solid.primitives.iter().any(|p| !matches!(p.shape, Shape::Cuboid(_) | Shape::Polyhedron(_)));
@@ -47,7 +47,7 @@ fn models_have_the_primitives_that_their_sources_have() {
         ("openscad/peg_in_hole.csg", 3, 2, 0),
     ];
     for (name, primitives, subtracted, notes) in table {
-        let import = read_csg(&root().join(name), Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+        let import = read_model(&root().join(name), Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
         let negative = import.solid.senses.iter().filter(|s| **s == Sense::Negative).count();
         let found = (import.solid.primitives.len(), negative, import.notes.len());
         assert_eq!(found, (primitives, subtracted, notes), "{name}: {:?}", import.notes.first());
@@ -56,7 +56,8 @@ fn models_have_the_primitives_that_their_sources_have() {
 
 #[test]
 fn a_polyhedron_given_inside_out_is_flipped_and_reported() {
-    let import = read_csg(&root().join("openscad/dovetail_b.csg"), Facets::Auto, &Limits::default()).expect("readable");
+    let import =
+        read_model(&root().join("openscad/dovetail_b.csg"), Facets::Auto, &Limits::default()).expect("readable");
     assert_eq!(import.notes.len(), 1);
     assert!(import.notes[0].text.contains("flipped"), "{}", import.notes[0]);
     assert!(import.solid.value(import.solid.aabb().center()) < 0.0, "its middle is inside");

@@ -330,7 +330,13 @@ fn table() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name);
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         let limits = import::Limits::default();
-        let prepared = contactd::cache::prepare(None, name, &text, import::Facets::Auto, &limits).expect("a model");
+        let prepared = contactd::cache::prepare(
+            None,
+            &import::Source::named(name, text.as_bytes()),
+            import::Facets::Auto,
+            &limits,
+        )
+        .expect("a model");
         std::sync::Arc::into_inner(prepared.model).expect("nobody else has it")
     };
     let mut cases = vec![

@@ -65,9 +65,9 @@ fn what_the_flattener_does_not_know_is_named_with_its_line() {
 
 /// The solid of one of the project's models, through the importer.
 fn solid(name: &str) -> contactd::solid::Solid {
-    use contactd::import::{Facets, Limits, read_csg};
+    use contactd::import::{Facets, Limits, read_model};
     let path = folder("../server/models").join(name).with_extension("csg");
-    read_csg(&path, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}")).solid
+    read_model(&path, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}")).solid
 }
 
 #[test]

@@ -11,7 +11,7 @@
 use clap::Parser;
 use contactd::cache::{self, Cache, Key, Origin, Prepared};
 use contactd::contact::{Outcome, Scratch, Status};
-use contactd::import::{Facets, Limits, import_csg};
+use contactd::import::{FORMATS, Facets, Limits, Source, import_csg};
 use contactd::octree::Model;
 use contactd::solid::primitive::Cylinder;
 use contactd_benches::facets::{Drilled, Outline};
@@ -135,8 +135,11 @@ fn loading(options: &Options) -> std::io::Result<()> {
     let sizes: &[usize] = options.pick(&[1, 10, 100, 1_000, 8_259, 30_000], &[10, 1_000, 8_259]);
     for &primitives in sizes {
         let text = text(&holes(primitives - 1));
-        let prepare = |cache| cache::prepare(cache, "plate.csg", &text, Facets::Auto, &limits).expect("a valid text");
-        let key = Key::of(&text, Facets::Auto, &limits);
+        let prepare = |cache| {
+            cache::prepare(cache, &Source::named("plate.csg", text.as_bytes()), Facets::Auto, &limits)
+                .expect("a valid text")
+        };
+        let key = Key::of(&FORMATS[0], text.as_bytes(), Facets::Auto, &limits);
         let bytes = |p: &Prepared| cache::encode(&p.model, &p.notes).expect("a tree of few levels");
         let mut laps = Vec::new();
         let mut nodes = 0;

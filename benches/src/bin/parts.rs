@@ -7,7 +7,7 @@
 
 use clap::Parser;
 use contactd::contact::{Outcome, Scratch, Status};
-use contactd::import::{Facets, Limits, read_csg};
+use contactd::import::{Facets, Limits, read_model};
 use contactd::octree::Model;
 use contactd::solid::primitive::{Cylinder, Sphere};
 use contactd_benches::facets::{Drilled, Outline, compound, mesh, sampled};
@@ -74,7 +74,7 @@ impl Faceted {
 
 fn model(file: &str) -> Model {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/models").join(file).with_extension("csg");
-    Model::new(read_csg(&path, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}")).solid)
+    Model::new(read_model(&path, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}")).solid)
 }
 
 /// Peers of a drilled solid and a convex one.

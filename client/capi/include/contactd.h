@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 #define CONTACTD_VERSION "0.1.0"
-#define CONTACTD_PROTOCOL_VERSION 1
+#define CONTACTD_PROTOCOL_VERSION 2
 
 // Why the server refused: numbers that never change, each with its sentence.
 
@@ -723,6 +723,16 @@ int32_t contactd_load_model(struct contactd_session *session,
                             const char *csg,
                             uint32_t facets,
                             uint32_t *model);
+
+// Loads a model from the `length` bytes of a file, text or not. `format` is what they are, such as "csg"; NULL: as `name` ends. A format that the
+// server does not read is refused by name. Otherwise as contactd_load_model.
+int32_t contactd_load_model_file(struct contactd_session *session,
+                                 const char *name,
+                                 const char *format,
+                                 const uint8_t *bytes,
+                                 size_t length,
+                                 uint32_t facets,
+                                 uint32_t *model);
 
 // Number of a model's faces, and of the warnings of its import: what it snapped or dropped.
 int32_t contactd_count_faces(struct contactd_session *session, uint32_t model, uint32_t *faces, uint32_t *warnings);

@@ -3,9 +3,9 @@
 use crate::abi::{Face, Mass, Pose};
 use crate::error::Failure;
 use crate::handle::{Session, State, free, on};
-use crate::raw::{given, place, text, word};
+use crate::raw::{given, place, row, text, word};
 use contactd_client::{MassOptions, MassProperties};
-use contactd_proto::control::Facets;
+use contactd_proto::control::{Facets, ModelFile};
 use std::ffi::c_char;
 
 /// Curved primitives are exact when `$fn` is 0 or at least 9, as written below that.
@@ -41,6 +41,37 @@ pub unsafe extern "C" fn contactd_load_model(
         // SAFETY: the caller's variable (1).
         let model = unsafe { place(model, "model")? };
         let info = state.session.load_model_with(name, csg, word(&FACETS, facets, "facets")?)?;
+        model.write(info.id);
+        state.models.add(info);
+        Ok(())
+    };
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, call) }
+}
+
+/// Loads a model from the `length` bytes of a file, text or not. `format` is what they are, such as "csg"; NULL: as `name` ends. A format that the
+/// server does not read is refused by name. Otherwise as contactd_load_model.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_load_model_file(
+    session: *mut Session,
+    name: *const c_char,
+    format: *const c_char,
+    bytes: *const u8,
+    length: usize,
+    facets: u32,
+    model: *mut u32,
+) -> i32 {
+    let call = |state: &mut State| {
+        // SAFETY: the caller's strings (2).
+        let name = unsafe { text(name, "name")? };
+        // SAFETY: as above.
+        let format = if format.is_null() { "" } else { unsafe { text(format, "format")? } };
+        // SAFETY: the caller's array (1).
+        let bytes = unsafe { row(bytes, length, "bytes")? };
+        // SAFETY: the caller's variable (1).
+        let model = unsafe { place(model, "model")? };
+        let file = ModelFile { name: name.into(), format: format.into(), bytes: bytes.into() };
+        let info = state.session.load_model_file(file, word(&FACETS, facets, "facets")?)?;
         model.write(info.id);
         state.models.add(info);
         Ok(())

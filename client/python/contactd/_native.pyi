@@ -126,7 +126,7 @@ class Session:
     def closed(self) -> bool:
         """True after ``close``."""
     def _load_model(
-        self, name: str, text: str, facets: str
+        self, name: str, format: str, bytes: bytes, facets: str
     ) -> tuple[int, list[tuple[int, str, str, bool]], list[str]]: ...
     def _mass_properties(self, model: int, tolerance: float, boxes: int) -> MassProperties: ...
     def _add_object(

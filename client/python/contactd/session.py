@@ -174,13 +174,15 @@ class Session(_native.Session):
             if error is None:
                 raise
 
-    def load_model(self, name: str, text: str, facets: str = "auto") -> Model:
-        """Loads a model from OpenSCAD CSG text; ``name`` stands in error sentences.
+    def load_model(self, name: str, text: str | bytes, facets: str = "auto", *, format: str | None = None) -> Model:
+        """Loads a model from OpenSCAD CSG text, or from the bytes of a file; ``name`` stands in error sentences.
 
-        ``facets``: how curved primitives are taken, "auto", "exact" or "as-written". Large models take seconds; other threads
+        ``format``: what it is, such as "csg"; None: bytes are what ``name`` ends in, text is CSG. ``facets``: how curved primitives are taken, "auto", "exact" or "as-written". Large models take seconds; other threads
         run meanwhile, and Ctrl-C is heard when the model is there.
         """
-        id, faces, warnings = self._load_model(name, text, facets)
+        if isinstance(text, str):
+            text, format = text.encode(), format or "csg"
+        id, faces, warnings = self._load_model(name, format or "", text, facets)
         return Model(id, [Face(*face) for face in faces], warnings)
 
     def mass_properties(self, model: Model | int, tolerance: float = 1e-6, boxes: int = 1_000_000) -> MassProperties:

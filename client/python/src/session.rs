@@ -10,7 +10,7 @@ use crate::reply::Reply;
 use crate::rules::RuleFields;
 use crate::slots::{Batch, Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
-use contactd_client::proto::control::Facets;
+use contactd_client::proto::control::{Facets, ModelFile};
 use contactd_client::transport::Opened;
 use contactd_client::{Error, MassOptions, Object, SharedMemory, StepOptions, Transport};
 use contactd_proto::names::Address;
@@ -244,7 +244,13 @@ impl Session {
         Self::enter(slf)?.with_any(slf.py(), |inner| inner.is_none())
     }
 
-    fn _load_model(slf: &Bound<'_, Self>, name: String, text: String, facets: &str) -> PyResult<Loaded> {
+    fn _load_model(
+        slf: &Bound<'_, Self>,
+        name: String,
+        format: String,
+        bytes: Vec<u8>,
+        facets: &str,
+    ) -> PyResult<Loaded> {
         let facets = match facets {
             "auto" => Facets::Auto,
             "exact" => Facets::Exact,
@@ -254,7 +260,8 @@ impl Session {
                 return Err(PyValueError::new_err(sentence));
             }
         };
-        let info = Self::call(slf, move |s| s.load_model_with(&name, &text, facets))?;
+        let file = ModelFile { name, format, bytes };
+        let info = Self::call(slf, move |s| s.load_model_file(file, facets))?;
         let faces = info.faces.into_iter().map(|f| (f.primitive, f.name, f.face, f.subtracted)).collect();
         Ok((info.id, faces, info.warnings))
     }

@@ -146,6 +146,20 @@ def test_objects_carry_what_is_declared(session):
     assert gone.value.code == contactd.ErrorCode.UNKNOWN_OBJECT
 
 
+def test_a_file_is_read_as_its_format_or_its_name_says(session):
+    text = "cube(size = [1, 2, 3], center = true);"
+    models = [
+        session.load_model("a", text),
+        session.load_model("a.csg", text.encode()),
+        session.load_model("a.bin", text.encode(), format="csg"),
+    ]
+    assert [session.mass_properties(model).volume for model in models] == [6, 6, 6]
+    with pytest.raises(contactd.Refused, match='expected one of the formats csg, found "step"'):
+        session.load_model("a.csg", text, format="step")
+    with pytest.raises(contactd.Refused, match="a.csg:1:1: expected text in UTF-8, found the byte 0xff"):
+        session.load_model("a.csg", b"\xff")
+
+
 def test_mass_properties_and_warnings(session):
     model = session.load_model("box.csg", "cube(size = [1, 2, 3], center = true);")
     mass = session.mass_properties(model).with_density(2.0)

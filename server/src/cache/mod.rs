@@ -19,7 +19,7 @@ mod tests;
 pub use file::{Flaw, decode, encode};
 pub use key::Key;
 
-use crate::import::{self, Facets, ImportError, Limits, Note, Scene, SceneError};
+use crate::import::{Facets, ImportError, Limits, Note, Scene, SceneError, Source};
 use crate::octree::Model;
 use std::collections::HashMap;
 use std::fs::{self, DirBuilder, File};
@@ -172,21 +172,20 @@ impl Cache {
     }
 }
 
-/// A model of a text, kept or imported; with a cache, what was imported is kept. `file` is what errors call the text.
+/// A model of a file, kept or imported; with a cache, what was imported is kept.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// What is wrong with the file.
 pub fn prepare(
     cache: Option<&Cache>,
-    file: &str,
-    text: &str,
+    source: &Source,
     facets: Facets,
     limits: &Limits,
 ) -> Result<Prepared, ImportError> {
-    let build = || import::import_csg(file, text, facets, limits).map(|i| (Model::new(i.solid), i.notes));
+    let build = || source.import(facets, limits).map(|i| (Model::new(i.solid), i.notes));
     let prepared = |(model, notes), origin, trouble| Prepared { model: Arc::new(model), notes, origin, trouble };
     let Some(cache) = cache else { return Ok(prepared(build()?, Origin::Built, None)) };
-    let key = Key::of(text, facets, limits);
+    let key = Key::of(source.format()?, source.bytes, facets, limits);
     let flaw = match cache.read(&key) {
         Ok(kept) => return Ok(prepared(kept, Origin::Kept, None)),
         Err(flaw) => flaw,
@@ -203,7 +202,7 @@ pub fn prepare(
     Ok(prepared((model, notes), Origin::Built, trouble))
 }
 
-/// The models of a scene, in the scene's order; those of the same text are one.
+/// The models of a scene, in the scene's order; those of the same content are one.
 ///
 /// # Errors
 /// What is wrong with one of them.
@@ -213,13 +212,14 @@ pub fn prepare_scene(
     facets: Facets,
     limits: &Limits,
 ) -> Result<Vec<Prepared>, SceneError> {
-    let mut known: HashMap<String, Prepared> = HashMap::new();
-    scene.each_model(limits, |file, text| {
-        if let Some(same) = known.get(&text) {
+    let mut known: HashMap<(&str, Vec<u8>), Prepared> = HashMap::new();
+    scene.each_model(limits, |source| {
+        let key = (source.format()?.name, source.bytes.to_vec());
+        if let Some(same) = known.get(&key) {
             return Ok(Prepared { trouble: None, ..same.clone() });
         }
-        let prepared = prepare(cache, file, &text, facets, limits)?;
-        known.insert(text, prepared.clone());
+        let prepared = prepare(cache, source, facets, limits)?;
+        known.insert(key, prepared.clone());
         Ok(prepared)
     })
 }

@@ -2,6 +2,7 @@
 
 use super::file::{FORMAT, PROGRAM, seal, sealed, unseal};
 use super::*;
+use crate::import::{FORMATS, Format};
 use crate::solid::primitive::Sphere;
 use crate::solid::{Label, Op, SolidBuilder};
 use contactd_proto::Pose;
@@ -26,12 +27,16 @@ fn cache(folder: &Path) -> Cache {
     Cache::open(folder, DEFAULT_BYTES).expect("a cache")
 }
 
+fn key_of(format: &Format, text: &str, facets: Facets, limits: &Limits) -> Key {
+    Key::of(format, text.as_bytes(), facets, limits)
+}
+
 fn key(text: &str) -> Key {
-    Key::of(text, Facets::Auto, &Limits::default())
+    key_of(&FORMATS[0], text, Facets::Auto, &Limits::default())
 }
 
 fn prepared(cache: Option<&Cache>, text: &str) -> Prepared {
-    prepare(cache, "part.csg", text, Facets::Auto, &Limits::default()).expect("a valid text")
+    prepare(cache, &Source::named("part.csg", text.as_bytes()), Facets::Auto, &Limits::default()).expect("a valid text")
 }
 
 /// All there is to say of a model, every bit of its numbers.
@@ -65,17 +70,19 @@ fn a_kept_model_is_the_built_one_bit_for_bit() {
 #[test]
 fn a_key_is_told_apart_by_all_that_decides_the_import() {
     let limits = Limits::default();
+    let another = Format { name: "another", ..FORMATS[0] };
     let keys = [
-        Key::of(BALL, Facets::Auto, &limits),
-        Key::of("sphere(r = 1); ", Facets::Auto, &limits),
-        Key::of(BALL, Facets::Exact, &limits),
-        Key::of(BALL, Facets::AsWritten, &limits),
-        Key::of(BALL, Facets::Auto, &Limits { text: 5, ..limits }),
-        Key::of(BALL, Facets::Auto, &Limits { nodes: 5, ..limits }),
-        Key::of(BALL, Facets::Auto, &Limits { depth: 5, ..limits }),
-        Key::of(BALL, Facets::Auto, &Limits { faces: 5, ..limits }),
-        Key::of(BALL, Facets::Auto, &Limits { polyhedron_faces: 5, ..limits }),
-        Key::of(BALL, Facets::Auto, &Limits { values: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &limits),
+        key_of(&another, BALL, Facets::Auto, &limits),
+        key_of(&FORMATS[0], "sphere(r = 1); ", Facets::Auto, &limits),
+        key_of(&FORMATS[0], BALL, Facets::Exact, &limits),
+        key_of(&FORMATS[0], BALL, Facets::AsWritten, &limits),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { bytes: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { nodes: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { depth: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { faces: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { polyhedron_faces: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { values: 5, ..limits }),
     ];
     for (i, a) in keys.iter().enumerate() {
         assert!(keys[..i].iter().all(|b| a != b && a.to_string() != b.to_string()), "{i}");
@@ -86,7 +93,7 @@ fn a_key_is_told_apart_by_all_that_decides_the_import() {
     let cache = cache(folder.path());
     prepared(Some(&cache), PART);
     let narrow = Limits { faces: 5, ..limits };
-    assert!(prepare(Some(&cache), "part.csg", PART, Facets::Auto, &narrow).is_err());
+    assert!(prepare(Some(&cache), &Source::named("part.csg", PART.as_bytes()), Facets::Auto, &narrow).is_err());
 }
 
 #[test]
@@ -325,7 +332,7 @@ fn models_of_one_text_in_a_scene_are_one() {
     }
     let models = ["a", "b", "c"].map(|m| format!("[[model]]\nname = \"{m}\"\nfile = \"{m}.csg\"\n")).concat();
     fs::write(folder.path().join("s.toml"), models).expect("a file");
-    let scene = import::read_scene(&folder.path().join("s.toml")).expect("a scene");
+    let scene = crate::import::read_scene(&folder.path().join("s.toml")).expect("a scene");
     let p = prepare_scene(None, &scene, Facets::Auto, &Limits::default()).expect("its models");
     assert!(Arc::ptr_eq(&p[0].model, &p[1].model) && !Arc::ptr_eq(&p[0].model, &p[2].model));
 }

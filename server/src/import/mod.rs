@@ -1,4 +1,4 @@
-//! File formats: OpenSCAD's flattened models (`csg`) and scene files (`scene`).
+//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`) and scene files (`scene`).
 //!
 //! A file is read completely or refused with one sentence that names the file, the line, the column, what was expected
 //! and what stands there. Real files are rough; whatever is snapped, flipped, merged or taken in another way than
@@ -8,9 +8,11 @@
 //! Floor 3: imports `solid`, `math`, `proto`.
 
 pub mod csg;
+pub mod format;
 pub mod scene;
 
-pub use csg::{Problem, import_csg, read_csg, read_text};
+pub use csg::{Problem, import_csg};
+pub use format::{FORMATS, Format, Source, read_bytes, read_model};
 pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
 
 use crate::solid::Solid;
@@ -104,8 +106,8 @@ impl Facets {
 /// The most that a model file may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of text.
-    pub text: usize,
+    /// Bytes of the file.
+    pub bytes: usize,
     /// Calls in a file.
     pub nodes: usize,
     /// Levels of nesting.
@@ -121,7 +123,7 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            text: 64 << 20,
+            bytes: 64 << 20,
             nodes: 1_000_000,
             // The deepest of several hundred real files has 23 levels. Trees are walked by recursion on higher floors.
             depth: 1_000,
@@ -142,6 +144,24 @@ pub enum ImportError {
         file: String,
         /// The system's reason.
         reason: std::io::Error,
+    },
+    /// More bytes than the limit.
+    #[error("{file}: expected at most {limit} bytes, found more")]
+    Large {
+        /// The file.
+        file: String,
+        /// How many.
+        limit: usize,
+    },
+    /// A format that is not read.
+    #[error("{file}: expected one of the formats {expected}, found {found:?}")]
+    Format {
+        /// The file.
+        file: String,
+        /// The names of those that are.
+        expected: String,
+        /// What was stated.
+        found: String,
     },
     /// Something in the file.
     #[error("{file}:{at}: {problem}")]

@@ -5,7 +5,7 @@
 //! no effect (a rule for a group that no object has, which leaves its pairs without one) is a `Note`. The models'
 //! files are read by `Scene::load_models`, so that a scene can be looked at without them.
 
-use super::csg::{import_csg, read_text};
+use super::format::{Source, read_bytes};
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, Report, Rule};
@@ -172,21 +172,21 @@ impl Scene {
 
     /// Reads every model of the scene, in order.
     pub fn load_models(&self, facets: Facets, limits: &Limits) -> Result<Vec<Import>, SceneError> {
-        self.each_model(limits, |file, text| import_csg(file, &text, facets, limits))
+        self.each_model(limits, |source| source.import(facets, limits))
     }
 
-    /// What `read` makes of each of the models, in order, from the name and the text of its file.
+    /// What `read` makes of each of the models, in order, from its file.
     ///
     /// # Errors
     /// A file that cannot be read, and whatever `read` refuses.
     pub fn each_model<T>(
         &self,
         limits: &Limits,
-        mut read: impl FnMut(&str, String) -> Result<T, ImportError>,
+        mut read: impl FnMut(&Source) -> Result<T, ImportError>,
     ) -> Result<Vec<T>, SceneError> {
         let each = self.models.iter().map(|m| {
-            let text = read_text(&m.path, limits);
-            text.and_then(|text| read(&m.path.display().to_string(), text)).map_err(|e| match e {
+            let (name, bytes) = (m.path.display().to_string(), read_bytes(&m.path, limits));
+            bytes.and_then(|bytes| read(&Source::named(&name, &bytes))).map_err(|e| match e {
                 ImportError::Read { file, reason } => SceneError::Value {
                     file: self.file.clone(),
                     at: m.at,

@@ -74,7 +74,7 @@ impl Default for ServerConfig {
             objects: 1 << 20,
             batch: 1 << 20,
             records: 1 << 20,
-            text: limits.text,
+            text: limits.bytes,
             models_mb: 256,
             nodes: limits.nodes,
             depth: limits.depth,
@@ -142,7 +142,7 @@ impl ServerConfig {
     /// What an import may use.
     pub(super) fn import_limits(&self) -> crate::import::Limits {
         let default = crate::import::Limits::default();
-        crate::import::Limits { text: self.text, nodes: self.nodes, depth: self.depth, faces: self.faces, ..default }
+        crate::import::Limits { bytes: self.text, nodes: self.nodes, depth: self.depth, faces: self.faces, ..default }
     }
 }
 

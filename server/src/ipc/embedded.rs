@@ -44,8 +44,8 @@ impl Embedded {
     }
 
     fn import(&mut self, import: Import) -> Answer {
-        let loaded = self.models.load(&import.name, &import.text, import.facets);
-        self.scene.loaded(import.model, import.text.len(), loaded)
+        let loaded = self.models.load(&import.file, import.facets);
+        self.scene.loaded(import.model, import.file.bytes.len(), loaded)
     }
 }
 

@@ -23,7 +23,7 @@ pub enum Work {
 
 /// What came of it.
 pub enum Finished {
-    /// The model's id, the bytes of its text, and the model.
+    /// The model's id, the bytes of its file, and the model.
     Imported(u32, usize, Result<Arc<Loaded>, Refusal>),
     /// The answer.
     Integrated(Answer),
@@ -32,7 +32,7 @@ pub enum Finished {
 impl Work {
     fn run(self, models: &Models) -> Finished {
         match self {
-            Work::Import(i) => Finished::Imported(i.model, i.text.len(), models.load(&i.name, &i.text, i.facets)),
+            Work::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
             Work::Integrate(integration) => Finished::Integrated(integration.answer()),
         }
     }
@@ -88,7 +88,7 @@ fn no_thread(e: &dyn std::fmt::Display) -> Refusal {
 mod tests {
     use super::super::config::ServerConfig;
     use super::*;
-    use contactd_proto::control::Facets;
+    use contactd_proto::control::{Facets, ModelFile};
     use std::sync::mpsc::channel;
     use std::time::Duration;
 
@@ -101,8 +101,10 @@ mod tests {
             format!("multmatrix([[1,0,0,{x}],[0,1,0,{y}],[0,0,1,0],[0,0,0,1]]) {{ sphere($fn = 0, r = 0.7); }}\n")
         };
         let many: String = (0..20_000).map(sphere).collect();
-        let import =
-            |model, text: String| Work::Import(Import { model, name: "m.csg".into(), text, facets: Facets::Auto });
+        let import = |model, text: String| {
+            let file = ModelFile { name: "m.csg".into(), format: String::new(), bytes: text.into() };
+            Work::Import(Import { model, file, facets: Facets::Auto })
+        };
         let start = |model, text: String| {
             let to = to.clone();
             Job::start(import(model, text), 1, models.clone(), move |finished| to.send((model, finished)).unwrap())

@@ -1,16 +1,16 @@
-//! Models by content: two sessions that load the same text share one model.
+//! Models by content: two sessions that load the same file share one model.
 //!
-//! The text itself is the key, so no two texts are ever taken for each other. An entry lives as long as a session uses it.
+//! The content itself is the key, so no two files are ever taken for each other. An entry lives as long as a session uses it.
 //! With a disk cache, models are kept beyond that, and between runs.
 
 use super::config::ServerConfig;
 use crate::cache::{self, Cache, Prepared};
-use crate::import::{self, ImportError, Problem};
+use crate::import::{self, ImportError, Problem, Source};
 use crate::math::halt;
 use crate::solid::Sense;
 use crate::world::{Part, Refusal};
 use contactd_proto::ErrorCode;
-use contactd_proto::control::{FaceName, Facets};
+use contactd_proto::control::{FaceName, Facets, ModelFile};
 use std::collections::HashMap;
 use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -26,12 +26,15 @@ pub struct Loaded {
     pub warnings: Vec<String>,
 }
 
+/// A file's content and how it is taken.
+type Key = (Facets, &'static str, Arc<[u8]>);
+
 /// The models in use.
 #[derive(Debug)]
 pub struct Models {
     limits: import::Limits,
     cache: Option<Cache>,
-    loaded: Mutex<HashMap<(Facets, Arc<str>), Weak<Loaded>>>,
+    loaded: Mutex<HashMap<Key, Weak<Loaded>>>,
 }
 
 impl Models {
@@ -42,17 +45,20 @@ impl Models {
         Self { limits: config.import_limits(), cache, loaded: Mutex::new(HashMap::new()) }
     }
 
-    /// The model of a text, imported if it is not in use already. May take seconds for a large one.
+    /// The model of a file, imported if it is not in use already. May take seconds for a large one.
     ///
     /// # Errors
     /// `Model` or a limit, with line and column in the sentence.
-    pub fn load(&self, name: &str, text: &str, facets: Facets) -> Result<Arc<Loaded>, Refusal> {
-        let key = (facets, Arc::<str>::from(text));
+    pub fn load(&self, file: &ModelFile, facets: Facets) -> Result<Arc<Loaded>, Refusal> {
+        let ModelFile { name, format, bytes } = file;
+        let source = Source { name, format, bytes };
+        let format = source.format().map_err(|e| Refusal::new(ErrorCode::Model, e.to_string()))?;
+        let key = (facets, format.name, Arc::<[u8]>::from(bytes.as_slice()));
         let known = self.loaded.lock().unwrap_or_else(PoisonError::into_inner).get(&key).and_then(Weak::upgrade);
         if let Some(known) = known {
             return Ok(known);
         }
-        let made = halt::catch(|| self.make(name, text, facets));
+        let made = halt::catch(|| self.make(&source, facets));
         let loaded =
             made.unwrap_or_else(|_| Err(Refusal::new(ErrorCode::Internal, format!("{name}: import failed"))))?;
         let loaded = Arc::new(loaded);
@@ -62,16 +68,16 @@ impl Models {
         Ok(loaded)
     }
 
-    fn make(&self, name: &str, text: &str, facets: Facets) -> Result<Loaded, Refusal> {
+    fn make(&self, source: &Source, facets: Facets) -> Result<Loaded, Refusal> {
         let facets = match facets {
             Facets::Auto => import::Facets::Auto,
             Facets::Exact => import::Facets::Exact,
             Facets::AsWritten => import::Facets::AsWritten,
         };
-        if text.len() > self.limits.text {
-            return Err(Refusal::new(ErrorCode::LimitText, format!("{name}: {} bytes", text.len())));
+        if source.bytes.len() > self.limits.bytes {
+            return Err(Refusal::new(ErrorCode::LimitText, format!("{}: {} bytes", source.name, source.bytes.len())));
         }
-        let prepared = cache::prepare(self.cache.as_ref(), name, text, facets, &self.limits);
+        let prepared = cache::prepare(self.cache.as_ref(), source, facets, &self.limits);
         let prepared = prepared.map_err(|e| Refusal::new(code_of(&e), e.to_string()))?;
         if let Some(trouble) = &prepared.trouble {
             warn(trouble);
@@ -109,6 +115,7 @@ fn code_of(error: &ImportError) -> ErrorCode {
             what if what.contains("face") => ErrorCode::LimitFaces,
             _ => ErrorCode::LimitNodes,
         },
+        ImportError::Large { .. } => ErrorCode::LimitText,
         _ => ErrorCode::Model,
     }
 }
@@ -126,7 +133,10 @@ mod tests {
         let cache = CacheFolder::from(folder.path().to_path_buf());
         for config in [ServerConfig::default(), ServerConfig { cache, ..ServerConfig::default() }] {
             let models = Models::new(&config);
-            let load = |name: &str, facets| models.load(name, PART, facets).expect("a valid text");
+            let load = |name: &str, facets| {
+                let file = ModelFile { name: name.into(), format: String::new(), bytes: PART.into() };
+                models.load(&file, facets).expect("a valid text")
+            };
             let (first, second) = (load("one", Facets::Auto), load("another", Facets::Auto));
             assert!(Arc::ptr_eq(&first, &second));
             assert!(!Arc::ptr_eq(&first, &load("exact", Facets::Exact)));

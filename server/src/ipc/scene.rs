@@ -5,7 +5,7 @@ use super::models::Loaded;
 use crate::math::halt;
 use crate::octree::mass::mass_properties;
 use crate::world::{Heed, ObjectSpec, Refusal, StepOptions, World, record};
-use contactd_proto::control::{Answer, Command, Facets, ObjectSpec as WireObject, WireMass};
+use contactd_proto::control::{Answer, Command, Facets, ModelFile, ObjectSpec as WireObject, WireMass};
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::step::{ASK_ALL, ASK_CLEAR, ASK_DETAILS, ASK_FIRST, NO_INDEX, STEP_REFUSED};
 use contactd_proto::{ContactRecord, ErrorCode, MassOptions, PoseRecord, StepReply, StepRequest};
@@ -62,10 +62,8 @@ impl Integration {
 pub struct Import {
     /// Its id.
     pub model: u32,
-    /// Its name.
-    pub name: String,
-    /// Its text.
-    pub text: String,
+    /// What it is made of.
+    pub file: ModelFile,
     /// How curved primitives are taken.
     pub facets: Facets,
 }
@@ -108,17 +106,17 @@ impl Scene {
             Command::Open { .. } | Command::Close => {
                 return Err(Refusal::new(ErrorCode::BadCommand, "open and close are the server's own"));
             }
-            Command::LoadModel { model, name, text, facets } => {
+            Command::LoadModel { model, file, facets } => {
                 if model <= self.last_model {
                     let detail = format!("model id {model} was used before");
                     return Err(Refusal::new(ErrorCode::BadCommand, detail));
                 }
-                let after = self.text + text.len() as u64;
+                let after = self.text + file.bytes.len() as u64;
                 if after > self.max_text {
-                    let detail = format!("{name}: {after} bytes of models, the limit is {}", self.max_text);
+                    let detail = format!("{}: {after} bytes of models, the limit is {}", file.name, self.max_text);
                     return Err(Refusal::new(ErrorCode::LimitMemory, detail));
                 }
-                return Ok(Outcome::Import(Import { model, name, text, facets }));
+                return Ok(Outcome::Import(Import { model, file, facets }));
             }
             Command::AddObject(spec) => {
                 let spec = self.object(spec)?;

@@ -2,7 +2,7 @@
 
 use super::Target;
 use contactd_proto::control::{
-    Answer, Command, Envelope, Facets, ObjectSpec, WireMass, WireRule, WireTrack, decode, encode,
+    Answer, Command, Envelope, Facets, ModelFile, ObjectSpec, WireMass, WireRule, WireTrack, decode, encode,
 };
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, MotionState, Pose, Rule};
 use glam::DVec3;
@@ -26,11 +26,14 @@ fn seeds() -> Vec<Vec<u8>> {
         place: Pose::IDENTITY.into(),
         pose: Pose::at(DVec3::X).into(),
     };
-    let text = "sphere(r = 1);".into();
     let commands = [
         Command::Open { version: 1, process: (300, 70_000) },
         Command::Close,
-        Command::LoadModel { model: 1, name: "ball".into(), text, facets: Facets::Exact },
+        Command::LoadModel {
+            model: 1,
+            file: ModelFile { name: "ball".into(), format: "csg".into(), bytes: b"sphere(r = 1);".into() },
+            facets: Facets::Exact,
+        },
         Command::AddObject(object),
         Command::RemoveObject(7),
         Command::SetRules(vec![WireRule::from(&rule)]),

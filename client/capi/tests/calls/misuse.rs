@@ -34,6 +34,7 @@ fn every_function_refuses_a_session_that_is_null_or_closed() {
             contactd_set_command_timeout(s, 1.0),
             contactd_reconnect(s, 1.0),
             contactd_load_model(s, null(), null(), 0, null_mut()),
+            contactd_load_model_file(s, null(), null(), null(), 0, 0, null_mut()),
             contactd_count_faces(s, 1, null_mut(), null_mut()),
             contactd_get_face(s, 1, 0, null_mut()),
             contactd_get_warning(s, 1, 0, null_mut()),
@@ -54,7 +55,7 @@ fn every_function_refuses_a_session_that_is_null_or_closed() {
             contactd_get_region(s, 0, 0, null_mut(), null_mut(), null_mut()),
         ]
     };
-    assert_eq!(codes, [ERROR_NULL; 22]);
+    assert_eq!(codes, [ERROR_NULL; 23]);
     refused_at(unsafe { contactd_send(s) }, ERROR_NULL, NO_INDEX, "the session (closed, or never opened) is NULL");
     refused(unsafe { contactd_close(null_mut()) }, ERROR_NULL, "session is NULL");
 }
@@ -76,6 +77,11 @@ fn every_pointer_that_is_null_is_named_and_nothing_is_done() {
         refused(contactd_load_model(s, null(), csg, 0, &mut id), ERROR_NULL, "name is NULL");
         refused(contactd_load_model(s, name, null(), 0, &mut id), ERROR_NULL, "csg is NULL");
         refused(contactd_load_model(s, name, csg, 0, null_mut()), ERROR_NULL, "model is NULL");
+        let file = b"sphere(r = 5);";
+        let of = |bytes, n, id| contactd_load_model_file(s, name, null(), bytes, n, 0, id);
+        refused(contactd_load_model_file(s, null(), null(), file.as_ptr(), 14, 0, &mut id), ERROR_NULL, "name is NULL");
+        refused(of(null(), 14, &mut id), ERROR_NULL, "bytes is NULL");
+        refused(of(file.as_ptr(), 14, null_mut()), ERROR_NULL, "model is NULL");
         refused(contactd_count_faces(s, 1, null_mut(), &mut count), ERROR_NULL, "faces is NULL");
         refused(contactd_count_faces(s, 1, &mut count, null_mut()), ERROR_NULL, "warnings is NULL");
         refused(contactd_get_face(s, 1, 0, null_mut()), ERROR_NULL, "out is NULL");
@@ -127,6 +133,16 @@ fn arguments_out_of_their_range_are_named() {
         refused(contactd_load_model(s, name, BALL.as_ptr(), 3, &mut id), ERROR_ARGUMENT, "facets of 0 to 2, found 3");
         let bad = c"sphere(r = 5);\n  torus(r = 2);";
         refused(contactd_load_model(s, name, bad.as_ptr(), 0, &mut id), number(ErrorCode::Model), "x:2:3");
+        let step = c"step".as_ptr();
+        let of =
+            |format, bytes: &[u8], id| contactd_load_model_file(s, name, format, bytes.as_ptr(), bytes.len(), 0, id);
+        let sentence = "expected one of the formats csg, found \"step\"";
+        refused(of(step, b"sphere(r = 5);", &mut id), number(ErrorCode::Model), sentence);
+        refused(
+            of(null(), b"cube(1);\xff", &mut id),
+            number(ErrorCode::Model),
+            "expected text in UTF-8, found the byte 0xff",
+        );
         refused(contactd_count_faces(s, 77, &mut count, &mut id), number(ErrorCode::UnknownModel), "no model");
         refused(contactd_get_warning(s, 1, 0, &mut text), ERROR_ARGUMENT, "warning 0: there are 0");
         let mut face = std::mem::MaybeUninit::uninit();

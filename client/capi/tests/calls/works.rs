@@ -10,6 +10,7 @@ use contactd_client::MassOptions;
 use contactd_proto::contact_record::{CONTACT, OVERLAP, SENSOR, VALID_POINT};
 use contactd_proto::step::{STEP_CLEAR, STEP_CONTACT};
 use contactd_proto::{PoseRecord, pose_record};
+use std::ffi::{CStr, c_char};
 use std::ptr::{null, null_mut};
 
 #[test]
@@ -87,6 +88,20 @@ fn facets_are_taken_as_asked() {
         faces
     };
     assert_eq!([count(FACETS_AUTO), count(FACETS_EXACT), count(FACETS_AS_WRITTEN)], [8, 3, 8]);
+}
+
+#[test]
+fn a_file_is_read_as_its_format_or_its_name_says() {
+    let session = Open::embedded();
+    let bytes = PLATE.to_bytes();
+    let volume = |name: &CStr, format: *const c_char| {
+        let (bytes, n) = (bytes.as_ptr(), bytes.len());
+        let model = out(|m| unsafe { contactd_load_model_file(session.0, name.as_ptr(), format, bytes, n, 0, m) });
+        out(|m| unsafe { contactd_mass_properties(session.0, model, 0.0, 0, m) }).volume
+    };
+    let text = session.model("plate.csg", PLATE);
+    let of_text = out(|m| unsafe { contactd_mass_properties(session.0, text, 0.0, 0, m) }).volume;
+    assert_eq!([volume(c"plate.csg", null()), volume(c"plate", c"CSG".as_ptr())], [of_text; 2]);
 }
 
 #[test]

@@ -25,9 +25,8 @@ mod syntax;
 #[cfg(test)]
 mod tests;
 
-use super::{Facets, Import, ImportError, Limits, Place};
+use super::{Facets, Format, Import, ImportError, Limits, Place};
 use crate::solid::primitive::MeshError;
-use std::path::Path;
 
 /// What is wrong with a model's text.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -78,25 +77,15 @@ pub fn import_csg(file: &str, text: &str, facets: Facets, limits: &Limits) -> Re
         .map_err(|(at, problem)| ImportError::Content { file: file.to_owned(), at, problem })
 }
 
-/// Reads a model from a flattened file.
-pub fn read_csg(path: &Path, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
-    import_csg(&path.display().to_string(), &read_text(path, limits)?, facets, limits)
-}
+/// The row of `format::FORMATS`.
+pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: import_bytes };
 
-/// Reads the text of a flattened file.
-pub fn read_text(path: &Path, limits: &Limits) -> Result<String, ImportError> {
-    let file = path.display().to_string();
-    let read = |reason| ImportError::Read { file: file.clone(), reason };
-    if std::fs::metadata(path).map_err(read)?.len() > limits.text as u64 {
-        let problem = Problem::Limit { what: "bytes of text", limit: limits.text };
-        return Err(ImportError::Content { file, at: Place::START, problem });
-    }
-    let bytes = std::fs::read(path).map_err(read)?;
-    String::from_utf8(bytes).map_err(|e| {
-        let (valid, bytes) = (e.utf8_error().valid_up_to(), e.as_bytes());
-        let before = String::from_utf8_lossy(&bytes[..valid]);
+fn import_bytes(file: &str, bytes: &[u8], facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
+    let text = std::str::from_utf8(bytes).map_err(|e| {
+        let before = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
         let at = Place::of_offset(&before, before.len());
-        let found = format!("the byte 0x{:02x}", bytes[valid]);
-        ImportError::Content { file, at, problem: Problem::syntax("text in UTF-8", found) }
-    })
+        let found = format!("the byte 0x{:02x}", bytes[e.valid_up_to()]);
+        ImportError::Content { file: file.to_owned(), at, problem: Problem::syntax("text in UTF-8", found) }
+    })?;
+    import_csg(file, text, facets, limits)
 }

@@ -98,8 +98,8 @@ impl Value {
 
 /// Parses a whole file.
 pub fn parse(text: &str, limits: &Limits) -> Result<File, (Place, Problem)> {
-    if text.len() > limits.text {
-        return Err((Place::START, Problem::Limit { what: "bytes of text", limit: limits.text }));
+    if text.len() > limits.bytes {
+        return Err((Place::START, Problem::Limit { what: "bytes of text", limit: limits.bytes }));
     }
     let mut parser = Parser { lexer: Lexer::new(text), limits };
     let mut file = File::default();
