@@ -12,8 +12,7 @@
 //! it is symmetric, whether it has an apex. A capability that a kind does not have is `None`, and whoever asks then takes
 //! the way that is right for every face.
 //!
-//! Adding a kind: a file here, a variant of [`Face`], a row in `each!` and in `like!`, its pairs in `curve`. What is missing does
-//! not compile.
+//! Adding a kind: a file here, a row of `faces!`, its pairs in `curve`. What is missing does not compile. docs/adding.md.
 //!
 //! On an axis the radial direction is undefined: closer than `ON_AXIS` any exact perpendicular stands in, elsewhere the
 //! direction is re-orthogonalised against the axis. Where it stands in, the tangent plane lies above the face by up to the
@@ -222,79 +221,51 @@ pub const NUMBERS: usize = 8;
 /// Any direction that no design has: what faces are sorted along.
 const SKEW: DVec3 = DVec3::new(0.481_726_53, 0.663_114_9, 0.572_917_13);
 
-/// One face of a primitive. Normals and axes are unit vectors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Face {
-    /// Half-space n·x <= d.
-    Plane(Plane),
-    /// Ball around a centre.
-    Sphere(Sphere),
-    /// Infinite cylinder.
-    Cylinder(Cylinder),
-    /// Infinite single-napped cone.
-    Cone(Cone),
-}
+/// Writes the enum of the kinds, and what dispatches over it: `each!`, the answer of a face's own kind, and `like!`, that of the kind of
+/// two faces, `None` for faces of two kinds.
+macro_rules! faces {
+    ($d:tt $($kind:ident = $rank:literal: $doc:literal),+ $(,)?) => {
+        /// One face of a primitive. Normals and axes are unit vectors.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Face { $(#[doc = $doc] $kind($kind)),+ }
 
-/// The answer of the face's own kind.
-macro_rules! each {
-    ($face:expr, $own:ident => $answer:expr) => {
-        match $face {
-            Face::Plane($own) => $answer,
-            Face::Sphere($own) => $answer,
-            Face::Cylinder($own) => $answer,
-            Face::Cone($own) => $answer,
+        macro_rules! each {
+            ($d face:expr, $d own:ident => $d answer:expr) => {
+                match $d face { $(Face::$kind($d own) => $d answer),+ }
+            };
         }
-    };
-}
 
-/// The answer of the kind of two faces; `None` for faces of two kinds.
-macro_rules! like {
-    ($p:expr, $q:expr, $a:ident, $b:ident => $answer:expr) => {
-        match $p {
-            Face::Plane($a) => {
-                if let Face::Plane($b) = $q {
-                    Some($answer)
-                } else {
-                    None
+        macro_rules! like {
+            ($d p:expr, $d q:expr, $d a:ident, $d b:ident => $d answer:expr) => {
+                match $d p {
+                    $(Face::$kind($d a) => if let Face::$kind($d b) = $d q { Some($d answer) } else { None }),+
                 }
-            }
-            Face::Sphere($a) => {
-                if let Face::Sphere($b) = $q {
-                    Some($answer)
-                } else {
-                    None
-                }
-            }
-            Face::Cylinder($a) => {
-                if let Face::Cylinder($b) = $q {
-                    Some($answer)
-                } else {
-                    None
-                }
-            }
-            Face::Cone($a) => {
-                if let Face::Cone($b) = $q {
-                    Some($answer)
-                } else {
-                    None
-                }
-            }
+            };
         }
-    };
-}
 
-macro_rules! from_kinds {
-    ($($kind:ident),+) => {
         $(impl From<$kind> for Face {
             #[inline]
             fn from(face: $kind) -> Self {
                 Face::$kind(face)
             }
         })+
+
+        impl Face {
+            /// The place of its kind among the kinds: what faces are sorted by first.
+            #[inline]
+            pub fn rank(&self) -> u32 {
+                match self { $(Face::$kind(_) => $rank),+ }
+            }
+        }
     };
 }
 
-from_kinds!(Plane, Sphere, Cylinder, Cone);
+faces! {$
+    Plane = 0: "Half-space n·x <= d.",
+    Sphere = 1: "Ball around a centre.",
+    Cylinder = 2: "Infinite cylinder.",
+    Cone = 3: "Infinite single-napped cone.",
+}
 
 impl Face {
     /// See [`Surface::reach`].
@@ -441,17 +412,6 @@ impl Face {
     #[inline]
     pub fn difference(&self, other: &Self, size: f64) -> Option<f64> {
         like!(self, other, a, b => a.difference(b, size))
-    }
-
-    /// The place of its kind among the kinds: what faces are sorted by first.
-    #[inline]
-    pub fn rank(&self) -> u32 {
-        match self {
-            Face::Plane(_) => 0,
-            Face::Sphere(_) => 1,
-            Face::Cylinder(_) => 2,
-            Face::Cone(_) => 3,
-        }
     }
 
     /// See [`Surface::key`]; to be compared among faces of one `rank`.
