@@ -324,7 +324,7 @@ impl Convex {
                 let corners = contactd::math::Aabb::around(DVec3::ZERO, half).corners();
                 Convex::Poly(Poly::new(corners.to_vec(), planes()))
             }
-            Form::Unbounded => return None,
+            Form::Other => return None,
         })
     }
 

@@ -65,7 +65,7 @@ impl CavityBody {
             Form::Corners(c) if c.len() <= MOST_CORNERS && is_simple(p, c) => {
                 Self { discs: c.iter().map(|v| (at.point(*v), 0.0)).collect(), axis: Some(z) }
             }
-            Form::Corners(_) | Form::Unbounded => return None,
+            Form::Corners(_) | Form::Other => return None,
         })
     }
 }

@@ -63,7 +63,7 @@ impl<'a> ConvexPart<'a> {
             Form::Ball(radius) => Core::Ball(radius),
             Form::Cuboid(half) => Core::Cuboid(half),
             Form::Round { bottom, top, half } => round(bottom, top, half),
-            Form::Corners(_) | Form::Unbounded => return None,
+            Form::Corners(_) | Form::Other => return None,
         };
         Some(Self { primitive, axes, core })
     }

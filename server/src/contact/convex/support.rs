@@ -33,7 +33,7 @@ impl<'s> Body<'s> {
     pub fn new(shape: &'s Shape, axes: DMat3, origin: DVec3) -> Option<Self> {
         let form = shape.form();
         let margin = match form {
-            Form::Unbounded => return None,
+            Form::Other => return None,
             Form::Ball(radius) => radius,
             Form::Cuboid(_) | Form::Round { .. } | Form::Corners(_) => 0.0,
         };
@@ -49,7 +49,7 @@ impl<'s> Body<'s> {
     pub fn center(&self) -> DVec3 {
         match self.form {
             Form::Corners(_) => self.origin + self.axes * self.form.middle(),
-            Form::Ball(_) | Form::Cuboid(_) | Form::Round { .. } | Form::Unbounded => self.origin,
+            Form::Ball(_) | Form::Cuboid(_) | Form::Round { .. } | Form::Other => self.origin,
         }
     }
 
@@ -65,7 +65,7 @@ impl<'s> Body<'s> {
             DVec3::new(k * m.x, k * m.y, z)
         };
         let local = match self.form {
-            Form::Ball(_) | Form::Unbounded => return self.origin,
+            Form::Ball(_) | Form::Other => return self.origin,
             Form::Round { bottom, top, half } => round(bottom, top, half),
             Form::Cuboid(half) => DVec3::new(half.x.copysign(m.x), half.y.copysign(m.y), half.z.copysign(m.z)),
             Form::Corners(corners) => {
@@ -147,7 +147,7 @@ impl<'s> Body<'s> {
                     reported(bottom, -self.axes.z_axis, 1 + usize::from(at_top > 0.0))
                 }
             }
-            Form::Corners(_) | Form::Unbounded => return None,
+            Form::Corners(_) | Form::Other => return None,
         })
     }
 
@@ -167,7 +167,7 @@ impl<'s> Body<'s> {
                     _ => 1,
                 }
             }
-            Form::Ball(_) | Form::Round { .. } | Form::Unbounded => 0,
+            Form::Ball(_) | Form::Round { .. } | Form::Other => 0,
         }
     }
 }

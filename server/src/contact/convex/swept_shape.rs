@@ -307,7 +307,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
         let sides = match self.forms[k] {
             Form::Cuboid(_) => [x, y, z],
             Form::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
-            Form::Ball(_) | Form::Corners(_) | Form::Unbounded => [DVec3::ZERO; 3],
+            Form::Ball(_) | Form::Corners(_) | Form::Other => [DVec3::ZERO; 3],
         };
         let towards = move |n: DVec3| if n.dot(way) < 0.0 { -n } else { n };
         sides.into_iter().filter(|n| *n != DVec3::ZERO).map(towards)

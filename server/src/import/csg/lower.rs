@@ -12,7 +12,6 @@ use super::syntax::{Call, CallId, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
 use crate::import::Note;
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
-use crate::solid::primitive::Form;
 use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -24,7 +23,7 @@ const EXACT_FROM: f64 = 9.0;
 
 /// True for a primitive that is meant to reach to infinity.
 fn is_unbounded(shape: &Shape) -> bool {
-    matches!(shape.form(), Form::Unbounded)
+    !shape.geometry().ball().radius.is_finite()
 }
 
 /// Makes a solid of a parsed file.

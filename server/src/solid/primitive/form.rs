@@ -23,8 +23,8 @@ pub enum Form<'a> {
     },
     /// The corners.
     Corners(&'a [DVec3]),
-    /// It has no bounds.
-    Unbounded,
+    /// None of these: without bounds, or of a kind that those who compute with forms do not know. They leave it to the search.
+    Other,
 }
 
 impl Form<'_> {
@@ -32,7 +32,7 @@ impl Form<'_> {
     pub fn middle(&self) -> DVec3 {
         match self {
             Form::Corners(corners) => middle(corners),
-            Form::Ball(_) | Form::Cuboid(_) | Form::Round { .. } | Form::Unbounded => DVec3::ZERO,
+            Form::Ball(_) | Form::Cuboid(_) | Form::Round { .. } | Form::Other => DVec3::ZERO,
         }
     }
 
@@ -42,7 +42,7 @@ impl Form<'_> {
             Form::Ball(radius) => Some(Form::Ball(radius)),
             Form::Cuboid(half) => Some(Form::Cuboid(half)),
             Form::Round { bottom, top, half } => Some(Form::Round { bottom, top, half }),
-            Form::Unbounded => Some(Form::Unbounded),
+            Form::Other => Some(Form::Other),
             Form::Corners(_) => None,
         }
     }
@@ -60,7 +60,7 @@ impl Form<'_> {
             Form::Corners(corners) => {
                 corners.iter().fold(T::all(f64::NEG_INFINITY), |far, v| far.max(m[0] * v.x + m[1] * v.y + m[2] * v.z))
             }
-            Form::Unbounded => T::all(f64::INFINITY),
+            Form::Other => T::all(f64::INFINITY),
         }
     }
 

@@ -41,7 +41,7 @@ impl Geometry for HalfSpace {
     }
     #[inline]
     fn form(&self) -> Form<'_> {
-        Form::Unbounded
+        Form::Other
     }
     fn moments(&self) -> Option<Moments> {
         None
