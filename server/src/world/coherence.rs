@@ -156,7 +156,7 @@ impl PairCache {
         counters: &mut Counters,
     ) -> Option<(Outcome, Option<f64>)> {
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
-            && last.motions == q.motions()
+            && last.motions.iter().zip(&q.motions()).all(|(p, q)| same_bits(p, q))
             && last.query_options == q.query.query_options
             && (last.limit == q.query.cell_limit || last.outcome.counters.fits(q.query.cell_limit.min(last.limit)))
         {
@@ -283,6 +283,16 @@ impl PairCache {
             self.reported = None;
         }
     }
+}
+
+/// True for motions of the same numbers, a zero's sign included: an answer's own zeros have theirs from it.
+fn same_bits(p: &Motion, q: &Motion) -> bool {
+    let bits = |m: &Motion| {
+        let [x, y, z] = m.start.position.to_array().map(f64::to_bits);
+        let rotation = m.start.rotation.to_array().map(f64::to_bits);
+        ([x, y, z], rotation, m.velocity.to_array().map(f64::to_bits), m.spin.to_array().map(f64::to_bits))
+    };
+    bits(p) == bits(q)
 }
 
 /// Writes to the place, which is made when there is none.
