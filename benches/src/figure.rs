@@ -254,10 +254,17 @@ impl Figure {
     /// # Errors
     /// The folder cannot be written.
     pub fn write(&self, folder: &Path) -> std::io::Result<()> {
+        self.write_png(folder)?;
+        std::fs::write(folder.join(&self.name).with_extension("svg"), self.draw(true).to_svg())
+    }
+
+    /// Writes NAME.png into a folder.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn write_png(&self, folder: &Path) -> std::io::Result<()> {
         std::fs::create_dir_all(folder)?;
-        let drawing = self.draw(true);
-        std::fs::write(folder.join(&self.name).with_extension("svg"), drawing.to_svg())?;
-        std::fs::write(folder.join(&self.name).with_extension("png"), drawing.to_png())
+        std::fs::write(folder.join(&self.name).with_extension("png"), self.draw(true).to_png())
     }
 }
 

@@ -83,30 +83,38 @@ pub fn made_by(bin: &str, quick: bool) -> String {
     format!("Made by cargo run --release -p contactd-benches --bin {bin}{quick} ({build}).")
 }
 
-/// Prints the tables of sections and writes them, their figures and their page into a folder; and the summaries between
-/// the marks of a text, if there is one.
+/// Where a report goes.
+#[derive(Debug)]
+pub struct Place<'a> {
+    /// The folder of its page, with each figure as SVG and PNG and each table as CSV.
+    pub page: &'a Path,
+    /// A text with the summaries between its marks, and the folder beside it of the tables' CSV and of the figures that it shows.
+    pub words: Option<(&'a Path, &'a Path)>,
+}
+
+/// Prints the tables of sections and writes the report; nothing but what a text shows, and CSV, is written beside that text.
 ///
 /// # Errors
-/// The folder or the text cannot be written, or a mark is not there.
-pub fn publish(
-    (title, text): (&str, &str),
-    sections: &[Section],
-    folder: &Path,
-    words: Option<&Path>,
-) -> Result<(), Box<dyn Error>> {
+/// A folder or the text cannot be written, or a mark is not there.
+pub fn publish((title, text): (&str, &str), sections: &[Section], place: &Place<'_>) -> Result<(), Box<dyn Error>> {
     for section in sections {
-        section.table.publish(section.name, folder)?;
+        print!("{}", section.table.text());
+        section.table.write(section.name, place.page)?;
         for figure in &section.figures {
-            figure.write(folder)?;
+            figure.write(place.page)?;
         }
     }
-    let page = folder.join("index.html");
+    let page = place.page.join("index.html");
     std::fs::write(&page, html(title, text, sections))?;
     println!("written: {}", page.display());
-    if let Some(path) = words {
+    if let Some((path, folder)) = place.words {
         let mut words = std::fs::read_to_string(path)?;
         for section in sections {
             words = between_marks(&words, section.name, &section.summary.markdown())?;
+            section.table.write(section.name, folder)?;
+            for figure in section.figures.iter().filter(|f| words.contains(&format!("/{}.png)", f.name))) {
+                figure.write_png(folder)?;
+            }
         }
         std::fs::write(path, words)?;
         println!("written: {}", path.display());

@@ -3,6 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Columns of a line of a text (`tests/tests/floors.rs` holds all of docs to it).
+const TEXT_WIDTH: usize = 120;
+
 /// One value of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
@@ -142,13 +145,47 @@ impl Table {
         Self { columns: self.columns.clone(), rows: self.rows.iter().filter(|r| is_chosen(r)).cloned().collect() }
     }
 
-    /// As Markdown.
+    /// As Markdown, of lines that are no longer than a text's: a table that is wider becomes several, one below the other,
+    /// each of which begins with the columns that tell the rows apart.
     pub fn markdown(&self) -> String {
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let mut out = line(self.columns.iter().map(|c| c.replace('_', " ")).collect());
-        out += &format!("|{}\n", "---|".repeat(self.columns.len()));
-        self.rows.iter().for_each(|r| out += &line(r.iter().map(Cell::shown).collect()));
+        let shown = self.rows.iter().map(|r| r.iter().map(Cell::shown).collect());
+        let lines: Vec<Vec<String>> =
+            std::iter::once(self.columns.iter().map(|c| c.replace('_', " ")).collect()).chain(shown).collect();
+        let keys = self.keys();
+        let mut parts: Vec<Vec<usize>> = Vec::new();
+        for k in keys..self.columns.len() {
+            let width = |columns: &[usize]| {
+                let of = |line: &Vec<String>| columns.iter().map(|c| line[*c].chars().count() + 3).sum::<usize>() + 1;
+                lines.iter().map(of).max().unwrap_or(0)
+            };
+            match parts.last_mut() {
+                Some(last) if width(&[&last[..], &[k]].concat()) <= TEXT_WIDTH => last.push(k),
+                _ => parts.push((0..keys).chain([k]).collect()),
+            }
+        }
+        let mut out = String::new();
+        for (i, columns) in parts.iter().enumerate() {
+            for (row, line) in lines.iter().enumerate() {
+                let cells: Vec<&str> = columns.iter().map(|c| line[*c].as_str()).collect();
+                out += if row == 0 && i > 0 { "\n" } else { "" };
+                out += &format!("| {} |\n", cells.join(" | "));
+                if row == 0 {
+                    out += &format!("|{}\n", "---|".repeat(columns.len()));
+                }
+            }
+        }
         out
+    }
+
+    /// The least number of leading columns, one at least, by which no two rows are alike; all but the last where there is none.
+    fn keys(&self) -> usize {
+        let differ = |k: &usize| {
+            let mut seen: Vec<String> = self.rows.iter().map(|r| format!("{:?}", &r[..*k])).collect();
+            seen.sort();
+            seen.windows(2).all(|w| w[0] != w[1])
+        };
+        let most = self.columns.len().saturating_sub(1);
+        (1..most).find(differ).unwrap_or(most)
     }
 
     /// As HTML; all digits of a number in its tool tip.
@@ -176,6 +213,14 @@ impl Table {
     /// The folder cannot be written.
     pub fn publish(&self, name: &str, folder: &Path) -> std::io::Result<()> {
         print!("{}", self.text());
+        self.write(name, folder)
+    }
+
+    /// Writes `NAME.csv` into a folder.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn write(&self, name: &str, folder: &Path) -> std::io::Result<()> {
         std::fs::create_dir_all(folder)?;
         let path = folder.join(name).with_extension("csv");
         std::fs::write(&path, self.csv())?;
@@ -197,5 +242,21 @@ mod tests {
         assert_eq!(t.markdown(), "| case | us | cells |\n|---|---|---|\n| a, b | 0.123 | 7 |\n| c | - | 1234 |\n");
         assert!(t.html().contains("<td title=\"0.123456\">0.123</td>") && t.html().contains("<td>-</td>"));
         assert_eq!(t.csv(), "case,us,cells\n\"a, b\",0.123456,7\nc,,1234\n");
+    }
+
+    #[test]
+    fn a_wide_table_becomes_several_that_begin_with_what_tells_the_rows_apart() {
+        let names =
+            ["class", "rung", "a_count_of_things_with_a_long_name", "another_long_name_of_a_count", "and_one_more"];
+        let mut t = Table::new(&[&names[..], &["the_last_count_that_finds_no_room"]].concat());
+        t.push(row!["peg", "hit", 1.0, 2.0, 3.0, 4.0]);
+        t.push(row!["peg", "time", 5.0, 6.0, 7.0, 8.0]);
+        let text = t.markdown();
+        assert!(text.lines().all(|l| l.chars().count() <= TEXT_WIDTH), "{text}");
+        assert!(
+            text.contains("| peg | time | 5 | 6 | 7 |\n\n| class | rung | the last count that finds no room |\n"),
+            "{text}"
+        );
+        assert!(text.ends_with("|---|---|---|\n| peg | hit | 4 |\n| peg | time | 8 |\n"), "{text}");
     }
 }

@@ -1,13 +1,13 @@
 //! `accuracy`: what accuracy costs in time, as a report of figures, tables and a page.
 //!
-//! The full form takes some minutes. It writes CSV, SVG, PNG and `index.html` into `docs/accuracy` of the repository and the
-//! tables between the marks of `docs/accuracy.md`; with `--csv DIR`, or `--quick`, all of it into that folder (by
-//! default `benches/accuracy` in cargo's target folder) and nothing else is touched.
+//! The page (`index.html`, each figure as SVG and PNG, each table as CSV) goes into the folder of `--csv DIR`, by default
+//! `benches/accuracy` in cargo's target folder. The full form takes some minutes; without `--csv` it also writes the tables between
+//! the marks of `docs/accuracy.md`, and beside that text the figures that it shows and all numbers as CSV.
 
 use clap::Parser;
 use contactd_benches::measure::Known;
 use contactd_benches::options::Options;
-use contactd_benches::page::{made_by, publish};
+use contactd_benches::page::{Place, made_by, publish};
 use contactd_benches::race::Plan;
 use contactd_benches::report::{Context, octree, resolution, strategies, today, volumes};
 use contactd_benches::workload::classes;
@@ -20,7 +20,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let from = Instant::now();
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let in_repository = !options.quick && options.csv.is_none();
-    let folder = if in_repository { docs.join("accuracy") } else { options.folder().join("accuracy") };
     let plan = Plan { blocks: options.pick(3, 1), least: Duration::from_micros(options.pick(20, 5)) };
     let classes = classes(options.pick(40, 2))?;
     eprintln!("accuracy: what is true of {} classes", classes.len());
@@ -37,8 +36,10 @@ fn main() -> Result<(), Box<dyn Error>> {
          mean over easy questions hides the one that takes a second.",
         made_by("accuracy", options.quick)
     );
-    let words = in_repository.then(|| docs.join("accuracy.md"));
-    publish(("contactd: what accuracy costs", &text), &sections, &folder, words.as_deref())?;
+    let (words, beside) = (docs.join("accuracy.md"), docs.join("accuracy"));
+    let page = options.folder().join("accuracy");
+    let place = Place { page: &page, words: in_repository.then_some((&words, &beside)) };
+    publish(("contactd: what accuracy costs", &text), &sections, &place)?;
     eprintln!("accuracy: {:.0} s", from.elapsed().as_secs_f64());
     Ok(())
 }

@@ -1,15 +1,16 @@
 //! `effects`: what each effect costs when it is on, and that it costs nothing when it is off, as a report of figures, tables
 //! and a page.
 //!
-//! The full form takes some minutes. It writes CSV, SVG, PNG and `index.html` into `docs/effects` of the repository and the
-//! tables between the marks of `docs/effects.md`; with `--csv DIR`, or `--quick`, all of it into that folder (by default
-//! `benches/effects` in cargo's target folder) and nothing else is touched. `effects probe` is what callgrind is given to
-//! run: one scene, stepped.
+//! The page (`index.html`, each figure as SVG and PNG, each table as CSV) goes into the folder of `--csv DIR`, by default
+//! `benches/effects` in cargo's target folder. The full form takes some minutes; without `--csv` it also writes the tables between
+//! the marks of `docs/effects.md`, and beside that text the figures that it shows and all numbers as CSV.
+//!
+//! `effects probe` is what callgrind is given to run: one scene, stepped.
 
 use clap::Parser;
 use contactd_benches::callgrind;
 use contactd_benches::effects::{Context, Probe, instructions, ladder, share, single};
-use contactd_benches::page::{made_by, publish};
+use contactd_benches::page::{Place, made_by, publish};
 use contactd_benches::race::Plan;
 use std::error::Error;
 use std::path::Path;
@@ -25,7 +26,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let from = Instant::now();
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let in_repository = !options.quick && options.csv.is_none();
-    let folder = if in_repository { docs.join("effects") } else { options.folder().join("effects") };
     let plan = Plan { blocks: options.pick(9, 2), least: Duration::from_millis(options.pick(5, 1)) };
     let context = Context::new(options.pick(6, 3), plan, options.quick)?;
     let mut sections = vec![ladder(&context), single(&context), share(&context)];
@@ -35,8 +35,10 @@ fn main() -> Result<(), Box<dyn Error>> {
          that alternate, and counts, which are the same everywhere.",
         made_by("effects", options.quick)
     );
-    let words = in_repository.then(|| docs.join("effects.md"));
-    publish(("contactd: what effects cost", &text), &sections, &folder, words.as_deref())?;
+    let (words, beside) = (docs.join("effects.md"), docs.join("effects"));
+    let page = options.folder().join("effects");
+    let place = Place { page: &page, words: in_repository.then_some((&words, &beside)) };
+    publish(("contactd: what effects cost", &text), &sections, &place)?;
     eprintln!("effects: {:.0} s", from.elapsed().as_secs_f64());
     Ok(())
 }
