@@ -452,7 +452,8 @@ fn a_margins_time_is_never_late_and_hardly_early() {
     let mut r = Random::new(516);
     let (mut entered, mut never, mut short) = (0, 0, 0);
     for i in 0..60 {
-        let mut scene = if i / 4 % 2 == 0 { scenes::primitives(&mut r) } else { scenes::trees(&mut r) };
+        let primitives = i / 4 % 2 == 0;
+        let mut scene = if primitives { scenes::primitives(&mut r) } else { scenes::trees(&mut r) };
         for motion in [&mut scene.motion_a, &mut scene.motion_b] {
             motion.velocity *= 0.5;
         }
@@ -466,10 +467,16 @@ fn a_margins_time_is_never_late_and_hardly_early() {
         }
         let query = question_of(&scene, [&a, &b], QueryOptions::CONTACT);
         let (until, known, _) = apart_until(&query, margin, &mut Scratch::default());
-        for k in 0..4 {
-            let t = until * f64::from(k) / 4.0;
+        // Of two convex primitives the distance tells when, and beside an edge f is far below half of it: nothing is looked for
+        // close to the end.
+        for k in (0..=8).filter(|k| !primitives || [0, 2, 4, 6].contains(k)) {
+            let t = until * f64::from(k) / 8.0;
             let at_t = lowest(t);
-            assert!(at_t > 0.5 * margin * (1.0 - 1e-9), "{i}: {at_t} at {t} before {until}, margin {margin}");
+            let least = 0.5 * margin * if k < 8 { 1.0 - 1e-9 } else { 1.0 - MARGIN_SLACK };
+            assert!(
+                at_t > least,
+                "{i}: {at_t} at {t}, reported as not within the margin before {until}, margin {margin}"
+            );
         }
         match lowest(until) {
             _ if until == 1.0 => never += 1,
