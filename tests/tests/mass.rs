@@ -322,7 +322,7 @@ fn a_session_answers_and_names_what_is_bad() {
     }
 }
 
-/// The table of docs/algorithm.md: `cargo test --release -p contactd-tests --test mass -- --ignored --nocapture table`.
+/// The table of docs/algorithm/mass.md: `cargo test --release -p contactd-tests --test mass -- --ignored --nocapture table`.
 #[test]
 #[ignore = "prints a table"]
 fn table() {
