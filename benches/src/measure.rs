@@ -8,8 +8,9 @@ use crate::race::{Lap, Plan, median, quantile, race, worst};
 use crate::row;
 use crate::table::Cell;
 use crate::workload::{Case, Class, Truth};
+use contactd::contact::exclusion::rounding;
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact, rounding,
+    Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
 };
 use contactd::motion::{Placed, Relative};
 use contactd_tests::reference::{self, Effort, Moving, Verdict};

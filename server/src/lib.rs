@@ -6,29 +6,29 @@
 //!
 //! # The stages and the queue
 //!
-//! One queue for each pair of objects ([`contact::search`]), ordered by the earliest time at which an item could hold a
+//! One queue for each pair of objects ([`contact::queue`]), ordered by the earliest time at which an item could hold a
 //! contact. The earliest item is popped and replaced by items that can hold one no sooner:
 //!
 //! ```text
-//!             +--------------------- queue: earliest first <--------------------+
-//!             |                                                                 |
-//!    slice of time [t0, t1]                                                     |
-//!      stage 1  S-bounds of A ∩ B: where can they meet at all?   bound::pair    |
-//!        nowhere -> gone;   a long way through a large region -> two halves ----+
-//!      stage 2  both octrees, walked together in that region     octree::walk,     |
-//!               by table 4: which primitives, where, when        contact::stage2|
-//!        nothing -> gone;   else a cell per alternative of the carrier ---------+
-//!             |                                                                 |
-//!    cell: a box that rides with the carrier, what is left there of both trees  |
-//!      stage 3  bound each clause of their literals over the     contact::clause|
-//!               cell: free until t + dt                                         |
-//!        the whole slice -> gone;   a good while -> the cell at t + dt ---------+
-//!               else solve for the contact that the bound points contact::newton|
-//!               to; it counts if both whole trees confirm it                    |
-//!        and the cell's two halves ---------------------------------------------+
+//!             +--------------------- queue: earliest first <----------------------+
+//!             |                                                                   |
+//!    slice of time [t0, t1]                                                       |
+//!      stage 1  S-bounds of A ∩ B: where can they meet at all?   bound::pair      |
+//!        nowhere -> gone;   a long way through a large region -> two halves ------+
+//!      stage 2  both octrees, walked together in that region     octree::walk,    |
+//!               by table 4: which primitives, where, when        contact::queue   |
+//!        nothing -> gone;   else a cell per alternative of the carrier -----------+
+//!             |                                                                   |
+//!    cell: a box that rides with the carrier, what is left there of both trees    |
+//!      stage 3  bound each clause of their literals over the     contact::exclusion|
+//!               cell: free until t + dt                                           |
+//!        the whole slice -> gone;   a good while -> the cell at t + dt -----------+
+//!               else solve for the contact that the bound points contact::witness |
+//!               to; it counts if both whole trees confirm it                      |
+//!        and the cell's two halves -----------------------------------------------+
 //! ```
 //!
-//! In front of the queue stand two proofs that need no cells: two convex primitives (`contact::direct`), convex bodies at
+//! In front of the queue stand two proofs that need no cells: two convex primitives (`contact::convex`), convex bodies at
 //! solids with holes (`contact::cavity`). What they do not settle is queued.
 //!
 //! It ends when the earliest item lies beyond the confirmed contact: then all that is still queued is the proof that

@@ -180,6 +180,8 @@ impl<'a> Visit<'a> for Names {
             visit::visit_item_mod(self, item);
         }
     }
+    /// Who may see an item is no import.
+    fn visit_visibility(&mut self, _: &'a syn::Visibility) {}
     fn visit_path(&mut self, path: &'a syn::Path) {
         if path.segments.len() > 1 {
             self.used.push(path.segments.iter().map(|s| s.ident.to_string()).collect());
@@ -270,6 +272,81 @@ fn circle(all: &BTreeMap<Module, Names>) -> (Option<Vec<Module>>, usize) {
     }
     let begin = way.iter().position(|place| *place == *at).unwrap();
     (Some(way.split_off(begin)), count)
+}
+
+/// Floors of the folders within a folder, from the table rows `| 6.1 | contact/exclusion | … |`, by the whole path.
+fn inner_floors() -> BTreeMap<Module, (u32, u32)> {
+    let text = std::fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let mut table = BTreeMap::new();
+    for line in text.lines() {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        if let [_, floor, folder, ..] = cells.as_slice()
+            && let Some((whole, part)) = floor.split_once('.')
+            && let (Ok(whole), Ok(part)) = (whole.parse(), part.parse())
+        {
+            let path = folder.trim_matches('`').split('/').map(str::to_owned).collect();
+            table.insert(path, (whole, part));
+        }
+    }
+    table
+}
+
+/// The imports of a divided folder that go up or sideways between its parts, or through the folder's face; and how many go down.
+fn uphill(all: &BTreeMap<Module, Names>, floors: &BTreeMap<Module, (u32, u32)>) -> (Vec<String>, usize) {
+    let divided: BTreeSet<&[String]> = floors.keys().map(|path| &path[..1]).collect();
+    let part_of = |path: &Module| floors.iter().find(|(part, _)| path.starts_with(part));
+    let (mut found, mut down) = (Vec::new(), 0);
+    for (at, names) in all.iter().filter(|(at, _)| at.len() > 1 && divided.contains(&at[..1])) {
+        let Some((own, floor)) = part_of(at) else {
+            found.push(format!("{at:?} stands on no floor"));
+            continue;
+        };
+        for place in names.used.iter().filter_map(|path| place_of(all, at, path)) {
+            match part_of(&place) {
+                Some((other, below)) if other == own || below < floor => down += usize::from(other != own),
+                Some(_) => found.push(format!("{at:?} imports {place:?}")),
+                None if place.len() == 1 && place[0] == at[0] => {
+                    found.push(format!("{at:?} imports by the face of {place:?}"))
+                }
+                None => {}
+            }
+        }
+    }
+    (found, down)
+}
+
+#[test]
+fn the_folders_within_a_folder_import_only_from_floors_below() {
+    let floors = inner_floors();
+    assert!(floors.len() > 8, "docs/architecture.md has no floors within folders");
+    let (outer, source) = (self::floors(), root().join("server/src"));
+    for (path, (whole, _)) in &floors {
+        let folder = source.join(path.join("/"));
+        assert!(folder.is_dir() || folder.with_extension("rs").is_file(), "{path:?} is not in server/src");
+        assert_eq!(outer.get(&path[0]), Some(whole), "{path:?}");
+    }
+    let (found, down) = uphill(&modules(&source), &floors);
+    println!("{down} imports go down");
+    assert!(found.is_empty(), "{found:#?}");
+    assert!(down > 60, "only {down} imports were found: the reader of sources is broken");
+}
+
+#[test]
+fn an_import_that_goes_up_within_a_folder_is_seen() {
+    let read = |text: &str| {
+        let mut names = Names::default();
+        names.visit_file(&syn::parse_file(text).unwrap());
+        names
+    };
+    let path = |p: &str| -> Module { p.split('/').map(str::to_owned).collect() };
+    let floors = BTreeMap::from([(path("f/low"), (6, 1)), (path("f/high"), (6, 2))]);
+    let of = |low: &str, high: &str| {
+        let texts = [("f", "pub mod low; pub mod high; pub use low::X;"), ("f/low", low), ("f/high", high)];
+        uphill(&texts.iter().map(|(p, text)| (path(p), read(text))).collect(), &floors)
+    };
+    assert_eq!(of("pub struct X;", "use crate::f::low::X; fn f(_: super::low::X) {}"), (vec![], 2));
+    assert_eq!(of("use crate::f::high::Y;", "pub struct Y;").0.len(), 1);
+    assert_eq!(of("pub struct X;", "use crate::f::X;").0.len(), 1);
 }
 
 #[test]

@@ -6,9 +6,9 @@
 //! `CONTACTD_EVALUATIONS=10000000 cargo test --release -p contactd-tests --test rounding -- --nocapture`
 #![allow(missing_docs)]
 
-use contactd::contact::clause::{self, Expressions};
-use contactd::contact::literal::{Faces, Side, View};
-use contactd::contact::{fit, rounding};
+use contactd::contact::exclusion::clause::{self, Expressions};
+use contactd::contact::exclusion::literal::{Faces, Side, View};
+use contactd::contact::exclusion::{fit, rounding};
 use contactd::motion::{Placed, Relative};
 use contactd::octree::Model;
 use contactd::solid::local::{LiteralId, literal_token};
@@ -148,7 +148,7 @@ fn psi(face: &Face, x: &Vector) -> Big {
     }
 }
 
-/// G of a fit (`contact::fit`) over A's frame, for round faces: squares, radii, depth.
+/// G of a fit (`contact::exclusion::fit`) over A's frame, for round faces: squares, radii, depth.
 fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2]) -> Option<Big> {
     // |u|² − ρ² of a face that delta shrinks; the fit takes an axis' direction, not its stored length.
     let square = |face: &Face, x: &Vector, shrink: f64| {
@@ -354,8 +354,9 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                 } else {
                     view.linear(side, id, DVec3::ZERO)
                 };
-                let plane =
-                    |l: &contactd::contact::literal::Linear| big(l.bound) + Vector::of(l.normal).dot(&x_a.minus(&c_a));
+                let plane = |l: &contactd::contact::exclusion::literal::Linear| {
+                    big(l.bound) + Vector::of(l.normal).dot(&x_a.minus(&c_a))
+                };
                 let above = plane(&l) - (own(&x_a, &x_b) * &sign + big(view.delta));
                 worst.see(|w| &mut w.plane, double(&above).max(0.0), budget, &what);
                 // Neither does a fit's.

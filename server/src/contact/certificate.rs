@@ -10,14 +10,14 @@
 //! Invariant: cells stand in preorder, spans meet end to end. It does not promise to be the shortest proof, and it proves
 //! the answer rather than the steps by which the search found it. Format: docs/certificate.md.
 
-use super::clause::{self, Hint, Proof, Term};
-use super::depth;
-use super::literal::{Faces, Side, View};
-use super::outcome::{NO_FACE, Outcome, Status};
-use super::query::PairQuery;
-use super::task::Task;
-use super::work::Work;
 use crate::bound::{Bound, Volumes};
+use crate::contact::exclusion::clause::{self, Hint, Proof, Term};
+use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::instant::depth;
+use crate::contact::instant::work::Work;
+use crate::contact::query::outcome::{NO_FACE, Outcome, Status};
+use crate::contact::query::question::PairQuery;
+use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::motion::Relative;
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};

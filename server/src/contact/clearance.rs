@@ -6,18 +6,18 @@
 //! so bodies displaced by d_A and d_B do not meet while d_A + d_B < 2g: a common point x would lie within (d_A + d_B)/2 of
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
-use super::cell::Ending;
-use super::certificate::{self, Certificate};
-use super::convex::Convex;
-use super::depth;
-use super::outcome::Counters;
-use super::query::{Body, PairQuery};
-use super::query_options::QueryOptions;
-use super::region;
-use super::search::{Scratch, Search};
-use super::task::Task;
-use super::within::{Within, within};
-use super::work::Work;
+use crate::contact::certificate::{self, Certificate};
+use crate::contact::convex::Convex;
+use crate::contact::instant::depth;
+use crate::contact::instant::within::{Within, within};
+use crate::contact::instant::work::Work;
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::Counters;
+use crate::contact::query::question::{Body, PairQuery};
+use crate::contact::query::task::Task;
+use crate::contact::queue::search::{Scratch, Search};
+use crate::contact::region;
+use crate::contact::witness::found::Ending;
 use crate::math::tolerance::WIDE_MARGIN;
 use crate::motion::Placed;
 use contactd_proto::Motion;

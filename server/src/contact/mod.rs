@@ -1,47 +1,28 @@
-//! Stage 3 and the queue that orders all three stages: earliest contact of one pair over one step.
+//! Earliest contact of one pair over one step: kernels that answer without cells, and the queue that orders the three stages.
 //!
-//! Floor 6: imports `octree`, `bound`, `motion`, `solid`, `math`, `proto`.
+//! Floor 6: imports `octree`, `bound`, `motion`, `solid`, `math`, `proto`. Its folders stand on floors of their own
+//! (docs/architecture.md): each holds one idea and imports only from those below it, by their own paths.
 
 mod cavity;
-mod cell;
 pub mod certificate;
-pub mod clause;
 pub mod clearance;
-pub mod clock;
 mod convex;
-mod depth;
-mod extent;
-mod features;
-pub mod fit;
-mod found;
-mod handed;
-pub mod literal;
-pub mod lp;
-pub mod newton;
-pub mod outcome;
+pub mod exclusion;
+pub mod instant;
 pub mod pair;
-mod propose;
 pub mod query;
-pub mod query_options;
+pub mod queue;
 pub mod region;
-mod rescue;
-pub mod roots;
-pub mod rounding;
-pub mod search;
-pub mod separation;
-mod stage2;
-mod task;
 #[cfg(test)]
 mod tests;
-mod unbounded;
-pub mod within;
-mod work;
+pub mod witness;
 
-pub use clock::{Clock, Stage};
 pub(crate) use convex::{Glancing, Hull, SeparatingAxisTest, SweptShape};
-pub use outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
+pub use instant::within;
 pub use pair::{PairSearch, earliest_contact, find_earliest, resolution_of};
-pub use query::{Body, PairQuery, Strategies, default_resolution};
-pub use query_options::QueryOptions;
+pub use query::options::QueryOptions;
+pub use query::outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
+pub use query::question::{Body, PairQuery, Strategies, default_resolution};
+pub use queue::clock::{Clock, Stage};
+pub use queue::search::Scratch;
 pub use region::{Region, RegionPoint, Regions};
-pub use search::Scratch;

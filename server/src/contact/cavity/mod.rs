@@ -17,9 +17,9 @@ mod body;
 mod pierced;
 mod proof;
 
-use super::cell::Ending;
-use super::literal::Side;
-use super::search::Search;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::queue::search::Search;
+use crate::contact::witness::found::Ending;
 use crate::motion::Relative;
 use glam::DVec3;
 use pierced::{CavityPair, First, Guess, Wall};

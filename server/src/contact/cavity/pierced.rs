@@ -1,11 +1,11 @@
 //! A convex body against a body with a cavity that it is in: its clearances, and the contact that they point to.
 
-use super::super::convex::faces_at;
-use super::super::literal::Side;
-use super::super::newton::{self, Constraint};
-use super::super::search::Search;
-use super::super::task::Task;
 use super::body::{Best, CavityBody, Moment, Plane};
+use crate::contact::convex::faces_at;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::query::task::Task;
+use crate::contact::queue::search::Search;
+use crate::contact::witness::newton::{self, Constraint};
 use crate::math::any_perpendicular;
 use crate::motion::Relative;
 use crate::solid::local::LiteralId;

@@ -3,8 +3,8 @@
 use super::body::{Moment, Plane};
 use super::pierced::{CavityPair, Wall};
 use super::proof::Verdict;
-use crate::contact::literal::Side;
-use crate::contact::task::Task;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::query::task::Task;
 use crate::contact::{
     Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };

@@ -1,16 +1,16 @@
 //! Two convex primitives by an advance: as far as the direction of their nearest points proves, and again from there.
 //!
-//! See `direct`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
+//! See `convex`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
 
-use super::super::cell::Ending;
-use super::super::literal::Side;
-use super::super::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
-use super::super::search::Search;
-use super::super::task::Task;
 use super::gjk::{GOOD, Nearest, nearest};
 use super::proof::{Gap, Pace};
 use super::support::Body;
 use super::whole::{APART, body_of, excluded};
+use crate::contact::exclusion::literal::Side;
+use crate::contact::query::task::Task;
+use crate::contact::queue::search::Search;
+use crate::contact::witness::found::Ending;
+use crate::contact::witness::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
 use crate::motion::Instant;
 use crate::solid::local::LiteralId;
 use crate::solid::{Primitive, Sense};

@@ -13,13 +13,13 @@
 //!
 //! Balls in the origins of their objects, the common case, need nothing else of a pair (`quick`).
 
-use super::super::extent::INCIDENT;
-use super::super::outcome::{Counters, NO_FACE, Outcome, Status};
-use super::super::query::{self, PairQuery};
-use super::super::query_options::QueryOptions;
-use super::super::rounding;
-use super::super::task::witness_level;
 use super::whole::{APART, PrimitivePair, excluded};
+use crate::contact::exclusion::rounding;
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::{Counters, NO_FACE, Outcome, Status};
+use crate::contact::query::question::{self, PairQuery};
+use crate::contact::query::task::witness_level;
+use crate::contact::witness::extent::INCIDENT;
 use crate::math::tolerance;
 use crate::motion::Rounding;
 use glam::DVec3;
@@ -153,7 +153,7 @@ fn no_shorter(v: DVec3) -> f64 {
 
 /// The radius and the face of a body that is a ball about its object's origin and does not turn.
 #[inline(always)] // Its answer passes through memory otherwise: a quarter of the time that two balls take.
-fn centered(body: &query::Body) -> Option<(f64, u32)> {
+fn centered(body: &question::Body) -> Option<(f64, u32)> {
     let placed = &body.placed;
     // Zeros of either sign: one comparison for six numbers.
     let bits = |v: DVec3| v.x.to_bits() | v.y.to_bits() | v.z.to_bits();

@@ -11,11 +11,11 @@
 //! The point has to lie on both surfaces, on no other faces than these, and the witness in both boxes. Whatever is not as
 //! simple, edges in faces and what starts near, is left to others.
 
-use super::super::extent::INCIDENT;
-use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::super::query_options::QueryOptions;
 use super::slabs::{Across, Boxes, Features, Passage};
 use super::whole::{APART, PrimitivePair, excluded};
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::witness::extent::INCIDENT;
 use glam::{DMat3, DVec3};
 
 /// A face lies no flatter on another than this (radians): its neighbours are told apart.

@@ -38,8 +38,8 @@ mod turning;
 mod turns;
 mod whole;
 
-use super::outcome::{Outcome, Status};
-use super::query::PairQuery;
+use crate::contact::query::outcome::{Outcome, Status};
+use crate::contact::query::question::PairQuery;
 use crate::solid::primitive::Form;
 pub(super) use advance::{Convex, answer, faces_at};
 pub(super) use balls::quick as balls;

@@ -10,12 +10,12 @@
 //! The direction is the one of three along which the bodies overlap least: the normals of the two faces that the point is
 //! nearest to, and the way between the centres.
 
-use super::super::outcome::{Outcome, Status};
-use super::super::query_options::QueryOptions;
-use super::super::task::most_raised;
 use super::gjk::{self, Meeting};
 use super::support::{Body, Slope};
 use super::whole::PrimitivePair;
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::{Outcome, Status};
+use crate::contact::query::task::most_raised;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 

@@ -3,8 +3,8 @@
 //! An edge or a side of a body is shown along a whole circle of directions, n·axis = lean; a flat face along one direction
 //! alone. What is shown nowhere else than there is *held* by it.
 
-use super::super::literal::Side;
-use super::super::newton::Constraint;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::witness::newton::Constraint;
 use crate::solid::local::LiteralId;
 use crate::solid::primitive::Form;
 use crate::solid::{Primitive, Sense};

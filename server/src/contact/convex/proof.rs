@@ -1,6 +1,6 @@
 //! What a direction proves: how long two convex bodies stay apart along it.
 //!
-//! The formulas are those of `direct`; both the advance and what goes ahead of it use them.
+//! The formulas are those of `convex`; both the advance and what goes ahead of it use them.
 
 use glam::DVec3;
 use smallvec::SmallVec;

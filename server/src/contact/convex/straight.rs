@@ -19,13 +19,13 @@
 //!
 //! What does not settle, starts near, or meets in more than its faces tell (`touch`) is left to the advance.
 
-use super::super::outcome::Outcome;
-use super::super::query_options::QueryOptions;
 use super::overlap::Start;
 use super::part::{ConvexPart, Shown};
 use super::steer::steer;
 use super::touch::Stand;
 use super::whole::{APART, PrimitivePair, excluded};
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::Outcome;
 use crate::math::any_perpendicular;
 use glam::{DVec2, DVec3};
 

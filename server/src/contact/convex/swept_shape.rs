@@ -7,7 +7,7 @@
 //! min(φ₀, φ₁) − ⅛ Q,    Q = 2|n₁ − n₀|(|v₀| + ω_A ρ_A + ω_B ρ_B) + ω_A² ρ_A + ω_B² ρ_B
 //! ```
 //!
-//! with n going over from n₀ to n₁ (the formula of `direct`, s(1−s) <= ¼). Most pairs that are near stay apart, and the
+//! with n going over from n₀ to n₁ (the formula of `convex`, s(1−s) <= ¼). Most pairs that are near stay apart, and the
 //! direction that kept them apart in the last step mostly does so in this one: four supports, and nothing is searched. So
 //! the direction is remembered; where it fails, nearest points give another one, at the start and then at the end.
 //!

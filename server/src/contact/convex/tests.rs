@@ -1,8 +1,8 @@
 //! What two boxes are told by their slabs, against the ways that know nothing of slabs.
 
-use super::super::pair::earliest_contact;
-use super::super::query::{self, default_resolution};
 use super::*;
+use crate::contact::pair::search::earliest_contact;
+use crate::contact::query::question::{self, default_resolution};
 use crate::contact::{DEFAULT_CELL_LIMIT, Extent, Kind, QueryOptions, Scratch, Strategies};
 use crate::math::random::Random;
 use crate::motion::Placed;
@@ -33,7 +33,7 @@ impl Bodies {
     }
 
     fn query(&self) -> PairQuery<'_> {
-        let [a, b] = [0, 1].map(|k| query::Body { model: &self.models[k], placed: self.placed[k] });
+        let [a, b] = [0, 1].map(|k| question::Body { model: &self.models[k], placed: self.placed[k] });
         PairQuery {
             a,
             b,

@@ -4,14 +4,14 @@
 //! The point follows from the features, the witness from one linear step or a few, and both trees confirm both. What meets in
 //! more than its features tell is left to others.
 
-use super::super::extent::{self, INCIDENT};
-use super::super::literal::Side;
-use super::super::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
-use super::super::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
-use super::super::query_options::QueryOptions;
 use super::part::{Active, ConvexPart, Core, Shown};
 use super::turns::Turns;
 use super::whole::PrimitivePair;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::witness::extent::{self, INCIDENT};
+use crate::contact::witness::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
 use glam::{DMat3, DQuat, DVec3};
 use smallvec::SmallVec;
 

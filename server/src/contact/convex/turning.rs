@@ -15,8 +15,6 @@
 //!
 //! What starts near, does not settle, or meets in more than its faces tell is left to the advance.
 
-use super::super::outcome::Outcome;
-use super::super::query_options::QueryOptions;
 use super::gjk::nearest;
 use super::overlap::Start;
 use super::part::{ConvexPart, Shown};
@@ -26,6 +24,8 @@ use super::support::Body;
 use super::touch::{Stand, Touch};
 use super::turns::{Posed, Turns};
 use super::whole::{APART, PrimitivePair, excluded};
+use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::Outcome;
 use glam::{DMat3, DVec3};
 
 /// Distance evaluations before a pair is left to others.

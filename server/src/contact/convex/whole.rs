@@ -1,8 +1,9 @@
 //! Two whole primitives as they stand at the start and move along: what every way of answering them begins with.
 
-use super::super::query;
-use super::super::task::witness_level;
 use super::support::Body;
+use crate::contact::exclusion::rounding;
+use crate::contact::query::question;
+use crate::contact::query::task::witness_level;
 use crate::math::tolerance;
 use crate::motion::Rounding;
 use crate::solid::Primitive;
@@ -13,7 +14,7 @@ pub(super) const APART: f64 = 4.0;
 
 /// Two whole primitives at the start and as they move along; world axes.
 pub(super) struct PrimitivePair<'a> {
-    pub(super) bodies: [&'a query::Body<'a>; 2],
+    pub(super) bodies: [&'a question::Body<'a>; 2],
     pub(super) primitives: [&'a Primitive; 2],
     /// From an object's origin to its primitive's centre.
     pub(super) offsets: [DVec3; 2],
@@ -32,7 +33,7 @@ pub(super) struct PrimitivePair<'a> {
 impl<'a> PrimitivePair<'a> {
     /// The pair of two bodies, the first of which carries; `None` if the resolution needs raising.
     pub(super) fn new(
-        bodies: [&'a query::Body<'a>; 2],
+        bodies: [&'a question::Body<'a>; 2],
         primitives: [&'a Primitive; 2],
         resolution: f64,
     ) -> Option<Self> {
@@ -45,17 +46,17 @@ impl<'a> PrimitivePair<'a> {
         let places = [length(a.placed.place.position), length(b.placed.place.position)];
         let turns = [length(from.spin), length(to.spin)];
         let motion = Rounding::with(turns[0] + turns[1], apart, places[0] + places[1]);
-        let rounding = super::super::rounding::of_motion(a.model, b.model, places, apart, &motion);
+        let rounding = rounding::of_motion(a.model, b.model, places, apart, &motion);
         let scale = a.model.radius.max(b.model.radius);
         // Sums of components: no less than lengths, and no roots.
-        let center = |body: &query::Body| body.model.bounds.root().ball.center.abs().element_sum();
+        let center = |body: &question::Body| body.model.bounds.root().ball.center.abs().element_sum();
         let centers = [center(a), center(b)];
         let extent = centers[0] + centers[1] + 2.0 * scale + places[0] + apart;
         let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
         if resolution.is_nan() || resolution < least {
             return None;
         }
-        let offset = |body: &query::Body, primitive: &Primitive| {
+        let offset = |body: &question::Body, primitive: &Primitive| {
             let (place, frame) = (&body.placed.place, primitive.frame.position);
             if place.position == DVec3::ZERO && frame == DVec3::ZERO {
                 DVec3::ZERO
@@ -70,9 +71,9 @@ impl<'a> PrimitivePair<'a> {
 
     /// How they turn, spins about their own axes left out.
     pub(super) fn spins(&self) -> [DVec3; 2] {
-        let spin = |body: &query::Body| {
+        let spin = |body: &question::Body| {
             let spin = body.placed.motion.spin;
-            if spin == DVec3::ZERO { spin } else { query::without_own_spin(body).motion.spin }
+            if spin == DVec3::ZERO { spin } else { question::without_own_spin(body).motion.spin }
         };
         [spin(self.bodies[0]), spin(self.bodies[1])]
     }

@@ -9,8 +9,8 @@
 use super::local::{Bodies, Lit};
 use super::patch::{Corner, key_of};
 use super::surface::{FacePair, Standing, is_convex, standing};
-use crate::contact::literal::Side;
-use crate::contact::separation::Place;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::separation::Place;
 use crate::solid::surface::curve::{self, Nearness, Outward};
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_4, TAU};

@@ -3,10 +3,10 @@
 //! Everything stands along A's axes at one instant; B's faces are carried there once. A literal within `eps` of a point
 //! passes through it; how it looks from there is read off its gradient and Hessian, not from points nearby.
 
-use crate::contact::literal::Side;
-use crate::contact::newton;
-use crate::contact::task::Task;
-use crate::contact::work::Work;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::work::Work;
+use crate::contact::query::task::Task;
+use crate::contact::witness::newton;
 use crate::motion::Instant;
 use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
 use crate::solid::{Face, Sense};

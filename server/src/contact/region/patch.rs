@@ -7,8 +7,8 @@
 
 use super::local::{Bodies, Lit};
 use super::surface::{FacePair, Standing, axis_of_curve, same_surface, standing};
-use crate::contact::literal::Side;
-use crate::contact::separation::Place;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::separation::Place;
 use crate::solid::{local, surface::Plane};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;

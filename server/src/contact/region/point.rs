@@ -7,10 +7,10 @@
 //! a point of its own.
 
 use super::local::{Bodies, Lit, has_descent};
-use crate::contact::depth::Deepest;
-use crate::contact::literal::Side;
-use crate::contact::newton::{MAX_UNKNOWNS, cholesky_solve, damped_step};
-use crate::contact::separation::Place;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::depth::Deepest;
+use crate::contact::instant::separation::Place;
+use crate::contact::witness::newton::{MAX_UNKNOWNS, cholesky_solve, damped_step};
 use crate::solid::Sense;
 use crate::solid::surface::Apex;
 use glam::DVec3;

@@ -6,7 +6,7 @@
 //! at a corner unless the boundary goes straight on.
 
 use super::local::{ANGLE, At, Bodies, Lit, holds};
-use crate::contact::literal::Side;
+use crate::contact::exclusion::literal::Side;
 use crate::math::any_perpendicular;
 use crate::solid::Sense;
 use crate::solid::local::{LiteralId, Truth};

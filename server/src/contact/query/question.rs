@@ -1,6 +1,6 @@
 //! A question: two bodies over one step, what is asked of them, and which of them carries the cells.
 
-use super::query_options::QueryOptions;
+use super::options::QueryOptions;
 use crate::math::tolerance;
 use crate::motion::Placed;
 use crate::octree::Model;
@@ -98,7 +98,7 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 }
 
 /// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
-pub(super) fn without_own_spin(body: &Body) -> Placed {
+pub(in crate::contact) fn without_own_spin(body: &Body) -> Placed {
     let mut placed = body.placed;
     let spin = placed.motion.spin;
     if spin != DVec3::ZERO {

@@ -8,11 +8,11 @@
 //! Either way its depth g is a proven lower bound: a ball of radius g is common to both bodies, so no translation
 //! shorter than 2g takes them apart.
 
-use super::clause::{self, Expressions};
-use super::literal::{Faces, Side, View};
 use super::separation::{self, Cover};
-use super::task::Task;
 use super::work::Work;
+use crate::contact::exclusion::clause::{self, Expressions};
+use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use crate::solid::Sense;
 use crate::solid::local::{self, LiteralId, Token, Truth};
@@ -122,12 +122,12 @@ fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work
 
 /// A locally deepest point near `start`, its depth and the literals that hold it with their weights; the climb ends once it
 /// is as deep as `enough`.
-pub(super) fn climb_to(enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
+pub(in crate::contact) fn climb_to(enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
     ascend(ROUNDS, enough, task, at, start, work)
 }
 
 /// A point, its depth, what holds it there.
-pub(super) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
+pub(in crate::contact) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
 
 fn ascend(rounds: usize, enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
     let f = |x: DVec3| separation::value(task, at, x);

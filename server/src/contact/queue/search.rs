@@ -1,6 +1,6 @@
 //! The search: one queue ordered by the earliest time at which an item could hold a contact.
 //!
-//! Items are slices of time (`stage2`) and cells: boxes fixed in the reference body A with what is left there of both trees. The
+//! Items are slices of time (`slices`) and cells: boxes fixed in the reference body A with what is left there of both trees. The
 //! earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a slice into
 //! smaller ones or into cells, a cell into its halves. Where a cell's bounds point to a contact, one is proposed and
 //! confirmed (`propose`). When the earliest item lies beyond the verified contact, all that was
@@ -11,14 +11,15 @@
 //! was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for clearances, too. At t = 0 such cells are refined like any other, and a
 //! witness found there restarts the search at 2 delta, then means overlap.
 
-use super::cell::{Cell, Ending, Range, Source};
-use super::clause::{self, Advance, Hint};
+use super::cell::{Cell, Range, Source};
 use super::clock::{Clock, Stage};
-use super::found::Found;
 use super::handed::Handed;
-use super::literal::{Side, View};
-use super::outcome::{Counters, DEFAULT_CELL_LIMIT};
-use super::task::Task;
+use crate::contact::exclusion::clause::{self, Advance, Hint};
+use crate::contact::exclusion::literal::{Side, View};
+use crate::contact::query::outcome::{Counters, DEFAULT_CELL_LIMIT};
+use crate::contact::query::task::Task;
+use crate::contact::witness::found::Ending;
+use crate::contact::witness::found::Found;
 use crate::math::halt::Halt;
 use crate::motion::Instant;
 use crate::solid::Face;
@@ -87,7 +88,7 @@ impl Scratch {
     }
 
     /// What follows is work of a stage.
-    pub(super) fn enter(&mut self, stage: impl Into<Option<Stage>>) {
+    pub(in crate::contact) fn enter(&mut self, stage: impl Into<Option<Stage>>) {
         if let Some(clock) = &mut self.clock {
             clock.enter(stage.into());
         }
@@ -96,18 +97,18 @@ impl Scratch {
 
 /// A search in progress.
 pub struct Search<'a> {
-    pub(super) task: Task<'a>,
+    pub(in crate::contact) task: Task<'a>,
     pub(super) scratch: Scratch,
     pub(super) handed: Handed,
     serial: u64,
-    pub(super) found: Option<Found>,
+    pub(in crate::contact) found: Option<Found>,
     /// Cells beyond the goal that were asked for a rival.
     rivals: u32,
     instant: Instant,
     /// Cells after which a witness is looked for where the search has come to.
     probe: u64,
     /// Cells' worth of work after which the search ends as `Ending::Long`.
-    pub(super) patience: u64,
+    pub(in crate::contact) patience: u64,
     /// Where the search came to its end without an answer: time and place.
     pub(super) stuck: Option<(f64, DVec3)>,
     /// Work done so far.
@@ -169,7 +170,7 @@ impl<'a> Search<'a> {
 
     /// The ending of a search that asks for a hit alone, once a contact is known; nothing is met before `proven`. Only where
     /// the start is known to be free.
-    pub(super) fn hit(&mut self, proven: f64) -> Option<Ending> {
+    pub(in crate::contact) fn hit(&mut self, proven: f64) -> Option<Ending> {
         if self.task.query_options.time() {
             return None;
         }
@@ -182,7 +183,7 @@ impl<'a> Search<'a> {
         self.instant.t
     }
 
-    pub(super) fn goal(&self) -> f64 {
+    pub(in crate::contact) fn goal(&self) -> f64 {
         self.found.as_ref().map_or(f64::INFINITY, |f| f.goal - self.task.proof_slack)
     }
 

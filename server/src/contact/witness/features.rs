@@ -7,9 +7,9 @@
 //! and of the open rest those count that the expression depends on, faces of one tangent plane counting as one. So
 //! neither a satisfied alternative of a complement is active nor the side of a body whose end lies flush in another's.
 
-use super::literal::Side;
 use super::newton::cholesky_solve;
-use super::task::Task;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
 use crate::solid::surface::Apex;

@@ -10,10 +10,10 @@
 //! The same walk with a level that sinks to the best point found is branch and bound: it makes the deepest point of an
 //! overlap the deepest of all, up to a tolerance.
 
-use super::clause;
-use super::literal::{Faces, Side, View};
-use super::task::Task;
 use super::work::Work;
+use crate::contact::exclusion::clause;
+use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::motion::Instant;
 use crate::solid::local::{self, LiteralId, Token, Truth};
@@ -21,7 +21,7 @@ use glam::DVec3;
 
 /// A box of A's frame with what is left there of both trees, for depths and distances below the cover's reach.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
+pub(in crate::contact) struct Place {
     pub center: DVec3,
     pub half: DVec3,
     pub a: Vec<Token>,
@@ -55,7 +55,7 @@ impl Place {
 const SLAB: f64 = 4.0;
 
 /// Boxes in which a point with F <= level may exist, depth first and in a fixed order.
-pub(super) struct Cover<'t, 'a> {
+pub(in crate::contact) struct Cover<'t, 'a> {
     task: &'t Task<'a>,
     at: &'t Instant,
     /// Depths and distances up to which the boxes' trees are kept.
@@ -187,6 +187,6 @@ impl<'t, 'a> Cover<'t, 'a> {
 }
 
 /// F at a point of A's frame.
-pub(super) fn value(task: &Task, at: &Instant, x: DVec3) -> f64 {
+pub(in crate::contact) fn value(task: &Task, at: &Instant, x: DVec3) -> f64 {
     task.a.value(x).max(task.b.value(at.b_point(x)))
 }

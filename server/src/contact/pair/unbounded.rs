@@ -4,8 +4,8 @@
 //! What else is unbounded mostly has common points far out, which are looked for along a few directions. A pair of which this
 //! tells nothing is undecided, at once.
 
-use super::outcome::{Kind, Outcome, Status};
-use super::query::{Body, PairQuery};
+use crate::contact::query::outcome::{Kind, Outcome, Status};
+use crate::contact::query::question::{Body, PairQuery};
 use crate::math::tolerance;
 use crate::solid::{Face, Node, Solid};
 use contactd_proto::Pose;

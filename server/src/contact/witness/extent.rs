@@ -1,14 +1,14 @@
 //! Which faces hold a contact, and whether they leave a point, a line or a patch.
 
-use super::outcome::{Extent, NO_FACE};
+use crate::contact::query::outcome::{Extent, NO_FACE};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
 /// A multiplier above this holds its face in the contact.
-pub(super) const ACTIVE: f64 = 1e-8;
+pub(in crate::contact) const ACTIVE: f64 = 1e-8;
 
 /// Adds a face to those of a contact, once, where there is room.
-pub(super) fn note(list: &mut [u32; 3], face: u32) {
+pub(in crate::contact) fn note(list: &mut [u32; 3], face: u32) {
     if let Some(slot) = list.iter().position(|f| *f == NO_FACE)
         && !list.contains(&face)
     {
@@ -17,15 +17,15 @@ pub(super) fn note(list: &mut [u32; 3], face: u32) {
 }
 
 /// How many faces are told.
-pub(super) fn noted(list: &[u32; 3]) -> usize {
+pub(in crate::contact) fn noted(list: &[u32; 3]) -> usize {
     list.iter().filter(|f| **f != NO_FACE).count()
 }
 
 /// A face within this many roundings of a contact point passes through it.
-pub(super) const INCIDENT: f64 = 16.0;
+pub(in crate::contact) const INCIDENT: f64 = 16.0;
 
 /// How many tangent planes some unit normals make: at least one.
-pub(super) fn rank_of(normals: &[DVec3]) -> usize {
+pub(in crate::contact) fn rank_of(normals: &[DVec3]) -> usize {
     match normals {
         [] | [_] => 1,
         _ => span_of(normals).len(),
@@ -45,7 +45,7 @@ fn span_of(vectors: &[DVec3]) -> SmallVec<[DVec3; 3]> {
 }
 
 /// Nullity of the Lagrangian's Hessian on the contact's tangent space: point, line or patch.
-pub(super) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
+pub(in crate::contact) fn extent(gradients: &[DVec3], curvature: DMat3, scale: f64) -> Extent {
     let span = span_of(gradients);
     let flat = |v: f64| v.abs() * scale < 1e-6;
     match span.len() {

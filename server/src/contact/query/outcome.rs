@@ -243,7 +243,7 @@ impl Outcome {
     }
 
     /// The same answer with a and b exchanged.
-    pub(super) fn swap_sides(&mut self) {
+    pub(in crate::contact) fn swap_sides(&mut self) {
         self.normal = -self.normal;
         // A field that is not asked for is +0, whichever body was searched first.
         self.direction = DVec3::ZERO - self.direction;

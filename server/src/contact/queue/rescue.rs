@@ -9,18 +9,19 @@
 //! Either way the whole trees confirm the point, and everything before the goal must still be proven. A search that cannot
 //! do that in `LAST` cells ends with what it has: the time proven and the witness bracket the contact.
 
-use super::cell::{Cell, Ending};
-use super::depth;
-use super::fit;
-use super::found::Found;
-use super::literal::Side;
-use super::newton::{Constraint, HELD, MAX_ACTIVE, SETTLED, Solution};
+use super::cell::Cell;
 use super::propose::has_both_sides;
 use super::search::Search;
-use super::separation;
-use super::task::{Task, witness_level};
-use super::within::{Within, within};
-use super::work::Work;
+use crate::contact::exclusion::fit;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::depth;
+use crate::contact::instant::separation;
+use crate::contact::instant::within::{Within, within};
+use crate::contact::instant::work::Work;
+use crate::contact::query::task::{Task, witness_level};
+use crate::contact::witness::found::Ending;
+use crate::contact::witness::found::Found;
+use crate::contact::witness::newton::{Constraint, HELD, MAX_ACTIVE, SETTLED, Solution};
 use crate::motion::Instant;
 use crate::solid::local::{self, LiteralId};
 use crate::solid::{Face, Sense, Solid};
@@ -82,7 +83,7 @@ impl Search<'_> {
     }
 
     /// The answer of a search that rounding has stopped: a witness behind what is proven.
-    pub(super) fn rescue(&mut self) -> Option<Ending> {
+    pub(in crate::contact) fn rescue(&mut self) -> Option<Ending> {
         let (t, x) = self.stuck.filter(|_| self.task.continues())?;
         self.probe(t, x);
         self.bracket(t)

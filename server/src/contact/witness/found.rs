@@ -1,10 +1,10 @@
-//! A contact that was found, and what stands beside it.
+//! A contact that was found, what stands beside it, and how a search ends.
 
 use super::newton::Solution;
 use glam::DVec3;
 
 /// Witnesses this close in time are of one contact; touches this close are at the same time.
-pub(super) const SAME_TIME: f64 = 1e-12;
+pub(in crate::contact) const SAME_TIME: f64 = 1e-12;
 
 /// A confirmed contact.
 #[derive(Clone, Debug)]
@@ -24,12 +24,12 @@ pub struct Found {
 impl Found {
     /// Latest time at which a contact that touches earlier than this one may reach delta and still be preferred to it: its
     /// witness comes later by no more than this one's own lag behind its touch.
-    pub(super) fn latest_rival(&self) -> f64 {
+    pub(in crate::contact) fn latest_rival(&self) -> f64 {
         self.touch.as_ref().map_or(self.goal, |touch| 2.0 * self.deep.t - touch.t.max(0.0))
     }
 
     /// The contact to report of two: of those that reach delta at about the same time the one that touches first.
-    pub(super) fn or(self, other: Self) -> Self {
+    pub(in crate::contact) fn or(self, other: Self) -> Self {
         let goal = self.goal.min(other.goal);
         let (upper, witness) = self.earlier_witness(&other);
         let (first, second) = if other.goal < self.goal { (other, self) } else { (self, other) };
@@ -41,7 +41,27 @@ impl Found {
     }
 
     /// The earlier of two witnesses.
-    pub(super) fn earlier_witness(&self, other: &Self) -> (f64, DVec3) {
+    pub(in crate::contact) fn earlier_witness(&self, other: &Self) -> (f64, DVec3) {
         if other.upper < self.upper { (other.upper, other.witness) } else { (self.upper, self.witness) }
     }
+}
+
+/// How a search ended.
+// The contact is kept in place: one a query, and nothing allocated.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug)]
+pub enum Ending {
+    /// No contact within the step.
+    Clear,
+    /// The earliest contact.
+    Contact(Found),
+    /// A point of this depth exists at t = 0 (A's frame).
+    Deep(DVec3),
+    /// Free before this time; then, to within rounding, as deep as delta: neither excluded nor a contact.
+    Rounding(f64),
+    /// The work limit ran out; free before this time.
+    Limit(f64),
+    /// The search took long enough for another resolution to be tried (`Search::patience`); free before this time. The contact that is
+    /// known, if any, comes much later.
+    Long(f64, Option<Found>),
 }

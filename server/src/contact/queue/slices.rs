@@ -10,12 +10,12 @@
 
 use super::cell::{Cell, Range, Source};
 use super::clock::Stage;
-use super::literal::Side;
 use super::roots;
 use super::roots::Root;
 use super::search::Search;
 use crate::bound::Region;
 use crate::bound::pair::{Pruned, Side as Operand, locate};
+use crate::contact::exclusion::literal::Side;
 use crate::math::Aabb;
 use crate::octree::span::primitive_span;
 use crate::octree::walk::{Detail, Next, NodePair, Walk};

@@ -2,8 +2,8 @@
 
 use super::depth;
 use super::separation::{Cover, value};
-use super::task::Task;
 use super::work::Work;
+use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use glam::DVec3;
 
@@ -19,7 +19,7 @@ pub enum Within {
 }
 
 /// Decides whether a point with F <= level exists.
-pub(super) fn within(task: &Task, at: &Instant, level: f64, work: &Work) -> Within {
+pub(in crate::contact) fn within(task: &Task, at: &Instant, level: f64, work: &Work) -> Within {
     let mut cover = Cover::new(task, at, 2.0 * level, 2.0 * level, work);
     let smallest = task.scale * f64::EPSILON;
     let mut boxes = 0u64;

@@ -27,12 +27,12 @@ impl QueryOptions {
     pub const DEPTH: Self = Self { penetration: true, ..Self::CONTACT };
 
     /// The time of a contact is told.
-    pub(super) fn time(&self) -> bool {
+    pub(in crate::contact) fn time(&self) -> bool {
         self.report >= Report::Time
     }
 
     /// Its point is told.
-    pub(super) fn point(&self) -> bool {
+    pub(in crate::contact) fn point(&self) -> bool {
         self.report >= Report::Contact
     }
 }

@@ -1,6 +1,5 @@
-//! A cell of the search: a box over a span of time, and how a search ends.
+//! A cell of the search: a box over a span of time.
 
-use super::found::Found;
 use crate::math::Aabb;
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -80,24 +79,4 @@ impl Ord for Cell {
     fn cmp(&self, o: &Self) -> Ordering {
         o.t.total_cmp(&self.t).then(o.serial.cmp(&self.serial))
     }
-}
-
-/// How a search ended.
-// The contact is kept in place: one a query, and nothing allocated.
-#[allow(clippy::large_enum_variant)]
-#[derive(Clone, Debug)]
-pub enum Ending {
-    /// No contact within the step.
-    Clear,
-    /// The earliest contact.
-    Contact(Found),
-    /// A point of this depth exists at t = 0 (A's frame).
-    Deep(DVec3),
-    /// Free before this time; then, to within rounding, as deep as delta: neither excluded nor a contact.
-    Rounding(f64),
-    /// The work limit ran out; free before this time.
-    Limit(f64),
-    /// The search took long enough for another resolution to be tried (`Search::patience`); free before this time. The contact that is
-    /// known, if any, comes much later.
-    Long(f64, Option<Found>),
 }

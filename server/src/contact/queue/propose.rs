@@ -7,16 +7,16 @@
 //! The search asks for proposals and uses their time; it never believes one that is not confirmed here.
 
 use super::cell::Cell;
-use super::clause::{Advance, Hint};
-use super::depth;
-use super::fit;
-use super::found::{Found, SAME_TIME};
-use super::literal::{Faces, Side};
-use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution, Weights};
 use super::search::Search;
-use super::separation;
-use super::task::witness_level;
-use super::work::Work;
+use crate::contact::exclusion::clause::{Advance, Hint};
+use crate::contact::exclusion::fit;
+use crate::contact::exclusion::literal::{Faces, Side};
+use crate::contact::instant::depth;
+use crate::contact::instant::separation;
+use crate::contact::instant::work::Work;
+use crate::contact::query::task::witness_level;
+use crate::contact::witness::found::{Found, SAME_TIME};
+use crate::contact::witness::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution, Weights};
 use crate::motion::Instant;
 use crate::octree::Model;
 use crate::solid::Sense;
@@ -51,7 +51,7 @@ const MAX_HINTS: usize = 8;
 
 impl Search<'_> {
     pub(super) fn problem(&self) -> Problem<'_> {
-        self.task.problem()
+        Problem::of(&self.task)
     }
 
     /// Tries to find the contact that a cell's weakest clause points to.
@@ -193,7 +193,14 @@ impl Search<'_> {
 
     /// Newton from a guess of a whole-primitive shortcut, which needs no stage 2: true when a contact was confirmed. With
     /// `mend` an active set that does not hold is mended as the search does it, which costs many times more.
-    pub(super) fn confirm(&mut self, active: Actives, x: DVec3, t: f64, lambda: Weights, mend: bool) -> bool {
+    pub(in crate::contact) fn confirm(
+        &mut self,
+        active: Actives,
+        x: DVec3,
+        t: f64,
+        lambda: Weights,
+        mend: bool,
+    ) -> bool {
         if !has_both_sides(&active) {
             return false;
         }
@@ -242,7 +249,7 @@ impl Search<'_> {
     }
 
     /// The unit normal of a solution, from A, along A's axes.
-    pub(super) fn normal(&self, s: &Solution) -> Option<DVec3> {
+    pub(in crate::contact) fn normal(&self, s: &Solution) -> Option<DVec3> {
         let at = self.task.relative.at(s.t);
         let problem = self.problem();
         let mut sum = DVec3::ZERO;

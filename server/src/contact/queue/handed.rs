@@ -1,8 +1,8 @@
 //! What the first two stages have handed over: the primitives whose faces a contact may be solved for.
 
-use super::literal::Side;
-use super::newton::Constraint;
-use super::task::Task;
+use crate::contact::exclusion::literal::Side;
+use crate::contact::query::task::Task;
+use crate::contact::witness::newton::Constraint;
 use std::collections::HashSet;
 
 /// What the first two stages have handed over so far.

@@ -14,7 +14,8 @@
 //! the surfaces do meet, minimum-norm steps on c_i = −level alone finish.
 //! Nothing here is trusted: the search accepts a solution only when both whole trees confirm it.
 
-use super::literal::{Faces, Side};
+use crate::contact::exclusion::literal::{Faces, Side};
+use crate::contact::query::task::Task;
 use crate::motion::{Instant, Relative};
 use crate::solid::local::LiteralId;
 use crate::solid::surface::Curvature;
@@ -29,9 +30,9 @@ const HARDLY: f64 = 1e-6;
 /// Steps in which a slow pair passes its scale.
 const SLOW: f64 = 1e3;
 /// |Σ λ g| below which multipliers have settled.
-pub(super) const SETTLED: f64 = 1e-6;
+pub(in crate::contact) const SETTLED: f64 = 1e-6;
 /// Constraints that hold a point in space and time.
-pub(super) const HELD: usize = 4;
+pub(in crate::contact) const HELD: usize = 4;
 /// Most constraints a system may hold.
 pub const MAX_ACTIVE: usize = 6;
 /// Least damping: keeps a singular system (redundant planes, an apex on an apex) positive definite in rounded arithmetic.
@@ -39,7 +40,7 @@ const LEAST_DAMPING: f64 = 1e-14;
 /// A guess from which the squared residual does not fall by `PROGRESS` in so many steps leads nowhere.
 const PATIENCE: usize = 8;
 const PROGRESS: f64 = 0.25;
-pub(super) const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
+pub(in crate::contact) const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
 
 /// Active constraints, in place.
 pub type Actives = SmallVec<[Constraint; MAX_ACTIVE]>;
@@ -70,6 +71,9 @@ pub struct Solution {
     pub stationarity: f64,
 }
 
+/// Steps in which the slowest motion that is told from rest passes the scale of a pair.
+const SLOWEST: f64 = 1e12;
+
 /// What the equations are about.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
@@ -97,8 +101,24 @@ pub struct Row {
 }
 
 /// Hessian of psi of a face at a point, in the face's own frame.
-pub(super) fn hessian(face: &Face, x: DVec3) -> DMat3 {
+pub(in crate::contact) fn hessian(face: &Face, x: DVec3) -> DMat3 {
     face.curvature(&face.at(x)).matrix()
+}
+
+impl<'a> Problem<'a> {
+    /// The equations of a contact, in the pair's units.
+    pub fn of(task: &'a Task) -> Self {
+        let speed = task.relative.bounds(0.0, 1.0, task.scale).speed;
+        Self {
+            a: Faces { solid: task.a, clip_planes: &[] },
+            b: Faces { solid: task.b, clip_planes: &[] },
+            relative: &task.relative,
+            scale: task.scale,
+            // However slow the pair: else equations that only time can meet look as if they had no solution.
+            time_scale: (task.scale / speed.max(f64::MIN_POSITIVE)).min(SLOWEST),
+            tolerance: 0.5 * task.rounding,
+        }
+    }
 }
 
 impl Problem<'_> {
@@ -484,7 +504,7 @@ fn eliminate_of<const N: usize>(
 }
 
 /// Solves (JᵀJ + μ I) step = −Jᵀ f.
-pub(super) fn damped_step(
+pub(in crate::contact) fn damped_step(
     jac: &[[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
     f: &[f64; MAX_UNKNOWNS],
     n: usize,
@@ -510,7 +530,11 @@ pub(super) fn damped_step(
 
 /// Solves a symmetric positive definite system in place.
 #[inline]
-pub(super) fn cholesky_solve<const N: usize>(a: &mut [[f64; N]; N], mut b: [f64; N], n: usize) -> Option<[f64; N]> {
+pub(in crate::contact) fn cholesky_solve<const N: usize>(
+    a: &mut [[f64; N]; N],
+    mut b: [f64; N],
+    n: usize,
+) -> Option<[f64; N]> {
     for j in 0..n {
         for k in 0..j {
             let l = a[j][k];

@@ -1,22 +1,22 @@
 //! Earliest contact of one pair over one step: from the question to the answer's fields.
 
-use super::cavity;
-use super::cell::Ending;
-use super::clock::Stage;
-use super::convex::{self, Quick};
-use super::depth;
-use super::extent::{ACTIVE, INCIDENT, extent, note, noted, rank_of};
-use super::features::Features;
-use super::found::Found;
-use super::literal::{Faces, Side};
-use super::newton::{Constraint, Problem, Solution};
-use super::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
-use super::query::PairQuery;
-use super::search::{Scratch, Search};
-use super::separation;
-use super::task::{RAISES, Task, clear_of_walls, most_raised, raised, witness_level};
 use super::unbounded;
-use super::work::Work;
+use crate::contact::cavity;
+use crate::contact::convex::{self, Quick};
+use crate::contact::exclusion::literal::{Faces, Side};
+use crate::contact::instant::depth;
+use crate::contact::instant::separation;
+use crate::contact::instant::work::Work;
+use crate::contact::query::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::query::question::PairQuery;
+use crate::contact::query::task::{RAISES, Task, clear_of_walls, most_raised, raised, witness_level};
+use crate::contact::queue::clock::Stage;
+use crate::contact::queue::search::{Scratch, Search};
+use crate::contact::witness::extent::{ACTIVE, INCIDENT, extent, note, noted, rank_of};
+use crate::contact::witness::features::Features;
+use crate::contact::witness::found::Ending;
+use crate::contact::witness::found::Found;
+use crate::contact::witness::newton::{Constraint, Problem, Solution};
 use crate::motion::{Instant, Placed};
 use crate::solid::Sense;
 use glam::{DMat3, DVec3};
@@ -551,7 +551,7 @@ const DEPTHS: usize = 6;
 
 /// What a contact that touched before the start is at the start: its equations at the depth that it has reached by then.
 fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Solution> {
-    let problem = task.problem();
+    let problem = Problem::of(task);
     // Depths and times before and after it.
     let (mut before, mut after) = ((0.0, touch.t), (witness_level(task.delta, task.rounding), deep.t));
     let mut s = deep.clone();

@@ -1,17 +1,14 @@
 //! What is searched: two solids, their motion, a depth, a limit; and a cell of it as its bounds see it.
 
-use super::literal::{Faces, View};
-use super::newton::Problem;
-use super::query::{PairQuery, Strategies, without_own_spin};
-use super::query_options::QueryOptions;
+use super::options::QueryOptions;
+use super::question::{PairQuery, Strategies, without_own_spin};
+use crate::contact::exclusion::literal::{Faces, View};
+use crate::contact::exclusion::rounding;
 use crate::math::tolerance;
 use crate::motion::{Bounds, Instant, Relative};
 use crate::octree::Model;
 use crate::solid::{Face, Solid};
 use glam::DVec3;
-
-/// Steps in which the slowest motion that is told from rest passes the scale of a pair.
-const SLOWEST: f64 = 1e12;
 
 /// What to search: two solids, their motion, a depth, a limit.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +47,7 @@ pub struct Task<'a> {
 
 impl<'a> Task<'a> {
     /// What is searched for a question, and whether its second body carries the cells.
-    pub(super) fn of(query: &PairQuery<'a>) -> (Task<'a>, bool) {
+    pub(in crate::contact) fn of(query: &PairQuery<'a>) -> (Task<'a>, bool) {
         let swapped = query.is_swapped();
         let (reference, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
         let (model_a, model_b) = (reference.model, other.model);
@@ -63,7 +60,7 @@ impl<'a> Task<'a> {
             + 2.0 * scale
             + relative.center_a().length()
             + relative.difference(0.0).length().max(relative.difference(1.0).length());
-        let rounding = super::rounding::of_literals(model_a, model_b, &relative);
+        let rounding = rounding::of_literals(model_a, model_b, &relative);
         let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
         let resolution = clear_of_walls(query.resolution.max(least), rounding, [model_a, model_b]);
         let task = Task {
@@ -87,7 +84,7 @@ impl<'a> Task<'a> {
     }
 
     /// A cell, by its centre and half extents, at an instant of its own time.
-    pub(super) fn view<'v>(
+    pub(in crate::contact) fn view<'v>(
         &self,
         (center, half): (DVec3, DVec3),
         at: &'v Instant,
@@ -116,44 +113,30 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The equations of a contact, in the pair's units.
-    pub(super) fn problem(&self) -> Problem<'_> {
-        let speed = self.relative.bounds(0.0, 1.0, self.scale).speed;
-        Problem {
-            a: Faces { solid: self.a, clip_planes: &[] },
-            b: Faces { solid: self.b, clip_planes: &[] },
-            relative: &self.relative,
-            scale: self.scale,
-            // However slow the pair: else equations that only time can meet look as if they had no solution.
-            time_scale: (self.scale / speed.max(f64::MIN_POSITIVE)).min(SLOWEST),
-            tolerance: 0.5 * self.rounding,
-        }
-    }
-
     /// True where a body has a thin curved wall, or a crescent.
-    pub(super) fn has_walls(&self) -> bool {
+    pub(in crate::contact) fn has_walls(&self) -> bool {
         self.a.alike.any_near() || self.b.alike.any_near()
     }
 
     /// True when a witness is to be continued back to where the surfaces meet: they did so before the start if it was an
     /// overlap, and do so later than bodies are near each other.
-    pub(super) fn continues(&self) -> bool {
+    pub(in crate::contact) fn continues(&self) -> bool {
         self.query_options.time() && self.ignored_depth == 0.0 && self.delta > 0.0
     }
 
     /// The largest f that a point searched for may have in a body: 0 at depths, the distance at a clearance.
-    pub(super) fn highest(&self) -> f64 {
+    pub(in crate::contact) fn highest(&self) -> f64 {
         (-self.delta).max(0.0)
     }
 
     /// Same-shape fits hold for distances of both bodies below this: half the smallest radius of a subtracted round face,
     /// which grown bodies take from it.
-    pub(super) fn fits_below(&self) -> f64 {
+    pub(in crate::contact) fn fits_below(&self) -> f64 {
         0.5 * self.model_a.narrowest.min(self.model_b.narrowest)
     }
 
     /// True when x (A's frame) is at least delta deep in both whole solids at the instant, by `more` as computed.
-    pub(super) fn is_deep(&self, x: DVec3, at: &Instant, more: f64) -> bool {
+    pub(in crate::contact) fn is_deep(&self, x: DVec3, at: &Instant, more: f64) -> bool {
         let level = -self.delta - more;
         self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level
     }
@@ -161,29 +144,29 @@ impl<'a> Task<'a> {
     /// True when x is deep at the start, or so nearly that rounding forbids to prove the contrary: what the first search
     /// takes for deep is searched again at twice the depth.
     /// At a negative depth −g that is a point hardly farther than g: what keeps a distance is told to be nearer, never the contrary.
-    pub(super) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
+    pub(in crate::contact) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
         let level = (8.0 * self.start_tolerance).min(0.5 * self.delta.abs()) - self.delta;
         self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level
     }
 }
 
 /// The depth at which witnesses are sought: delta and what rounding may take from it.
-pub(super) fn witness_level(delta: f64, rounding: f64) -> f64 {
+pub(in crate::contact) fn witness_level(delta: f64, rounding: f64) -> f64 {
     // Deep enough to be so after all rounding, with what Newton may leave.
     delta + 1e-6 * delta.abs() + 1.5 * rounding
 }
 
 /// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
-pub(super) const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
+pub(in crate::contact) const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
 
 /// The resolution after a raise.
-pub(super) fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
+pub(in crate::contact) fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
     resolution + 2e-6 * resolution + more * rounding
 }
 
 /// The resolution, raised where a wall of a body is as thick as twice a depth that is searched: a point in its middle could
 /// neither be excluded nor confirmed.
-pub(super) fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
+pub(in crate::contact) fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model; 2]) -> f64 {
     let at_depth = |wall: f64, depth: f64| {
         (2.0 * depth..=2.0 * (witness_level(depth, rounding) + NEARLY_DEEP * rounding)).contains(&wall)
     };
@@ -201,6 +184,6 @@ pub(super) fn clear_of_walls(mut resolution: f64, rounding: f64, models: [&Model
 const NEARLY_DEEP: f64 = 8.0;
 
 /// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
-pub(super) fn most_raised(resolution: f64, rounding: f64) -> f64 {
+pub(in crate::contact) fn most_raised(resolution: f64, rounding: f64) -> f64 {
     RAISES.iter().fold(resolution, |r, more| raised(r, *more, rounding))
 }

@@ -1,0 +1,8 @@
+//! What proves that a box of A holds no contact over a span of time: literals bounded, clauses of them, like faces that fit, and what
+//! rounding may take from each.
+
+pub mod clause;
+pub mod fit;
+pub mod literal;
+pub mod lp;
+pub mod rounding;

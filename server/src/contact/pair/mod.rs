@@ -1,0 +1,6 @@
+//! One pair over one step: the kernels in front of the queue, then the queue; and the answer's fields.
+
+pub mod search;
+pub mod unbounded;
+
+pub use search::{PairSearch, earliest_contact, find_earliest, resolution_of};
