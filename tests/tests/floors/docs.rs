@@ -1,0 +1,232 @@
+//! The documents: lines that fit a page, links and paths that lead somewhere, commands and tests that exist.
+
+use super::{root, rust_files};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+const WIDTH: usize = 120;
+/// Every type that it names is one of the sources.
+const GLOSSARY: &str = "glossary.md";
+/// A changelog speaks of what was: its paths need not be there any more.
+const HISTORY: &str = "CHANGELOG.md";
+
+fn markdown_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            markdown_files(&path, found);
+        } else if path.extension().is_some_and(|e| e == "md") {
+            found.push(path);
+        }
+    }
+}
+
+fn documents() -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> = ["README.md", HISTORY, "client/python/README.md"].map(|f| root().join(f)).into();
+    markdown_files(&root().join("docs"), &mut all);
+    all
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Lines outside of fenced code.
+fn prose(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut fenced = false;
+    (1..).zip(text.lines()).filter(move |(_, line)| {
+        let fence = line.trim_start().starts_with("```");
+        fenced ^= fence;
+        !fenced && !fence
+    })
+}
+
+/// What stands between two marks on a line, pair by pair.
+fn between<'a>(line: &'a str, open: &str, close: &str) -> Vec<&'a str> {
+    let mut found = Vec::new();
+    let mut rest = line;
+    while let Some((_, after)) = rest.split_once(open)
+        && let Some((inner, more)) = after.split_once(close)
+    {
+        found.push(inner);
+        rest = more;
+    }
+    found
+}
+
+/// The name by which a heading is linked to.
+fn anchor(heading: &str) -> String {
+    let text = heading.trim_start_matches('#').trim().to_lowercase();
+    text.chars()
+        .filter_map(|c| if c == ' ' { Some('-') } else { (c.is_alphanumeric() || "-_".contains(c)).then_some(c) })
+        .collect()
+}
+
+/// Lines that are too long.
+fn too_long(text: &str) -> Vec<String> {
+    let long = (1..).zip(text.lines()).map(|(n, line)| (n, line.chars().count())).filter(|(_, count)| *count > WIDTH);
+    long.map(|(n, count)| format!("line {n} has {count} columns, {WIDTH} at most")).collect()
+}
+
+/// Links of a document at `path` that lead nowhere.
+fn broken_links(path: &Path, text: &str) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (n, line) in prose(text) {
+        for link in between(line, "](", ")") {
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let to = if file.is_empty() { path.to_owned() } else { path.parent().unwrap().join(file) };
+            if link.contains("://") {
+            } else if !to.exists() {
+                wrong.push(format!("line {n} links to {link}, which is not there"));
+            } else if !heading.is_empty() && !prose(&read(&to)).any(|(_, l)| l.starts_with('#') && anchor(l) == heading)
+            {
+                wrong.push(format!("line {n} links to {link}, and no heading there is called so"));
+            }
+        }
+    }
+    wrong
+}
+
+/// What the repository has, as far as documents name it.
+struct Known {
+    /// Paths of all files and folders, from the root.
+    paths: BTreeSet<PathBuf>,
+    /// Programs, examples and test binaries.
+    programs: BTreeSet<String>,
+    /// All Rust sources, one after the other.
+    sources: String,
+}
+
+/// Paths of all files and folders below a folder, from the root.
+fn paths(folder: &Path, found: &mut BTreeSet<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if name.starts_with('.') || ["target", "build"].contains(&name) {
+            continue;
+        }
+        found.insert(path.strip_prefix(root()).unwrap().to_owned());
+        if path.is_dir() {
+            paths(&path, found);
+        }
+    }
+}
+
+impl Known {
+    fn read() -> Self {
+        let mut known = Self { paths: BTreeSet::new(), programs: BTreeSet::new(), sources: String::new() };
+        paths(&root(), &mut known.paths);
+        let mut sources = Vec::new();
+        for folder in ["proto", "client", "server", "tests", "benches"] {
+            rust_files(&root().join(folder), &mut sources);
+        }
+        for path in sources {
+            known.sources += &read(&path);
+            let folder = path.parent().unwrap().file_name().unwrap().to_str().unwrap();
+            if ["bin", "tests", "examples"].contains(&folder) {
+                known.programs.insert(path.file_stem().unwrap().to_str().unwrap().to_owned());
+            } else if path.ends_with("main.rs") {
+                known.programs.insert(folder.to_owned());
+            }
+        }
+        known
+    }
+
+    /// Whether a word that stands in a document as code names nothing that is there; `None` for what is no path and no test.
+    fn lacks(&self, at: &Path, word: &str) -> Option<bool> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_./-".contains(c);
+        if !word.chars().all(|c| plain(c) || c == '…') || word.starts_with('/') {
+            return None;
+        }
+        let kind = Path::new(word).extension().and_then(|e| e.to_str()).unwrap_or("");
+        let is_file = ["rs", "md", "py", "c", "h", "patch", "csv", "png"].contains(&kind);
+        let bases = [root(), root().join("server/src"), at.parent().unwrap().to_owned()];
+        // A path may leave out where it begins, and a module its ending.
+        let first = word.split('/').next().unwrap_or_default();
+        let is_path = word.contains('/') && bases.iter().any(|base| base.join(first).is_dir());
+        if first != "target" && (is_file || is_path) {
+            let module = format!("{}.rs", word.trim_end_matches('/'));
+            return Some(!self.paths.iter().any(|path| path.ends_with(word) || path.ends_with(&module)));
+        }
+        // A test is told from a field by its length; its name may end in an ellipsis.
+        let start = word.trim_end_matches('…');
+        let is_test = start.matches('_').count() >= 3 && start.chars().all(|c| plain(c) && c != '.' && c != '-');
+        is_test.then(|| !self.sources.contains(start))
+    }
+
+    /// Whether a word names a type, or something of a type, that is declared nowhere; `None` for other words.
+    fn lacks_type(&self, word: &str) -> Option<bool> {
+        let (name, item) = word.split_once("::").unwrap_or((word, ""));
+        let is_type = name.starts_with(|c: char| c.is_ascii_uppercase())
+            && name.contains(|c: char| c.is_ascii_lowercase())
+            && word.chars().all(|c| c.is_ascii_alphanumeric() || c == ':' || c == '_');
+        let is_declared = |kind: &str| {
+            let name = format!("{kind} {name}");
+            let rest = self.sources.match_indices(&name).map(|(at, found)| &self.sources[at + found.len()..]);
+            rest.into_iter().any(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_'))
+        };
+        let kinds = ["struct", "enum", "trait", "type"];
+        is_type.then(|| !kinds.into_iter().any(is_declared) || !self.sources.contains(item))
+    }
+
+    /// Paths, tests and programs that a document at `at` names and that are not there; of the glossary, types too.
+    fn missing(&self, at: &Path, text: &str) -> Vec<String> {
+        let mut wrong = Vec::new();
+        for (n, line) in prose(text) {
+            for word in between(line, "`", "`") {
+                let is_type = at.ends_with(GLOSSARY) && self.lacks_type(word) == Some(true);
+                if is_type || self.lacks(at, word) == Some(true) {
+                    wrong.push(format!("line {n} names `{word}`, which is not there"));
+                }
+            }
+        }
+        for (n, line) in (1..).zip(text.lines()) {
+            let words: Vec<&str> = line.split(|c: char| c.is_whitespace() || "`()".contains(c)).collect();
+            for pair in words.windows(2) {
+                let name = pair[1].trim_end_matches([',', '.', ';', ':']);
+                let is_name = !name.is_empty() && name.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+                if ["--bin", "--test", "--example"].contains(&pair[0]) && is_name && !self.programs.contains(name) {
+                    wrong.push(format!("line {n} names {} {name}, which is not there", pair[0]));
+                }
+            }
+        }
+        wrong
+    }
+}
+
+#[test]
+fn documents_fit_a_page_and_what_they_name_is_there() {
+    let known = Known::read();
+    let mut wrong = Vec::new();
+    for path in documents() {
+        let text = read(&path);
+        let mut of_this = too_long(&text);
+        of_this.extend(broken_links(&path, &text));
+        if !path.ends_with(HISTORY) {
+            of_this.extend(known.missing(&path, &text));
+        }
+        wrong.extend(of_this.into_iter().map(|w| format!("{}: {w}", path.strip_prefix(root()).unwrap().display())));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_long_line_a_dead_link_and_a_lost_path_are_seen() {
+    let at = root().join("docs/adding.md");
+    assert_eq!(too_long(&format!("{}\n{}\n", "é".repeat(120), "x".repeat(121))).len(), 1);
+    let links =
+        "# A face, or two\n[a](gone.md) [b](adding.md#nowhere) [c](#a-solid) [d](../README.md) [e](https://a.b)\n";
+    assert_eq!(broken_links(&at, links).len(), 2);
+    assert_eq!(anchor("## In front: two convex, `turning`"), "in-front-two-convex-turning");
+    let known = Known::read();
+    let good = "`server/src/lib.rs` `world/step.rs` `floors.rs` `contact/convex` `time_lower` `target/x/y.rs` `BASE/S/lock`\n\
+                ```\nserver/src/gone.rs\n```\n`no_files_import_…` `cargo run --bin kernels -- --quick` --test floors\n";
+    assert_eq!(known.missing(&at, good), Vec::<String>::new());
+    let words = "`F64x2` `Kind::Empty` `Gone` `Kind::Gone_for_good` `E` `time_lower`"
+        .replace("Gone", "NoSuch")
+        .replace("_for_good", "Thing");
+    assert_eq!(known.missing(&at.with_file_name(GLOSSARY), &words).len(), 2);
+    let bad =
+        "`server/src/gone.rs` `gone.rs` `contact/gone` `a_test_that_is_gone_for_good`\n--bin gone, --test gone.\n";
+    assert_eq!(known.missing(&at, bad.replace("a_test_that", "a_test_which").as_str()).len(), 6);
+}
