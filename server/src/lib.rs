@@ -10,22 +10,22 @@
 //! contact. The earliest item is popped and replaced by items that can hold one no sooner:
 //!
 //! ```text
-//!             +--------------------- queue: earliest first <----------------------+
-//!             |                                                                   |
-//!    slice of time [t0, t1]                                                       |
-//!      stage 1  S-bounds of A ∩ B: where can they meet at all?   bound::pair      |
-//!        nowhere -> gone;   a long way through a large region -> two halves ------+
-//!      stage 2  both octrees, walked together in that region     octree::walk,    |
-//!               by table 4: which primitives, where, when        contact::queue   |
-//!        nothing -> gone;   else a cell per alternative of the carrier -----------+
-//!             |                                                                   |
-//!    cell: a box that rides with the carrier, what is left there of both trees    |
-//!      stage 3  bound each clause of their literals over the     contact::exclusion|
-//!               cell: free until t + dt                                           |
-//!        the whole slice -> gone;   a good while -> the cell at t + dt -----------+
-//!               else solve for the contact that the bound points contact::witness |
-//!               to; it counts if both whole trees confirm it                      |
-//!        and the cell's two halves -----------------------------------------------+
+//!             +---------------------- queue: earliest first <-----------------------+
+//!             |                                                                     |
+//!    slice of time [t0, t1]                                                         |
+//!      stage 1  S-bounds of A ∩ B: where can they meet at all?   bound::pair        |
+//!        nowhere -> gone;   a long way through a large region -> two halves --------+
+//!      stage 2  both octrees, walked together in that region     octree::walk,      |
+//!               by table 4: which primitives, where, when        contact::queue     |
+//!        nothing -> gone;   else a cell per alternative of the reference body ------+
+//!             |                                                                     |
+//!    cell: a box that rides with the reference body, what is left there of both     |
+//!      stage 3  bound each clause of their literals over the     contact::exclusion |
+//!               cell: free until t + dt                                             |
+//!        the whole slice -> gone;   a good while -> the cell at t + dt -------------+
+//!               else solve for the contact that the bound points contact::witness   |
+//!               to; it counts if both whole trees confirm it                        |
+//!        and the cell's two halves -------------------------------------------------+
 //! ```
 //!
 //! In front of the queue stand two proofs that need no cells: two convex primitives (`contact::convex`), convex bodies at
