@@ -38,6 +38,9 @@ pub const REGIONS_INCOMPLETE: u8 = 16;
 /// `flags`: clear, but within its margin at the start or during the step; the detail slot says until when it is proven not to. With
 /// [`REGIONS_INCOMPLETE`]: it may do so.
 pub const WITHIN_MARGIN: u8 = 32;
+/// `flags`: the answer speaks of a resolution coarser than the pair's own: rounding or the length of its search left nothing
+/// to prove at that. Which one is in the detail slot.
+pub const COARSER_RESOLUTION: u8 = 64;
 
 /// `valid`: time and time_lower.
 pub const VALID_TIME: u32 = 1;
@@ -72,7 +75,8 @@ pub struct ContactRecord {
     pub kind: u8,
     /// Index into [`EXTENT_NAMES`].
     pub extent: u8,
-    /// [`TOUCHING`], [`NOT_CONTINUED`], [`AVERAGED_NORMAL`], [`SENSOR`], [`REGIONS_INCOMPLETE`], [`WITHIN_MARGIN`].
+    /// [`TOUCHING`], [`NOT_CONTINUED`], [`AVERAGED_NORMAL`], [`SENSOR`], [`REGIONS_INCOMPLETE`], [`WITHIN_MARGIN`],
+    /// [`COARSER_RESOLUTION`].
     pub flags: u8,
     /// A bit per field that has meaning.
     pub valid: u32,
@@ -145,7 +149,7 @@ pub struct DetailSlot {
     pub reserved: u32,
     /// A verified witness of the resolution's depth exists then.
     pub time_upper: f64,
-    /// The resolution that was used, a length.
+    /// The resolution that the answer speaks of, a length; larger than the pair's own with [`COARSER_RESOLUTION`].
     pub resolution: f64,
     /// The contact point in a's object frame; of an overlap whose penetration is asked for the deepest point.
     pub point_a: [f64; 3],

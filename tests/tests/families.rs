@@ -4,6 +4,8 @@
 //! (1 by default). `cargo run --release -p contactd-benches --bin families` tells what they cost.
 
 use contactd::contact::{Outcome, Status};
+use contactd::world::{StepOutcome, record};
+use contactd_proto::contact_record::COARSER_RESOLUTION;
 use contactd_tests::families::{Course, Effort, Fault, NAMES, Node, Scene, Shape, ask, examine, judge, scene};
 use glam::{DQuat, DVec3, dvec3};
 use rayon::prelude::*;
@@ -128,8 +130,13 @@ fn long_searches_are_answered_at_a_coarser_resolution_that_is_reported() {
         let o = &answer.pair.outcome;
         let name = format!("{} {index}", NAMES[family]);
         assert_eq!(o.status, if met { Status::Contact } else { Status::Clear }, "{name}");
-        let coarser = o.resolution / answer.query_options;
+        let coarser = o.resolution / answer.own_resolution;
         assert!((16.0..=4e4).contains(&coarser), "{name}: {coarser} times as coarse");
+        let step = StepOutcome { pairs: vec![answer.pair], ..StepOutcome::default() };
+        let slot = |i| record::slot(&answer.check.world, &step, true, i);
+        let reported = slot(1).as_detail().expect("a detail slot").resolution;
+        assert_ne!(slot(0).flags & COARSER_RESOLUTION, 0, "{name}");
+        assert_eq!(reported, o.resolution, "{name}");
         assert!(o.counters.cells < 200_000, "{name}: {} cells", o.counters.cells);
         let faults = judge(&scene, o, Effort::Thorough, || answer.witness());
         assert!(faults.is_empty(), "{name}: {faults:?}");

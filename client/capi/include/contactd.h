@@ -178,6 +178,10 @@
 // CONTACTD_REGIONS_INCOMPLETE: it may do so.
 #define CONTACTD_WITHIN_MARGIN 32
 
+// `flags`: the answer speaks of a resolution coarser than the pair's own: rounding or the length of its search left nothing
+// to prove at that. Which one is in the detail slot.
+#define CONTACTD_COARSER_RESOLUTION 64
+
 // `valid`: time and time_lower.
 #define CONTACTD_VALID_TIME 1
 
@@ -532,7 +536,8 @@ typedef struct contactd_record {
     uint8_t kind;
     // Index into CONTACTD_EXTENT_NAMES.
     uint8_t extent;
-    // CONTACTD_TOUCHING, CONTACTD_NOT_CONTINUED, CONTACTD_AVERAGED_NORMAL, CONTACTD_SENSOR, CONTACTD_REGIONS_INCOMPLETE, CONTACTD_WITHIN_MARGIN.
+    // CONTACTD_TOUCHING, CONTACTD_NOT_CONTINUED, CONTACTD_AVERAGED_NORMAL, CONTACTD_SENSOR, CONTACTD_REGIONS_INCOMPLETE, CONTACTD_WITHIN_MARGIN,
+    // CONTACTD_COARSER_RESOLUTION.
     uint8_t flags;
     // A bit per field that has meaning.
     uint32_t valid;
@@ -582,7 +587,7 @@ typedef struct contactd_detail_slot {
     uint32_t reserved;
     // A verified witness of the resolution's depth exists then.
     double time_upper;
-    // The resolution that was used, a length.
+    // The resolution that the answer speaks of, a length; larger than the pair's own with CONTACTD_COARSER_RESOLUTION.
     double resolution;
     // The contact point in a's object frame; of an overlap whose penetration is asked for the deepest point.
     double point_a[3];

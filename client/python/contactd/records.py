@@ -61,6 +61,7 @@ class Flag(enum.IntFlag):
     SENSOR = 8
     REGIONS_INCOMPLETE = 16
     WITHIN_MARGIN = 32
+    COARSER_RESOLUTION = 64
 
 
 class Valid(enum.IntFlag):

@@ -103,6 +103,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, u32)> {
         ("Flag", "SENSOR", wire::SENSOR.into()),
         ("Flag", "REGIONS_INCOMPLETE", wire::REGIONS_INCOMPLETE.into()),
         ("Flag", "WITHIN_MARGIN", wire::WITHIN_MARGIN.into()),
+        ("Flag", "COARSER_RESOLUTION", wire::COARSER_RESOLUTION.into()),
         ("Valid", "TIME", wire::VALID_TIME),
         ("Valid", "POINT", wire::VALID_POINT),
         ("Valid", "NORMAL", wire::VALID_NORMAL),

@@ -15,6 +15,8 @@ pub struct PairOutcome {
     pub plan: PairPlan,
     /// What was found.
     pub outcome: Outcome,
+    /// It speaks of a resolution coarser than the pair's own.
+    pub coarser: bool,
     /// Index of its job.
     pub(super) job: u32,
     /// False when the work limit cut the search for its regions: there may be more, and whether it touches may be open.

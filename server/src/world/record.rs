@@ -136,6 +136,7 @@ fn record(p: &PairOutcome) -> ContactRecord {
         r.flags |= if p.regions_complete { 0 } else { wire::REGIONS_INCOMPLETE };
     }
     r.flags |= if o.margin_time < 1.0 { wire::WITHIN_MARGIN } else { 0 };
+    r.flags |= if p.coarser { wire::COARSER_RESOLUTION } else { 0 };
     let meets = matches!(o.status, Status::Contact | Status::Overlap);
     // A clear pair that touches has the fields of its nearest region, where its rule asks for them.
     let rests = o.status == Status::Clear && p.regions.1 > 0;

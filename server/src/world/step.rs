@@ -364,9 +364,10 @@ impl World {
         // Outcomes are large: their keys are sorted, and each is moved once.
         state.command.sort_unstable();
         out.pairs.extend(state.command.iter().map(|&(_, a, b, i, regions_complete)| {
-            let PairJob { plan, found, .. } = &state.jobs[i as usize];
+            let PairJob { plan, found, resolution, .. } = &state.jobs[i as usize];
+            let (outcome, coarser) = (found.outcome, found.outcome.resolution > *resolution);
             let (regions, patch_slots) = ((0, 0), (0, 0));
-            PairOutcome { a, b, plan: *plan, outcome: found.outcome, job: i, regions_complete, regions, patch_slots }
+            PairOutcome { a, b, plan: *plan, outcome, coarser, job: i, regions_complete, regions, patch_slots }
         }));
         if options.first {
             keep_first(&mut out.pairs);

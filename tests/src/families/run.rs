@@ -21,7 +21,7 @@ pub struct Answer {
     /// The world before the step.
     pub check: Check,
     /// The resolution that was asked for.
-    pub query_options: f64,
+    pub own_resolution: f64,
     /// Seconds that the step took, reading and preprocessing not counted.
     pub seconds: f64,
 }
@@ -66,7 +66,7 @@ pub fn ask(scene: &Scene, cells: u64) -> Result<Answer, String> {
     };
     let models = [model("a.csg", &scene.a.text())?, model("b.csg", &scene.b.text())?];
     let own = models.iter().map(|m| default_resolution(m, m)).fold(0.0, f64::max);
-    let query_options = parsed.resolution.unwrap_or(own);
+    let own_resolution = parsed.resolution.unwrap_or(own);
     let mut check = Check::new(&parsed, &models, None).map_err(|e| e.to_string())?;
     let options = StepOptions { clear: true, cell_limit: cells, batch_limit: cells, ..StepOptions::default() };
     let started = Instant::now();
@@ -74,7 +74,7 @@ pub fn ask(scene: &Scene, cells: u64) -> Result<Answer, String> {
     let seconds = started.elapsed().as_secs_f64();
     let [pair] = step.pairs.as_slice() else { return Err(format!("{} pairs reported", step.pairs.len())) };
     let pair = *pair;
-    Ok(Answer { pair, check, query_options, seconds })
+    Ok(Answer { pair, check, own_resolution, seconds })
 }
 
 /// Writes a scene as a folder that `contactd check FOLDER/scene.toml` reads, with a note beside it.
