@@ -120,6 +120,19 @@ fn a_peg_that_hardly_leans_meets_its_hole() {
     }
 }
 
+/// Deep trees whose small primitives allow no coarser resolution: a long search goes on at its own, with the work that is left.
+#[test]
+fn long_searches_without_a_coarser_resolution_go_on() {
+    for (index, met) in [(107, true), (9009, false)] {
+        let scene = scene(1, 1, index);
+        let answer = ask(&scene, 0).expect("a scene");
+        let o = &answer.pair.outcome;
+        assert_eq!(o.status, if met { Status::Contact } else { Status::Clear }, "{} {index}: {o:?}", NAMES[1]);
+        let faults = judge(&scene, o, Effort::Thorough, || answer.witness());
+        assert!(faults.is_empty(), "{index}: {faults:?}");
+    }
+}
+
 /// Bodies that spin in holes of nearly their own shape, where a search at the resolution asked for takes too long: a coarser one
 /// answers, says so, and no point contradicts it.
 #[test]

@@ -130,6 +130,8 @@ pub struct PairSearch<'a> {
     raised: usize,
     /// How often the resolution was made coarser since a search took too long, and what the first of these had proven.
     coarser: usize,
+    /// No coarser resolution is to be tried: the search goes on until its work limit.
+    insists: bool,
     open: Option<Box<Open>>,
     /// The bodies of the question as they move, where the search leaves out a spin that moves nothing: what closes in along a normal is
     /// told of these.
@@ -171,6 +173,7 @@ impl<'a> PairSearch<'a> {
                 resolution,
                 raised: 0,
                 coarser: 0,
+                insists: false,
                 open: None,
                 spun: None,
                 limit,
@@ -226,6 +229,7 @@ impl<'a> PairSearch<'a> {
             resolution,
             raised: 0,
             coarser: 0,
+            insists: false,
             open: None,
             spun,
             limit,
@@ -330,7 +334,7 @@ impl<'a> PairSearch<'a> {
                 Ending::Clear => {}
                 Ending::Contact(found) => self.meets(&found),
                 Ending::Long(t, found) => {
-                    if self.coarsen(t, found) {
+                    if self.coarsen(t, found) || !std::mem::replace(&mut self.insists, true) {
                         self.restart(cells);
                         continue;
                     }
@@ -457,7 +461,7 @@ impl<'a> PairSearch<'a> {
         if self.ending.is_none() {
             search.start();
         }
-        let tries = self.task.strategies.coarser && self.coarser < COARSENINGS;
+        let tries = self.task.strategies.coarser && self.coarser < COARSENINGS && !self.insists;
         search.patience = if tries { PATIENCE } else { u64::MAX };
         self.search = Some(search);
     }
