@@ -94,7 +94,7 @@ pub struct Walked {
     /// Pairs told, asked about, and known without a search, in all.
     pub reported: usize,
     /// See `reported`.
-    pub query_options: u32,
+    pub asked: u32,
     /// See `reported`.
     pub known: u32,
 }
@@ -130,7 +130,7 @@ pub fn walk(scene: &Scene, steps: usize) -> Result<Walked, Box<dyn std::error::E
             return Err(format!("{}: step {step} has another answer when all is forgotten", scene.name).into());
         }
         walked.reported += warm.pairs.len();
-        walked.query_options += warm.searched;
+        walked.asked += warm.searched;
         walked.known += warm.known;
     }
     Ok(walked)

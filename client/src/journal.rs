@@ -201,11 +201,11 @@ mod tests {
                 late.removed(id);
                 at_once.removed(id);
             }
-            let mut query_options = late.clone();
-            query_options.settle();
-            assert_eq!(motion_states(&query_options), motion_states(&at_once), "after step {step}");
+            let mut asked = late.clone();
+            asked.settle();
+            assert_eq!(motion_states(&asked), motion_states(&at_once), "after step {step}");
             if r.below(9) == 0 {
-                late = query_options;
+                late = asked;
             }
         }
         assert!(alike.iter().all(|n| *n > 200), "{alike:?}");

@@ -21,7 +21,7 @@ pub struct StepRequest {
     /// Protocol version.
     pub version: u32,
     /// `ASK_…` bits.
-    pub query_options: u32,
+    pub asked: u32,
     /// Session id.
     pub session: u64,
     /// Epoch of the server that opened the session.

@@ -362,7 +362,7 @@ fn bad_input_is_refused_each_with_its_sentence() {
         (StepRequest { version: names::PROTOCOL_VERSION + 1, ..plain }, ErrorCode::Version),
         (StepRequest { records: 9, ..plain }, ErrorCode::TooMany),
         (StepRequest { records: 10, ..plain }, ErrorCode::BadCount),
-        (StepRequest { query_options: ASK_ALL + 1, ..plain }, ErrorCode::BadNumber),
+        (StepRequest { asked: ASK_ALL + 1, ..plain }, ErrorCode::BadNumber),
         (StepRequest { session: opened.session + 5, ..plain }, ErrorCode::SessionGone),
         (StepRequest { epoch: opened.epoch + 1, ..plain }, ErrorCode::SessionGone),
     ] {

@@ -191,7 +191,7 @@ impl Play {
         };
         play.stops = play.rng.chance(0.4);
         play.unrest = [0.0, 0.02, 0.1, 0.3][play.rng.below(4)];
-        play.options = play.query_options();
+        play.options = play.step_options();
         for k in 0..count {
             let thing = play.thing(k);
             play.enter(thing);
@@ -278,7 +278,7 @@ impl Play {
         rules
     }
 
-    fn query_options(&mut self) -> StepOptions {
+    fn step_options(&mut self) -> StepOptions {
         let r = &mut self.rng;
         StepOptions {
             advance: 1.0,
@@ -328,7 +328,7 @@ impl Play {
                 changes.push(Change::Remove(self.actors.remove(k).thing.id));
             }
             if self.rng.chance(self.unrest) {
-                self.options = self.query_options();
+                self.options = self.step_options();
             }
         }
         let mut records = Vec::new();

@@ -301,7 +301,7 @@ fn the_motion_itself_rules_effects_out() {
     let answer = Cell::new(&resting, &[rule(|_| ())]).step(&[]);
     assert_eq!((answer.effects(), answer.records.len()), (EffectCounters::default(), 0));
     let still = Cell::new(&resting, &[rule(|r| r.report = Report::Patch)]).step(&[]);
-    assert_eq!(still.effects(), only(|c| c.patches = 1), "resting bodies are query_options about their start alone");
+    assert_eq!(still.effects(), only(|c| c.patches = 1), "resting bodies are asked about their start alone");
     assert_eq!((still.statuses(), still.regions), (vec![(1, 2, CLEAR)], 1));
 }
 

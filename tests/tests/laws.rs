@@ -37,14 +37,14 @@ thread_local! {
 
 fn ask(scene: &Scene) -> Outcome {
     let o = engine::ask(scene);
-    let (query_options, undecided) = ASKED.get();
-    ASKED.set((query_options + 1, undecided + usize::from(o.status == Status::Undecided)));
+    let (asked, undecided) = ASKED.get();
+    ASKED.set((asked + 1, undecided + usize::from(o.status == Status::Undecided)));
     if o.status == Status::Undecided {
         let (place, first) = SCENE.with_borrow(Clone::clone);
         let cells = o.counters.cells;
         println!(
             "UNDECIDED {place}, ask {} ({}): free before {}, {cells} cells",
-            query_options - first,
+            asked - first,
             scene.class,
             o.time_lower
         );
@@ -85,9 +85,9 @@ fn hold_over(
         }
     }
     share.assert_enough(name);
-    let (query_options, undecided) = ASKED.get();
-    println!("{name}: {undecided} of {query_options} answers undecided");
-    assert_eq!(undecided, 0, "{name}: of {query_options}");
+    let (asked, undecided) = ASKED.get();
+    println!("{name}: {undecided} of {asked} answers undecided");
+    assert_eq!(undecided, 0, "{name}: of {asked}");
     assert!(wrong.is_empty(), "{name}: {} of {count} scenes break it\n{}", wrong.len(), wrong.join("\n"));
 }
 

@@ -580,8 +580,8 @@ fn tight_and_tiny_scenes_are_decided() {
                 Status::Overlap => 2,
                 Status::Undecided => 3,
             }] += 1;
-            let query_options = scene.resolution.unwrap_or_else(|| default_resolution(models[0], models[1]));
-            raised += u64::from(o.resolution > 1.5 * query_options);
+            let own_resolution = scene.resolution.unwrap_or_else(|| default_resolution(models[0], models[1]));
+            raised += u64::from(o.resolution > 1.5 * own_resolution);
             dearest = dearest.max(o.counters.cells);
             cells.push(o.counters.cells);
             let wrong = judge(&mut Random::new(own), &scene, &o, &pair)

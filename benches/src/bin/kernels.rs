@@ -78,8 +78,8 @@ fn main() -> std::io::Result<()> {
         "parry_error_worst",
     ]);
     for family in FAMILIES.into_iter().filter(|f| only.as_deref().is_none_or(|only| *f == only)) {
-        let query_options = |time: f64| which == Which::All || (time >= 0.0) == (which == Which::Hits);
-        let cases = rows(family).into_iter().filter(|(_, time)| query_options(*time)).step_by(options.pick(1, 10));
+        let asked = |time: f64| which == Which::All || (time >= 0.0) == (which == Which::Hits);
+        let cases = rows(family).into_iter().filter(|(_, time)| asked(*time)).step_by(options.pick(1, 10));
         let cases: Vec<(Scene, f64)> = cases.collect();
         let models: Vec<[Model; 2]> =
             cases.iter().map(|(s, _)| [Model::new(s.a.build()), Model::new(s.b.build())]).collect();

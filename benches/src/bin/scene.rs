@@ -332,10 +332,7 @@ fn profile(kind: Kind, n: usize, steps: usize) -> Result<(), Error> {
         let now = [reply.header().pairs as usize, of(CONTACT), of(OVERLAP), reply.header().counters.cells as usize];
         count.iter_mut().zip(now).for_each(|(sum, n)| *sum += n);
         if k % (steps / 10).max(1) == 0 {
-            println!(
-                "to step {k}: {:.3} ms; query_options, contacts, overlaps, cells: {count:?}",
-                median(times.drain(..))
-            );
+            println!("to step {k}: {:.3} ms; asked, contacts, overlaps, cells: {count:?}", median(times.drain(..)));
             count = [0; 4];
         }
     }
@@ -400,7 +397,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "scene",
         "objects",
         "steps",
-        "query_options",
+        "asked",
         "contacts",
         "overlaps",
         "undecided",

@@ -74,20 +74,18 @@ impl Probe {
             let group = if i % 2 == 0 { "near" } else { "far" };
             ids.push(session.add_object(Object::new("body", model).group(group).at(Pose::at(at(i, 0))))?);
         }
-        let mut query_options = 0;
+        let mut asked = 0;
         for k in 1..=self.steps {
             for (i, slot) in session.begin_step(ids.len())?.iter_mut().enumerate() {
                 *slot = PoseRecord::end(ids[i], &Pose::at(at(i, k)));
             }
             let reply = session.finish(Duration::from_secs(60))?;
             if k > STEPS[0] {
-                query_options += reply.header().pairs;
+                asked += reply.header().pairs;
             }
         }
-        if query_options > 0 {
-            return Err(
-                format!("{query_options} pairs were query_options about: they are not within their clearance").into()
-            );
+        if asked > 0 {
+            return Err(format!("{asked} pairs were asked about: they are not within their clearance").into());
         }
         Ok(())
     }
@@ -113,7 +111,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "objects",
         "steps",
         "reported",
-        "query_options",
+        "asked",
         "known",
         "cells",
         "cells_cold",
@@ -130,7 +128,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             scene.recipes.len(),
             steps,
             walked.reported as f64 / n,
-            f64::from(walked.query_options) / n,
+            f64::from(walked.asked) / n,
             f64::from(walked.known) / n,
             walked.cells[0] as f64 / n,
             walked.cells[1] as f64 / n,

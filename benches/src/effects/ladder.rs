@@ -78,7 +78,7 @@ pub fn ladder(context: &Context) -> Section {
     let figure = Figure {
         name: "effects_ladder".into(),
         title: "What each rung of the report costs".into(),
-        caption: "Time of a pair in a step that is made anew, by what is query_options of it; each rung reports what the one above it in the \
+        caption: "Time of a pair in a step that is made anew, by what is asked of it; each rung reports what the one above it in the \
                   legend reports, and more. Where two bars end together the upper rung has nothing to do there: no regions are \
                   looked for of pairs that do not meet, and no depth where nothing overlaps at the start. The scale is \
                   logarithmic: lengths of bars report ratios to its left end only, their ends report times."

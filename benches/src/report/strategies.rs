@@ -82,7 +82,7 @@ pub fn strategies(context: &Context) -> Result<Section, Box<dyn Error>> {
         for (k, off) in all.iter().enumerate() {
             context.progress(&format!("without {}, {group}", off.name));
             let (mut ratios, mut cells, mut cells_on) = (Vec::new(), Vec::new(), Vec::new());
-            let (mut undecided, mut wrong, mut query_options) = (0, 0, 0);
+            let (mut undecided, mut wrong, mut asked) = (0, 0, 0);
             for (class, known) in &few {
                 let own = Setting { limit: limit(class, &off.base), ..off.own };
                 let m = measure((class, &own), (class, &off.base), known, plan);
@@ -93,7 +93,7 @@ pub fn strategies(context: &Context) -> Result<Section, Box<dyn Error>> {
                 cells_on.extend(class.cases.iter().map(|c| ask(c, &off.base, &mut scratch).counters.cells as f64));
                 undecided += m.undecided;
                 wrong += m.wrong;
-                query_options += m.answers.len();
+                asked += m.answers.len();
             }
             let at = |q: f64| quantile(ratios.iter().copied(), q);
             whiskers[color].extend([[at(0.5), k as f64], [at(1.0), k as f64]]);
@@ -107,7 +107,7 @@ pub fn strategies(context: &Context) -> Result<Section, Box<dyn Error>> {
                 median(cells_on.iter().copied()),
                 worst(cells.iter().copied()),
                 worst(cells_on.iter().copied()),
-                100.0 * f64::from(undecided as u32) / query_options.max(1) as f64,
+                100.0 * f64::from(undecided as u32) / asked.max(1) as f64,
                 wrong,
             ]);
         }

@@ -78,7 +78,7 @@ pub struct Dispatcher {
 }
 
 /// Two solids, in the order in which rapier asks for them.
-struct QueryOptions<'s> {
+struct ExactPair<'s> {
     objects: [u32; 2],
     /// The first shape is the pair's b.
     is_flipped: bool,
@@ -93,7 +93,7 @@ struct Seen {
     dist: Real,
 }
 
-impl QueryOptions<'_> {
+impl ExactPair<'_> {
     /// The group's normal out of the first shape and out of the second, each in its own frame.
     fn normals(&self, group: &Group) -> [Vector; 2] {
         if self.is_flipped {
@@ -110,12 +110,12 @@ impl QueryOptions<'_> {
 }
 
 /// Which pair is asked for, if both shapes are solids; otherwise whether one is.
-fn query_options<'s>(pos12: &'s Pose, g1: &dyn Shape, g2: &dyn Shape) -> Result<Option<QueryOptions<'s>>, Unsupported> {
+fn exact_pair<'s>(pos12: &'s Pose, g1: &dyn Shape, g2: &dyn Shape) -> Result<Option<ExactPair<'s>>, Unsupported> {
     match (g1.as_shape::<Solid>(), g2.as_shape::<Solid>()) {
         (Some(s1), Some(s2)) => {
             let is_flipped = s1.object > s2.object;
             let objects = [s1.object.min(s2.object), s1.object.max(s2.object)];
-            Ok(Some(QueryOptions { objects, is_flipped, pos12 }))
+            Ok(Some(ExactPair { objects, is_flipped, pos12 }))
         }
         (None, None) => Ok(None),
         _ => Err(Unsupported),
@@ -125,7 +125,7 @@ fn query_options<'s>(pos12: &'s Pose, g1: &dyn Shape, g2: &dyn Shape) -> Result<
 /// Parry's answer, unless a solid takes part.
 macro_rules! parry {
     ($pos12:expr, $g1:expr, $g2:expr, $call:expr) => {
-        match query_options($pos12, $g1, $g2)? {
+        match exact_pair($pos12, $g1, $g2)? {
             Some(_) => Err(Unsupported),
             None => $call,
         }
@@ -139,7 +139,7 @@ impl QueryDispatcher for Dispatcher {
         g1: &dyn Shape,
         g2: &dyn Shape,
     ) -> Result<ShapeIntersection, Unsupported> {
-        let Some(pair) = query_options(pos12, g1, g2)? else {
+        let Some(pair) = exact_pair(pos12, g1, g2)? else {
             return DefaultQueryDispatcher.intersection_test(pos12, g1, g2);
         };
         let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
@@ -226,7 +226,7 @@ where
         manifolds: &mut Vec<ContactManifold<M, C>>,
         workspace: &mut Option<ContactManifoldsWorkspace>,
     ) -> Result<(), Unsupported> {
-        let Some(pair) = query_options(pos12, g1, g2)? else {
+        let Some(pair) = exact_pair(pos12, g1, g2)? else {
             return DefaultQueryDispatcher.contact_manifolds(pos12, g1, g2, prediction, manifolds, workspace);
         };
         // What the solver left with each point goes on with its id, whichever manifold that is in now. Manifolds are never

@@ -132,7 +132,7 @@ struct Placed {
 }
 
 impl Placed {
-    fn query_options(&self) -> WorldPose {
+    fn world_pose(&self) -> WorldPose {
         WorldPose::new(self.pose.position + self.back, self.pose.rotation)
     }
 }
@@ -326,7 +326,7 @@ impl<T: Transport> Coupling<T> {
         let slots = self.session.begin_step(self.batch.len())?;
         for (slot, object) in slots.iter_mut().zip(&self.batch) {
             let placed = &mut self.objects[*object as usize];
-            *slot = PoseRecord::start(*object, &placed.query_options());
+            *slot = PoseRecord::start(*object, &placed.world_pose());
             placed.is_stale = true;
         }
         self.requests += 1;
@@ -348,7 +348,7 @@ impl<T: Transport> Coupling<T> {
             let pair = (record.a, record.b);
             let wanted = record.status != OVERLAP && self.deep.iter().any(|d| (d.0, d.1) == pair);
             if !again || wanted {
-                let [a, b] = [record.a, record.b].map(|id| self.objects[id as usize].query_options());
+                let [a, b] = [record.a, record.b].map(|id| self.objects[id as usize].world_pose());
                 self.manifolds.add(&reply, record, &a, &b);
             }
         }

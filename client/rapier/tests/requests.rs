@@ -228,7 +228,7 @@ fn a_second_request_that_fails_leaves_the_depth() {
         assert_eq!(s.points().len(), kept.len());
         let pair = s.coupling.manifolds().pairs().next().unwrap();
         assert!(pair.points.iter().all(|p| (p.separation - 5e-4).abs() < 1e-4), "half a gap out: {pair:?}");
-        assert_eq!(s.world.narrow_phase.contact_pairs().count(), 0, "rapier was not query_options yet");
+        assert_eq!(s.world.narrow_phase.contact_pairs().count(), 0, "rapier was not asked yet");
         s.coupling.step(&mut s.world).unwrap();
         let pair = s.world.narrow_phase.contact_pairs().next().unwrap();
         let found: Vec<f64> = pair.manifolds().iter().flat_map(|m| m.points.iter().map(|p| p.dist)).collect();

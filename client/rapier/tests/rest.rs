@@ -253,11 +253,11 @@ fn a_stack_stands_as_rapiers_own_does_and_then_asks_nothing() {
         s.step();
     }
     assert!(bodies.iter().all(|b| s.world.bodies[*b].is_sleeping()));
-    let query_options = s.coupling.requests();
+    let asked = s.coupling.requests();
     for _ in 0..10 {
         s.step();
     }
-    assert_eq!(s.coupling.requests(), query_options, "all sleep");
+    assert_eq!(s.coupling.requests(), asked, "all sleep");
 }
 
 #[test]

@@ -50,11 +50,10 @@ impl<T: Transport> Session<T> {
             Stage::Idle | Stage::Sent { .. } => return Err(Error::Misuse("no step was begun")),
         }
         let o = &self.options;
-        let query_options =
-            [(o.first, ASK_FIRST), (o.details, ASK_DETAILS), (o.clear, ASK_CLEAR), (o.polling, ASK_POLLING)];
+        let asked = [(o.first, ASK_FIRST), (o.details, ASK_DETAILS), (o.clear, ASK_CLEAR), (o.polling, ASK_POLLING)];
         let request = StepRequest {
             version: PROTOCOL_VERSION,
-            query_options: query_options.iter().map(|(on, bit)| if *on { *bit } else { 0 }).sum(),
+            asked: asked.iter().map(|(on, bit)| if *on { *bit } else { 0 }).sum(),
             session: self.opened.session,
             epoch: self.opened.epoch,
             step: self.step + 1,

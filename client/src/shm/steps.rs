@@ -342,7 +342,7 @@ impl Transport for SharedMemory {
             return Err(Error::Misuse("no step was begun"));
         };
         *loan.user_header_mut() = request;
-        link.polling = request.query_options & ASK_POLLING != 0;
+        link.polling = request.asked & ASK_POLLING != 0;
         link.pending = Some(loan.send().map_err(|e| system("a batch cannot be sent", e))?);
         link.wake_server();
         Ok(())

@@ -171,7 +171,7 @@ fn bad_files_of_all_kinds_are_replaced() {
 }
 
 /// Asks a model that was read whatever would follow an index of it.
-fn query_options(model: &Model) {
+fn asked(model: &Model) {
     fn visit(model: &Model, node: &crate::octree::Node, out: &mut Vec<u32>) {
         out.clear();
         let mut tokens = vec![];
@@ -201,7 +201,7 @@ fn well_sealed_nonsense_is_refused_or_a_model_that_can_be_asked() {
             other[at] = value;
             match decode(&other) {
                 Ok((model, _)) => {
-                    query_options(&model);
+                    asked(&model);
                     read += 1;
                 }
                 Err(Flaw::Content(_)) => refused += 1,

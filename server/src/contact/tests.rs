@@ -249,7 +249,7 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
     let (plate, block) =
         (pierced(Cuboid { half: v(1.0, 1.0, 0.2) }, vec![hole]), simple(Cuboid { half: v(0.3, 0.2, 0.4) }));
     let down = turn(Pose::new(v(0.1, 0.05, 2.0), tilt(v(0.3, 0.2, 0.1))), v(0.0, 0.0, -2.5), v(0.2, 0.1, 0.3));
-    let query_options = |a: &Model, motion: Motion, strategies: Strategies, scratch: &mut Scratch| {
+    let ask = |a: &Model, motion: Motion, strategies: Strategies, scratch: &mut Scratch| {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let query = PairQuery {
             a: Body { model: a, placed: placed(rest()) },
@@ -263,16 +263,16 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
     };
     let search = Strategies { convex: false, cavities: false, ..Strategies::default() };
     let mut timed = Scratch::timed();
-    let own = query_options(&plate, down, search, &mut Scratch::default());
+    let own = ask(&plate, down, search, &mut Scratch::default());
     assert!(own.status == Status::Contact && own.counters.cells > 0, "{own:?}");
-    assert_eq!(query_options(&plate, down, search, &mut timed), own);
+    assert_eq!(ask(&plate, down, search, &mut timed), own);
     let clock = timed.take_clock().expect("a clock");
     assert!([Stage::Region, Stage::Walk, Stage::Cells].iter().all(|s| !clock.of(*s).is_zero()), "{clock:?}");
     assert_eq!(clock.last(), Stage::Cells);
     assert_eq!(clock.total(), Stage::ALL.iter().map(|s| clock.of(*s)).sum());
     // Convex bodies are told in front; what was told before is not in it.
     let ball = simple(Sphere { radius: 0.5 });
-    let met = query_options(&ball, down, Strategies::default(), &mut timed);
+    let met = ask(&ball, down, Strategies::default(), &mut timed);
     let clock = timed.take_clock().expect("a clock");
     assert!(met.counters.cells == 0 && clock.last() == Stage::Front && !clock.total().is_zero(), "{met:?} {clock:?}");
     assert!(Scratch::default().take_clock().is_none());

@@ -100,7 +100,7 @@ impl ServerProcess {
                 None => std::thread::sleep(Duration::from_millis(2)),
             }
         }
-        Err("expected the server to end when query_options to, found it running".into())
+        Err("expected the server to end when asked to, found it running".into())
     }
 }
 

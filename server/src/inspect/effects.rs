@@ -90,7 +90,7 @@ pub fn effects(scene: &Scene) -> String {
     }
     let _ = writeln!(
         out,
-        "  of the objects, in this step: at rest {rest} (two of them: query_options about the start alone), translating {slide} (no \
+        "  of the objects, in this step: at rest {rest} (two of them: asked about the start alone), translating {slide} (no \
          bounds of rotation), turning {turn}"
     );
     out

@@ -186,21 +186,21 @@ impl Scene {
         if request.version != PROTOCOL_VERSION {
             return write(0, refuse(ErrorCode::Version, None), &none);
         }
-        if request.query_options & !ASK_ALL != 0 {
+        if request.asked & !ASK_ALL != 0 {
             return write(0, refuse(ErrorCode::BadNumber, None), &none);
         }
         if n > records.len() {
             return write(0, refuse(ErrorCode::BadCount, None), &none);
         }
-        let details = request.query_options & ASK_DETAILS != 0;
+        let details = request.asked & ASK_DETAILS != 0;
         // Room for the records and, where asked for, a detail slot each.
         let room = self.max_records / if details { 2 } else { 1 };
         let cap = if request.max_records == 0 { room } else { room.min(request.max_records as usize) };
         let options = StepOptions {
             advance: request.advance,
             dt: request.dt,
-            first: request.query_options & ASK_FIRST != 0,
-            clear: request.query_options & ASK_CLEAR != 0,
+            first: request.asked & ASK_FIRST != 0,
+            clear: request.asked & ASK_CLEAR != 0,
             max_records: cap.max(1) as u32,
             max_patch_slots: u32::try_from(self.max_records).unwrap_or(u32::MAX),
             cell_limit: request.cell_limit.into(),

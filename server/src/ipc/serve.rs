@@ -98,7 +98,7 @@ struct Session {
 }
 
 impl Session {
-    fn query_options(&mut self) {
+    fn hear(&mut self) {
         (self.last_request, self.arrived) = (Instant::now(), true);
     }
 
@@ -196,7 +196,7 @@ fn send_step(response: Option<StepResponse>, call: StepCall, request: &StepReque
     let _ = response.map(StepResponse::send);
     // The end of the call before the wake-up: a client that wakes up without a reply then knows that none comes.
     drop(call);
-    if request.query_options & ASK_POLLING == 0 {
+    if request.asked & ASK_POLLING == 0 {
         wake.notify();
     }
 }
@@ -455,8 +455,8 @@ impl Lead {
             refuse(&call, code);
             return None;
         };
-        session.query_options();
-        session.polls = request.query_options & ASK_POLLING != 0;
+        session.hear();
+        session.polls = request.asked & ASK_POLLING != 0;
         self.steps += 1;
         let scene = if session.waiting { None } else { session.scene.take() };
         let Some(scene) = scene else {
@@ -511,7 +511,7 @@ impl Lead {
         let Some(session) = session else {
             return answer(&call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
         };
-        session.query_options();
+        session.hear();
         // Whatever is under way: what comes of it has nobody to go to.
         if envelope.command == Command::Close {
             self.remove(id);

@@ -35,7 +35,7 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
     if encode(&back, &back_notes).as_ref() != Some(&again) {
         return Err("another model came back".into());
     }
-    query_options(&model, model.octree.root());
+    asked(&model, model.octree.root());
     for x in [DVec3::ZERO, DVec3::new(0.1, 0.2, 0.3)] {
         model.solid.value(x);
         model.octree.locate(x);
@@ -45,10 +45,10 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
 }
 
 /// Follows all that a node points to.
-fn query_options(model: &Model, node: &Node) {
+fn asked(model: &Model, node: &Node) {
     model.literals(node, 0.0, &mut vec![]);
     for p in node.refs() {
         let _ = model.solid.primitives[*p as usize].value(DVec3::ONE);
     }
-    node.children().into_iter().flatten().for_each(|c| query_options(model, c));
+    node.children().into_iter().flatten().for_each(|c| asked(model, c));
 }

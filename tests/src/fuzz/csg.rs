@@ -80,7 +80,7 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
     for facets in [Facets::Auto, Facets::Exact, Facets::AsWritten] {
         word += &match import_csg("m.csg", &text, facets, &limits) {
             Ok(import) => {
-                query_options(&import.solid, thorough)?;
+                ask_all(&import.solid, thorough)?;
                 let kinds: Vec<_> = import.notes.iter().map(|n| family(&n.text)).collect();
                 format!("loaded {} {kinds:?} ", import.solid.primitives.len().min(4))
             }
@@ -97,7 +97,7 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
 }
 
 /// What a solid that was loaded must be able to answer.
-fn query_options(solid: &Solid, thorough: bool) -> Result<(), String> {
+fn ask_all(solid: &Solid, thorough: bool) -> Result<(), String> {
     for x in [DVec3::ZERO, DVec3::new(0.1, 0.2, 0.3), DVec3::new(-1e3, 7.0, 1e-9)] {
         if solid.value(x).is_nan() {
             return Err(format!("f is NaN at {x}"));

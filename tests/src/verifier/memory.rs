@@ -325,8 +325,8 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
         "prediction" => prediction(words, rest, &bodies, resolution),
         "answer" => {
             let mut numbers = Numbers::of(words)?;
-            let query_options = [numbers.motion()?, numbers.motion()?];
-            if query_options != motions {
+            let asked = [numbers.motion()?, numbers.motion()?];
+            if asked != motions {
                 return Err("another question".into());
             }
             let [a, b] = &bodies;

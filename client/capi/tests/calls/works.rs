@@ -233,7 +233,7 @@ fn a_resting_box_tells_its_region_and_its_corners_in_place() {
     let inside = slots(&reply).as_ptr_range();
     assert!(inside.contains(&patches.cast()));
     let detail = out(|slot| unsafe { contactd_get_detail(session.0, 0, slot) });
-    assert!(detail.is_null(), "details were not query_options for");
+    assert!(detail.is_null(), "details were not asked for");
 }
 
 #[test]

@@ -159,7 +159,7 @@ impl<'a> CavityPair<'a> {
         match (wall, &self.round) {
             (Wall::Round(u), Some(round)) => m.best(u, round.radius + round.origin.dot(u), &self.planes),
             (Wall::Flat(j), _) => m.best(self.flats[j].normal, self.flats[j].offset, &self.planes),
-            (Wall::Round(_), None) => unreachable!("a round wall is query_options for where there is one"),
+            (Wall::Round(_), None) => unreachable!("a round wall is asked for where there is one"),
         }
     }
 

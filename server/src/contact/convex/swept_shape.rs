@@ -434,8 +434,8 @@ mod tests {
         let near = motion_state(DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         let hulls = [0, 1].map(|k| Hull::new(&models[k], &Pose::IDENTITY).expect("bounded"));
         let stances = [hulls[0].swept_shape(&near), hulls[1].swept_shape(&far)];
-        let query_options = |touch| Glancing::new(stances.each_ref(), |k| hulls[k].shape(&models[k]), touch);
-        assert!(query_options(0.0).is_some_and(|g| g.look(DVec3::ZERO).apart) && query_options(0.1).is_none());
+        let glance = |touch| Glancing::new(stances.each_ref(), |k| hulls[k].shape(&models[k]), touch);
+        assert!(glance(0.0).is_some_and(|g| g.look(DVec3::ZERO).apart) && glance(0.1).is_none());
     }
 
     #[test]
