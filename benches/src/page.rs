@@ -140,6 +140,7 @@ pub fn between_marks(text: &str, name: &str, body: &str) -> Result<String, Strin
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figure::{Axis, Series, Stroke};
     use crate::row;
 
     #[test]
@@ -149,6 +150,39 @@ mod tests {
         assert_eq!(once, "before\n<!-- a -->\n\nnew\n\n<!-- /a -->\nafter");
         assert_eq!(between_marks(&once, "a", "new").expect("marks"), once);
         assert!(between_marks(text, "b", "new").is_err());
+    }
+
+    #[test]
+    fn beside_a_text_stand_numbers_and_the_figures_that_it_shows() {
+        let figure = |name: &str| Figure {
+            name: name.into(),
+            title: "t".into(),
+            caption: "c".into(),
+            axes: [Axis::Linear("x".into()), Axis::Linear("y".into())],
+            series: vec![Series { name: "s".into(), points: vec![[1.0, 2.0]], stroke: Stroke::Solid, color: 0 }],
+        };
+        let mut table = Table::new(&["class", "us"]);
+        table.push(row!["peg", 1.5]);
+        let figures = vec![figure("s_shown"), figure("s_hidden")];
+        let (title, text, summary) = ("A".into(), "words".into(), table.clone());
+        let section = Section { name: "s", title, text, figures, table, summary };
+        let folder = std::env::temp_dir().join(format!("contactd_page_{}", std::process::id()));
+        let (page, beside, words) = (folder.join("page"), folder.join("text"), folder.join("text.md"));
+        std::fs::create_dir_all(&folder).expect("a folder for the test");
+        std::fs::write(&words, "![t](text/s_shown.png)\n<!-- s -->\n<!-- /s -->\n").expect("a text");
+        let place = Place { page: &page, words: Some((&words, &beside)) };
+        publish(("title", "text"), &[section], &place).expect("published");
+        let names = |folder: &Path| {
+            let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").file_name());
+            let mut names: Vec<String> = entries.map(|n| n.to_string_lossy().into_owned()).collect();
+            names.sort();
+            names
+        };
+        assert_eq!(names(&beside), ["s.csv", "s_shown.png"]);
+        let all = ["index.html", "s.csv", "s_hidden.png", "s_hidden.svg", "s_shown.png", "s_shown.svg"];
+        assert_eq!(names(&page), all);
+        assert!(std::fs::read_to_string(&words).expect("the text").contains("| peg | 1.50 |"));
+        std::fs::remove_dir_all(&folder).expect("removed");
     }
 
     #[test]
