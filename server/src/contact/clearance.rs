@@ -15,8 +15,10 @@ use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
 use crate::contact::query::question::{Body, PairQuery};
 use crate::contact::query::task::Task;
-use crate::contact::queue::search::{Scratch, Search};
+use crate::contact::queue::scratch::Scratch;
+use crate::contact::queue::search::Search;
 use crate::contact::region;
+use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::math::tolerance::WIDE_MARGIN;
 use crate::motion::Placed;
@@ -60,12 +62,12 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
     task.delta = -level;
     task.strategies.fits &= level < task.fits_below();
     let is_empty = task.a.is_empty() || task.b.is_empty();
-    let mut search = Search::new(task, std::mem::take(scratch));
+    let mut search = Search::new(Contacts::new(task), std::mem::take(scratch));
     if !is_empty {
         search.start();
     }
     let ending = search.run(f64::INFINITY);
-    let counters = search.counters;
+    let counters = *search.counters();
     *scratch = search.into_scratch();
     (ending, counters)
 }

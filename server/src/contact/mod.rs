@@ -24,5 +24,5 @@ pub use query::options::QueryOptions;
 pub use query::outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
 pub use query::question::{Body, PairQuery, Strategies, default_resolution};
 pub use queue::clock::{Clock, Stage};
-pub use queue::search::Scratch;
+pub use queue::scratch::Scratch;
 pub use region::{Region, RegionPoint, Regions};

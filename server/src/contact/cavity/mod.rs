@@ -18,7 +18,7 @@ mod pierced;
 mod proof;
 
 use crate::contact::exclusion::literal::Side;
-use crate::contact::queue::search::Search;
+use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::motion::Relative;
 use glam::DVec3;
@@ -28,12 +28,12 @@ use smallvec::SmallVec;
 
 /// Pairs of parts beyond which the search does better.
 const MOST_PAIRS: usize = 256;
-/// Contacts that are solved for before a pair is left to the search.
+/// Contacts that are solved for before a pair is left to the contacts.
 const MOST_CONTACTS: usize = 6;
 
-/// The answer for two unions of convex primitives, of which one or both have cavities; `None` leaves them to the search.
-pub(super) fn answer(search: &mut Search) -> Option<Ending> {
-    let task = search.task;
+/// The answer for two unions of convex primitives, of which one or both have cavities; `None` leaves them to the contacts.
+pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
+    let task = contacts.task;
     let (of_a, of_b) = (task.model_a.parts.as_ref()?, task.model_b.parts.as_ref()?);
     let pierced = of_a.are_pierced() || of_b.are_pierced();
     if !pierced || of_a.all().len() * of_b.all().len() > MOST_PAIRS {
@@ -51,11 +51,11 @@ pub(super) fn answer(search: &mut Search) -> Option<Ending> {
             let pair = if b.is_pierced() { of_b().or_else(of_a) } else { of_a() }?;
             // Later ones than what is known are not looked for to their end.
             let until = guess.as_ref().map_or(1.0, |(_, g)| g.t);
-            match pair.first(until, &mut search.counters.closed_forms) {
+            match pair.first(until, &mut contacts.counters.closed_forms) {
                 // What starts as near as it may be is told where it comes no deeper.
                 First::Near => {
                     let (verdict, looks) = pair.prove(1.0, None);
-                    search.counters.closed_forms += looks;
+                    contacts.counters.closed_forms += looks;
                     if verdict != Verdict::Proven {
                         return None;
                     }
@@ -74,29 +74,29 @@ pub(super) fn answer(search: &mut Search) -> Option<Ending> {
     if let Some((i, g)) = &guess {
         solved += 1;
         // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
-        pairs[*i].0.solve(search, g);
+        pairs[*i].0.solve(contacts, g);
     }
     for (pair, toward) in &pairs {
         loop {
-            let end = search.goal().min(1.0);
+            let end = contacts.goal().min(1.0);
             let (verdict, looks) = pair.prove(end, *toward);
-            search.counters.closed_forms += looks;
+            contacts.counters.closed_forms += looks;
             match verdict {
                 Verdict::Proven => break,
                 Verdict::Open => return None,
                 Verdict::Met(t, wall) => {
                     solved += 1;
-                    let goal = search.goal();
-                    let guess = pair.settle(t, wall, 0.0, &mut search.counters.closed_forms);
-                    let found = solved <= MOST_CONTACTS && pair.solve(search, &guess);
-                    if !(found && search.goal() < goal) {
+                    let goal = contacts.goal();
+                    let guess = pair.settle(t, wall, 0.0, &mut contacts.counters.closed_forms);
+                    let found = solved <= MOST_CONTACTS && pair.solve(contacts, &guess);
+                    if !(found && contacts.goal() < goal) {
                         return None;
                     }
                 }
             }
         }
     }
-    Some(search.found.take().map_or(Ending::Clear, Ending::Contact))
+    Some(contacts.end())
 }
 
 #[cfg(test)]

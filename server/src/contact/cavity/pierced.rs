@@ -1,10 +1,10 @@
 //! A convex body against a body with a cavity that it is in: its clearances, and the contact that they point to.
 
 use super::body::{Best, CavityBody, Moment, Plane};
-use crate::contact::convex::faces_at;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
-use crate::contact::queue::search::Search;
+use crate::contact::witness::contacts::Contacts;
+use crate::contact::witness::faces::faces_at;
 use crate::contact::witness::newton::{self, Constraint};
 use crate::math::any_perpendicular;
 use crate::motion::Relative;
@@ -278,7 +278,7 @@ impl<'a> CavityPair<'a> {
     }
 
     /// Solves for the contact that a guess points to; true when both trees confirm it.
-    pub(super) fn solve(&self, search: &mut Search, guess: &Guess) -> bool {
+    pub(super) fn solve(&self, contacts: &mut Contacts, guess: &Guess) -> bool {
         let at = self.relative.at(guess.t);
         let other = if self.side == Side::A { Side::B } else { Side::A };
         let best = &guess.best;
@@ -324,6 +324,6 @@ impl<'a> CavityPair<'a> {
         let total: f64 = active.iter().map(|(c, l)| if matches!(c, Constraint::Apex(..)) { 0.0 } else { *l }).sum();
         let (constraints, lambda) = active.iter().map(|(c, l)| (*c, l / total)).unzip();
         let x = if self.side == Side::A { x } else { at.a_point(x) };
-        search.confirm(constraints, x, guess.t, lambda, true)
+        contacts.confirm(constraints, x, guess.t, lambda, true)
     }
 }

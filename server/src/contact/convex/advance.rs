@@ -8,16 +8,16 @@ use super::support::Body;
 use super::whole::{APART, body_of, excluded};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
-use crate::contact::queue::search::Search;
+use crate::contact::witness::contacts::Contacts;
+use crate::contact::witness::faces::faces_at;
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
 use crate::motion::Instant;
-use crate::solid::local::LiteralId;
-use crate::solid::{Primitive, Sense};
+use crate::solid::Primitive;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
-/// Distance evaluations before a pair is left to the search.
+/// Distance evaluations before a pair is left to the contacts.
 const ROUNDS: usize = 24;
 /// Distance evaluations that a proof of a kept distance may take.
 const KEPT: u64 = 6;
@@ -39,14 +39,14 @@ const MEND: (f64, usize) = (0.01, 4);
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
 const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
-/// The answer for two solids that are one convex primitive each; `None` leaves them to the search. The distance at the
+/// The answer for two solids that are one convex primitive each; `None` leaves them to the contacts. The distance at the
 /// start is looked for along a direction of the world first, if one is given.
-pub fn answer(search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
-    let task = search.task;
+pub fn answer(contacts: &mut Contacts, along: Option<DVec3>) -> Option<Ending> {
+    let task = contacts.task;
     let (a, b) = (task.a.whole()?, task.b.whole()?);
     let (body_a, body_b) = (body_of(a)?, body_of(b)?);
     let advance = Advance::new(task, (a, body_a), (b, body_b));
-    if advance.never_near() { Some(Ending::Clear) } else { advance.run(search, along) }
+    if advance.never_near() { Some(Ending::Clear) } else { advance.run(contacts, along) }
 }
 
 /// Two solids that are one convex primitive each, to be asked how far apart they are.
@@ -202,7 +202,7 @@ impl<'a> Advance<'a> {
         here.phi > APART * self.task.delta && self.pace.proven(&here, &self.gap(end, n)) >= 1.0
     }
 
-    fn run(&self, search: &mut Search, along: Option<DVec3>) -> Option<Ending> {
+    fn run(&self, contacts: &mut Contacts, along: Option<DVec3>) -> Option<Ending> {
         let scale = self.task.scale;
         let mut t = 0.0;
         let mut near = false;
@@ -216,7 +216,7 @@ impl<'a> Advance<'a> {
             }
             let first = along
                 .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
-            search.counters.closed_forms += 1;
+            contacts.counters.closed_forms += 1;
             let seen = |b: &Body| {
                 let found = nearest(&self.a.1, b, first, GOOD)?;
                 let n = (m.at.world_from_a * found.normal).normalize();
@@ -242,8 +242,8 @@ impl<'a> Advance<'a> {
             let guess = t + found.distance.max(0.0) / closing;
             if contact.is_none() && !near && closing > 0.0 && found.distance <= NEAR * scale && guess <= LATEST {
                 let mend = found.distance <= MEND.0 * scale || round >= MEND.1;
-                contact = self.contact(search, &m, &found, guess.min(1.0), mend);
-                if let Some(hit) = search.hit(t) {
+                contact = self.contact(contacts, &m, &found, guess.min(1.0), mend);
+                if let Some(hit) = contacts.hit(t) {
                     return Some(hit);
                 }
             }
@@ -254,7 +254,7 @@ impl<'a> Advance<'a> {
                 let proven =
                     fixed.phi > self.pace.least && c.phi > self.pace.least && self.pace.proven(&fixed, &c) >= c.t;
                 if proven || self.pace.prove(here, c, |t, n| self.gap(&self.moment(t), n)) >= c.t {
-                    return search.found.take().map(Ending::Contact);
+                    return contacts.found.take().map(Ending::Contact);
                 }
             }
             // As far as this direction proves; a nearer end tightens the bound.
@@ -288,7 +288,7 @@ impl<'a> Advance<'a> {
 
     /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees
     /// confirm it.
-    fn contact(&self, search: &mut Search, m: &Moment, found: &Nearest, guess: f64, mend: bool) -> Option<Gap> {
+    fn contact(&self, contacts: &mut Contacts, m: &Moment, found: &Nearest, guess: f64, mend: bool) -> Option<Gap> {
         let b = m.at.b_point(found.b);
         let normal_b = m.at.b_from_a * -found.normal;
         let x = 0.5 * (found.a + found.b);
@@ -310,15 +310,15 @@ impl<'a> Advance<'a> {
                 break;
             }
             tried.clone_from(&constraints);
-            if search.confirm(constraints, x, guess, lambda, mend) {
-                if search.found.as_ref().is_some_and(|f| f.deep.stationarity > BALANCED) {
+            if contacts.confirm(constraints, x, guess, lambda, mend) {
+                if contacts.found.as_ref().is_some_and(|f| f.deep.stationarity > BALANCED) {
                     // Balanced but for a slight tilt: which end of the line comes first is not told.
-                    search.found = None;
+                    contacts.found = None;
                     continue;
                 }
-                let f = search.found.as_ref()?;
+                let f = contacts.found.as_ref()?;
                 let s = f.touch.as_ref().filter(|s| s.t >= 0.0)?;
-                let normal = search.normal(s)?;
+                let normal = contacts.normal(s)?;
                 let at = self.task.relative.at(s.t);
                 let n = (at.world_from_a * normal).normalize();
                 return Some(self.gap(&self.moment(s.t), n));
@@ -326,74 +326,4 @@ impl<'a> Advance<'a> {
         }
         None
     }
-}
-
-/// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
-pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
-    let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
-    for (i, face) in p.faces.iter().enumerate() {
-        let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
-        if let Some(apex) = face.apex()
-            && (x - apex.point).length() <= tol
-        {
-            // An apex holds every direction of its normal cone.
-            let along = apex.directions();
-            out.extend((0..3).map(|k| (Constraint::Apex(side, id, k), n.dot(along[usize::from(k)]))));
-            return;
-        }
-        let f = face.at(x);
-        if f.value.abs() <= tol && f.normal.dot(n) > -0.99 {
-            near.push((id, f.normal));
-        }
-    }
-    // The least set of them whose normals hold n between them: one, two, then three.
-    let mut best: (f64, SmallVec<[(usize, f64); 3]>) = (f64::INFINITY, SmallVec::new());
-    let mut offer = |set: &[usize]| {
-        let Some(weights) = weights(set, &near, n) else { return };
-        let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| near[*i].1 * *w).sum();
-        // A larger set must be better by more than rounding.
-        let off = (sum - n).length() + 1e-7 * set.len() as f64;
-        if off < 0.5 * best.0 || (off < best.0 && set.len() == best.1.len()) {
-            best = (off, set.iter().copied().zip(weights).collect());
-        }
-    };
-    for i in 0..near.len() {
-        offer(&[i]);
-    }
-    for i in 0..near.len() {
-        for j in i + 1..near.len() {
-            offer(&[i, j]);
-        }
-    }
-    for i in 0..near.len() {
-        for j in i + 1..near.len() {
-            for k in j + 1..near.len() {
-                offer(&[i, j, k]);
-            }
-        }
-    }
-    out.extend(best.1.iter().map(|(i, w)| (Constraint::Literal(side, near[*i].0), *w)));
-}
-
-/// Least-squares weights of some unit vectors for n; `None` if one is negative or they are dependent.
-fn weights(set: &[usize], near: &[(LiteralId, DVec3)], n: DVec3) -> Option<SmallVec<[f64; 3]>> {
-    let g = |i: usize| near[set[i]].1;
-    let w: SmallVec<[f64; 3]> = match set.len() {
-        1 => SmallVec::from_slice(&[g(0).dot(n)]),
-        2 => {
-            let c = g(0).dot(g(1));
-            let det = 1.0 - c * c;
-            let (p, q) = (g(0).dot(n), g(1).dot(n));
-            SmallVec::from_slice(&[(p - c * q) / det, (q - c * p) / det])
-        }
-        _ => {
-            let m = glam::DMat3::from_cols(g(0), g(1), g(2));
-            let det = m.determinant();
-            if det.abs() < 1e-9 {
-                return None;
-            }
-            SmallVec::from_slice(&(m.inverse() * n).to_array())
-        }
-    };
-    w.iter().all(|w| w.is_finite() && *w > 0.0).then_some(w)
 }

@@ -41,7 +41,7 @@ mod whole;
 use crate::contact::query::outcome::{Outcome, Status};
 use crate::contact::query::question::PairQuery;
 use crate::solid::primitive::Form;
-pub(super) use advance::{Convex, answer, faces_at};
+pub(super) use advance::{Convex, answer};
 pub(super) use balls::quick as balls;
 use glam::DVec3;
 use overlap::{Look, Start};

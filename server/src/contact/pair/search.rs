@@ -11,7 +11,9 @@ use crate::contact::query::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, S
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::{RAISES, Task, clear_of_walls, most_raised, raised, witness_level};
 use crate::contact::queue::clock::Stage;
-use crate::contact::queue::search::{Scratch, Search};
+use crate::contact::queue::scratch::Scratch;
+use crate::contact::queue::search::Search;
+use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::extent::{ACTIVE, INCIDENT, extent, note, noted, rank_of};
 use crate::contact::witness::features::Features;
 use crate::contact::witness::found::Ending;
@@ -147,8 +149,8 @@ impl<'a> PairSearch<'a> {
     pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
         if let Some(search) = &mut self.search {
             let limit =
-                self.limit.saturating_sub(self.spent).min(search.counters.spent(self.limit).saturating_add(cells));
-            search.task.limit = limit;
+                self.limit.saturating_sub(self.spent).min(search.counters().spent(self.limit).saturating_add(cells));
+            search.limit_to(limit);
             self.task.limit = limit;
         }
         self.run(until)
@@ -196,18 +198,19 @@ impl<'a> PairSearch<'a> {
         let mut outcome = Outcome::clear(resolution);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
         outcome.counters.closed_forms = before.counters.closed_forms;
-        let mut search = Search::new(task, scratch);
+        let mut contacts = Contacts::new(task);
         let (mut ending, mut overlap) = (None, None);
         // Of what has no volume nothing is asked.
         let some = !a.is_empty() && !b.is_empty();
         match quick {
             Quick::Overlap(x) => overlap = Some(x),
-            Quick::Open(along) if query.strategies.convex => ending = convex::answer(&mut search, along),
+            Quick::Open(along) if query.strategies.convex => ending = convex::answer(&mut contacts, along),
             _ => {}
         }
         if ending.is_none() && overlap.is_none() && some && query.strategies.cavities {
-            ending = cavity::answer(&mut search);
+            ending = cavity::answer(&mut contacts);
         }
+        let mut search = Search::new(contacts, scratch);
         if ending.is_none() && overlap.is_none() && some {
             search.start();
         }
@@ -324,10 +327,9 @@ impl<'a> PairSearch<'a> {
             // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
             let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
             let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
-            let cells = search.counters.spent(self.limit);
+            let cells = search.counters().spent(self.limit);
             self.spent += cells;
-            self.outcome.counters += search.counters;
-            search.counters = Default::default();
+            self.outcome.counters += search.take_counters();
             match ending {
                 // What a finer search has found is there all the same.
                 Ending::Clear if self.open.as_ref().is_some_and(|open| open.found.is_some()) => self.leave_open(0.0),
@@ -454,10 +456,11 @@ impl<'a> PairSearch<'a> {
         self.task.delta = self.task.ignored_depth + self.level * self.resolution;
         self.task.limit = self.task.limit.saturating_sub(cells);
         let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
-        let mut search = Search::new(self.task, scratch);
+        let mut contacts = Contacts::new(self.task);
         if self.coarser > 0 && self.task.strategies.cavities {
-            self.ending = cavity::answer(&mut search);
+            self.ending = cavity::answer(&mut contacts);
         }
+        let mut search = Search::new(contacts, scratch);
         if self.ending.is_none() {
             search.start();
         }
@@ -468,13 +471,13 @@ impl<'a> PairSearch<'a> {
 
     /// Cells' worth of work done so far.
     pub fn spent(&self) -> u64 {
-        self.spent + self.search.as_ref().map_or(0, |search| search.counters.spent(self.limit))
+        self.spent + self.search.as_ref().map_or(0, |search| search.counters().spent(self.limit))
     }
 
     /// Work done so far.
     pub fn counters(&self) -> Counters {
         let mut counters = self.outcome.counters;
-        counters += self.search.as_ref().map_or_else(Counters::default, |search| search.counters);
+        counters += self.search.as_ref().map_or_else(Counters::default, |search| *search.counters());
         counters
     }
 

@@ -11,25 +11,25 @@
 //! was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for clearances, too. At t = 0 such cells are refined like any other, and a
 //! witness found there restarts the search at 2 delta, then means overlap.
 
-use super::cell::{Cell, Range, Source};
-use super::clock::{Clock, Stage};
-use super::handed::Handed;
+use super::cell::{Cell, Source};
+use super::clock::Stage;
+use super::items::{Items, prune_in_pool};
+use super::propose::Proposals;
+use super::scratch::Scratch;
+use super::slices::Slices;
 use crate::contact::exclusion::clause::{self, Advance, Hint};
 use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::outcome::{Counters, DEFAULT_CELL_LIMIT};
-use crate::contact::query::task::Task;
+use crate::contact::witness::climb;
+use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
-use crate::contact::witness::found::Found;
-use crate::math::halt::Halt;
+use crate::contact::witness::known::Known;
 use crate::motion::Instant;
-use crate::solid::Face;
-use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::local::{self, LiteralId, Truth};
 use glam::DVec3;
-use std::collections::BinaryHeap;
-use std::sync::Arc;
 
 /// Cells after which a witness is looked for; again whenever as many more were refined.
-pub(super) const FIRST_PROBE: u64 = 2_000;
+const FIRST_PROBE: u64 = 2_000;
 
 /// Cells beyond the goal that are asked whether another contact touches earlier.
 const MAX_RIVALS: u32 = 16;
@@ -57,51 +57,16 @@ const CELLS_PER_LOOK: u64 = 16;
 /// A point this many roundings short of delta can be neither excluded nor confirmed by much.
 const NEARLY: f64 = 8.0;
 
-/// Memory of a search, kept from one to the next.
-#[derive(Default, Debug)]
-pub struct Scratch {
-    heap: BinaryHeap<Cell>,
-    pub(super) pool: Vec<Token>,
-    pub(super) clip_planes_b: Vec<Face>,
-    pub(super) clause: clause::Scratch,
-    pub(super) hints: Vec<Hint>,
-    pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
-    clock: Option<Clock>,
-    /// Ends searches like their limit, from outside.
-    pub halt: Option<Arc<Halt>>,
-}
+/// Cells after which a witness and what is proven by then are the answer.
+const LAST: u64 = 16_000;
 
-impl Scratch {
-    /// With a clock: `take_clock` tells afterwards where the time went.
-    pub fn timed() -> Self {
-        Self { clock: Some(Clock::default()), ..Self::default() }
-    }
-
-    /// Memory whose searches end from outside.
-    pub fn heeding(halt: Option<Arc<Halt>>) -> Self {
-        Self { halt, ..Self::default() }
-    }
-
-    /// What the clock says, which starts anew.
-    pub fn take_clock(&mut self) -> Option<Clock> {
-        self.clock.as_mut().map(std::mem::take)
-    }
-
-    /// What follows is work of a stage.
-    pub(in crate::contact) fn enter(&mut self, stage: impl Into<Option<Stage>>) {
-        if let Some(clock) = &mut self.clock {
-            clock.enter(stage.into());
-        }
-    }
-}
+/// A bracket this wide, a fraction of the step, is told where no coarser resolution has a narrower one.
+const WIDE: f64 = 1e-3;
 
 /// A search in progress.
 pub struct Search<'a> {
-    pub(in crate::contact) task: Task<'a>,
-    pub(super) scratch: Scratch,
-    pub(super) handed: Handed,
-    serial: u64,
-    pub(in crate::contact) found: Option<Found>,
+    contacts: Contacts<'a>,
+    items: Items,
     /// Cells beyond the goal that were asked for a rival.
     rivals: u32,
     instant: Instant,
@@ -110,135 +75,102 @@ pub struct Search<'a> {
     /// Cells' worth of work after which the search ends as `Ending::Long`.
     pub(in crate::contact) patience: u64,
     /// Where the search came to its end without an answer: time and place.
-    pub(super) stuck: Option<(f64, DVec3)>,
-    /// Work done so far.
-    pub counters: Counters,
+    stuck: Option<(f64, DVec3)>,
 }
 
 impl<'a> Search<'a> {
-    /// A search with an empty queue; see `start`.
-    pub fn new(task: Task<'a>, mut scratch: Scratch) -> Self {
-        scratch.heap.clear();
-        scratch.pool.clear();
-        scratch.clip_planes_b.clear();
-        scratch.tried.clear();
-        scratch.hints.clear();
-        (scratch.clause.clauses, scratch.clause.evaluations) = (0, 0);
-        let instant = task.relative.at(0.0);
+    /// A search with an empty queue (see `start`), after kernels that may have found contacts, but did not settle the task.
+    pub fn new(contacts: Contacts<'a>, scratch: Scratch) -> Self {
+        let instant = contacts.task.relative.at(0.0);
         Self {
-            task,
-            scratch,
-            handed: Handed::default(),
-            serial: 0,
-            found: None,
+            contacts,
+            items: Items::new(scratch),
             rivals: 0,
             instant,
             probe: FIRST_PROBE,
             patience: u64::MAX,
             stuck: None,
-            counters: Counters::default(),
         }
+    }
+
+    /// Queues the whole step.
+    pub fn start(&mut self) {
+        self.items.push(Cell::source(0.0, 1.0, Source::Slice));
+    }
+
+    /// Work done so far.
+    pub fn counters(&self) -> &Counters {
+        &self.contacts.counters
+    }
+
+    /// The work done so far, which is counted anew.
+    pub fn take_counters(&mut self) -> Counters {
+        std::mem::take(&mut self.contacts.counters)
+    }
+
+    /// Lets the search do so many cells' worth of work in all.
+    pub fn limit_to(&mut self, cells: u64) {
+        self.contacts.task.limit = cells;
     }
 
     /// Ends the search and gives its memory back.
     pub fn into_scratch(self) -> Scratch {
-        self.scratch
-    }
-
-    pub(super) fn store(&mut self, tokens: &[Token]) -> Range {
-        let start = self.scratch.pool.len() as u32;
-        self.scratch.pool.extend_from_slice(tokens);
-        (start, self.scratch.pool.len() as u32)
-    }
-
-    pub(super) fn push(&mut self, mut cell: Cell) {
-        cell.serial = self.serial;
-        self.serial += 1;
-        self.scratch.heap.push(cell);
-    }
-
-    /// Takes the earliest item off the queue.
-    #[cfg(test)]
-    pub(super) fn pop(&mut self) -> Option<Cell> {
-        self.scratch.heap.pop()
+        self.items.scratch
     }
 
     /// Time before which nothing can happen in what is queued; infinite when nothing is.
     pub fn earliest(&self) -> f64 {
-        self.scratch.heap.peek().map_or(f64::INFINITY, |c| c.t)
-    }
-
-    /// The ending of a search that asks for a hit alone, once a contact is known; nothing is met before `proven`. Only where
-    /// the start is known to be free.
-    pub(in crate::contact) fn hit(&mut self, proven: f64) -> Option<Ending> {
-        if self.task.query_options.time() {
-            return None;
-        }
-        let found = self.found.take()?;
-        Some(Ending::Contact(Found { goal: proven.max(found.goal), ..found }))
-    }
-
-    /// Time of the item that was taken off the queue last: nothing happens before it.
-    pub(super) fn now(&self) -> f64 {
-        self.instant.t
-    }
-
-    pub(in crate::contact) fn goal(&self) -> f64 {
-        self.found.as_ref().map_or(f64::INFINITY, |f| f.goal - self.task.proof_slack)
-    }
-
-    /// Time until which a rival of the contact found may come; the goal or later.
-    fn horizon(&self) -> f64 {
-        self.found.as_ref().map_or(f64::INFINITY, |f| f.latest_rival().max(f.goal))
+        self.items.earliest()
     }
 
     /// Runs to the end, or until nothing before `until` is left: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Ending> {
-        self.scratch.enter(Stage::Cells);
+        self.items.scratch.enter(Stage::Cells);
         loop {
-            let Some(cell) = self.scratch.heap.peek().copied() else {
-                return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
+            let Some(cell) = self.items.scratch.heap.peek().copied() else {
+                return Some(self.contacts.end());
             };
-            if cell.t >= self.goal() {
+            if cell.t >= self.contacts.goal() {
                 // Proven. What lies just behind may touch earlier all the same: a few cells are asked once more.
-                let asks = cell.source == Source::Cell && cell.t < self.horizon() && self.rivals < MAX_RIVALS;
-                if asks && self.counters.spent(self.task.asked_limit) < self.task.limit {
-                    self.scratch.heap.pop();
+                let asks = cell.source == Source::Cell && cell.t < self.contacts.horizon() && self.rivals < MAX_RIVALS;
+                if asks && self.contacts.counters.spent(self.contacts.task.asked_limit) < self.contacts.task.limit {
+                    self.items.scratch.heap.pop();
                     self.rivals += 1;
                     self.refine(cell);
                     continue;
                 }
-                return Some(self.found.take().map_or(Ending::Clear, Ending::Contact));
+                return Some(self.contacts.end());
             }
             if cell.t > until {
                 return None;
             }
-            if self.counters.cells >= LONG
+            if self.contacts.counters.cells >= LONG
                 && let Some(ending) = self.settle_for(cell.t)
             {
                 return Some(ending);
             }
             // Slices of time are few, and cost no cells.
             if cell.source == Source::Cell
-                && (self.counters.spent(self.task.asked_limit) >= self.task.limit || self.is_halted())
+                && (self.contacts.counters.spent(self.contacts.task.asked_limit) >= self.contacts.task.limit
+                    || self.is_halted())
             {
                 return Some(Ending::Limit(cell.t));
             }
             // Counted as the default limit counts, so that no other limit changes an answer that it does not cut.
-            if cell.source == Source::Cell && self.counters.spent(DEFAULT_CELL_LIMIT) >= self.patience {
+            if cell.source == Source::Cell && self.contacts.counters.spent(DEFAULT_CELL_LIMIT) >= self.patience {
                 return Some(self.impatient(&cell));
             }
-            if cell.source == Source::Cell && self.counters.cells >= self.probe {
-                self.probe = 2 * self.counters.cells;
+            if cell.source == Source::Cell && self.contacts.counters.cells >= self.probe {
+                self.probe = 2 * self.contacts.counters.cells;
                 if let Some(ending) = self.look_for_witness(&cell) {
                     return Some(ending);
                 }
                 continue;
             }
-            self.scratch.heap.pop();
+            self.items.scratch.heap.pop();
             let ending = self.refine(cell);
-            self.counters.clauses = self.scratch.clause.clauses;
-            self.counters.evaluations = self.scratch.clause.evaluations;
+            self.contacts.counters.clauses = self.items.scratch.clause.clauses;
+            self.contacts.counters.evaluations = self.items.scratch.clause.evaluations;
             if ending.is_some() {
                 return ending;
             }
@@ -248,35 +180,36 @@ impl<'a> Search<'a> {
     /// The ending with the contact that is known, where it comes so soon after `proven` that what is left is the sharpness of an
     /// edge: nothing is met before, and the bracket says what is open.
     fn settle_for(&mut self, proven: f64) -> Option<Ending> {
-        let known = self.found.as_ref()?;
+        let known = self.contacts.found.as_ref()?;
         if proven <= 0.0 || known.upper - proven > SOON {
             return None;
         }
-        let found = self.found.take()?;
-        Some(Ending::Contact(Found { goal: proven.min(found.goal), ..found }))
+        self.contacts.end_from(proven)
     }
 
     /// True once the search is to end from outside. The clock is looked at once for some cells.
     fn is_halted(&self) -> bool {
-        let looks = self.counters.cells.is_multiple_of(CELLS_PER_LOOK);
-        self.scratch.halt.as_ref().is_some_and(|halt| if looks { halt.is_over() } else { halt.is_set() })
+        let looks = self.contacts.counters.cells.is_multiple_of(CELLS_PER_LOOK);
+        self.items.scratch.halt.as_ref().is_some_and(|halt| if looks { halt.is_over() } else { halt.is_set() })
     }
 
     /// Refines one cell. A point deeper than delta in both bodies at t = 0 ends the search, and so does one that rounding
     /// keeps from being told.
     fn refine(&mut self, mut cell: Cell) -> Option<Ending> {
         if self.instant.t != cell.t {
-            self.instant = self.task.relative.at(cell.t);
+            self.instant = self.contacts.task.relative.at(cell.t);
+            self.contacts.now = self.instant.t;
         }
         let at = self.instant;
         let start = cell.t == 0.0;
-        let beyond = cell.t >= self.goal();
+        let beyond = cell.t >= self.contacts.goal();
         match cell.source {
-            Source::Cell => self.counters.cells += 1,
+            Source::Cell => self.contacts.counters.cells += 1,
             Source::Slice => {
-                self.scratch.enter(Stage::Region);
-                self.locate(&cell);
-                self.scratch.enter(Stage::Cells);
+                self.items.scratch.enter(Stage::Region);
+                Slices { task: &self.contacts.task, items: &mut self.items, counters: &mut self.contacts.counters }
+                    .locate(&cell);
+                self.items.scratch.enter(Stage::Cells);
                 return None;
             }
         }
@@ -285,16 +218,16 @@ impl<'a> Search<'a> {
         }
         let radius = cell.half.length();
         let x_max = (cell.center - at.center_a).length() + radius;
-        let end = self.horizon().min(cell.until) - cell.t;
+        let end = self.contacts.horizon().min(cell.until) - cell.t;
         // Speed bounds need a span, the span a speed: take the whole rest first, then cut.
-        let whole = self.task.relative.bounds(cell.t, end, x_max);
+        let whole = self.contacts.task.relative.bounds(cell.t, end, x_max);
         let h = if whole.speed * end > cell.reach * radius { cell.reach * radius / whole.speed } else { end };
-        let motion = if h < end { self.task.relative.bounds(cell.t, h, x_max) } else { whole };
+        let motion = if h < end { self.contacts.task.relative.bounds(cell.t, h, x_max) } else { whole };
 
-        let scratch = &mut self.scratch;
+        let scratch = &mut self.items.scratch;
         let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
-        let hints: &[Hint] = if self.task.strategies.hints { &scratch.hints } else { &[] };
-        let view = self.task.view((cell.center, cell.half), &at, motion, &scratch.clip_planes_b);
+        let hints: &[Hint] = if self.contacts.task.strategies.hints { &self.contacts.hints } else { &[] };
+        let view = self.contacts.task.view((cell.center, cell.half), &at, motion, &scratch.clip_planes_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
         let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
         let b = match b_truth {
@@ -319,15 +252,15 @@ impl<'a> Search<'a> {
             Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 }
         } else {
             let pair = clause::Expressions { pool, a: cell.a, b };
-            clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch)
+            clause::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch)
         };
-        let still = self.task.relative.bounds(cell.t, 0.0, x_max);
+        let still = self.contacts.task.relative.bounds(cell.t, 0.0, x_max);
         // Where the bounds are lowest at the start itself: two faces a few resolutions inside each other leave a layer that
         // the lowest point of a later time misses.
         let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
             let view = View { motion: still, ..view };
             let pair = clause::Expressions { pool, a: cell.a, b };
-            clause::advance(&view, &pair, hints, self.task.rounding, 0.0, clause_scratch).y
+            clause::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch).y
         } else {
             found.y
         };
@@ -342,10 +275,10 @@ impl<'a> Search<'a> {
         } else if found.dt >= h {
             self.again(cell, h, end, true);
             return None;
-        } else if found.dt > LEAST_ADVANCE.max(LEAST_STEP * self.task.rounding / motion.speed) && !beyond {
+        } else if found.dt > LEAST_ADVANCE.max(LEAST_STEP * self.contacts.task.rounding / motion.speed) && !beyond {
             // What splitting could gain is what the cell's extents cost the bound.
             let gain = found.cost.element_sum().min(radius);
-            let proven = cell.t + found.dt >= self.goal();
+            let proven = cell.t + found.dt >= self.contacts.goal();
             let far = found.dt * motion.speed >= 0.25 * gain && found.now >= 0.25 * gain;
             if far || found.dt >= self.worthwhile() * end || proven {
                 self.again(cell, found.dt, end, false);
@@ -354,34 +287,42 @@ impl<'a> Search<'a> {
         }
         if start {
             for x in [cell.center, cell.center + found.y, cell.center + now] {
-                if self.task.is_deep_at_start(x, &at) {
+                if self.contacts.task.is_deep_at_start(x, &at) {
                     return Some(Ending::Deep(x));
                 }
             }
         }
         // Bodies that stand still to each other meet at the start or never.
         if !one_sided && motion.speed > 0.0 {
-            self.attempt(&cell, &found, &at);
-            if cell.t >= self.goal() {
+            self.propose(&cell, &found, &at);
+            if cell.t >= self.contacts.goal() {
                 return None;
             }
-            let walls = self.task.has_walls();
+            let walls = self.contacts.task.has_walls();
             // At the edge of a crescent its two faces part slower than a bound's rounding: fits know better.
-            let fine = if walls { SHARP * self.task.rounding } else { self.task.rounding };
-            if walls && self.found.is_none() && self.counters.cells.is_multiple_of(DEEPEN_EVERY) {
+            let fine = if walls { SHARP * self.contacts.task.rounding } else { self.contacts.task.rounding };
+            if walls && self.contacts.found.is_none() && self.contacts.counters.cells.is_multiple_of(DEEPEN_EVERY) {
                 self.deepen(cell.center + found.y, cell.t, &found.support);
             }
             if found.cost.element_sum() <= fine {
                 // The bound is as good as rounding lets it be, and its faces may be those of a later time: what of now?
-                let view = self.task.view((cell.center, cell.half), &at, still, &self.scratch.clip_planes_b);
-                let pair = clause::Expressions { pool: &self.scratch.pool, a: cell.a, b };
-                let now = clause::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch.clause);
-                self.attempt(&cell, &now, &at);
-                if cell.t >= self.goal() {
+                let view =
+                    self.contacts.task.view((cell.center, cell.half), &at, still, &self.items.scratch.clip_planes_b);
+                let pair = clause::Expressions { pool: &self.items.scratch.pool, a: cell.a, b };
+                let now = clause::advance(
+                    &view,
+                    &pair,
+                    &[],
+                    self.contacts.task.rounding,
+                    0.0,
+                    &mut self.items.scratch.clause,
+                );
+                self.propose(&cell, &now, &at);
+                if cell.t >= self.contacts.goal() {
                     return None;
                 }
-                if self.task.is_deep(cell.center + now.y, &at, -NEARLY * self.task.rounding) {
-                    if walls && self.found.is_none() {
+                if self.contacts.task.is_deep(cell.center + now.y, &at, -NEARLY * self.contacts.task.rounding) {
+                    if walls && self.contacts.found.is_none() {
                         self.deepen(cell.center + now.y, cell.t, &found.support);
                     }
                     if walls && let Some(ending) = self.settle_for(cell.t) {
@@ -396,30 +337,67 @@ impl<'a> Search<'a> {
         None
     }
 
+    /// Tries to find the contact that a cell's weakest clause points to.
+    fn propose(&mut self, cell: &Cell, advance: &Advance, at: &Instant) {
+        Proposals { items: &mut self.items, contacts: &mut self.contacts }.attempt(cell, advance, at);
+    }
+
+    /// Looks for a witness at a thin wall, beside x.
+    fn deepen(&mut self, x: DVec3, t: f64, support: &[(Side, LiteralId, f64)]) {
+        climb::deepen(&mut self.contacts, Known::Handed(&self.items.handed), x, t, support);
+    }
+
+    /// Looks for a witness soon after a cell's time; an ending where nothing more is to be gained by further cells.
+    fn look_for_witness(&mut self, cell: &Cell) -> Option<Ending> {
+        // Depths that are no depths, and what starts inside, are asked otherwise.
+        if !self.contacts.task.continues() {
+            return None;
+        }
+        climb::probe(&mut self.contacts, cell.t, cell.center);
+        (self.contacts.counters.cells >= LAST).then(|| self.bracket_or_long(cell.t)).flatten()
+    }
+
+    /// The ending of a search whose patience is at its end: a witness not long after a cell's time, or none.
+    fn impatient(&mut self, cell: &Cell) -> Ending {
+        let long = Ending::Long(cell.t, None);
+        if !self.contacts.task.continues() {
+            return long;
+        }
+        climb::probe(&mut self.contacts, cell.t, cell.center);
+        self.bracket_or_long(cell.t).unwrap_or(long)
+    }
+
+    /// As `bracket`; where a coarser resolution may be tried, and may tell more, that is said.
+    fn bracket_or_long(&mut self, proven: f64) -> Option<Ending> {
+        match climb::bracket(&mut self.contacts, proven)? {
+            Ending::Contact(found) if found.upper - proven > WIDE && self.patience < u64::MAX => {
+                Some(Ending::Long(proven, Some(found)))
+            }
+            ending => Some(ending),
+        }
+    }
+
+    /// The answer of a search that rounding has stopped: a witness behind what is proven.
+    pub(in crate::contact) fn rescue(&mut self) -> Option<Ending> {
+        let (t, x) = self.stuck.filter(|_| self.contacts.task.continues())?;
+        climb::probe(&mut self.contacts, t, x);
+        climb::bracket(&mut self.contacts, t)
+    }
+
     /// The part of the time left that is worth taking as it is. A slow pair hardly moves in it, and smaller cells would hardly
     /// get further: the more of them there are, the less they must ask for.
     fn worthwhile(&self) -> f64 {
-        match self.counters.cells {
+        match self.contacts.counters.cells {
             0..1_000 => 0.25,
             1_000..4_000 => 1.0 / 16.0,
             _ => 1.0 / 64.0,
         }
     }
 
-    /// True unless B is proven out of a cell's reach for the whole of its slice.
-    pub(super) fn may_meet(&self, cell: &Cell) -> bool {
-        let at = self.task.relative.at(cell.t);
-        let x_max = (cell.center - at.center_a).length() + cell.half.length();
-        let motion = self.task.relative.bounds(cell.t, cell.until - cell.t, x_max);
-        let view = self.task.view((cell.center, cell.half), &at, motion, &self.scratch.clip_planes_b);
-        let tokens = &self.scratch.pool[cell.b.0 as usize..cell.b.1 as usize];
-        tokens.is_empty() || local::prune(tokens, &mut Vec::new(), &mut |id| view.truth(Side::B, id)) != Truth::False
-    }
-
     /// Puts a cell back that is free for `dt`, unless that is all the time there is.
     fn again(&mut self, mut cell: Cell, dt: f64, end: f64, capped: bool) {
         // Beyond the goal a cell is asked once.
-        if dt >= end || cell.t >= self.goal() {
+        if dt >= end || cell.t >= self.contacts.goal() {
             return;
         }
         let mut t = cell.t + dt;
@@ -434,7 +412,7 @@ impl<'a> Search<'a> {
         }
         cell.t = t;
         cell.reach = if capped { cell.reach * 2.0 } else { (cell.reach * 0.5).max(0.5) };
-        self.push(cell);
+        self.items.push(cell);
     }
 
     /// Halves a cell along the axis that costs its bound most (`cost`), the longest one where none does.
@@ -451,18 +429,19 @@ impl<'a> Search<'a> {
                 child.half[k] = (half[k] + off.abs()).next_up();
             }
             if cell.a.0 < cell.a.1 {
-                let (faces, delta, rounding) = (&self.task.a.faces, self.task.delta, self.task.rounding);
+                let (faces, delta, rounding) =
+                    (&self.contacts.task.a.faces, self.contacts.task.delta, self.contacts.task.rounding);
                 let mut classify = |id: LiteralId| {
                     let span = local::face_span(&faces[id.face() as usize], child.center, child.half);
                     local::truth_of(id.sense(), span, delta, rounding)
                 };
-                match prune_in_pool(&mut self.scratch.pool, cell.a, &mut classify) {
+                match prune_in_pool(&mut self.items.scratch.pool, cell.a, &mut classify) {
                     (Truth::False, _) => continue,
                     (Truth::True, _) => child.a = (0, 0),
                     (Truth::Open, range) => child.a = range,
                 }
             }
-            self.push(child);
+            self.items.push(child);
         }
     }
 }
@@ -471,26 +450,4 @@ impl<'a> Search<'a> {
 fn rounded_off(a: f64, b: f64, sum: f64) -> f64 {
     let from_b = sum - a;
     (a - (sum - from_b)) + (b - from_b)
-}
-
-/// Prunes an expression of the pool, the result behind everything else in it.
-fn prune_in_pool(
-    pool: &mut Vec<Token>,
-    source: Range,
-    classify: &mut impl FnMut(LiteralId) -> Truth,
-) -> (Truth, Range) {
-    if source.0 == source.1 {
-        return (Truth::True, (0, 0));
-    }
-    // The source stays put while the result grows behind it: copy it out of the way of the borrow.
-    let tokens: smallvec::SmallVec<[Token; 64]> = pool[source.0 as usize..source.1 as usize].into();
-    let start = pool.len() as u32;
-    let truth = local::prune(&tokens, pool, classify);
-    let end = pool.len() as u32;
-    if truth == Truth::Open && end - start == source.1 - source.0 {
-        // Nothing folded: keep the old one.
-        pool.truncate(start as usize);
-        return (Truth::Open, source);
-    }
-    (truth, (start, end))
 }

@@ -6,16 +6,18 @@
 //! terms are left in a pair or a number of pairs is reached. The pairs of voxels at which the walk ends say which positive
 //! alternatives of A can meet anything, where, and when at the earliest; each becomes one cell of stage 3, with B cut
 //! down to the voxels it may meet (their hull's six planes keep the cell to it: clip planes).
-//! Stage 3 has no other source of primitives: `knows` tells which were handed over.
+//! Stage 3 has no other source of primitives: `Known` tells which were handed over.
 
 use super::cell::{Cell, Range, Source};
 use super::clock::Stage;
+use super::items::Items;
 use super::roots;
 use super::roots::Root;
-use super::search::Search;
 use crate::bound::Region;
 use crate::bound::pair::{Pruned, Side as Operand, locate};
 use crate::contact::exclusion::literal::Side;
+use crate::contact::query::outcome::Counters;
+use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::octree::span::primitive_span;
 use crate::octree::walk::{Detail, Next, NodePair, Walk};
@@ -39,12 +41,14 @@ const SLICE_TRAVEL: f64 = 0.25;
 /// … down to this part of the step.
 const SLICE_LEAST: f64 = 1.0 / 64.0;
 
-impl<'a> Search<'a> {
-    /// Queues the whole step.
-    pub fn start(&mut self) {
-        self.push(Cell::source(0.0, 1.0, Source::Slice));
-    }
+/// What makes cells of slices.
+pub(super) struct Slices<'s, 'a> {
+    pub(super) task: &'s Task<'a>,
+    pub(super) items: &'s mut Items,
+    pub(super) counters: &'s mut Counters,
+}
 
+impl<'a> Slices<'_, 'a> {
     /// Stage 1 on a slice of time.
     pub(super) fn locate(&mut self, cell: &Cell) {
         let (t0, t1) = (cell.t, cell.until);
@@ -64,14 +68,14 @@ impl<'a> Search<'a> {
             let far = bounds.speed * (t1 - t0) > SLICE_TRAVEL * 2.0 * span;
             if left > FEW_PRIMITIVES && far && t1 - t0 > SLICE_LEAST {
                 let middle = 0.5 * (t0 + t1);
-                self.push(Cell::source(t0, middle, Source::Slice));
-                self.push(Cell::source(middle, t1, Source::Slice));
+                self.items.push(Cell::source(t0, middle, Source::Slice));
+                self.items.push(Cell::source(middle, t1, Source::Slice));
                 return;
             }
             self.counters.after_stage1 = self.counters.after_stage1.max(left as u64);
             region = Some(Arc::new(found));
         }
-        self.scratch.enter(Stage::Walk);
+        self.items.scratch.enter(Stage::Walk);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         if self.whole(Side::A, region.as_ref(), &mut a) != Truth::Open
             || self.whole(Side::B, region.as_ref(), &mut b) != Truth::Open
@@ -187,9 +191,9 @@ impl<'a> Search<'a> {
         let range_a = self.store_and(&of_a, &[]);
         let range_b = self.store_and(&of_b, &clip_planes);
         let cell = Cell::new((t, until), in_a, range_a, range_b);
-        if self.may_meet(&cell) {
+        if self.items.may_meet(self.task, &cell) {
             self.note(&of_a, &of_b);
-            self.push(cell);
+            self.items.push(cell);
         }
     }
 
@@ -203,8 +207,8 @@ impl<'a> Search<'a> {
                 }
                 let mut normal = DVec3::ZERO;
                 normal[k] = sign;
-                let id = (self.task.b.faces.len() + self.scratch.clip_planes_b.len()) as u32;
-                self.scratch.clip_planes_b.push(Plane { normal, offset }.into());
+                let id = (self.task.b.faces.len() + self.items.scratch.clip_planes_b.len()) as u32;
+                self.items.scratch.clip_planes_b.push(Plane { normal, offset }.into());
                 tokens.push(local::literal_token(LiteralId::new(id, Sense::Positive)));
             }
         }
@@ -219,7 +223,7 @@ impl<'a> Search<'a> {
         let mut joined = Vec::new();
         let parts = (!tokens.is_empty()).then_some(tokens).into_iter().chain(clip_planes.chunks(1));
         local::write_and(parts, &mut joined);
-        self.store(&joined)
+        self.items.store(&joined)
     }
 
     /// Counts each pair of primitives once and remembers what was handed over.
@@ -233,13 +237,13 @@ impl<'a> Search<'a> {
         let (a, b) = (owners(a, self.task.a), owners(b, self.task.b));
         for p in &a {
             for q in &b {
-                if self.handed.candidates.insert((*p, *q)) {
+                if self.items.handed.candidates.insert((*p, *q)) {
                     self.counters.candidates += 1;
                 }
             }
         }
-        self.handed.primitives[0].extend(a);
-        self.handed.primitives[1].extend(b);
+        self.items.handed.primitives[0].extend(a);
+        self.items.handed.primitives[1].extend(b);
     }
 }
 

@@ -1,7 +1,10 @@
 //! What the queue's cells hold.
 
-use super::search::{Scratch, Search};
+use super::items::Items;
+use super::scratch::Scratch;
+use super::slices::Slices;
 use crate::contact::query::options::QueryOptions;
+use crate::contact::query::outcome::Counters;
 use crate::contact::query::question::{Body, PairQuery, Strategies, default_resolution};
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
@@ -47,13 +50,19 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             query_options: QueryOptions::DEPTH,
         };
         let (task, _) = Task::of(&query);
-        let mut search = Search::new(task, Scratch::default());
+        let mut items = Items::new(Scratch::default());
         // A hull of voxels as a walk might leave it.
         let hull = Aabb::around(v(0.5 * r(0.137), 0.5 * r(0.291), 0.0), v(0.15, 0.2, 0.1));
         let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
-        search.hand_over((0.0, 1.0), &task.a.aabb(), &hull, &a, &b);
-        let cells: Vec<_> = std::iter::from_fn(|| search.pop()).collect();
-        let scratch = &search.scratch;
+        Slices { task: &task, items: &mut items, counters: &mut Counters::default() }.hand_over(
+            (0.0, 1.0),
+            &task.a.aabb(),
+            &hull,
+            &a,
+            &b,
+        );
+        let cells: Vec<_> = std::iter::from_fn(|| items.pop()).collect();
+        let scratch = &items.scratch;
         for cell in &cells {
             let tokens = |r: (u32, u32)| &scratch.pool[r.0 as usize..r.1 as usize];
             for i in 0..2500u32 {

@@ -6,6 +6,9 @@ use glam::DVec3;
 /// Witnesses this close in time are of one contact; touches this close are at the same time.
 pub(in crate::contact) const SAME_TIME: f64 = 1e-12;
 
+/// Witnesses this close, in scales of the pair, are one point.
+pub(in crate::contact) const SAME_POINT: f64 = 1e-6;
+
 /// A confirmed contact.
 #[derive(Clone, Debug)]
 pub struct Found {
