@@ -2,7 +2,7 @@
 
 use super::config::ServerConfig;
 use super::models::Models;
-use super::scene::{Import, Outcome, Scene, refused};
+use super::scene::{CommandOutcome, Import, Scene, refused};
 use crate::world::Refusal;
 use contactd_client::transport::{Opened, Transport};
 use contactd_client::{Error, Session};
@@ -63,9 +63,9 @@ impl Transport for Embedded {
             Command::Close => Answer::Done,
             Command::Open { .. } => refused(Refusal::new(ErrorCode::BadCommand, "an embedded session is open")),
             command => match self.scene.command(command) {
-                Outcome::Answered(answer) => answer,
-                Outcome::Import(import) => self.import(import),
-                Outcome::Integrate(integration) => integration.answer(),
+                CommandOutcome::Answered(answer) => answer,
+                CommandOutcome::Import(import) => self.import(import),
+                CommandOutcome::Integrate(integration) => integration.answer(),
             },
         })
     }

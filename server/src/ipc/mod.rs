@@ -1,7 +1,8 @@
 //! The server's two doors: shared memory for other processes, and an embedded session for the caller's own.
 //!
-//! Both lead to the same `scene`: commands and steps on one session's world. The loop (`serve`) takes steps as they come
-//! and waits by spinning first and blocking then; long steps (`relay`), imports and mass properties (`jobs`) run beside it. `root` makes sure that
+//! Both lead to the same `scene`: commands and steps on one session's world. The loop (`lead`) takes steps as they come
+//! and waits by spinning first and blocking then; long steps (`relay`), imports and mass properties (`jobs`) run beside it. Where requests come from is behind `port`, which
+//! `services` has over shared memory. `root` makes sure that
 //! one server of a name runs, that a killed predecessor is no obstacle, and that nothing stays behind.
 //!
 //! Invariant: what lies in shared memory is copied before it is branched on. It is no security boundary between
@@ -12,12 +13,16 @@
 pub mod config;
 mod embedded;
 mod jobs;
+mod lead;
 mod models;
+mod port;
 mod relay;
 mod root;
 mod scene;
 mod serve;
 mod services;
+mod session;
+mod task;
 
 pub use config::{CacheFolder, ServerConfig};
 pub use embedded::{Embedded, embedded};

@@ -29,7 +29,7 @@ pub struct Scene {
 
 /// What becomes of a command.
 #[derive(Debug)]
-pub enum Outcome {
+pub enum CommandOutcome {
     /// It is answered.
     Answered(Answer),
     /// A model has to be imported first; `Scene::loaded` makes the answer.
@@ -83,8 +83,8 @@ impl Scene {
     }
 
     /// Obeys a command other than open and close.
-    pub fn command(&mut self, command: Command) -> Outcome {
-        self.obey(command).unwrap_or_else(|refusal| Outcome::Answered(refused(refusal)))
+    pub fn command(&mut self, command: Command) -> CommandOutcome {
+        self.obey(command).unwrap_or_else(|refusal| CommandOutcome::Answered(refused(refusal)))
     }
 
     /// Takes an imported model, of a text of so many bytes.
@@ -101,7 +101,7 @@ impl Scene {
         }
     }
 
-    fn obey(&mut self, command: Command) -> Result<Outcome, Refusal> {
+    fn obey(&mut self, command: Command) -> Result<CommandOutcome, Refusal> {
         match command {
             Command::Open { .. } | Command::Close => {
                 return Err(Refusal::new(ErrorCode::BadCommand, "open and close are the server's own"));
@@ -116,7 +116,7 @@ impl Scene {
                     let detail = format!("{}: {after} bytes of models, the limit is {}", file.name, self.max_text);
                     return Err(Refusal::new(ErrorCode::LimitMemory, detail));
                 }
-                return Ok(Outcome::Import(Import { model, file, facets }));
+                return Ok(CommandOutcome::Import(Import { model, file, facets }));
             }
             Command::AddObject(spec) => {
                 let spec = self.object(spec)?;
@@ -141,10 +141,10 @@ impl Scene {
                 };
                 let options = MassOptions { tolerance, boxes }.checked();
                 let options = options.map_err(|sentence| Refusal::new(ErrorCode::BadNumber, sentence))?;
-                return Ok(Outcome::Integrate(Integration { model: loaded.clone(), options }));
+                return Ok(CommandOutcome::Integrate(Integration { model: loaded.clone(), options }));
             }
         }
-        Ok(Outcome::Answered(Answer::Done))
+        Ok(CommandOutcome::Answered(Answer::Done))
     }
 
     fn object(&self, spec: WireObject) -> Result<ObjectSpec, Refusal> {

@@ -5,45 +5,102 @@
 //! sender, a reply that cannot be delivered is dropped and its client told so, and nobody waits for anybody.
 
 use super::config::ServerConfig;
+use super::port::{Bell, CommandCall, Port, StepCall, Wake};
 use contactd_client::Error;
 use contactd_client::shm::link::{self, ControlServer, Shared, StepServer, system};
 use contactd_proto::control::ControlHeader;
-use contactd_proto::names::{self, Address};
+use contactd_proto::names::{self, Address, PROTOCOL_VERSION};
 use contactd_proto::status::StatusRecord;
 use contactd_proto::{ContactRecord, PoseRecord, StepReply, StepRequest};
+use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::writer::{EntryHandleMut, Writer};
 use iceoryx2::prelude::*;
+use iceoryx2::response_mut::ResponseMut;
 use iceoryx2::service::port_factory::event::PortFactory as EventService;
+use std::time::Duration;
 
 /// The way to wake the client of a session.
-pub struct Wake {
+pub struct ClientWake {
     notifier: Notifier<Shared>,
     service: EventService<Shared>,
 }
 
-impl Wake {
-    /// Wakes it.
-    pub fn notify(&self) {
+impl Wake for ClientWake {
+    fn notify(&self) {
         // A client that cannot be woken is dead, gone or full of wake-ups: either shows elsewhere.
         let _ = self.notifier.notify();
     }
 
-    /// True while the client has its port: from soon after the session was opened until the client leaves it.
-    pub fn is_heard(&self) -> bool {
+    fn is_heard(&self) -> bool {
         self.service.dynamic_config().number_of_listeners() > 0
+    }
+}
+
+impl Bell for Notifier<Shared> {
+    fn ring(&self) {
+        let _ = self.notify();
+    }
+}
+
+type StepRequestInPlace = ActiveRequest<Shared, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
+type CommandInPlace = ActiveRequest<Shared, [u8], ControlHeader, [u8], ControlHeader>;
+
+impl StepCall for StepRequestInPlace {
+    type Reply = ResponseMut<Shared, [ContactRecord], StepReply>;
+
+    fn request(&self) -> StepRequest {
+        *self.user_header()
+    }
+
+    fn records(&self) -> &[PoseRecord] {
+        self.payload()
+    }
+
+    /// Writes the reply once, into slots of shared memory.
+    fn write(&self, n: usize, reply: StepReply, slot: &dyn Fn(usize) -> ContactRecord) -> Option<Self::Reply> {
+        // iceoryx2 knows no empty slices: the header says how many slots count.
+        let (loan, reply) = match self.loan_slice_uninit(n.max(1)) {
+            Ok(loan) => (loan, reply),
+            // The step was taken, its records cannot be told: the client learns that they are cut off.
+            Err(_) => (self.loan_slice_uninit(1).ok()?, StepReply { records: 0, slots: 0, truncated: 1, ..reply }),
+        };
+        let reported = (reply.records + reply.slots) as usize;
+        let mut response = loan.write_from_fn(|i| if i < reported { slot(i) } else { ContactRecord::default() });
+        *response.user_header_mut() = reply;
+        Some(response)
+    }
+
+    fn send(self, reply: Option<Self::Reply>) {
+        // A reply that cannot be delivered is dropped; the end of the call tells the client.
+        let _ = reply.map(ResponseMut::send);
+    }
+}
+
+impl CommandCall for CommandInPlace {
+    fn version(&self) -> u32 {
+        self.user_header().version
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.payload()
+    }
+
+    fn answer(self, bytes: &[u8]) {
+        let Ok(loan) = self.loan_slice_uninit(bytes.len()) else { return };
+        let mut response = loan.write_from_slice(bytes);
+        *response.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };
+        let _ = response.send();
     }
 }
 
 /// The server's ports. Dropped in this order.
 pub struct Services {
-    /// Steps.
-    pub steps: StepServer,
-    /// Commands.
-    pub control: ControlServer,
-    /// Woken by clients.
-    pub wake: Listener<Shared>,
+    steps: StepServer,
+    control: ControlServer,
+    /// Woken by clients, and by the bell.
+    wake: Listener<Shared>,
     status: EntryHandleMut<Shared, u32, StatusRecord>,
     _writer: Writer<Shared, u32>,
     node: Node<Shared>,
@@ -139,17 +196,29 @@ impl Services {
         let services = Self { steps, control, wake, status, _writer: writer, node };
         Ok((services, bell))
     }
+}
 
-    /// Shows the server's state.
-    pub fn show(&mut self, status: StatusRecord) {
-        self.status.update_with_copy(status);
+impl Port for Services {
+    type Step = StepRequestInPlace;
+    type Command = CommandInPlace;
+    type Wake = ClientWake;
+    type Bell = Notifier<Shared>;
+
+    fn next_step(&mut self) -> Option<Self::Step> {
+        // A failed receive concerns one client's connection; the others go on.
+        self.steps.receive().ok().flatten()
     }
 
-    /// The way to wake the client of a session; its service is created here.
-    ///
-    /// # Errors
-    /// `System`.
-    pub fn wake_of(&self, session: u64) -> Result<Wake, Error> {
+    fn next_command(&mut self) -> Option<Self::Command> {
+        self.control.receive().ok().flatten()
+    }
+
+    fn wait(&self, longest: Duration) -> bool {
+        self.wake.timed_wait(|_| {}, longest).is_ok()
+    }
+
+    /// Its service is created here.
+    fn wake_of(&self, session: u64) -> Result<ClientWake, Error> {
         let service = self
             .node
             .service_builder(&link::service_name(&names::wake_service_of(session))?)
@@ -160,11 +229,14 @@ impl Services {
             .create()
             .map_err(|e| system("a session's wake service", e))?;
         let notifier = service.notifier_builder().create().map_err(|e| system("a session's wake port", e))?;
-        Ok(Wake { notifier, service })
+        Ok(ClientWake { notifier, service })
     }
 
-    /// Frees what processes that have died still hold.
-    pub fn sweep_dead(&self) {
+    fn show(&mut self, status: StatusRecord) {
+        self.status.update_with_copy(status);
+    }
+
+    fn sweep_dead(&self) {
         self.node.try_cleanup_dead_nodes();
     }
 }

@@ -74,7 +74,7 @@ impl World {
         let notes = self.state.notes.as_deref()?;
         let (a, b) = (a.min(b), a.max(b));
         self.plan_of(a, b)?;
-        let pair = (*self.by_id.get(&a)?, *self.by_id.get(&b)?);
+        let pair = (*self.roster.by_id.get(&a)?, *self.roster.by_id.get(&b)?);
         let neighbours = self.state.neighbours();
         let clearance = || notes.clearances.get(&(a, b)).copied().map_or(Remembered::Nothing, Remembered::Clearance);
         match notes.decided.get(&pair) {
@@ -91,7 +91,7 @@ impl World {
         let (Some(pair_cache), true) = (neighbours.pair_cache(place), job.found.known) else {
             return Some(Remembered::Nothing);
         };
-        let q = job.question(&self.bodies, &notes.options, self.state.clock());
+        let q = job.question(&self.roster.bodies, &notes.options, self.state.clock());
         let motions = [q.query.a.placed.motion, q.query.b.placed.motion];
         Some(match pair_cache.via() {
             (Via::Search, _) | (Via::PredictedMotion, None) => Remembered::Nothing,
@@ -129,8 +129,8 @@ impl World {
                 let _ = writeln!(out, "pair {a} {b} directions {} {}", numbers(&[n0]), numbers(&[n1]));
             }
             Remembered::PredictedMotion { motions, since, steps, until, clearance, strays } => {
-                let job = self.job((*self.by_id.get(&a)?, *self.by_id.get(&b)?))?;
-                let q = job.question(&self.bodies, &notes.options, self.state.clock());
+                let job = self.job((*self.roster.by_id.get(&a)?, *self.roster.by_id.get(&b)?))?;
+                let q = job.question(&self.roster.bodies, &notes.options, self.state.clock());
                 let share = SHARES.into_iter().find(|share| strays <= share * clearance)?;
                 let part = if until.is_finite() { until / steps } else { 1.0 };
                 let query = over(&q.query, motions, steps, cells);
@@ -150,8 +150,8 @@ impl World {
             // Of a search past an overlap nothing is proven that two certificates could say.
             Remembered::Answer { outcome, .. } if outcome.past => return None,
             Remembered::Answer { motions, outcome } => {
-                let job = self.job((*self.by_id.get(&a)?, *self.by_id.get(&b)?))?;
-                let query = search::query(&self.bodies, job, &notes.options);
+                let job = self.job((*self.roster.by_id.get(&a)?, *self.roster.by_id.get(&b)?))?;
+                let query = search::query(&self.roster.bodies, job, &notes.options);
                 let query = PairQuery { cell_limit: cells, query_options: QueryOptions::CONTACT, ..query };
                 let _ = write!(out, "pair {a} {b} answer");
                 motions.iter().for_each(|m| write_motion(&mut out, m));

@@ -12,6 +12,7 @@
 //! Floor 7: imports `contact`, `octree`, `motion`, `solid`, `math`, `proto`.
 
 pub mod body;
+mod boxes;
 pub mod broad;
 mod coherence;
 pub mod heed;
@@ -20,8 +21,10 @@ mod neighbours;
 mod notes;
 pub mod options;
 pub mod outcome;
+mod pairs;
 pub mod plan;
 pub mod record;
+mod roster;
 pub mod scene;
 mod search;
 mod stances;

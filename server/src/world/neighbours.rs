@@ -317,7 +317,7 @@ impl Neighbours {
     }
 
     /// Calls `ask` for every pair that its path lengths don't prove apart over this step.
-    pub fn query_options(&self, mut ask: impl FnMut(usize)) {
+    pub fn each_near(&self, mut ask: impl FnMut(usize)) {
         for (i, near) in self.pairs.iter().enumerate() {
             if !self.apart(near) {
                 ask(i);

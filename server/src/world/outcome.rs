@@ -59,6 +59,16 @@ pub struct StepOutcome {
 }
 
 impl StepOutcome {
+    /// Makes room for another step's answer: nothing is told, and nothing stands in the way of the whole step. Lists keep their
+    /// memory.
+    pub(super) fn clear(&mut self) {
+        let Self { pairs, regions, .. } = self;
+        pairs.clear();
+        regions.clear();
+        let (pairs, regions) = (std::mem::take(pairs), std::mem::take(regions));
+        *self = Self { pairs, regions, safe_time: 1.0, ..Self::default() };
+    }
+
     /// The contact regions of a told pair.
     pub fn regions_of(&self, pair: &PairOutcome) -> &[Region] {
         &self.regions[pair.regions.0 as usize..][..pair.regions.1 as usize]

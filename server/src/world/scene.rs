@@ -1,11 +1,10 @@
 //! The world: bodies by id, rules, resolution, and how they change between steps.
 
 use super::body::{Body, ObjectSpec};
-use super::plan::{PairPlan, Plans};
+use super::plan::PairPlan;
+use super::roster::Roster;
 use super::state::StepState;
-use crate::math::tolerance;
-use contactd_proto::{Detect, ErrorCode, MotionState, Pose, Rule};
-use std::collections::HashMap;
+use contactd_proto::{ErrorCode, MotionState, Pose, Rule};
 use std::fmt;
 
 /// Why a change of the world was refused; nothing has changed.
@@ -47,11 +46,7 @@ impl std::error::Error for Refusal {}
 /// The scene of one session.
 #[derive(Debug)]
 pub struct World {
-    /// In the order of their ids.
-    pub(super) bodies: Vec<Body>,
-    pub(super) by_id: HashMap<u32, u32>,
-    pub(super) plans: Plans,
-    pub(super) resolution: Option<f64>,
+    pub(super) roster: Roster,
     last_id: Option<u32>,
     max_objects: usize,
     /// Smallest primitive dimension and largest default resolution of any body so far.
@@ -64,10 +59,7 @@ impl World {
     /// An empty world that takes at most `max_objects` objects and `max_batch` records a step.
     pub fn new(max_objects: usize, max_batch: usize) -> Self {
         Self {
-            bodies: Vec::new(),
-            by_id: HashMap::new(),
-            plans: Plans::default(),
-            resolution: None,
+            roster: Roster::default(),
             last_id: None,
             max_objects,
             smallest: f64::INFINITY,
@@ -78,17 +70,17 @@ impl World {
 
     /// The bodies in the order of their ids.
     pub fn bodies(&self) -> &[Body] {
-        &self.bodies
+        &self.roster.bodies
     }
 
     /// The body of an id.
     pub fn body(&self, id: u32) -> Option<&Body> {
-        self.by_id.get(&id).map(|i| &self.bodies[*i as usize])
+        self.roster.by_id.get(&id).map(|i| &self.roster.bodies[*i as usize])
     }
 
     /// The rules in force.
     pub fn rules(&self) -> &[Rule] {
-        self.plans.rules()
+        self.roster.plans.rules()
     }
 
     /// The plan of a pair of objects; `None` when it is never searched (or an id is unknown).
@@ -97,7 +89,7 @@ impl World {
         if a.id == b.id || (a.is_static && b.is_static) {
             return None;
         }
-        self.plans.of([a.group, b.group], [&a.name, &b.name]).map(|plan| self.plans.plan(plan))
+        self.roster.plans.of([a.group, b.group], [&a.name, &b.name]).map(|plan| self.roster.plans.plan(plan))
     }
 
     /// Adds an object.
@@ -107,7 +99,7 @@ impl World {
     /// speed that is not positive; `Resolution` when a pair's resolution would swallow a primitive.
     pub fn add_object(&mut self, mut spec: ObjectSpec) -> Result<(), Refusal> {
         let name = format!("object \"{}\"", spec.name);
-        if self.bodies.len() >= self.max_objects {
+        if self.roster.bodies.len() >= self.max_objects {
             return Err(Refusal::new(ErrorCode::LimitObjects, format!("the limit is {}", self.max_objects)));
         }
         if self.last_id.is_some_and(|last| spec.id <= last) {
@@ -121,13 +113,13 @@ impl World {
         }
         let smallest = self.smallest.min(spec.part.smallest);
         let coarsest = self.coarsest.max(spec.part.resolution);
-        check_resolution(self.resolution, smallest, coarsest)
+        check_resolution(self.roster.resolution, smallest, coarsest)
             .map_err(|e| Refusal { detail: format!("{name}: {}", e.detail), ..e })?;
         (self.smallest, self.coarsest) = (smallest, coarsest);
         self.last_id = Some(spec.id);
-        let group = self.plans.group(&spec.group);
-        self.by_id.insert(spec.id, self.bodies.len() as u32);
-        self.bodies.push(Body::new(spec, group));
+        let group = self.roster.plans.group(&spec.group);
+        self.roster.by_id.insert(spec.id, self.roster.bodies.len() as u32);
+        self.roster.bodies.push(Body::new(spec, group));
         self.state.extend();
         Ok(())
     }
@@ -137,12 +129,12 @@ impl World {
     /// # Errors
     /// `UnknownObject`.
     pub fn remove_object(&mut self, id: u32) -> Result<(), Refusal> {
-        let Some(index) = self.by_id.remove(&id) else {
+        let Some(index) = self.roster.by_id.remove(&id) else {
             return Err(Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")));
         };
-        self.bodies.remove(index as usize);
-        for (i, body) in self.bodies.iter().enumerate().skip(index as usize) {
-            self.by_id.insert(body.id, i as u32);
+        self.roster.bodies.remove(index as usize);
+        for (i, body) in self.roster.bodies.iter().enumerate().skip(index as usize) {
+            self.roster.by_id.insert(body.id, i as u32);
         }
         self.forget();
         Ok(())
@@ -159,7 +151,7 @@ impl World {
                 return Err(Refusal::new(ErrorCode::BadRule, detail).at(i));
             }
         }
-        self.plans.set(rules);
+        self.roster.plans.set(rules);
         self.forget();
         Ok(())
     }
@@ -175,7 +167,7 @@ impl World {
             return Err(Refusal::new(ErrorCode::Resolution, format!("{d} is not a positive length")));
         }
         check_resolution(resolution, self.smallest, self.coarsest)?;
-        self.resolution = resolution;
+        self.roster.resolution = resolution;
         self.forget();
         Ok(())
     }
@@ -187,18 +179,18 @@ impl World {
     pub fn restore(&mut self, motion_states: &[(u32, MotionState)]) -> Result<(), Refusal> {
         let mut places = Vec::with_capacity(motion_states.len());
         for (i, (id, motion_state)) in motion_states.iter().enumerate() {
-            let Some(index) = self.by_id.get(id) else {
+            let Some(index) = self.roster.by_id.get(id) else {
                 return Err(Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")).at(i));
             };
             let refuse = |code| Refusal::new(code, format!("object id {id}")).at(i);
             check_pose(&motion_state.motion.start).and(check_pose(&motion_state.end)).map_err(refuse)?;
-            if self.bodies[*index as usize].is_static && !motion_state.is_rest() {
+            if self.roster.bodies[*index as usize].is_static && !motion_state.is_rest() {
                 return Err(refuse(ErrorCode::StaticObject));
             }
             places.push(*index);
         }
         for (index, (_, motion_state)) in places.into_iter().zip(motion_states) {
-            self.bodies[index as usize].motion_state = *motion_state;
+            self.roster.bodies[index as usize].motion_state = *motion_state;
         }
         self.forget();
         Ok(())
@@ -206,25 +198,7 @@ impl World {
 
     /// Forgets what was proven in earlier steps. It changes no answer, only the work of the next ones.
     pub fn forget(&mut self) {
-        self.state.forget(&self.bodies);
-    }
-
-    /// Index of the plan by which the pair of two bodies is searched: `None` when rules or two static bodies rule it out.
-    pub(super) fn pair_plan(&self, i: u32, j: u32) -> Option<u32> {
-        let (a, b) = (&self.bodies[i as usize], &self.bodies[j as usize]);
-        if a.is_static && b.is_static {
-            return None;
-        }
-        let plan = self.plans.of([a.group, b.group], [&a.name, &b.name]);
-        debug_assert!(plan.is_none_or(|p| self.plans.plan(p).detect != Detect::Off));
-        plan
-    }
-
-    /// The resolution of a pair.
-    pub(super) fn resolution_of(&self, i: u32, j: u32) -> f64 {
-        let default = |k: u32| self.bodies[k as usize].part.resolution;
-        let own = default(i).max(default(j));
-        self.resolution.unwrap_or(if own > 0.0 { own } else { tolerance::DEFAULT_RESOLUTION })
+        self.state.forget(&self.roster.bodies);
     }
 }
 

@@ -1,13 +1,13 @@
 //! What a world keeps from step to step, and the memory that its steps use again.
 
 use super::body::Body;
+use super::boxes::SweptBoxes;
 use super::neighbours::Neighbours;
 use super::notes::Notes;
 use super::outcome::StepOutcome;
 use super::search::{self, PairJob};
 use super::stances::Stances;
 use crate::contact::Scratch;
-use crate::math::Aabb;
 use contactd_proto::Pose;
 use contactd_proto::pose_record::PoseCommand;
 
@@ -24,16 +24,15 @@ pub struct StepState {
     /// When the step begins, in steps taken.
     pub(super) clock: f64,
     pub(super) neighbours: Neighbours,
-    /// Swept boxes, each with the serial of the step it was taken for.
-    pub(super) boxes: Vec<(u64, Aabb)>,
+    pub(super) boxes: SweptBoxes,
     pub(super) stances: Stances,
     /// Neighbours that their path lengths don't prove apart.
-    pub(super) query_options: Vec<usize>,
+    pub(super) near: Vec<usize>,
     /// How many of them a direction proved apart.
     pub(super) glanced: u32,
     pub(super) jobs: Vec<PairJob>,
     /// Time (as a key), ids and job of each told pair, to be ordered, and whether its regions are complete.
-    pub(super) command: Vec<(i64, u32, u32, u32, bool)>,
+    pub(super) reported: Vec<(i64, u32, u32, u32, bool)>,
     pub(super) searches: search::Memory,
     /// Memory of what is asked beside the searches.
     pub(super) scratch: Scratch,
@@ -52,12 +51,12 @@ impl StepState {
             moving: Vec::new(),
             clock: 0.0,
             neighbours: Neighbours::default(),
-            boxes: Vec::new(),
+            boxes: SweptBoxes::default(),
             stances: Stances::default(),
-            query_options: Vec::new(),
+            near: Vec::new(),
             glanced: 0,
             jobs: Vec::new(),
-            command: Vec::new(),
+            reported: Vec::new(),
             searches: search::Memory::default(),
             scratch: Scratch::default(),
             outcome: StepOutcome::default(),

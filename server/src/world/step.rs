@@ -6,18 +6,16 @@
 
 use super::body::Body;
 use super::heed::Heed;
-use super::neighbours::PairHint;
-use super::notes::Decided;
 use super::options::{StepError, StepOptions};
 use super::outcome::{PairOutcome, StepOutcome};
+use super::pairs;
 use super::plan::PairPlan;
+use super::roster::Roster;
 use super::scene::World;
 use super::search::{self, PairJob};
-use super::stances::Stances;
 use super::state::StepState;
 use super::touch;
-use crate::contact::{Glancing, Outcome, SeparatingAxisTest, Status};
-use crate::math::Aabb;
+use crate::contact::{Outcome, Status};
 use contactd_proto::pose_record::PoseCommand;
 use contactd_proto::{Detect, EffectCounters, ErrorCode, MotionState, Pose, PoseRecord, Report};
 
@@ -43,7 +41,7 @@ impl World {
         self.check(records, options)?;
         self.stage(options)?;
         self.take(options);
-        self.find_pairs(options);
+        pairs::find(&self.roster, &mut self.state, options);
         self.search(options, heed);
         Ok(&self.state.outcome)
     }
@@ -71,13 +69,13 @@ impl World {
             let record = *record;
             let refuse = |code| StepError { code, index: Some(i as u32) };
             // Batches mostly name the objects in their order.
-            let next = self.bodies.get(expected as usize).filter(|body| body.id == record.object);
-            let Some(index) = next.map(|_| expected).or_else(|| self.by_id.get(&record.object).copied()) else {
+            let next = self.roster.bodies.get(expected as usize).filter(|body| body.id == record.object);
+            let Some(index) = next.map(|_| expected).or_else(|| self.roster.by_id.get(&record.object).copied()) else {
                 return Err(refuse(ErrorCode::UnknownObject));
             };
             expected = index + 1;
             let command = record.decode().map_err(refuse)?;
-            let body = &mut self.bodies[index as usize];
+            let body = &mut self.roster.bodies[index as usize];
             if body.is_static {
                 return Err(refuse(ErrorCode::StaticObject));
             }
@@ -93,7 +91,7 @@ impl World {
 
     /// Checks the motions of the named objects, from where they start.
     fn stage(&mut self, options: &StepOptions) -> Result<(), StepError> {
-        let Self { bodies, state, .. } = self;
+        let Self { roster: Roster { bodies, .. }, state, .. } = self;
         state.put.clear();
         for (index, command) in &state.commands {
             if let PoseCommand::Start(pose) = command {
@@ -119,7 +117,7 @@ impl World {
 
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
-        let Self { bodies, state, .. } = self;
+        let Self { roster: Roster { bodies, .. }, state, .. } = self;
         let StepState { neighbours, moving, commands, put, serial, stances, .. } = state;
         state.clock += options.advance;
         neighbours.count(bodies.len());
@@ -153,241 +151,98 @@ impl World {
         }
     }
 
-    /// Fills the jobs: the pairs to ask about, plan by plan in the order of their ids; every pair when all are to be told.
-    fn find_pairs(&mut self, options: &StepOptions) {
-        let mut neighbours = std::mem::take(&mut self.state.neighbours);
-        let mut boxes = std::mem::take(&mut self.state.boxes);
-        let mut stances = std::mem::take(&mut self.state.stances);
-        let mut query_options = std::mem::take(&mut self.state.query_options);
-        let mut jobs = std::mem::take(&mut self.state.jobs);
-        let mut notes = std::mem::take(&mut self.state.notes);
-        if let Some(notes) = &mut notes {
-            notes.begin(*options);
-        }
-        let plan = |i: u32, j: u32| {
-            let index = self.pair_plan(i, j)?;
-            Some((index, *self.plans.plan(index), self.resolution_of(i, j)))
-        };
-        let reach = |body: &Body| self.touch(body) + 0.5 * self.plans.margin_of(body.group);
-        neighbours.update(&self.bodies, &self.state.moving, reach, plan);
-        boxes.resize(self.bodies.len(), (0, Aabb::EMPTY));
-        let mut swept = |i: u32| {
-            let (serial, place) = &mut boxes[i as usize];
-            if *serial != self.state.serial {
-                let body = &self.bodies[i as usize];
-                (*serial, *place) = (self.state.serial, body.swept().grown(self.touch(body)));
-            }
-            *place
-        };
-        let mut glanced = 0;
-        jobs.clear();
-        if options.clear {
-            // The caller wants a line for every pair: the excluded ones are listed too.
-            let count = self.bodies.len() as u32;
-            for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
-                let Some((index, plan, resolution)) = plan(i, j) else { continue };
-                // Side by side: bodies whose corners are farther apart may be within it.
-                let reach = 0.5 * plan.reach();
-                let near = swept(i).grown(reach).meets(&swept(j).grown(reach));
-                let found = neighbours.find(i, j);
-                let pair = found.filter(|pair| near && !neighbours.is_apart(*pair));
-                if let (Some(notes), None) = (&mut notes, pair) {
-                    let apart = found.is_some_and(|pair| neighbours.is_apart(pair));
-                    notes.decided((i, j), if apart { Decided::Clearance } else { Decided::boxes(swept(i), swept(j)) });
-                }
-                let pair = pair.map(|pair| (pair, neighbours.lend(pair).1));
-                jobs.push(PairJob::new((i, j), (index, plan), resolution, near, pair));
-            }
-            if self.plans.count() > 1 {
-                jobs.sort_unstable_by_key(|job| (job.plan_index, job.a, job.b));
-            }
-        } else {
-            query_options.clear();
-            neighbours.query_options(|pair| query_options.push(pair));
-            if self.plans.count() > 1 {
-                query_options.sort_unstable_by_key(|pair| (neighbours.plan(*pair), *pair));
-            }
-            query_options.retain(|&pair| {
-                let (i, j) = neighbours.bodies(pair);
-                let pair_hint = *neighbours.pair_hint(pair);
-                // What met mostly does so again: no look is worth its while.
-                let look = !pair_hint.met && !pair_hint.discrete;
-                let axis_test = if look { self.axis_test((i, j), &pair_hint, &mut stances) } else { None };
-                if let Some(axis_test) = axis_test {
-                    if let Some(notes) = &mut notes {
-                        notes.glanced((i, j), &self.bodies, &axis_test);
-                        if axis_test.apart {
-                            let last = self.glance_to((i, j), &pair_hint, &mut stances).unwrap_or([axis_test.along; 2]);
-                            notes.decided((i, j), Decided::Directions(last));
-                        }
-                    }
-                    neighbours.noticed(pair, &axis_test);
-                    glanced += u32::from(axis_test.apart);
-                    return !axis_test.apart;
-                }
-                // Where nothing is glanced at the swept boxes decide what is asked about, whether the bodies have met or not:
-                // trees are near each other by f, whose levels reach beyond turned boxes, and what is told of that must not
-                // depend on what is remembered. Without a margin or regions nothing is.
-                let plan = self.plans.plan(neighbours.plan(pair));
-                // Of discrete pairs those are counted that may have passed through each other: by their boxes alone.
-                if pair_hint.met
-                    && !pair_hint.discrete
-                    && (!plan.reports_nearness() || self.can_glance((i, j), &pair_hint))
-                {
-                    return true;
-                }
-                neighbours.box_tests += 1;
-                let (reach, boxes) = (plan.reach(), [swept(i), swept(j)]);
-                let meet = boxes[0].grown(0.5 * reach).meets(&boxes[1].grown(0.5 * reach));
-                if let (Some(notes), false) = (&mut notes, meet) {
-                    notes.decided((i, j), Decided::boxes(boxes[0], boxes[1]));
-                    if !pair_hint.discrete {
-                        notes.apart_by((i, j), &self.bodies, boxes[0].gap(&boxes[1]) - reach, boxes);
-                    }
-                }
-                if !meet && !pair_hint.discrete {
-                    // Side by side, as they are compared: boxes whose corners are farther apart may meet sooner.
-                    neighbours.note(pair, boxes[0].gap(&boxes[1]) - reach);
-                }
-                meet
-            });
-            // In a loop of its own: what is known of pairs lies all over the memory, which answers several at a time.
-            for &pair in &query_options {
-                let plan_index = neighbours.plan(pair);
-                let plan = (plan_index, *self.plans.plan(plan_index));
-                let (resolution, pair_cache) = neighbours.lend(pair);
-                let bodies = neighbours.bodies(pair);
-                jobs.push(PairJob::new(bodies, plan, resolution, true, Some((pair, pair_cache))));
-            }
-        }
-        self.state.notes = notes;
-        self.state.neighbours = neighbours;
-        self.state.boxes = boxes;
-        self.state.stances = stances;
-        self.state.glanced = glanced;
-        self.state.query_options = query_options;
-        self.state.jobs = jobs;
-    }
-
-    /// True when a pair is one that is glanced at: both bodies have hulls, out as far as they matter to each other.
-    fn can_glance(&self, (i, j): (u32, u32), pair_hint: &PairHint) -> bool {
-        let holds = |k: u32| self.bodies[k as usize].hull.as_ref().is_some_and(|hull| hull.holds(pair_hint.touch));
-        !pair_hint.discrete && holds(i) && holds(j)
-    }
-
-    /// What a direction tells of a pair of convex bodies.
-    #[inline]
-    fn axis_test(&self, (i, j): (u32, u32), pair_hint: &PairHint, stances: &mut Stances) -> Option<SeparatingAxisTest> {
-        let indices = [i as usize, j as usize];
-        let seen = stances.look(indices, &self.bodies)?;
-        let shapes = |k: usize| {
-            let body = &self.bodies[indices[k]];
-            body.hull.as_ref()?.shape(&body.part.model)
-        };
-        Some(Glancing::new(seen, shapes, pair_hint.touch)?.look(pair_hint.along))
-    }
-
-    /// The directions by which a separating-axis test keeps a pair apart.
-    fn glance_to(&self, (i, j): (u32, u32), pair_hint: &PairHint, stances: &mut Stances) -> Option<[glam::DVec3; 2]> {
-        let indices = [i as usize, j as usize];
-        let seen = stances.look(indices, &self.bodies)?;
-        let shapes = |k: usize| {
-            let body = &self.bodies[indices[k]];
-            body.hull.as_ref()?.shape(&body.part.model)
-        };
-        Glancing::new(seen, shapes, pair_hint.touch)?.directions(pair_hint.along)
-    }
-
-    /// What a body's box grows by, so that boxes of bodies within their touching distance meet. A pair's margin counts for
-    /// that pair alone.
-    fn touch(&self, body: &Body) -> f64 {
-        // Touching is told within twice the resolution, of which this body answers for its share.
-        2.0 * self.resolution.unwrap_or(body.part.resolution)
-    }
-
     /// Searches the jobs and orders what they found.
     fn search(&mut self, options: &StepOptions, heed: Option<&Heed>) {
-        let Self { bodies, state, .. } = self;
-        let out = &mut state.outcome;
+        let Self { roster: Roster { bodies, .. }, state, .. } = self;
         search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches, heed);
         state.scratch.halt = heed.map(|heed| heed.halt.clone());
-        *out = StepOutcome {
-            pairs: std::mem::take(&mut out.pairs),
-            regions: std::mem::take(&mut out.regions),
-            safe_time: 1.0,
-            searched: state.glanced,
-            known: state.glanced,
-            box_tests: state.neighbours.box_tests,
-            busiest_cells: state.searches.busiest(),
-            ..StepOutcome::default()
-        };
-        out.pairs.clear();
-        out.regions.clear();
-        state.command.clear();
-        let mut earliest = f64::INFINITY;
+        state.outcome.clear();
+        let out = &mut state.outcome;
+        (out.searched, out.known) = (state.glanced, state.glanced);
+        (out.box_tests, out.busiest_cells) = (state.neighbours.box_tests, state.searches.busiest());
         // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
         let mut left = search::batch_limit(options);
-        let mut before = 0;
-        for jobs in state.jobs.chunk_by_mut(|p, q| p.plan_index == q.plan_index) {
-            let plan = jobs[0].plan;
-            let discrete = plan.detect == Detect::Discrete;
-            for (i, job) in (before..).zip(jobs.iter_mut()) {
-                let (effects, scratch) = (&mut out.effect_counters, &mut state.scratch);
-                if heed.is_some_and(Heed::is_over) {
-                    left = 0;
-                }
-                let complete = touch::decide(bodies, job, options, &mut left, effects, scratch);
-                count_effects(job, bodies, effects);
-                let outcome = &job.found.outcome;
-                out.counters += outcome.counters;
-                out.searched += u32::from(job.near);
-                out.known += u32::from(job.near && job.found.known);
-                out.safe_time = out.safe_time.min(outcome.time_lower);
-                if discrete && job.near && outcome.status == Status::Clear && passes(job, bodies) {
-                    out.may_have_passed += 1;
-                }
-                if matches!(outcome.status, Status::Contact | Status::Overlap) {
-                    out.contact = true;
-                    // A sensor stops nothing, and of a mere hit nobody knows when it comes.
-                    if !plan.sensor && plan.report >= Report::Time {
-                        earliest = earliest.min(outcome.time);
-                    }
-                }
-                if is_reported(&plan, outcome, options) {
-                    let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
-                    state.command.push((key_of(&plan, outcome), a, b, i, complete));
+        decide(bodies, state, options, &mut left, heed);
+        report(state, options);
+        touch::find_regions(bodies, &mut state.jobs, options, left, &mut state.outcome, heed);
+        learn(bodies, state, options);
+    }
+}
+
+/// Decides what is told of each job, sums up, and notes the keys of those that are told.
+fn decide(bodies: &[Body], state: &mut StepState, options: &StepOptions, left: &mut u64, heed: Option<&Heed>) {
+    let StepState { jobs, outcome: out, reported, scratch, .. } = state;
+    reported.clear();
+    let mut earliest = f64::INFINITY;
+    let mut before = 0;
+    for jobs in jobs.chunk_by_mut(|p, q| p.plan_index == q.plan_index) {
+        let plan = jobs[0].plan;
+        let discrete = plan.detect == Detect::Discrete;
+        for (i, job) in (before..).zip(jobs.iter_mut()) {
+            if heed.is_some_and(Heed::is_over) {
+                *left = 0;
+            }
+            let effects = &mut out.effect_counters;
+            let complete = touch::decide(bodies, job, options, left, effects, scratch);
+            count_effects(job, bodies, effects);
+            let outcome = &job.found.outcome;
+            out.counters += outcome.counters;
+            out.searched += u32::from(job.near);
+            out.known += u32::from(job.near && job.found.known);
+            out.safe_time = out.safe_time.min(outcome.time_lower);
+            if discrete && job.near && outcome.status == Status::Clear && passes(job, bodies) {
+                out.may_have_passed += 1;
+            }
+            if matches!(outcome.status, Status::Contact | Status::Overlap) {
+                out.contact = true;
+                // A sensor stops nothing, and of a mere hit nobody knows when it comes.
+                if !plan.sensor && plan.report >= Report::Time {
+                    earliest = earliest.min(outcome.time);
                 }
             }
-            before += jobs.len() as u32;
-        }
-        out.undecided = state.jobs.iter().any(|job| is_undecided_before(&job.found.outcome, earliest));
-        // Outcomes are large: their keys are sorted, and each is moved once.
-        state.command.sort_unstable();
-        out.pairs.extend(state.command.iter().map(|&(_, a, b, i, regions_complete)| {
-            let PairJob { plan, found, resolution, .. } = &state.jobs[i as usize];
-            let (outcome, coarser) = (found.outcome, found.outcome.resolution > *resolution);
-            let (regions, patch_slots) = ((0, 0), (0, 0));
-            PairOutcome { a, b, plan: *plan, outcome, coarser, job: i, regions_complete, regions, patch_slots }
-        }));
-        if options.first {
-            keep_first(&mut out.pairs);
-        }
-        out.effect_counters.sensors = out.pairs.iter().filter(|p| p.plan.sensor).count() as u64;
-        if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
-            out.pairs.truncate(options.max_records as usize);
-            out.truncated = true;
-        }
-        touch::find_regions(bodies, &mut state.jobs, options, left, out, heed);
-        for job in &mut state.jobs {
-            if let Some(pair) = job.pair {
-                let clearance = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.clearance };
-                if let Some(notes) = &mut state.notes {
-                    notes.measured(job, bodies, options);
-                }
-                // What meets now will mostly do so in the next step: no look is worth its while.
-                let met = job.found.outcome.status != Status::Clear;
-                state.neighbours.learned(pair, job.pair_cache.take(), clearance, met);
+            if is_reported(&plan, outcome, options) {
+                let (a, b) = (bodies[job.a as usize].id, bodies[job.b as usize].id);
+                reported.push((key_of(&plan, outcome), a, b, i, complete));
             }
+        }
+        before += jobs.len() as u32;
+    }
+    out.undecided = jobs.iter().any(|job| is_undecided_before(&job.found.outcome, earliest));
+}
+
+/// Writes the told pairs in their order, as many as are asked for.
+fn report(state: &mut StepState, options: &StepOptions) {
+    let StepState { jobs, outcome: out, reported, .. } = state;
+    // Outcomes are large: their keys are sorted, and each is moved once.
+    reported.sort_unstable();
+    out.pairs.extend(reported.iter().map(|&(_, a, b, i, regions_complete)| {
+        let PairJob { plan, found, resolution, .. } = &jobs[i as usize];
+        let (outcome, coarser) = (found.outcome, found.outcome.resolution > *resolution);
+        let (regions, patch_slots) = ((0, 0), (0, 0));
+        PairOutcome { a, b, plan: *plan, outcome, coarser, job: i, regions_complete, regions, patch_slots }
+    }));
+    if options.first {
+        keep_first(&mut out.pairs);
+    }
+    out.effect_counters.sensors = out.pairs.iter().filter(|p| p.plan.sensor).count() as u64;
+    if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
+        out.pairs.truncate(options.max_records as usize);
+        out.truncated = true;
+    }
+}
+
+/// Gives the list of neighbours back what is known of each pair, and what this step has added.
+fn learn(bodies: &[Body], state: &mut StepState, options: &StepOptions) {
+    let StepState { jobs, neighbours, notes, .. } = state;
+    for job in jobs {
+        if let Some(pair) = job.pair {
+            let clearance = if job.plan.detect == Detect::Discrete { 0.0 } else { job.found.clearance };
+            if let Some(notes) = notes {
+                notes.measured(job, bodies, options);
+            }
+            // What meets now will mostly do so in the next step: no look is worth its while.
+            let met = job.found.outcome.status != Status::Clear;
+            neighbours.learned(pair, job.pair_cache.take(), clearance, met);
         }
     }
 }

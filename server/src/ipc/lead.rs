@@ -1,0 +1,500 @@
+//! The server's loop: steps first, then commands, then what other threads have done; spin, then block.
+//!
+//! One thread leads: it takes requests as they come and runs steps itself. A step that takes long keeps its thread and loses
+//! the lead (`relay`); from then on the session has a thread of its own for its steps, of low priority, until they are
+//! short again. Imports and mass properties are jobs on threads of their own (`jobs`). So a session whose steps or models
+//! take long delays nobody but itself, and what nobody waits for any more is ended. Clients that died are noticed by their
+//! pidfd, those that left unheard by the port that they no longer have; both lose their sessions, and what they held in
+//! shared memory is freed.
+//!
+//! Where requests come from is behind a port (`port`): the loop knows no shared memory.
+
+use super::config::ServerConfig;
+use super::jobs::{Finished, Job, Work};
+use super::models::{Models, warn};
+use super::port::{CommandCall, Port, StepCall, Wake};
+use super::relay::Relay;
+use super::scene::{CommandOutcome, Scene, refusal, refused};
+use super::session::{Session, fresh_heed};
+use super::task::{Mailbox, Ran, Report, Task};
+use crate::world::{Refusal, yield_to_others};
+use contactd_proto::control::{Answer, Command, Envelope, decode, encode};
+use contactd_proto::names::PROTOCOL_VERSION;
+use contactd_proto::status::StatusRecord;
+use contactd_proto::step::ASK_POLLING;
+use contactd_proto::{ContactRecord, EffectCounters, ErrorCode};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Weak};
+use std::thread::{Builder, Scope};
+use std::time::{Duration, Instant};
+
+/// Time between two looks at the clients' lives, and the longest wait.
+const BEAT: Duration = Duration::from_millis(50);
+/// Looks for a step for each look at all else, while it polls.
+const LOOKS: usize = 8;
+/// A step on a thread of its session's own is short below this; after so many of them in a row the session has none any more.
+const SHORT: Duration = Duration::from_millis(1);
+const CALM: u32 = 16;
+/// How long the end of a server waits for what it has cancelled.
+const CANCELLED: Duration = Duration::from_secs(2);
+/// The part of a deadline that is left to the reply.
+const REPLY_PART: u32 = 10;
+
+/// Serves until `stop` is set; gives back what the last leader held, to be dropped by the caller.
+pub fn run<P: Port>(lead: Box<Lead<P>>, stop: &AtomicBool) -> Option<Box<Lead<P>>> {
+    let relay = Relay::new(lead);
+    std::thread::scope(|scope| {
+        // On a thread of its own: a long step keeps the thread on which it began, and its priority is not the caller's.
+        let leads = || follow(scope, &relay, relay.take_back(), stop);
+        if Builder::new().name("contactd-loop".into()).spawn_scoped(scope, leads).is_err() {
+            follow(scope, &relay, relay.take_back(), stop);
+        }
+    });
+    relay.into_lead()
+}
+
+/// What the leader holds. Dropped in the order of its fields.
+pub struct Lead<P: Port> {
+    pending: BTreeMap<u64, (P::Command, Job)>,
+    sessions: BTreeMap<u64, Session<P>>,
+    reports: Receiver<(u64, Report<P>)>,
+    mailbox: Arc<Mailbox<P>>,
+    port: P,
+    models: Arc<Models>,
+    config: ServerConfig,
+    last_session: u64,
+    steps: u64,
+    /// What they worked out.
+    effects: EffectCounters,
+    beats: u64,
+    last_work: Instant,
+    last_beat: Instant,
+    /// Sessions that have asked something lately, as of the last beat; new ones count.
+    active: usize,
+    cores: usize,
+    /// A thread watches, to take the lead; and that none could be started was told.
+    watched: bool,
+    alone: bool,
+    /// Set when the process was sent a hangup.
+    pub hangup: Arc<AtomicBool>,
+    /// The server's incarnation.
+    epoch: u64,
+}
+
+/// What becomes of a thread that leads: it serves to the end, or runs the steps of the session that kept it.
+fn follow<'scope, 'env, P: Port>(
+    scope: &'scope Scope<'scope, 'env>,
+    relay: &'scope Relay<Box<Lead<P>>>,
+    lead: Option<Box<Lead<P>>>,
+    stop: &'scope AtomicBool,
+) {
+    let Some(lead) = lead else { return };
+    let own = rustix::thread::gettid();
+    if let Some((task, ran)) = lead_on(scope, relay, lead, stop, own) {
+        yield_to_others();
+        let (to, tasks) = channel();
+        task.answer_from_afar(ran, false, Some(to));
+        // Until the session has no use for it.
+        while !relay.is_over() {
+            match tasks.recv_timeout(BEAT) {
+                Ok(task) => run_from_afar(task),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+}
+
+fn run_from_afar<P: Port>(mut task: Task<P>) {
+    let began = Instant::now();
+    let ran = task.run();
+    task.answer_from_afar(ran, began.elapsed() < SHORT, None);
+}
+
+/// Serves until `stop` is set, or until a step has taken so long that another thread leads: then that step, done.
+fn lead_on<'scope, 'env, P: Port>(
+    scope: &'scope Scope<'scope, 'env>,
+    relay: &'scope Relay<Box<Lead<P>>>,
+    mut lead: Box<Lead<P>>,
+    stop: &'scope AtomicBool,
+    own: rustix::process::Pid,
+) -> Option<(Task<P>, Ran<P>)> {
+    lead.watched = false;
+    while !stop.load(Ordering::Relaxed) {
+        if !lead.watched {
+            let watch = move || follow(scope, relay, relay.watch(), stop);
+            lead.watched = Builder::new().name("contactd-watch".into()).spawn_scoped(scope, watch).is_ok();
+            lead.is_alone();
+        }
+        let mut worked = false;
+        let spins = lead.last_work.elapsed() < lead.spin();
+        // Steps first: while it polls it looks for them several times for each look at all else.
+        for _ in 0..if spins { LOOKS } else { 1 } {
+            while let Some(call) = lead.port.next_step() {
+                worked = true;
+                let Some(mut task) = lead.begin(call) else { continue };
+                let id = task.session;
+                relay.lend(lead, task.heed.clone(), own);
+                let ran = task.run();
+                match relay.take_back() {
+                    Some(back) => lead = back,
+                    None => return Some((task, ran)),
+                }
+                lead.effects += ran.0;
+                let scene = task.answer(ran);
+                lead.put_back(id, scene);
+            }
+            std::hint::spin_loop();
+        }
+        while let Some(call) = lead.port.next_command() {
+            lead.command(call);
+            worked = true;
+        }
+        worked |= lead.hear();
+        if lead.last_beat.elapsed() >= BEAT {
+            lead.beat();
+            lead.last_beat = Instant::now();
+        }
+        if worked {
+            lead.last_work = Instant::now();
+        } else if !spins && !lead.port.wait(BEAT) {
+            // An interrupted wait ends early, a failing one must not become a busy loop.
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    lead.end();
+    relay.end(lead);
+    None
+}
+
+impl<P: Port> Lead<P> {
+    /// A loop that has served nobody yet, of the server's incarnation `epoch`; `bell` wakes it.
+    pub fn new(config: ServerConfig, epoch: u64, port: P, bell: P::Bell) -> Self {
+        let (to, reports) = channel();
+        Self {
+            pending: BTreeMap::new(),
+            sessions: BTreeMap::new(),
+            reports,
+            mailbox: Arc::new(Mailbox { reports: to, bell }),
+            port,
+            models: Arc::new(Models::new(&config)),
+            config,
+            last_session: 0,
+            steps: 0,
+            effects: EffectCounters::default(),
+            beats: 0,
+            last_work: Instant::now(),
+            last_beat: Instant::now(),
+            active: 0,
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            watched: false,
+            alone: false,
+            hangup: Arc::default(),
+            epoch,
+        }
+    }
+
+    /// How long to poll before blocking: not at all when the clients that poll need the cores. Who has asked nothing of late
+    /// polls no more.
+    fn spin(&self) -> Duration {
+        let spinners = 1 + self.active;
+        Duration::from_micros(if spinners <= self.cores { self.config.spin_us } else { 0 })
+    }
+
+    /// Takes what other threads tell; true when there was something.
+    fn hear(&mut self) -> bool {
+        let mut heard = false;
+        while let Ok((session, report)) = self.reports.try_recv() {
+            heard = true;
+            match report {
+                Report::Job(finished) => self.finished(session, finished),
+                Report::Stepped { scene, effects, short, thread } => {
+                    self.effects += effects;
+                    self.stepped(session, short, thread);
+                    self.put_back(session, scene);
+                }
+            }
+        }
+        heard
+    }
+
+    /// A session's step is done on another thread.
+    fn stepped(&mut self, id: u64, short: bool, thread: Option<Sender<Task<P>>>) {
+        let Some(session) = self.sessions.get_mut(&id) else { return };
+        session.calm = if short { session.calm + 1 } else { 0 };
+        if thread.is_some() {
+            session.thread = thread;
+        } else if session.calm >= CALM {
+            // Its steps are short again: they are the loop's, and its threads end.
+            session.thread = None;
+            session.heed = fresh_heed(self.cores);
+        }
+    }
+
+    /// A scene comes back to its session.
+    fn put_back(&mut self, id: u64, scene: Box<Scene>) {
+        match self.sessions.get_mut(&id) {
+            Some(session) => session.scene = Some(scene),
+            None => discard(scene),
+        }
+    }
+
+    /// A step that is to be run by the caller; `None` where it is answered, or runs elsewhere.
+    fn begin(&mut self, call: P::Step) -> Option<Task<P>> {
+        let request = call.request();
+        let refuse = |call: P::Step, code| {
+            let reply = call.write(0, refusal(&request, code, None), &|_| ContactRecord::default());
+            call.send(reply);
+        };
+        let is_mine = request.epoch == self.epoch;
+        if is_mine && self.sessions.get(&request.session).is_some_and(|session| session.scene.is_none()) {
+            // Its reply was sent: what is left of its last step is on its way.
+            self.hear();
+        }
+        let session = if is_mine { self.sessions.get_mut(&request.session) } else { None };
+        let Some(session) = session else {
+            let code = if request.version == PROTOCOL_VERSION { ErrorCode::SessionGone } else { ErrorCode::Version };
+            refuse(call, code);
+            return None;
+        };
+        session.has_asked();
+        session.polls = request.asked & ASK_POLLING != 0;
+        self.steps += 1;
+        let scene = if session.waiting { None } else { session.scene.take() };
+        let Some(scene) = scene else {
+            refuse(call, ErrorCode::Busy);
+            if !session.polls {
+                session.wake.notify();
+            }
+            return None;
+        };
+        if self.config.deadline_ms > 0 {
+            let has_left = session.thread.is_some();
+            session.heed = session.heed.next(Some(deadline(&self.config)));
+            if has_left {
+                session.heed.leave();
+            }
+        }
+        let (heed, wake, mailbox) = (session.heed.clone(), session.wake.clone(), self.mailbox.clone());
+        let task = Task { session: request.session, scene, heed, request, call, wake, mailbox };
+        let Some(thread) = &session.thread else { return Some(task) };
+        match thread.send(task) {
+            Ok(()) => None,
+            // Its thread has gone: the loop is what is left.
+            Err(e) => {
+                session.thread = None;
+                Some(e.0)
+            }
+        }
+    }
+
+    fn command(&mut self, call: P::Command) {
+        let version = call.version();
+        if version != PROTOCOL_VERSION {
+            return answer(call, &refused(Refusal::new(ErrorCode::Version, format!("the client speaks {version}"))));
+        }
+        if call.bytes().len() > self.config.text + (1 << 20) {
+            return answer(call, &refused(Refusal::new(ErrorCode::LimitText, "")));
+        }
+        // One copy, then decoding: what is decoded can no longer change.
+        let bytes = call.bytes().to_vec();
+        let envelope: Envelope = match decode(&bytes) {
+            Ok(envelope) => envelope,
+            Err(code) => return answer(call, &refused(Refusal::new(code, ""))),
+        };
+        if let Command::Open { version, process } = envelope.command {
+            let opened = self.open(version, process).unwrap_or_else(refused);
+            return answer(call, &opened);
+        }
+        let id = envelope.session;
+        self.hear();
+        let session = if envelope.epoch == self.epoch { self.sessions.get_mut(&id) } else { None };
+        let Some(session) = session else {
+            return answer(call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
+        };
+        session.has_asked();
+        // Whatever is under way: what comes of it has nobody to go to.
+        if envelope.command == Command::Close {
+            self.remove(id);
+            self.show();
+            return answer(call, &Answer::Done);
+        }
+        let scene = if session.waiting { None } else { session.scene.as_mut() };
+        let Some(scene) = scene else {
+            let detail = if session.waiting { "a model is being imported or integrated over" } else { "a step runs" };
+            return answer(call, &refused(Refusal::new(ErrorCode::Busy, detail)));
+        };
+        let work = match scene.command(envelope.command) {
+            CommandOutcome::Answered(a) => {
+                answer(call, &a);
+                session.wake.notify();
+                return;
+            }
+            CommandOutcome::Import(import) => Work::Import(import),
+            CommandOutcome::Integrate(integration) => Work::Integrate(integration),
+        };
+        // A core is left to the loop; the others are shared between the jobs by the system.
+        let threads = self.cores.saturating_sub(1) / (self.pending.len() + 1);
+        // The bell must not outlive its service: a job that is still to be told of that has ended is told to nobody.
+        let mailbox: Weak<Mailbox<P>> = Arc::downgrade(&self.mailbox);
+        let done = move |finished| {
+            if let Some(mailbox) = mailbox.upgrade() {
+                mailbox.report(id, Report::Job(finished));
+            }
+        };
+        match Job::start(work, threads, self.models.clone(), done) {
+            Ok(job) => {
+                session.waiting = true;
+                self.pending.insert(id, (call, job));
+            }
+            Err(refusal) => answer(call, &refused(refusal)),
+        }
+    }
+
+    fn open(&mut self, version: u32, process: (u32, u64)) -> Result<Answer, Refusal> {
+        if version != PROTOCOL_VERSION {
+            return Err(Refusal::new(ErrorCode::Version, format!("the client speaks {version}")));
+        }
+        if self.sessions.len() >= self.config.sessions {
+            self.end_sessions();
+        }
+        if self.sessions.len() >= self.config.sessions {
+            let detail = format!("the limit is {}", self.config.sessions);
+            return Err(Refusal::new(ErrorCode::LimitSessions, detail));
+        }
+        let id = self.last_session + 1;
+        let wake = self.port.wake_of(id).map_err(|e| Refusal::new(ErrorCode::Internal, e.to_string()))?;
+        self.last_session = id;
+        let session = Session::new(Scene::new(&self.config), wake, process, self.cores);
+        self.sessions.insert(id, session);
+        self.active += 1;
+        self.show();
+        // The client polls beside the server: only where both have a core.
+        let spin = if self.cores > 1 { self.config.spin_us } else { 0 };
+        Ok(Answer::Opened { session: id, max_batch: self.config.batch as u32, spin_ns: spin * 1000 })
+    }
+
+    /// A job is done, or was refused.
+    fn finished(&mut self, id: u64, finished: Finished) {
+        // A session that ended meanwhile has nobody to answer.
+        let Some((call, _job)) = self.pending.remove(&id) else { return };
+        let Some(session) = self.sessions.get_mut(&id) else { return };
+        session.waiting = false;
+        let said = match (finished, session.scene.as_mut()) {
+            (Finished::Imported(model, text, loaded), Some(scene)) => scene.loaded(model, text, loaded),
+            (Finished::Imported(..), None) => refused(Refusal::new(ErrorCode::Busy, "a step runs")),
+            (Finished::Integrated(said), _) => said,
+        };
+        answer(call, &said);
+        session.wake.notify();
+    }
+
+    /// Ends a session: what runs for it is cancelled, and its scene freed on another thread.
+    fn remove(&mut self, id: u64) {
+        self.pending.remove(&id);
+        if let Some(mut session) = self.sessions.remove(&id)
+            && let Some(scene) = session.scene.take()
+        {
+            discard(scene);
+        }
+    }
+
+    /// Ends the sessions that are over.
+    fn end_sessions(&mut self) {
+        let idle = Duration::from_secs(self.config.idle_s);
+        let over: Vec<u64> =
+            self.sessions.iter_mut().filter_map(|(id, session)| session.is_over(idle).then_some(*id)).collect();
+        for id in &over {
+            self.remove(*id);
+        }
+        if !over.is_empty() {
+            self.port.sweep_dead();
+        }
+    }
+
+    fn beat(&mut self) {
+        self.end_sessions();
+        self.active = self.sessions.values().filter(|s| s.is_active()).count();
+        self.beats += 1;
+        // A client may also die without a session: rarely looked for, since the look costs milliseconds.
+        if self.beats.is_multiple_of(200) {
+            self.port.sweep_dead();
+        }
+        if self.hangup.swap(false, Ordering::Relaxed) {
+            warn("SIGHUP: there is nothing to read again, the server goes on");
+        }
+        self.show();
+    }
+
+    /// Tells, once, that nobody watches.
+    fn is_alone(&mut self) {
+        if !self.watched && !self.alone {
+            warn("no thread can be started: a step that takes long delays all sessions");
+        }
+        self.alone = !self.watched;
+    }
+
+    /// Ends what runs for its sessions, and waits for it.
+    fn end(&mut self) {
+        let until = Instant::now() + CANCELLED;
+        for session in self.sessions.values_mut() {
+            session.heed.halt();
+            session.thread = None;
+        }
+        let mut left: usize = self.pending.len();
+        self.pending.clear();
+        while left > 0
+            && let Ok((_, report)) = self.reports.recv_timeout(until.saturating_duration_since(Instant::now()))
+        {
+            left -= usize::from(matches!(report, Report::Job(_)));
+        }
+    }
+
+    fn show(&mut self) {
+        let status = status(self.epoch, &self.config, self.sessions.len(), self.steps);
+        self.port.show(StatusRecord { effects: self.effects, ..status });
+    }
+}
+
+/// When a step that begins now must have been searched.
+fn deadline(config: &ServerConfig) -> Instant {
+    let whole = Duration::from_millis(config.deadline_ms);
+    Instant::now() + (whole - whole / REPLY_PART)
+}
+
+/// Frees a scene on another thread: a large one takes longer than a step may wait.
+fn discard(scene: Box<Scene>) {
+    // Where no thread can be started it is freed here.
+    let _ = Builder::new().name("contactd-free".into()).spawn(move || drop(scene));
+}
+
+/// What a server shows of itself before it has counted anything.
+pub fn status(epoch: u64, config: &ServerConfig, sessions: usize, steps: u64) -> StatusRecord {
+    StatusRecord {
+        version_min: PROTOCOL_VERSION,
+        version_max: PROTOCOL_VERSION,
+        iceoryx2: [0, 10, 0],
+        pid: std::process::id(),
+        epoch,
+        sessions: sessions as u64,
+        steps,
+        limit_text: config.text as u64,
+        limit_batch: config.batch as u64,
+        limit_objects: config.objects as u64,
+        limit_sessions: config.sessions as u64,
+        ..StatusRecord::default()
+    }
+}
+
+/// Sends the answer to a command.
+fn answer(call: impl CommandCall, answer: &Answer) {
+    // An answer that is too long ends the call without one.
+    if let Ok(bytes) = encode(answer) {
+        call.answer(&bytes);
+    }
+}
+
+#[cfg(test)]
+mod tests;
