@@ -2,7 +2,8 @@
 //!
 //! Both sides bound what they decode by [`DECODE_LIMIT`], so a forged length cannot make them allocate.
 
-use crate::{Detect, ErrorCode, InitialOverlap, MassProperties, Motion, MotionState, Pose, Report, Rule};
+use crate::rule::{Effects, Setting};
+use crate::{ErrorCode, MassProperties, Motion, MotionState, Pose, Rule};
 use bincode::{Decode, Encode, config};
 use glam::DVec3;
 use iceoryx2::prelude::ZeroCopySend;
@@ -10,27 +11,31 @@ use iceoryx2::prelude::ZeroCopySend;
 /// Most bytes that an encoded command or answer may have.
 pub const DECODE_LIMIT: usize = 80 << 20;
 
-/// A rule in bytes; its words as indices into their tables.
+/// A rule in bytes: its settings in the order of their table.
 #[derive(Clone, Debug, PartialEq, Encode, Decode)]
 pub struct WireRule {
     between: [String; 2],
     except: Vec<[String; 2]>,
-    words: [u8; 3],
-    margin: f64,
-    penetration: bool,
-    sensor: bool,
+    settings: Vec<WireSetting>,
+}
+
+/// What a field of a rule holds; a word by its code.
+#[derive(Clone, Debug, PartialEq, Encode, Decode)]
+enum WireSetting {
+    Word(u32),
+    Flag(bool),
+    Length(f64),
 }
 
 impl From<&Rule> for WireRule {
     fn from(r: &Rule) -> Self {
-        Self {
-            between: r.between.clone(),
-            except: r.except.clone(),
-            words: [r.detect as u8, r.report as u8, r.initial_overlap as u8],
-            margin: r.margin,
-            penetration: r.penetration,
-            sensor: r.sensor,
-        }
+        let effects = r.effects();
+        let settings = Effects::FIELDS.iter().map(|field| match field.get(&effects) {
+            Setting::Word(code) => WireSetting::Word(code),
+            Setting::Flag(on) => WireSetting::Flag(on),
+            Setting::Length(length) => WireSetting::Length(length),
+        });
+        Self { between: r.between.clone(), except: r.except.clone(), settings: settings.collect() }
     }
 }
 
@@ -38,19 +43,23 @@ impl WireRule {
     /// The rule.
     ///
     /// # Errors
-    /// `BadRule` for a word that is not in its table.
+    /// `BadRule` for settings that are not those of the table, in its order.
     pub fn checked(self) -> Result<Rule, ErrorCode> {
-        let [detect, report, overlap] = self.words.map(usize::from);
-        Ok(Rule {
-            between: self.between,
-            except: self.except,
-            detect: *Detect::ALL.get(detect).ok_or(ErrorCode::BadRule)?,
-            report: *Report::ALL.get(report).ok_or(ErrorCode::BadRule)?,
-            penetration: self.penetration,
-            margin: self.margin,
-            initial_overlap: *InitialOverlap::ALL.get(overlap).ok_or(ErrorCode::BadRule)?,
-            sensor: self.sensor,
-        })
+        if self.settings.len() != Effects::FIELDS.len() {
+            return Err(ErrorCode::BadRule);
+        }
+        let mut effects = Effects::DEFAULT;
+        for (field, setting) in Effects::FIELDS.iter().zip(self.settings) {
+            let setting = match setting {
+                WireSetting::Word(code) => Setting::Word(code),
+                WireSetting::Flag(on) => Setting::Flag(on),
+                WireSetting::Length(length) => Setting::Length(length),
+            };
+            if !field.set(&mut effects, setting) {
+                return Err(ErrorCode::BadRule);
+            }
+        }
+        Ok(Rule { except: self.except, ..Rule::asking(self.between, effects) })
     }
 }
 
@@ -337,6 +346,16 @@ mod tests {
     fn commands_come_back_and_damage_is_refused() {
         let rule = Rule { except: vec![["a".into(), "b".into()]], margin: 0.5, ..Rule::new(["x".into(), "y".into()]) };
         assert_eq!(WireRule::from(&rule).checked(), Ok(rule.clone()));
+        let settings = WireRule::from(&rule).settings;
+        let word = settings.iter().position(|s| matches!(s, WireSetting::Word(_))).unwrap();
+        let spoilt = |change: &dyn Fn(&mut Vec<WireSetting>)| {
+            let mut wire = WireRule::from(&rule);
+            change(&mut wire.settings);
+            wire.checked()
+        };
+        assert_eq!(spoilt(&|s| s.truncate(1)), Err(ErrorCode::BadRule));
+        assert_eq!(spoilt(&|s| s[word] = WireSetting::Word(99)), Err(ErrorCode::BadRule));
+        assert_eq!(spoilt(&|s| s[word] = WireSetting::Flag(true)), Err(ErrorCode::BadRule));
         let command = Envelope { epoch: 9, session: 3, command: Command::SetRules(vec![WireRule::from(&rule)]) };
         let bytes = encode(&command).unwrap();
         assert_eq!(decode::<Envelope>(&bytes), Ok(command));

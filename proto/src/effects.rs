@@ -1,9 +1,30 @@
 //! Effects: what a scene asks of its pairs, by name, and how often each was worked out.
+//!
+//! One table (`effects!` below): counters, bits, words, and which rules ask for them. The wire, C, Python and what
+//! `contactd inspect` says follow from it.
 
+use crate::rule::{Detect, Effects, InitialOverlap, Report};
 use iceoryx2::prelude::ZeroCopySend;
 
+/// A row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Effect {
+    /// The name of its counter.
+    pub counter: &'static str,
+    /// The name of its bit: `EFFECT_…`.
+    pub bit: &'static str,
+    /// The bit.
+    pub value: u32,
+    /// Its word.
+    pub word: &'static str,
+    /// What is counted, by lines.
+    pub doc: &'static [&'static str],
+    /// Whether a rule asks for it; `None` where it is the motion that decides.
+    pub asked: Option<fn(&Effects) -> bool>,
+}
+
 macro_rules! effects {
-    ($($(#[$doc:meta])* $field:ident = $bit:ident: $value:literal, $word:literal);+ $(;)?) => {
+    ($($(#[doc = $doc:literal])+ $field:ident = $bit:ident: $value:literal, $word:literal, $asked:expr;)+) => {
         /// How often each effect was worked out: in a step (its reply), or since the server's start (its status). An effect
         /// that no rule asks for, or that the motion itself rules out, is not worked out: its counter is exactly 0. What an
         /// earlier step has proven need not be worked out again, so counters are no part of the answer's bits.
@@ -12,10 +33,20 @@ macro_rules! effects {
         )]
         #[repr(C)]
         pub struct EffectCounters {
-            $($(#[$doc])* pub $field: u64,)+
+            $($(#[doc = $doc])+ pub $field: u64,)+
         }
 
-        $($(#[$doc])* pub const $bit: u32 = $value;)+
+        $($(#[doc = $doc])+ pub const $bit: u32 = $value;)+
+
+        /// The table, in the order of the bits.
+        pub const ALL: &[Effect] = &[$(Effect {
+            counter: stringify!($field),
+            bit: stringify!($bit),
+            value: $value,
+            word: $word,
+            doc: &[$($doc),+],
+            asked: $asked,
+        }),+];
 
         impl EffectCounters {
             /// Each effect's word with its counter, in the order of the bits.
@@ -39,28 +70,29 @@ macro_rules! effects {
 
 effects! {
     /// Pairs searched over the whole step.
-    continuous = EFFECT_CONTINUOUS: 1, "continuous";
+    continuous = EFFECT_CONTINUOUS: 1, "continuous", Some(|e| e.detect == Detect::Continuous);
     /// Pairs tested at the end of the step only.
-    discrete = EFFECT_DISCRETE: 2, "discrete";
+    discrete = EFFECT_DISCRETE: 2, "discrete", Some(|e| e.detect == Detect::Discrete);
     /// Of the pairs searched over the step those of which a body turns: their bounds are those of rotation.
-    turning = EFFECT_TURNING: 4, "turning";
+    turning = EFFECT_TURNING: 4, "turning", None;
     /// Times of contact worked out: continued from the witness back to where the surfaces meet.
-    times = EFFECT_TIME: 8, "time";
+    times = EFFECT_TIME: 8, "time", Some(|e| e.report >= Report::Time);
     /// Contact points with their normal, kind and faces.
-    contacts = EFFECT_CONTACT: 16, "contact";
+    contacts = EFFECT_CONTACT: 16, "contact", Some(|e| e.report >= Report::Contact);
     /// Pairs whose contact regions were looked for.
-    patches = EFFECT_PATCH: 32, "patch";
+    patches = EFFECT_PATCH: 32, "patch", Some(|e| e.report >= Report::Patch);
     /// Deepest points of overlaps at the start.
-    penetrations = EFFECT_PENETRATION: 64, "penetration";
+    penetrations = EFFECT_PENETRATION: 64, "penetration", Some(|e| e.penetration);
     /// Separations tested against a margin.
-    margins = EFFECT_MARGIN: 128, "margin";
+    margins = EFFECT_MARGIN: 128, "margin", Some(|e| e.margin > 0.0);
     /// Overlaps at the start that were searched past.
-    past_overlaps = EFFECT_PAST_OVERLAP: 256, "ignore_if_separating";
+    past_overlaps = EFFECT_PAST_OVERLAP: 256, "ignore_if_separating",
+        Some(|e| e.initial_overlap == InitialOverlap::IgnoreIfSeparating);
     /// Sensor pairs told.
-    sensors = EFFECT_SENSOR: 512, "sensor";
+    sensors = EFFECT_SENSOR: 512, "sensor", Some(|e| e.sensor);
 }
 
-const _: () = assert!(size_of::<EffectCounters>() == 80);
+const _: () = assert!(size_of::<EffectCounters>() == 8 * ALL.len());
 
 #[cfg(test)]
 mod tests {

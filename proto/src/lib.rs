@@ -29,5 +29,5 @@ pub use motion::Motion;
 pub use motion_state::MotionState;
 pub use pose::Pose;
 pub use pose_record::PoseRecord;
-pub use rule::{Detect, InitialOverlap, Report, Rule};
+pub use rule::{Detect, Effects, InitialOverlap, Report, Rule};
 pub use step::{StepReply, StepRequest};

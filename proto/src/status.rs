@@ -1,6 +1,6 @@
 //! The one record whose layout never changes: it tells a client of any version whom it talks to.
 
-use crate::EffectCounters;
+use crate::{EffectCounters, effects};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What `contactd/status` shows. Fields may be appended in `spare`, never moved.
@@ -31,8 +31,8 @@ pub struct StatusRecord {
     pub limit_sessions: u64,
     /// How often each effect was worked out since the start, over all sessions.
     pub effects: EffectCounters,
-    /// Zero.
-    pub spare: [u64; 12],
+    /// Zero. A new effect's counter takes its place from here.
+    pub spare: [u64; 22 - effects::ALL.len()],
 }
 
 const _: () = assert!(size_of::<StatusRecord>() == 256);

@@ -136,7 +136,7 @@ impl WorkCounters {
 
 const _: () = {
     assert!(size_of::<StepRequest>() == 64);
-    assert!(size_of::<StepReply>() == 224 && size_of::<WorkCounters>() == 88);
+    assert!(size_of::<StepReply>() == 144 + size_of::<EffectCounters>() && size_of::<WorkCounters>() == 88);
     assert!(std::mem::offset_of!(StepReply, status) == 16);
     assert!(std::mem::offset_of!(StepReply, safe_time) == 48);
     assert!(std::mem::offset_of!(StepReply, effect_counters) == 144);

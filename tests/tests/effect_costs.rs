@@ -7,7 +7,7 @@ use contactd::contact::{Counters, DEFAULT_CELL_LIMIT, PairQuery, Scratch, Status
 use contactd::contact::{clearance, earliest_contact, region};
 use contactd::motion::Placed;
 use contactd::world::{self, PairPlan};
-use contactd_proto::{Detect, EffectCounters, Report, Rule};
+use contactd_proto::{Detect, EffectCounters, Effects, Report, Rule};
 use contactd_tests::engine::question;
 use contactd_tests::lanes::{Class, EFFECTS, Lane, Lanes, NARROW, PLAIN, WIDE, counts, rule};
 use contactd_tests::scenes::{Recipe, Scene};
@@ -117,7 +117,7 @@ fn a_step_costs_what_its_searches_cost() {
         let lanes = class.lanes(LANES);
         for report in [Report::Hit, Report::Time, Report::Contact] {
             for penetration in [false, true] {
-                let plan = PairPlan { report, penetration, ..PairPlan::DEFAULT };
+                let plan = PairPlan(Effects { report, penetration, ..Effects::DEFAULT });
                 let mut scene = Lanes::all(&lanes, |r| (r.report, r.penetration) = (report, penetration));
                 let counted = scene.step().counters;
                 let mut expected = Counters::default();
@@ -140,7 +140,7 @@ fn a_margin_costs_what_its_tests_cost() {
         let mut lanes = Class::Short.lanes(LANES);
         lanes.push(Lane::of(&fall(2.4 + gap)));
         // Of mere times no regions are told: those of pairs within a margin have counters of their own.
-        let plan = PairPlan { report: Report::Time, margin, ..PairPlan::DEFAULT };
+        let plan = PairPlan(Effects { report: Report::Time, margin, ..Effects::DEFAULT });
         let mut scene = Lanes::all(&lanes, |r| (r.report, r.margin) = (Report::Time, margin));
         let out = scene.step();
         let (counted, tested) = (out.counters.instant_cells, out.effect_counters.margins);

@@ -227,46 +227,37 @@
 // "No record in particular" in `index`.
 #define CONTACTD_NO_INDEX UINT32_MAX
 
-// `effects`: pairs were searched over the whole step.
+// `effects`: pairs searched over the whole step.
 #define CONTACTD_EFFECT_CONTINUOUS 1
 
-// `effects`: pairs were tested at the end of the step.
+// `effects`: pairs tested at the end of the step only.
 #define CONTACTD_EFFECT_DISCRETE 2
 
-// `effects`: a body of a pair turned.
+// `effects`: of the pairs searched over the step those of which a body turns: their bounds are those of rotation.
 #define CONTACTD_EFFECT_TURNING 4
 
-// `effects`: times of contact were worked out.
+// `effects`: times of contact worked out: continued from the witness back to where the surfaces meet.
 #define CONTACTD_EFFECT_TIME 8
 
-// `effects`: contact points were worked out.
+// `effects`: contact points with their normal, kind and faces.
 #define CONTACTD_EFFECT_CONTACT 16
 
-// `effects`: contact regions were looked for.
+// `effects`: pairs whose contact regions were looked for.
 #define CONTACTD_EFFECT_PATCH 32
 
-// `effects`: deepest points were looked for.
+// `effects`: deepest points of overlaps at the start.
 #define CONTACTD_EFFECT_PENETRATION 64
 
-// `effects`: separations were tested against a margin.
+// `effects`: separations tested against a margin.
 #define CONTACTD_EFFECT_MARGIN 128
 
-// `effects`: overlaps at the start were searched past.
+// `effects`: overlaps at the start that were searched past.
 #define CONTACTD_EFFECT_PAST_OVERLAP 256
 
-// `effects`: sensor pairs were told.
+// `effects`: sensor pairs told.
 #define CONTACTD_EFFECT_SENSOR 512
 
-// Curved primitives are exact when `$fn` is 0 or at least 9, as written below that.
-#define CONTACTD_FACETS_AUTO 0
-
-// Always exact.
-#define CONTACTD_FACETS_EXACT 1
-
-// Always the prism or polyhedron that `$fn` asks for.
-#define CONTACTD_FACETS_AS_WRITTEN 2
-
-// Not searched at all.
+// Not at all.
 #define CONTACTD_DETECT_OFF 0
 
 // The end pose only.
@@ -292,6 +283,15 @@
 
 // The search goes on for the starting depth + the resolution.
 #define CONTACTD_INITIAL_OVERLAP_IGNORE_IF_SEPARATING 1
+
+// Curved primitives are exact when `$fn` is 0 or at least 9, as written below that.
+#define CONTACTD_FACETS_AUTO 0
+
+// Always exact.
+#define CONTACTD_FACETS_EXACT 1
+
+// Always the prism or polyhedron that `$fn` asks for.
+#define CONTACTD_FACETS_AS_WRITTEN 2
 
 // The points of all pairs, from step to step.
 typedef struct contactd_manifolds contactd_manifolds;
@@ -389,6 +389,8 @@ typedef struct contactd_rule {
     const struct contactd_names *except;
     // Number of them.
     size_t except_count;
+    // Report at this separation too (length, >= 0): measured by f, never late, early at sharp features.
+    double margin;
     // CONTACTD_DETECT_…: how the pair is searched.
     uint32_t detect;
     // CONTACTD_REPORT_…: what is told of it.
@@ -399,10 +401,6 @@ typedef struct contactd_rule {
     uint32_t penetration;
     // 1: record only; never stops a search for the scene's first contact.
     uint32_t sensor;
-    // Zero.
-    uint32_t reserved;
-    // Report at this separation too (length, >= 0): never late, early at sharp features.
-    double margin;
 } contactd_rule;
 
 // What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
@@ -468,16 +466,16 @@ typedef struct contactd_work_counters {
     uint64_t instant_cells;
 } contactd_work_counters;
 
-// How often each effect was worked out: in a step. What an earlier step has proven need not be worked out again, so counters
-// are no part of the answer's bits.
+// How often each effect was worked out in a step. What an earlier step has proven need not be worked out again, so
+// counters are no part of the answer's bits.
 typedef struct contactd_effect_counters {
     // Pairs searched over the whole step.
     uint64_t continuous;
     // Pairs tested at the end of the step only.
     uint64_t discrete;
-    // Of the pairs searched over the step those of which a body turns.
+    // Of the pairs searched over the step those of which a body turns: their bounds are those of rotation.
     uint64_t turning;
-    // Times of contact worked out.
+    // Times of contact worked out: continued from the witness back to where the surfaces meet.
     uint64_t times;
     // Contact points with their normal, kind and faces.
     uint64_t contacts;
@@ -1101,17 +1099,6 @@ CONTACTD_AT(contactd_work_counters, newton, 56);
 CONTACTD_AT(contactd_work_counters, closed_forms, 64);
 CONTACTD_AT(contactd_work_counters, may_have_passed, 72);
 CONTACTD_AT(contactd_work_counters, instant_cells, 80);
-CONTACTD_SIZE(contactd_effect_counters, 80);
-CONTACTD_AT(contactd_effect_counters, continuous, 0);
-CONTACTD_AT(contactd_effect_counters, discrete, 8);
-CONTACTD_AT(contactd_effect_counters, turning, 16);
-CONTACTD_AT(contactd_effect_counters, times, 24);
-CONTACTD_AT(contactd_effect_counters, contacts, 32);
-CONTACTD_AT(contactd_effect_counters, patches, 40);
-CONTACTD_AT(contactd_effect_counters, penetrations, 48);
-CONTACTD_AT(contactd_effect_counters, margins, 56);
-CONTACTD_AT(contactd_effect_counters, past_overlaps, 64);
-CONTACTD_AT(contactd_effect_counters, sensors, 72);
 CONTACTD_SIZE(contactd_pose, 56);
 CONTACTD_AT(contactd_pose, position, 0);
 CONTACTD_AT(contactd_pose, rotation, 24);
@@ -1147,17 +1134,6 @@ CONTACTD_AT(contactd_object, reserved, 28);
 CONTACTD_AT(contactd_object, max_speed, 32);
 CONTACTD_AT(contactd_object, place, 40);
 CONTACTD_AT(contactd_object, pose, 96);
-CONTACTD_SIZE(contactd_rule, 64);
-CONTACTD_AT(contactd_rule, between, 0);
-CONTACTD_AT(contactd_rule, except, 16);
-CONTACTD_AT(contactd_rule, except_count, 24);
-CONTACTD_AT(contactd_rule, detect, 32);
-CONTACTD_AT(contactd_rule, report, 36);
-CONTACTD_AT(contactd_rule, initial_overlap, 40);
-CONTACTD_AT(contactd_rule, penetration, 44);
-CONTACTD_AT(contactd_rule, sensor, 48);
-CONTACTD_AT(contactd_rule, reserved, 52);
-CONTACTD_AT(contactd_rule, margin, 56);
 CONTACTD_SIZE(contactd_options, 48);
 CONTACTD_AT(contactd_options, advance, 0);
 CONTACTD_AT(contactd_options, dt, 8);
@@ -1190,6 +1166,27 @@ CONTACTD_AT(contactd_manifold, status, 8);
 CONTACTD_AT(contactd_manifold, is_complete, 12);
 CONTACTD_AT(contactd_manifold, points, 16);
 CONTACTD_AT(contactd_manifold, point_count, 24);
+CONTACTD_SIZE(contactd_effect_counters, 80);
+CONTACTD_AT(contactd_effect_counters, continuous, 0);
+CONTACTD_AT(contactd_effect_counters, discrete, 8);
+CONTACTD_AT(contactd_effect_counters, turning, 16);
+CONTACTD_AT(contactd_effect_counters, times, 24);
+CONTACTD_AT(contactd_effect_counters, contacts, 32);
+CONTACTD_AT(contactd_effect_counters, patches, 40);
+CONTACTD_AT(contactd_effect_counters, penetrations, 48);
+CONTACTD_AT(contactd_effect_counters, margins, 56);
+CONTACTD_AT(contactd_effect_counters, past_overlaps, 64);
+CONTACTD_AT(contactd_effect_counters, sensors, 72);
+CONTACTD_SIZE(contactd_rule, 64);
+CONTACTD_AT(contactd_rule, between, 0);
+CONTACTD_AT(contactd_rule, except, 16);
+CONTACTD_AT(contactd_rule, except_count, 24);
+CONTACTD_AT(contactd_rule, margin, 32);
+CONTACTD_AT(contactd_rule, detect, 40);
+CONTACTD_AT(contactd_rule, report, 44);
+CONTACTD_AT(contactd_rule, initial_overlap, 48);
+CONTACTD_AT(contactd_rule, penetration, 52);
+CONTACTD_AT(contactd_rule, sensor, 56);
 #undef CONTACTD_AT
 #undef CONTACTD_SIZE
 #undef CONTACTD_ASSERT

@@ -2,7 +2,8 @@
 
 use contactd_client::transport::Opened as Session;
 use contactd_proto::control::WirePose;
-use contactd_proto::{ContactRecord, ErrorCode, StepReply, effects};
+use contactd_proto::rule::RuleNumbers;
+use contactd_proto::{ContactRecord, ErrorCode, StepReply};
 use std::ffi::c_char;
 
 /// A rigid placement: `parent = rotation * local + position`.
@@ -116,6 +117,8 @@ pub struct Object {
 }
 
 /// What happens between two groups of objects. contactd_rule_new sets the defaults.
+///
+/// cbindgen:ignore
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Rule {
@@ -125,20 +128,8 @@ pub struct Rule {
     pub except: *const Names,
     /// Number of them.
     pub except_count: usize,
-    /// CONTACTD_DETECT_…: how the pair is searched.
-    pub detect: u32,
-    /// CONTACTD_REPORT_…: what is told of it.
-    pub report: u32,
-    /// CONTACTD_INITIAL_OVERLAP_…: what a pair that starts in overlap does.
-    pub initial_overlap: u32,
-    /// 1: depth and direction where a step starts in overlap.
-    pub penetration: u32,
-    /// 1: record only; never stops a search for the scene's first contact.
-    pub sensor: u32,
-    /// Zero.
-    pub reserved: u32,
-    /// Report at this separation too (length, >= 0): never late, early at sharp features.
-    pub margin: f64,
+    /// What it asks for. In the header its fields stand here one by one: tests/header.rs makes that structure of the table of rules.
+    pub effects: RuleNumbers,
 }
 
 /// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
@@ -184,78 +175,3 @@ pub struct Reply {
     /// Number of them.
     pub slot_count: usize,
 }
-
-/// How often each effect was worked out: in a step. What an earlier step has proven need not be worked out again, so counters
-/// are no part of the answer's bits.
-// The header's form of proto's structure, which a macro makes; the conversion below fails to build when they differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C)]
-pub struct EffectCounters {
-    /// Pairs searched over the whole step.
-    pub continuous: u64,
-    /// Pairs tested at the end of the step only.
-    pub discrete: u64,
-    /// Of the pairs searched over the step those of which a body turns.
-    pub turning: u64,
-    /// Times of contact worked out.
-    pub times: u64,
-    /// Contact points with their normal, kind and faces.
-    pub contacts: u64,
-    /// Pairs whose contact regions were looked for.
-    pub patches: u64,
-    /// Deepest points of overlaps at the start.
-    pub penetrations: u64,
-    /// Separations tested against a margin.
-    pub margins: u64,
-    /// Overlaps at the start that were searched past.
-    pub past_overlaps: u64,
-    /// Sensor pairs told.
-    pub sensors: u64,
-}
-
-/// `effects`: pairs were searched over the whole step.
-pub const EFFECT_CONTINUOUS: u32 = 1;
-/// `effects`: pairs were tested at the end of the step.
-pub const EFFECT_DISCRETE: u32 = 2;
-/// `effects`: a body of a pair turned.
-pub const EFFECT_TURNING: u32 = 4;
-/// `effects`: times of contact were worked out.
-pub const EFFECT_TIME: u32 = 8;
-/// `effects`: contact points were worked out.
-pub const EFFECT_CONTACT: u32 = 16;
-/// `effects`: contact regions were looked for.
-pub const EFFECT_PATCH: u32 = 32;
-/// `effects`: deepest points were looked for.
-pub const EFFECT_PENETRATION: u32 = 64;
-/// `effects`: separations were tested against a margin.
-pub const EFFECT_MARGIN: u32 = 128;
-/// `effects`: overlaps at the start were searched past.
-pub const EFFECT_PAST_OVERLAP: u32 = 256;
-/// `effects`: sensor pairs were told.
-pub const EFFECT_SENSOR: u32 = 512;
-
-macro_rules! same_counters {
-    ($($field:ident),+) => {
-        impl From<effects::EffectCounters> for EffectCounters {
-            fn from(counters: effects::EffectCounters) -> Self {
-                let effects::EffectCounters { $($field),+ } = counters;
-                Self { $($field),+ }
-            }
-        }
-        const _: () = {
-            assert!(size_of::<EffectCounters>() == size_of::<effects::EffectCounters>());
-            $(assert!(
-                std::mem::offset_of!(EffectCounters, $field) == std::mem::offset_of!(effects::EffectCounters, $field)
-            );)+
-        };
-    };
-}
-same_counters!(continuous, discrete, turning, times, contacts, patches, penetrations, margins, past_overlaps, sensors);
-
-const _: () = {
-    assert!(EFFECT_CONTINUOUS == effects::EFFECT_CONTINUOUS && EFFECT_DISCRETE == effects::EFFECT_DISCRETE);
-    assert!(EFFECT_TURNING == effects::EFFECT_TURNING && EFFECT_TIME == effects::EFFECT_TIME);
-    assert!(EFFECT_CONTACT == effects::EFFECT_CONTACT && EFFECT_PATCH == effects::EFFECT_PATCH);
-    assert!(EFFECT_PENETRATION == effects::EFFECT_PENETRATION && EFFECT_MARGIN == effects::EFFECT_MARGIN);
-    assert!(EFFECT_PAST_OVERLAP == effects::EFFECT_PAST_OVERLAP && EFFECT_SENSOR == effects::EFFECT_SENSOR);
-};

@@ -3,40 +3,10 @@
 use crate::abi::{Names, Object, Pose, Rule};
 use crate::error::Failure;
 use crate::handle::{Session, State, on};
-use crate::raw::{flag, given, place, reserved, row, text, word};
-use contactd_proto::{Detect, InitialOverlap, Report};
+use crate::raw::{flag, given, place, reserved, row, text};
+use contactd_proto::Effects;
+use contactd_proto::rule::{OutOfTable, RuleNumbers};
 use std::ffi::c_char;
-
-/// Not searched at all.
-pub const DETECT_OFF: u32 = 0;
-/// The end pose only.
-pub const DETECT_DISCRETE: u32 = 1;
-/// The whole motion.
-pub const DETECT_CONTINUOUS: u32 = 2;
-
-/// Yes or no.
-pub const REPORT_HIT: u32 = 0;
-/// The time too.
-pub const REPORT_TIME: u32 = 1;
-/// Point, normal and kind too.
-pub const REPORT_CONTACT: u32 = 2;
-/// The points of all contact regions too.
-pub const REPORT_PATCH: u32 = 3;
-
-/// The overlap is the answer.
-pub const INITIAL_OVERLAP_REPORT: u32 = 0;
-/// The search goes on for the starting depth + the resolution.
-pub const INITIAL_OVERLAP_IGNORE_IF_SEPARATING: u32 = 1;
-
-const _: () = {
-    assert!(Detect::Off as u32 == DETECT_OFF && Detect::Discrete as u32 == DETECT_DISCRETE);
-    assert!(Detect::Continuous as u32 == DETECT_CONTINUOUS && Detect::ALL.len() == 3);
-    assert!(Report::Hit as u32 == REPORT_HIT && Report::Time as u32 == REPORT_TIME);
-    assert!(Report::Contact as u32 == REPORT_CONTACT && Report::Patch as u32 == REPORT_PATCH);
-    assert!(InitialOverlap::Report as u32 == INITIAL_OVERLAP_REPORT && Report::ALL.len() == 4);
-    assert!(InitialOverlap::IgnoreIfSeparating as u32 == INITIAL_OVERLAP_IGNORE_IF_SEPARATING);
-    assert!(InitialOverlap::ALL.len() == 2);
-};
 
 /// A moving object of group "default" at the origin. Name and group are copied when it is added.
 #[unsafe(no_mangle)]
@@ -61,13 +31,7 @@ pub extern "C" fn contactd_rule_new(a: *const c_char, b: *const c_char) -> Rule 
         between: Names { a, b },
         except: std::ptr::null(),
         except_count: 0,
-        detect: DETECT_CONTINUOUS,
-        report: REPORT_CONTACT,
-        initial_overlap: INITIAL_OVERLAP_REPORT,
-        penetration: 0,
-        sensor: 0,
-        reserved: 0,
-        margin: 0.0,
+        effects: RuleNumbers::from(&Effects::DEFAULT),
     }
 }
 
@@ -137,17 +101,14 @@ unsafe fn checked(rule: &Rule) -> Result<contactd_proto::Rule, Failure> {
         let (a, b) = unsafe { (text(names.a, what)?, text(names.b, what)?) };
         Ok([a.to_owned(), b.to_owned()])
     };
-    reserved(rule.reserved, "rule.reserved")?;
     // SAFETY: the caller's structures (1).
     let except = unsafe { row(rule.except, rule.except_count, "rule.except")? };
+    let effects = rule.effects.checked().map_err(|e| {
+        let OutOfTable { field, largest, found } = e;
+        Failure::argument(format!("expected rule.{field} of 0 to {largest}, found {found}"))
+    })?;
     Ok(contactd_proto::Rule {
-        between: pair(&rule.between, "rule.between")?,
         except: except.iter().map(|names| pair(names, "rule.except")).collect::<Result<_, Failure>>()?,
-        detect: word(Detect::ALL, rule.detect, "rule.detect")?,
-        report: word(Report::ALL, rule.report, "rule.report")?,
-        penetration: flag(rule.penetration, "rule.penetration")?,
-        margin: rule.margin,
-        initial_overlap: word(InitialOverlap::ALL, rule.initial_overlap, "rule.initial_overlap")?,
-        sensor: flag(rule.sensor, "rule.sensor")?,
+        ..contactd_proto::Rule::asking(pair(&rule.between, "rule.between")?, effects)
     })
 }

@@ -3,20 +3,27 @@
 //! `CONTACTD_WRITE_HEADER=1 cargo test -p contactd-capi --test header` writes it anew after a change of the interface.
 
 use cbindgen::{Builder, Config};
-use contactd_capi::abi::{EffectCounters, Face, Mass, Names, Object, Opened, Options, Pose, Reply, Rule};
+use contactd_capi::abi::{Face, Mass, Names, Object, Opened, Options, Pose, Reply, Rule};
 use contactd_capi::manifold::{Manifold, ManifoldPoint};
+use contactd_proto::effects::{self, EffectCounters};
+use contactd_proto::rule::{Effects, Field, RuleNumbers, Values};
 use contactd_proto::step::WorkCounters;
 use contactd_proto::{ContactRecord, DetailSlot, ErrorCode, PatchSlot, PoseRecord, RegionSlot, StepReply};
 use std::fmt::Write as _;
 use std::mem::offset_of;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// Stands for what is made of the tables of rules and effects, which cbindgen cannot read.
+const TABLES: &str = "tables";
 
 /// Sources of the header, in its order.
-const SOURCES: [&str; 13] = [
+const SOURCES: [&str; 14] = [
     "src/error.rs",
     "../../proto/src/pose_record.rs",
     "../../proto/src/contact_record.rs",
     "../../proto/src/step.rs",
+    TABLES,
     "src/abi.rs",
     "src/handle.rs",
     "src/session.rs",
@@ -85,9 +92,6 @@ fn offsets() -> String {
             box_tests, primitives, after_stage1, node_pairs, candidates, cells, clauses, newton, closed_forms,
             may_have_passed, instant_cells,
         }
-        "contactd_effect_counters" EffectCounters {
-            continuous, discrete, turning, times, contacts, patches, penetrations, margins, past_overlaps, sensors,
-        }
         "contactd_pose" Pose { position, rotation }
         "contactd_opened" Opened { session, epoch, max_batch, reserved }
         "contactd_face" Face { primitive, subtracted, name, face }
@@ -96,15 +100,23 @@ fn offsets() -> String {
         }
         "contactd_names" Names { a, b }
         "contactd_object" Object { name, group, model, is_static, rotates, reserved, max_speed, place, pose }
-        "contactd_rule" Rule {
-            between, except, except_count, detect, report, initial_overlap, penetration, sensor, reserved, margin,
-        }
         "contactd_options" Options {
             advance, dt, first, details, clear, polling, max_records, cell_limit, batch_limit, reserved,
         }
         "contactd_reply" Reply { header, records, record_count, slots, slot_count }
         "contactd_manifold_point" ManifoldPoint { id, group, position, normal, separation, on_a, on_b }
         "contactd_manifold" Manifold { a, b, status, is_complete, points, point_count }
+    }
+    let _ = writeln!(out, "CONTACTD_SIZE(contactd_effect_counters, {});", size_of::<EffectCounters>());
+    for (i, effect) in effects::ALL.iter().enumerate() {
+        let _ = writeln!(out, "CONTACTD_AT(contactd_effect_counters, {}, {});", effect.counter, size_of::<u64>() * i);
+    }
+    let _ = writeln!(out, "CONTACTD_SIZE(contactd_rule, {});", size_of::<Rule>());
+    let pairs = [offset_of!(Rule, between), offset_of!(Rule, except), offset_of!(Rule, except_count)];
+    let pairs = ["between", "except", "except_count"].into_iter().zip(pairs);
+    let effects = RuleNumbers::OFFSETS.iter().map(|(name, at)| (*name, offset_of!(Rule, effects) + at));
+    for (name, at) in pairs.chain(effects) {
+        let _ = writeln!(out, "CONTACTD_AT(contactd_rule, {name}, {at});");
     }
     text + "#undef CONTACTD_AT\n#undef CONTACTD_SIZE\n#undef CONTACTD_ASSERT"
 }
@@ -119,6 +131,70 @@ fn screaming(name: &str) -> String {
         out.push(c.to_ascii_uppercase());
     }
     out
+}
+
+/// " How the pair …" → "how the pair …".
+fn inner(doc: &str) -> String {
+    let mut letters = doc.trim_start().chars();
+    letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
+}
+
+/// The tables of rules and effects as Rust that cbindgen reads.
+fn tables() -> String {
+    let mut text = String::new();
+    let out = &mut text;
+    for effect in effects::ALL {
+        let doc = effect.doc.join("\n///");
+        let _ = writeln!(out, "/// `effects`: {}\npub const {}: u32 = {};", inner(&doc), effect.bit, effect.value);
+    }
+    for field in Effects::FIELDS {
+        let Values::Words(of, words) = field.values else { continue };
+        for (code, word) in words.iter().enumerate() {
+            let name = format!("{}_{}", screaming(of), word.word.to_uppercase());
+            let _ = writeln!(out, "///{}\npub const {name}: u32 = {code};", word.doc.join("\n///"));
+        }
+    }
+    let _ = writeln!(
+        out,
+        "/// How often each effect was worked out in a step. What an earlier step has proven need not be worked out again, so\n\
+         /// counters are no part of the answer's bits.\n#[repr(C)]\npub struct EffectCounters {{"
+    );
+    for effect in effects::ALL {
+        let _ = writeln!(out, "///{}\npub {}: u64,", effect.doc.join("\n///"), effect.counter);
+    }
+    let _ = writeln!(
+        out,
+        "}}\n/// What happens between two groups of objects. contactd_rule_new sets the defaults.\n#[repr(C)]\npub struct Rule {{\n\
+         /// The two groups; both may be the same.\npub between: Names,\n\
+         /// Single pairs, by object name, that this rule leaves out; NULL when there are none.\npub except: *const Names,\n\
+         /// Number of them.\npub except_count: usize,"
+    );
+    for (name, _) in RuleNumbers::OFFSETS {
+        let field = Field::of_name(name).expect("a field of the table");
+        let doc = field.doc.join("\n///");
+        let _ = match field.values {
+            Values::Words(of, _) => {
+                writeln!(out, "/// CONTACTD_{}_…: {}\npub {name}: u32,", screaming(of), inner(&doc))
+            }
+            Values::Flag(_) => writeln!(out, "/// 1: {}\npub {name}: u32,", inner(&doc)),
+            Values::Length => writeln!(out, "///{doc}\npub {name}: f64,"),
+        };
+    }
+    text + "}\n"
+}
+
+/// A source of the header.
+fn source(name: &str) -> PathBuf {
+    if name != TABLES {
+        return Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+    }
+    static MADE: OnceLock<PathBuf> = OnceLock::new();
+    let make = || {
+        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("tables{}.rs", std::process::id()));
+        std::fs::write(&file, tables()).expect("a file that can be written");
+        file
+    };
+    MADE.get_or_init(make).clone()
 }
 
 fn codes() -> String {
@@ -158,7 +234,7 @@ fn made() -> String {
     config.header = Some(HEAD.into());
     config.after_includes = Some(codes());
     config.trailer = Some(offsets());
-    let builder = SOURCES.iter().fold(Builder::new(), |builder, source| builder.with_src(folder.join(source)));
+    let builder = SOURCES.iter().fold(Builder::new(), |builder, name| builder.with_src(source(name)));
     let mut bytes = Vec::new();
     builder.with_config(config.clone()).generate().expect("sources that cbindgen reads").write(&mut bytes);
     without_links(&String::from_utf8(bytes).expect("text"), &config)
@@ -186,11 +262,11 @@ fn the_committed_header_is_the_one_that_the_sources_make() {
 fn every_function_of_the_sources_is_declared() {
     let header = made();
     let mut functions = 0;
-    for source in SOURCES.iter().filter(|s| s.starts_with("src")) {
-        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(source)).expect("a source");
+    for name in SOURCES.iter().filter(|s| s.starts_with("src")) {
+        let text = std::fs::read_to_string(source(name)).expect("a source");
         for (at, _) in text.match_indices("extern \"C\" fn ") {
-            let name = text[at..].split([' ', '(']).nth(3).expect("a name");
-            assert!(header.contains(&format!("{name}(")), "{name} of {source} is not in the header");
+            let function = text[at..].split([' ', '(']).nth(3).expect("a name");
+            assert!(header.contains(&format!("{function}(")), "{function} of {name} is not in the header");
             functions += 1;
         }
     }

@@ -40,7 +40,6 @@ from .records import (
     POSE,
     REGION,
     STATUS_NAMES,
-    Effect,
     Flag,
     Order,
     Status,
@@ -48,7 +47,8 @@ from .records import (
     Tag,
     Valid,
 )
-from .session import Face, Model, Region, Reply, Rule, Session, connect, embedded
+from .rules import Effect, Rule
+from .session import Face, Model, Region, Reply, Session, connect, embedded
 from .view import View
 
-__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "session", "view")]
+__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "rules", "session", "view")]

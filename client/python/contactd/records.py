@@ -84,21 +84,6 @@ class StepStatus(enum.IntEnum):
     UNDECIDED = 3
 
 
-class Effect(enum.IntFlag):
-    """Effects that ran in a step."""
-
-    CONTINUOUS = 1
-    DISCRETE = 2
-    TURNING = 4
-    TIME = 8
-    CONTACT = 16
-    PATCH = 32
-    PENETRATION = 64
-    MARGIN = 128
-    PAST_OVERLAP = 256
-    SENSOR = 512
-
-
 class Tag(enum.IntEnum):
     """First word of a further slot."""
 

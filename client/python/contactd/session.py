@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
-from typing import Any, Iterable, Iterator, NamedTuple, Sequence
+from typing import Any, Iterable, Iterator, NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,8 @@ from . import _native
 from ._native import MassProperties
 from .errors import Error
 from .pose import PoseLike, pose
-from .records import DETAIL, PATCH, REGION, Effect, StepStatus, Tag
+from .records import DETAIL, PATCH, REGION, StepStatus, Tag
+from .rules import Effect, Rule
 from .view import Part, View
 
 
@@ -39,28 +39,6 @@ class Model(NamedTuple):
     faces: list[Face]
     #: What the import snapped or dropped.
     warnings: list[str]
-
-
-@dataclass
-class Rule:
-    """What happens between two groups of objects. The first rule that names a pair decides; see docs/effects.md."""
-
-    #: The two groups; both may be the same.
-    between: Sequence[str]
-    #: Single pairs, by object name, that this rule leaves out.
-    except_: Sequence[Sequence[str]] = ()
-    #: "off", "discrete" or "continuous".
-    detect: str = "continuous"
-    #: "hit", "time", "contact" or "patch".
-    report: str = "contact"
-    #: Depth and direction where a step starts in overlap.
-    penetration: bool = False
-    #: Report at this separation.
-    margin: float = 0.0
-    #: "report" or "ignore_if_separating".
-    initial_overlap: str = "report"
-    #: Record only; never stops first.
-    sensor: bool = False
 
 
 class Region(NamedTuple):

@@ -1,7 +1,8 @@
 //! Layouts of the records, constants and words, told by the types themselves: Python's dtypes cannot drift from them.
 
 use contactd_proto::contact_record as wire;
-use contactd_proto::{ContactRecord, DetailSlot, Detect, InitialOverlap, PatchSlot, PoseRecord, RegionSlot, Report};
+use contactd_proto::rule::Values;
+use contactd_proto::{ContactRecord, DetailSlot, Effects, PatchSlot, PoseRecord, RegionSlot};
 use contactd_proto::{effects, pose_record, step};
 use pyo3::prelude::*;
 use std::mem::offset_of;
@@ -119,30 +120,20 @@ pub fn constants() -> Vec<(&'static str, &'static str, u32)> {
         ("Tag", "REGION", wire::REGION_SLOT),
         ("", "NO_FACE", wire::NO_FACE),
     ];
-    all.extend([
-        ("Effect", "CONTINUOUS", effects::EFFECT_CONTINUOUS),
-        ("Effect", "DISCRETE", effects::EFFECT_DISCRETE),
-        ("Effect", "TURNING", effects::EFFECT_TURNING),
-        ("Effect", "TIME", effects::EFFECT_TIME),
-        ("Effect", "CONTACT", effects::EFFECT_CONTACT),
-        ("Effect", "PATCH", effects::EFFECT_PATCH),
-        ("Effect", "PENETRATION", effects::EFFECT_PENETRATION),
-        ("Effect", "MARGIN", effects::EFFECT_MARGIN),
-        ("Effect", "PAST_OVERLAP", effects::EFFECT_PAST_OVERLAP),
-        ("Effect", "SENSOR", effects::EFFECT_SENSOR),
-    ]);
+    // `EFFECT_TIME` is `Effect.TIME`.
+    all.extend(effects::ALL.iter().map(|e| ("Effect", e.bit.trim_start_matches("EFFECT_"), e.value)));
     all
 }
 
 /// Words of rules and records by their tables.
 #[pyfunction]
 pub fn words() -> Vec<(&'static str, Vec<&'static str>)> {
-    vec![
-        ("detect", Detect::ALL.iter().map(|w| w.name()).collect()),
-        ("report", Report::ALL.iter().map(|w| w.name()).collect()),
-        ("initial_overlap", InitialOverlap::ALL.iter().map(|w| w.name()).collect()),
+    let rules = Effects::FIELDS.iter().filter(|field| matches!(field.values, Values::Words(..)));
+    let mut all: Vec<_> = rules.map(|field| (field.name, field.words().collect())).collect();
+    all.extend([
         ("kind", wire::KIND_NAMES.to_vec()),
         ("extent", wire::EXTENT_NAMES.to_vec()),
         ("status", wire::STATUS_NAMES.to_vec()),
-    ]
+    ]);
+    all
 }

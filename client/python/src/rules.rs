@@ -1,48 +1,38 @@
-//! Rules as Python gives them: any object with the fields of `contactd.Rule`.
+//! Rules as Python gives them: any object with the fields of `contactd.Rule`, which is made of the same table
+//! (`contactd_proto::rule`).
 
 use crate::errors;
-use contactd_proto::{Detect, InitialOverlap, Report, Rule};
+use contactd_proto::rule::{Field, Setting, Values};
+use contactd_proto::{Effects, Rule};
 use pyo3::prelude::*;
 
-/// The fields of `contactd.Rule`.
-#[derive(FromPyObject)]
-pub struct RuleFields {
-    between: [String; 2],
-    except_: Vec<[String; 2]>,
-    detect: String,
-    report: String,
-    penetration: bool,
-    margin: f64,
-    initial_overlap: String,
-    sensor: bool,
+/// The rule that stands at `index` of a list.
+///
+/// # Errors
+/// `AttributeError` for a field that is missing, `TypeError` for one of another type; `Refused` at `index`, naming a word that
+/// is not in its table.
+pub fn rule(rule: &Bound<'_, PyAny>, index: usize) -> PyResult<Rule> {
+    let mut effects = Effects::DEFAULT;
+    for field in Effects::FIELDS {
+        let setting = setting(field, &rule.getattr(field.name)?, index)?;
+        let is_set = field.set(&mut effects, setting);
+        debug_assert!(is_set, "a setting of the field's own type");
+    }
+    let except = rule.getattr("except_")?.extract()?;
+    Ok(Rule { except, ..Rule::asking(rule.getattr("between")?.extract()?, effects) })
 }
 
-impl RuleFields {
-    /// The rule.
-    ///
-    /// # Errors
-    /// `Refused` at `index`, naming a word that is not in its table.
-    pub fn rule(self, py: Python<'_>, index: usize) -> PyResult<Rule> {
-        let unknown = |field: &str, word: &str, words: Vec<&str>| {
-            let words = words.join(", ");
-            errors::bad_rule(py, &format!("rule {index}: {field} = {word:?} is none of {words}"), index)
-        };
-        let names = || Detect::ALL.iter().map(|w| w.name()).collect();
-        let detect = Detect::of_name(&self.detect).ok_or_else(|| unknown("detect", &self.detect, names()))?;
-        let names = || Report::ALL.iter().map(|w| w.name()).collect();
-        let report = Report::of_name(&self.report).ok_or_else(|| unknown("report", &self.report, names()))?;
-        let names = || InitialOverlap::ALL.iter().map(|w| w.name()).collect();
-        let word = &self.initial_overlap;
-        let initial_overlap = InitialOverlap::of_name(word).ok_or_else(|| unknown("initial_overlap", word, names()))?;
-        Ok(Rule {
-            between: self.between,
-            except: self.except_,
-            detect,
-            report,
-            penetration: self.penetration,
-            margin: self.margin,
-            initial_overlap,
-            sensor: self.sensor,
-        })
+/// What a field is set to.
+fn setting(field: &Field, value: &Bound<'_, PyAny>, index: usize) -> PyResult<Setting> {
+    match field.values {
+        Values::Flag(_) => Ok(Setting::Flag(value.extract()?)),
+        Values::Length => Ok(Setting::Length(value.extract()?)),
+        Values::Words(..) => {
+            let word: String = value.extract()?;
+            field.word(&word).ok_or_else(|| {
+                let (name, words) = (field.name, field.words().collect::<Vec<_>>().join(", "));
+                errors::bad_rule(value.py(), &format!("rule {index}: {name} = {word:?} is none of {words}"), index)
+            })
+        }
     }
 }

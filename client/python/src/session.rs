@@ -7,7 +7,7 @@ use crate::mass::MassProperties;
 use crate::options::Options;
 use crate::pose::{PoseFields, pose};
 use crate::reply::Reply;
-use crate::rules::RuleFields;
+use crate::rules;
 use crate::slots::{Batch, Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::control::{Facets, ModelFile};
@@ -292,8 +292,8 @@ impl Session {
         Self::call(slf, move |s| s.remove_object(object))
     }
 
-    fn _set_rules(slf: &Bound<'_, Self>, rules: Vec<RuleFields>) -> PyResult<()> {
-        let rules = rules.into_iter().enumerate().map(|(i, r)| r.rule(slf.py(), i)).collect::<PyResult<Vec<_>>>()?;
+    fn _set_rules(slf: &Bound<'_, Self>, rules: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
+        let rules = rules.iter().enumerate().map(|(i, r)| rules::rule(r, i)).collect::<PyResult<Vec<_>>>()?;
         Self::call(slf, move |s| s.set_rules(&rules))
     }
 

@@ -5,10 +5,13 @@
 //! no effect (a rule for a group that no object has, which leaves its pairs without one) is a `Note`. The models'
 //! files are read by `Scene::load_models`, so that a scene can be looked at without them.
 
+mod rules;
+
+use self::rules::RawRule;
 use super::format::{Source, read_bytes};
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
-use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, Report, Rule};
+use contactd_proto::{Motion, MotionState, Pose, Rule};
 use glam::DVec3;
 use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
@@ -246,22 +249,6 @@ struct RawPose {
     rotation: Option<Spanned<[f64; 4]>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawRule {
-    between: [Spanned<String>; 2],
-    #[serde(default)]
-    except: Vec<[Spanned<String>; 2]>,
-    detect: Option<Spanned<String>>,
-    report: Option<Spanned<String>>,
-    #[serde(default)]
-    penetration: bool,
-    margin: Option<Spanned<f64>>,
-    initial_overlap: Option<Spanned<String>>,
-    #[serde(default)]
-    sensor: bool,
-}
-
 /// A pose as it stands in the file, and what it means.
 #[derive(Clone, Copy)]
 struct Written {
@@ -393,41 +380,6 @@ impl Checker<'_> {
         })
     }
 
-    fn rule(&self, r: &RawRule, objects: &HashMap<String, usize>) -> Result<Rule, SceneError> {
-        let mut rule = Rule::new([0, 1].map(|i| r.between[i].as_ref().clone()));
-        for pair in &r.except {
-            for name in pair {
-                if !objects.contains_key(name.as_ref()) {
-                    return Err(self.wrong(name, "the name of an object", &format!("\"{}\"", name.as_ref())));
-                }
-            }
-            rule.except.push([pair[0].as_ref().clone(), pair[1].as_ref().clone()]);
-        }
-        if let Some(word) = &r.detect {
-            let words = Detect::ALL.iter().map(|d| d.name());
-            rule.detect = Detect::of_name(word.as_ref()).ok_or_else(|| self.wrong_word(word, words))?;
-        }
-        if let Some(word) = &r.report {
-            let words = Report::ALL.iter().map(|d| d.name());
-            rule.report = Report::of_name(word.as_ref()).ok_or_else(|| self.wrong_word(word, words))?;
-        }
-        if let Some(word) = &r.initial_overlap {
-            let words = InitialOverlap::ALL.iter().map(|d| d.name());
-            rule.initial_overlap =
-                InitialOverlap::of_name(word.as_ref()).ok_or_else(|| self.wrong_word(word, words))?;
-        }
-        if let Some(margin) = &r.margin {
-            let m = *margin.as_ref();
-            if !(m >= 0.0 && m.is_finite()) {
-                return Err(self.wrong(margin, "a finite margin that is not negative", &m.to_string()));
-            }
-            rule.margin = m;
-        }
-        rule.penetration = r.penetration;
-        rule.sensor = r.sensor;
-        Ok(rule)
-    }
-
     /// What stands in a scene without effect: models of no object, rules that decide for no pair, exceptions that except none,
     /// and the duration of a step that no declaration asks for.
     fn without_effect(&self, raw: &RawScene, objects: &[SceneObject]) -> Vec<Note> {
@@ -440,57 +392,12 @@ impl Checker<'_> {
         for (_, m) in raw.model.iter().enumerate().filter(|(i, _)| !used.contains(i)) {
             note(self.place(&m.name), format!("no object is of the model \"{}\"", m.name.as_ref()));
         }
-        // How many objects each group has, and the group of each object.
-        let mut members: HashMap<&str, usize> = HashMap::new();
-        objects.iter().for_each(|o| *members.entry(&o.group).or_default() += 1);
-        let group_of: HashMap<&str, &str> = objects.iter().map(|o| (o.name.as_str(), o.group.as_str())).collect();
-        let mut decided: HashSet<[&str; 2]> = HashSet::new();
-        for r in &raw.rule {
-            let mut groups = [r.between[0].as_ref().as_str(), r.between[1].as_ref().as_str()];
-            let strangers = r.between.iter().filter(|g| !members.contains_key(g.as_ref().as_str()));
-            let mut known = true;
-            for g in strangers {
-                known = false;
-                note(
-                    self.place(g),
-                    format!("the rule decides for no pair: no object is of the group \"{}\"", g.as_ref()),
-                );
-            }
-            if known && groups[0] == groups[1] && members[groups[0]] == 1 {
-                let text = format!("the rule decides for no pair: the group \"{}\" has one object only", groups[0]);
-                note(self.place(&r.between[0]), text);
-            }
-            groups.sort_unstable();
-            if decided.contains(&groups) {
-                let text = "the rule decides for no pair: one before it has the same groups and no exceptions".into();
-                note(self.place(&r.between[0]), text);
-            }
-            if r.except.is_empty() {
-                decided.insert(groups);
-            }
-            for [a, b] in &r.except {
-                let mut theirs = [a, b].map(|name| group_of.get(name.as_ref().as_str()).copied().unwrap_or_default());
-                theirs.sort_unstable();
-                if theirs != groups || a.as_ref() == b.as_ref() {
-                    let pair = format!("\"{}\" and \"{}\"", a.as_ref(), b.as_ref());
-                    note(
-                        self.place(a),
-                        format!("the exception has no effect: {pair} are no pair of the rule's groups"),
-                    );
-                }
-            }
-            if r.detect.as_ref().is_some_and(|d| d.as_ref() == Detect::Off.name()) {
-                let words = [&r.report, &r.initial_overlap].into_iter().flatten().map(|w| self.place(w));
-                let set = words.chain(r.margin.as_ref().map(|m| self.place(m))).min_by_key(|p| (p.line, p.column));
-                if let Some(at) = set {
-                    note(at, "what the rule asks for has no effect beside detect = \"off\"".into());
-                }
-            }
-        }
+        self.rules_without_effect(&raw.rule, objects, &mut note);
         notes.sort_by_key(|n| (n.at.line, n.at.column));
         notes
     }
 
+    /// Refuses a word that is none of some.
     fn wrong_word(&self, word: &Spanned<String>, words: impl Iterator<Item = &'static str>) -> SceneError {
         let expected = words.map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ");
         self.wrong(word, &expected, &format!("\"{}\"", word.as_ref()))
@@ -500,6 +407,7 @@ impl Checker<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contactd_proto::{Detect, InitialOverlap, Report};
     use std::f64::consts::TAU;
 
     const MODELS: &str = "[[model]]\nname = \"m\"\nfile = \"m.csg\"\n";

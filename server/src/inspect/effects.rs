@@ -2,7 +2,7 @@
 
 use crate::import::{Scene, SceneObject};
 use crate::world::{PairPlan, Plans};
-use contactd_proto::{Detect, InitialOverlap, Report};
+use contactd_proto::effects::{self, Effect};
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -39,7 +39,7 @@ pub fn effects(scene: &Scene) -> String {
             if !used.contains(plan) {
                 used.push(*plan);
             }
-            Fate::Searched(words(plan))
+            Fate::Searched(plan.phrases().join("; "))
         } else if scene.rules.iter().any(|r| r.names([&a.group, &b.group], names)) {
             Fate::Off("off: by its rule")
         } else {
@@ -76,7 +76,8 @@ pub fn effects(scene: &Scene) -> String {
         };
         let _ = writeln!(out, "    {g} - {h}: {count} {}: {words}", if *count == 1 { "pair" } else { "pairs" });
     }
-    let not: Vec<&str> = EFFECTS.iter().filter(|(_, on)| !used.iter().any(on)).map(|(name, _)| *name).collect();
+    let asked = |effect: &Effect| effect.asked.is_none_or(|asked| used.iter().any(|plan| asked(plan)));
+    let not: Vec<&str> = effects::ALL.iter().filter(|effect| !asked(effect)).map(|effect| effect.word).collect();
     if !(used.is_empty() || not.is_empty()) {
         let _ = writeln!(out, "    for no pair: {}", not.join(", "));
     }
@@ -94,52 +95,6 @@ pub fn effects(scene: &Scene) -> String {
          bounds of rotation), turning {turn}"
     );
     out
-}
-
-/// Each effect's word, and whether a plan asks for it.
-const EFFECTS: [(&str, fn(&PairPlan) -> bool); 9] = [
-    ("continuous", |p| p.detect == Detect::Continuous),
-    ("discrete", |p| p.detect == Detect::Discrete),
-    ("time", |p| p.report >= Report::Time),
-    ("contact", |p| p.report >= Report::Contact),
-    ("patch", |p| p.report >= Report::Patch),
-    ("penetration", |p| p.penetration),
-    ("margin", |p| p.margin > 0.0),
-    ("ignore_if_separating", |p| p.initial_overlap == InitialOverlap::IgnoreIfSeparating),
-    ("sensor", |p| p.sensor),
-];
-
-fn words(plan: &PairPlan) -> String {
-    let mut words = vec![
-        match plan.detect {
-            Detect::Continuous => "the whole motion",
-            Detect::Discrete => "the end pose only",
-            Detect::Off => "nothing",
-        }
-        .to_owned(),
-    ];
-    words.push(
-        match plan.report {
-            Report::Hit => "yes or no",
-            Report::Time => "time",
-            Report::Contact => "time, point, normal, kind",
-            Report::Patch => "time, point, normal, kind, all contact regions",
-        }
-        .into(),
-    );
-    if plan.penetration {
-        words.push("depth of an overlap".into());
-    }
-    if plan.margin > 0.0 {
-        words.push(format!("margin {}", plan.margin));
-    }
-    if plan.initial_overlap == InitialOverlap::IgnoreIfSeparating {
-        words.push("an overlap at the start is searched past".into());
-    }
-    if plan.sensor {
-        words.push("sensor: stops nothing".into());
-    }
-    words.join("; ")
 }
 
 /// The pairs of objects that rules name as exceptions, by index, the smaller one first.

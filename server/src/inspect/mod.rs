@@ -68,15 +68,7 @@ pub fn scene(scene: &Scene) -> String {
         let _ = writeln!(out, "  object {}: model {}, group {}, {how}", o.name, scene.models[o.model].name, o.group);
     }
     for r in &scene.rules {
-        let _ = writeln!(
-            out,
-            "  rule {} - {}: detect {}, report {}, margin {}",
-            r.between[0],
-            r.between[1],
-            r.detect.name(),
-            r.report.name(),
-            r.margin
-        );
+        let _ = writeln!(out, "  rule {} - {}: {}", r.between[0], r.between[1], r.effects());
         for group in &r.between {
             if !scene.objects.iter().any(|o| o.group == *group) {
                 let _ = writeln!(out, "    warning: no object is of group {group}");

@@ -7,36 +7,24 @@
 //! pair that no rule names is off once there are rules; without rules every pair has the default plan.
 
 use crate::contact::{QueryOptions, clearance};
-use contactd_proto::{Detect, InitialOverlap, Report, Rule};
+use contactd_proto::{Detect, Effects, InitialOverlap, Report, Rule};
 use std::collections::HashMap;
 
-/// What is done for a pair.
+/// What is done for a pair: what its rule asks for. Its `detect` is never off: such pairs have no plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PairPlan {
-    /// Discrete or continuous (never off: such pairs have no plan).
-    pub detect: Detect,
-    /// How much is reported.
-    pub report: Report,
-    /// Measure an overlap at the start.
-    pub penetration: bool,
-    /// Report at this separation.
-    pub margin: f64,
-    /// What becomes of an overlap at the start.
-    pub initial_overlap: InitialOverlap,
-    /// Never stops a search for the first contact.
-    pub sensor: bool,
+pub struct PairPlan(pub Effects);
+
+impl std::ops::Deref for PairPlan {
+    type Target = Effects;
+
+    fn deref(&self) -> &Effects {
+        &self.0
+    }
 }
 
 impl PairPlan {
     /// The plan of pairs in a scene without rules.
-    pub const DEFAULT: Self = Self {
-        detect: Detect::Continuous,
-        report: Report::Contact,
-        penetration: false,
-        margin: 0.0,
-        initial_overlap: InitialOverlap::Report,
-        sensor: false,
-    };
+    pub const DEFAULT: Self = Self(Effects::DEFAULT);
 
     /// What it asks of a search. Regions are asked for beside it.
     pub fn query_options(&self) -> QueryOptions {
@@ -60,17 +48,6 @@ impl PairPlan {
     /// True when contact regions are told: for patches, and of pairs within a margin whose contacts are told.
     pub fn reports_regions(&self) -> bool {
         self.report >= Report::Patch || (self.margin > 0.0 && self.report >= Report::Contact)
-    }
-
-    fn of(rule: &Rule) -> Self {
-        Self {
-            detect: rule.detect,
-            report: rule.report,
-            penetration: rule.penetration,
-            margin: rule.margin,
-            initial_overlap: rule.initial_overlap,
-            sensor: rule.sensor,
-        }
     }
 }
 
@@ -107,7 +84,7 @@ impl Plans {
     pub fn set(&mut self, rules: Vec<Rule>) {
         self.plans.clear();
         self.plan_of.clear();
-        for plan in rules.iter().map(PairPlan::of) {
+        for plan in rules.iter().map(|rule| PairPlan(rule.effects())) {
             let same = self.plans.iter().position(|p| *p == plan);
             let index = same.unwrap_or_else(|| {
                 self.plans.push(plan);
@@ -165,7 +142,7 @@ impl Plans {
             let (Some(p), Some(q)) = (p, q) else { continue };
             for group in [p, q] {
                 let margin = &mut self.margins[group as usize];
-                *margin = margin.max(if rule.detect == Detect::Off { 0.0 } else { PairPlan::of(rule).reach() });
+                *margin = margin.max(if rule.detect == Detect::Off { 0.0 } else { PairPlan(rule.effects()).reach() });
             }
             for key in [(p, q), (q, p)].into_iter().take(if p == q { 1 } else { 2 }) {
                 self.table.entry(key).or_default().push(r as u32);

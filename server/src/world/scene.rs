@@ -143,11 +143,11 @@ impl World {
     /// Replaces the rules.
     ///
     /// # Errors
-    /// `BadRule` at the index of a rule whose margin is not a finite length >= 0.
+    /// `BadRule` at the index of a rule with a margin, or another length, that is not finite and >= 0.
     pub fn set_rules(&mut self, rules: Vec<Rule>) -> Result<(), Refusal> {
         for (i, rule) in rules.iter().enumerate() {
-            if !(rule.margin.is_finite() && rule.margin >= 0.0) {
-                let detail = format!("a margin must be a finite length >= 0, not {}", rule.margin);
+            if let Some((field, length)) = rule.effects().bad_length() {
+                let detail = format!("a {field} must be a finite length >= 0, not {length}");
                 return Err(Refusal::new(ErrorCode::BadRule, detail).at(i));
             }
         }

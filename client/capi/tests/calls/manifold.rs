@@ -4,7 +4,7 @@ use crate::support::{Open, done, out, records, refused, refused_at};
 use contactd_capi::abi::{Pose, Reply};
 use contactd_capi::error::{ERROR_ARGUMENT, ERROR_NULL};
 use contactd_capi::manifold::*;
-use contactd_capi::scene::{REPORT_PATCH, contactd_rule_new, contactd_set_rules};
+use contactd_capi::scene::{contactd_rule_new, contactd_set_rules};
 use contactd_client::Object;
 use contactd_client::manifold::Manifolds as Rust;
 use contactd_proto::{ErrorCode, PoseRecord, Report, Rule};
@@ -39,7 +39,7 @@ fn points_and_ids_are_those_of_rust() {
     session.object(c"floor", floor, |o| o.is_static = 1);
     session.object(c"cube", cube, |o| o.pose.position = [0.0, 0.0, 4.0]);
     let mut rule = contactd_rule_new(c"default".as_ptr(), c"default".as_ptr());
-    (rule.report, rule.margin) = (REPORT_PATCH, 0.1);
+    (rule.effects.report, rule.effects.margin) = (Report::Patch as u32, 0.1);
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let mut manifolds = out(|m| unsafe { contactd_manifolds_new(m) });
 
@@ -92,7 +92,7 @@ fn misuse_of_manifolds_is_named_and_changes_nothing() {
     let session = Open::embedded();
     let (_, ball) = session.scene();
     let mut rule = contactd_rule_new(c"default".as_ptr(), c"default".as_ptr());
-    rule.report = REPORT_PATCH;
+    rule.effects.report = Report::Patch as u32;
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let mut manifolds = out(|m| unsafe { contactd_manifolds_new(m) });
     let at = ([1.0, 0.0, 3.0], [0.0, 0.0, 0.0, 1.0]);

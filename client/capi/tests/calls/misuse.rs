@@ -3,7 +3,7 @@
 use crate::stub::{Script, scripted};
 use crate::support::*;
 use contactd_capi::Session;
-use contactd_capi::abi::{Mass, Options, Pose, Rule};
+use contactd_capi::abi::{Mass, Options, Pose};
 use contactd_capi::error::*;
 use contactd_capi::model::*;
 use contactd_capi::scene::*;
@@ -170,8 +170,13 @@ fn arguments_out_of_their_range_are_named() {
     refused(add(|o| o.is_static = 2), ERROR_ARGUMENT, "object.is_static of 0 to 1, found 2");
     refused(add(|o| o.rotates = 7), ERROR_ARGUMENT, "object.rotates of 0 to 1, found 7");
     refused(add(|o| o.reserved = 1), ERROR_ARGUMENT, "object.reserved of 0 to 0, found 1");
-    let rule = Rule { reserved: 1, ..contactd_rule_new(name, name) };
-    refused(unsafe { contactd_set_rules(s, &rule, 1) }, ERROR_ARGUMENT, "rule.reserved of 0 to 0, found 1");
+    let set = |change: fn(&mut contactd_proto::rule::RuleNumbers)| {
+        let mut rule = contactd_rule_new(name, name);
+        change(&mut rule.effects);
+        unsafe { contactd_set_rules(s, &rule, 1) }
+    };
+    refused(set(|r| r.sensor = 2), ERROR_ARGUMENT, "rule.sensor of 0 to 1, found 2");
+    refused(set(|r| r.detect = 3), ERROR_ARGUMENT, "rule.detect of 0 to 2, found 3");
 
     let mut options = out(|o| unsafe { contactd_get_options(s, o) });
     options.polling = 2;
@@ -190,7 +195,7 @@ fn a_bad_rule_is_named_by_its_index() {
     let good = contactd_rule_new(c"a".as_ptr(), c"b".as_ptr());
     let set = |bad| unsafe { contactd_set_rules(session.0, [good, bad].as_ptr(), 2) };
     let mut bad = good;
-    bad.detect = 3;
+    bad.effects.detect = 3;
     refused_at(set(bad), ERROR_ARGUMENT, 1, "index 1: expected rule.detect of 0 to 2, found 3");
     bad = good;
     bad.between.b = null();
@@ -199,7 +204,7 @@ fn a_bad_rule_is_named_by_its_index() {
     bad.except_count = 1;
     refused_at(set(bad), ERROR_NULL, 1, "rule.except is NULL");
     bad = good;
-    bad.margin = -1.0;
+    bad.effects.margin = -1.0;
     refused_at(set(bad), number(ErrorCode::BadRule), 1, "index 1: ");
 }
 

@@ -8,8 +8,9 @@ use contactd_capi::session::*;
 use contactd_capi::step::*;
 use contactd_client::MassOptions;
 use contactd_proto::contact_record::{CONTACT, OVERLAP, SENSOR, VALID_POINT};
+use contactd_proto::rule::RuleNumbers;
 use contactd_proto::step::{STEP_CLEAR, STEP_CONTACT};
-use contactd_proto::{PoseRecord, pose_record};
+use contactd_proto::{Detect, InitialOverlap, PoseRecord, Report, pose_record};
 use std::ffi::{CStr, c_char};
 use std::ptr::{null, null_mut};
 
@@ -168,7 +169,8 @@ fn a_rule_s_every_field_is_obeyed() {
     let except = [Names { a: c"a".as_ptr(), b: c"c".as_ptr() }];
     let mut rule = contactd_rule_new(c"left".as_ptr(), c"right".as_ptr());
     (rule.except, rule.except_count) = (except.as_ptr(), 1);
-    (rule.penetration, rule.sensor) = (1, 1);
+    let asked = rule.effects;
+    (rule.effects.penetration, rule.effects.sensor) = (1, 1);
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let mut options = out(|o| unsafe { contactd_get_options(session.0, o) });
     options.details = 1;
@@ -181,26 +183,26 @@ fn a_rule_s_every_field_is_obeyed() {
     assert!((unsafe { *detail }.penetration - 2.0).abs() < 1e-6, "{:?}", unsafe { *detail });
 
     // Past the overlap: b leaves.
-    rule.initial_overlap = INITIAL_OVERLAP_IGNORE_IF_SEPARATING;
-    (rule.penetration, rule.sensor) = (0, 0);
+    rule.effects = RuleNumbers { initial_overlap: InitialOverlap::IgnoreIfSeparating as u32, ..asked };
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     assert_eq!(session.step(&[end(2, [12.0, 0.0, 0.0])]).header.status, STEP_CLEAR);
 
     // A margin tells of a pair 1.5 apart, with its regions; discrete looks at the end alone, a hit tells no point.
-    (rule.margin, rule.report) = (2.0, REPORT_PATCH);
+    (rule.effects.margin, rule.effects.report) = (2.0, Report::Patch as u32);
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let reply = session.step(&[end(2, [11.5, 0.0, 0.0])]);
     assert!((records(&reply)[0].separation - 2.0).abs() < 1e-9, "{:?}", records(&reply));
     assert_eq!(out(|n| unsafe { contactd_count_regions(session.0, 0, n) }), 1);
-    (rule.margin, rule.report, rule.detect) = (0.0, REPORT_HIT, DETECT_DISCRETE);
+    (rule.effects.margin, rule.effects.report) = (0.0, Report::Hit as u32);
+    rule.effects.detect = Detect::Discrete as u32;
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let reply = session.step(&[end(2, [-11.5, 0.0, 0.0])]);
     assert_eq!((reply.record_count, reply.header.counters.may_have_passed), (0, 1));
-    rule.detect = DETECT_CONTINUOUS;
+    rule.effects.detect = Detect::Continuous as u32;
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let reply = session.step(&[end(2, [11.5, 0.0, 0.0])]);
     assert_eq!((reply.record_count, records(&reply)[0].valid & VALID_POINT), (1, 0));
-    rule.detect = DETECT_OFF;
+    rule.effects.detect = Detect::Off as u32;
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     assert_eq!(session.step(&[end(2, [-11.5, 0.0, 0.0])]).header.pairs, 0);
     done(unsafe { contactd_set_rules(session.0, null(), 0) });
@@ -216,7 +218,7 @@ fn a_resting_box_tells_its_region_and_its_corners_in_place() {
     session.object(c"floor", floor, |o| o.is_static = 1);
     session.object(c"box", cube, |o| o.pose.position = [0.0, 0.0, 4.0]);
     let mut rule = contactd_rule_new(c"default".as_ptr(), c"default".as_ptr());
-    rule.report = REPORT_PATCH;
+    rule.effects.report = Report::Patch as u32;
     done(unsafe { contactd_set_rules(session.0, &rule, 1) });
     let reply = session.step(&[]);
     assert_eq!(reply.record_count, 1);
