@@ -120,57 +120,7 @@ impl Services {
         let node = link::node_of::<Shared>(&link::config(address, epoch)?)?;
         // A few more than sessions: clients that are just coming or going, and those that only look at the status.
         let clients = config.sessions + 8;
-        let steps = node
-            .service_builder(&link::service_name(names::STEP_SERVICE)?)
-            .request_response::<[PoseRecord], [ContactRecord]>()
-            .request_user_header::<StepRequest>()
-            .response_user_header::<StepReply>()
-            .max_clients(clients)
-            .max_nodes(clients + 1)
-            .max_servers(1)
-            .max_active_requests_per_client(2)
-            .max_loaned_requests(2)
-            .max_response_buffer_size(2)
-            .max_borrowed_responses_per_pending_response(2)
-            .enable_safe_overflow_for_requests(false)
-            .enable_safe_overflow_for_responses(false)
-            .enable_fire_and_forget_requests(false)
-            .create()
-            .map_err(|e| system(names::STEP_SERVICE, e))?
-            .server_builder()
-            .initial_max_slice_len(64)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .max_loaned_responses_per_request(1)
-            // Each client holds one reply and may be getting the next: the worst case of every buffer full cannot occur.
-            .override_response_preallocation(move |n| n.min(3 * clients))
-            .create()
-            .map_err(|e| system("step port", e))?;
-        let control = node
-            .service_builder(&link::service_name(names::CONTROL_SERVICE)?)
-            .request_response::<[u8], [u8]>()
-            .request_user_header::<ControlHeader>()
-            .response_user_header::<ControlHeader>()
-            .max_clients(clients)
-            .max_nodes(clients + 1)
-            .max_servers(1)
-            .max_active_requests_per_client(2)
-            .max_loaned_requests(2)
-            .max_response_buffer_size(2)
-            .max_borrowed_responses_per_pending_response(2)
-            .enable_safe_overflow_for_requests(false)
-            .enable_safe_overflow_for_responses(false)
-            .enable_fire_and_forget_requests(false)
-            .create()
-            .map_err(|e| system(names::CONTROL_SERVICE, e))?
-            .server_builder()
-            .initial_max_slice_len(4096)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .max_loaned_responses_per_request(1)
-            .override_response_preallocation(move |n| n.min(3 * clients))
-            .create()
-            .map_err(|e| system("control port", e))?;
+        let (steps, control) = (step_port(&node, clients)?, control_port(&node, clients)?);
         let wakes = node
             .service_builder(&link::service_name(names::WAKE_SERVICE)?)
             .event()
@@ -196,6 +146,63 @@ impl Services {
         let services = Self { steps, control, wake, status, _writer: writer, node };
         Ok((services, bell))
     }
+}
+
+/// The service of steps, for so many clients.
+fn step_port(node: &Node<Shared>, clients: usize) -> Result<StepServer, Error> {
+    node.service_builder(&link::service_name(names::STEP_SERVICE)?)
+        .request_response::<[PoseRecord], [ContactRecord]>()
+        .request_user_header::<StepRequest>()
+        .response_user_header::<StepReply>()
+        .max_clients(clients)
+        .max_nodes(clients + 1)
+        .max_servers(1)
+        .max_active_requests_per_client(2)
+        .max_loaned_requests(2)
+        .max_response_buffer_size(2)
+        .max_borrowed_responses_per_pending_response(2)
+        .enable_safe_overflow_for_requests(false)
+        .enable_safe_overflow_for_responses(false)
+        .enable_fire_and_forget_requests(false)
+        .create()
+        .map_err(|e| system(names::STEP_SERVICE, e))?
+        .server_builder()
+        .initial_max_slice_len(64)
+        .allocation_strategy(AllocationStrategy::PowerOfTwo)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .max_loaned_responses_per_request(1)
+        // Each client holds one reply and may be getting the next: the worst case of every buffer full cannot occur.
+        .override_response_preallocation(move |n| n.min(3 * clients))
+        .create()
+        .map_err(|e| system("step port", e))
+}
+
+/// The service of commands, for so many clients.
+fn control_port(node: &Node<Shared>, clients: usize) -> Result<ControlServer, Error> {
+    node.service_builder(&link::service_name(names::CONTROL_SERVICE)?)
+        .request_response::<[u8], [u8]>()
+        .request_user_header::<ControlHeader>()
+        .response_user_header::<ControlHeader>()
+        .max_clients(clients)
+        .max_nodes(clients + 1)
+        .max_servers(1)
+        .max_active_requests_per_client(2)
+        .max_loaned_requests(2)
+        .max_response_buffer_size(2)
+        .max_borrowed_responses_per_pending_response(2)
+        .enable_safe_overflow_for_requests(false)
+        .enable_safe_overflow_for_responses(false)
+        .enable_fire_and_forget_requests(false)
+        .create()
+        .map_err(|e| system(names::CONTROL_SERVICE, e))?
+        .server_builder()
+        .initial_max_slice_len(4096)
+        .allocation_strategy(AllocationStrategy::PowerOfTwo)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .max_loaned_responses_per_request(1)
+        .override_response_preallocation(move |n| n.min(3 * clients))
+        .create()
+        .map_err(|e| system("control port", e))
 }
 
 impl Port for Services {

@@ -102,14 +102,21 @@ struct ThreadScratch {
 }
 
 impl Memory {
-    /// The calling thread's seat.
+    /// The calling thread's scratch.
     fn with<T>(&self, work: impl FnOnce(&mut ThreadScratch) -> T) -> T {
         let own = rayon::current_thread_index().map_or(0, |i| i + 1);
         let mut thread_scratch = self.thread_scratches[own].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         work(&mut thread_scratch)
     }
 
-    /// Makes a seat for each thread.
+    /// A step begins: nobody has refined a cell.
+    fn begin(&mut self) {
+        for thread_scratch in &mut self.thread_scratches {
+            thread_scratch.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
+        }
+    }
+
+    /// Makes a scratch for each thread.
     fn ready(&mut self) {
         let threads = rayon::current_num_threads();
         if self.thread_scratches.len() <= threads {
@@ -138,18 +145,74 @@ pub fn run(
     memory: &mut Memory,
     heed: Option<&Heed>,
 ) {
-    for thread_scratch in &mut memory.thread_scratches {
-        thread_scratch.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
-    }
-    let is_over = || heed.is_some_and(Heed::is_over);
+    memory.begin();
     let first = options.first && !options.clear;
-    let most = batch_limit(options);
-    let (spent, beyond) = (AtomicU64::new(0), AtomicBool::new(false));
-    let work = |memory: &Memory, halt: Option<&Arc<Halt>>, job: &mut PairJob| {
-        if job.pair.is_none() || job.is_done || beyond.load(Relaxed) || halt.is_some_and(|halt| halt.is_over()) {
+    let (most, spent, beyond) = (batch_limit(options), AtomicU64::new(0), AtomicBool::new(false));
+    let searches = Searches { bodies, options, clock, heed, first, most, spent, beyond };
+    match heed {
+        None => searches.share(jobs, memory, None),
+        Some(heed) => {
+            searches.share(jobs, memory, Some(&heed.leave));
+            if heed.has_left() && !searches.beyond.load(Relaxed) {
+                heed.elsewhere(|| searches.share(jobs, memory, Some(&heed.halt)));
+            }
+        }
+    }
+    if searches.is_over() {
+        // Nothing is proven of pairs that were not come to.
+        for job in jobs.iter_mut().filter(|job| job.pair.is_some() && (!job.is_done || first && !job.found.known)) {
+            (job.found.known, job.found.apart) = (false, false);
+            job.found.outcome.status = Status::Undecided;
+            job.found.outcome.time_lower = 0.0;
+        }
+    } else if first || searches.beyond.into_inner() {
+        run_queue(bodies, jobs, options, first, clock, heed);
+    }
+    if options.clear {
+        // A line for each pair, the same whether it was searched or known.
+        for job in jobs.iter_mut().filter(|job| job.near && job.found.known) {
+            job.found.outcome.resolution = contact::resolution_of(&query(bodies, job, options));
+        }
+    }
+}
+
+/// The searches of a step, each pair by itself, on all threads.
+struct Searches<'a> {
+    bodies: &'a [Body],
+    options: &'a StepOptions,
+    clock: f64,
+    heed: Option<&'a Heed>,
+    /// Only the first contact is asked for: here what is known answers, the rest is the queue's.
+    first: bool,
+    /// Cells that all of them may spend together, and those that they have spent.
+    most: u64,
+    spent: AtomicU64,
+    /// They need more than that.
+    beyond: AtomicBool,
+}
+
+impl Searches<'_> {
+    fn is_over(&self) -> bool {
+        self.heed.is_some_and(Heed::is_over)
+    }
+
+    /// Answers the jobs that are not done, until `halt`.
+    fn share(&self, jobs: &mut [PairJob], memory: &mut Memory, halt: Option<&Arc<Halt>>) {
+        memory.ready();
+        let memory = &*memory;
+        if rayon::current_num_threads() > 1 && jobs.len() >= WORTH_SHARING {
+            jobs.par_iter_mut().for_each(|job| self.answer(job, memory, halt));
+        } else {
+            jobs.iter_mut().for_each(|job| self.answer(job, memory, halt));
+        }
+    }
+
+    /// Answers a job by what is known, or by a search.
+    fn answer(&self, job: &mut PairJob, memory: &Memory, halt: Option<&Arc<Halt>>) {
+        if job.pair.is_none() || job.is_done || self.beyond.load(Relaxed) || halt.is_some_and(|halt| halt.is_over()) {
             return;
         }
-        let mut q = job.question(bodies, options, clock);
+        let q = job.question(self.bodies, self.options, self.clock);
         let cells = memory.with(|thread_scratch| {
             thread_scratch.scratch.halt = halt.cloned();
             let mut counters = Counters::default();
@@ -162,72 +225,51 @@ pub fn run(
                 return 0;
             }
             job.found.known = false;
-            if first {
+            if self.first {
                 job.is_done = true;
                 return 0;
             }
-            let cut = q.query.cell_limit > most;
-            q.query.cell_limit = q.query.cell_limit.min(most);
-            // Outcomes are large: it is written where it is to be.
-            let outcome = &mut job.found.outcome;
-            contact::find_earliest(&q.query, &mut thread_scratch.scratch, outcome);
-            if outcome.status == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
-                if !is_over() {
-                    // Cut short, perhaps, to be searched elsewhere: it counts for nothing.
-                    job.found.outcome = Outcome::clear(job.resolution);
-                    return 0;
-                }
-                outcome.counters += counters;
-                job.take(&q, q.query.cell_limit);
-                job.is_done = true;
+            self.search(job, q, counters, halt, thread_scratch)
+        });
+        if self.spent.fetch_add(cells, Relaxed) + cells > self.most {
+            self.beyond.store(true, Relaxed);
+        }
+    }
+
+    /// Searches a pair; `asked` is what it has cost to ask what is known. Returns the cells that count for the batch.
+    fn search(
+        &self,
+        job: &mut PairJob,
+        mut q: Question,
+        asked: Counters,
+        halt: Option<&Arc<Halt>>,
+        thread_scratch: &mut ThreadScratch,
+    ) -> u64 {
+        let cut = q.query.cell_limit > self.most;
+        q.query.cell_limit = q.query.cell_limit.min(self.most);
+        // Outcomes are large: it is written where it is to be.
+        let outcome = &mut job.found.outcome;
+        contact::find_earliest(&q.query, &mut thread_scratch.scratch, outcome);
+        if outcome.status == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
+            if !self.is_over() {
+                // Cut short, perhaps, to be searched elsewhere: it counts for nothing.
+                job.found.outcome = Outcome::clear(job.resolution);
                 return 0;
             }
-            let cells = outcome.counters.spent(q.query.cell_limit);
-            if cut && outcome.status == Status::Undecided {
-                beyond.store(true, Relaxed);
-            }
-            outcome.counters += counters;
-            thread_scratch.cells += outcome.counters.cells;
+            outcome.counters += asked;
             job.take(&q, q.query.cell_limit);
             job.is_done = true;
-            cells
-        });
-        if spent.fetch_add(cells, Relaxed) + cells > most {
-            beyond.store(true, Relaxed);
+            return 0;
         }
-    };
-    let mut share = |jobs: &mut [PairJob], halt: Option<&Arc<Halt>>| {
-        memory.ready();
-        if rayon::current_num_threads() > 1 && jobs.len() >= WORTH_SHARING {
-            jobs.par_iter_mut().for_each(|job| work(memory, halt, job));
-        } else {
-            jobs.iter_mut().for_each(|job| work(memory, halt, job));
+        let cells = outcome.counters.spent(q.query.cell_limit);
+        if cut && outcome.status == Status::Undecided {
+            self.beyond.store(true, Relaxed);
         }
-    };
-    match heed {
-        None => share(jobs, None),
-        Some(heed) => {
-            share(jobs, Some(&heed.leave));
-            if heed.has_left() && !beyond.load(Relaxed) {
-                heed.elsewhere(|| share(jobs, Some(&heed.halt)));
-            }
-        }
-    }
-    if is_over() {
-        // Nothing is proven of pairs that were not come to.
-        for job in jobs.iter_mut().filter(|job| job.pair.is_some() && (!job.is_done || first && !job.found.known)) {
-            (job.found.known, job.found.apart) = (false, false);
-            job.found.outcome.status = Status::Undecided;
-            job.found.outcome.time_lower = 0.0;
-        }
-    } else if first || beyond.into_inner() {
-        run_queue(bodies, jobs, options, first, clock, heed);
-    }
-    if options.clear {
-        // A line for each pair, the same whether it was searched or known.
-        for job in jobs.iter_mut().filter(|job| job.near && job.found.known) {
-            job.found.outcome.resolution = contact::resolution_of(&query(bodies, job, options));
-        }
+        outcome.counters += asked;
+        thread_scratch.cells += outcome.counters.cells;
+        job.take(&q, q.query.cell_limit);
+        job.is_done = true;
+        cells
     }
 }
 
