@@ -10,7 +10,7 @@
 
 use contactd::contact::Status;
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, Part, StepError, StepOptions, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepError, StepOptions, World};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
 use contactd_tests::scenes::Recipe;
@@ -77,7 +77,7 @@ fn world(scene: &Scene) -> Result<World, Box<dyn std::error::Error>> {
     let mut world = World::new(scene.recipes.len(), scene.recipes.len());
     world.set_rules(scene.rules.clone())?;
     for (i, recipe) in scene.recipes.iter().enumerate() {
-        let part = Arc::new(Part::new(Arc::new(Model::new(recipe.build()))));
+        let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))));
         let spec = ObjectSpec::new(i as u32, &part, (scene.pose)(i, 0));
         world.add_object(ObjectSpec { is_static: i < scene.fixed, ..spec })?;
     }
@@ -172,7 +172,7 @@ pub struct Approached {
 pub fn approach(approach: &Approach, steps: usize, times: usize) -> Result<Approached, Box<dyn std::error::Error>> {
     let mut world = World::new(2, 2);
     for (i, recipe) in plate_and_peg().iter().enumerate() {
-        let part = Arc::new(Part::new(Arc::new(Model::new(recipe.build()))));
+        let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))));
         let spec = ObjectSpec::new(i as u32, &part, if i == 0 { Pose::IDENTITY } else { approach.motion.start });
         world.add_object(ObjectSpec { is_static: i == 0, ..spec })?;
     }

@@ -7,7 +7,7 @@ use crate::contact::{self, Body, Clock, PairQuery, Scratch, Strategies, certific
 use crate::import::{Place, Scene};
 use crate::motion::Placed;
 use crate::octree::Model;
-use crate::world::{ObjectSpec, PairOutcome, Part, Refusal, StepOptions, StepOutcome, World};
+use crate::world::{MeasuredModel, ObjectSpec, PairOutcome, Refusal, StepOptions, StepOutcome, World};
 use contactd_proto::{Detect, ErrorCode, InitialOverlap, Motion, PoseRecord, Report};
 use std::sync::Arc;
 
@@ -64,10 +64,10 @@ impl Check {
     pub fn new(scene: &Scene, models: &[Arc<Model>], resolution: Option<f64>) -> Result<Self, CheckError> {
         let file = scene.file.clone();
         let refused = |at| move |refusal| CheckError::World { file: scene.file.clone(), at, refusal };
-        let mut parts: Vec<Arc<Part>> = Vec::with_capacity(models.len());
+        let mut parts: Vec<Arc<MeasuredModel>> = Vec::with_capacity(models.len());
         for model in models {
             let same = parts.iter().find(|p| Arc::ptr_eq(&p.model, model)).cloned();
-            parts.push(same.unwrap_or_else(|| Arc::new(Part::new(model.clone()))));
+            parts.push(same.unwrap_or_else(|| Arc::new(MeasuredModel::new(model.clone()))));
         }
         let count = scene.objects.len();
         let mut world = World::new(count, count);

@@ -10,7 +10,7 @@ use crate::random_solids::Random;
 use crate::scenes::{self, Recipe, Scene};
 use contactd::contact::Status;
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World, record};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, StepOutcome, World, record};
 use contactd_proto::{Detect, EffectCounters, InitialOverlap, Motion, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::TAU;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Lane {
     /// Their models.
-    pub parts: [Arc<Part>; 2],
+    pub parts: [Arc<MeasuredModel>; 2],
     /// Their motions.
     pub motions: [Motion; 2],
     /// Their models in their objects' frames.
@@ -42,7 +42,7 @@ impl Lane {
             let start = Pose::new(rounded(m.start.position), m.start.rotation);
             Motion { start, velocity: rounded(m.velocity), spin: m.spin }
         });
-        Self { parts: models.map(|m| Arc::new(Part::new(m))), motions, places, rotates: true }
+        Self { parts: models.map(|m| Arc::new(MeasuredModel::new(m))), motions, places, rotates: true }
     }
 
     /// A scene's two bodies.
@@ -136,7 +136,7 @@ impl Lanes {
     }
 
     /// A body of a group, as far from every anchor as nothing else is.
-    pub fn add_bystander(&mut self, part: &Arc<Part>, group: &str) {
+    pub fn add_bystander(&mut self, part: &Arc<MeasuredModel>, group: &str) {
         let last = self.world.bodies().last().map_or(0, |b| b.id);
         let at = Pose::at(dvec3(-1e4 - 100.0 * f64::from(last), -1e4, 0.0));
         let spec = ObjectSpec { group: group.into(), ..ObjectSpec::new(last + 1, part, at) };

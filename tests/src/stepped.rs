@@ -8,7 +8,7 @@ use crate::random_solids::Random;
 use crate::scenes::{self, Recipe};
 use contactd::solid::Op;
 use contactd::solid::primitive::HalfSpace;
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub struct Thing {
 
 impl Thing {
     /// What a world is given, with the parts of the play's models.
-    pub fn spec(&self, parts: &[Arc<Part>]) -> ObjectSpec {
+    pub fn spec(&self, parts: &[Arc<MeasuredModel>]) -> ObjectSpec {
         ObjectSpec {
             is_static: self.is_static,
             group: self.group.into(),

@@ -9,7 +9,7 @@ use contactd::contact::{
 use contactd::import::{self, Limits};
 use contactd::motion::Placed;
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, StepOutcome, World};
 use contactd_proto::{Motion, Pose, PoseRecord};
 use contactd_tests::engine::{CELL_LIMIT, ask};
 use contactd_tests::random_solids::Random;
@@ -271,13 +271,13 @@ fn a_pair_stops_at_its_limit_with_what_is_proven_by_then() {
 /// Four plates in a row and a tilted peg above each; peg i falls i + 2 lengths a step, so that the last meets first.
 fn pegs() -> (World, Vec<PoseRecord>) {
     let (plate, peg, motion) = tilted_peg();
-    let part = |r: &Recipe| Arc::new(Part::new(Arc::new(Model::new(r.build()))));
+    let part = |r: &Recipe| Arc::new(MeasuredModel::new(Arc::new(Model::new(r.build()))));
     let (plate, peg) = (part(&plate), part(&peg));
     let mut world = World::new(16, 16);
     let mut records = Vec::new();
     for i in 0..4u32 {
         let x = DVec3::X * 4.0 * f64::from(i);
-        let mut add = |id: u32, part: &Arc<Part>, is_static: bool, pose: Pose| {
+        let mut add = |id: u32, part: &Arc<MeasuredModel>, is_static: bool, pose: Pose| {
             let spec = ObjectSpec { is_static, ..ObjectSpec::new(id, part, pose) };
             world.add_object(spec).expect("an object");
         };

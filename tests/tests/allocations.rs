@@ -3,7 +3,7 @@
 
 use contactd::contact::Status;
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, StepOutcome, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, StepOutcome, World};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Pose, PoseRecord};
 use contactd_tests::scenes::Recipe;
@@ -23,15 +23,15 @@ fn pose(spacing: f64, object: u32, step: u32) -> Pose {
     Pose::new(at, quat_of_rotation_vector(DVec3::new(0.6, 0.0, 0.8) * angle))
 }
 
-fn part(recipe: &Recipe) -> Arc<Part> {
-    Arc::new(Part::new(Arc::new(Model::new(recipe.build()))))
+fn part(recipe: &Recipe) -> Arc<MeasuredModel> {
+    Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))))
 }
 
 /// Objects on a grid, and what each of 900 steps did: the allocations it made, too. On one thread, which is the one that is
 /// measured; a pool of several takes a block of memory for its own queue once in 63 steps.
 fn walk(spacing: f64, recipes: &[Recipe], mut each: impl FnMut(u32, &StepOutcome, u64)) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    let parts: Vec<Arc<Part>> = recipes.iter().map(part).collect();
+    let parts: Vec<Arc<MeasuredModel>> = recipes.iter().map(part).collect();
     let mut world = World::new(64, 64);
     for object in 0..OBJECTS {
         let spec = ObjectSpec::new(object + 1, &parts[object as usize % parts.len()], pose(spacing, object, 0));

@@ -7,7 +7,7 @@ use contactd::contact::Outcome;
 use contactd::import::{self, Facets, read_model};
 use contactd::octree::{Limits, Model, Node};
 use contactd::solid::{Op, Solid, SolidBuilder};
-use contactd::world::{ObjectSpec, Part, World};
+use contactd::world::{MeasuredModel, ObjectSpec, World};
 use contactd_proto::Pose;
 use contactd_tests::engine::ask_models;
 use contactd_tests::random_solids::{Random, perforated_plate, placed, solid};
@@ -170,7 +170,7 @@ fn what_searches_make_on_demand_is_made_without_other_threads() {
 #[test]
 fn a_thousand_instances_are_one_model() {
     let model = Arc::new(Model::new(Recipe::cuboid(0.5, 0.5, 0.1).minus(Recipe::cylinder(0.25, 0.5)).build()));
-    let part = Arc::new(Part::new(model.clone()));
+    let part = Arc::new(MeasuredModel::new(model.clone()));
     let mut world = World::new(1000, 1000);
     for id in 0..1000 {
         let at = Pose::at(DVec3::new(2.0 * f64::from(id), 0.0, 0.0));

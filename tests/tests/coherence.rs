@@ -6,7 +6,7 @@
 
 use contactd::contact::{Counters, Outcome, Region, Status};
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World};
+use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, StepOptions, StepOutcome, World};
 use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe};
@@ -16,8 +16,8 @@ use std::sync::Arc;
 
 const STEPS: usize = 40;
 
-fn part(recipe: &Recipe) -> Arc<Part> {
-    Arc::new(Part::new(Arc::new(Model::new(recipe.build()))))
+fn part(recipe: &Recipe) -> Arc<MeasuredModel> {
+    Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))))
 }
 
 /// What a caller sees of an answer; work may differ.

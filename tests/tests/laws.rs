@@ -11,7 +11,7 @@ use contactd::contact::{
 use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::solid::primitive::HalfSpace;
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_proto::{Motion, Pose, PoseRecord};
 use contactd_tests::engine;
 use contactd_tests::random_solids::Random;
@@ -509,11 +509,11 @@ fn memory_that_was_used_before_changes_no_bit() {
 
 #[test]
 fn other_pairs_of_the_step_change_no_bit() {
-    let ball = Arc::new(Part::new(Arc::new(Model::new(Recipe::sphere(0.4).build()))));
+    let ball = Arc::new(MeasuredModel::new(Arc::new(Model::new(Recipe::sphere(0.4).build()))));
     hold("batch", 19, |random, scene, o| {
-        let parts = [&scene.a, &scene.b].map(|r| Arc::new(Part::new(Arc::new(Model::new(r.build())))));
+        let parts = [&scene.a, &scene.b].map(|r| Arc::new(MeasuredModel::new(Arc::new(Model::new(r.build())))));
         let mut world = World::new(8, 8);
-        let mut add = |id: u32, part: &Arc<Part>, motion: &Motion| {
+        let mut add = |id: u32, part: &Arc<MeasuredModel>, motion: &Motion| {
             world.add_object(ObjectSpec::new(id, part, motion.start)).map(|_| ()).map_err(|e| e.to_string())
         };
         let free = Motion::turning(scenes::pose(random, 1.0), random.vector(1.0), random.vector(2.0));

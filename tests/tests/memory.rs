@@ -8,7 +8,7 @@ use contactd::contact::{Counters, Outcome, Status};
 use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::world::memory::Remembered;
-use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World, record};
+use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, StepOptions, StepOutcome, World, record};
 use contactd_proto::contact_record::{ContactRecord, DETAIL_SLOT, DetailSlot};
 use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Rule};
 use contactd_tests::random_solids::Random;
@@ -20,8 +20,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-fn part(recipe: &Recipe) -> Arc<Part> {
-    Arc::new(Part::new(Arc::new(Model::new(recipe.build()))))
+fn part(recipe: &Recipe) -> Arc<MeasuredModel> {
+    Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))))
 }
 
 /// The reply to a step as its caller reads it, to the bit: header and all slots, work left out.
@@ -79,7 +79,7 @@ fn lines(out: &StepOutcome, regions: bool) -> Vec<String> {
 
 /// A world that has never been asked anything: objects, rules and the tracks of the step before.
 struct Fresh {
-    parts: Vec<Arc<Part>>,
+    parts: Vec<Arc<MeasuredModel>>,
     things: Vec<Thing>,
     rules: Vec<Rule>,
     resolution: Option<f64>,
@@ -111,7 +111,7 @@ impl Fresh {
     }
 }
 
-fn apply(world: &mut World, parts: &[Arc<Part>], change: &Change) {
+fn apply(world: &mut World, parts: &[Arc<MeasuredModel>], change: &Change) {
     match change {
         Change::Add(thing) => world.add_object(thing.spec(parts)).expect("an object"),
         Change::Remove(id) => world.remove_object(*id).expect("an object to remove"),
@@ -212,9 +212,9 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
 /// A play in a world that remembers, and each of its steps in a world made for it.
 fn run(seed: u64, steps: usize) -> Work {
     let mut play = Play::new(seed);
-    let parts: Vec<Arc<Part>> = play.recipes.iter().map(part).collect();
+    let parts: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
     // Octrees are refined by searches: the fresh worlds have models of their own.
-    let own: Vec<Arc<Part>> = play.recipes.iter().map(part).collect();
+    let own: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
     let mut fresh =
         Fresh { parts: own, things: Vec::new(), rules: Vec::new(), resolution: None, motion_states: Vec::new() };
     let mut warm = World::new(256, 256);
@@ -351,7 +351,7 @@ fn plays_that_were_told_wrong_once_are_told_right() {
 }
 
 /// Two objects in a world.
-fn two(parts: [&Arc<Part>; 2], poses: [Pose; 2], margin: f64) -> World {
+fn two(parts: [&Arc<MeasuredModel>; 2], poses: [Pose; 2], margin: f64) -> World {
     let mut world = World::new(2, 8);
     for (i, (part, pose)) in parts.iter().zip(poses).enumerate() {
         world.add_object(ObjectSpec::new(i as u32 + 1, part, pose)).expect("an object");

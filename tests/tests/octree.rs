@@ -4,7 +4,7 @@ use contactd::bound::SBounds;
 use contactd::octree::local::{Classifier, whole};
 use contactd::octree::span::primitive_span;
 use contactd::octree::tables::combine;
-use contactd::octree::{Kind, Limits, Meet, Model, Node, meet};
+use contactd::octree::{Limits, Meet, Model, Node, NodeKind, meet};
 use contactd::solid::local::{self, Truth};
 use contactd::solid::primitive::{Cuboid, Cylinder, Primitive, Sphere};
 use contactd::solid::{Label, Op, Sense, Solid, SolidBuilder};
@@ -43,23 +43,23 @@ p     | branches | pairs | skip | pairs
 n     | branches | pairs | skip | pairs | pairs
 mixed | branches | pairs | skip | pairs | pairs | pairs";
 
-fn kind(word: &str) -> Option<Kind> {
+fn kind(word: &str) -> Option<NodeKind> {
     match word {
         "-" => None,
-        "p" => Some(Kind::PSurface),
-        "n" => Some(Kind::NSurface),
-        w => Some(Kind::ALL.into_iter().find(|k| k.name() == w).unwrap_or_else(|| panic!("no kind {w}"))),
+        "p" => Some(NodeKind::PSurface),
+        "n" => Some(NodeKind::NSurface),
+        w => Some(NodeKind::ALL.into_iter().find(|k| k.name() == w).unwrap_or_else(|| panic!("no kind {w}"))),
     }
 }
 
 /// Calls `check(row kind, column kind, word)` for every printed cell; returns their number.
-fn cells(table: &str, mut check: impl FnMut(Kind, Kind, &str)) -> usize {
+fn cells(table: &str, mut check: impl FnMut(NodeKind, NodeKind, &str)) -> usize {
     let mut count = 0;
     for line in table.trim().lines() {
         let mut words = line.split('|').map(str::trim);
         let row = kind(words.next().unwrap()).unwrap();
         for (column, word) in words.enumerate() {
-            check(row, Kind::ALL[column], word);
+            check(row, NodeKind::ALL[column], word);
             count += 1;
         }
     }
@@ -93,10 +93,10 @@ fn every_cell_of_the_four_tables_is_the_papers() {
 
 #[test]
 fn the_tables_treat_grey_and_mixed_alike_but_for_the_name() {
-    let mixed = |k: Kind| if k == Kind::Grey { Kind::Mixed } else { k };
+    let mixed = |k: NodeKind| if k == NodeKind::Grey { NodeKind::Mixed } else { k };
     for op in [Op::Union, Op::Intersection, Op::Difference] {
-        for a in Kind::ALL {
-            for b in Kind::ALL {
+        for a in NodeKind::ALL {
+            for b in NodeKind::ALL {
                 if let Some(r) = combine(op, a, b) {
                     // Two surfaces give grey, at the lowest level mixed: the same thing.
                     assert_eq!(Some(mixed(r)), combine(op, mixed(a), mixed(b)).map(mixed), "{a:?} {op:?} {b:?}");
@@ -107,31 +107,33 @@ fn the_tables_treat_grey_and_mixed_alike_but_for_the_name() {
 }
 
 /// Asserts what a voxel's kind and references say at a point of the voxel; `slack` for points on a surface.
-fn assert_membership(s: &Solid, kind: Kind, refs: &[u32], x: DVec3, slack: f64, what: &str) {
+fn assert_membership(s: &Solid, kind: NodeKind, refs: &[u32], x: DVec3, slack: f64, what: &str) {
     let f = s.value(x);
     let psi = |i: usize| s.primitives[refs[i] as usize].value(x);
     let clear = |v: f64| v.abs() > slack;
     match kind {
-        Kind::Full => {
+        NodeKind::Full => {
             assert!(f <= slack, "{what}: full, but f = {f}");
             assert!(
                 !refs.is_empty() && (0..refs.len()).all(|i| psi(i) <= slack),
                 "{what}: full by a primitive beside it"
             );
         }
-        Kind::Empty => assert!(f >= -slack, "{what}: empty, but f = {f}"),
-        Kind::PSurface => {
+        NodeKind::Empty => assert!(f >= -slack, "{what}: empty, but f = {f}"),
+        NodeKind::PSurface => {
             assert_eq!(refs.len(), 1);
             assert_eq!(s.senses[refs[0] as usize], Sense::Positive);
             assert!(!clear(f) || !clear(psi(0)) || (f < 0.0) == (psi(0) < 0.0), "{what}: p, f {f}, psi {}", psi(0));
         }
-        Kind::NSurface => {
+        NodeKind::NSurface => {
             assert_eq!(refs.len(), 2);
             assert_eq!((s.senses[refs[0] as usize], s.senses[refs[1] as usize]), (Sense::Positive, Sense::Negative));
             assert!(psi(0) <= slack, "{what}: n, the volume does not fill the voxel");
             assert!(!clear(f) || !clear(psi(1)) || (f < 0.0) == (psi(1) > 0.0), "{what}: n, f {f}, psi {}", psi(1));
         }
-        Kind::Mixed | Kind::Grey => assert!(kind == Kind::Grey || refs.len() > 1, "{what}: mixed by {refs:?}"),
+        NodeKind::Mixed | NodeKind::Grey => {
+            assert!(kind == NodeKind::Grey || refs.len() > 1, "{what}: mixed by {refs:?}")
+        }
     }
 }
 
@@ -170,11 +172,11 @@ fn combined_kinds_agree_with_dense_sampling_in_every_cell() {
             // Bounds without the downward rule's help from the whole: the operands' own.
             let (ka, kb) = (classify(&a, &SBounds::new(&a, 0.0)).0, classify(&b, &SBounds::new(&b, 0.0)).0);
             let (k, refs) = classify(&both, &SBounds::new(&both, 0.0));
-            let table = combine(op, ka, kb).map(|k| if k == Kind::Grey { Kind::Mixed } else { k });
+            let table = combine(op, ka, kb).map(|k| if k == NodeKind::Grey { NodeKind::Mixed } else { k });
             seen[seed as usize % 3][ka as usize][kb as usize] += 1;
             // The bounds of the whole tree clip the operands' own, so that it sees less of them: sharper as a rule.
             agree += usize::from(Some(k) == table);
-            sharper += usize::from(Some(k) != table && k != Kind::Mixed);
+            sharper += usize::from(Some(k) != table && k != NodeKind::Mixed);
             voxels += 1;
             for i in 0..30 {
                 let x = if i < 8 {
@@ -238,7 +240,7 @@ fn octree_membership_is_tree_membership_also_where_refined_later() {
                 x,
                 |n| n.depth() < limit,
                 |n| {
-                    let kind = if n.children().is_some() { Kind::Grey } else { n.kind() };
+                    let kind = if n.children().is_some() { NodeKind::Grey } else { n.kind() };
                     kinds.push(kind);
                     deepest = deepest.max(n.depth());
                     assert_membership(&m.solid, n.kind(), n.refs(), x, slack, &format!("solid {i}"));
@@ -273,10 +275,10 @@ fn octree_membership_is_tree_membership_also_where_refined_later() {
     println!(
         "octree membership: {points} points, {:.0}% inside; leaves {:?}; down to depth {deepest}",
         100.0 * inside as f64 / points as f64,
-        Kind::ALL.map(|k| (k.name(), by_kind[k as usize]))
+        NodeKind::ALL.map(|k| (k.name(), by_kind[k as usize]))
     );
     assert!(inside * 10 > points && deepest >= 10);
-    assert!(Kind::ALL.iter().all(|k| *k == Kind::Grey || by_kind[*k as usize] > 20));
+    assert!(NodeKind::ALL.iter().all(|k| *k == NodeKind::Grey || by_kind[*k as usize] > 20));
 }
 
 #[test]
@@ -341,7 +343,7 @@ fn who_asks_first_does_not_matter() {
         *count += 1;
         assert_eq!((a.center, a.half, a.f_lo, a.f_hi), (b.center, b.half, b.f_lo, b.f_hi));
         assert_eq!((a.refs(), a.terms()), (b.refs(), b.terms()));
-        assert!(a.kind() == b.kind() || (a.kind() == Kind::Grey && b.kind() == Kind::Mixed));
+        assert!(a.kind() == b.kind() || (a.kind() == NodeKind::Grey && b.kind() == NodeKind::Mixed));
         if let Some(children) = a.children() {
             let others = m.expand(b).expect("a mixed node expands");
             children.iter().zip(others).for_each(|(x, y)| compare(x, y, m, count));
@@ -367,9 +369,9 @@ fn the_budget_bounds_the_octree_of_a_large_part() {
     let census = m.octree.census();
     println!("8193 primitives: depth {}, {} nodes, {took:?}", m.octree.depth(), census.nodes());
     for (d, row) in census.by_depth.iter().enumerate() {
-        println!("  depth {d}: {:?}", Kind::ALL.map(|k| (k.name(), row[k as usize])));
+        println!("  depth {d}: {:?}", NodeKind::ALL.map(|k| (k.name(), row[k as usize])));
     }
-    assert!(m.octree.depth() >= 2 && census.of(Kind::Mixed) > 0 && census.nodes() <= Limits::default().nodes);
+    assert!(m.octree.depth() >= 2 && census.of(NodeKind::Mixed) > 0 && census.nodes() <= Limits::default().nodes);
 }
 
 #[test]
@@ -377,11 +379,11 @@ fn an_empty_and_an_unbounded_solid_have_their_octrees_too() {
     let mut b = SolidBuilder::new();
     let root = b.empty();
     let m = Model::new(b.finish(root));
-    assert_eq!((m.octree.root().kind(), m.radius), (Kind::Empty, 0.0));
+    assert_eq!((m.octree.root().kind(), m.radius), (NodeKind::Empty, 0.0));
     let mut b = SolidBuilder::new();
     let root = b.primitive(contactd::solid::primitive::HalfSpace, contactd_proto::Pose::IDENTITY, Default::default());
     let m = Model::new(b.finish(root));
-    assert_eq!(m.octree.root().kind(), Kind::Mixed);
+    assert_eq!(m.octree.root().kind(), NodeKind::Mixed);
     assert!(m.expand(m.octree.root()).is_none() && m.radius.is_infinite());
 }
 
@@ -393,10 +395,10 @@ fn a_voxel_that_a_surface_reaches_within_the_margin_is_neither_full_nor_empty() 
     let (margin, half) = (1e-3, 0.125);
     let bounds = SBounds::new(&solid, margin);
     for (distance, kind) in [
-        (2.0 * margin, Kind::Empty),
-        (0.5 * margin, Kind::PSurface),
-        (-2.0 * half - 0.5 * margin, Kind::PSurface),
-        (-2.0 * half - 2.0 * margin, Kind::Full),
+        (2.0 * margin, NodeKind::Empty),
+        (0.5 * margin, NodeKind::PSurface),
+        (-2.0 * half - 0.5 * margin, NodeKind::PSurface),
+        (-2.0 * half - 2.0 * margin, NodeKind::Full),
     ] {
         let center = DVec3::X * (1.0 + half + distance);
         let mut classifier = Classifier { solid: &solid, bounds: &bounds, center, half, work: 0 };

@@ -12,7 +12,7 @@ use contactd::import::{Facets, Limits, import_csg, read_scene};
 use contactd::ipc::ServerConfig;
 use contactd::octree::Model;
 use contactd::solid::{Face, Sense, Solid, surface};
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_client::Object;
 use contactd_proto::control::WireTrack;
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -282,9 +282,9 @@ fn a_contact_beside_a_far_larger_body_is_continued() {
 /// What a step of two cubes with a common face says of touching, asked in different ways.
 #[test]
 fn touching_is_told_of_clear_pairs_without_being_asked_for() {
-    let cube = Arc::new(Part::new(Arc::new(Model::new(Recipe::cuboid(0.5, 0.5, 0.5).build()))));
+    let cube = Arc::new(MeasuredModel::new(Arc::new(Model::new(Recipe::cuboid(0.5, 0.5, 0.5).build()))));
     let tree = Recipe::cuboid(0.5, 0.5, 0.5).minus(Recipe::sphere(0.2)).build();
-    let tree = Arc::new(Part::new(Arc::new(Model::new(tree))));
+    let tree = Arc::new(MeasuredModel::new(Arc::new(Model::new(tree))));
     let rules = [Report::Time, Report::Contact, Report::Patch].map(|report| {
         let mut rule = Rule::new(["default".into(), "default".into()]);
         rule.report = report;
@@ -385,7 +385,7 @@ fn a_pose_is_one_to_the_bit_whichever_way_it_comes_in() {
 #[test]
 fn an_end_that_differs_by_its_last_bit_is_where_the_next_step_starts() {
     let mut rng = Random::new(2);
-    let part = Arc::new(Part::new(Arc::new(Model::new(plate().build()))));
+    let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(plate().build()))));
     for round in 0..200 {
         let (q, p) = (unit(&mut rng), rng.vector(2.0));
         let mut turned = q.to_array();
@@ -426,7 +426,7 @@ fn fields_that_are_not_asked_for_are_plus_zero() {
 #[test]
 fn a_world_that_is_restored_goes_on_with_the_same_bits() {
     let mut rng = Random::new(5);
-    let part = Arc::new(Part::new(Arc::new(Model::new(plate().scaled(0.5).build()))));
+    let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(plate().scaled(0.5).build()))));
     let mut reported = 0;
     for round in 0..rounds(40) {
         let mut first = World::new(3, 6);

@@ -14,7 +14,7 @@ use contactd::contact::{Outcome, QueryOptions, Region, Scratch, Status, earliest
 use contactd::import::{Facets, Limits, read_scene};
 use contactd::ipc::ServerConfig;
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, PairOutcome, Part, StepOptions, StepOutcome, World};
+use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, StepOptions, StepOutcome, World};
 use contactd_benches::options::Options;
 use contactd_benches::row;
 use contactd_benches::table::Table;
@@ -236,7 +236,8 @@ fn stepped(seed: u64) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
     // Bodies of a heap share few models, as those of real scenes do.
     let drawn: Vec<Scene> = (0..if crowd { 3 } else { 2 }).map(|_| scenes::any(&mut r)).collect();
     let recipes: Vec<&Recipe> = drawn.iter().flat_map(|s| [&s.a, &s.b]).collect();
-    let parts: Vec<Arc<Part>> = recipes.iter().map(|c| Arc::new(Part::new(Arc::new(Model::new(c.build()))))).collect();
+    let parts: Vec<Arc<MeasuredModel>> =
+        recipes.iter().map(|c| Arc::new(MeasuredModel::new(Arc::new(Model::new(c.build()))))).collect();
     let mut world = World::new(count, 2 * count);
     let side = (count as f64).cbrt().ceil();
     let mut ways = Vec::new();

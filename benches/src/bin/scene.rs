@@ -14,7 +14,7 @@ use contactd::ipc::Embedded;
 use contactd::octree::Model;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_benches::facets::{Drilled, Outline};
 use contactd_benches::options::Options;
 use contactd_benches::race::{median, worst};
@@ -345,7 +345,7 @@ fn shared(n: usize, steps: usize, threads: usize) -> Result<[f64; 3], Box<dyn st
     let paths = paths(&twins, n);
     let parts = twins.iter().map(|(text, _)| {
         let imported = import_csg("part.csg", text, Facets::default(), &Limits::default())?;
-        Ok(Arc::new(Part::new(Arc::new(Model::new(imported.solid)))))
+        Ok(Arc::new(MeasuredModel::new(Arc::new(Model::new(imported.solid)))))
     });
     let parts = parts.collect::<Result<Vec<_>, ImportError>>()?;
     let mut world = World::new(n, n);

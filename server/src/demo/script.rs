@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 
 /// A model of the demo: its name and its OpenSCAD tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
+pub struct DemoModel {
     /// Name, also of its file.
     pub name: &'static str,
     /// The `.csg` text.
@@ -22,9 +22,9 @@ pub struct Part {
 macro_rules! parts {
     ($($constant:ident $name:literal),+ $(,)?) => {
         $(#[doc = concat!("`server/models/", $name, ".csg`.")]
-        pub const $constant: Part = Part { name: $name, text: include_str!(concat!("../../models/", $name, ".csg")) };)+
+        pub const $constant: DemoModel = DemoModel { name: $name, text: include_str!(concat!("../../models/", $name, ".csg")) };)+
         /// All models of the demo.
-        pub const PARTS: &[Part] = &[$($constant),+];
+        pub const PARTS: &[DemoModel] = &[$($constant),+];
     };
 }
 
@@ -35,11 +35,11 @@ parts! {
 
 /// An object of an act.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct DemoObject {
     /// Its name.
     pub name: String,
     /// Its model.
-    pub part: Part,
+    pub part: DemoModel,
     /// It never moves.
     pub fixed: bool,
 }
@@ -65,7 +65,7 @@ pub struct Act {
     /// What happens, for the progress bar.
     pub title: &'static str,
     /// Its objects.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<DemoObject>,
     /// Number of its steps.
     pub steps: usize,
     legs: fn(usize) -> Vec<Leg>,
@@ -80,10 +80,10 @@ impl Act {
 
 /// The acts, in order.
 pub fn acts() -> Vec<Act> {
-    let fixed = |name: &str, part| Body { name: name.into(), part, fixed: true };
-    let moving = |name: &str, part| Body { name: name.into(), part, fixed: false };
+    let fixed = |name: &str, part| DemoObject { name: name.into(), part, fixed: true };
+    let moving = |name: &str, part| DemoObject { name: name.into(), part, fixed: false };
     let several = |stem: &str, n: usize, part| (1..=n).map(move |i| moving(&format!("{stem}_{i}"), part)).collect();
-    let with = |first: Vec<Body>, rest: Vec<Body>| [first, rest].concat();
+    let with = |first: Vec<DemoObject>, rest: Vec<DemoObject>| [first, rest].concat();
     vec![
         Act {
             title: "bolts into the flange",

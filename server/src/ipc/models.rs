@@ -8,7 +8,7 @@ use crate::cache::{self, Cache, Prepared};
 use crate::import::{self, ImportError, Problem, Source};
 use crate::math::halt;
 use crate::solid::Sense;
-use crate::world::{Part, Refusal};
+use crate::world::{MeasuredModel, Refusal};
 use contactd_proto::ErrorCode;
 use contactd_proto::control::{FaceName, Facets, ModelFile};
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 #[derive(Debug)]
 pub struct Loaded {
     /// The model and its measures.
-    pub part: Arc<Part>,
+    pub part: Arc<MeasuredModel>,
     /// Its faces by id.
     pub faces: Vec<FaceName>,
     /// What the import had to say.
@@ -104,7 +104,11 @@ fn loaded(Prepared { model, notes, .. }: Prepared) -> Loaded {
         }
     });
     let faces = faces.collect();
-    Loaded { faces, warnings: notes.iter().map(ToString::to_string).collect(), part: Arc::new(Part::new(model)) }
+    Loaded {
+        faces,
+        warnings: notes.iter().map(ToString::to_string).collect(),
+        part: Arc::new(MeasuredModel::new(model)),
+    }
 }
 
 fn code_of(error: &ImportError) -> ErrorCode {

@@ -9,7 +9,7 @@
 //! decided beyond ±margin, hence hold at every depth within it.
 
 use super::span::{face_span, primitive_span};
-use super::tables::{Kind, combine};
+use super::tables::{NodeKind, combine};
 use crate::bound::SBounds;
 use crate::math::Aabb;
 use crate::solid::local::{AND, LiteralId, OR, Token, Truth, fold, truth_of};
@@ -72,8 +72,8 @@ pub fn whole(solid: &Solid, bounds: &SBounds) -> Vec<Term> {
 /// What `classify` knows of a local tree over a voxel.
 #[derive(Clone, Copy, Debug)]
 pub struct Local {
-    /// Kind at the lowest level: never grey.
-    pub kind: Kind,
+    /// NodeKind at the lowest level: never grey.
+    pub kind: NodeKind,
     /// Lower bound of f, meaningful up to the margin.
     pub lo: f64,
     /// Upper bound of f, meaningful down to −margin.
@@ -94,10 +94,10 @@ pub struct Classifier<'a> {
     pub work: usize,
 }
 
-const EMPTY: Local = Local { kind: Kind::Empty, lo: f64::INFINITY, hi: f64::INFINITY };
+const EMPTY: Local = Local { kind: NodeKind::Empty, lo: f64::INFINITY, hi: f64::INFINITY };
 
 impl Classifier<'_> {
-    /// Kind of the voxel for the tree at the head of `terms`. Appends to `out` what is left of it unless it is full or
+    /// NodeKind of the voxel for the tree at the head of `terms`. Appends to `out` what is left of it unless it is full or
     /// empty, and to `refs` the primitives the kind refers to.
     pub fn classify(&mut self, terms: &[Term], out: &mut Vec<Term>, refs: &mut Vec<u32>) -> Local {
         let Some(head) = terms.first() else { return EMPTY };
@@ -106,7 +106,7 @@ impl Classifier<'_> {
             if let Node::Primitive(p) = node {
                 refs.push(*p);
             }
-            return Local { kind: Kind::Full, lo: f64::NEG_INFINITY, hi: f64::NEG_INFINITY };
+            return Local { kind: NodeKind::Full, lo: f64::NEG_INFINITY, hi: f64::NEG_INFINITY };
         }
         let e = DVec3::splat(self.half);
         let bound = self.bounds.node(head.node());
@@ -125,10 +125,10 @@ impl Classifier<'_> {
                 }
                 refs.push(*p);
                 if hi < -margin {
-                    return Local { kind: Kind::Full, lo, hi };
+                    return Local { kind: NodeKind::Full, lo, hi };
                 }
                 out.push(*head);
-                Local { kind: Kind::PSurface, lo, hi }
+                Local { kind: NodeKind::PSurface, lo, hi }
             }
             Node::Op(op, _) => self.operation(*op, *head, &terms[1..1 + head.len_below()], out, refs),
         }
@@ -146,7 +146,7 @@ impl Classifier<'_> {
             let (out_mark, refs_mark) = (out.len(), refs.len());
             let x = self.classify(operand, out, refs);
             let Some(a) = acc else {
-                if x.kind == Kind::Empty && op == Op::Union {
+                if x.kind == NodeKind::Empty && op == Op::Union {
                     continue;
                 }
                 acc = Some(x);
@@ -154,7 +154,7 @@ impl Classifier<'_> {
                 if decides(op, x.kind, true) {
                     break;
                 }
-                if x.kind == Kind::Full && op == Op::Difference {
+                if x.kind == NodeKind::Full && op == Op::Difference {
                     self.stand_in(operand, refs[refs_mark], out);
                     kept = 1;
                 }
@@ -162,7 +162,7 @@ impl Classifier<'_> {
             };
             // Mixed stands for grey at the lowest level, which is what every voxel is until it is decomposed.
             let kind = match combine(op, a.kind, x.kind) {
-                Some(Kind::Grey) | None => Kind::Mixed,
+                Some(NodeKind::Grey) | None => NodeKind::Mixed,
                 Some(kind) => kind,
             };
             merge_refs(op, a.kind, x.kind, kind, refs, refs_start, refs_mark);
@@ -178,9 +178,9 @@ impl Classifier<'_> {
             }
         }
         let result = acc.unwrap_or(EMPTY);
-        if matches!(result.kind, Kind::Full | Kind::Empty) {
+        if matches!(result.kind, NodeKind::Full | NodeKind::Empty) {
             out.truncate(out_start);
-            if result.kind == Kind::Empty {
+            if result.kind == NodeKind::Empty {
                 refs.truncate(refs_start);
                 return EMPTY;
             }
@@ -201,45 +201,45 @@ impl Classifier<'_> {
 }
 
 /// True when an operand of this kind makes the rest irrelevant.
-fn decides(op: Op, kind: Kind, first: bool) -> bool {
+fn decides(op: Op, kind: NodeKind, first: bool) -> bool {
     match op {
-        Op::Union => kind == Kind::Full,
-        Op::Intersection => kind == Kind::Empty,
-        Op::Difference => kind == if first { Kind::Empty } else { Kind::Full },
+        Op::Union => kind == NodeKind::Full,
+        Op::Intersection => kind == NodeKind::Empty,
+        Op::Difference => kind == if first { NodeKind::Empty } else { NodeKind::Full },
     }
 }
 
 /// References of `a op b` of kind `kind`, from those of a in `refs[start..mark]` and those of b in `refs[mark..]`.
-fn merge_refs(op: Op, a: Kind, b: Kind, kind: Kind, refs: &mut Vec<u32>, start: usize, mark: usize) {
+fn merge_refs(op: Op, a: NodeKind, b: NodeKind, kind: NodeKind, refs: &mut Vec<u32>, start: usize, mark: usize) {
     match kind {
-        Kind::Empty => refs.truncate(start),
-        Kind::Full => match (a, b) {
-            (Kind::Full, Kind::Full) => {}
-            (Kind::Full, _) => refs.truncate(mark),
+        NodeKind::Empty => refs.truncate(start),
+        NodeKind::Full => match (a, b) {
+            (NodeKind::Full, NodeKind::Full) => {}
+            (NodeKind::Full, _) => refs.truncate(mark),
             _ => drop(refs.drain(start..mark)),
         },
-        Kind::NSurface if op == Op::Difference && b == Kind::PSurface => {
+        NodeKind::NSurface if op == Op::Difference && b == NodeKind::PSurface => {
             // Full − p: the volume of the one, the boundary of the other.
             refs.drain(start + 1..mark);
         }
-        Kind::PSurface if op == Op::Difference && b == Kind::NSurface => {
+        NodeKind::PSurface if op == Op::Difference && b == NodeKind::NSurface => {
             // Full − n: what the inner difference cut away from the subtracted volume comes back.
             let boundary = refs[mark + 1];
             refs.truncate(start);
             refs.push(boundary);
         }
-        Kind::PSurface | Kind::NSurface => {
+        NodeKind::PSurface | NodeKind::NSurface => {
             if a == kind && b != kind {
                 refs.truncate(mark);
             } else {
                 refs.drain(start..mark);
             }
         }
-        Kind::Mixed | Kind::Grey => {
+        NodeKind::Mixed | NodeKind::Grey => {
             // The primitives partly in it: a full operand has none, an n-surface only its boundary.
-            let partly = |kind: Kind, range: std::ops::Range<usize>| match kind {
-                Kind::Full | Kind::Empty => range.end..range.end,
-                Kind::NSurface => range.start + 1..range.end,
+            let partly = |kind: NodeKind, range: std::ops::Range<usize>| match kind {
+                NodeKind::Full | NodeKind::Empty => range.end..range.end,
+                NodeKind::NSurface => range.start + 1..range.end,
                 _ => range,
             };
             let (ra, rb) = (partly(a, start..mark), partly(b, mark..refs.len()));

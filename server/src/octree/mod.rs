@@ -21,7 +21,7 @@ pub mod walk;
 pub use approach::Approach;
 pub use nodes::{Census, Eco, Limits, Node};
 pub use snapshot::{Snapshot, SnapshotView};
-pub use tables::{Kind, Meet, meet};
+pub use tables::{Meet, NodeKind, meet};
 pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
 
 use crate::bound::{SBounds, Volumes};
@@ -160,7 +160,7 @@ impl Model {
             return self.solid.value(x);
         }
         match self.voxel(x) {
-            Some(node) if node.kind() == Kind::Full => f64::NEG_INFINITY,
+            Some(node) if node.kind() == NodeKind::Full => f64::NEG_INFINITY,
             Some(node) => local::value(&self.solid, node.terms(), x),
             None => f64::INFINITY,
         }
@@ -185,7 +185,7 @@ impl Model {
             return solid::local::prune(&self.solid.normal_form, out, &mut truth);
         }
         match self.voxel(x) {
-            Some(node) if node.kind() == Kind::Full => Truth::True,
+            Some(node) if node.kind() == NodeKind::Full => Truth::True,
             Some(node) if self.solid.simplified => {
                 let mut near = Vec::new();
                 match local::write_literals_at(&self.solid, node.terms(), x, tolerance, &mut near) {
@@ -238,8 +238,8 @@ impl Model {
     pub fn literals(&self, node: &Node, delta: f64, out: &mut Vec<Token>) -> Truth {
         debug_assert!(delta <= self.margin() || self.radius.is_infinite());
         match node.kind() {
-            Kind::Full => Truth::True,
-            Kind::Empty => Truth::False,
+            NodeKind::Full => Truth::True,
+            NodeKind::Empty => Truth::False,
             _ if node.half.is_finite() => local::write_literals(&self.solid, node.terms(), &node.aabb(), delta, out),
             _ => solid::write_tree(&self.solid, out),
         }

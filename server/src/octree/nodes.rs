@@ -1,7 +1,7 @@
 //! The extended CSG octree of a model: cubes of its own frame, down to a limited resolution, finer where asked.
 //!
 //! M. Zeiller 1993. A node is grey (eight children), full, empty, p- or n-surface, or mixed, and refers to primitives as
-//! `Kind` says; n-surface: first the positive primitive of the volume, then the negative one of the boundary. Building is
+//! `NodeKind` says; n-surface: first the positive primitive of the volume, then the negative one of the boundary. Building is
 //! depth first to a depth that a budget of evaluated primitives sets, so that a part of thousands of primitives still
 //! loads at once; `expand` decomposes mixed leaves further, on demand and for good.
 //!
@@ -12,7 +12,7 @@
 //! Not promised: the smallest octree; a voxel near an edge may count a primitive as partly in that is not.
 
 use super::local::{Classifier, Term, whole};
-use super::tables::Kind;
+use super::tables::NodeKind;
 use crate::bound::SBounds;
 use crate::math::{Aabb, halt};
 use crate::solid::Solid;
@@ -61,7 +61,7 @@ pub struct Node {
     pub f_lo: f64,
     /// Proven upper bound of f over the cube, as far as it tells within ±margin.
     pub f_hi: f64,
-    pub(super) kind: Kind,
+    pub(super) kind: NodeKind,
     pub(super) path: u64,
     pub(super) refs: Box<[u32]>,
     pub(super) terms: Box<[Term]>,
@@ -69,8 +69,8 @@ pub struct Node {
 }
 
 impl Node {
-    /// Kind; a mixed node stays mixed when it is expanded on demand.
-    pub fn kind(&self) -> Kind {
+    /// NodeKind; a mixed node stays mixed when it is expanded on demand.
+    pub fn kind(&self) -> NodeKind {
         self.kind
     }
     /// Levels below the root.
@@ -127,7 +127,7 @@ pub struct Census {
 
 impl Census {
     /// Nodes of a kind.
-    pub fn of(&self, kind: Kind) -> usize {
+    pub fn of(&self, kind: NodeKind) -> usize {
         self.by_depth.iter().map(|d| d[kind as usize]).sum()
     }
     /// All nodes.
@@ -147,7 +147,7 @@ impl Eco {
             classified(solid, bounds, &terms, center, half, 1, &mut work)
         } else {
             let refs = (0..solid.primitives.len() as u32).collect();
-            let (kind, children) = (Kind::Mixed, OnceLock::new());
+            let (kind, children) = (NodeKind::Mixed, OnceLock::new());
             Node { center, half, f_lo: -half, f_hi: half, kind, path: 1, refs, terms: terms.into(), children }
         };
         let mut octree = Self { root, depth: 0 };
@@ -203,7 +203,7 @@ impl Eco {
             if census.by_depth.len() <= d {
                 census.by_depth.resize(d + 1, [0; 6]);
             }
-            let kind = if node.children().is_some() { Kind::Grey } else { node.kind };
+            let kind = if node.children().is_some() { NodeKind::Grey } else { node.kind };
             census.by_depth[d][kind as usize] += 1;
             for c in node.children().into_iter().flatten() {
                 count(c, census);
@@ -229,7 +229,7 @@ pub(super) fn cube_of(bounds: &SBounds) -> (DVec3, f64) {
 }
 
 fn can_expand(bounds: &SBounds, node: &Node) -> bool {
-    matches!(node.kind, Kind::Grey | Kind::Mixed)
+    matches!(node.kind, NodeKind::Grey | NodeKind::Mixed)
         && node.half.is_finite()
         && node.depth() < DEEPEST
         && node.half > FINEST * bounds.margin()
@@ -309,7 +309,7 @@ fn deepen(solid: &Solid, bounds: &SBounds, node: &mut Node, shared: bool) -> usi
     let children: Vec<Node> = made.into_iter().map(|(child, _)| child).collect();
     let children: Box<[Node; 8]> = children.try_into().expect("eight children");
     node.children = OnceLock::from(children);
-    node.kind = Kind::Grey;
+    node.kind = NodeKind::Grey;
     work
 }
 
@@ -326,7 +326,7 @@ impl Frontier {
     fn add(&mut self, node: &Node) {
         if let Some(children) = node.children() {
             children.iter().for_each(|c| self.add(c));
-        } else if node.kind == Kind::Mixed && node.half.is_finite() {
+        } else if node.kind == NodeKind::Mixed && node.half.is_finite() {
             self.mixed += 1;
             self.leaves += node.terms.iter().filter(|t| t.len_below() == 0).count();
         }

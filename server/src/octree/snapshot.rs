@@ -14,7 +14,7 @@
 
 use super::local::Term;
 use super::nodes::{DEEPEST, Node, cube_of};
-use super::tables::Kind;
+use super::tables::NodeKind;
 use super::{Eco, Model};
 use crate::bound::{Bound, SBounds, Volumes};
 use crate::math::{Aabb, Ball};
@@ -144,7 +144,7 @@ impl Snapshot {
             self.word(node as usize);
             self.word(len as usize);
         }
-        if node.kind == Kind::Grey {
+        if node.kind == NodeKind::Grey {
             node.children().into_iter().flatten().for_each(|c| self.octree_node(c));
         }
     }
@@ -366,12 +366,12 @@ impl<'a> Streams<'a> {
     }
 
     fn octree_node(&mut self, solid: &Solid, center: DVec3, half: f64, path: u64) -> Checked<Node> {
-        let kind = *Kind::ALL.get(self.tag()? as usize).ok_or("a kind of voxel")?;
+        let kind = *NodeKind::ALL.get(self.tag()? as usize).ok_or("a kind of voxel")?;
         let (f_lo, f_hi) = (self.number()?, self.number()?);
         let (refs, terms) = (self.word()? as usize, self.word()? as usize);
         let least = match kind {
-            Kind::PSurface | Kind::Full => 1,
-            Kind::NSurface => 2,
+            NodeKind::PSurface | NodeKind::Full => 1,
+            NodeKind::NSurface => 2,
             _ => 0,
         };
         let refs: Box<[u32]> = self.words(refs)?.collect();
@@ -379,12 +379,12 @@ impl<'a> Streams<'a> {
             return Err("primitives of a voxel");
         }
         let terms: Box<[Term]> = self.groups(terms)?.map(Term::of_words).collect();
-        if terms.is_empty() != matches!(kind, Kind::Full | Kind::Empty) {
+        if terms.is_empty() != matches!(kind, NodeKind::Full | NodeKind::Empty) {
             return Err("a tree in a voxel of the surface, and nowhere else");
         }
         well_nested(solid, &terms)?;
         let node = Node { center, half, f_lo, f_hi, kind, path, refs, terms, children: OnceLock::new() };
-        if kind != Kind::Grey {
+        if kind != NodeKind::Grey {
             return Ok(node);
         }
         if node.depth() >= DEEPEST || !half.is_finite() {

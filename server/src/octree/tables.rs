@@ -9,9 +9,9 @@
 
 use crate::solid::Op;
 
-/// Kind of an octree node.
+/// NodeKind of an octree node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
+pub enum NodeKind {
     /// Inner node with eight children.
     Grey,
     /// Inside the solid.
@@ -26,9 +26,10 @@ pub enum Kind {
     Mixed,
 }
 
-impl Kind {
+impl NodeKind {
     /// All kinds in the tables' order.
-    pub const ALL: [Kind; 6] = [Kind::Grey, Kind::Full, Kind::Empty, Kind::PSurface, Kind::NSurface, Kind::Mixed];
+    pub const ALL: [NodeKind; 6] =
+        [NodeKind::Grey, NodeKind::Full, NodeKind::Empty, NodeKind::PSurface, NodeKind::NSurface, NodeKind::Mixed];
 
     /// The paper's word for it.
     pub fn name(self) -> &'static str {
@@ -49,17 +50,17 @@ pub enum Meet {
 
 type Cells<T> = [[T; 6]; 6];
 
-const G: Option<Kind> = Some(Kind::Grey);
-const F: Option<Kind> = Some(Kind::Full);
-const E: Option<Kind> = Some(Kind::Empty);
-const P: Option<Kind> = Some(Kind::PSurface);
-const N: Option<Kind> = Some(Kind::NSurface);
-const M: Option<Kind> = Some(Kind::Mixed);
-const X: Option<Kind> = None;
+const G: Option<NodeKind> = Some(NodeKind::Grey);
+const F: Option<NodeKind> = Some(NodeKind::Full);
+const E: Option<NodeKind> = Some(NodeKind::Empty);
+const P: Option<NodeKind> = Some(NodeKind::PSurface);
+const N: Option<NodeKind> = Some(NodeKind::NSurface);
+const M: Option<NodeKind> = Some(NodeKind::Mixed);
+const X: Option<NodeKind> = None;
 
 /// Table 1, A ∪ B.
 #[rustfmt::skip]
-pub const UNION: Cells<Option<Kind>> = [
+pub const UNION: Cells<Option<NodeKind>> = [
     // grey full empty p  n  mixed
     [  G,   F,   G,   G, G, X ], // grey
     [  F,   F,   F,   F, F, F ], // full
@@ -71,7 +72,7 @@ pub const UNION: Cells<Option<Kind>> = [
 
 /// Table 2, A ∩ B.
 #[rustfmt::skip]
-pub const INTERSECTION: Cells<Option<Kind>> = [
+pub const INTERSECTION: Cells<Option<NodeKind>> = [
     // grey full empty p  n  mixed
     [  G,   G,   E,   G, G, X ], // grey
     [  G,   F,   E,   P, N, M ], // full
@@ -83,7 +84,7 @@ pub const INTERSECTION: Cells<Option<Kind>> = [
 
 /// Table 3, A − B: row B, column A.
 #[rustfmt::skip]
-pub const DIFFERENCE: Cells<Option<Kind>> = [
+pub const DIFFERENCE: Cells<Option<NodeKind>> = [
     // A: grey full empty p  n  mixed
     [  G,   G,   E,   G, G, X ], // B grey
     [  E,   E,   E,   E, E, E ], // B full
@@ -110,8 +111,8 @@ pub const COLLISION: Cells<Meet> = [
     [  B,   A,   S,   A, A, A ], // mixed
 ];
 
-/// Kind of `a op b`; `None` where the paper says it cannot occur.
-pub fn combine(op: Op, a: Kind, b: Kind) -> Option<Kind> {
+/// NodeKind of `a op b`; `None` where the paper says it cannot occur.
+pub fn combine(op: Op, a: NodeKind, b: NodeKind) -> Option<NodeKind> {
     match op {
         Op::Union => UNION[a as usize][b as usize],
         Op::Intersection => INTERSECTION[a as usize][b as usize],
@@ -120,6 +121,6 @@ pub fn combine(op: Op, a: Kind, b: Kind) -> Option<Kind> {
 }
 
 /// What two voxels of these kinds call for when they may meet.
-pub fn meet(a: Kind, b: Kind) -> Meet {
+pub fn meet(a: NodeKind, b: NodeKind) -> Meet {
     COLLISION[a as usize][b as usize]
 }

@@ -15,7 +15,7 @@
 use super::Model;
 use super::approach::Approach;
 use super::nodes::Node;
-use super::tables::{Kind, Meet, meet};
+use super::tables::{Meet, NodeKind, meet};
 use crate::bound::{Pruned, Region};
 use crate::motion::Placed;
 use crate::solid::{Sense, Solid};
@@ -155,7 +155,7 @@ impl<'m> Walk<'m> {
     pub fn timed(&self, pair: NodePair<'m>, end: f64) -> Option<NodePair<'m>> {
         let (a, b) = (pair.a, pair.b);
         let outside = |p: &Pruned, n: &Node| !p.aabb.meets(&n.aabb().grown(self.margin));
-        if a.kind() == Kind::Empty || b.kind() == Kind::Empty {
+        if a.kind() == NodeKind::Empty || b.kind() == NodeKind::Empty {
             return None;
         }
         if self.region.as_ref().is_some_and(|r| outside(&r.a, a) || outside(&r.b, b)) {
@@ -169,14 +169,14 @@ impl<'m> Walk<'m> {
     pub fn next(&self, pair: &NodePair<'m>) -> Next<'m> {
         let (a, b) = (pair.a, pair.b);
         let splits = |n: &Node| match n.kind() {
-            Kind::Grey => true,
-            Kind::Mixed => n.half > self.detail.finest,
+            NodeKind::Grey => true,
+            NodeKind::Mixed => n.half > self.detail.finest,
             _ => false,
         };
         let split_a = splits(a).then(|| self.a.expand(a)).flatten();
         let split_b = splits(b).then(|| self.b.expand(b)).flatten();
         // A mixed leaf that may be finer counts as the grey node it is about to become.
-        let kind = |n: &Node, split: bool| if split { Kind::Grey } else { n.kind() };
+        let kind = |n: &Node, split: bool| if split { NodeKind::Grey } else { n.kind() };
         match meet(kind(a, split_a.is_some()), kind(b, split_b.is_some())) {
             Meet::Skip => Next::Skip,
             Meet::Pairs => Next::Pairs,
@@ -248,7 +248,7 @@ impl<'m> Walk<'m> {
     /// The surfaces of a node, without those that stage 1 has pruned.
     fn elements(&self, solid: &Solid, node: &Node, alive: Option<&Pruned>) -> Vec<Element> {
         let living = |p: &u32| alive.is_none_or(|a| a.primitive_alive(*p));
-        if node.kind() == Kind::NSurface {
+        if node.kind() == NodeKind::NSurface {
             let (volume, surface) = (node.refs()[0], node.refs()[1]);
             let element = Element { surface, complemented: true, volume: Some(volume) };
             return if living(&volume) && living(&surface) { vec![element] } else { vec![] };

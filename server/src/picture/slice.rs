@@ -5,7 +5,7 @@
 
 use super::drawing::{Anchor, Color, Drawing, GREY, INK, Size, text_width};
 use super::ray::{Ray, Traced};
-use crate::octree::{Kind, Model, Node};
+use crate::octree::{Model, Node, NodeKind};
 use glam::DVec3;
 
 /// Side of a panel, pixels.
@@ -14,12 +14,12 @@ const PANEL: usize = 640;
 const FINEST: f64 = 4.0;
 
 /// What is drawn for each kind of leaf, in the order of the legend.
-const KINDS: [(Kind, &str, Color); 5] = [
-    (Kind::Full, "full: inside", Color::hex(0x3e4c59)),
-    (Kind::Empty, "empty: outside", Color::hex(0xf5f7fa)),
-    (Kind::PSurface, "p: one added surface", Color::hex(0x2f80c3)),
-    (Kind::NSurface, "n: one subtracted surface", Color::hex(0xe0632f)),
-    (Kind::Mixed, "mixed: several", Color::hex(0x8c4fb0)),
+const KINDS: [(NodeKind, &str, Color); 5] = [
+    (NodeKind::Full, "full: inside", Color::hex(0x3e4c59)),
+    (NodeKind::Empty, "empty: outside", Color::hex(0xf5f7fa)),
+    (NodeKind::PSurface, "p: one added surface", Color::hex(0x2f80c3)),
+    (NodeKind::NSurface, "n: one subtracted surface", Color::hex(0xe0632f)),
+    (NodeKind::Mixed, "mixed: several", Color::hex(0x8c4fb0)),
 ];
 
 /// Two slices through the middle of `model`: one upright (y constant), one level, low enough to cut
@@ -82,12 +82,12 @@ fn collect<'a>(model: &'a Model, node: &'a Node, axis: usize, level: f64, scale:
     }
     let finer = node.half * scale >= FINEST;
     match (node.kind(), finer) {
-        (Kind::Grey | Kind::Mixed, true) => match model.expand(node) {
+        (NodeKind::Grey | NodeKind::Mixed, true) => match model.expand(node) {
             Some(children) => children.iter().for_each(|c| collect(model, c, axis, level, scale, cells)),
             None => cells.push(node),
         },
         _ => match node.children() {
-            Some(children) if node.kind() == Kind::Grey => {
+            Some(children) if node.kind() == NodeKind::Grey => {
                 children.iter().for_each(|c| collect(model, c, axis, level, scale, cells));
             }
             _ => cells.push(node),

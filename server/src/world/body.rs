@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// A model with the few numbers that a world asks for again and again. Shared by all sessions that use it.
 #[derive(Debug)]
-pub struct Part {
+pub struct MeasuredModel {
     /// The model.
     pub model: Arc<Model>,
     /// Box of the solid in the model's frame.
@@ -25,7 +25,7 @@ pub struct Part {
     pub smallest: f64,
 }
 
-impl Part {
+impl MeasuredModel {
     /// Measures a model.
     pub fn new(model: Arc<Model>) -> Self {
         let primitives = model.solid.primitives.iter();
@@ -48,7 +48,7 @@ pub struct ObjectSpec {
     /// Its group, for rules.
     pub group: String,
     /// Its model.
-    pub part: Arc<Part>,
+    pub part: Arc<MeasuredModel>,
     /// It never moves.
     pub is_static: bool,
     /// It may turn.
@@ -63,7 +63,7 @@ pub struct ObjectSpec {
 
 impl ObjectSpec {
     /// A moving object of the group "default" about which nothing is declared, its model in its own frame.
-    pub fn new(id: u32, part: &Arc<Part>, pose: Pose) -> Self {
+    pub fn new(id: u32, part: &Arc<MeasuredModel>, pose: Pose) -> Self {
         Self {
             id,
             name: format!("object {id}"),
@@ -101,7 +101,7 @@ pub struct Body {
     /// The body as one convex primitive, or one around it; `None` for a body without bounds.
     pub(super) hull: Option<Hull>,
     /// Its model.
-    pub part: Arc<Part>,
+    pub part: Arc<MeasuredModel>,
     /// The model in the object's frame.
     pub place: Pose,
     /// Corners of the model's box in the object's frame; empty for an unbounded model.
@@ -244,7 +244,7 @@ mod tests {
             Pose::at(DVec3::new(3.0, 0.0, 1.0)),
             Label::default(),
         );
-        let part = Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))));
+        let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(b.finish(root)))));
         let spins = [0.0, 1e-3, 0.7, 3.0, 9.0, 60.0];
         for (i, spin) in spins.into_iter().enumerate() {
             let place = Pose::new(DVec3::new(-1.0, 0.5, 0.0), quat_of_rotation_vector(DVec3::new(0.3, 1.0, i as f64)));

@@ -34,7 +34,7 @@ pub mod step;
 mod tests;
 mod touch;
 
-pub use body::{ObjectSpec, Part};
+pub use body::{MeasuredModel, ObjectSpec};
 pub use heed::{Crew, Heed, LONG_PRIORITY, yield_to_others};
 pub use options::{StepError, StepOptions};
 pub use outcome::{PairOutcome, StepOutcome};

@@ -12,24 +12,24 @@ use contactd_proto::{Detect, ErrorCode, Pose, PoseRecord, Report, Rule};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-fn part(model: Model) -> Arc<Part> {
-    Arc::new(Part::new(Arc::new(model)))
+fn part(model: Model) -> Arc<MeasuredModel> {
+    Arc::new(MeasuredModel::new(Arc::new(model)))
 }
 
-fn ball(radius: f64) -> Arc<Part> {
+fn ball(radius: f64) -> Arc<MeasuredModel> {
     part(simple(Sphere { radius }))
 }
 
-fn slab(half: DVec3) -> Arc<Part> {
+fn slab(half: DVec3) -> Arc<MeasuredModel> {
     part(simple(Cuboid { half }))
 }
 
-fn object(id: u32, part: &Arc<Part>, at: DVec3) -> ObjectSpec {
+fn object(id: u32, part: &Arc<MeasuredModel>, at: DVec3) -> ObjectSpec {
     ObjectSpec::new(id, part, Pose::at(at))
 }
 
 /// A slab with a drilled hole far aside: what meets it is answered by the search, not in front of it.
-fn drilled(half: DVec3) -> Arc<Part> {
+fn drilled(half: DVec3) -> Arc<MeasuredModel> {
     let aside = Pose::at(DVec3::new(-0.5 * half.x, 0.0, 0.0));
     let drill = Cylinder { radius: 0.1 * half.x, half_height: 2.0 * half.z };
     part(pierced(Cuboid { half }, vec![(drill.into(), aside)]))
@@ -40,7 +40,7 @@ fn balls(n: u32) -> World {
     balls_over(slab(DVec3::new(1e3, 1e3, 1.0)), n)
 }
 
-fn balls_over(floor: Arc<Part>, n: u32) -> World {
+fn balls_over(floor: Arc<MeasuredModel>, n: u32) -> World {
     let mut world = World::new(2000, 4096);
     world.add_object(ObjectSpec { is_static: true, group: "floor".into(), ..object(1, &floor, -DVec3::Z) }).unwrap();
     let part = ball(1.0);
@@ -292,7 +292,7 @@ fn a_contact_says_whether_the_pair_touched_at_the_start() {
     let wall = Cuboid { half: DVec3::new(1.0, 9.0, 9.0) };
     let wall = b.primitive(wall, Pose::at(DVec3::new(5.0, 0.0, 0.0)), Label::default());
     let root = b.operation(Op::Union, &[floor, wall]);
-    let corner = Arc::new(Part::new(Arc::new(Model::new(b.finish(root)))));
+    let corner = Arc::new(MeasuredModel::new(Arc::new(Model::new(b.finish(root)))));
     for (height, x, down, expected) in [
         (1.0, 6.0, 0.0, (true, 0.5)),
         (1.0, 6.0, -1.0, (true, 0.0)),

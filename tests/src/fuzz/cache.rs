@@ -40,7 +40,7 @@ fn run(bytes: &[u8], _: bool) -> Result<String, String> {
         model.solid.value(x);
         model.octree.locate(x);
     }
-    let kinds: Vec<usize> = contactd::octree::Kind::ALL.map(|k| model.octree.census().of(k).min(2)).into();
+    let kinds: Vec<usize> = contactd::octree::NodeKind::ALL.map(|k| model.octree.census().of(k).min(2)).into();
     Ok(format!("read {} {kinds:?} {}", model.solid.primitives.len().min(4), notes.len().min(2)))
 }
 

@@ -4,7 +4,7 @@ use super::{Reader, Target, sound};
 use crate::scenes::Recipe;
 use contactd::contact::Status;
 use contactd::octree::Model;
-use contactd::world::{ObjectSpec, Part, StepOptions, World};
+use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_proto::pose_record::{END, START, TURN};
 use contactd_proto::{MotionState, Pose, PoseRecord, Rule};
 use glam::DVec3;
@@ -23,11 +23,11 @@ fn seeds() -> Vec<Vec<u8>> {
 
 thread_local! {
     /// Parts are built once: an input is worth microseconds.
-    static PARTS: RefCell<Option<[Arc<Part>; 3]>> = const { RefCell::new(None) };
+    static PARTS: RefCell<Option<[Arc<MeasuredModel>; 3]>> = const { RefCell::new(None) };
 }
 
-fn parts() -> [Arc<Part>; 3] {
-    let build = |recipe: Recipe| Arc::new(Part::new(Arc::new(Model::new(recipe.build()))));
+fn parts() -> [Arc<MeasuredModel>; 3] {
+    let build = |recipe: Recipe| Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))));
     PARTS.with_borrow_mut(|parts| {
         let plate = Recipe::cuboid(1.0, 1.0, 0.25).minus(Recipe::cylinder(0.5, 1.0));
         parts
@@ -40,7 +40,7 @@ fn parts() -> [Arc<Part>; 3] {
 fn world() -> World {
     let [plate, ball, cube] = parts();
     let mut world = World::new(8, 6);
-    let mut add = |id, part: &Arc<Part>, at: DVec3, is_static, rotates, max_speed| {
+    let mut add = |id, part: &Arc<MeasuredModel>, at: DVec3, is_static, rotates, max_speed| {
         let spec = ObjectSpec { is_static, rotates, max_speed, ..ObjectSpec::new(id, part, Pose::at(at)) };
         world.add_object(spec).expect("an object of the world");
     };

@@ -21,7 +21,7 @@ use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::octree::span::primitive_span;
 use crate::octree::walk::{Detail, Next, NodePair, Walk};
-use crate::octree::{Kind, Node};
+use crate::octree::{Node, NodeKind};
 use crate::solid;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::surface::Plane;
@@ -111,7 +111,7 @@ impl<'a> Slices<'_, 'a> {
         let mut ends = Vec::new();
         let mut queue: VecDeque<NodePair<'a>> = walk.root(t0, t1).into_iter().collect();
         let mut count = queue.len();
-        let full = |n: &Node| n.kind() == Kind::Full;
+        let full = |n: &Node| n.kind() == NodeKind::Full;
         while let Some(pair) = queue.pop_front() {
             self.counters.node_pairs += 1;
             // After the start first contacts lie on both surfaces {f = −delta}; in a full voxel f is below −margin.
