@@ -27,6 +27,12 @@ impl<'a> Arguments<'a> {
         let mut unnamed = parameters.iter();
         for a in &call.arguments {
             let name = match &a.name {
+                // Written for no file at all.
+                Some(n)
+                    if n == "file" && a.value.kind == ValueKind::Text(String::new()) && !call.children.is_empty() =>
+                {
+                    continue;
+                }
                 Some(n) if HARMLESS.contains(&n.as_str()) || parameters.contains(&n.as_str()) => n.as_str(),
                 Some(n) if n == "file" => {
                     let construct = format!("{} of another file", call.name);
@@ -78,25 +84,26 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// A number greater than zero, infinite included.
-    pub fn positive(&self, name: &str) -> Result<f64> {
-        self.positive_of(name, self.required(name, "a positive number")?)
+    /// A size: a number greater than zero, infinite included; `None` for zero or less, of which OpenSCAD makes nothing.
+    pub fn size(&self, name: &str) -> Result<Option<f64>> {
+        self.size_of(name, self.required(name, "a positive number")?)
     }
 
-    /// A number greater than zero and finite.
-    pub fn finite_positive(&self, name: &str) -> Result<f64> {
+    /// A size that is finite.
+    pub fn finite_size(&self, name: &str) -> Result<Option<f64>> {
         let v = self.required(name, "a positive number")?;
-        match self.positive_of(name, v)? {
-            n if n.is_finite() => Ok(n),
-            _ => Err(self.wrong(v, "a finite number", name)),
+        match self.size_of(name, v)? {
+            Some(n) if !n.is_finite() => Err(self.wrong(v, "a finite number", name)),
+            size => Ok(size),
         }
     }
 
-    /// A number that is zero or more, infinite included.
-    pub fn not_negative(&self, name: &str) -> Result<f64> {
+    /// A number that is zero or more, infinite included; `None` for less.
+    pub fn not_negative(&self, name: &str) -> Result<Option<f64>> {
         let v = self.required(name, "a number")?;
         match self.number_of(name, v)? {
-            n if n >= 0.0 => Ok(n),
+            n if n >= 0.0 => Ok(Some(n)),
+            n if n.is_finite() => Ok(None),
             _ => Err(self.wrong(v, "a number that is not negative", name)),
         }
     }
@@ -112,33 +119,37 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// Three numbers greater than zero (infinite included), or one that stands for all three.
-    pub fn positive_sizes(&self, name: &str) -> Result<DVec3> {
+    /// Three sizes (infinite included), or one that stands for all three; `None` where one is zero or less.
+    pub fn sizes(&self, name: &str) -> Result<Option<DVec3>> {
         let v = self.required(name, "three positive numbers")?;
         match &v.kind {
             ValueKind::List(l) => match l.as_slice() {
                 [x, y, z] => {
-                    Ok(DVec3::new(self.positive_of(name, x)?, self.positive_of(name, y)?, self.positive_of(name, z)?))
+                    let [x, y, z] = [self.size_of(name, x)?, self.size_of(name, y)?, self.size_of(name, z)?];
+                    Ok(x.zip(y).zip(z).map(|((x, y), z)| DVec3::new(x, y, z)))
                 }
                 _ => Err(self.wrong(v, "three positive numbers", name)),
             },
-            _ => Ok(DVec3::splat(self.positive_of(name, v)?)),
+            _ => Ok(self.size_of(name, v)?.map(DVec3::splat)),
         }
     }
 
-    /// Two finite numbers greater than zero, or one that stands for both.
-    pub fn positive_sizes_2d(&self, name: &str) -> Result<DVec2> {
+    /// Two finite sizes, or one that stands for both; `None` where one is zero or less.
+    pub fn sizes_2d(&self, name: &str) -> Result<Option<DVec2>> {
         let v = self.required(name, "two positive numbers")?;
-        let finite = |v: &Value| match self.positive_of(name, v)? {
-            n if n.is_finite() => Ok(n),
-            _ => Err(self.wrong(v, "a finite number", name)),
+        let finite = |v: &Value| match self.size_of(name, v)? {
+            Some(n) if !n.is_finite() => Err(self.wrong(v, "a finite number", name)),
+            size => Ok(size),
         };
         match &v.kind {
             ValueKind::List(l) => match l.as_slice() {
-                [x, y] => Ok(DVec2::new(finite(x)?, finite(y)?)),
+                [x, y] => {
+                    let [x, y] = [finite(x)?, finite(y)?];
+                    Ok(x.zip(y).map(|(x, y)| DVec2::new(x, y)))
+                }
                 _ => Err(self.wrong(v, "two positive numbers", name)),
             },
-            _ => Ok(DVec2::splat(finite(v)?)),
+            _ => Ok(finite(v)?.map(DVec2::splat)),
         }
     }
 
@@ -206,9 +217,10 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    fn positive_of(&self, name: &str, v: &Value) -> Result<f64> {
+    fn size_of(&self, name: &str, v: &Value) -> Result<Option<f64>> {
         match v.kind {
-            ValueKind::Number(n) if n > 0.0 => Ok(n),
+            ValueKind::Number(n) if n > 0.0 => Ok(Some(n)),
+            ValueKind::Number(n) if n.is_finite() => Ok(None),
             _ => Err(self.wrong(v, "a positive number", name)),
         }
     }

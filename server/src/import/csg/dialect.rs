@@ -29,8 +29,10 @@ const FLAT: [(&str, Fate); 4] = [("$fn", Harmless), ("$fa", Harmless), ("$fs", H
 const BALL: &str = "{ sphere(r = 1); cube(size = [1, 1, 1]); }";
 const SQUARE: &str = "{ square(size = [1, 2]); }";
 const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin", Refused), ("timestamp", Refused)];
+/// Written for drawings of other files by rotate_extrude, and without one by old versions of OpenSCAD.
+const WITHOUT_FILE: [&str; 3] = ["layer", "origin", "timestamp"];
 
-const KINDS: [Kind; 15] = [
+const KINDS: [Kind; 19] = [
     Kind { name: "group", arguments: &[], inside: BALL, fates: &[] },
     Kind { name: "union", arguments: &[], inside: BALL, fates: &[] },
     Kind { name: "difference", arguments: &[], inside: BALL, fates: &[] },
@@ -63,6 +65,28 @@ const KINDS: [Kind; 15] = [
             ("segments", Harmless),
             ("h", Refused),
         ],
+    },
+    Kind {
+        name: "rotate_extrude",
+        arguments: &[],
+        inside: SQUARE,
+        fates: &[
+            ("angle", Read("90", "91")),
+            ("start", Harmless),
+            ("origin", Harmless),
+            ("scale", Harmless),
+            ("layer", Harmless),
+            ("timestamp", Harmless),
+            ("h", Refused),
+        ],
+    },
+    Kind { name: "hull", arguments: &[], inside: BALL, fates: &[] },
+    Kind { name: "minkowski", arguments: &[], inside: BALL, fates: &[] },
+    Kind {
+        name: "offset",
+        arguments: &[("r", "1")],
+        inside: SQUARE,
+        fates: &[("r", Read("2", "3")), ("delta", Harmless)],
     },
     Kind { name: "sphere", arguments: &[("r", "1")], inside: ";", fates: &[("r", Read("1", "2")), ("d", Refused)] },
     Kind {
@@ -121,14 +145,10 @@ const KINDS: [Kind; 15] = [
 ];
 
 /// Kinds of nodes and modules of OpenSCAD that make or change shapes in ways that are not imported.
-const REFUSED: [&str; 32] = [
-    "hull",
-    "minkowski",
-    "rotate_extrude",
+const REFUSED: [&str; 28] = [
     "resize",
     "projection",
     "roof",
-    "offset",
     "fill",
     "text",
     "import",
@@ -169,7 +189,7 @@ fn text(kind: &Kind, changed: Option<(&str, &str)>) -> String {
     let arguments: Vec<String> = arguments.iter().map(|(n, v)| format!("{n} = {v}")).collect();
     let call = format!("{}({}) {}", kind.name, arguments.join(", "), kind.inside);
     match kind.name {
-        "circle" | "square" | "polygon" => format!("linear_extrude(height = 1) {{\n{call}\n}}"),
+        "circle" | "square" | "polygon" | "offset" => format!("linear_extrude(height = 1) {{\n{call}\n}}"),
         _ => format!("\n{call}"),
     }
 }
@@ -195,10 +215,15 @@ fn place(text: &str, word: &str) -> String {
 fn every_argument_is_read_without_effect_or_refused() {
     for kind in &KINDS {
         let plain = solid(&text(kind, None)).unwrap_or_else(|e| panic!("{}: {e}", kind.name));
-        let curved = matches!(kind.name, "sphere" | "cylinder" | "circle");
+        let curved = matches!(kind.name, "sphere" | "cylinder" | "circle" | "rotate_extrude");
         let everywhere = if curved { CURVES } else { FLAT };
-        let fates = kind.fates.iter().chain(&everywhere).chain(&FILE).chain(&[("convexity", Harmless)]);
+        let old = |f: &&(&str, Fate)| !(kind.name == "rotate_extrude" && WITHOUT_FILE.contains(&f.0));
+        let fates =
+            kind.fates.iter().chain(&everywhere).chain(FILE.iter().filter(old)).chain(&[("convexity", Harmless)]);
         for (name, fate) in fates.chain(&[("$fx", Refused), ("colour", Refused), ("chamfer", Refused)]) {
+            if kind.name == "offset" && *name == "chamfer" {
+                continue;
+            }
             match fate {
                 Read(one, two) => {
                     let [a, b] = [one, two].map(|v| solid(&text(kind, Some((name, v)))));
@@ -268,6 +293,44 @@ fn what_is_left_out_is_reported() {
             "1:40: a second !: without effect, the first one counts, as in OpenSCAD",
         ),
         ("cube(1); linear_extrude(height = 1);", "1:10: linear_extrude without a shape inside: nothing is there"),
+        ("cube(1); rotate_extrude();", "1:10: rotate_extrude without a shape inside: nothing is there"),
+        ("cube(1); sphere(r = 0);", "1:10: sphere of no size: left out, as OpenSCAD does"),
+        ("cube(1); cylinder(h = 1, r1 = -1, r2 = 1);", "1:10: cylinder of no size: left out, as OpenSCAD does"),
+        ("cube(1); cube([1, 0, 1]);", "1:10: cube of no size: left out, as OpenSCAD does"),
+        (
+            "cube(1); polyhedron(points = [], faces = []);",
+            "1:10: polyhedron without volume: left out, as OpenSCAD does",
+        ),
+        ("cube(1); linear_extrude(height = 0) { circle(1); }", "1:10: linear_extrude of no height: left out"),
+        ("cube(1); linear_extrude(height = 1) { circle(0); }", "1:39: circle of no size: left out, as OpenSCAD does"),
+        ("cube(1); linear_extrude(height = 1) { polygon([]); }", "1:39: polygon without area: left out"),
+        (
+            "cube(1); linear_extrude(height = 1) { polygon([[0, 0], [2, 0], [1, 0]]); }",
+            "1:39: a polygon without area: left out, as OpenSCAD does",
+        ),
+        ("cube(1); linear_extrude(height = 1) { cube(2); }", "1:39: cube inside of a 2D shape: left out"),
+        ("cube(1); group() { cube(2); square(1); }", "1:29: square among solids: a 2D shape, left out"),
+        (
+            "cube(1); group() { hull() { circle(1); } cube(2); }",
+            "1:29: circle among solids, as the first: all solids beside it left out",
+        ),
+        (
+            "cube(1); multmatrix([[1,0,0,0],[0,1,0,0],[0,0,0,0],[0,0,0,1]]) { cube(1); }",
+            "1:10: multmatrix that flattens what is inside of it: left out, as OpenSCAD does",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon([[0, 0], [2, 2], [2, 0], [0, 2]]); }",
+            "1:30: a polygon whose sides cross: filled by the even-odd rule, as OpenSCAD does",
+        ),
+        (
+            "hull() { cylinder(1, 1, 1); cube(3); }",
+            "1:1: hull faceted: no exact form, taken as OpenSCAD's polyhedron of",
+        ),
+        (
+            "multmatrix([[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]) { sphere(1); }",
+            "1:57: non-uniform scale on a sphere faceted: taken as OpenSCAD's polyhedron of",
+        ),
+        ("cube(1); hull() { linear_extrude(height = 1) { hull() { } } }", "1:48: a hull without area: left out"),
         (
             "cube(1); intersection() { cube(1); group(); }",
             "1:10: an intersection with nothing: left out with all that is inside",

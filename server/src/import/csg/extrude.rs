@@ -1,4 +1,7 @@
-//! Outlines and their extrusion: circle, square and convex polygon between two heights.
+//! Outlines and their extrusion: circle, square and polygon between two heights.
+//!
+//! A polygon that is not convex is the prism of its convex hull, cut down by the half-spaces of the edges of its pockets and holes
+//! (`polygon`).
 //!
 //! An extrusion without twist distributes over set operations: each of its cross-sections is the same outline, moved
 //! and scaled by a bijection. So `linear_extrude` of a difference is the difference of linear_extrudes, and the lowering
@@ -6,10 +9,16 @@
 //! (`overshoot`), so that no cap of a hole coincides with a cap of the part.
 
 use super::arguments::{Arguments, finite};
+use super::facets::prism;
+use super::flat::{Flat, Outline};
+use super::outlines::crossing;
+use super::parts::{Part, PartId, Parts, Signed};
 use super::place::{self, Placed};
+use super::polygon::{Edge, Region};
 use super::syntax::{Call, ValueKind};
 use super::{Place, Problem};
 use crate::math::tolerance::ROUNDING;
+use crate::solid::Op;
 use crate::solid::primitive::MeshError;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -32,9 +41,11 @@ impl Extrusion {
     }
 
     /// Reads the arguments of `linear_extrude`.
-    pub fn new(call: &Call) -> Result<Self> {
+    ///
+    /// `None` for a height of zero or less.
+    pub fn new(call: &Call) -> Result<Option<Self>> {
         let arguments = Self::arguments(call)?;
-        let mut height = arguments.finite_positive("height")?;
+        let Some(mut height) = arguments.finite_size("height")? else { return Ok(None) };
         if arguments.number_or("twist", 0.0)? != 0.0 {
             return Err((call.at, Problem::unsupported("twist of linear_extrude")));
         }
@@ -56,7 +67,7 @@ impl Extrusion {
             slant.z_axis = along / along.z;
         }
         let low = if arguments.bool_or("center", false)? { -0.5 * height } else { 0.0 };
-        Ok(Self { low, height, scale, slant })
+        Ok(Some(Self { low, height, scale, slant }))
     }
 
     /// `outer` with the slant.
@@ -70,8 +81,102 @@ impl Extrusion {
         (self.low - more, self.low + self.height + more)
     }
 
+    /// What a flat shape becomes.
+    pub fn part(&self, parts: &mut Parts<'_>, outer: &DAffine3, flat: &Flat) -> Result<Part> {
+        let leaf = |parts: &mut Parts<'_>, placed| parts.leaf(&flat.name, flat.at, placed);
+        match &flat.outline {
+            Outline::Circle(radius) => match self.circle(outer, &flat.inner, *radius, flat.overshoot) {
+                Err(Problem::Unsupported { construct, .. }) => {
+                    let part = self.paths(parts, outer, flat, &flat.paths())?;
+                    let count = flat.pieces + 2;
+                    let text = format!("{construct} faceted: taken as OpenSCAD's polygon, {count} facets");
+                    parts.note(flat.at, text, Some(flat.deviation()));
+                    Ok(part)
+                }
+                placed => leaf(parts, placed),
+            },
+            Outline::Square { corner, size } => {
+                leaf(parts, self.square(outer, &flat.inner, *corner, *size, flat.overshoot))
+            }
+            Outline::Paths(paths) => {
+                if let [one] = paths.as_slice() {
+                    parts.affordable(flat.at, one.len() + 2)?;
+                    match self.polygon(outer, &flat.inner, one, flat.overshoot) {
+                        Err(Problem::Mesh(_)) => {}
+                        placed => return leaf(parts, placed),
+                    }
+                }
+                self.paths(parts, outer, flat, &flat.paths())
+            }
+        }
+    }
+
+    /// Any paths, in the plane.
+    fn paths(&self, parts: &mut Parts<'_>, outer: &DAffine3, flat: &Flat, paths: &[Vec<DVec2>]) -> Result<Part> {
+        let at = flat.at;
+        parts.affordable(at, paths.iter().map(Vec::len).sum::<usize>() + 2)?;
+        let region = Region::of_paths(paths);
+        if region.open {
+            return Err((at, crossing()));
+        }
+        if region.crossed {
+            let text = "a polygon whose sides cross: filled by the even-odd rule, as OpenSCAD does";
+            parts.note(at, text, None);
+        }
+        if region.islands.is_empty() {
+            parts.note(at, format!("a {} without area: left out, as OpenSCAD does", flat.name), None);
+            return Ok(Part::Empty);
+        }
+        let mut made = Vec::with_capacity(region.islands.len());
+        for island in &region.islands {
+            let hull = match self.polygon(outer, &DAffine3::IDENTITY, &island.hull, flat.overshoot) {
+                Err(Problem::Mesh(MeshError::Flat)) => {
+                    parts.note(at, format!("a sliver of a {}: left out", flat.name), None);
+                    continue;
+                }
+                Err(Problem::Mesh(_)) => return Err((at, self.bent())),
+                placed => parts.leaf(&flat.name, at, placed)?,
+            };
+            let hull = parts.push(hull);
+            let mut all = vec![Signed::In(hull)];
+            for cut in &island.cuts {
+                let mut edge = |parts: &mut Parts<'_>, e: usize| self.edge(parts, outer, flat, region.edges[e]);
+                all.push(parts.formula(at, cut, &mut edge)?);
+            }
+            if let Signed::In(part) = parts.many(true, at, all) {
+                // Pockets and holes take no corner away.
+                if part != hull {
+                    parts.hulls.insert(part, hull);
+                }
+                made.push(part);
+            }
+        }
+        Ok(Part::Op(Op::Union, at, made))
+    }
+
+    /// The half-space of an edge with the inside on its left: vertical, or towards where the scale has it at the top.
+    fn edge(&self, parts: &mut Parts<'_>, outer: &DAffine3, flat: &Flat, [p, q]: Edge) -> Result<Signed> {
+        let t = q - p;
+        let (low, high) = self.span(flat.overshoot);
+        let up = (p * self.scale - p).extend(high - low);
+        let bend = t.perp_dot(t * self.scale).abs();
+        if bend > ROUNDING * t.length_squared() {
+            return Err((flat.at, self.bent()));
+        }
+        let normal = t.extend(0.0).cross(up);
+        let placed = place::half_space_at(outer, normal, p.extend(low));
+        let leaf = parts.leaf(&format!("{} edge", flat.name), flat.at, Ok(placed))?;
+        let part: PartId = parts.push(leaf);
+        Ok(Signed::In(part))
+    }
+
+    fn bent(&self) -> Problem {
+        let hint = " (scale both axes alike, or build the shape of convex polyhedra)";
+        Problem::Unsupported { construct: "non-uniform scale of linear_extrude on a polygon".into(), hint }
+    }
+
     /// A circle of radius `radius` around the origin of `inner`.
-    pub fn circle(
+    fn circle(
         &self,
         outer: &DAffine3,
         inner: &DAffine3,
@@ -91,7 +196,7 @@ impl Extrusion {
     }
 
     /// A rectangle from `corner`, with sides `size`.
-    pub fn square(
+    fn square(
         &self,
         outer: &DAffine3,
         inner: &DAffine3,
@@ -108,8 +213,8 @@ impl Extrusion {
         self.polygon(outer, inner, &[c(0.0, 0.0), c(1.0, 0.0), c(1.0, 1.0), c(0.0, 1.0)], overshoot)
     }
 
-    /// A convex polygon, either way round.
-    pub fn polygon(
+    /// A convex polygon, either way round; another one is an error of its mesh.
+    fn polygon(
         &self,
         outer: &DAffine3,
         inner: &DAffine3,
@@ -129,53 +234,7 @@ impl Extrusion {
                 }
                 Ok(placed)
             }
-            Err(Problem::Mesh(MeshError::Flat)) => Err(Problem::syntax("a polygon with an area", "none")),
-            Err(Problem::Mesh(_)) if self.scale.x != self.scale.y => {
-                Err(Problem::unsupported("non-uniform scale of linear_extrude on a polygon"))
-            }
-            Err(Problem::Mesh(_)) => Err(Problem::unsupported("a polygon that is not convex")),
             Err(other) => Err(other),
         }
     }
-}
-
-/// The mesh between two outlines with equally many corners, counter-clockwise; an outline may shrink to one point.
-pub fn prism(bottom: &[DVec2], top: &[DVec2], low: f64, high: f64) -> (Vec<DVec3>, Vec<Vec<u32>>) {
-    let n = bottom.len() as u32;
-    let points = bottom.iter().map(|p| p.extend(low)).chain(top.iter().map(|p| p.extend(high))).collect();
-    let mut faces: Vec<Vec<u32>> = (0..n).map(|i| vec![i, n + i, n + (i + 1) % n, (i + 1) % n]).collect();
-    faces.push((n..2 * n).rev().collect());
-    faces.push((0..n).collect());
-    (points, faces)
-}
-
-/// The corners that OpenSCAD gives a circle of `fragments` sides: the first on +x, counter-clockwise. Multiples of 30°
-/// are exact, as they are in OpenSCAD.
-pub fn ring(radius: f64, fragments: u32) -> Vec<DVec2> {
-    (0..fragments).map(|i| turn(i, fragments) * radius).collect()
-}
-
-/// Cosine and sine of the `i`-th of `n` parts of a full turn.
-pub fn turn(i: u32, n: u32) -> DVec2 {
-    let h = 0.5 * 3f64.sqrt();
-    let twelfths: [[f64; 2]; 12] = [
-        [1.0, 0.0],
-        [h, 0.5],
-        [0.5, h],
-        [0.0, 1.0],
-        [-0.5, h],
-        [-h, 0.5],
-        [-1.0, 0.0],
-        [-h, -0.5],
-        [-0.5, -h],
-        [0.0, -1.0],
-        [0.5, -h],
-        [h, -0.5],
-    ];
-    let (i, n) = (u64::from(i), u64::from(n));
-    if (12 * i).is_multiple_of(n) {
-        return DVec2::from_array(twelfths[(12 * i / n % 12) as usize]);
-    }
-    let (sin, cos) = libm::sincos(std::f64::consts::TAU * i as f64 / n as f64);
-    DVec2::new(cos, sin)
 }

@@ -1,9 +1,7 @@
 //! OpenSCAD's flattened tree (`openscad -o model.csg model.scad`): `lexer` and `syntax` read it, `lower` makes a solid.
 //!
-//! Supported: group, union, difference, intersection, color, render, multmatrix; sphere, cylinder, cube, polyhedron;
-//! linear_extrude over circle, square, convex polygon and set operations of them; the modifiers `%`, `*` (left out),
-//! `#` (kept), `!` (root). A cylinder with infinite radius and height, or a cube with infinite sides, is a half-space or
-//! an intersection of some. Everything else is refused by name.
+//! docs/openscad.md lists what loads and what it becomes. A cylinder with infinite radius and height, or a cube with infinite
+//! sides, is a half-space or an intersection of some. What is not listed is refused by name.
 //!
 //! Nothing is dropped in silence. Read without effect is only what changes no shape: the arguments of color, convexity, the
 //! `$`-variables that cut curves into pieces (`arguments::HARMLESS`; where they say that a curve is a prism they are read),
@@ -11,16 +9,27 @@
 //! note tells of it). What a modifier leaves out, an extrusion of nothing, and what is subtracted from or cut with nothing
 //! are notes. A test goes through all kinds of nodes with all their arguments.
 //!
-//! OpenSCAD drops primitives of size zero in silence; here they are refused, for an object that vanishes in silence is
-//! never what a collision query should answer for.
+//! What has no size, no area or no volume is left out, as OpenSCAD does, and a note names its line.
 
 mod arguments;
 #[cfg(test)]
+mod constructs;
+mod convex;
+#[cfg(test)]
 mod dialect;
 mod extrude;
+mod facets;
+mod flat;
+mod hull;
 mod lexer;
 mod lower;
+mod offset;
+mod outlines;
+mod parts;
 mod place;
+mod polygon;
+mod revolve;
+mod shapes;
 mod syntax;
 #[cfg(test)]
 mod tests;

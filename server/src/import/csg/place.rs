@@ -169,6 +169,12 @@ pub fn half_space(a: &DAffine3, n: DVec3, d: f64) -> Placed {
     Placed::new(HalfSpace, Pose::new(point, DQuat::from_rotation_arc(DVec3::Z, normal)))
 }
 
+/// The half-space with an outward normal (of any length) through a point.
+pub fn half_space_at(a: &DAffine3, n: DVec3, point: DVec3) -> Placed {
+    let normal = (a.matrix3.inverse().transpose() * n).normalize();
+    Placed::new(HalfSpace, Pose::new(a.transform_point3(point), DQuat::from_rotation_arc(DVec3::Z, normal)))
+}
+
 /// Why a curved primitive cannot follow `m`.
 fn refusal(m: DMat3, kind: &str) -> Problem {
     let how = if columns_are_perpendicular(m) { "non-uniform scale" } else { "shear" };

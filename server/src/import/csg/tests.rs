@@ -57,7 +57,7 @@ fn trees_keep_their_shape() {
         (format!("%{s} *{c} #{c}"), "cube#0"),
         (format!("difference() {{ %{s} {c} {s} }}"), "(cube#0 - sphere#1)"),
         (format!("{s} multmatrix([[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) {{ !{c} {s} }}"), "cube#0"),
-        (format!("%#{s} {c} * minkowski() {{ {s} }}"), "cube#0"),
+        (format!("%#{s} {c} * projection() {{ {s} }}"), "cube#0"),
         (String::new(), "0"),
     ] {
         assert_eq!(tree(&text), expected, "{text}");
@@ -248,15 +248,26 @@ fn every_refusal_is_a_sentence_with_its_place() {
     let triangles = "[[2,6,4],[2,4,0],[5,7,3],[5,3,1],[4,5,1],[4,1,0],[3,7,6],[3,6,2],[1,3,2],[1,2,0],[6,7,5],[6,5,4]]";
     let table: Vec<(String, &str)> = vec![
         (
-            "union() {\n  hull() { }\n}".into(),
-            "2:3: expected a supported construct, found hull, which is not supported",
+            "union() {\n  projection() { }\n}".into(),
+            "2:3: expected a supported construct, found projection, which is not supported",
+        ),
+        (
+            "hull() { difference() { cube(2); cube(1); } }".into(),
+            "1:1: expected a supported construct, found hull of what a difference or an intersection has cut",
+        ),
+        (
+            "minkowski() { sphere(1); difference() { sphere(2); sphere(1); } }".into(),
+            "1:1: expected a supported construct, found minkowski of a solid that is no union of convex primitives",
+        ),
+        (
+            "rotate_extrude() { square([4, 1], center = true); }".into(),
+            "1:1: expected an outline on one side of the axis of rotate_extrude, found one on both",
         ),
         (
             "translate([1, 2, 3]) { }".into(),
             "1:1: expected a supported construct, found translate, which is not supported (flatten the file first: \
              openscad -o model.csg model.scad)",
         ),
-        ("sphere(r = 0);".into(), "1:12: expected a positive number as r of sphere, found 0"),
         ("sphere(r = nan);".into(), "1:12: expected a positive number as r of sphere, found nan"),
         ("sphere(r = -inf);".into(), "1:12: expected a positive number as r of sphere, found -inf"),
         ("sphere(r = inf);".into(), "1:12: expected a finite number as r of sphere, found inf"),
@@ -265,17 +276,16 @@ fn every_refusal_is_a_sentence_with_its_place() {
         ("sphere(d = 1);".into(), "1:8: expected the argument r of sphere, found \"d\""),
         ("sphere(1, r = 2);".into(), "1:11: expected each argument of sphere once, found a second r"),
         ("sphere(1, 2);".into(), "1:11: expected at most 1 unnamed arguments of sphere, found another"),
-        ("cylinder(h = 1, r1 = 0, r2 = 0);".into(), "1:1: expected a positive r1 or r2 of cylinder, found 0 for both"),
         (
-            "cylinder(h = 1, r1 = -1, r2 = 0);".into(),
-            "1:22: expected a number that is not negative as r1 of cylinder, found -1",
+            "cylinder(h = 1, r1 = -inf, r2 = 0);".into(),
+            "1:22: expected a number that is not negative as r1 of cylinder, found -inf",
         ),
         (
             "cylinder(h = inf, r1 = 1, r2 = 1);".into(),
             "1:1: expected a finite cylinder, or one with r1 and r2 infinite, found h = inf, r1 = 1, r2 = 1",
         ),
         ("cube(size = [1, 2]);".into(), "1:13: expected three positive numbers as size of cube, found a list of 2"),
-        ("cube(size = [0, 1, 1]);".into(), "1:14: expected a positive number as size of cube, found 0"),
+        ("cube(size = [nan, 1, 1]);".into(), "1:14: expected a positive number as size of cube, found nan"),
         (
             "cube(1, center = true);cube(1, center = \"a\");".into(),
             "1:41: expected true or false as center of cube, found the string \"a\"",
@@ -293,44 +303,16 @@ fn every_refusal_is_a_sentence_with_its_place() {
         ("union() {\n\nsphere(1);".into(), "3:11: expected \"}\" closing line 1, found the end of the file"),
         ("circle(r = 1);".into(), "1:1: expected a solid, found the 2D shape circle outside of linear_extrude"),
         (
-            "linear_extrude(height = 1) { cube(1); }".into(),
-            "1:30: expected a 2D shape inside of linear_extrude, found cube",
-        ),
-        (
             "linear_extrude(height = 1, twist = 5) { circle(1); }".into(),
             "1:1: expected a supported construct, found twist of linear_extrude, which is not supported",
         ),
         (
-            "linear_extrude(height = 0) { circle(1); }".into(),
-            "1:25: expected a positive number as height of linear_extrude, found 0",
+            "linear_extrude(height = inf) { circle(1); }".into(),
+            "1:25: expected a finite number as height of linear_extrude, found inf",
         ),
         (
             "linear_extrude(height = 1, scale = [1, 2]) { circle(1); }".into(),
-            "1:46: expected a supported construct, found non-uniform scale of linear_extrude on a circle, which is not supported",
-        ),
-        (
-            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[0.2,0.2],[0,2]]); }".into(),
-            "1:30: expected a supported construct, found a polygon that is not convex, which is not supported",
-        ),
-        (
-            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[0,2]], paths = [[0,1,2],[0,2,1]]); }".into(),
-            "1:76: expected a supported construct, found a polygon of several paths, which is not supported",
-        ),
-        (
-            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[1,0]]); }".into(),
-            "1:30: expected a polygon with an area, found none",
-        ),
-        (
-            under("[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]", "sphere(1);"),
-            "1:72: expected a supported construct, found non-uniform scale on a sphere, which is not supported",
-        ),
-        (
-            under("[1, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]", "cylinder(1, 1, 1);"),
-            "1:74: expected a supported construct, found shear on a cylinder, which is not supported",
-        ),
-        (
-            under("[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]", "sphere(1);"),
-            "1:12: expected a matrix that keeps volumes, found one that flattens them",
+            "1:46: expected a supported construct, found non-uniform scale of linear_extrude on a polygon, which is not supported",
         ),
         (under("[1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:13: expected a row of 4 numbers, found a list of 3"),
         (under("[1, 0, 0, nan], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:23: expected a finite number, found nan"),
@@ -356,10 +338,6 @@ fn every_refusal_is_a_sentence_with_its_place() {
         (
             "polyhedron(points = [[0, 0, 0]], faces = [[0, 1, 2]]);".into(),
             "1:47: expected an index below 1 as faces of polyhedron, found 1",
-        ),
-        (
-            "polyhedron(points = [], faces = []);".into(),
-            "1:1: expected a closed convex polyhedron, found a polyhedron without volume",
         ),
         (
             under("[1e99, 0, 0, 0], [0, 1e99, 0, 0], [0, 0, 1e99, 0]", "cube(1e250);"),

@@ -1,0 +1,376 @@
+//! What constructs mean, told a second time by formulas of the point that share nothing with the importer: membership, a depth and a
+//! distance that nothing oversteps, and no seam, for f is near 0 near the surface alone.
+
+use crate::import::{Facets, Limits, import_csg};
+use crate::math::random::Random;
+use glam::{DVec2, DVec3};
+
+type Inside = Box<dyn Fn(DVec3) -> bool>;
+
+fn linear(arguments: &str, inner: &str) -> String {
+    format!("linear_extrude({arguments}) {{ {inner} }}")
+}
+
+fn revolved(arguments: &str, inner: &str) -> String {
+    format!("rotate_extrude({arguments}) {{ {inner} }}")
+}
+
+fn moved(x: f64, y: f64, z: f64, inner: &str) -> String {
+    format!("multmatrix([[1, 0, 0, {x}], [0, 1, 0, {y}], [0, 0, 1, {z}], [0, 0, 0, 1]]) {{ {inner} }}")
+}
+
+/// Inside of paths by the even-odd rule: crossings of a ray.
+fn even_odd(paths: &[&[[f64; 2]]], p: DVec2) -> bool {
+    let mut odd = false;
+    for path in paths {
+        for i in 0..path.len() {
+            let ([ax, ay], [bx, by]) = (path[i], path[(i + 1) % path.len()]);
+            odd ^= (ay > p.y) != (by > p.y) && p.x < ax + (bx - ax) * (p.y - ay) / (by - ay);
+        }
+    }
+    odd
+}
+
+/// Distance from the segment between two points.
+fn to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    (p - a - (b - a) * t).length()
+}
+
+/// Inside of the hull of balls: below the tangent plane of every direction of a fine set, which lies outside of it by
+/// less than the tests' margin; exact where `false`.
+fn in_hull(balls: Vec<(DVec3, f64)>) -> Inside {
+    let count = 200_000;
+    let directions: Vec<(DVec3, f64)> = (0..count)
+        .map(|i| {
+            // A Fibonacci lattice of the sphere.
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
+            let (s, c) = libm::sincos(f64::from(i) * 2.399_963_229_728_653);
+            let n = DVec3::new(c * (1.0 - z * z).sqrt(), s * (1.0 - z * z).sqrt(), z);
+            (n, balls.iter().map(|(c, r)| n.dot(*c) + r).fold(f64::NEG_INFINITY, f64::max))
+        })
+        .collect();
+    Box::new(move |p| directions.iter().all(|(n, h)| n.dot(p) <= *h))
+}
+
+const L: [[f64; 2]; 6] = [[0., 0.], [3., 0.], [3., 1.], [1., 1.], [1., 3.], [0., 3.]];
+const HOLE: [[f64; 2]; 4] = [[0.2, 0.2], [0.8, 0.3], [0.7, 0.8], [0.3, 0.6]];
+const STAR: [[f64; 2]; 10] = [
+    [2., 0.],
+    [0.8, 0.6],
+    [0.6, 1.9],
+    [-0.3, 0.95],
+    [-1.6, 1.2],
+    [-1., 0.],
+    [-1.6, -1.2],
+    [-0.3, -0.95],
+    [0.6, -1.9],
+    [0.8, -0.6],
+];
+const VASE: [[f64; 2]; 8] =
+    [[0., -1.], [1.2, -1.], [0.5, 0.], [1.5, 1.], [1.2, 1.5], [0.6, 0.8], [0.4, 0.2], [0., 0.1]];
+const RING: [[f64; 2]; 5] = [[1., -0.5], [2., -0.5], [1.6, 0.1], [2., 0.7], [1.1, 0.5]];
+
+fn list(points: &[[f64; 2]]) -> String {
+    format!("{points:?}")
+}
+
+/// Distance to the boundary of a path in the plane.
+fn to_path(path: &[[f64; 2]], p: DVec2) -> f64 {
+    let at = |i: usize| DVec2::from_array(path[i % path.len()]).extend(0.0);
+    (0..path.len()).map(|i| to_segment(p.extend(0.0), at(i), at(i + 1))).fold(f64::INFINITY, f64::min)
+}
+
+fn angle(p: DVec3) -> f64 {
+    p.y.atan2(p.x).to_degrees().rem_euclid(360.0)
+}
+
+/// Texts, each with what it holds; the last number is how far the second telling may be off.
+fn cases() -> Vec<(String, Inside, f64)> {
+    let meridian = |p: DVec3| DVec2::new(p.x.hypot(p.y), p.z);
+    let plane = |p: DVec3| p.truncate();
+    let ball = |x: f64, y: f64, z: f64, r: f64| moved(x, y, z, &format!("sphere({r});"));
+    let mut cases: Vec<(String, Inside, f64)> = vec![
+        (
+            linear("height = 2", &format!("polygon({});", list(&L))),
+            Box::new(move |p| (0.0..2.0).contains(&p.z) && even_odd(&[&L], plane(p))),
+            0.0,
+        ),
+        (
+            linear("height = 2, scale = 0.25", &format!("polygon({});", list(&STAR))),
+            Box::new(move |p| (0.0..2.0).contains(&p.z) && even_odd(&[&STAR], plane(p) / (1.0 - 0.375 * p.z))),
+            0.0,
+        ),
+        (
+            linear(
+                "height = 2, center = true",
+                &format!(
+                    "polygon({}, [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9]]);",
+                    list(&L.iter().chain(&HOLE).copied().collect::<Vec<_>>())
+                ),
+            ),
+            Box::new(move |p| p.z.abs() < 1.0 && even_odd(&[&L, &HOLE], plane(p))),
+            0.0,
+        ),
+        (
+            linear(
+                "height = 1",
+                &format!(
+                    "difference() {{ circle(2.5); polygon({}); }} {}",
+                    list(&STAR),
+                    moved(3., 0., 0., "square(1);")
+                ),
+            ),
+            Box::new(move |p| {
+                let q = plane(p);
+                let square = (3.0..4.0).contains(&q.x) && (0.0..1.0).contains(&q.y);
+                (0.0..1.0).contains(&p.z) && (q.length() < 2.5 && !even_odd(&[&STAR], q) || square)
+            }),
+            0.0,
+        ),
+        (
+            revolved("angle = 360", &format!("polygon({});", list(&VASE))),
+            Box::new(move |p| even_odd(&[&VASE], meridian(p))),
+            0.0,
+        ),
+        (
+            revolved("angle = 75", &format!("polygon({});", list(&RING))),
+            Box::new(move |p| even_odd(&[&RING], meridian(p)) && angle(p) < 75.0),
+            0.0,
+        ),
+        (
+            revolved(
+                "angle = 250, start = 30",
+                &format!("difference() {{ polygon({}); square([1.5, 0.3]); }}", list(&RING)),
+            ),
+            Box::new(move |p| {
+                let m = meridian(p);
+                let cut = m.x < 1.5 && (0.0..0.3).contains(&m.y);
+                even_odd(&[&RING], m) && !cut && (30.0..280.0).contains(&angle(p))
+            }),
+            0.0,
+        ),
+        (
+            revolved(
+                "angle = 360",
+                &format!("multmatrix([[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) {{ polygon({}); }}", list(&RING)),
+            ),
+            Box::new(move |p| even_odd(&[&RING], meridian(p))),
+            0.0,
+        ),
+        (
+            revolved(
+                "",
+                "difference() { circle(2); translate_left(); }"
+                    .replace("translate_left();", &moved(-5., -5., 0., "square([5, 10]);"))
+                    .as_str(),
+            ),
+            Box::new(move |p| p.length() < 2.0),
+            0.0,
+        ),
+        (
+            revolved("$fn = 6", &format!("polygon({});", list(&RING))),
+            Box::new(move |p| {
+                // How far out by the hexagon with a corner at −x.
+                let far = (0..6).map(|k| {
+                    let (s, c) = (60.0 * f64::from(k) + 30.0).to_radians().sin_cos();
+                    (p.x * c + p.y * s) / 30f64.to_radians().cos()
+                });
+                even_odd(&[&RING], DVec2::new(far.fold(f64::NEG_INFINITY, f64::max), p.z))
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", &format!("offset(r = 0.3) {{ polygon({}); }}", list(&STAR))),
+            Box::new(move |p| {
+                let q = plane(p);
+                (0.0..1.0).contains(&p.z) && (even_odd(&[&STAR], q) || to_path(&STAR, q) < 0.3)
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", &format!("offset(r = 1.1) {{ polygon({}); }}", list(&STAR))),
+            Box::new(move |p| {
+                let q = plane(p);
+                (0.0..1.0).contains(&p.z) && (even_odd(&[&STAR], q) || to_path(&STAR, q) < 1.1)
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", &format!("offset(r = -0.2) {{ polygon({}); }}", list(&STAR))),
+            Box::new(move |p| {
+                let q = plane(p);
+                (0.0..1.0).contains(&p.z) && even_odd(&[&STAR], q) && to_path(&STAR, q) > 0.2
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", &format!("offset(delta = 0.3) {{ polygon({}); }}", list(&L))),
+            Box::new(move |p| {
+                let grown = [[-0.3, -0.3], [3.3, -0.3], [3.3, 1.3], [1.3, 1.3], [1.3, 3.3], [-0.3, 3.3]];
+                (0.0..1.0).contains(&p.z) && even_odd(&[&grown], plane(p))
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", &format!("offset(delta = -0.3) {{ polygon({}); }}", list(&L))),
+            Box::new(move |p| {
+                let shrunk = [[0.3, 0.3], [2.7, 0.3], [2.7, 0.7], [0.7, 0.7], [0.7, 2.7], [0.3, 2.7]];
+                (0.0..1.0).contains(&p.z) && even_odd(&[&shrunk], plane(p))
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", "offset(delta = 0.5, chamfer = true) { square(2); }"),
+            Box::new(move |p| {
+                let q = (plane(p) - 1.0).abs();
+                (0.0..1.0).contains(&p.z) && q.max_element() < 1.5 && (q.x + q.y - 2.0) / 2f64.sqrt() < 0.5
+            }),
+            0.0,
+        ),
+        (
+            linear("height = 1", "minkowski() { square(2); circle(0.5); }"),
+            Box::new(move |p| {
+                let q = plane(p);
+                (0.0..1.0).contains(&p.z) && (q - q.clamp(DVec2::ZERO, DVec2::splat(2.0))).length() < 0.5
+            }),
+            0.0,
+        ),
+        (
+            moved(1., 0., 0., "minkowski() { cube(2); sphere(0.5); }"),
+            Box::new(move |p| {
+                let q = p - DVec3::X;
+                (q - q.clamp(DVec3::ZERO, DVec3::splat(2.0))).length() < 0.5
+            }),
+            0.0,
+        ),
+        (
+            "minkowski() { cube([2, 1, 1]); cylinder(h = 1, r1 = 0.5, r2 = 0.5); }".into(),
+            Box::new(move |p| {
+                let q = plane(p);
+                (0.0..2.0).contains(&p.z) && (q - q.clamp(DVec2::ZERO, DVec2::new(2.0, 1.0))).length() < 0.5
+            }),
+            0.0,
+        ),
+        (
+            format!(
+                "minkowski() {{ union() {{ cube([3, 1, 1]); cube([1, 3, 1]); }} {} }}",
+                moved(0., 0., 1., "cube([1, 1, 2]);")
+            ),
+            Box::new(move |p| {
+                let within = |x: f64, y: f64| (0.0..x).contains(&p.x) && (0.0..y).contains(&p.y);
+                (1.0..4.0).contains(&p.z) && (within(4., 2.) || within(2., 4.))
+            }),
+            0.0,
+        ),
+        (
+            format!("hull() {{ {} {} }}", ball(0., 0., 0., 1.), ball(2., 1., 0.5, 1.)),
+            Box::new(move |p| to_segment(p, DVec3::ZERO, DVec3::new(2., 1., 0.5)) < 1.0),
+            0.0,
+        ),
+        (
+            format!(
+                "hull() {{ cylinder(h = 3, r1 = 1, r2 = 1); {} }}",
+                moved(2., 0., 0., "cylinder(h = 3, r1 = 1, r2 = 1);")
+            ),
+            Box::new(move |p| {
+                (0.0..3.0).contains(&p.z) && to_segment(p.with_z(0.0), DVec3::ZERO, DVec3::X * 2.0) < 1.0
+            }),
+            0.0,
+        ),
+        (
+            format!("hull() {{ cube(1); {} }}", moved(1., 1., 1., "cube(1);")),
+            Box::new(move |p| {
+                let diagonal = |a: f64, b: f64| (a - b).abs() < 1.0;
+                p.min_element() > 0.0
+                    && p.max_element() < 2.0
+                    && diagonal(p.x, p.y)
+                    && diagonal(p.x, p.z)
+                    && diagonal(p.y, p.z)
+            }),
+            0.0,
+        ),
+        (
+            format!(
+                "hull() {{ cylinder(h = 1, r1 = 2, r2 = 2); {} }}",
+                moved(0., 0., 2., "cylinder(h = 1, r1 = 1, r2 = 0);")
+            ),
+            Box::new(move |p| {
+                let m = meridian(p);
+                // Corners of the meridian: (2, 0), (2, 1), (1, 2) and (0, 3) on one line.
+                (0.0..3.0).contains(&m.y) && m.x < 2.0 && m.x + m.y < 3.0
+            }),
+            0.0,
+        ),
+        (
+            linear(
+                "height = 1",
+                &format!(
+                    "hull() {{ circle(1); {} polygon([[0, -3], [1, -3], [0.5, -2]]); }}",
+                    moved(3., 1., 0., "circle(0.5);")
+                ),
+            ),
+            {
+                let flat = in_hull(vec![
+                    (DVec3::ZERO, 1.0),
+                    (DVec3::new(3., 1., 0.), 0.5),
+                    (DVec3::new(0., -3., 0.), 0.0),
+                    (DVec3::new(1., -3., 0.), 0.0),
+                ]);
+                Box::new(move |p| (0.0..1.0).contains(&p.z) && flat(p.with_z(0.0)))
+            },
+            1e-3,
+        ),
+    ];
+    // What is taken away takes no corner, and points are enough of a polyhedron.
+    let open_mesh = "polyhedron([[0,0,0],[2,0,0],[0,2,0],[2,2,0],[0,0,1]], [[0,1,2],[3,4,1]]);";
+    cases.push((
+        format!(
+            "hull() {{ difference() {{ cube(2); {} }} group() {{ {open_mesh} }} }}",
+            moved(1., 1., -1., "cylinder(h = 9, r1 = 0.5, r2 = 0.5);")
+        ),
+        Box::new(|p| p.min_element() > 0.0 && p.max_element() < 2.0),
+        0.0,
+    ));
+    let balls = [[0., 0., 0., 1.], [3., 0., 0., 0.5], [0., 3., 0., 0.7], [1., 1., 3., 0.2], [1., 1., 0.5, 1.1]];
+    let text: String = balls.iter().map(|[x, y, z, r]| ball(*x, *y, *z, *r)).collect();
+    let all = balls.iter().map(|[x, y, z, r]| (DVec3::new(*x, *y, *z), *r)).collect();
+    cases.push((format!("hull() {{ {text} }}"), in_hull(all), 2e-3));
+    cases
+}
+
+#[test]
+fn constructs_hold_what_they_mean_without_seams() {
+    let mut r = Random(17);
+    for (text, inside, off) in cases() {
+        let import =
+            import_csg("m.csg", &text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}"));
+        let (solid, b) = (&import.solid, import.solid.aabb());
+        let faceted = import.notes.iter().any(|n| n.text.contains("faceted"));
+        assert!(b.is_finite() && !faceted, "{text}: {:?}", import.notes);
+        let tell = 1e-9 + off;
+        let (mut full, mut near) = (0, 0);
+        for _ in 0..if off > 0.0 { 600 } else { 6000 } {
+            let x = b.center() + (r.vector(1.0) * 1.2) * b.half();
+            let f = solid.value(x);
+            if f.abs() <= tell {
+                near += 1;
+                continue;
+            }
+            let here = inside(x);
+            assert_eq!(f < 0.0, here, "{x}, f {f}: {text}");
+            full += usize::from(here);
+            // Nothing else within |f|.
+            for _ in 0..4 {
+                let aside = r.vector(1.0).normalize() * (f.abs() - tell).max(0.0) * r.unit();
+                assert_eq!(inside(x + aside), here, "{x}, f {f}, {aside}: {text}");
+            }
+            // Where f is near 0 the surface is.
+            if off == 0.0 && f.abs() < 0.01 {
+                let other = (0..4000).any(|_| inside(x + r.vector(1.0) * f.abs() * 30.0) != here);
+                assert!(other, "a seam at {x}, f {f}: {text}");
+            }
+        }
+        assert!(full > 40 && near < 60, "{full} inside, {near} near: {text}");
+    }
+}

@@ -1,0 +1,232 @@
+//! OpenSCAD's offset of flat shapes: rounded by a radius, or with sharp or cut corners by a distance.
+//!
+//! A ring's edges are moved, and their ends joined: where the ring opens there, around the corner (`r`: a disc at it), to the
+//! point in which the moved edges meet (`delta`) or to a cut at the distance (`chamfer`); where it closes, at the point in which they
+//! meet. That is the offset where the moved rings are simple and no edge has turned round. Where they are not, the rounded one is
+//! the shape with a rectangle over every edge and a disc at every corner, added or taken away.
+
+use super::arguments::Arguments;
+use super::flat::{Flat, Outline};
+use super::hull::Disc;
+use super::outlines::{crossing, flat, flat_of, hull_parts, paths};
+use super::parts::{Part, PartId, Parts};
+use super::polygon::{Region, turn};
+use super::syntax::Call;
+use super::{Place, Problem};
+use crate::solid::Op;
+use glam::DVec2;
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// How corners are joined where the ring opens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Join {
+    Round,
+    Sharp,
+    Cut,
+}
+
+/// An `offset`.
+#[derive(Clone, Copy, Debug)]
+pub struct Offset {
+    by: f64,
+    join: Join,
+}
+
+impl Offset {
+    /// Its arguments by name.
+    pub fn arguments(call: &Call) -> Result<Arguments<'_>> {
+        Arguments::new(call, &["r", "delta", "chamfer"])
+    }
+
+    /// Reads the arguments of `offset`.
+    pub fn new(call: &Call) -> Result<Self> {
+        let arguments = Self::arguments(call)?;
+        let chamfer = arguments.bool_or("chamfer", false)?;
+        let (name, join) = match (arguments.get("r"), chamfer) {
+            (Some(_), _) => ("r", Join::Round),
+            (None, true) => ("delta", Join::Cut),
+            (None, false) => ("delta", Join::Sharp),
+        };
+        // OpenSCAD's own, where neither is given.
+        let by = arguments.number_or(name, 1.0)?;
+        if !by.is_finite() {
+            return Err((call.at, Problem::syntax(format!("a finite number as {name} of offset"), by.to_string())));
+        }
+        Ok(Self { by, join })
+    }
+
+    /// How far it reaches.
+    pub fn by(&self) -> f64 {
+        self.by
+    }
+
+    /// The offset of the union of some parts, which stand in the coordinates in which it is asked for.
+    pub fn of(&self, parts: &mut Parts<'_>, at: Place, like: &Flat, roots: &[PartId]) -> Result<Part> {
+        if self.by == 0.0 || roots.is_empty() {
+            return Ok(Part::Op(Op::Union, at, roots.to_vec()));
+        }
+        let mut leaves = Vec::new();
+        let mut plain = true;
+        for root in roots {
+            match parts.leaves(*root) {
+                Some((more, false)) => leaves.extend(more),
+                Some((_, true)) | None => plain = false,
+            }
+        }
+        // The rounded offset outwards of a union is the union of the offsets.
+        let one_by_one = plain && (leaves.len() <= 1 || self.by > 0.0 && self.join == Join::Round);
+        if !one_by_one {
+            let all = paths(parts, at, roots, "offset of shapes together")?;
+            return self.of_paths(parts, at, like, &all);
+        }
+        let mut made = Vec::new();
+        for leaf in leaves {
+            let Some((disc, paths)) = flat_of(parts, leaf).map(|f| (f.disc(), f.paths())) else { continue };
+            let part = match disc {
+                Some(Disc { center, radius }) if radius + self.by > 0.0 => {
+                    flat(like, Outline::Circle(radius + self.by), center)
+                }
+                Some(_) => Part::Empty,
+                None => {
+                    super::outlines::note_facets(parts, at, &[leaf], "offset");
+                    self.of_paths(parts, at, like, &paths)?
+                }
+            };
+            made.push(parts.push(part));
+        }
+        Ok(Part::Op(Op::Union, at, made))
+    }
+
+    fn of_paths(&self, parts: &mut Parts<'_>, at: Place, like: &Flat, paths: &[Vec<DVec2>]) -> Result<Part> {
+        let region = Region::of_paths(paths);
+        if region.open {
+            return Err((at, crossing()));
+        }
+        let corners: usize = region.rings.iter().map(Vec::len).sum();
+        parts.affordable(at, corners)?;
+        if self.join == Join::Round && self.by > 0.0 && region.is_convex() {
+            let disc = |c: &DVec2| Disc { center: *c, radius: self.by };
+            let discs: Vec<Disc> = region.islands[0].hull.iter().map(disc).collect();
+            return Ok(Part::Op(Op::Union, at, hull_parts(parts, like, &discs)));
+        }
+        if self.by < 0.0 && region.is_convex() {
+            let inner = self.inset(&region.islands[0].hull);
+            return Ok(if inner.len() < 3 {
+                Part::Empty
+            } else {
+                flat(like, Outline::Paths(vec![inner]), DVec2::ZERO)
+            });
+        }
+        let moved: Vec<Option<Vec<DVec2>>> = region.rings.iter().map(|r| self.moved(r)).collect();
+        if let Some(moved) = moved.into_iter().collect::<Option<Vec<_>>>() {
+            let after = Region::of_paths(&moved);
+            if !after.crossed && !after.open && after.rings.len() == region.rings.len() {
+                return Ok(self.joined(parts, at, like, &region, Outline::Paths(moved), false));
+            }
+        }
+        if self.join != Join::Round {
+            let hint = " (take offset(r = …), or a smaller delta)";
+            let construct = "offset by a delta at which sides of the shape meet".into();
+            return Err((at, Problem::Unsupported { construct, hint }));
+        }
+        Ok(self.joined(parts, at, like, &region, Outline::Paths(paths.to_vec()), true))
+    }
+
+    /// The shape with discs at the corners where it opens, and with rectangles over its edges; added or taken away.
+    fn joined(
+        &self,
+        parts: &mut Parts<'_>,
+        at: Place,
+        like: &Flat,
+        region: &Region,
+        base: Outline,
+        strips: bool,
+    ) -> Part {
+        let like = &Flat { overshoot: like.overshoot + u32::from(self.by < 0.0), ..like.clone() };
+        let first = Flat { overshoot: like.overshoot - u32::from(self.by < 0.0), ..like.clone() };
+        let mut made = vec![parts.push(flat(&first, base, DVec2::ZERO))];
+        for ring in &region.rings {
+            for i in 0..ring.len() {
+                let [before, p, after] = around(ring, i);
+                if strips {
+                    let out = outwards(p, after) * self.by;
+                    let strip = vec![p - out, after - out, after + out, p + out];
+                    made.push(parts.push(flat(like, Outline::Paths(vec![strip]), DVec2::ZERO)));
+                }
+                if self.join == Join::Round && turn(before, p, after) * self.by > 0.0 {
+                    made.push(parts.push(flat(like, Outline::Circle(self.by.abs()), p)));
+                }
+            }
+        }
+        Part::Op(if self.by > 0.0 { Op::Union } else { Op::Difference }, at, made)
+    }
+
+    /// A ring with its edges moved; `None` where one turns round.
+    fn moved(&self, ring: &[DVec2]) -> Option<Vec<DVec2>> {
+        let n = ring.len();
+        let mut corners = Vec::with_capacity(2 * n);
+        // Where the edge from corner i begins and ends when moved.
+        let (mut starts, mut ends) = (vec![DVec2::ZERO; n], vec![DVec2::ZERO; n]);
+        for i in 0..n {
+            let [before, p, after] = around(ring, i);
+            let (m1, m2) = (outwards(before, p), outwards(p, after));
+            let (from, to) = (p + m1 * self.by, p + m2 * self.by);
+            let meet = p + (m1 + m2) * (self.by / (1.0 + m1.dot(m2)));
+            let opens = turn(before, p, after) * self.by > 0.0;
+            match self.join {
+                Join::Round if opens => corners.extend([from, to]),
+                Join::Cut if opens => {
+                    // The cut lies at the distance from the corner, square to the middle.
+                    let middle = (m1 + m2).try_normalize()?;
+                    let along = |m: DVec2, edge: DVec2| {
+                        let t = self.by * (1.0 - m.dot(middle)) / edge.dot(middle);
+                        p + m * self.by + edge * t
+                    };
+                    corners.extend([along(m1, (p - before).normalize()), along(m2, (p - after).normalize())]);
+                }
+                Join::Sharp | Join::Round | Join::Cut if meet.is_finite() => corners.push(meet),
+                Join::Sharp | Join::Round | Join::Cut => return None,
+            }
+            let count = corners.len();
+            let single = count < 2 || !opens || self.join == Join::Sharp;
+            ends[(i + n - 1) % n] = if single { corners[count - 1] } else { corners[count - 2] };
+            starts[i] = corners[count - 1];
+        }
+        let kept = (0..n).all(|i| (ends[i] - starts[i]).dot(ring[(i + 1) % n] - ring[i]) > 0.0);
+        kept.then_some(corners)
+    }
+
+    /// A convex ring moved inwards: what all moved sides leave of it.
+    fn inset(&self, ring: &[DVec2]) -> Vec<DVec2> {
+        let mut left = ring.to_vec();
+        for i in 0..ring.len() {
+            let [_, p, after] = around(ring, i);
+            let out = outwards(p, after);
+            let height = |q: DVec2| out.dot(q - p) - self.by;
+            let mut kept = Vec::with_capacity(left.len() + 1);
+            for k in 0..left.len() {
+                let (a, b) = (left[k], left[(k + 1) % left.len()]);
+                let (s, t) = (height(a), height(b));
+                if s <= 0.0 {
+                    kept.push(a);
+                }
+                if (s < 0.0) != (t < 0.0) && s != 0.0 && t != 0.0 {
+                    kept.push(a + (b - a) * (s / (s - t)));
+                }
+            }
+            left = kept;
+        }
+        left
+    }
+}
+
+fn around(ring: &[DVec2], i: usize) -> [DVec2; 3] {
+    let n = ring.len();
+    [ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n]]
+}
+
+/// The unit normal to the right of the way from a to b: out of a shape on the left.
+fn outwards(a: DVec2, b: DVec2) -> DVec2 {
+    -(b - a).normalize().perp()
+}

@@ -1,0 +1,198 @@
+//! Flat shapes together: as paths, their hull, their sum.
+
+use super::flat::{Flat, Outline};
+use super::hull::{Disc, disc_hull};
+use super::parts::{Part, PartId, Parts};
+use super::polygon::{Region, overlay};
+use super::{Place, Problem};
+use crate::solid::Op;
+use glam::{DAffine3, DVec2, DVec3};
+use std::collections::HashMap;
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// A shape in the plane's own coordinates.
+pub fn flat(like: &Flat, outline: Outline, center: DVec2) -> Part {
+    Part::Flat(Box::new(like.with(outline, DAffine3::from_translation(center.extend(0.0)))))
+}
+
+/// Some discs and the polygon of their tangent points, as parts.
+pub fn hull_parts(parts: &mut Parts<'_>, like: &Flat, discs: &[Disc]) -> Vec<PartId> {
+    let hull = disc_hull(discs);
+    let mut made = Vec::new();
+    if hull.corners.len() >= 3 {
+        made.push(parts.push(flat(like, Outline::Paths(vec![hull.corners]), DVec2::ZERO)));
+    }
+    for d in hull.discs {
+        made.push(parts.push(flat(like, Outline::Circle(d.radius), d.center)));
+    }
+    made
+}
+
+/// The leaves below some parts, in order.
+pub fn flats(parts: &Parts<'_>, roots: &[PartId]) -> Vec<PartId> {
+    let mut stack: Vec<PartId> = roots.iter().rev().copied().collect();
+    let mut found = Vec::new();
+    while let Some(p) = stack.pop() {
+        match &parts.list[p] {
+            Part::Flat(_) => found.push(p),
+            Part::Op(_, _, of) => stack.extend(of.iter().rev()),
+            Part::Empty | Part::Leaf(..) | Part::Stray(..) => {}
+        }
+    }
+    found
+}
+
+/// The flat shape of a leaf.
+pub fn flat_of<'p>(parts: &'p Parts<'_>, id: PartId) -> Option<&'p Flat> {
+    match &parts.list[id] {
+        Part::Flat(flat) => Some(flat),
+        Part::Empty | Part::Leaf(..) | Part::Stray(..) | Part::Op(..) => None,
+    }
+}
+
+/// Tells that round shapes are taken as polygons, by whom; nothing where none is round.
+pub fn note_facets(parts: &mut Parts<'_>, at: Place, leaves: &[PartId], who: &str) {
+    let round = leaves.iter().filter_map(|l| flat_of(parts, *l)).filter(|f| matches!(f.outline, Outline::Circle(_)));
+    let (count, sides, off) = round.fold((0, 0, 0.0_f64), |(n, s, d), f| (n + 1, s + f.pieces, d.max(f.deviation())));
+    if count > 0 {
+        let text = format!("{who}: {count} circle(s) faceted, taken as OpenSCAD's polygons of {sides} sides together");
+        parts.note(at, text, Some(off));
+    }
+}
+
+/// The union of some parts as closed paths, by the even-odd rule; circles as polygons, with a note that names `who` needs it.
+pub fn paths(parts: &mut Parts<'_>, at: Place, roots: &[PartId], who: &str) -> Result<Vec<Vec<DVec2>>> {
+    let leaves = flats(parts, roots);
+    note_facets(parts, at, &leaves, who);
+    let of_each: Vec<Vec<Vec<DVec2>>> = leaves.iter().filter_map(|l| flat_of(parts, *l)).map(Flat::paths).collect();
+    parts.affordable(at, of_each.iter().flatten().map(Vec::len).sum())?;
+    if let ([one], [root]) = (of_each.as_slice(), roots)
+        && leaves[0] == *root
+    {
+        return Ok(one.clone());
+    }
+    // Operands before operations, each by its place among the leaves or in this order.
+    let place: HashMap<PartId, usize> = leaves.iter().enumerate().map(|(i, l)| (*l, i)).collect();
+    let mut order = Vec::new();
+    let mut stack: Vec<(PartId, bool)> = roots.iter().map(|r| (*r, false)).collect();
+    while let Some((p, done)) = stack.pop() {
+        match &parts.list[p] {
+            Part::Op(_, _, of) if !done => {
+                stack.push((p, true));
+                stack.extend(of.iter().map(|c| (*c, false)));
+            }
+            Part::Empty | Part::Leaf(..) | Part::Flat(_) | Part::Stray(..) | Part::Op(..) => order.push(p),
+        }
+    }
+    let list = &parts.list;
+    let inside = |of: &[bool]| {
+        let mut truth: HashMap<PartId, bool> = HashMap::with_capacity(order.len());
+        for p in &order {
+            let holds = match &list[*p] {
+                Part::Flat(_) => of[place[p]],
+                Part::Op(Op::Union, _, c) => c.iter().any(|c| truth[c]),
+                Part::Op(Op::Intersection, _, c) => !c.is_empty() && c.iter().all(|c| truth[c]),
+                Part::Op(Op::Difference, _, c) => {
+                    c.first().is_some_and(|f| truth[f]) && !c.iter().skip(1).any(|c| truth[c])
+                }
+                Part::Empty | Part::Leaf(..) | Part::Stray(..) => false,
+            };
+            truth.insert(*p, holds);
+        }
+        roots.iter().any(|r| truth[r])
+    };
+    overlay(&of_each, &inside).ok_or_else(|| (at, crossing()))
+}
+
+/// What to say of paths that make no closed rings.
+pub fn crossing() -> Problem {
+    Problem::syntax("outlines whose crossings a double can tell", "sides that nearly lie on each other")
+}
+
+/// Discs and points whose hull is that of some parts; circles that are none any more as points, with a note.
+fn discs(parts: &mut Parts<'_>, at: Place, roots: &[PartId], who: &str) -> Result<Vec<Disc>> {
+    let points = |paths: Vec<Vec<DVec2>>| paths.into_iter().flatten().map(|center| Disc { center, radius: 0.0 });
+    let mut discs = Vec::new();
+    for root in roots {
+        let Some((leaves, false)) = parts.leaves(*root) else {
+            discs.extend(points(paths(parts, at, &[*root], who)?));
+            continue;
+        };
+        for leaf in leaves {
+            let Some((disc, paths)) = flat_of(parts, leaf).map(|f| (f.disc(), f.paths())) else { continue };
+            match disc {
+                Some(disc) => discs.push(disc),
+                None => {
+                    note_facets(parts, at, &[leaf], who);
+                    discs.extend(points(paths));
+                }
+            }
+        }
+    }
+    Ok(discs)
+}
+
+/// The hull of some parts.
+pub fn hull(parts: &mut Parts<'_>, at: Place, like: &Flat, roots: &[PartId]) -> Result<Part> {
+    let discs = discs(parts, at, roots, "hull")?;
+    parts.affordable(at, discs.len())?;
+    let made = hull_parts(parts, like, &discs);
+    if made.is_empty() {
+        parts.note(at, "a hull without area: left out, as OpenSCAD does", None);
+        return Ok(Part::Empty);
+    }
+    Ok(Part::Op(Op::Union, at, made))
+}
+
+/// The sum of some operands about the plane point `origin`, which each of them was moved by: the union of the sums of their convex
+/// pieces.
+pub fn minkowski(parts: &mut Parts<'_>, at: Place, like: &Flat, operands: &[PartId], origin: DVec3) -> Result<Part> {
+    let origin = origin.truncate();
+    let mut sums: Vec<Vec<Disc>> = vec![vec![Disc { center: origin, radius: 0.0 }]];
+    for operand in operands {
+        let pieces = convex_pieces(parts, at, *operand)?;
+        let mut next = Vec::with_capacity(sums.len() * pieces.len());
+        for sum in &sums {
+            for piece in &pieces {
+                let all = sum.iter().flat_map(|a| {
+                    piece.iter().map(|b| Disc { center: a.center + b.center - origin, radius: a.radius + b.radius })
+                });
+                next.push(all.collect());
+            }
+        }
+        sums = next;
+        parts.affordable(at, sums.iter().map(Vec::len).sum())?;
+    }
+    let mut made = Vec::new();
+    for sum in sums {
+        made.extend(hull_parts(parts, like, &sum));
+    }
+    Ok(Part::Op(Op::Union, at, made))
+}
+
+fn convex_pieces(parts: &mut Parts<'_>, at: Place, operand: PartId) -> Result<Vec<Vec<Disc>>> {
+    let refused = || {
+        let hint = " (write the sum out as a union of sums of convex pieces, or use offset)";
+        (at, Problem::Unsupported { construct: "minkowski of a shape that is not convex".into(), hint })
+    };
+    let leaves = match parts.leaves(operand) {
+        Some((leaves, false)) => leaves,
+        Some((_, true)) | None => return Err(refused()),
+    };
+    let mut pieces = Vec::new();
+    for leaf in leaves {
+        let Some((disc, paths)) = flat_of(parts, leaf).map(|f| (f.disc(), f.paths())) else { continue };
+        if let Some(disc) = disc {
+            pieces.push(vec![disc]);
+            continue;
+        }
+        note_facets(parts, at, &[leaf], "minkowski");
+        let region = Region::of_paths(&paths);
+        if !region.is_convex() {
+            return Err(refused());
+        }
+        pieces.push(region.islands[0].hull.iter().map(|center| Disc { center: *center, radius: 0.0 }).collect());
+    }
+    Ok(pieces)
+}

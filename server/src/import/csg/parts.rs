@@ -1,0 +1,255 @@
+//! What calls have become before it is known which primitives stay: a list of parts, and the solid made of it.
+
+use super::flat::Flat;
+use super::place::Placed;
+use super::polygon::Formula;
+use super::{Limits, Place, Problem};
+use crate::import::Note;
+use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
+use contactd_proto::Pose;
+use std::collections::HashMap;
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// Index of a part.
+pub type PartId = usize;
+
+/// What a call became.
+pub enum Part {
+    /// Nothing.
+    Empty,
+    /// A primitive.
+    Leaf(Shape, Pose, Label),
+    /// A shape in the plane of the extrusion around it.
+    Flat(Box<Flat>),
+    /// A shape in a plane, by its name, where no extrusion is around it.
+    Stray(Place, String),
+    /// An operation, where it stands, and its operands.
+    Op(Op, Place, Vec<PartId>),
+}
+
+/// A part, or all that is outside of it, or everything (true) or nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Signed {
+    /// A part.
+    In(PartId),
+    /// What is outside of a part.
+    Out(PartId),
+    /// Everything or nothing.
+    Known(bool),
+}
+
+/// Parts and notes as they come.
+pub struct Parts<'a> {
+    limits: &'a Limits,
+    /// What was noticed.
+    pub notes: Vec<Note>,
+    /// All parts; a part that is not replaced by a later one comes after its operands.
+    pub list: Vec<Part>,
+    /// Of a round primitive: into how many pieces OpenSCAD cuts it.
+    pub pieces: HashMap<PartId, u32>,
+    /// Of an extruded island: the part that is its convex hull.
+    pub hulls: HashMap<PartId, PartId>,
+    faces: usize,
+}
+
+/// True for a primitive that is meant to reach to infinity.
+pub fn is_unbounded(shape: &Shape) -> bool {
+    !shape.geometry().ball().radius.is_finite()
+}
+
+impl<'a> Parts<'a> {
+    /// None yet.
+    pub fn new(limits: &'a Limits) -> Self {
+        let (pieces, hulls) = (HashMap::new(), HashMap::new());
+        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, hulls, faces: 0 }
+    }
+
+    /// Adds a part.
+    pub fn push(&mut self, part: Part) -> PartId {
+        self.list.push(part);
+        self.list.len() - 1
+    }
+
+    /// Adds a note.
+    pub fn note(&mut self, at: Place, text: impl Into<String>, amount: Option<f64>) {
+        self.notes.push(Note { at, text: text.into(), amount });
+    }
+
+    /// An operation.
+    pub fn op(&mut self, op: Op, at: Place, operands: Vec<PartId>) -> PartId {
+        match operands.as_slice() {
+            [one] => *one,
+            _ => self.push(Part::Op(op, at, operands)),
+        }
+    }
+
+    /// Refuses more faces of one primitive or shape than the limit says.
+    pub fn affordable(&self, at: Place, faces: usize) -> Result<()> {
+        if faces > self.limits.polyhedron_faces {
+            return Err((at, Problem::Limit { what: "faces of a primitive", limit: self.limits.polyhedron_faces }));
+        }
+        Ok(())
+    }
+
+    /// A primitive as it was placed.
+    pub fn leaf(&mut self, name: &str, at: Place, placed: std::result::Result<Placed, Problem>) -> Result<Part> {
+        let Placed { shape, frame, mirrored, notes } = placed.map_err(|p| (at, p))?;
+        let geometry = shape.geometry();
+        self.faces += geometry.faces().len();
+        if self.faces > self.limits.faces {
+            return Err((at, Problem::Limit { what: "faces", limit: self.limits.faces }));
+        }
+        let bounded = is_unbounded(&shape) || geometry.aabb(&frame).is_finite();
+        if !(bounded && frame.position.is_finite()) {
+            return Err((at, Problem::syntax("coordinates that a double can hold", "an overflow")));
+        }
+        for (text, amount) in notes {
+            self.note(at, text, amount);
+        }
+        let label = Label { name: name.to_owned(), line: at.line, column: at.column, mirrored };
+        Ok(Part::Leaf(shape, frame, label))
+    }
+
+    /// All (true) or one of some parts and outsides of parts must hold. What has an outside is a difference where it is bounded.
+    pub fn many(&mut self, all: bool, at: Place, of: Vec<Signed>) -> Signed {
+        if of.contains(&Signed::Known(!all)) {
+            return Signed::Known(!all);
+        }
+        let (mut ins, mut outs) = (Vec::new(), Vec::new());
+        for s in of {
+            match s {
+                Signed::In(p) => ins.push(p),
+                Signed::Out(p) => outs.push(p),
+                Signed::Known(_) => {}
+            }
+        }
+        match (all, ins.is_empty(), outs.is_empty()) {
+            (_, true, true) => Signed::Known(all),
+            (true, true, false) => Signed::Out(self.op(Op::Union, at, outs)),
+            (true, false, _) => {
+                let base = self.op(Op::Intersection, at, ins);
+                Signed::In(self.op(Op::Difference, at, [vec![base], outs].concat()))
+            }
+            (false, false, true) => Signed::In(self.op(Op::Union, at, ins)),
+            (false, _, false) => {
+                let base = self.op(Op::Intersection, at, outs);
+                Signed::Out(self.op(Op::Difference, at, [vec![base], ins].concat()))
+            }
+        }
+    }
+
+    /// The parts of a formula whose edges `edge` makes.
+    pub fn formula(
+        &mut self,
+        at: Place,
+        formula: &Formula,
+        edge: &mut dyn FnMut(&mut Self, usize) -> Result<Signed>,
+    ) -> Result<Signed> {
+        if formula.depth() > self.limits.depth {
+            return Err((at, Problem::Limit { what: "levels of nesting", limit: self.limits.depth }));
+        }
+        self.below(at, formula, edge)
+    }
+
+    fn below(
+        &mut self,
+        at: Place,
+        formula: &Formula,
+        edge: &mut dyn FnMut(&mut Self, usize) -> Result<Signed>,
+    ) -> Result<Signed> {
+        match formula {
+            Formula::Edge(e) => edge(self, *e),
+            Formula::Many(all, list) => {
+                let of = list.iter().map(|f| self.below(at, f, edge)).collect::<Result<Vec<_>>>()?;
+                Ok(self.many(*all, at, of))
+            }
+        }
+    }
+
+    /// The leaves below a part of which it is the union, and whether something is taken from any of them; `None` where it is cut
+    /// in another way.
+    pub fn leaves(&self, root: PartId) -> Option<(Vec<PartId>, bool)> {
+        let (mut found, mut cut, mut stack) = (Vec::new(), false, vec![root]);
+        while let Some(p) = stack.pop() {
+            match &self.list[p] {
+                Part::Empty | Part::Stray(..) => {}
+                Part::Leaf(..) | Part::Flat(_) => found.push(p),
+                Part::Op(Op::Union, _, of) => stack.extend(of.iter().rev()),
+                Part::Op(Op::Difference, _, of) => {
+                    cut |= of.iter().skip(1).any(|c| !matches!(self.list[*c], Part::Empty));
+                    stack.extend(of.first());
+                }
+                Part::Op(Op::Intersection, _, of) if of.len() == 1 => stack.extend(of),
+                Part::Op(Op::Intersection, ..) => return None,
+            }
+        }
+        Some((found, cut))
+    }
+}
+
+/// Which parts are empty: those made of nothing, and those that cannot contribute.
+fn empties(parts: &[Part], root: PartId) -> Vec<bool> {
+    let mut empty = vec![false; parts.len()];
+    let mut stack = vec![(root, false)];
+    while let Some((p, done)) = stack.pop() {
+        empty[p] = match &parts[p] {
+            Part::Empty | Part::Flat(_) | Part::Stray(..) => true,
+            Part::Leaf(..) => false,
+            Part::Op(_, _, of) if !done => {
+                stack.push((p, true));
+                stack.extend(of.iter().map(|c| (*c, false)));
+                continue;
+            }
+            Part::Op(Op::Union, _, c) => c.iter().all(|c| empty[*c]),
+            Part::Op(Op::Intersection, _, c) => c.is_empty() || c.iter().any(|c| empty[*c]),
+            Part::Op(Op::Difference, _, c) => c.first().is_none_or(|c| empty[*c]),
+        };
+    }
+    empty
+}
+
+/// Builds the solid of `root`, leaving out what cannot contribute; where that is more than nothing, a note tells.
+pub fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid {
+    let empty = empties(&parts, root);
+    for (i, part) in parts.iter().enumerate() {
+        if let Part::Op(op, at, c) = part
+            && empty[i]
+            && c.iter().any(|c| !empty[*c])
+        {
+            let what = if *op == Op::Difference { "a difference from" } else { "an intersection with" };
+            notes.push(Note {
+                at: *at,
+                text: format!("{what} nothing: left out with all that is inside"),
+                amount: None,
+            });
+        }
+    }
+    enum Visit {
+        Enter(PartId),
+        Leave(Op, usize),
+    }
+    let mut builder = SolidBuilder::new();
+    let mut built: Vec<NodeId> = Vec::new();
+    let mut visits = vec![Visit::Enter(root)];
+    while let Some(visit) = visits.pop() {
+        match visit {
+            Visit::Enter(p) if empty[p] => built.push(builder.empty()),
+            Visit::Enter(p) => match std::mem::replace(&mut parts[p], Part::Empty) {
+                Part::Empty | Part::Flat(_) | Part::Stray(..) => built.push(builder.empty()),
+                Part::Leaf(shape, frame, label) => built.push(builder.primitive(shape, frame, label)),
+                Part::Op(op, _, children) => {
+                    let kept: Vec<PartId> = children.into_iter().filter(|c| !empty[*c]).collect();
+                    visits.push(Visit::Leave(op, kept.len()));
+                    visits.extend(kept.into_iter().rev().map(Visit::Enter));
+                }
+            },
+            Visit::Leave(op, count) => {
+                let children = built.split_off(built.len() - count);
+                built.push(builder.operation(op, &children));
+            }
+        }
+    }
+    let root = built.pop().unwrap_or_else(|| builder.empty());
+    builder.finish(root)
+}

@@ -1,0 +1,127 @@
+//! Set operations on polygons: edges of all operands are cut at each other, and those stay that have the inside of the result on
+//! one side alone.
+
+use super::rings::{Owned, bits, cut, simple, traced};
+use super::{order, turn};
+use glam::DVec2;
+use std::collections::HashMap;
+
+/// Corners are moved to a grid of this times the largest coordinate, so that edges meant to lie on each other do so to the bit.
+const GRID: f64 = 1.0 / (1u64 << 40) as f64;
+/// Rounds of cutting.
+const ROUNDS: usize = 8;
+
+/// Paths around what `inside` says of some operands, each filled by the even-odd rule: it is given whether a point lies in each of
+/// them. `None` where edges make no closed ring.
+pub fn overlay(operands: &[Vec<Vec<DVec2>>], inside: &dyn Fn(&[bool]) -> bool) -> Option<Vec<Vec<DVec2>>> {
+    let largest = operands.iter().flatten().flatten().fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
+    if largest == 0.0 {
+        return Some(Vec::new());
+    }
+    // A power of two: what is short stays as it is.
+    let grid = (largest * GRID).log2().ceil().exp2();
+    let snap = |p: DVec2| (p / grid).round() * grid + DVec2::ZERO;
+    let mut edges: Vec<Owned> = Vec::new();
+    for (owner, paths) in operands.iter().enumerate() {
+        for path in paths {
+            let at = |i: usize| snap(path[i % path.len()]);
+            let all = (0..path.len()).map(|i| ([at(i), at(i + 1)], owner));
+            edges.extend(all.filter(|(e, _)| e[0] != e[1]));
+        }
+    }
+    for _ in 0..ROUNDS {
+        let before = edges.len();
+        edges = cut(&edges, &snap).0;
+        if edges.len() == before {
+            break;
+        }
+    }
+    let pieces = pieces(&edges, operands.len());
+    let kept: Vec<[DVec2; 2]> =
+        pieces.iter().filter(|(e, own)| bounds(*e, own, &pieces, inside)).map(|(e, _)| *e).collect();
+    let (rings, open) = traced(&kept);
+    (!open).then(|| simple(rings))
+}
+
+/// Every edge once, with whether it is a side of each operand: there an odd number of times.
+fn pieces(edges: &[Owned], operands: usize) -> Vec<([DVec2; 2], Vec<bool>)> {
+    let mut place: HashMap<[[u64; 2]; 2], usize> = HashMap::with_capacity(edges.len());
+    let mut pieces: Vec<([DVec2; 2], Vec<bool>)> = Vec::with_capacity(edges.len());
+    for ([a, b], owner) in edges {
+        let e = if order(*a, *b).is_lt() { [*a, *b] } else { [*b, *a] };
+        let at = *place.entry(e.map(bits)).or_insert_with(|| {
+            pieces.push((e, vec![false; operands]));
+            pieces.len() - 1
+        });
+        pieces[at].1[*owner] ^= true;
+    }
+    pieces
+}
+
+/// True when the result lies on one side of an edge: counted along a ray from its middle, up or, from a steep one, to the right.
+fn bounds(e: [DVec2; 2], own: &[bool], pieces: &[([DVec2; 2], Vec<bool>)], inside: &dyn Fn(&[bool]) -> bool) -> bool {
+    let steep = (e[1].y - e[0].y).abs() > (e[1].x - e[0].x).abs();
+    let flip = |p: DVec2| if steep { DVec2::new(p.y, p.x) } else { p };
+    let middle = flip((e[0] + e[1]) * 0.5);
+    let mut beside = vec![false; own.len()];
+    for (other, owners) in pieces {
+        if *other == e {
+            continue;
+        }
+        let (a, b) = (flip(other[0]), flip(other[1]));
+        if (a.x > middle.x) != (b.x > middle.x) {
+            let (a, b) = if a.x < b.x { (a, b) } else { (b, a) };
+            if turn(a, b, middle) < 0.0 {
+                beside.iter_mut().zip(owners).for_each(|(x, o)| *x ^= o);
+            }
+        }
+    }
+    let beyond: Vec<bool> = beside.iter().zip(own).map(|(x, o)| x ^ o).collect();
+    inside(&beside) != inside(&beyond)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    fn holds(paths: &[Vec<DVec2>], p: DVec2) -> bool {
+        let edges = paths.iter().flat_map(|path| (0..path.len()).map(move |i| (path[i], path[(i + 1) % path.len()])));
+        let crosses =
+            |(a, b): &(DVec2, DVec2)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y);
+        edges.filter(crosses).count() % 2 == 1
+    }
+
+    #[test]
+    fn overlays_hold_what_the_operands_say() {
+        let mut r = Random(11);
+        for round in 0..200 {
+            let operands: Vec<Vec<Vec<DVec2>>> = (0..4)
+                .map(|_| {
+                    let n = 3 + (r.unit() * 6.0) as usize;
+                    let corner = |r: &mut Random| {
+                        let p = DVec2::new(r.within(-2.0, 2.0), r.within(-2.0, 2.0));
+                        // On a grid every other time: sides lie on each other.
+                        if round % 2 == 0 { p.round() } else { p }
+                    };
+                    vec![(0..n).map(|_| corner(&mut r)).collect()]
+                })
+                .collect();
+            let says = |m: &[bool]| (m[0] || m[1]) && !m[2] || m[3] && m[1];
+            let paths = overlay(&operands, &says).expect("closed rings");
+            for _ in 0..300 {
+                let p = DVec2::new(r.within(-2.1, 2.1), r.within(-2.1, 2.1));
+                let near = operands.iter().flatten().any(|path| {
+                    (0..path.len()).any(|i| {
+                        let (a, b) = (path[i], path[(i + 1) % path.len()]);
+                        let along = b - a;
+                        let t = ((p - a).dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+                        (a + along * t - p).length() < 1e-9
+                    })
+                });
+                let of_each: Vec<bool> = operands.iter().map(|o| holds(o, p)).collect();
+                assert!(near || holds(&paths, p) == says(&of_each), "{p}: {operands:?} gave {paths:?}");
+            }
+        }
+    }
+}

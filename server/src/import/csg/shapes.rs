@@ -1,0 +1,282 @@
+//! The primitives: what each call makes.
+//!
+//! What has no size is nothing, with a note, as in OpenSCAD.
+
+use super::arguments::Arguments;
+use super::facets::{faceted_sphere, prism, ring};
+use super::flat::{Flat, Outline};
+use super::hull::point_hull;
+use super::parts::{Part, PartId, Parts};
+use super::place;
+use super::syntax::Call;
+use super::{Facets, Limits, Place, Problem};
+use crate::solid::Op;
+use crate::solid::primitive::MeshError;
+use glam::{DAffine3, DVec2, DVec3};
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// From this `$fn` on a curved primitive is taken as exact (`Facets::Auto`).
+const EXACT_FROM: f64 = 9.0;
+
+/// Makes primitives.
+pub struct Shapes<'l> {
+    /// How curved ones are taken.
+    pub facets: Facets,
+    /// What a file may ask for.
+    pub limits: &'l Limits,
+    /// Where they go.
+    pub parts: Parts<'l>,
+}
+
+impl Shapes<'_> {
+    /// Nothing, for the reason that the note tells.
+    pub fn nothing(&mut self, call: &Call, why: &str) -> PartId {
+        self.parts.note(call.at, format!("{} {why}: left out, as OpenSCAD does", call.short()), None);
+        self.parts.push(Part::Empty)
+    }
+
+    fn leaf(&mut self, call: &Call, placed: std::result::Result<place::Placed, Problem>) -> Result<PartId> {
+        let leaf = self.parts.leaf(&call.name, call.at, placed)?;
+        Ok(self.parts.push(leaf))
+    }
+
+    /// A round primitive, or OpenSCAD's polyhedron for one that a transform makes something else of.
+    fn round(
+        &mut self,
+        call: &Call,
+        outer: &DAffine3,
+        placed: std::result::Result<place::Placed, Problem>,
+        (pieces, radius): (u32, f64),
+        mesh: &dyn Fn(u32) -> (Vec<DVec3>, Vec<Vec<u32>>),
+    ) -> Result<PartId> {
+        let Err(Problem::Unsupported { construct, .. }) = placed else {
+            let id = self.leaf(call, placed)?;
+            self.parts.pieces.insert(id, pieces);
+            return Ok(id);
+        };
+        let (points, faces) = mesh(pieces);
+        self.parts.affordable(call.at, faces.len())?;
+        let m = outer.matrix3;
+        let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+        let off = radius * size * (1.0 - libm::cos(std::f64::consts::PI / f64::from(pieces)));
+        let count = faces.len();
+        let text = format!("{construct} faceted: taken as OpenSCAD's polyhedron of {count} facets");
+        self.parts.note(call.at, text, Some(off));
+        self.leaf(call, place::polyhedron(outer, &points, &faces).map(|p| p.0))
+    }
+
+    /// `sphere`.
+    pub fn sphere(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
+        let arguments = Arguments::new(call, &["r"])?;
+        let Some(r) = arguments.finite_size("r")? else { return Ok(self.nothing(call, "of no size")) };
+        let mesh = |n: u32| faceted_sphere(r, n, n.div_ceil(2));
+        match self.fragments(&arguments, r)? {
+            None => {
+                let pieces = self.pieces(&arguments, r)?;
+                self.round(call, outer, place::sphere(outer, r), (pieces, r), &mesh)
+            }
+            Some(n) => {
+                self.parts.affordable(call.at, n as usize * n.div_ceil(2) as usize)?;
+                let (points, faces) = mesh(n);
+                self.leaf(call, place::polyhedron(outer, &points, &faces).map(|p| p.0))
+            }
+        }
+    }
+
+    /// `cylinder`.
+    pub fn cylinder(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
+        let arguments = Arguments::new(call, &["h", "r1", "r2", "center"])?;
+        let (h, r1, r2) = (arguments.size("h")?, arguments.not_negative("r1")?, arguments.not_negative("r2")?);
+        let center = arguments.bool_or("center", false)?;
+        let (Some(h), Some(r1), Some(r2)) = (h, r1, r2) else { return Ok(self.nothing(call, "of no size")) };
+        if r1 == 0.0 && r2 == 0.0 {
+            return Ok(self.nothing(call, "of no size"));
+        }
+        if r1.is_infinite() && r2.is_infinite() {
+            let sides = DVec3::new(f64::INFINITY, f64::INFINITY, h);
+            // Sideways it has no ends, so only z tells whether it is centred.
+            return self.infinite_box(call, outer, sides, [true, true, center]);
+        }
+        if !(h.is_finite() && r1.is_finite() && r2.is_finite()) {
+            let found = format!("h = {h}, r1 = {r1}, r2 = {r2}");
+            return Err((call.at, Problem::syntax("a finite cylinder, or one with r1 and r2 infinite", found)));
+        }
+        let (low, high) = if center { (-0.5 * h, 0.5 * h) } else { (0.0, h) };
+        let mesh = |n: u32| prism(&ring(r1, n), &ring(r2, n), low, high);
+        match self.fragments(&arguments, r1.max(r2))? {
+            None => {
+                let middle = DVec3::new(0.0, 0.0, 0.5 * (low + high));
+                let pieces = self.pieces(&arguments, r1.max(r2))?;
+                let placed = place::cylinder(outer, middle, r1, r2, h);
+                self.round(call, outer, placed, (pieces, r1.max(r2)), &mesh)
+            }
+            Some(n) => {
+                self.parts.affordable(call.at, n as usize + 2)?;
+                let (points, faces) = mesh(n);
+                self.leaf(call, place::polyhedron(outer, &points, &faces).map(|p| p.0))
+            }
+        }
+    }
+
+    /// `cube`.
+    pub fn cube(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
+        let arguments = Arguments::new(call, &["size", "center"])?;
+        let size = arguments.sizes("size")?;
+        let center = arguments.bool_or("center", false)?;
+        let Some(size) = size else { return Ok(self.nothing(call, "of no size")) };
+        if !size.is_finite() {
+            return self.infinite_box(call, outer, size, [center; 3]);
+        }
+        let middle = if center { DVec3::ZERO } else { size * 0.5 };
+        self.leaf(call, place::cuboid(outer, middle, size * 0.5))
+    }
+
+    /// A box with infinite sides: an intersection of half-spaces. A centred infinite side has no ends, any other begins
+    /// at 0.
+    fn infinite_box(&mut self, call: &Call, outer: &DAffine3, size: DVec3, center: [bool; 3]) -> Result<PartId> {
+        let mut ends: Vec<(DVec3, f64)> = Vec::new();
+        for k in 0..3 {
+            let axis = DVec3::AXES[k];
+            match (size[k].is_finite(), center[k]) {
+                (true, true) => ends.extend([(axis, 0.5 * size[k]), (-axis, 0.5 * size[k])]),
+                (true, false) => ends.extend([(axis, size[k]), (-axis, 0.0)]),
+                (false, false) => ends.push((-axis, 0.0)),
+                (false, true) => {}
+            }
+        }
+        if ends.is_empty() {
+            return Err((call.at, Problem::syntax("a primitive with at least one face", "all of space")));
+        }
+        self.parts.note(call.at, format!("an infinite {}: {} half-space(s)", call.name, ends.len()), None);
+        let mut made = Vec::with_capacity(ends.len());
+        for (n, d) in ends {
+            made.push(self.leaf(call, Ok(place::half_space(outer, n, d)))?);
+        }
+        Ok(self.parts.push(Part::Op(Op::Intersection, call.at, made)))
+    }
+
+    /// `polyhedron`; below a hull the points of its faces are enough.
+    pub fn polyhedron(&mut self, call: &Call, outer: &DAffine3, hull: bool) -> Result<PartId> {
+        let arguments = Arguments::new(call, &["points", "faces"])?;
+        let points: Vec<DVec3> = arguments.points::<3>("points")?.into_iter().map(DVec3::from_array).collect();
+        let faces = arguments.index_lists("faces", points.len())?;
+        self.parts.affordable(call.at, faces.len())?;
+        let mut mesh = place::polyhedron(outer, &points, &faces);
+        if hull && matches!(mesh, Err(Problem::Mesh(_))) {
+            let used: Vec<DVec3> = faces.iter().flatten().map(|i| points[*i as usize]).collect();
+            if let Some(faces) = point_hull(&used) {
+                self.parts.affordable(call.at, faces.len())?;
+                let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
+                mesh = place::polyhedron(outer, &used, &faces);
+            }
+        }
+        let (placed, fit) = match mesh {
+            Err(Problem::Mesh(MeshError::Flat)) => return Ok(self.nothing(call, "without volume")),
+            placed => placed.map_err(|p| (call.at, p))?,
+        };
+        let mut note = |text: &str, amount| self.parts.note(call.at, text, amount);
+        if fit.flipped {
+            note("a polyhedron with all faces reversed: flipped", None);
+        }
+        if fit.merged > 0 {
+            note("a polyhedron with coplanar neighbours: merged into one face each", None);
+        }
+        if fit.moved > 0.0 {
+            note(
+                "a polyhedron that is not quite convex or not quite planar: taken as the hull of its planes",
+                Some(fit.moved),
+            );
+        }
+        self.leaf(call, Ok(placed))
+    }
+
+    /// `circle`, `square` or `polygon`, in a plane.
+    pub fn outline(&mut self, call: &Call, inner: DAffine3, overshoot: u32) -> Result<PartId> {
+        let mut pieces = 0;
+        let outline = match call.name.as_str() {
+            "circle" => {
+                let arguments = Arguments::new(call, &["r"])?;
+                let Some(r) = arguments.finite_size("r")? else { return Ok(self.nothing(call, "of no size")) };
+                pieces = self.pieces(&arguments, r)?;
+                match self.fragments(&arguments, r)? {
+                    None => Outline::Circle(r),
+                    Some(n) => Outline::Paths(vec![ring(r, n)]),
+                }
+            }
+            "square" => {
+                let arguments = Arguments::new(call, &["size", "center"])?;
+                let size = arguments.sizes_2d("size")?;
+                let center = arguments.bool_or("center", false)?;
+                let Some(size) = size else { return Ok(self.nothing(call, "of no size")) };
+                Outline::Square { corner: if center { size * -0.5 } else { DVec2::ZERO }, size }
+            }
+            _ => {
+                let arguments = Arguments::new(call, &["points", "paths"])?;
+                if arguments.get("points").is_none() && !call.arguments.is_empty() {
+                    return Ok(self.nothing(call, "without points"));
+                }
+                let points: Vec<DVec2> = arguments.points::<2>("points")?.into_iter().map(DVec2::from_array).collect();
+                let paths = match arguments.get("paths") {
+                    None => vec![points],
+                    Some(_) => {
+                        let lists = arguments.index_lists("paths", points.len())?;
+                        lists.iter().map(|l| l.iter().map(|i| points[*i as usize]).collect()).collect()
+                    }
+                };
+                self.parts.affordable(call.at, paths.iter().map(Vec::len).sum::<usize>() + 2)?;
+                if paths.iter().all(|p| p.len() < 3) {
+                    return Ok(self.nothing(call, "without area"));
+                }
+                Outline::Paths(paths)
+            }
+        };
+        let flat = Flat { outline, inner, overshoot, name: call.name.clone(), at: call.at, pieces };
+        Ok(self.parts.push(Part::Flat(Box::new(flat))))
+    }
+
+    /// How many sides a curved primitive of radius `r` gets; `None` for as many as it has: none.
+    pub fn fragments(&mut self, arguments: &Arguments<'_>, r: f64) -> Result<Option<u32>> {
+        let fn_ = arguments.number_or("$fn", 0.0)?;
+        let name = arguments.name();
+        let faceted = match self.facets {
+            Facets::Exact => false,
+            Facets::Auto => fn_ > 0.0 && fn_ < EXACT_FROM,
+            Facets::AsWritten => true,
+        };
+        if !faceted {
+            if fn_ > 0.0 {
+                self.parts.note(arguments.at(), format!("{name} with $fn = {fn_}: taken as exact"), None);
+            }
+            return Ok(None);
+        }
+        if fn_ <= 0.0 && arguments.number_or("$fe", 0.0)? > 0.0 {
+            let construct = format!("$fe of {name} taken as written");
+            return Err((arguments.at(), Problem::Unsupported { construct, hint: " (give $fn, or $fa and $fs)" }));
+        }
+        let n = pieces(arguments, r)?;
+        if n > self.limits.polyhedron_faces as f64 {
+            let problem = Problem::Limit { what: "faces of a primitive", limit: self.limits.polyhedron_faces };
+            return Err((arguments.at(), problem));
+        }
+        self.parts.note(arguments.at(), format!("{name} taken as OpenSCAD's polyhedron of {n} sides"), None);
+        Ok(Some(n as u32))
+    }
+
+    /// How many pieces OpenSCAD cuts a curve of radius `r` into, where it has to be cut; never more than the limit.
+    pub fn pieces(&self, arguments: &Arguments<'_>, r: f64) -> Result<u32> {
+        // Whatever is written there: whole curves are not cut, and their arguments change nothing.
+        Ok(pieces(arguments, r).map_or(30.0, |n| n.min(self.limits.polyhedron_faces as f64)) as u32)
+    }
+}
+
+/// OpenSCAD's rule (Calc::get_fragments_from_r).
+fn pieces(arguments: &Arguments<'_>, r: f64) -> Result<f64> {
+    let fn_ = arguments.number_or("$fn", 0.0)?;
+    let (fs, fa) = (arguments.number_or("$fs", 2.0)?, arguments.number_or("$fa", 12.0)?);
+    Ok(if fn_ > 0.0 {
+        fn_.max(3.0).floor()
+    } else {
+        (360.0 / fa.max(0.01)).min(r * std::f64::consts::TAU / fs.max(0.01)).max(5.0).ceil()
+    })
+}
