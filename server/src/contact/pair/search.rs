@@ -92,7 +92,7 @@ fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     }
 }
 
-/// Cells' worth of work after which a coarser resolution is tried.
+/// Effort (`Counters::effort`) after which a coarser resolution is tried.
 const PATIENCE: u64 = 100_000;
 
 /// How much coarser, and how often.

@@ -107,6 +107,9 @@ pub struct Counters {
 /// others.
 pub const EVALUATIONS_PER_CELL: u64 = 64;
 
+/// Cells' worth of evaluations that count as one cell where a search's patience is concerned.
+const DEAR: u64 = 3;
+
 /// Cells that a pair may cost by default.
 pub const DEFAULT_CELL_LIMIT: u64 = 1_000_000;
 
@@ -115,6 +118,12 @@ impl Counters {
     /// them (less what a small limit leaves of the default one), whichever is more.
     pub fn spent(&self, limit: u64) -> u64 {
         self.cells.max(self.worth(limit))
+    }
+
+    /// What counts against a search's patience: its cells, or a third of the cells' worth of evaluations that they took, whichever
+    /// is more. Few cells whose clauses are dear are no sign that a search is stuck.
+    pub fn effort(&self) -> u64 {
+        self.cells.max(self.evaluations / (DEAR * EVALUATIONS_PER_CELL))
     }
 
     fn worth(&self, limit: u64) -> u64 {

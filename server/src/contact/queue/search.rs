@@ -19,7 +19,7 @@ use super::scratch::Scratch;
 use super::slices::Slices;
 use crate::contact::exclusion::clause::{self, Advance, Hint};
 use crate::contact::exclusion::literal::{Side, View};
-use crate::contact::query::outcome::{Counters, DEFAULT_CELL_LIMIT};
+use crate::contact::query::outcome::Counters;
 use crate::contact::witness::climb;
 use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
@@ -72,7 +72,7 @@ pub struct Search<'a> {
     instant: Instant,
     /// Cells after which a witness is looked for where the search has come to.
     probe: u64,
-    /// Cells' worth of work after which the search ends as `Ending::Long`.
+    /// Effort (`Counters::effort`) after which the search ends as `Ending::Long`.
     pub(in crate::contact) patience: u64,
     /// Where the search came to its end without an answer: time and place.
     stuck: Option<(f64, DVec3)>,
@@ -156,8 +156,8 @@ impl<'a> Search<'a> {
             {
                 return Some(Ending::Limit(cell.t));
             }
-            // Counted as the default limit counts, so that no other limit changes an answer that it does not cut.
-            if cell.source == Source::Cell && self.contacts.counters.spent(DEFAULT_CELL_LIMIT) >= self.patience {
+            // Counted the same whatever the limit is, so that none changes an answer that it does not cut.
+            if cell.source == Source::Cell && self.contacts.counters.effort() >= self.patience {
                 return Some(self.impatient(&cell));
             }
             if cell.source == Source::Cell && self.contacts.counters.cells >= self.probe {
