@@ -1,7 +1,7 @@
 //! Random CSG trees of all primitives and operations, and random motions, from a seed: the same seed, the same solid.
 
 use contactd::motion::Placed;
-use contactd::solid::primitive::{Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Shape, Sphere};
+use contactd::solid::primitive::{Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Shape, Sphere, Torus};
 use contactd::solid::{Label, NodeId, Op, Solid, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
@@ -78,11 +78,28 @@ pub fn shape(r: &mut Random, size: f64) -> Shape {
     }
 }
 
+/// A random torus of size about `size`; one in four has no hole.
+pub fn torus(r: &mut Random, size: f64) -> Torus {
+    let minor = size * r.within(0.1, 0.4);
+    let major = if r.below(4) == 0 { minor * r.within(0.2, 1.0) } else { minor + size * r.within(0.02, 0.6) };
+    Torus { major, minor }
+}
+
+/// The same as `shape`, or a torus, one in three.
+pub fn shape_or_torus(r: &mut Random, size: f64) -> Shape {
+    if r.below(3) == 0 { torus(r, size).into() } else { shape(r, size) }
+}
+
 /// A random solid whose tree has up to `depth` levels of operations; bounded, its plain box not empty.
 pub fn solid(r: &mut Random, depth: usize) -> Solid {
+    solid_of(r, depth, shape)
+}
+
+/// The same of primitives that `shape` draws.
+pub fn solid_of(r: &mut Random, depth: usize, shape: fn(&mut Random, f64) -> Shape) -> Solid {
     loop {
         let mut b = SolidBuilder::new();
-        let root = node(r, &mut b, depth, 1.0, false);
+        let root = node_of(r, &mut b, depth, 1.0, (false, shape));
         let s = b.finish(root);
         if s.aabb().is_finite() {
             return s;
@@ -92,6 +109,13 @@ pub fn solid(r: &mut Random, depth: usize) -> Solid {
 
 /// Adds a random tree of up to `depth` levels to a builder; an `operand` of something bounded may be a half-space.
 pub fn node(r: &mut Random, b: &mut SolidBuilder, depth: usize, size: f64, operand: bool) -> NodeId {
+    node_of(r, b, depth, size, (operand, shape))
+}
+
+/// A source of random primitives of a size.
+type Draw = fn(&mut Random, f64) -> Shape;
+
+fn node_of(r: &mut Random, b: &mut SolidBuilder, depth: usize, size: f64, (operand, shape): (bool, Draw)) -> NodeId {
     if depth == 0 || r.below(8) == 0 {
         let frame = Pose::new(r.vector(0.8 * size), r.rotation());
         if operand && r.below(6) == 0 {
@@ -102,13 +126,13 @@ pub fn node(r: &mut Random, b: &mut SolidBuilder, depth: usize, size: f64, opera
     }
     let arity = 2 + r.below(3);
     let op = [Op::Union, Op::Difference, Op::Difference, Op::Intersection][r.below(4)];
-    let mut children = vec![node(r, b, depth - 1, size, false)];
+    let mut children = vec![node_of(r, b, depth - 1, size, (false, shape))];
     for _ in 1..arity {
         // Subtracted and intersecting operands may be unbounded: the first operand bounds the result.
         let child = match op {
-            Op::Union => node(r, b, depth - 1, size, false),
-            Op::Difference => node(r, b, depth - 1, 0.7 * size, true),
-            Op::Intersection => node(r, b, depth - 1, 1.6 * size, true),
+            Op::Union => node_of(r, b, depth - 1, size, (false, shape)),
+            Op::Difference => node_of(r, b, depth - 1, 0.7 * size, (true, shape)),
+            Op::Intersection => node_of(r, b, depth - 1, 1.6 * size, (true, shape)),
         };
         children.push(child);
     }

@@ -133,6 +133,7 @@ impl<'a> Side<'a> {
             Face::Sphere(surface::Sphere { center: o, radius })
             | Face::Cylinder(surface::Cylinder { origin: o, radius, .. }) => o.length() + radius,
             Face::Cone(surface::Cone { apex, .. }) => apex.length(),
+            Face::Torus(surface::Torus { origin, major, minor, .. }) => origin.length() + major + minor,
         });
         let motion = &moving.motion;
         let extent = motion.start.position.length()
@@ -465,6 +466,11 @@ fn features(
             Face::Cylinder(surface::Cylinder { origin: o, axis, .. })
             | Face::Cone(surface::Cone { apex: o, axis, .. }) => {
                 moves / axis.cross(point - o).length().max(f64::MIN_POSITIVE)
+            }
+            Face::Torus(surface::Torus { origin, axis, major, .. }) => {
+                let rho = axis.cross(point - origin).length();
+                let tube = (rho - major).hypot(axis.dot(point - origin));
+                moves / tube.min(rho).max(f64::MIN_POSITIVE)
             }
         });
         each.fold(0.0, f64::max)

@@ -6,7 +6,7 @@
 
 use crate::random_solids::Random;
 use crate::reference::{self, Effort, Moving, Truth};
-use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere};
+use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere, Torus};
 use contactd::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
 use glam::{DQuat, DVec3};
@@ -40,6 +40,10 @@ impl Recipe {
     /// Box with the given half extents.
     pub fn cuboid(x: f64, y: f64, z: f64) -> Self {
         Self::of(Cuboid { half: DVec3::new(x, y, z) })
+    }
+    /// A torus about z.
+    pub fn torus(major: f64, minor: f64) -> Self {
+        Self::of(Torus { major, minor })
     }
     /// Regular polyhedron with 4, 6, 8, 12 or 20 faces.
     pub fn platonic(faces: usize, radius: f64) -> Self {
@@ -110,6 +114,7 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
         }
         .into(),
         Shape::HalfSpace(h) => h.clone().into(),
+        Shape::Torus(t) => Torus { major: t.major * k, minor: t.minor * k }.into(),
     }
 }
 

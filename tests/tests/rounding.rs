@@ -145,6 +145,12 @@ fn psi(face: &Face, x: &Vector) -> Big {
             let (rho, z) = across(axis, &x.minus(&Vector::of(apex)));
             rho * big(cos) - z * big(sin)
         }
+        Face::Torus(surface::Torus { origin, axis, major, minor }) => {
+            let (rho, z) = across(axis, &x.minus(&Vector::of(origin)));
+            let off = rho - big(major);
+            let square = &off * &off + &z * &z;
+            (if square == Big::ZERO { big(0.0) } else { square.sqrt() }) - big(minor)
+        }
     }
 }
 
@@ -163,7 +169,7 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
                 let tan = big(sin) / big(cos);
                 (Vector::of(apex + axis * (shrink / sin)), Some(axis), big(0.0), &tan * &tan)
             }
-            Face::Plane(_) => return None,
+            Face::Plane(_) | Face::Torus(_) => return None,
         };
         let o = x.minus(&origin);
         let along = axis.map_or(big(0.0), |a| {
@@ -247,6 +253,21 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
         std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
     let mut r = Random::new(7);
     let models = models(&mut r);
+    evaluate(&mut r, &models, wanted, "all kinds");
+}
+
+#[test]
+fn nothing_that_is_computed_of_a_torus_differs_by_more_than_the_budget() {
+    let wanted: u64 =
+        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
+    let mut r = Random::new(8);
+    let shapes: Vec<Shape> = (0..24).map(|_| random_solids::torus(&mut r, 1.0).into()).collect();
+    let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
+    evaluate(&mut r, &models, wanted, "tori");
+}
+
+/// Draws cells, literals and times until so many numbers were compared.
+fn evaluate(r: &mut Random, models: &[Model], wanted: u64, name: &str) {
     let mut worst = Worst::default();
     while worst.evaluations < wanted {
         let (a, mut b) = (&models[r.below(models.len())], &models[r.below(models.len())]);
@@ -263,10 +284,10 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
             1 => r.within(0.0, 81.0) * TAU,
             _ => r.within(0.0, 3.0),
         };
-        let (turns_a, turns_b) = (turns(&mut r), turns(&mut r));
+        let (turns_a, turns_b) = (turns(r), turns(r));
         let place = |r: &mut Random| Pose::new(r.vector(2.0), r.rotation());
-        let placed_a = Placed { place: place(&mut r), motion: motion(&mut r, base, reach, turns_a) };
-        let mut placed_b = Placed { place: place(&mut r), motion: motion(&mut r, base, reach, turns_b) };
+        let placed_a = Placed { place: place(r), motion: motion(r, base, reach, turns_a) };
+        let mut placed_b = Placed { place: place(r), motion: motion(r, base, reach, turns_b) };
         if leans {
             let lean =
                 contactd_proto::motion::quat_of_rotation_vector(r.direction() * 10f64.powf(r.within(-12.0, -3.0)));
@@ -289,7 +310,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
             let mut beside_axis_of = None;
             if r.chance(0.3) {
                 // On an axis, where directions are noise, or very near it, in a cell of that size.
-                if let Some((face, origin)) = axis_point(&mut r, a) {
+                if let Some((face, origin)) = axis_point(r, a) {
                     beside_axis_of = Some(face);
                     size = 10f64.powf(r.within(-14.0, -8.0));
                     let beside = if r.chance(0.3) { DVec3::ZERO } else { r.direction() * size * aabb.half().length() };
@@ -318,7 +339,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
             };
             let inside = |r: &mut Random| (center + half * r.vector(1.0)).clamp(center - half, center + half);
             let (c_b, c_a) = in_b(center);
-            let x = inside(&mut r);
+            let x = inside(r);
             let (x_b, x_a) = in_b(x);
             for _ in 0..6 {
                 // The face whose axis is near is asked most of the time.
@@ -372,14 +393,14 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
                         let g = exact_fit((face, in_p), (&other.faces[i], in_q), view.delta, mu).expect("round");
                         // Its own rounding is subtracted already; E stands for the sums.
                         worst.see(|w| &mut w.fit, double(&(plane(&l) - &g)).max(0.0), budget, &what);
-                        let touched = fit::touch(&view, &l, inside(&mut r) - center).expect("curved fits");
+                        let touched = fit::touch(&view, &l, inside(r) - center).expect("curved fits");
                         worst.see(|w| &mut w.fit, double(&(plane(&touched) - &g)).max(0.0), budget, &what);
                     }
                 }
             }
             // Through time: what a clause of one or two literals excludes stays excluded until then.
             let pick = |r: &mut Random, m: &Model| LiteralId::new(r.below(m.solid.faces.len()) as u32, Sense::Positive);
-            let (on_a, on_b) = (pick(&mut r, a), pick(&mut r, b));
+            let (on_a, on_b) = (pick(r, a), pick(r, b));
             let pool = [literal_token(on_a), literal_token(on_b)];
             let alone = r.chance(0.5);
             let pair = Expressions { pool: &pool, a: if alone { (0, 0) } else { (0, 1) }, b: (1, 2) };
@@ -402,7 +423,7 @@ fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget
         }
     }
     println!(
-        "{} evaluations; worst share of the budget: value {:.3}, normal {:.3}, plane {:.3}, fit {:.3}, time {:.3}",
+        "{name}: {} evaluations; worst share of the budget: value {:.3}, normal {:.3}, plane {:.3}, fit {:.3}, time {:.3}",
         worst.evaluations, worst.value, worst.normal, worst.plane, worst.fit, worst.time
     );
     // The budget is a worst case, not a fantasy: something comes within two orders of magnitude of it.
@@ -418,6 +439,13 @@ fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
         Face::Cylinder(surface::Cylinder { origin, axis, .. }) => origin + axis * r.within(-1.0, 1.0),
         Face::Cone(surface::Cone { apex, axis, .. }) => apex + axis * r.within(0.0, 2.0),
         Face::Sphere(surface::Sphere { center, .. }) => center,
+        // On its axis, or on its circle.
+        Face::Torus(surface::Torus { origin, axis, .. }) if r.chance(0.5) => origin + axis * r.within(-1.0, 1.0),
+        Face::Torus(surface::Torus { origin, axis, major, .. }) => {
+            let u = axis.any_orthonormal_vector();
+            let (sin, cos) = r.within(0.0, TAU).sin_cos();
+            origin + (u * cos + axis.cross(u) * sin) * major
+        }
         Face::Plane(_) => return None,
     };
     Some((face, point))

@@ -35,6 +35,9 @@ pub struct Bound {
 
 /// By how much of their distance from an interior point c a primitive's points go out to hold {psi <= margin}.
 fn reach(p: &Primitive, c: DVec3, margin: f64) -> Option<f64> {
+    if !p.is_convex() {
+        return None;
+    }
     let rho = -p.value(c);
     let reach = if margin > 0.0 { margin / rho } else { 0.0 };
     (rho > 0.0 && reach.is_finite()).then_some(reach)
@@ -71,8 +74,15 @@ impl Bound {
     ///
     /// psi is convex and psi(c) = −rho at an interior point c. So y with psi(y) <= margin lies on the ray from c through
     /// a point x of the primitive with |y−c| <= (1 + margin/rho)|x−c|: scaling the primitive's own bounds about c by
-    /// 1 + margin/rho bounds the dilated set, whatever the primitive.
+    /// 1 + margin/rho bounds the dilated set, whatever the primitive. A face that is not convex is an exact distance: it alone
+    /// bounds such a primitive, and its own bounds grow by the margin.
     pub fn of_primitive(p: &Primitive, margin: f64, volumes: Volumes) -> Self {
+        if !p.is_convex() {
+            let rounding = (p.aabb.min.abs().max(p.aabb.max.abs()).max_element() + margin.abs()) * OUTWARD;
+            let by = margin.max(0.0) + rounding;
+            let ball = Ball { center: p.ball.center, radius: p.ball.radius + by };
+            return Self { aabb: p.aabb.grown(by), ball }.tightened(volumes);
+        }
         let c = p.frame.point(p.shape.geometry().interior_point());
         let Some(reach) = reach(p, c, margin) else { return Self::ALL };
         let outward = |x: DVec3, sign: f64| {

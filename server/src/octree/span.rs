@@ -8,8 +8,9 @@
 //! | plane | v − Σ e_k\|n_k\|, exact | v + Σ e_k\|n_k\|, exact |
 //! | sphere | distance of box and centre − r, exact | largest corner value, exact |
 //! | cylinder, cone | the larger of tangent v − Σ e_k\|n_k\| and axis (rho >= 0) | largest corner value, exact |
+//! | torus | the larger of the tangent less what it dips and that of ρ and z | largest corner value of the ball at c, or ρ and z |
 //!
-//! v is psi(c) and n its gradient: psi is convex, so it lies above its tangents and is largest at a corner. The maximum
+//! v is psi(c) and n its gradient: psi is convex (but for a torus), so it lies above its tangents and is largest at a corner. The maximum
 //! over a primitive's faces is exact from above and a lower bound from below. Both are moved outwards by the rounding.
 
 use crate::math::tolerance::OUTWARD;

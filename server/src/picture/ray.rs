@@ -1,7 +1,7 @@
 //! Exact rays through CSG trees: where a line enters and leaves a solid, and through which face.
 //!
-//! Idea (S. Roth, "Ray casting for modeling solids", CGIP 18, 1982): every primitive is convex, so a line meets it in one
-//! span, cut out by its faces; the tree's operations then combine lists of spans. Planes give a half-line, spheres and
+//! Idea (S. Roth, "Ray casting for modeling solids", CGIP 18, 1982): a line meets a convex primitive in one span, cut out by
+//! its faces, and a torus in two; the tree's operations then combine lists of spans. Planes give a half-line, spheres and
 //! cylinders the two roots of a quadratic, the cone's nappe at most one span of its quadratic's sign.
 //! Invariant: spans are disjoint, ascending, none a skin (`THIN`).
 //! Not promised: skins thinner than `THIN`, and rays that graze a face, may go either way. Pictures only.
@@ -99,7 +99,7 @@ impl<'a> Traced<'a> {
         }
         match &self.solid.nodes[node as usize] {
             Node::Empty => vec![],
-            Node::Primitive(p) => span_of(&self.solid.primitives[*p as usize], ray).into_iter().collect(),
+            Node::Primitive(p) => spans_of_primitive(&self.solid.primitives[*p as usize], ray),
             Node::Op(op, children) => {
                 let mut lists: Vec<(usize, Vec<Span>)> = Vec::with_capacity(children.len());
                 for (i, child) in children.iter().enumerate() {
@@ -148,21 +148,33 @@ impl<'a> Traced<'a> {
     }
 }
 
-/// The span of a ray inside a convex primitive.
-fn span_of(primitive: &Primitive, ray: &Ray) -> Option<Span> {
-    let mut enter = Crossing { at: f64::NEG_INFINITY, face: 0, outward: true };
-    let mut leave = Crossing { at: f64::INFINITY, ..enter };
+/// The spans of a ray inside a primitive: what all of its faces' stretches have in common. One of a convex one.
+fn spans_of_primitive(primitive: &Primitive, ray: &Ray) -> Vec<Span> {
+    let enter = Crossing { at: f64::NEG_INFINITY, face: 0, outward: true };
+    let mut spans = vec![(enter, Crossing { at: f64::INFINITY, ..enter })];
     for (i, face) in primitive.faces.iter().enumerate() {
         let id = primitive.first_face + i as u32;
-        let (from, to) = face.inside(ray.origin, ray.direction)?;
-        if from > enter.at {
-            enter = Crossing { at: from, face: id, outward: true };
-        }
-        if to < leave.at {
-            leave = Crossing { at: to, face: id, outward: true };
-        }
+        let stretches = face.inside(ray.origin, ray.direction);
+        let cut = |(enter, leave): &Span| {
+            let (first, last) = (*enter, *leave);
+            stretches.iter().map(move |&(from, to)| {
+                let (mut enter, mut leave) = (first, last);
+                if from > enter.at {
+                    enter = Crossing { at: from, face: id, outward: true };
+                }
+                if to < leave.at {
+                    leave = Crossing { at: to, face: id, outward: true };
+                }
+                (enter, leave)
+            })
+        };
+        spans = match (spans.as_slice(), stretches.as_slice()) {
+            (_, []) => return vec![],
+            (all, _) => all.iter().flat_map(cut).filter(|(enter, leave)| enter.at < leave.at).collect(),
+        };
     }
-    (leave.at - enter.at > THIN * enter.at.abs().min(leave.at.abs())).then_some((enter, leave))
+    spans.retain(|(enter, leave)| leave.at - enter.at > THIN * enter.at.abs().min(leave.at.abs()));
+    spans
 }
 
 /// Combines the spans of several children; children without spans are left out of `lists` but counted in `arity`.
@@ -233,10 +245,15 @@ mod tests {
             Pose::at(DVec3::new(-1.0, 0.0, 0.8)),
             label(),
         );
+        let ring = b.primitive(
+            crate::solid::primitive::Torus { major: 1.1, minor: 0.25 },
+            Pose::new(DVec3::new(1.0, 0.5, -0.8), tilt),
+            label(),
+        );
         let spike =
             b.primitive(Cone { bottom: 0.8, top: 0.0, half_height: 1.5 }, Pose::new(DVec3::NEG_X, tilt), label());
         let drilled = b.operation(Op::Difference, &[body, hole, sink]);
-        let root = b.operation(Op::Union, &[drilled, spike]);
+        let root = b.operation(Op::Union, &[drilled, spike, ring]);
         let solid = b.finish(root);
         let traced = Traced::new(&solid);
         let mut state = 7;

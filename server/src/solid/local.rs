@@ -9,6 +9,7 @@
 //! Invariant: no operator stands directly below one of its own kind, and none has fewer than two operands.
 
 use crate::math::Aabb;
+use crate::solid::surface::Under;
 use crate::solid::{Face, Sense};
 use glam::DVec3;
 
@@ -234,7 +235,7 @@ pub fn literal_token(id: LiteralId) -> Token {
 pub type Span = (f64, f64);
 
 /// Proven bounds of a face's psi over the box of half extents `half` around `center`, up to rounding.
-/// Lower: the tangent at the centre (psi is convex) and the Lipschitz bound; upper: a convex function is largest at a
+/// Lower: the tangent at the centre (psi is convex, or falls below it by its `dip`) and the Lipschitz bound; upper: a convex function is largest at a
 /// corner, which for a plane is v + Σ e|n|, for curved faces bounded by Lipschitz and by tangent plus curvature k·r²/(2ρ).
 pub fn face_span(face: &Face, center: DVec3, half: DVec3) -> Span {
     let at = face.at(center);
@@ -244,7 +245,8 @@ pub fn face_span(face: &Face, center: DVec3, half: DVec3) -> Span {
     }
     let r = half.length();
     let bulge = if at.rho > 0.0 { at.k * r * r / (2.0 * at.rho) } else { f64::INFINITY };
-    (at.value - tilt.min(r), at.value + (tilt + bulge).min(r))
+    let dip = if face.is_convex() { None } else { face.under(center, center).map(|u| Under::dip(u.k, u.rho, r)) };
+    (at.value - (tilt + dip.unwrap_or(0.0)).min(r), at.value + (tilt + bulge).min(r))
 }
 
 /// Truth of a literal at depth `delta` from the bounds of its psi, each of them known to `rounding` (a length).

@@ -30,6 +30,9 @@ impl Literal {
                 Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
                     axis.cross(x - apex).length() * cos - axis.dot(x - apex) * sin
                 }
+                Face::Torus(surface::Torus { origin, axis, major, minor }) => {
+                    (axis.cross(x - origin).length() - major).hypot(axis.dot(x - origin)) - minor
+                }
             }
     }
 
@@ -42,6 +45,10 @@ impl Literal {
                 Face::Sphere(surface::Sphere { center, .. }) => (x - center).normalize_or(DVec3::Z),
                 Face::Cylinder(surface::Cylinder { origin, axis, .. }) => across(origin, axis),
                 Face::Cone(surface::Cone { apex, axis, sin, cos }) => across(apex, axis) * cos - axis * sin,
+                Face::Torus(surface::Torus { origin, axis, major, .. }) => {
+                    let out = across(origin, axis);
+                    (x - origin - out * major).normalize_or(out)
+                }
             }
     }
 
@@ -175,6 +182,9 @@ fn moved(face: &Face, place: &Pose) -> Face {
         }
         Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
             Face::Cone(surface::Cone { apex: point(apex), axis: turned(axis), sin, cos })
+        }
+        Face::Torus(surface::Torus { origin, axis, major, minor }) => {
+            Face::Torus(surface::Torus { origin: point(origin), axis: turned(axis), major, minor })
         }
     }
 }

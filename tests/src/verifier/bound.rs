@@ -135,10 +135,15 @@ impl Bounder<'_> {
                 cost[k] += (whole.g[k].hi - whole.g[k].lo).min(1e3) * y[k].mag() * 1e-9;
             }
             let best = [whole.v.lo, second.lo, first.lo].into_iter().fold(f64::NEG_INFINITY, f64::max);
-            if best > 0.0 || !second.lo.is_finite() && at_corners(self, r) > 0.0 {
+            let is_singular = !second.lo.is_finite();
+            if best > 0.0 || is_singular && at_corners(self, r) > 0.0 {
                 continue;
             }
             let k = (0..4).max_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
+            // What holds at the corners at one time fails for the span alone.
+            let mut instant = r;
+            instant.0[3] = (mid[3], mid[3]);
+            let k = if is_singular && at_corners(self, instant) > 0.0 { 3 } else { k };
             let k = if r.0[k].0 < mid[k] && mid[k] < r.0[k].1 {
                 k
             } else {
@@ -154,8 +159,8 @@ impl Bounder<'_> {
         true
     }
 
-    /// A lower bound of the sum over a region near the axes of its faces, where nothing is known of curvatures. −psi is concave
-    /// and a tangent is linear in space, and both change by no more than a point's way: with the literals as they are in the
+    /// A lower bound of the sum over a region near the axes of its faces, where nothing is known of curvatures. −psi (of a torus
+    /// −`above`) and what `tangent` gives are concave or linear in space, and both change by no more than a point's way: with the literals as they are in the
     /// middle of the time t_m
     ///
     /// ```text
@@ -176,10 +181,18 @@ impl Bounder<'_> {
             let whole = point(span.1) - point(span.0);
             if span.1 > span.0 { (point(t) - point(span.0)) * whole.recip() } else { point(0.0) }
         };
+        let center: Vector = std::array::from_fn(|k| point((0.5 * (r.0[k].0 + r.0[k].1)).clamp(r.0[k].0, r.0[k].1)));
+        let centers = [in_a(center), self.motions.in_b(center, point(middle))];
+        let beside = centers.map(|c| DVec3::from_array(c.map(|x| 0.5 * (x.v.lo + x.v.hi))));
         let away = (point(middle) - point(t0)).mag().max((point(t1) - point(middle)).mag());
         let mut least = f64::INFINITY;
         for corner in 0..8u32 {
             let x: Vector = std::array::from_fn(|k| point(if corner >> k & 1 == 0 { r.0[k].0 } else { r.0[k].1 }));
+            let at_corner = self.through_time(terms, span, x, (t0, middle, t1), beside);
+            if at_corner.is_some_and(|v| v > 0.0) {
+                least = least.min(at_corner.unwrap_or(f64::NEG_INFINITY));
+                continue;
+            }
             let (a, b) = (in_a(x), self.motions.in_b(x, point(middle)));
             for t in [t0, t1] {
                 let s = part(t);
@@ -188,7 +201,7 @@ impl Bounder<'_> {
                     let Some(face) = self.face(&term.literal) else { return f64::NEG_INFINITY };
                     let y = if term.literal.on_b { &b } else { &a };
                     let value = match term.literal.negative {
-                        true => point(0.0) - self.psi(face, y).v,
+                        true => point(0.0) - self.above(face, beside[usize::from(term.literal.on_b)], y).v,
                         false => tangent(face, term.point, y).v,
                     };
                     let lambda = point(term.lambda[0]) + s * (point(term.lambda[1]) - point(term.lambda[0]));
@@ -200,6 +213,36 @@ impl Bounder<'_> {
             }
         }
         least
+    }
+
+    /// The same sum at one point of A through a span of time, to second order in it: being concave in space at each time, over a box
+    /// the sum is least at a corner at each time.
+    fn through_time(
+        &self,
+        terms: &[Term],
+        span: (f64, f64),
+        x: Vector,
+        (t0, middle, t1): (f64, f64, f64),
+        beside: [DVec3; 2],
+    ) -> Option<f64> {
+        let sum = |t: Interval| {
+            let (a, b) = (in_a(x), self.motions.in_b(x, t));
+            let mut sum = Jet::constant(ZERO);
+            for term in terms {
+                let y = if term.literal.on_b { &b } else { &a };
+                let face = self.face(&term.literal)?;
+                let value = match term.literal.negative {
+                    true => self.above(face, beside[usize::from(term.literal.on_b)], y).scaled(point(-1.0)),
+                    false => tangent(face, term.point, y),
+                };
+                sum = sum + weighted(&value.plus(point(self.depth)), term.lambda, span, t);
+            }
+            Some(sum)
+        };
+        let (at, whole) = (sum(point(middle))?, sum(Interval::new(t0, t1))?);
+        let dt = Interval::new(t0, t1) - point(middle);
+        let second = at.v + at.g[3] * dt + point(0.5) * whole.h[place(3, 3)] * dt.square();
+        Some(whole.v.lo.max(second.lo))
     }
 
     fn coordinates(&self, on_b: bool, x: Vector, t: Interval) -> [Jet; 3] {
@@ -256,7 +299,25 @@ impl Bounder<'_> {
                 let rho = square_length(&across(&o, axis)).sqrt();
                 rho.scaled(point(cos)) - linear(axis, &o).scaled(point(sin))
             }
+            Face::Torus(surface::Torus { origin, axis, major, minor }) => {
+                let (o, axis) = (offsets(y, origin), unit(vector(axis.to_array())));
+                let off = square_length(&across(&o, axis)).sqrt().plus(point(-major));
+                (off.square() + linear(axis, &o).square()).sqrt().plus(point(-minor))
+            }
         }
+    }
+
+    /// What a psi is nowhere above, convex: of a torus the ball of its tube around the point of its circle on the side of `beside`.
+    fn above(&self, face: &Face, beside: DVec3, y: &[Jet; 3]) -> Jet {
+        let Face::Torus(surface::Torus { origin, axis, major, minor }) = *face else { return self.psi(face, y) };
+        let a = unit(vector(axis.to_array()));
+        let out = (beside - origin) - axis * (beside - origin).dot(axis);
+        let out = out.try_normalize().unwrap_or(axis.any_orthonormal_vector());
+        let out = vector(out.to_array());
+        let out = unit(minus(out, times(dot(out, a), a)));
+        let o = offsets(y, origin);
+        let from: [Jet; 3] = std::array::from_fn(|i| o[i].plus(-(point(major) * out[i])));
+        square_length(&from).sqrt().plus(point(-minor))
     }
 
     /// ½(psi_p − psi_q) + delta for two cones, from below: with one axis a and one angle it is at least
@@ -323,6 +384,16 @@ impl Bounder<'_> {
                 let along = dot(delta, own);
                 let across = length(minus(delta, times(along, own)));
                 sin * along - cos * across - far(u) * (lean * (sin + cos) + point(angle))
+            }
+            // The circles are no farther from each other than their centres, their radii and their planes.
+            (
+                Face::Torus(surface::Torus { origin: o, axis: a, major, minor }),
+                Face::Torus(surface::Torus { origin: u, axis: b, major: major_q, minor: minor_q }),
+            ) => {
+                let turned = if a.dot(b) < 0.0 { -b } else { b };
+                let lean = length(minus(unit(place(a)), unit(place(turned))));
+                let wider = point((point(major) - point(major_q)).mag());
+                point(minor_q) - point(minor) - length(minus(place(o), place(u))) - wider - lean * point(major_q)
             }
             _ => return None,
         };
@@ -469,7 +540,7 @@ fn short(v: DVec3) -> Vector {
     times(point(1.0 - 1e-15), vector(v.normalize_or_zero().to_array()))
 }
 
-/// A plane below a convex psi: |v| >= n·v for every |n| <= 1.
+/// A plane below a convex psi: |v| >= n·v for every |n| <= 1. Below a torus' psi what is concave, too.
 fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
     let perpendicular = |axis: DVec3, o: DVec3| {
         let a = unit(vector(axis.to_array()));
@@ -491,6 +562,21 @@ fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
             let a = unit(vector(axis.to_array()));
             let m = perpendicular(axis, apex);
             linear(minus(times(point(cos), m), times(point(sin), a)), &offsets(y, apex))
+        }
+        // hypot(ρ − R, z) >= n_ρ (ρ − R) + n_z z for every |n| <= 1; where n_ρ < 0 that is concave, and stays as it is.
+        Face::Torus(surface::Torus { origin, axis, major, minor }) => {
+            let a = unit(vector(axis.to_array()));
+            let (z, off) = {
+                let (o, axis) = (at - origin, axis.normalize());
+                let z = o.dot(axis);
+                (z, (o - axis * z).length() - major)
+            };
+            let size = off.hypot(z) * (1.0 + 1e-15);
+            let (lean, up) = if size > 0.0 { (off / size, z / size) } else { (0.0, 0.0) };
+            let o = offsets(y, origin);
+            let rho =
+                if lean < 0.0 { square_length(&across(&o, a)).sqrt() } else { linear(perpendicular(axis, origin), &o) };
+            rho.plus(point(-major)).scaled(point(lean)) + linear(a, &o).scaled(point(up)).plus(point(-minor))
         }
     }
 }

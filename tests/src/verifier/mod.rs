@@ -464,6 +464,8 @@ fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
             let all: Vec<DVec3> = p.vertices.iter().map(|v| middle + (*v - middle) * scale(rho)).collect();
             around(&all, &|_| 0.0)
         }
+        // Its psi is the exact distance.
+        Shape::Torus(t) => around(&[DVec3::ZERO], &|k| disc(t.major)(k) + grown(t.minor)),
         Shape::HalfSpace(_) => [point(0.0); 3].map(|_| Interval::new(f64::NEG_INFINITY, f64::INFINITY)),
     }
 }

@@ -98,7 +98,8 @@ pub struct SeparatingAxisTest {
 impl Hull {
     /// Of a model placed in its object; `None` for one without bounds.
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
-        let (around, level, form, frame, ball) = if let Some(p) = model.solid.whole() {
+        let whole = model.solid.whole().filter(|p| p.is_convex());
+        let (around, level, form, frame, ball) = if let Some(p) = whole {
             body_of(p)?;
             (None, f64::INFINITY, p.shape.form().of_few(), p.frame, p.ball)
         } else {

@@ -1,7 +1,8 @@
 //! A cell at an instant, and the linear lower bounds of its literals.
 //!
 //! The cell is a box fixed in A. For x in it, a literal is at least a + n·(x − c) − R:
-//! * +psi: psi is convex, so a tangent plane bounds it everywhere: R = 0;
+//! * +psi: where psi is convex a tangent plane bounds it everywhere: R = 0; where it is not (`Surface::under`), it bends away from
+//!   its tangent as a subtracted cone does, and R is that of the next line;
 //! * −psi: concave; R is the supremum of k·(ρ(x) − ρ − u·(x−c)): k·D²/(2ρ) over |x−c| <= D across the face's axis (exact
 //!   where D <= 2ρ, an upper bound beyond), or k·T²/(2(ρ−S)) where the cell reaches S along the radial direction u and
 //!   T along the curving tangents (sqrt((ρ+s)² + τ²) − (ρ+s) falls with s). Where D > 2ρ the radial direction means
@@ -15,7 +16,7 @@
 use super::rounding;
 use crate::motion::{Bounds, Instant};
 use crate::solid::local::{LiteralId, Truth, truth_of};
-use crate::solid::surface::FaceAt;
+use crate::solid::surface::{FaceAt, Under};
 use crate::solid::{Face, Sense, Solid};
 use glam::DVec3;
 
@@ -98,6 +99,27 @@ impl Linear {
     }
 }
 
+/// What bends as k·ρ(x) does, ρ the distance from an axis or, without one, from a point; A's axes.
+struct Round {
+    k: f64,
+    /// ρ at the cell's centre.
+    rho: f64,
+    axis: Option<DVec3>,
+    /// The face's normal there, or any that leans against the axis on the same side.
+    normal: DVec3,
+}
+
+/// How far that rises above its tangent over a cell, and how much more in time: first order, and half the second.
+struct Remainder {
+    most: f64,
+    s: f64,
+    q: f64,
+    /// What each half extent costs.
+    cost: DVec3,
+    /// The cell is so large that the direction away from the axis means nothing: `most` is above a function without that slope.
+    far: bool,
+}
+
 /// A box cell of A at an instant, with bounds on its motion against B over [t, t + h].
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
@@ -154,13 +176,17 @@ impl View<'_> {
         }
     }
 
+    /// A direction of a body along A's axes.
+    fn turned(&self, side: Side, direction: DVec3) -> DVec3 {
+        if side == Side::A { direction } else { self.at.a_vector(direction) }
+    }
+
     /// Extents of the cell at a curved face: (across the axis or all around, along the normal, along the curving
-    /// tangents), each the largest distance from the centre. `normal` is the face's there, along A's axes.
-    fn extents(&self, side: Side, face: &Face, normal: DVec3) -> (f64, f64, f64) {
+    /// tangents), each the largest distance from the centre. `normal` is the face's there, both along A's axes.
+    fn extents(&self, axis: Option<DVec3>, normal: DVec3) -> (f64, f64, f64) {
         let along = |n: DVec3| n.abs().dot(self.half);
-        match face.developable() {
+        match axis {
             Some(axis) => {
-                let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
                 let t = axis.cross(normal).normalize_or_zero();
                 let u = t.cross(axis);
                 (along(u).hypot(along(t)).min(self.radius), along(u), along(t))
@@ -171,6 +197,35 @@ impl View<'_> {
                 (self.radius, along(normal), t)
             }
         }
+    }
+
+    /// How far a function that bends as k·ρ(x) does rises above its tangent over the cell.
+    fn remainder(&self, side: Side, round: &Round) -> Remainder {
+        // Extents and distance from the axis are each known to the rounding; R must not come out too small.
+        let (d, radial, tangential) = self.extents(round.axis, round.normal);
+        let (d, tangential) = (d + self.rounding, tangential + self.rounding);
+        let rho = (round.rho - self.rounding).max(0.0);
+        let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
+        let closest = rho - radial - way;
+        // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
+        let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
+        let across = match round.axis {
+            Some(axis) => DVec3::ONE - axis * axis,
+            None => DVec3::ONE,
+        };
+        let k = round.k;
+        let cost = if slab {
+            let steepness = k * (tangential / closest) * (tangential / closest) * 0.5;
+            self.bulge(round) * (round.rho.max(self.radius) / closest) + round.normal.abs() * self.half * steepness
+        } else {
+            across * self.half * self.half * (k / (2.0 * round.rho.max(0.5 * d)))
+        };
+        if slab || d <= 2.0 * rho {
+            let (d, rho) = if slab { (tangential, closest) } else { (d, rho) };
+            let (s, q) = (k * self.motion.speed * d / rho, k * self.motion.speed * self.motion.speed / rho);
+            return Remainder { most: k * d * d / (2.0 * rho), s, q, cost, far: false };
+        }
+        Remainder { most: k * d, s: k * self.motion.speed, q: 0.0, cost, far: true }
     }
 
     /// What is known of a literal over the cell, for B over the whole span.
@@ -185,6 +240,13 @@ impl View<'_> {
             let bulge = if f.rho > 0.0 { f.k * r * r / (2.0 * f.rho) } else { f64::INFINITY };
             hi = f.value + (tilt + bulge).min(r);
         }
+        let mut dip = 0.0;
+        if !face.is_convex() {
+            let center = if side == Side::A { self.center } else { self.center_b };
+            let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
+            dip = face.under(center, center).map_or(0.0, |u| Under::dip(u.k, u.rho, r + way));
+            lo = f.value - (tilt + dip).min(r);
+        }
         if side == Side::B {
             // Lipschitz in space: no point moves further than V·h. A plane (and the tangent of a convex face) also has a
             // rate of its own, with the second-order bound for a single normal.
@@ -193,7 +255,8 @@ impl View<'_> {
             let rate = f.normal.dot(self.velocity) * h;
             let pull = self.motion.curvature(self.at, f.normal) + self.motion.bend;
             let slack = (f.normal.cross(self.at.omega).length() * r + self.motion.slip) * h + 0.5 * pull * h * h;
-            lo = (lo - way).max(lo + rate.min(0.0) - slack);
+            let moved = if dip > 0.0 { f.value - tilt - dip } else { lo };
+            lo = (lo - way).max(moved + rate.min(0.0) - slack);
             hi = if f.k == 0.0 { (hi + way).min(hi + rate.max(0.0) + slack) } else { hi + way };
         }
         truth_of(id.sense(), (lo, hi), if faces.is_guard(id.face()) { 0.0 } else { self.delta }, self.rounding)
@@ -205,63 +268,60 @@ impl View<'_> {
         let face = faces.get(id.face());
         let delta = if faces.is_guard(id.face()) { 0.0 } else { self.delta };
         if id.sense() == Sense::Positive {
-            let f = self.face_at(side, face, y);
-            let mut l = self.plane(side, id, f.normal, f.value - f.normal.dot(y) + delta);
-            l.cost = self.bulge(side, face, &f);
-            l.point = match side {
+            let point = match side {
                 Side::A => self.center + y,
                 Side::B => self.center_b + self.at.b_from_a * y,
             };
+            if !face.is_convex()
+                && let Some(l) = self.over(side, id, point)
+            {
+                return l;
+            }
+            let f = self.face_at(side, face, y);
+            let mut l = self.plane(side, id, f.normal, f.value - f.normal.dot(y) + delta);
+            l.cost = self.bulge(&self.round(side, face, &f));
+            l.point = point;
             return l;
         }
         let f = self.face_at(side, face, DVec3::ZERO);
-        let mut normal = -f.normal;
-        let (mut remainder, mut s, mut q, mut cost) = (0.0, 0.0, 0.0, DVec3::ZERO);
-        if f.k > 0.0 {
-            // Extents and distance from the axis are each known to the rounding; R must not come out too small.
-            let (d, radial, tangential) = self.extents(side, face, f.normal);
-            let (d, tangential) = (d + self.rounding, tangential + self.rounding);
-            let rho = (f.rho - self.rounding).max(0.0);
-            let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
-            let closest = rho - radial - way;
-            // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
-            let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
-            let round = match face.developable() {
-                Some(axis) => {
-                    let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
-                    DVec3::ONE - axis * axis
-                }
-                None => DVec3::ONE,
-            };
-            cost = if slab {
-                let steepness = f.k * (tangential / closest) * (tangential / closest) * 0.5;
-                self.bulge(side, face, &f) * (f.rho.max(self.radius) / closest) + f.normal.abs() * self.half * steepness
-            } else {
-                round * self.half * self.half * (f.k / (2.0 * f.rho.max(0.5 * d)))
-            };
-            if slab || d <= 2.0 * rho {
-                let (d, rho) = if slab { (tangential, closest) } else { (d, rho) };
-                remainder = f.k * d * d / (2.0 * rho);
-                s = f.k * self.motion.speed * d / rho;
-                q = f.k * self.motion.speed * self.motion.speed / rho;
-            } else {
-                // −psi >= −psi(c) [+ sin α axis·(x−c) for a cone] − k·D.
-                normal = match face.apex() {
-                    Some(c) => c.sin * if side == Side::A { c.axis } else { self.at.a_vector(c.axis) },
-                    None => DVec3::ZERO,
-                };
-                remainder = f.k * d;
-                s = f.k * self.motion.speed;
-            }
+        if f.k == 0.0 {
+            return self.plane(side, id, -f.normal, -f.value + delta);
         }
-        let mut l = self.plane(side, id, normal, -f.value - remainder + delta);
-        l.cost = cost;
-        if side == Side::A { l } else { Linear { s, q, ..l } }
+        let rest = self.remainder(side, &self.round(side, face, &f));
+        let normal = match face.apex() {
+            _ if !rest.far => -f.normal,
+            // −psi >= −psi(c) [+ sin α axis·(x−c) for a cone] − k·D.
+            Some(c) => c.sin * self.turned(side, c.axis),
+            None => DVec3::ZERO,
+        };
+        let mut l = self.plane(side, id, normal, -f.value - rest.most + delta);
+        l.cost = rest.cost;
+        if side == Side::A { l } else { Linear { s: rest.s, q: rest.q, ..l } }
     }
 
-    /// The tangent plane of a convex face at a point of its own body's frame, wherever that is.
+    /// The bound of a face that is not convex, with the gradient that it has at a point of its own body's frame; `None` where its
+    /// tangent there is one.
+    fn over(&self, side: Side, id: LiteralId, point: DVec3) -> Option<Linear> {
+        let face = self.faces(side).get(id.face());
+        let center = if side == Side::A { self.center } else { self.center_b };
+        let under = face.under(point, center)?;
+        let [axis, normal] = [under.axis, under.out].map(|v| self.turned(side, v));
+        let rest = self.remainder(side, &Round { k: under.k, rho: under.rho, axis: Some(axis), normal });
+        let normal = self.turned(side, if rest.far { under.far } else { under.normal });
+        let l = self.plane(side, id, normal, under.value - rest.most + self.delta);
+        let l = Linear { point, cost: rest.cost, ..l };
+        Some(if side == Side::A { l } else { Linear { s: rest.s, q: rest.q, ..l } })
+    }
+
+    /// The tangent plane of a convex face at a point of its own body's frame, wherever that is; what bounds another one with the
+    /// gradient that it has there.
     pub fn tangent(&self, side: Side, id: LiteralId, point: DVec3) -> Linear {
         let face = self.faces(side).get(id.face());
+        if !face.is_convex()
+            && let Some(l) = self.over(side, id, point)
+        {
+            return l;
+        }
         let mut f = face.at(point);
         let center = if side == Side::A { self.center } else { self.center_b };
         let value = f.value + f.normal.dot(center - point);
@@ -269,7 +329,7 @@ impl View<'_> {
             f.normal = self.at.a_vector(f.normal);
         }
         let bound = value + self.delta - rounding::of_distance((center - point).length());
-        Linear { point, cost: self.bulge(side, face, &f), ..self.plane(side, id, f.normal, bound) }
+        Linear { point, cost: self.bulge(&self.round(side, face, &f)), ..self.plane(side, id, f.normal, bound) }
     }
 
     /// A bound by a plane that is fixed in its body.
@@ -295,20 +355,26 @@ impl View<'_> {
         }
     }
 
+    /// How a face bends where `f` was taken.
+    #[inline]
+    fn round(&self, side: Side, face: &Face, f: &FaceAt) -> Round {
+        let axis = face.developable().map(|axis| self.turned(side, axis));
+        Round { k: f.k, rho: f.rho, axis, normal: f.normal }
+    }
+
     /// How much each half extent weighs in how far a face bends away from its tangent: k·(tangent component)²·e²/(2ρ).
-    fn bulge(&self, side: Side, face: &Face, f: &FaceAt) -> DVec3 {
-        if f.k == 0.0 {
+    fn bulge(&self, round: &Round) -> DVec3 {
+        if round.k == 0.0 {
             return DVec3::ZERO;
         }
-        let across = match face.developable() {
+        let across = match round.axis {
             Some(axis) => {
-                let axis = if side == Side::A { axis } else { self.at.a_vector(axis) };
-                let t = axis.cross(f.normal);
+                let t = axis.cross(round.normal);
                 t * t
             }
-            None => DVec3::ONE - f.normal * f.normal,
+            None => DVec3::ONE - round.normal * round.normal,
         };
-        across * self.half * self.half * (f.k / (2.0 * f.rho.max(self.radius)))
+        across * self.half * self.half * (round.k / (2.0 * round.rho.max(self.radius)))
     }
 
     /// True where a tangent at another point can tighten the literal's bound.

@@ -109,15 +109,10 @@ fn may_balance(bodies: &Bodies, place: &Place, lits: &[Lit]) -> bool {
     let mut gradients = Vec::with_capacity(lits.len());
     let mut turn: f64 = 10.0 * BALANCE;
     for lit in lits {
-        let at = bodies.face(*lit).at(place.center);
+        let face = bodies.face(*lit);
+        let at = face.at(place.center);
         // How far a gradient turns on the way through the box.
-        turn = turn.max(if at.k == 0.0 {
-            0.0
-        } else if at.rho > reach {
-            at.k * reach / (at.rho - reach)
-        } else {
-            2.0
-        });
+        turn = turn.max(face.turn(place.center, &at, reach));
         gradients.push(if lit.1.sense() == Sense::Positive { at.normal } else { -at.normal });
     }
     bodies.work.look(2 * lits.len());

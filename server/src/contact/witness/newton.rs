@@ -102,7 +102,7 @@ pub struct Row {
 
 /// Hessian of psi of a face at a point, in the face's own frame.
 pub(in crate::contact) fn hessian(face: &Face, x: DVec3) -> DMat3 {
-    face.curvature(&face.at(x)).matrix()
+    face.curvature(x, &face.at(x)).matrix()
 }
 
 impl<'a> Problem<'a> {
@@ -130,12 +130,11 @@ impl Problem<'_> {
         let (value, mut gradient, mut curvature) = match *c {
             Constraint::Literal(..) => {
                 let f = face.at(own);
-                let curvature = face.curvature(&f);
+                let curvature = face.curvature(own, &f);
                 if id.sense() == Sense::Positive {
                     (f.value + level, f.normal, curvature)
                 } else {
-                    let (each, factor) = (-curvature.each, -curvature.factor);
-                    (-f.value + level, -f.normal, Curvature { each, factor, ..curvature })
+                    (-f.value + level, -f.normal, curvature.negated())
                 }
             }
             Constraint::Apex(_, _, k) => {
@@ -149,11 +148,13 @@ impl Problem<'_> {
         if side == Side::B {
             gradient = at.a_vector(gradient);
             curvature.along = at.a_vector(curvature.along);
+            if curvature.other != 0.0 {
+                curvature.beside = at.a_vector(curvature.beside);
+            }
             let v = at.velocity(x);
             rate = gradient.dot(v);
-            let bent = v * curvature.each + curvature.along * (curvature.factor * curvature.along.dot(v));
             // B's field turns with −omega against A and is passed through at v.
-            gradient_rate = bent - at.omega.cross(gradient);
+            gradient_rate = curvature.times(v) - at.omega.cross(gradient);
         }
         Row { value, gradient, hessian: curvature.matrix(), rate, gradient_rate }
     }

@@ -89,7 +89,7 @@ impl Element {
     }
 }
 
-/// What a primitive is the hull of; `None` for what has no bounds.
+/// What a primitive is the hull of; `None` for what has no bounds, and for a torus, which is no hull.
 pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>> {
     let axes = frame.matrix();
     let disc = |z: f64, radius: f64| Element {
@@ -105,7 +105,7 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
         Shape::Cone(c) => Some(vec![disc(-c.half_height, c.bottom), disc(c.half_height, c.top)]),
         Shape::Cuboid(c) => corners(&crate::math::Aabb::around(DVec3::ZERO, c.half).corners()),
         Shape::Polyhedron(p) => corners(&p.vertices),
-        Shape::HalfSpace(_) => None,
+        Shape::HalfSpace(_) | Shape::Torus(_) => None,
     }
 }
 

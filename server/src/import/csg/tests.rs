@@ -123,6 +123,7 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::Cuboid(_) => "box",
         Shape::Polyhedron(_) => "polyhedron",
         Shape::HalfSpace(_) => "half-space",
+        Shape::Torus(_) => "torus",
     }
 }
 

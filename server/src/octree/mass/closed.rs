@@ -21,7 +21,7 @@ use super::voxel::Evaluator;
 use crate::math::Aabb;
 use crate::math::moments::{Moments, PAIRS};
 use crate::math::tolerance::BOX_ROUNDING;
-use crate::octree::span::rounding;
+use crate::octree::span::{face_span, rounding};
 use crate::solid::write_node;
 use crate::solid::{Face, Node, NodeId, Op, Primitive, Sense, Solid};
 use contactd_proto::Pose;
@@ -91,11 +91,17 @@ fn apart(boxes: &[Aabb]) -> bool {
         && (0..boxes.len()).all(|i| boxes[i].is_empty() || boxes[..i].iter().all(|b| !b.meets(&boxes[i])))
 }
 
-/// True when a primitive holds a box: it is convex, so its corners tell.
+/// True when a primitive holds a box: of a convex face its corners tell.
 fn holds(p: &Primitive, b: &Aabb) -> bool {
     b.is_empty()
         || b.is_finite()
-            && b.corners().iter().all(|x| p.faces.iter().all(|f| f.value(*x) < -rounding(f, *x, DVec3::ZERO)))
+            && p.faces.iter().all(|f| {
+                if f.is_convex() {
+                    b.corners().iter().all(|x| f.value(*x) < -rounding(f, *x, DVec3::ZERO))
+                } else {
+                    face_span(f, b.center(), b.half()).1 < 0.0
+                }
+            })
 }
 
 fn of_primitive(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> Option<(Moments, f64)> {

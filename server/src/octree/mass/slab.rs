@@ -11,11 +11,13 @@
 //! | plane | 0 | 0 | |
 //! | sphere, cylinder | 1/r | 2/(r + √(r² − T²)) | q >= 0, T < r |
 //! | cone | 2 cos α/(q⁺ + √(q⁺² + T²)) | cos α/q⁻ | q⁻ > 0 |
+//! | torus | min(0, n_ρ)/q⁻ | 2/(r + √(r² − T²)) | q⁻ > 0, T < r, the box no deeper than the middle of the tube |
 //!
 //! with T the largest τ and q⁻, q⁺ the range of q over the box. Sphere: x is inside where (r + v + n·(x − c))² + τ² <= r²,
 //! and r − √(r² − τ²) = τ²/(r + √(r² − τ²)); the cylinder the same in its cross-section. Cone: inside where √(q² + τ²) cos α
 //! <= z sin α, and √(q² + τ²) − q = τ²/(q + √(q² + τ²)). So nothing with v + n·(x − c) > 0 is inside, and everything where it is
-//! <= −½ κ⁺ T² is. Only points between these planes matter: T, q⁻ and q⁺ are taken over them once more (`tightened`).
+//! <= −½ κ⁺ T² is. Torus: it holds the ball of its tube at c, and psi >= n_ρ (ρ − R) + n_z z − r, where ρ − q <= τ²/(2 q⁻): what bends
+//! inwards moves the outer plane out by ½ |κ⁻| T². Only points between these planes matter: T, q⁻ and q⁺ are taken over them once more (`tightened`).
 //!
 //! Both planes lie further apart by the rounding of v and n·(x − c) (`span::rounding`), which also covers that of cutting along
 //! them. Their distance is of the second order in the size of the box, and no part of it comes from directions along which
@@ -63,20 +65,22 @@ impl Slab {
     /// The slab of a face over the box center ± half.
     pub fn new(face: &Face, center: DVec3, half: DVec3) -> Self {
         let at = face.at(center);
-        let Bend { law, radial, tangents } = face.bend(&at);
+        let Bend { law, radial: (rho, radial), tangents, core } = face.bend(center, &at);
         let mut slab = Self {
             law,
             gradient: at.normal * half,
             value: at.value,
             pad: rounding(face, center, half),
             tangents: tangents.map(|t| t * half),
-            radial: (at.rho, radial * half),
+            radial: (rho, radial * half),
             along: if law.changes_along() { at.normal.cross(tangents[0]) * half } else { DVec3::ZERO },
             curve: None,
         };
         let widest = slab.radial.1.abs().element_sum();
         let reach = CORNERS.iter().map(|u| slab.offset(*u)).fold(0.0, f64::max);
-        slab.curve = slab.curvature(reach, [at.rho - widest, at.rho + widest]);
+        if core > slab.gradient.abs().element_sum() + slab.pad {
+            slab.curve = slab.curvature(reach, [rho - widest, rho + widest]);
+        }
         slab
     }
 
@@ -90,7 +94,8 @@ impl Slab {
         let t = reach * (1.0 + 64.0 * f64::EPSILON);
         let range = self.law.range(t, [least, most], self.pad)?;
         let outward = 8.0 * f64::EPSILON;
-        Some(Curve { range: [range[0] * (1.0 - outward), range[1] * (1.0 + outward)], reach: t })
+        let low = range[0] * if range[0] < 0.0 { 1.0 + outward } else { 1.0 - outward };
+        Some(Curve { range: [low, range[1] * (1.0 + outward)], reach: t })
     }
 
     /// The same, its inner plane moved closer: `between` is what of the cube lies between its planes.
@@ -126,6 +131,14 @@ impl Slab {
         self.curve.map(|c| 0.5 * c.range[1] * c.reach * c.reach)
     }
 
+    /// ½ |κ⁻| T² of what bends the other way, too: how far the outer plane is moved out. `None` where nobody knows.
+    pub fn dent(&self) -> Option<f64> {
+        match (self.law, self.curve) {
+            (Law::Ring { lean, .. }, None) if lean > 0.0 => None,
+            (_, curve) => Some(curve.map_or(0.0, |c| 0.5 * (-c.range[0]).max(0.0) * c.reach * c.reach)),
+        }
+    }
+
     /// True when refining the box would bring nothing but rounding.
     pub fn is_flat(&self) -> bool {
         self.law.is_straight()
@@ -157,13 +170,13 @@ impl Slab {
     /// `None` where there is no such half-space: all of the box, or nothing of it.
     pub fn plane(&self, sense: Sense, all: bool) -> Option<Plane> {
         let gradient = self.gradient;
-        let outer = Plane { gradient, offset: self.value - self.pad };
+        let outer = self.dent().map(|dent| Plane { gradient, offset: self.value - dent - self.pad });
         let inner = self.bulge().map(|bulge| Plane { gradient, offset: self.value + bulge + self.pad });
         match (sense, all) {
-            (Sense::Positive, true) => Some(outer),
+            (Sense::Positive, true) => outer,
             (Sense::Positive, false) => inner,
             (Sense::Negative, true) => inner.map(|p| p.flipped()),
-            (Sense::Negative, false) => Some(outer.flipped()),
+            (Sense::Negative, false) => outer.map(|p| p.flipped()),
         }
     }
 }
@@ -172,7 +185,7 @@ impl Slab {
 mod tests {
     use super::*;
     use crate::math::random::Random;
-    use crate::solid::surface::{Cone, Cylinder, Plane, Sphere};
+    use crate::solid::surface::{Cone, Cylinder, Plane, Sphere, Torus};
 
     #[test]
     fn the_surface_lies_between_the_planes() {
@@ -180,10 +193,11 @@ mod tests {
         let (mut tight, mut seen, mut tighter) = (0, 0, 0);
         for i in 0..6000 {
             let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
-            let face = match i % 4 {
+            let face = match i % 5 {
                 0 => Plane { normal: n, offset: r.within(-1.0, 1.0) }.into(),
                 1 => Sphere { center: o, radius: r.within(0.2, 2.0) }.into(),
                 2 => Cylinder { origin: o, axis: n, radius: r.within(0.2, 2.0) }.into(),
+                3 => Torus { origin: o, axis: n, major: r.within(0.3, 2.0), minor: r.within(0.1, 1.0) }.into(),
                 _ => {
                     let (sin, cos) = r.within(0.1, 1.4).sin_cos();
                     Face::from(Cone { apex: o, axis: n, sin, cos })
@@ -205,7 +219,8 @@ mod tests {
                     tighter += usize::from(slab.bulge().unwrap() < 0.7 * whole);
                 }
             }
-            let (all, some) = (slab.plane(Sense::Positive, true).unwrap(), slab.plane(Sense::Positive, false));
+            let Some(all) = slab.plane(Sense::Positive, true) else { continue };
+            let some = slab.plane(Sense::Positive, false);
             let mut closest = f64::INFINITY;
             for k in 0..60 {
                 let corner = |b: usize| if k >> b & 1 == 0 { -1.0 } else { 1.0 };

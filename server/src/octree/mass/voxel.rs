@@ -346,7 +346,8 @@ impl<'a> Evaluator<'a> {
         self.cells.extend([outer, between, inner]);
 
         let ([low, high], t) = (curve.range, curve.reach);
-        let thick = slab.bulge().unwrap_or(0.0) + 2.0 * slab.pad;
+        let dent = slab.dent().unwrap_or(0.0);
+        let thick = slab.bulge().unwrap_or(0.0) + dent + 2.0 * slab.pad;
         let volume = gap.volume().max(0.0);
         let mean = if volume > 0.0 { (gap.square_along(&slab.tangents) / volume).clamp(0.0, t * t) } else { 0.0 };
         let ends = 0.25 * thick * shadow;
@@ -354,7 +355,7 @@ impl<'a> Evaluator<'a> {
         // The face itself is known to a pad, the mean to the rounding of a cell.
         let rounding = 2.0 * slab.pad * (volume / thick + shadow) + CUBE * CELL_ROUNDING;
         let (mut share, mut error) =
-            ((1.0 - (0.25 * (low + high) * mean + slab.pad) / thick).clamp(0.0, 1.0), ends + bending + rounding);
+            ((1.0 - (0.25 * (low + high) * mean + dent + slab.pad) / thick).clamp(0.0, 1.0), ends + bending + rounding);
         let mut spread = 2.0 * share * (1.0 - share) * volume + error;
         if error >= 0.5 * volume {
             (share, error, spread) = (0.5, 0.5 * volume, 0.5 * volume);

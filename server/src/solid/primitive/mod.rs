@@ -15,6 +15,7 @@ mod form;
 mod half_space;
 mod polyhedron;
 mod sphere;
+mod torus;
 
 pub use cone::Cone;
 pub use cuboid::Cuboid;
@@ -23,6 +24,7 @@ pub use form::Form;
 pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use sphere::Sphere;
+pub use torus::Torus;
 
 /// What every primitive answers about itself, in its own frame.
 pub trait Geometry {
@@ -140,7 +142,7 @@ macro_rules! shapes {
     };
 }
 
-shapes!(Sphere = 0, Cylinder = 1, Cone = 2, Cuboid = 3, Polyhedron = 4, HalfSpace = 5);
+shapes!(Sphere = 0, Cylinder = 1, Cone = 2, Cuboid = 3, Polyhedron = 4, HalfSpace = 5, Torus = 6);
 
 /// A primitive placed in a model.
 #[derive(Clone, Debug)]
@@ -177,6 +179,11 @@ impl Primitive {
     pub fn face_name(&self, index: usize) -> String {
         let geometry = self.shape.geometry();
         geometry.face_name(if self.label.mirrored { geometry.mirrored_face(index) } else { index })
+    }
+
+    /// True where all of its faces are convex; another one has one face alone, whose psi is the exact distance.
+    pub fn is_convex(&self) -> bool {
+        self.faces.len() != 1 || self.faces[0].is_convex()
     }
 
     /// psi of the whole primitive: the largest of its faces' values. 1-Lipschitz, negative inside.

@@ -7,13 +7,16 @@ use glam::DVec3;
 pub struct Bend {
     /// How the curvature ranges over a box.
     pub law: Law,
-    /// Unit direction away from the centre or axis; zero for a plane.
-    pub radial: DVec3,
+    /// Distance from the centre or axis, a length, and the unit direction away from it; zero for a plane.
+    pub radial: (f64, DVec3),
     /// Unit vectors along which the face curves, zero where there are fewer.
     pub tangents: [DVec3; 2],
+    /// How far inwards along the normal the face is what it is from here: a tube to its middle. Infinite where `radial` says it.
+    pub core: f64,
 }
 
-/// The range of κ: the surface lies between ½ κ⁻ τ² and ½ κ⁺ τ² below its tangent plane, τ the offset along the tangents.
+/// The range of κ: the surface lies between ½ κ⁻ τ² and ½ κ⁺ τ² below its tangent plane, τ the offset along the tangents. A
+/// face that is not convex has κ⁻ < 0.
 /// Formulas and their derivation: `octree::mass::slab`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
@@ -28,6 +31,13 @@ pub enum Law {
     Conical {
         /// cos α of the half angle.
         cos: f64,
+    },
+    /// A torus': above as of a ball of its tube, below as of a cone seen from inside where it looks towards its axis.
+    Ring {
+        /// Radius of the tube, a length.
+        radius: f64,
+        /// The normal's part towards the axis, 0 where it leads away.
+        lean: f64,
     },
 }
 
@@ -55,6 +65,13 @@ impl Law {
             }
             Law::Conical { cos } => {
                 (least > 16.0 * pad).then(|| [2.0 * cos / (most + most.hypot(t)), cos / (least - pad)])
+            }
+            Law::Ring { radius: r, lean } => {
+                let high = 2.0 / (r + ((r - t) * (r + t)).max(0.0).sqrt());
+                (t < r && (lean == 0.0 || least > 16.0 * pad)).then(|| {
+                    let low = if lean == 0.0 { 0.0 } else { -lean / (least - pad) };
+                    [low, high]
+                })
             }
         }
     }

@@ -4,8 +4,8 @@
 //! distance to the lateral surface; outside it is the distance where ρ sin α + z cos α >= 0 and a lower bound elsewhere.
 
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Surface, Symmetry, around, between_roots,
-    half_line, largest_corner, radial, tangent,
+    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
+    between_roots, half_line, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -75,7 +75,7 @@ impl Surface for Cone {
     }
 
     #[inline]
-    fn curvature(&self, at: &FaceAt) -> Curvature {
+    fn curvature(&self, _: DVec3, at: &FaceAt) -> Curvature {
         around(self.axis, at)
     }
 
@@ -88,9 +88,10 @@ impl Surface for Cone {
     }
 
     #[inline]
-    fn bend(&self, at: &FaceAt) -> Bend {
+    fn bend(&self, _: DVec3, at: &FaceAt) -> Bend {
         let radial = (at.normal + self.axis * self.sin) / self.cos;
-        Bend { law: Law::Conical { cos: self.cos }, radial, tangents: [self.axis.cross(radial), DVec3::ZERO] }
+        let tangents = [self.axis.cross(radial), DVec3::ZERO];
+        Bend { law: Law::Conical { cos: self.cos }, radial: (at.rho, radial), tangents, core: f64::INFINITY }
     }
 
     #[inline]
@@ -181,7 +182,13 @@ impl Surface for Cone {
         [o.x, o.y, o.z, a.x, a.y, a.z, self.sin, self.cos]
     }
 
-    fn inside(&self, origin: DVec3, d: DVec3) -> Option<(f64, f64)> {
+    fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
+        self.stretch(origin, d).into_iter().collect()
+    }
+}
+
+impl Cone {
+    fn stretch(&self, origin: DVec3, d: DVec3) -> Option<(f64, f64)> {
         let (o, axis) = (origin - self.apex, self.axis);
         let (z, dz) = (o.dot(axis), d.dot(axis));
         let (p, e) = (o - axis * z, d - axis * dz);

@@ -1,7 +1,8 @@
 //! Straight and circular curves of two faces: those that they have in common, and those along which they touch.
 
-use super::{Cone, Cylinder, Face, Plane, Sphere};
-use glam::DVec3;
+use super::{Axis, Cone, Cylinder, Face, Plane, Sphere, Symmetry, Torus};
+use crate::math::any_perpendicular;
+use glam::{DVec2, DVec3};
 
 /// A straight or circular curve, in the frame of the faces that make it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +108,85 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
         | (Face::Cone(_), Face::Cylinder(_)) => common(q, p, size, least, found),
         // Two cones, and a cone and a sphere, share no line or circle that is looked for.
         (Face::Cone(_), Face::Cone(_) | Face::Sphere(_)) | (Face::Sphere(_), Face::Cone(_)) => {}
+        (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
+        (_, Face::Torus(_)) => common(q, p, size, least, found),
     }
+}
+
+/// True where a face is symmetric about the axis of a torus, by sines up to the first and offsets up to the second.
+fn is_about(torus: &Torus, face: &Face, [sine, offset]: [f64; 2]) -> bool {
+    let parallel = |d: DVec3| d.cross(torus.axis).length() <= sine;
+    let passes = |o: DVec3| (o - torus.origin).cross(torus.axis).length() <= offset;
+    match face.symmetry() {
+        Symmetry::Normal(normal) => parallel(normal),
+        Symmetry::Center(center) => passes(center),
+        Symmetry::Axis(Axis { origin, direction }) => parallel(direction) && passes(origin),
+    }
+}
+
+/// The circles that a torus has in common with a face about its own axis: in a half-plane through the axis, (ρ, z) from the torus'
+/// centre, its tube is a circle and the other face a line or a circle.
+fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMut(DVec3, DVec3, f64)) {
+    if !is_about(torus, other, within) {
+        return;
+    }
+    let Torus { origin, axis, major, minor } = *torus;
+    let height = |x: DVec3| (x - origin).dot(axis);
+    let tube = DVec2::new(major, 0.0);
+    let mut at = |p: DVec2| {
+        let x = origin + axis * p.y;
+        // Of the line through a cone's apex a half belongs to its other nappe; a tube may go beyond the axis.
+        let is_on = match other {
+            Face::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
+            Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Torus(_) => true,
+        };
+        if is_on && p.x > 0.0 {
+            circle(x, axis, p.x * p.x);
+        }
+    };
+    // Points at distances r and s from two centres, or at a distance r from one and on the line n·p = d.
+    let mut on_line = |n: DVec2, d: f64| {
+        let h = n.dot(tube) - d;
+        let half = (minor - h) * (minor + h);
+        if half > 0.0 {
+            let foot = tube - n * h;
+            at(foot + n.perp() * half.sqrt());
+            at(foot - n.perp() * half.sqrt());
+        }
+    };
+    let (center, radius) = match *other {
+        Face::Plane(Plane { normal, offset }) => {
+            let up = normal.dot(axis).signum();
+            return on_line(DVec2::Y, up * (offset - normal.dot(origin)));
+        }
+        Face::Cylinder(Cylinder { radius, .. }) => return on_line(DVec2::X, radius),
+        Face::Cone(Cone { apex, axis: own, sin, cos }) => {
+            let n = DVec2::new(cos, -sin * own.dot(axis).signum());
+            return on_line(n, n.y * height(apex));
+        }
+        Face::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
+        Face::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
+    };
+    let way = center - tube;
+    let d = way.length();
+    if d > within[1] {
+        on_line(way / d, (way / d).dot(tube) + (d * d + (minor - radius) * (minor + radius)) / (2.0 * d));
+    }
+}
+
+/// The circle along which a torus touches a face about its own axis: it lies under its tube, towards the other body.
+fn under_tube(torus: &Torus, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within: &Nearness) -> Option<Curve> {
+    if !is_about(torus, q.face, [within.lie / within.size, within.lie]) {
+        return None;
+    }
+    let Torus { origin, axis, major, minor } = *torus;
+    let u = any_perpendicular(axis);
+    let middle = origin + u * major;
+    let apart = if q.is_convex { q.face.value(middle) } else { -q.face.value(middle) };
+    let n = out_of_q(middle);
+    let circle =
+        Curve::Circle { center: origin - axis * (n.dot(axis) * minor), axis, radius: major - n.dot(u) * minor };
+    ((apart - minor).abs() <= within.near && major > n.dot(u) * minor).then_some(circle)
 }
 
 /// A face of a body as it looks out of it.
@@ -182,8 +261,16 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
         }
         // A plane touches what is round, and a hollow what is in it, the other way round.
-        (Face::Plane(_), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_))
-        | (Face::Cylinder(_) | Face::Cone(_), Face::Sphere(_)) => None,
+        (Face::Plane(_), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_) | Face::Torus(_))
+        | (Face::Cylinder(_) | Face::Cone(_), Face::Sphere(_) | Face::Torus(_))
+        | (Face::Sphere(_), Face::Torus(_)) => None,
+        (Face::Torus(torus), _) => {
+            if p.is_convex {
+                under_tube(&torus, q, out_of_q, within)
+            } else {
+                None
+            }
+        }
         // These touch at points, or along no line or circle that is looked for.
         (Face::Sphere(_), Face::Plane(_) | Face::Sphere(_))
         | (Face::Cylinder(_), Face::Cone(_))

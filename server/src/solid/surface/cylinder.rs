@@ -1,8 +1,8 @@
 //! Cylinder: psi = ρ − r, ρ the distance from the axis.
 
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Surface, Symmetry, around, between_roots,
-    largest_corner, radial, tangent,
+    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
+    between_roots, largest_corner, radial, tangent,
 };
 use glam::DVec3;
 
@@ -41,7 +41,7 @@ impl Surface for Cylinder {
     }
 
     #[inline]
-    fn curvature(&self, at: &FaceAt) -> Curvature {
+    fn curvature(&self, _: DVec3, at: &FaceAt) -> Curvature {
         around(self.axis, at)
     }
 
@@ -52,9 +52,10 @@ impl Surface for Cylinder {
     }
 
     #[inline]
-    fn bend(&self, at: &FaceAt) -> Bend {
+    fn bend(&self, _: DVec3, at: &FaceAt) -> Bend {
         let tangents = [self.axis.cross(at.normal), DVec3::ZERO];
-        Bend { law: Law::Round { radius: self.radius }, radial: at.normal, tangents }
+        let law = Law::Round { radius: self.radius };
+        Bend { law, radial: (at.rho, at.normal), tangents, core: f64::INFINITY }
     }
 
     #[inline]
@@ -127,7 +128,13 @@ impl Surface for Cylinder {
         [o.x, o.y, o.z, a.x, a.y, a.z, self.radius, 0.0]
     }
 
-    fn inside(&self, origin: DVec3, d: DVec3) -> Option<(f64, f64)> {
+    fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
+        self.stretch(origin, d).into_iter().collect()
+    }
+}
+
+impl Cylinder {
+    fn stretch(&self, origin: DVec3, d: DVec3) -> Option<(f64, f64)> {
         let (o, axis) = (origin - self.origin, self.axis);
         let (p, e) = (o - axis * o.dot(axis), d - axis * d.dot(axis));
         let c = p.length_squared() - self.radius * self.radius;

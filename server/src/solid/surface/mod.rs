@@ -1,4 +1,5 @@
-//! Surfaces of faces: the convex, 1-Lipschitz functions psi whose common negative part is a primitive, one file each.
+//! Surfaces of faces: the 1-Lipschitz functions psi whose common negative part is a primitive, one file each. All are convex
+//! but the torus', which says how far it falls below its tangents ([`Surface::under`]).
 //!
 //! | face | psi |
 //! |---|---|
@@ -6,6 +7,7 @@
 //! | sphere | \|x − o\| − r |
 //! | cylinder | ρ − r, ρ the distance from the axis |
 //! | cone | ρ cos α − z sin α, z along the axis from the apex into the cone, α the half angle |
+//! | torus | hypot(ρ − R, z) − r, R the radius of its circle, r that of the tube |
 //!
 //! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
 //! functions. Nobody outside of this folder asks of what kind a face is, only what it can tell: whether it is flat, about what
@@ -27,6 +29,7 @@ mod sphere;
 mod symmetry;
 #[cfg(test)]
 mod tests;
+mod torus;
 
 pub use bend::{Bend, Law};
 pub use cone::{Apex, Cone};
@@ -35,10 +38,12 @@ pub use cylinder::Cylinder;
 pub use plane::Plane;
 pub use sphere::Sphere;
 pub use symmetry::{Axis, Symmetry};
+pub use torus::Torus;
 
 use crate::math::{any_perpendicular, tolerance::ON_AXIS};
 use contactd_proto::Pose;
 use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
 
 /// A face at a point: psi, its gradient, and how it curves there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,14 +52,14 @@ pub struct FaceAt {
     pub value: f64,
     /// Gradient of psi, a unit vector.
     pub normal: DVec3,
-    /// Curvature factor k: 0 plane, 1 sphere and cylinder, cos α cone.
+    /// Curvature factor k: 0 plane, 1 sphere, cylinder and torus, cos α cone. psi rises above its tangent by k D²/(2ρ) at most.
     pub k: f64,
-    /// Distance from the centre or axis (infinite for a plane, where k is 0).
+    /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0).
     pub rho: f64,
 }
 
-/// The Hessian of psi of a face at a point, `each`·I + `factor`·`along`⊗`along`, in the face's own frame: a form that
-/// turns by turning one vector.
+/// The Hessian of psi of a face at a point, `each`·I + `factor`·`along`⊗`along` + `other`·`beside`⊗`beside`, in the face's own
+/// frame: a form that turns by turning two vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Curvature {
     /// Curvature in all directions, per length.
@@ -63,15 +68,32 @@ pub struct Curvature {
     pub factor: f64,
     /// A unit vector, or zero.
     pub along: DVec3,
+    /// What is added along `beside`, per length.
+    pub other: f64,
+    /// A unit vector, or zero.
+    pub beside: DVec3,
 }
 
 impl Curvature {
     /// Of what is straight.
-    pub const NONE: Self = Self { each: 0.0, factor: 0.0, along: DVec3::ZERO };
+    pub const NONE: Self = Self { each: 0.0, factor: 0.0, along: DVec3::ZERO, other: 0.0, beside: DVec3::ZERO };
 
     /// The form as a matrix, per length.
     pub fn matrix(&self) -> DMat3 {
-        outer(self.along, self.along * self.factor) + DMat3::from_diagonal(DVec3::splat(self.each))
+        let one = outer(self.along, self.along * self.factor) + DMat3::from_diagonal(DVec3::splat(self.each));
+        if self.other == 0.0 { one } else { one + outer(self.beside, self.beside * self.other) }
+    }
+
+    /// The form's product with a vector.
+    #[inline]
+    pub fn times(&self, v: DVec3) -> DVec3 {
+        let one = v * self.each + self.along * (self.factor * self.along.dot(v));
+        if self.other == 0.0 { one } else { one + self.beside * (self.other * self.beside.dot(v)) }
+    }
+
+    /// The form of −psi.
+    pub fn negated(self) -> Self {
+        Self { each: -self.each, factor: -self.factor, other: -self.other, ..self }
     }
 }
 
@@ -79,6 +101,40 @@ impl Curvature {
 fn outer(u: DVec3, v: DVec3) -> DMat3 {
     DMat3::from_cols(u * v.x, u * v.y, u * v.z)
 }
+
+/// A lower bound of a psi that is not convex: with p(y) = ρ + out·(y − c) and T the offset of y across `axis` and `out`,
+///
+/// psi(y) >= value + normal·(y − c) − k (√(p² + T²) − p),
+///
+/// what bends away as a subtracted cone does; k T²/(2ρ) at most for |y − c| <= T. In the face's own frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Under {
+    /// At c, a length.
+    pub value: f64,
+    /// Gradient of the plane, a unit vector.
+    pub normal: DVec3,
+    /// That gradient without its part along `out`: what is left of it where the direction away from the axis means nothing.
+    pub far: DVec3,
+    /// How steep it falls, 0 to 1.
+    pub k: f64,
+    /// Distance of c from the axis, a length.
+    pub rho: f64,
+    /// Unit axis.
+    pub axis: DVec3,
+    /// Unit direction from the axis to c.
+    pub out: DVec3,
+}
+
+impl Under {
+    /// How far it falls below its plane within `reach` of c at most: k·reach²/(2ρ), and no more than k·2·reach. A length.
+    #[inline]
+    pub fn dip(k: f64, rho: f64, reach: f64) -> f64 {
+        k * reach * if reach < 4.0 * rho { reach / (2.0 * rho) } else { 2.0 }
+    }
+}
+
+/// The stretches of a line where psi <= 0, ascending.
+pub type Stretches = SmallVec<[(f64, f64); 2]>;
 
 /// A face that is a quadric of revolution: Q = |u|² − ρ² with s = x − origin, z = s·axis, u = s − z axis (a sphere has no
 /// axis: u = s) and ρ = radius + slope·z; psi <= 0 where Q <= 0 (and ρ >= 0).
@@ -119,14 +175,39 @@ pub trait Surface: Copy {
     /// psi at `x` with gradient and curvature.
     fn at(&self, x: DVec3) -> FaceAt;
 
-    /// The Hessian of psi where `at` was taken, off the axis and the centre.
-    fn curvature(&self, at: &FaceAt) -> Curvature;
+    /// True where psi is convex; otherwise `under` bounds it from below.
+    #[inline]
+    fn is_convex(&self) -> bool {
+        true
+    }
+
+    /// The Hessian of psi at `x`, where `at` was taken, off the axis and the centre.
+    fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature;
+
+    /// What bounds psi from below as seen from `center`, with the gradient that it has at `touched` (any two points). `None` where
+    /// its tangent at `touched` does: everywhere where psi is convex.
+    #[inline]
+    fn under(&self, _touched: DVec3, _center: DVec3) -> Option<Under> {
+        None
+    }
+
+    /// How far the gradient turns within `reach` (a length) of `x`, where `at` was taken: a bound of the length of its change.
+    #[inline]
+    fn turn(&self, _x: DVec3, at: &FaceAt, reach: f64) -> f64 {
+        if at.k == 0.0 {
+            0.0
+        } else if at.rho > reach {
+            at.k * reach / (at.rho - reach)
+        } else {
+            2.0
+        }
+    }
 
     /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
     fn span(&self, center: DVec3, half: DVec3) -> (f64, f64);
 
-    /// How it bends away from its tangent plane, as `at` has it.
-    fn bend(&self, at: &FaceAt) -> Bend;
+    /// How it bends away from its tangent plane at `x`, where `at` was taken.
+    fn bend(&self, x: DVec3, at: &FaceAt) -> Bend;
 
     /// The face moved by a rigid motion that is given by what it does to points and to vectors.
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self;
@@ -211,8 +292,8 @@ pub trait Surface: Copy {
     /// All that tells it from others of its kind, the rest 0.
     fn numbers(&self) -> [f64; NUMBERS];
 
-    /// Where psi <= 0 along the ray origin + t·direction (a unit vector), ends infinite where it never ends; `None` nowhere.
-    fn inside(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)>;
+    /// Where psi <= 0 along the ray origin + t·direction (a unit vector), ends infinite where it never ends.
+    fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches;
 }
 
 /// Most numbers that tell a face.
@@ -265,6 +346,7 @@ faces! {$
     Sphere = 1: "Ball around a centre.",
     Cylinder = 2: "Infinite cylinder.",
     Cone = 3: "Infinite single-napped cone.",
+    Torus = 4: "All points within a radius of a circle.",
 }
 
 impl Face {
@@ -289,13 +371,31 @@ impl Face {
         each!(self, f => f.at(x))
     }
 
-    /// The Hessian of psi at the point that `at` was taken at; none on the axis and in the centre, where there is none.
+    /// See [`Surface::is_convex`].
     #[inline]
-    pub fn curvature(&self, at: &FaceAt) -> Curvature {
+    pub fn is_convex(&self) -> bool {
+        each!(self, f => f.is_convex())
+    }
+
+    /// The Hessian of psi at the point `x` that `at` was taken at; none on the axis and in the centre, where there is none.
+    #[inline]
+    pub fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature {
         if at.rho == 0.0 {
             return Curvature::NONE;
         }
-        each!(self, f => f.curvature(at))
+        each!(self, f => f.curvature(x, at))
+    }
+
+    /// See [`Surface::under`].
+    #[inline]
+    pub fn under(&self, touched: DVec3, center: DVec3) -> Option<Under> {
+        each!(self, f => f.under(touched, center))
+    }
+
+    /// See [`Surface::turn`].
+    #[inline]
+    pub fn turn(&self, x: DVec3, at: &FaceAt, reach: f64) -> f64 {
+        each!(self, f => f.turn(x, at, reach))
     }
 
     /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
@@ -306,8 +406,8 @@ impl Face {
 
     /// See [`Surface::bend`].
     #[inline]
-    pub fn bend(&self, at: &FaceAt) -> Bend {
-        each!(self, f => f.bend(at))
+    pub fn bend(&self, x: DVec3, at: &FaceAt) -> Bend {
+        each!(self, f => f.bend(x, at))
     }
 
     /// The same face seen from the parent of `frame`.
@@ -428,7 +528,7 @@ impl Face {
 
     /// See [`Surface::inside`].
     #[inline]
-    pub fn inside(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
+    pub fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {
         each!(self, f => f.inside(origin, direction))
     }
 }
@@ -452,7 +552,7 @@ fn radial(offset: DVec3, axis: DVec3) -> (f64, DVec3) {
 #[inline]
 fn around(axis: DVec3, at: &FaceAt) -> Curvature {
     // The tangent across the axis is the same for the cone's normal and its radial direction.
-    Curvature { each: 0.0, factor: at.k / at.rho, along: axis.cross(at.normal).normalize_or_zero() }
+    Curvature { factor: at.k / at.rho, along: axis.cross(at.normal).normalize_or_zero(), ..Curvature::NONE }
 }
 
 /// The lowest value of the tangent plane at the centre of a box over it: psi is convex and lies above.

@@ -1,6 +1,6 @@
 //! Plane: psi = n·x − d.
 
-use super::{Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Surface, Symmetry, half_line};
+use super::{Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, half_line};
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -35,7 +35,7 @@ impl Surface for Plane {
     }
 
     #[inline]
-    fn curvature(&self, _: &FaceAt) -> Curvature {
+    fn curvature(&self, _: DVec3, _: &FaceAt) -> Curvature {
         Curvature::NONE
     }
 
@@ -47,8 +47,13 @@ impl Surface for Plane {
     }
 
     #[inline]
-    fn bend(&self, _: &FaceAt) -> Bend {
-        Bend { law: Law::Straight, radial: DVec3::ZERO, tangents: [DVec3::ZERO; 2] }
+    fn bend(&self, _: DVec3, _: &FaceAt) -> Bend {
+        Bend {
+            law: Law::Straight,
+            radial: (f64::INFINITY, DVec3::ZERO),
+            tangents: [DVec3::ZERO; 2],
+            core: f64::INFINITY,
+        }
     }
 
     #[inline]
@@ -116,7 +121,7 @@ impl Surface for Plane {
     }
 
     #[inline]
-    fn inside(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
-        half_line(self.normal.dot(direction), self.normal.dot(origin) - self.offset)
+    fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {
+        half_line(self.normal.dot(direction), self.normal.dot(origin) - self.offset).into_iter().collect()
     }
 }

@@ -1,7 +1,8 @@
 //! Sphere: psi = |x − o| − r.
 
 use super::{
-    Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Surface, Symmetry, between_roots, largest_corner,
+    Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, between_roots,
+    largest_corner,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -40,9 +41,9 @@ impl Surface for Sphere {
     }
 
     #[inline]
-    fn curvature(&self, at: &FaceAt) -> Curvature {
+    fn curvature(&self, _: DVec3, at: &FaceAt) -> Curvature {
         let each = 1.0 / at.rho;
-        Curvature { each, factor: -each, along: at.normal }
+        Curvature { each, factor: -each, along: at.normal, ..Curvature::NONE }
     }
 
     /// Exact: the distance of box and centre − r, and the largest value of a corner.
@@ -53,9 +54,11 @@ impl Surface for Sphere {
     }
 
     #[inline]
-    fn bend(&self, at: &FaceAt) -> Bend {
+    fn bend(&self, _: DVec3, at: &FaceAt) -> Bend {
         let t = any_perpendicular(at.normal);
-        Bend { law: Law::Round { radius: self.radius }, radial: at.normal, tangents: [t, at.normal.cross(t)] }
+        let tangents = [t, at.normal.cross(t)];
+        let law = Law::Round { radius: self.radius };
+        Bend { law, radial: (at.rho, at.normal), tangents, core: f64::INFINITY }
     }
 
     #[inline]
@@ -116,8 +119,9 @@ impl Surface for Sphere {
         [o.x, o.y, o.z, self.radius, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn inside(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
+    fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {
         let o = origin - self.center;
-        between_roots(1.0, o.dot(direction), o.length_squared() - self.radius * self.radius)
+        let found = between_roots(1.0, o.dot(direction), o.length_squared() - self.radius * self.radius);
+        found.into_iter().collect()
     }
 }

@@ -5,7 +5,7 @@ use crate::math::random::Random;
 use glam::DQuat;
 
 /// One face of each kind, somewhere.
-fn faces(r: &mut Random) -> [Face; 4] {
+fn faces(r: &mut Random) -> [Face; 6] {
     let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
     let radius = r.within(0.2, 2.0);
     let (sin, cos) = r.within(0.1, 1.2).sin_cos();
@@ -14,6 +14,9 @@ fn faces(r: &mut Random) -> [Face; 4] {
         Sphere { center: o, radius }.into(),
         Cylinder { origin: o, axis: n, radius }.into(),
         Cone { apex: o, axis: n, sin, cos }.into(),
+        Torus { origin: o, axis: n, major: r.within(1.0, 2.0), minor: r.within(0.1, 1.0) }.into(),
+        // One without a hole.
+        Torus { origin: o, axis: n, major: r.within(0.1, 0.5), minor: r.within(0.5, 1.0) }.into(),
     ]
 }
 
@@ -26,14 +29,14 @@ fn a_face_at_a_point_is_its_value_with_its_derivatives() {
             let at = face.at(x);
             assert!((at.value - face.value(x)).abs() < 1e-14 && (at.normal.length() - 1.0).abs() < 1e-14);
             // Near an axis or a centre the third derivative is large.
-            if at.rho < 0.2 {
+            if at.rho < 0.2 || face.axis().is_some_and(|axis| (x - axis.origin).cross(axis.direction).length() < 0.2) {
                 continue;
             }
             let (h, d) = (1e-5, r.vector(1.0).normalize());
             let slope = (face.value(x + d * h) - face.value(x - d * h)) / (2.0 * h);
             assert!((slope - at.normal.dot(d)).abs() < 1e-8, "{face:?}");
             let turn = (face.at(x + d * h).normal - face.at(x - d * h).normal) / (2.0 * h);
-            assert!((turn - face.curvature(&at).matrix() * d).length() < 1e-7, "{face:?}");
+            assert!((turn - face.curvature(x, &at).matrix() * d).length() < 1e-7, "{face:?}");
         }
     }
 }
@@ -52,7 +55,7 @@ fn spans_hold_the_values_and_rays_end_where_psi_changes_its_sign() {
                 assert!(lo - 1e-14 <= v && v <= hi + 1e-14, "{face:?}");
                 let t = r.within(-4.0, 4.0);
                 let v = face.value(c + d * t);
-                assert!(v.abs() < 1e-9 || (v < 0.0) == inside.is_some_and(|(s, e)| s <= t && t <= e), "{face:?}");
+                assert!(v.abs() < 1e-9 || (v < 0.0) == inside.iter().any(|(s, e)| *s <= t && t <= *e), "{face:?}");
             }
         }
     }
@@ -108,12 +111,14 @@ fn capabilities_agree_with_psi() {
                 if let Some(axis) = face.developable() {
                     // Straight along the tangent that the axis lies over.
                     let along = at.normal.cross(axis.cross(at.normal)).normalize();
-                    assert!((face.curvature(&at).matrix() * along).length() < 1e-9, "{face:?}");
+                    assert!((face.curvature(x, &at).matrix() * along).length() < 1e-9, "{face:?}");
                 }
                 if let Some(apex) = face.apex() {
                     assert!(face.value(apex.point).abs() < 1e-14 && at.normal.dot(apex.axis) + apex.sin < 1e-12);
                 }
-                if !face.is_flat() {
+                // What lies within a tube that meets itself is none of the surface.
+                let is_whole = |foot: DVec3| face.is_convex() || face.value(foot) > -1e-9;
+                if !face.is_flat() && is_whole(face.foot(x, at.normal, 1.0)) {
                     let foot = face.foot(x, at.normal, 1.0);
                     assert!(face.value(foot).abs() < 1e-13, "{face:?}");
                     assert!((face.at(foot).normal - at.normal).length() < 1e-12, "{face:?}");
@@ -125,4 +130,51 @@ fn capabilities_agree_with_psi() {
         let [p, s, ..] = faces(&mut r);
         assert_eq!((p.above(&s, DVec3::ZERO, 1.0), p.deviation(&s, 1.0)), (None, None));
     }
+}
+
+/// What `Under` promises, at a point `y` off the centre.
+fn beneath(u: &Under, y: DVec3) -> f64 {
+    let (p, t) = (u.rho + u.out.dot(y), u.axis.cross(u.out).dot(y));
+    u.value + u.normal.dot(y) - u.k * (p.hypot(t) - p)
+}
+
+#[test]
+fn what_bounds_psi_from_below_and_from_above_does_so_near_and_far() {
+    let mut r = Random(13);
+    let (mut bent, mut close) = (0, 0);
+    for _ in 0..4000 {
+        for face in faces(&mut r) {
+            let (c, touched) = (r.vector(2.0), r.vector(2.0));
+            let touched = if r.unit() < 0.5 { c } else { touched };
+            let at = face.at(c);
+            let under = face.under(touched, c);
+            assert!(under.is_none() || !face.is_convex());
+            bent += usize::from(under.is_some());
+            for _ in 0..10 {
+                let size = 10f64.powf(r.within(-4.0, 0.5));
+                let y = r.vector(size);
+                let psi = face.value(c + y);
+                let d = y.length();
+                // From above: a ball's or an axis' k D²/(2 rho).
+                if at.k > 0.0 {
+                    assert!(psi <= at.value + at.normal.dot(y) + at.k * d * d / (2.0 * at.rho) + 1e-13, "{face:?}");
+                }
+                let turned = (face.at(c + y).normal - at.normal).length();
+                assert!(turned <= face.turn(c, &at, d) + 1e-9, "{face:?}");
+                let Some(u) = under else {
+                    let t = face.at(touched);
+                    let tangent = t.value + t.normal.dot(c + y - touched);
+                    assert!(psi >= tangent - 1e-13, "{face:?} {touched} {y}");
+                    continue;
+                };
+                let least = beneath(&u, y);
+                assert!(psi >= least - 1e-13, "{face:?} {touched} {y}");
+                let plane = u.value + u.normal.dot(y);
+                assert!(least >= plane - Under::dip(u.k, u.rho, d) - 1e-13);
+                assert!(psi >= u.value + u.far.dot(y) - u.k * d - 1e-13);
+                close += usize::from(touched == c && psi - least < 0.01 * d);
+            }
+        }
+    }
+    assert!(bent > 700 && close > 1000, "{bent} {close}");
 }
