@@ -353,7 +353,11 @@ impl<'a> Search<'a> {
         if !self.contacts.task.continues() {
             return None;
         }
-        climb::probe(&mut self.contacts, cell.t, cell.center);
+        // One that is known and comes soon is as good as any other: what is left to do is the proof.
+        let known = self.contacts.found.as_ref().is_some_and(|found| found.upper - cell.t <= WIDE);
+        if !known {
+            climb::probe(&mut self.contacts, cell.t, cell.center);
+        }
         (self.contacts.counters.cells >= LAST).then(|| self.bracket_or_long(cell.t)).flatten()
     }
 

@@ -28,6 +28,9 @@ use glam::DVec3;
 /// Cells' worth of work to prove that nothing is deep at the start.
 const START: u64 = 20_000;
 
+/// Cells' worth of work that any look for a witness may take.
+const LEAST_WORK: u64 = 2_000;
+
 /// The first look ahead, a fraction of what is left of the step; how much further each of the next ones goes.
 const NEAREST: f64 = 1e-14;
 const FURTHER: f64 = 8.0;
@@ -71,7 +74,8 @@ pub fn bracket(contacts: &mut Contacts, proven: f64) -> Option<Ending> {
 pub fn probe(contacts: &mut Contacts, t0: f64, x0: DVec3) {
     let end = contacts.goal().min(1.0);
     let enough = witness_level(contacts.task.delta, contacts.task.rounding);
-    let work = Work::new(u64::MAX);
+    // No more than the search itself has cost so far.
+    let work = Work::new(contacts.counters.cells.max(LEAST_WORK));
     let task = contacts.task;
     let fits = alike(&task);
     let climb = |enough: f64, t: f64, x: DVec3| {
@@ -100,13 +104,13 @@ pub fn probe(contacts: &mut Contacts, t0: f64, x0: DVec3) {
             }
             before = t;
         }
-        if part >= 1.0 {
+        if part >= 1.0 || work.is_spent() {
             break None;
         }
         part *= FURTHER;
     };
     let mut rounds = 0;
-    while let Some((t, y, _)) = hit.as_ref().filter(|_| rounds < FINE) {
+    while let Some((t, y, _)) = hit.as_ref().filter(|_| rounds < FINE && !work.is_spent()) {
         let middle = 0.5 * (before + t);
         if middle <= before || middle >= *t {
             break;
