@@ -2,7 +2,7 @@
 //! against the share of pairs that ask for one, and instructions where none does.
 //!
 //! Scenes are lanes of pairs (`contactd_tests::lanes`): a step costs the sum of what its pairs cost, and every step is made
-//! anew. What is asserted of counts is in `--test effect_costs`; here they stand beside times.
+//! anew. What is asserted of counts is in `--test steps effect_costs::`; here they stand beside times.
 
 mod instructions;
 mod ladder;

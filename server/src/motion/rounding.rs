@@ -3,7 +3,7 @@
 //! Every constant counts half units in the last place (u = 2⁻⁵³) of the operations on one path, by the standard model
 //! fl(x ∘ y) = (x ∘ y)(1 + d), |d| <= u (N. J. Higham, "Accuracy and Stability of Numerical Algorithms", SIAM 2002, sections
 //! 2.2 and 3.1), with sine and cosine right to one unit in the last place. docs/accuracy.md, "The rounding budget", counts
-//! them one by one; `cargo test -p contactd-tests --test rounding` holds them against 160-bit arithmetic.
+//! them one by one; `cargo test -p contactd-tests --test search rounding::` holds them against 160-bit arithmetic.
 //!
 //! What is exact by definition: the stored numbers of a motion, places and faces, and the time of an instant. Quaternions
 //! are unit to four units in the last place; the rotation meant is that of the normalised quaternion.

@@ -182,6 +182,13 @@ impl Known {
         }
         for (n, line) in (1..).zip(text.lines()) {
             let words: Vec<&str> = line.split(|c: char| c.is_whitespace() || "`()".contains(c)).collect();
+            for three in words.windows(3) {
+                if let (["--test", program], Some((file, _))) = (&three[..2], three[2].split_once("::"))
+                    && !self.paths.iter().any(|path| path.ends_with(format!("tests/{program}/{file}.rs")))
+                {
+                    wrong.push(format!("line {n} names --test {program} {file}::, which is not there"));
+                }
+            }
             for pair in words.windows(2) {
                 let name = pair[1].trim_end_matches([',', '.', ';', ':']);
                 let is_name = !name.is_empty() && name.chars().all(|c| c.is_ascii_lowercase() || c == '_');
@@ -210,6 +217,52 @@ fn documents_fit_a_page_and_what_they_name_is_there() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// What is wrong with the test that a deliberate fault names: `-p PACKAGE --test PROGRAM -- FILE::NAME` or `--lib -- PATH::NAME`.
+fn lost_test(known: &Known, patch: &str) -> Option<String> {
+    let Some(line) = patch.lines().find_map(|line| line.strip_prefix("Test: ")) else {
+        return Some("names no test".to_owned());
+    };
+    let words: Vec<&str> = line.split(' ').filter(|word| *word != "--exact").collect();
+    let name = words.last()?.rsplit("::").next()?;
+    // A macro's tests stand there without `fn`.
+    let is_in = |text: &str| {
+        let mut rest = text.match_indices(name).map(|(at, _)| text[at + name.len()..].trim_start());
+        rest.any(|rest| rest.starts_with(['(', ',', ')', ']', ';', '=']))
+    };
+    let found = match words.as_slice() {
+        ["-p", "contactd-tests", "--test", program, "--", path] => {
+            let file = path.rsplit_once("::").map_or(String::new(), |(file, _)| format!("{file}.rs"));
+            let text = std::fs::read_to_string(root().join("tests/tests").join(program).join(file));
+            text.is_ok_and(|text| is_in(&text))
+        }
+        ["-p", _, "--test", program, "--", _] => known.programs.contains(*program) && is_in(&known.sources),
+        ["-p", _, "--lib", "--", _] => is_in(&known.sources),
+        _ => false,
+    };
+    (!found).then(|| format!("names {line}, which is not there"))
+}
+
+#[test]
+fn every_deliberate_fault_names_a_test_that_is_there() {
+    let (known, folder) = (Known::read(), root().join("tests/mutants"));
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "patch") {
+            count += 1;
+            let lost = lost_test(&known, &read(&path));
+            wrong.extend(lost.map(|what| format!("{}: {what}", path.file_name().unwrap().display())));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 100, "only {count} faults were found");
+    let of = |test: &str| lost_test(&known, &format!("Test: -p contactd-tests --test {test}\n"));
+    assert_eq!(of("answers -- cases::every_case_is_answered_to_eight_digits"), None);
+    assert!(of("answers -- laws::every_case_is_answered_to_eight_digits").is_some());
+    assert!(of("cases -- every_case_is_answered_to_eight_digits").is_some());
+}
+
 #[test]
 fn a_long_line_a_dead_link_and_a_lost_path_are_seen() {
     let at = root().join("docs/adding.md");
@@ -220,13 +273,13 @@ fn a_long_line_a_dead_link_and_a_lost_path_are_seen() {
     assert_eq!(anchor("## In front: two convex, `turning`"), "in-front-two-convex-turning");
     let known = Known::read();
     let good = "`server/src/lib.rs` `world/step.rs` `floors.rs` `contact/convex` `time_lower` `target/x/y.rs` `BASE/S/lock`\n\
-                ```\nserver/src/gone.rs\n```\n`no_files_import_…` `cargo run --bin kernels -- --quick` --test floors\n";
+                ```\nserver/src/gone.rs\n```\n`no_files_import_…` `cargo run --bin kernels -- --quick` --test floors\n\
+                --test answers laws::\n";
     assert_eq!(known.missing(&at, good), Vec::<String>::new());
     let words = "`F64x2` `Kind::Empty` `Gone` `Kind::Gone_for_good` `E` `time_lower`"
         .replace("Gone", "NoSuch")
         .replace("_for_good", "Thing");
     assert_eq!(known.missing(&at.with_file_name(GLOSSARY), &words).len(), 2);
-    let bad =
-        "`server/src/gone.rs` `gone.rs` `contact/gone` `a_test_that_is_gone_for_good`\n--bin gone, --test gone.\n";
-    assert_eq!(known.missing(&at, bad.replace("a_test_that", "a_test_which").as_str()).len(), 6);
+    let bad = "`server/src/gone.rs` `gone.rs` `contact/gone` `a_test_that_is_gone_for_good`\n--bin gone, --test gone.\n--test steps laws::\n";
+    assert_eq!(known.missing(&at, bad.replace("a_test_that", "a_test_which").as_str()).len(), 7);
 }

@@ -1,0 +1,454 @@
+//! Every kind of contact, with the regions in which two bodies touch: their extent, kind, normal, faces and the points
+//! that bound them, against what elementary geometry says.
+
+use contactd::contact::clearance::touching;
+use contactd::contact::region::{Region, Regions, complete, regions, threshold};
+use contactd::contact::within::Within;
+use contactd::contact::{
+    Body, DEFAULT_CELL_LIMIT, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies,
+    default_resolution, earliest_contact,
+};
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd_proto::motion::quat_of_rotation_vector;
+use contactd_proto::{Motion, Pose};
+use contactd_tests::scenes::Recipe;
+use glam::{DQuat, DVec3, dvec3};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
+
+/// Two bodies at rest.
+struct Rest {
+    a: Model,
+    b: Model,
+    pose_a: Pose,
+    pose_b: Pose,
+}
+
+impl Rest {
+    fn new(a: Recipe, pose_a: Pose, b: Recipe, pose_b: Pose) -> Self {
+        Self { a: Model::new(a.build()), b: Model::new(b.build()), pose_a, pose_b }
+    }
+
+    fn query(&self) -> PairQuery<'_> {
+        self.moving(DVec3::ZERO)
+    }
+
+    /// b moves, a rests.
+    fn moving(&self, velocity: DVec3) -> PairQuery<'_> {
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        PairQuery {
+            a: Body { model: &self.a, placed: placed(Motion::resting(self.pose_a)) },
+            b: Body { model: &self.b, placed: placed(Motion { start: self.pose_b, velocity, spin: DVec3::ZERO }) },
+            resolution: default_resolution(&self.a, &self.b),
+            cell_limit: 100_000,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
+        }
+    }
+
+    fn regions(&self, margin: f64) -> Regions {
+        let query = self.query();
+        let found = regions(&query, 0.0, threshold(query.resolution, margin));
+        assert!(found.complete, "{} boxes: {found:?}", found.cells);
+        found
+    }
+
+    fn answer(&self, velocity: DVec3, margin: f64) -> (Outcome, Regions) {
+        let query = self.moving(velocity);
+        let mut o = earliest_contact(&query, &mut Scratch::default());
+        let threshold = threshold(query.resolution, margin);
+        o.touching |= touching(&query, threshold, &mut Scratch::default()).0 != Within::Apart;
+        let found = complete(&query, &mut o, threshold);
+        (o, found)
+    }
+}
+
+/// a at the origin, b over it.
+fn rest(a: Recipe, b: Recipe, pose_b: Pose) -> Rest {
+    Rest::new(a, Pose::IDENTITY, b, pose_b)
+}
+
+fn turned(axis: DVec3, angle: f64) -> DQuat {
+    quat_of_rotation_vector(axis.normalize() * angle)
+}
+
+fn cube() -> Recipe {
+    Recipe::cuboid(0.5, 0.5, 0.5)
+}
+
+/// A plate whose upper face is z = 0.
+fn floor() -> Recipe {
+    Recipe::cuboid(4.0, 4.0, 1.0).at(0.0, 0.0, -1.0)
+}
+
+/// Holds the one region of a list against its kind, extent, normal and set of points.
+#[track_caller]
+fn is(r: &Region, kind: &str, extent: Extent, normal: DVec3, points: &[DVec3]) {
+    assert_eq!((r.kind.name(), r.extent), (kind, extent), "{r:?}");
+    assert!(r.normal.distance(normal) < 1e-7, "normal {}, expected {normal}", r.normal);
+    assert_eq!(r.points.len(), points.len(), "{r:#?}");
+    for p in points {
+        let off = r.points.iter().map(|q| q.point.distance(*p)).fold(f64::INFINITY, f64::min);
+        assert!(off < 3e-9, "no point at {p}, the nearest is {off} away: {r:#?}");
+    }
+    assert!(r.faces_a[0] != u32::MAX && r.faces_b[0] != u32::MAX, "{r:?}");
+}
+
+#[track_caller]
+fn only(found: &Regions) -> &Region {
+    assert_eq!(found.regions.len(), 1, "{found:#?}");
+    &found.regions[0]
+}
+
+fn square(half: f64, x: f64, y: f64) -> Vec<DVec3> {
+    [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(s, t)| dvec3(x + s * half, y + t * half, 0.0)).to_vec()
+}
+
+/// Eight points of a circle about z.
+fn ring(radius: f64, x: f64, y: f64, z: f64) -> Vec<DVec3> {
+    (0..8)
+        .map(|k| {
+            let angle = f64::from(k) * FRAC_PI_4;
+            dvec3(x + radius * angle.cos(), y + radius * angle.sin(), z)
+        })
+        .collect()
+}
+
+#[test]
+fn a_box_on_a_floor_is_a_patch_with_its_four_corners() {
+    let s = rest(floor(), cube(), Pose::at(dvec3(0.3, -0.2, 0.5)));
+    is(only(&s.regions(0.0)), "face-face", Extent::Patch, DVec3::Z, &square(0.5, 0.3, -0.2));
+    assert_eq!(only(&s.regions(0.0)).faces_b[0], 5);
+    // Turned about the normal, and hanging over the edge: clipped by the floor.
+    let s = rest(floor(), cube(), Pose::new(dvec3(4.0, 0.0, 0.5), turned(DVec3::Z, FRAC_PI_4)));
+    let d = 0.5 * SQRT_2;
+    let points = [dvec3(4.0, d, 0.0), dvec3(4.0, -d, 0.0), dvec3(4.0 - d, 0.0, 0.0)];
+    is(only(&s.regions(0.0)), "face-face", Extent::Patch, DVec3::Z, &points);
+}
+
+#[test]
+fn patches_have_the_corners_that_set_operations_make() {
+    // A block with a groove stands on two feet: one face, two patches.
+    let block = Recipe::cuboid(1.0, 0.5, 0.5).minus(Recipe::cuboid(0.4, 1.0, 0.4).at(0.0, 0.0, -0.5));
+    let s = rest(floor(), block, Pose::at(DVec3::Z * 0.5));
+    let found = s.regions(0.0);
+    assert_eq!(found.regions.len(), 2, "{found:#?}");
+    let mut feet: Vec<f64> = found.regions.iter().map(|r| r.points.iter().map(|p| p.point.x).sum::<f64>()).collect();
+    feet.sort_by(f64::total_cmp);
+    assert!((feet[0] + 2.8).abs() < 1e-9 && (feet[1] - 2.8).abs() < 1e-9, "{found:#?}");
+    // Two abutting operands of a union are one face: no corner on their seam.
+    let two = cube().at(-0.5, 0.0, 0.0).union(cube().at(0.5, 0.0, 0.0));
+    let s = rest(floor(), two, Pose::at(DVec3::Z * 0.5));
+    let points = [(1.0, 0.5), (1.0, -0.5), (-1.0, 0.5), (-1.0, -0.5)].map(|(x, y)| dvec3(x, y, 0.0));
+    is(only(&s.regions(0.0)), "face-face", Extent::Patch, DVec3::Z, &points);
+    // A hole in the block: its rim bounds the patch from within.
+    let drilled = cube().minus(Recipe::cylinder(0.25, 1.0));
+    let s = rest(floor(), drilled, Pose::at(DVec3::Z * 0.5));
+    let points = [square(0.5, 0.0, 0.0), ring(0.25, 0.0, 0.0, 0.0)].concat();
+    is(only(&s.regions(0.0)), "face-face", Extent::Patch, DVec3::Z, &points);
+}
+
+#[test]
+fn a_standing_cylinder_is_a_disc_and_a_lying_one_a_line() {
+    let s = rest(floor(), Recipe::cylinder(0.5, 1.0), Pose::at(dvec3(0.2, 0.1, 1.0)));
+    is(only(&s.regions(0.0)), "face-face", Extent::Patch, DVec3::Z, &ring(0.5, 0.2, 0.1, 0.0));
+    let lying = Pose::new(dvec3(0.2, 0.1, 0.5), turned(DVec3::Y, FRAC_PI_2));
+    let s = rest(floor(), Recipe::cylinder(0.5, 1.0), lying);
+    let ends = [dvec3(1.2, 0.1, 0.0), dvec3(-0.8, 0.1, 0.0)];
+    is(only(&s.regions(0.0)), "face-face", Extent::Line, DVec3::Z, &ends);
+    // Over the floor's edge: the line ends there.
+    let lying = Pose::new(dvec3(3.5, 0.1, 0.5), turned(DVec3::Y, FRAC_PI_2));
+    let s = rest(floor(), Recipe::cylinder(0.5, 1.0), lying);
+    is(only(&s.regions(0.0)), "face-face", Extent::Line, DVec3::Z, &[dvec3(4.0, 0.1, 0.0), dvec3(2.5, 0.1, 0.0)]);
+    // A cone on its side, its apex an end.
+    let half = (0.5f64 / 2.0).atan();
+    let cone = Recipe::cone(0.5, 0.0, 1.0).at(0.0, 0.0, -1.0);
+    // Its axis from the apex points down; laid so that the ruling is horizontal.
+    let lay = Pose::new(DVec3::ZERO, turned(DVec3::Y, FRAC_PI_2 + half));
+    let s = rest(floor(), cone, lay);
+    let slant = 2.0f64.hypot(0.5);
+    let found = s.regions(0.0);
+    let r = only(&found);
+    assert_eq!((r.kind.name(), r.extent), ("face-face", Extent::Line), "{r:?}");
+    let far = r.points.iter().map(|p| p.point.length()).fold(0.0, f64::max);
+    assert!((far - slant).abs() < 1e-9 && r.points.iter().any(|p| p.point.length() < 1e-9), "{r:?}");
+}
+
+#[test]
+fn round_faces_touch_at_points() {
+    let s = rest(floor(), Recipe::sphere(0.5), Pose::at(dvec3(0.3, 0.2, 0.5)));
+    is(only(&s.regions(0.0)), "face-face", Extent::Point, DVec3::Z, &[dvec3(0.3, 0.2, 0.0)]);
+    let s = rest(Recipe::sphere(0.5), Recipe::sphere(0.25), Pose::at(DVec3::X * 0.75));
+    is(only(&s.regions(0.0)), "face-face", Extent::Point, DVec3::X, &[DVec3::X * 0.5]);
+    // Crossed cylinders.
+    let crossed = Pose::new(DVec3::Y * 1.0, turned(DVec3::Y, FRAC_PI_2));
+    let s = rest(Recipe::cylinder(0.5, 1.0), Recipe::cylinder(0.5, 1.0), crossed);
+    is(only(&s.regions(0.0)), "face-face", Extent::Point, DVec3::Y, &[DVec3::Y * 0.5]);
+    // A ball between two walls of a groove touches both.
+    let groove = Recipe::cuboid(2.0, 2.0, 1.0).minus(Recipe::cuboid(0.5, 3.0, 0.8).at(0.0, 0.0, 1.0));
+    let s = rest(groove, Recipe::sphere(0.5), Pose::at(dvec3(0.0, 0.0, 0.8)));
+    let found = s.regions(0.0);
+    assert_eq!(found.regions.len(), 2, "{found:#?}");
+    for r in &found.regions {
+        let side = r.points[0].point.x.signum();
+        is(r, "face-face", Extent::Point, DVec3::X * -side, &[dvec3(0.5 * side, 0.0, 0.8)]);
+    }
+}
+
+#[test]
+fn edges_and_vertices_on_faces() {
+    // An edge down: a line.
+    let on_edge = Pose::new(DVec3::Z * (0.5 * SQRT_2), turned(DVec3::X, FRAC_PI_4));
+    let s = rest(floor(), cube(), on_edge);
+    is(only(&s.regions(0.0)), "edge-face", Extent::Line, DVec3::Z, &[DVec3::X * 0.5, DVec3::X * -0.5]);
+    // A vertex down: a point.
+    let diagonal = DQuat::from_rotation_arc(dvec3(-1.0, -1.0, -1.0).normalize(), DVec3::NEG_Z);
+    let s = rest(floor(), cube(), Pose::new(DVec3::Z * (0.5 * 3f64.sqrt()), diagonal));
+    is(only(&s.regions(0.0)), "vertex-face", Extent::Point, DVec3::Z, &[DVec3::ZERO]);
+    // A tilted cylinder touches with its rim.
+    let tilt = Pose::new(DVec3::ZERO, turned(DVec3::Y, 0.3));
+    let low = tilt.vector(dvec3(0.5, 0.0, -1.0));
+    let s = rest(floor(), Recipe::cylinder(0.5, 1.0), Pose::new(DVec3::Z * -low.z, tilt.rotation));
+    is(only(&s.regions(0.0)), "edge-face", Extent::Point, DVec3::Z, &[dvec3(low.x, 0.0, 0.0)]);
+    // A cone's apex is a vertex.
+    let cone = Recipe::cone(0.5, 0.0, 0.5).at(0.0, 0.0, -0.5);
+    let s = rest(floor(), cone, Pose::new(DVec3::ZERO, turned(DVec3::X, 2.8)));
+    is(only(&s.regions(0.0)), "vertex-face", Extent::Point, DVec3::Z, &[DVec3::ZERO]);
+}
+
+#[test]
+fn edges_and_vertices_on_edges_and_vertices() {
+    let ridge = || cube().moved(&Pose::new(DVec3::Z * (-0.5 * SQRT_2), turned(DVec3::X, FRAC_PI_4)));
+    let keel = |turn: DQuat| Pose::new(DVec3::Z * (0.5 * SQRT_2), turn * turned(DVec3::X, FRAC_PI_4));
+    // Crossing edges.
+    let s = rest(ridge(), cube(), keel(turned(DVec3::Z, FRAC_PI_2)));
+    is(only(&s.regions(0.0)), "edge-edge", Extent::Point, DVec3::Z, &[DVec3::ZERO]);
+    // Edges along each other, one shifted.
+    let along = keel(DQuat::IDENTITY);
+    let s = rest(ridge(), cube(), Pose::new(along.position + DVec3::X * 0.3, along.rotation));
+    is(only(&s.regions(0.0)), "edge-edge", Extent::Line, DVec3::Z, &[DVec3::X * 0.5, DVec3::X * -0.2]);
+    // A vertex on an edge, and on a vertex.
+    let diagonal = DQuat::from_rotation_arc(dvec3(-1.0, -1.0, -1.0).normalize(), DVec3::NEG_Z);
+    let point = Pose::new(DVec3::Z * (0.5 * 3f64.sqrt()), diagonal);
+    let s = rest(ridge(), cube(), point);
+    let found = s.regions(0.0);
+    assert_eq!(only(&found).kind.name(), "vertex-edge", "{found:?}");
+    let up = cube().moved(&Pose::new(DVec3::Z * (-0.5 * 3f64.sqrt()), diagonal));
+    let s = rest(up, cube(), point);
+    is(only(&s.regions(0.0)), "vertex-vertex", Extent::Point, DVec3::Z, &[DVec3::ZERO]);
+    // Apex on apex.
+    let cone = || Recipe::cone(0.5, 0.0, 0.5).at(0.0, 0.0, -0.5);
+    let s = rest(cone(), cone(), Pose::new(DVec3::ZERO, turned(DVec3::X, TAU / 2.0)));
+    is(only(&s.regions(0.0)), "vertex-vertex", Extent::Point, DVec3::Z, &[DVec3::ZERO]);
+}
+
+#[test]
+fn pegs_balls_and_cones_in_their_holes() {
+    let plate = |r: f64| Recipe::cuboid(1.0, 1.0, 0.2).minus(Recipe::cylinder(r, 0.5));
+    // A thinner peg against the wall: a line as long as the plate is thick.
+    let s = rest(plate(0.25), Recipe::cylinder(0.24, 0.5), Pose::at(DVec3::X * 0.01));
+    let ends = [dvec3(0.25, 0.0, 0.2), dvec3(0.25, 0.0, -0.2)];
+    is(only(&s.regions(0.0)), "face-face", Extent::Line, DVec3::NEG_X, &ends);
+    // A peg of its own size: all of the wall.
+    let s = rest(plate(0.25), Recipe::cylinder(0.25, 0.5), Pose::at(DVec3::Z * 0.1));
+    let found = s.regions(0.0);
+    let r = only(&found);
+    let rims = [ring(0.25, 0.0, 0.0, 0.2), ring(0.25, 0.0, 0.0, -0.2)].concat();
+    is(r, "face-face", Extent::Patch, r.normal, &rims);
+    // A ball in a cylinder of its size: a circle.
+    let s = rest(plate(0.25), Recipe::sphere(0.25), Pose::IDENTITY);
+    let found = s.regions(0.0);
+    let r = only(&found);
+    is(r, "face-face", Extent::Line, r.normal, &ring(0.25, 0.0, 0.0, 0.0));
+    // A ball in its socket: the rim bounds the patch.
+    let socket = Recipe::cuboid(1.0, 1.0, 0.4).at(0.0, 0.0, -0.4).minus(Recipe::sphere(0.5).at(0.0, 0.0, 0.3));
+    let s = rest(socket, Recipe::sphere(0.5), Pose::at(DVec3::Z * 0.3));
+    let found = s.regions(0.0);
+    is(only(&found), "face-face", Extent::Patch, DVec3::Z, &ring(0.4, 0.0, 0.0, 0.0));
+    // A larger ball rests on the rim that the hole makes: a circle, edge against face.
+    let s = rest(plate(0.3), Recipe::sphere(0.5), Pose::at(DVec3::Z * 0.6));
+    let found = s.regions(0.0);
+    let r = only(&found);
+    assert!(r.kind.name() == "edge-face", "{r:?}");
+    is(r, "edge-face", Extent::Line, r.normal, &ring(0.3, 0.0, 0.0, 0.2));
+    // A cone in a cone of its angle, deeper than it is high: its lateral surface.
+    let hole = Recipe::cone(0.0, 1.0, 0.5).at(0.0, 0.0, 0.5);
+    let block = Recipe::cuboid(2.0, 2.0, 0.9).at(0.0, 0.0, -0.1).minus(hole);
+    let s = rest(block, Recipe::cone(0.0, 0.5, 0.25).at(0.0, 0.0, 0.25), Pose::IDENTITY);
+    let found = s.regions(0.0);
+    let r = &found.regions[0];
+    assert_eq!((r.extent, r.kind.name()), (Extent::Patch, "face-face"), "{found:#?}");
+    for p in ring(0.5, 0.0, 0.0, 0.5) {
+        assert!(r.points.iter().any(|q| q.point.distance(p) < 1e-8), "{p}: {found:#?}");
+    }
+}
+
+#[test]
+fn a_tilted_peg_touches_the_rim_of_its_hole_on_both_sides() {
+    let plate = Recipe::cuboid(1.0, 1.0, 0.2).minus(Recipe::cylinder(0.25, 0.5));
+    let turn = turned(DVec3::Y, 0.1);
+    let s = rest(plate, Recipe::cylinder(0.25, 0.5), Pose::new(DVec3::Z * 1.2, turn));
+    let (o, found) = s.answer(dvec3(0.0, 0.0, -1.0), 0.0);
+    assert_eq!(o.status, Status::Contact);
+    assert!(found.complete, "{found:#?}");
+    // The contact is among the regions, and every region is mirrored in the plane of the tilt.
+    let points: Vec<DVec3> = found.regions.iter().flat_map(|r| r.points.iter().map(|p| p.point)).collect();
+    assert!(points.iter().any(|p| p.distance(o.point) < 1e-7), "{o:?}: {found:#?}");
+    for p in &points {
+        let mirrored = dvec3(p.x, -p.y, p.z);
+        assert!(points.iter().any(|q| q.distance(mirrored) < 1e-6), "{p} has no mirror image: {found:#?}");
+    }
+}
+
+#[test]
+fn touching_is_decided_by_the_margin() {
+    let s = |gap: f64| rest(floor(), cube(), Pose::at(DVec3::Z * (0.5 + gap)));
+    for (gap, margin, expected) in
+        [(0.0, 0.0, true), (1e-3, 0.0, false), (1e-3, 0.9e-3, false), (1e-3, 1.1e-3, true), (1e-12, 0.0, true)]
+    {
+        let (o, found) = s(gap).answer(DVec3::ZERO, margin);
+        assert_eq!((o.status, o.touching), (Status::Clear, expected), "gap {gap}, margin {margin}");
+        assert_eq!(found.regions.len(), usize::from(expected), "gap {gap}, margin {margin}: {found:#?}");
+        if expected {
+            assert!((o.separation - gap).abs() < 1e-12, "{o:?}");
+            assert!(found.regions[0].points.iter().all(|p| (p.separation - gap).abs() < 1e-12), "{found:#?}");
+            assert!(o.normal.distance(DVec3::Z) < 1e-12 && o.normal_speed == 0.0);
+        }
+    }
+    // Sliding and receding pairs are clear and touch; their speeds along the normal tell which is which.
+    let (o, _) = s(0.0).answer(dvec3(0.3, 0.0, 0.0), 0.0);
+    assert_eq!((o.status, o.touching, o.normal_speed), (Status::Clear, true, 0.0));
+    let (o, found) = s(0.0).answer(dvec3(0.0, 0.0, 0.5), 0.0);
+    assert_eq!((o.status, o.touching, o.normal_speed), (Status::Clear, true, -0.5));
+    assert_eq!(found.regions[0].points.len(), 4);
+    // Beside contact too: a body pressed on.
+    let (o, found) = s(0.0).answer(dvec3(0.0, 0.0, -0.5), 0.0);
+    assert_eq!((o.status, o.touching), (Status::Contact, true));
+    assert!(o.time < 1e-15, "{o:?}");
+    assert_eq!(found.regions[0].points.len(), 4);
+    // A curved pair that comes near only at one point is proven apart just above the threshold.
+    let ball = rest(floor(), Recipe::sphere(0.5), Pose::at(dvec3(0.1, 0.2, 0.501)));
+    assert_eq!(touching(&ball.query(), 0.999e-3, &mut Scratch::default()).0, Within::Apart);
+    assert!(matches!(touching(&ball.query(), 1.001e-3, &mut Scratch::default()).0, Within::Witness(_)));
+}
+
+/// A body of about 20 mm that moves by 0.2 µm keeps its regions, and no point of them goes further than that.
+#[test]
+fn a_body_that_moves_by_a_fifth_of_a_micrometre_keeps_its_points() {
+    let (size, step, margin) = (20.0, 2e-4, 1e-3);
+    let floor = || Recipe::cuboid(100.0, 100.0, 10.0).at(0.0, 0.0, -10.0);
+    let upright = Pose::at(DVec3::Z * (size / 2.0));
+    let lying = Pose::new(DVec3::Z * (size / 2.0), turned(DVec3::Y, FRAC_PI_2));
+    let bodies = [
+        ("box", Recipe::cuboid(size / 2.0, size / 2.0, size / 2.0), upright),
+        ("standing cylinder", Recipe::cylinder(size / 2.0, size / 2.0), upright),
+        ("lying cylinder", Recipe::cylinder(size / 2.0, size), lying),
+        ("tube", Recipe::cylinder(10.0, 10.0).minus(Recipe::cylinder(6.0, 20.0)), upright),
+    ];
+    for (name, body, pose) in bodies {
+        let base = rest(floor(), body.clone(), pose).regions(margin);
+        assert_eq!(base.regions.len(), 1, "{name}: {base:#?}");
+        for k in 0..24u32 {
+            // Up to a step along each axis, and as much at the rim by turning about each.
+            let r = |salt: u32| f64::from((k * 7919 + salt * 104_729) % 1009) / 504.5 - 1.0;
+            let shift = dvec3(r(1), r(2), 0.5 + 0.5 * r(3)) * step;
+            let lean = dvec3(r(4), r(5), r(6)) * (step / size);
+            let moved = Pose::new(pose.position + shift, turned(lean, lean.length()) * pose.rotation);
+            let now = rest(floor(), body.clone(), moved).regions(margin);
+            assert_eq!(now.regions.len(), 1, "{name}, {k}: {now:#?}");
+            let (p, q) = (&base.regions[0], &now.regions[0]);
+            assert_eq!((p.kind, p.extent, p.faces_a, p.faces_b), (q.kind, q.extent, q.faces_a, q.faces_b), "{name}");
+            assert_eq!(p.points.len(), q.points.len(), "{name}, {k}: {p:#?} {q:#?}");
+            for (x, y) in p.points.iter().zip(&q.points) {
+                let way = x.point.distance(y.point);
+                assert!(way <= 6.0 * step, "{name}, {k}: a point went {way}: {p:#?} {q:#?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn swapping_the_pair_negates_the_normals_and_swaps_the_faces() {
+    let pose = Pose::new(dvec3(0.4, 0.3, 0.5), turned(DVec3::Z, 0.3));
+    let s = rest(floor(), cube(), pose);
+    let t = Rest::new(cube(), pose, floor(), Pose::IDENTITY);
+    let (p, q) = (s.regions(0.0), t.regions(0.0));
+    assert_eq!(p.regions.len(), q.regions.len());
+    for (r, s) in p.regions.iter().zip(&q.regions) {
+        assert_eq!((r.normal, r.faces_a, r.faces_b), (-s.normal, s.faces_b, s.faces_a));
+        assert_eq!(r.points, s.points);
+    }
+}
+
+/// A gap of a fifth of a body's size, in a margin that is larger yet: the same regions as where the body touches.
+#[test]
+fn a_gap_within_a_large_margin_has_the_regions_of_the_contact() {
+    let on_edge = turned(DVec3::X, FRAC_PI_4);
+    let diagonal = DQuat::from_rotation_arc(dvec3(-1.0, -1.0, -1.0).normalize(), DVec3::NEG_Z);
+    let lying = turned(DVec3::Y, FRAC_PI_2);
+    for (body, turn, height) in [
+        (cube(), DQuat::IDENTITY, 0.5),
+        (cube(), on_edge, 0.5 * SQRT_2),
+        (cube(), diagonal, 0.5 * 3f64.sqrt()),
+        (cube().minus(Recipe::cylinder(0.25, 1.0)), DQuat::IDENTITY, 0.5),
+        (Recipe::sphere(0.5), DQuat::IDENTITY, 0.5),
+        (Recipe::cylinder(0.5, 0.5), DQuat::IDENTITY, 0.5),
+        (Recipe::cylinder(0.5, 0.5), lying, 0.5),
+    ] {
+        let at = |gap: f64| rest(floor(), body.clone(), Pose::new(dvec3(0.3, -0.2, height + gap), turn)).regions(0.1);
+        let touching = at(0.0);
+        for gap in [1e-3, 0.01, 0.04, 0.09] {
+            let apart = at(gap);
+            let kinds = |r: &Regions| r.regions.iter().map(|r| (r.kind, r.extent, r.points.len())).collect::<Vec<_>>();
+            assert_eq!(kinds(&touching), kinds(&apart), "gap {gap}: {touching:#?} {apart:#?}");
+            for (r, s) in touching.regions.iter().zip(&apart.regions) {
+                assert!((s.separation() - r.separation() - gap).abs() < 1e-9, "gap {gap}: {r:?} {s:?}");
+                let lifted = |p: DVec3| p + DVec3::Z * (0.5 * gap);
+                for (p, q) in r.points.iter().zip(&s.points) {
+                    assert!(lifted(p.point).distance(q.point) < 1e-9, "gap {gap}: {r:#?} {s:#?}");
+                }
+            }
+        }
+    }
+}
+
+/// Margins from a hundredth of the bodies to 1e12 times their size: bounded work, and a pair that touches has a region.
+#[test]
+fn any_margin_has_its_answer_within_bounded_work() {
+    let plate = || Recipe::cuboid(1.0, 1.0, 0.25).minus(Recipe::cylinder(0.5, 1.0));
+    let slot = |i: i32| Recipe::cuboid(0.1, 1.0, 0.3).at(f64::from(i) * 0.5 - 1.75, 0.0, 0.3);
+    let comb = || (0..8).fold(Recipe::cuboid(2.0, 0.4, 0.3), |bar, i| bar.minus(slot(i)));
+    let tilted = |z: f64| Pose::new(dvec3(0.3, 0.2, z), turned(dvec3(1.0, 2.0, 0.3), 0.7));
+    // The ball hangs over the hole, nearest to its rim.
+    let to_rim = dvec3(0.5, 0.0, 0.75).length() - 0.5;
+    for (name, s, nearest, incomplete) in [
+        ("ball over plate", rest(plate(), Recipe::sphere(0.5), Pose::at(DVec3::Z)), Some(to_rim), 0),
+        ("box over plate", rest(plate(), cube(), Pose::at(DVec3::Z)), Some(0.25), 0),
+        ("tilted box over plate", rest(plate(), cube(), tilted(1.2)), None, 0),
+        ("plate over plate", rest(plate(), plate(), tilted(2.0)), None, 0),
+        ("peg in hole", rest(plate(), Recipe::cylinder(0.4, 1.0), Pose::at(DVec3::X * 0.05)), Some(0.05), 0),
+        // Its slots are narrower than the margin: more faces are near each other than there is work for.
+        ("comb over comb", rest(comb(), comb(), Pose::at(dvec3(0.1, 0.0, 0.8))), None, 6),
+    ] {
+        let mut missing = 0;
+        for margin in [1e-3, 0.01, 0.06, 0.1, 0.21, 0.5, 1.0, 10.0, 1e3, 1e12] {
+            let mut query = s.query();
+            for limit in [DEFAULT_CELL_LIMIT, 60] {
+                query.cell_limit = limit;
+                let (within, cells) = touching(&query, margin, &mut Scratch::default());
+                let found = regions(&query, 0.0, margin);
+                let says = format!("{name}, margin {margin}: {within:?} for {cells} cells, {found:?}");
+                // The last step of it may go beyond.
+                assert!(cells.max(found.cells) <= limit.min(20_000) + 256, "{says}");
+                if limit == DEFAULT_CELL_LIMIT {
+                    missing += usize::from(!found.complete);
+                    assert_eq!(!found.regions.is_empty(), matches!(within, Within::Witness(_)), "{says}");
+                    let reported = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
+                    let fits = |gap: f64| reported == f64::INFINITY || (reported - gap).abs() < 1e-9;
+                    assert!(nearest.is_none_or(fits), "{says}");
+                }
+            }
+        }
+        assert!(missing <= incomplete, "{name}: {missing} times incomplete");
+    }
+}

@@ -1,0 +1,19 @@
+//! Answers for pairs, against truths of their own: closed forms, laws, a reference, judges, scenes that once were hard.
+//! One program for all of them links once; `--test answers NAME::` runs those of one file.
+#![allow(missing_docs)]
+
+mod accuracy;
+mod cases;
+mod closed_forms;
+mod coincident;
+mod contact_regions;
+mod families;
+mod hard_cases;
+mod laws;
+mod overlap;
+mod primitive_pairs;
+mod records;
+mod reference;
+mod tight;
+mod tori;
+mod unbounded;

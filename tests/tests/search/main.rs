@@ -1,0 +1,12 @@
+//! What the search is made of: bounds, octrees and their walk, fits, fronts, what rounding takes, certificates.
+//! One program for all of them links once; `--test search NAME::` runs those of one file.
+#![allow(missing_docs)]
+
+mod bounds;
+mod certificate;
+mod fits;
+mod fronts;
+mod octree;
+mod rounding;
+mod stages;
+mod walk;

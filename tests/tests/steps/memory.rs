@@ -1,0 +1,460 @@
+//! A session that remembers tells what one tells that never saw a step before: to the bit, whatever happens to its bodies.
+//!
+//! The steps are drawn by `stepped`, which knows nothing of what is remembered. 100,000 of them:
+//! `CONTACTD_MEMORY_STEPS=100000 cargo test --release -p contactd-tests --test steps memory:: -- --nocapture`
+
+use contactd::contact::{Counters, Outcome, Status};
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd::world::memory::Remembered;
+use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, StepOptions, StepOutcome, World, record};
+use contactd_proto::contact_record::{ContactRecord, DETAIL_SLOT, DetailSlot};
+use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Rule};
+use contactd_tests::random_solids::Random;
+use contactd_tests::scenes::Recipe;
+use contactd_tests::stepped::{Act, Change, Play, Thing, block, motion_states, plate};
+use contactd_tests::verifier::UNSHOWN;
+use contactd_tests::verifier::memory::{Proven, Truth, check};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+fn part(recipe: &Recipe) -> Arc<MeasuredModel> {
+    Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))))
+}
+
+/// The reply to a step as its caller reads it, to the bit: header and all slots, work left out.
+fn reported(world: &World) -> (String, Vec<ContactRecord>) {
+    let out = world.outcome();
+    let r = record::reply(out, true);
+    let header = format!(
+        "{} {} {} {} {:x} {}",
+        r.status,
+        r.records,
+        r.slots,
+        r.truncated,
+        r.safe_time.to_bits(),
+        out.may_have_passed
+    );
+    let slot = |i: usize| {
+        let slot = record::slot(world, out, true, i);
+        let detail: DetailSlot = bytemuck::cast(slot);
+        // Cells are work.
+        if i >= out.pairs.len() && detail.tag == DETAIL_SLOT {
+            bytemuck::cast(DetailSlot { cells: 0, ..detail })
+        } else {
+            slot
+        }
+    };
+    (header, (0..record::slots_of(out, true)).map(slot).collect())
+}
+
+fn same(a: &(String, Vec<ContactRecord>), b: &(String, Vec<ContactRecord>)) -> bool {
+    a.0 == b.0 && bytemuck::cast_slice::<_, u8>(&a.1) == bytemuck::cast_slice::<_, u8>(&b.1)
+}
+
+/// The first slot in which two replies differ.
+fn differing(a: &(String, Vec<ContactRecord>), b: &(String, Vec<ContactRecord>)) -> String {
+    let bytes = |x: &ContactRecord| bytemuck::bytes_of(x).to_vec();
+    let slots = a.1.iter().zip(&b.1).enumerate().find(|(_, (x, y))| bytes(x) != bytes(y));
+    let slots = slots.map(|(i, (x, y))| {
+        let at: Vec<usize> =
+            bytes(x).iter().zip(bytes(y)).enumerate().filter(|(_, (x, y))| **x != *y).map(|(k, _)| k).collect();
+        format!("slot {i} of {}, bytes {at:?}: {x:?}, {y:?}", a.1.len())
+    });
+    format!("{} {} {slots:?}", a.0, b.0)
+}
+
+/// Every pair with all that is told of it but the work that it took, `regions` or not. A field that is not told may be 0 or -0.
+fn lines(out: &StepOutcome, regions: bool) -> Vec<String> {
+    let text = |p: &PairOutcome| {
+        let outcome = Outcome { counters: Counters::default(), apart: 0.0, ..p.outcome };
+        let regions = if regions { out.regions_of(p) } else { &[] };
+        let text = format!("{:?} {} {outcome:?} {regions:?}", (p.a, p.b), p.regions_complete);
+        text.replace("-0.0,", "0.0,").replace("-0.0)", "0.0)")
+    };
+    out.pairs.iter().map(text).collect()
+}
+
+/// A world that has never been asked anything: objects, rules and the tracks of the step before.
+struct Fresh {
+    parts: Vec<Arc<MeasuredModel>>,
+    things: Vec<Thing>,
+    rules: Vec<Rule>,
+    resolution: Option<f64>,
+    motion_states: Vec<(u32, MotionState)>,
+}
+
+impl Fresh {
+    fn world(&self) -> World {
+        let mut world = World::new(256, 256);
+        for thing in &self.things {
+            world.add_object(thing.spec(&self.parts)).expect("an object");
+        }
+        world.set_rules(self.rules.clone()).expect("rules");
+        world.set_resolution(self.resolution).expect("a resolution");
+        world.restore(&self.motion_states).expect("motion_states");
+        world
+    }
+
+    fn change(&mut self, change: &Change) {
+        match change {
+            Change::Add(thing) => self.things.push(thing.clone()),
+            Change::Remove(id) => {
+                self.things.retain(|t| t.id != *id);
+                self.motion_states.retain(|t| t.0 != *id);
+            }
+            Change::Rules(rules) => self.rules.clone_from(rules),
+            Change::Resolution(resolution) => self.resolution = *resolution,
+        }
+    }
+}
+
+fn apply(world: &mut World, parts: &[Arc<MeasuredModel>], change: &Change) {
+    match change {
+        Change::Add(thing) => world.add_object(thing.spec(parts)).expect("an object"),
+        Change::Remove(id) => world.remove_object(*id).expect("an object to remove"),
+        Change::Rules(rules) => world.set_rules(rules.clone()).expect("rules"),
+        Change::Resolution(resolution) => world.set_resolution(*resolution).expect("a resolution"),
+    }
+}
+
+#[derive(Default)]
+struct Work {
+    difference: Option<String>,
+    steps: usize,
+    /// Steps with a contact, with an overlap alone, with nothing met; of the last those without a search.
+    contacts: usize,
+    overlaps: usize,
+    clear: usize,
+    known: usize,
+    /// Steps that only a session without memory had to leave open.
+    open: usize,
+    /// Certificates that hold, by kind: clearance, directions, predicted motion, answer, overlap.
+    proven: [usize; 5],
+    /// Answers of memory without a certificate, and pairs whose certificate does not hold.
+    unproven: usize,
+    /// Certificates that the checker's budget did not suffice for.
+    unshown: usize,
+    refused: Option<String>,
+    /// Steps with more than 12 primitives in both trees of some pair asked about.
+    large: usize,
+}
+
+/// Cells that the proof of a predicted motion or an answer may take.
+const CELLS: u64 = 4_000;
+
+/// Asks a world for a certificate of each pair that it has answered without a search, and checks it against the motions that
+/// another world has.
+fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), String> {
+    let ids: Vec<u32> = cold.bodies().iter().map(|b| b.id).collect();
+    let truths: Vec<Truth> = cold
+        .bodies()
+        .iter()
+        .map(|b| Truth::new(&b.part.model.solid, Placed { place: b.place, motion: b.motion_state.motion }))
+        .collect();
+    for (i, a) in ids.iter().enumerate() {
+        for (j, b) in ids.iter().enumerate().skip(i + 1) {
+            let Some(plan) = cold.plan_of(*a, *b) else { continue };
+            let remembered = warm.remembered(*a, *b).ok_or(format!("{a}, {b}: nothing is said of the pair"))?;
+            if remembered == Remembered::Nothing {
+                continue;
+            }
+            let Some(text) = warm.certificate_of(*a, *b, CELLS) else {
+                work.unproven += 1;
+                continue;
+            };
+            let bodies = [i, j].map(|k| match plan.detect {
+                Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].motion_state.end)),
+                _ => truths[k],
+            });
+            let own = |id: u32| cold.body(id).expect("a body").part.resolution;
+            let resolution = own(*a).max(own(*b));
+            let kind = match check(&text, (*a, *b), bodies, resolution) {
+                Ok(Proven::Clearance) => 0,
+                Ok(Proven::Directions) => 1,
+                Ok(Proven::PredictedMotion) => 2,
+                Ok(Proven::Answer(checked)) => {
+                    // Of later pairs than the first contact nothing need be told.
+                    let Remembered::Answer { outcome, .. } = remembered else {
+                        return Err(format!("{a}, {b}: {remembered:?} is reported as an answer"));
+                    };
+                    let lower = outcome.time_lower;
+                    if warm.outcome().pairs.iter().any(|p| (p.a, p.b) == (*a, *b) && p.outcome.time_lower != lower) {
+                        return Err(format!("{a}, {b}: remembered until {lower}, reported otherwise"));
+                    }
+                    if checked.until < lower && plan.detect != Detect::Discrete {
+                        return Err(format!("{a}, {b}: proven until {}, reported {lower}", checked.until));
+                    }
+                    3
+                }
+                Ok(Proven::Overlap) => 4,
+                // Neither shown nor refuted: counted, and bounded by the test.
+                Err(e) if e.contains(UNSHOWN) => {
+                    work.unshown += 1;
+                    continue;
+                }
+                Err(e) => {
+                    let motion_states = [i, j].map(|k| cold.bodies()[k].motion_state);
+                    return Err(format!(
+                        "{a}, {b}: {e}\n{}\n{plan:?}\n{motion_states:?}",
+                        &text[..text.len().min(600)]
+                    ));
+                }
+            };
+            work.proven[kind] += 1;
+        }
+    }
+    Ok(())
+}
+
+/// A play in a world that remembers, and each of its steps in a world made for it.
+fn run(seed: u64, steps: usize) -> Work {
+    let mut play = Play::new(seed);
+    let parts: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
+    // Octrees are refined by searches: the fresh worlds have models of their own.
+    let own: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
+    let mut fresh =
+        Fresh { parts: own, things: Vec::new(), rules: Vec::new(), resolution: None, motion_states: Vec::new() };
+    let mut warm = World::new(256, 256);
+    warm.certify(true);
+    let mut work = Work::default();
+    let mut free = 1.0;
+    for k in 0..steps {
+        let Act { changes, records, options } = play.next(free);
+        for change in &changes {
+            fresh.change(change);
+            apply(&mut warm, &parts, change);
+        }
+        let mut cold = fresh.world();
+        cold.step(&records, &options).expect("a step");
+        warm.step(&records, &options).expect("a step");
+        let (expected, answer) = (cold.outcome(), warm.outcome());
+        if !same(&reported(&warm), &reported(&cold)) {
+            // What a limit left open may be known; then it is what no limit leaves open.
+            // An overlap that was to be searched past, too: how deep it is was not proven.
+            let is_left = |p: &PairOutcome| match p.outcome.status {
+                Status::Undecided => true,
+                Status::Overlap => p.plan.initial_overlap == InitialOverlap::IgnoreIfSeparating,
+                _ => false,
+            };
+            let is_open = |p: &PairOutcome| is_left(p) || !p.regions_complete;
+            let open = expected.undecided || expected.pairs.iter().any(is_open);
+            let (mine, other) = (lines(answer, true), lines(expected, true));
+            let wide = StepOptions { cell_limit: 0, batch_limit: 0, max_records: 0, max_patch_slots: 0, ..options };
+            let is_known = open && {
+                let mut whole = fresh.world();
+                let found = whole.step(&records, &wide).expect("a step");
+                let all = lines(found, true);
+                // What the whole step's limit leaves for a pair depends on what others took, of which some may be known: such a
+                // pair stays undecided from a time on before which it is free.
+                let meets = |p: &PairOutcome| {
+                    let same = found.pairs.iter().find(|q| (q.a, q.b) == (p.a, p.b));
+                    same.filter(|q| q.outcome.status != Status::Clear).map_or(f64::INFINITY, |q| q.outcome.time_upper)
+                };
+                let cut = |p: &PairOutcome| options.batch_limit > 0 && is_left(p) && p.outcome.time_lower <= meets(p);
+                // Regions that a limit cuts short are those that were looked at first.
+                let (heads, others) = (lines(answer, false), lines(expected, false));
+                let few = |k: usize| !answer.pairs[k].regions_complete && others.contains(&heads[k]);
+                let pairs = mine.iter().zip(&answer.pairs).enumerate();
+                pairs.into_iter().all(|(k, (line, p))| all.contains(line) || other.contains(line) || cut(p) || few(k))
+            };
+            if !is_known {
+                let differs = |a: &[String], b: &[String]| {
+                    a.iter().filter(|x| !b.contains(x)).map(|x| x[..x.len().min(600)].to_string()).collect::<Vec<_>>()
+                };
+                work.difference = Some(format!(
+                    "seed {seed}, step {k}, {options:?}\nremembers: {:#?}\nfresh: {:#?}\n{}",
+                    differs(&mine, &other),
+                    differs(&other, &mine),
+                    differing(&reported(&warm), &reported(&cold))
+                ));
+                break;
+            }
+            work.open += 1;
+        }
+        if let Err(e) = certificates(&warm, &cold, &mut work) {
+            work.refused = Some(format!("seed {seed}, step {k}: {e}"));
+            break;
+        }
+        work.steps += 1;
+        let has = |status| expected.pairs.iter().any(|p| p.outcome.status == status);
+        work.contacts += usize::from(has(Status::Contact));
+        work.overlaps += usize::from(!has(Status::Contact) && has(Status::Overlap));
+        if !expected.contact && !expected.undecided {
+            work.clear += 1;
+            work.known += usize::from(answer.known == answer.searched);
+        }
+        work.large += usize::from(answer.counters.primitives > 12);
+        free = expected.safe_time;
+        fresh.motion_states = motion_states(&cold);
+        play.follow(&cold);
+    }
+    work
+}
+
+const STEPS: usize = 25;
+
+#[test]
+fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
+    let steps = std::env::var("CONTACTD_MEMORY_STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(2_000usize);
+    let first: u64 = std::env::var("CONTACTD_MEMORY_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(40_000_001);
+    let plays = steps.div_ceil(STEPS) as u64;
+    let all: Vec<Work> = (0..plays).into_par_iter().map(|i| run(first + i, STEPS)).collect();
+    let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
+    println!(
+        "{} steps: {} with a contact, {} in overlap alone, {} clear, {} of them without a search; {} with trees of more than 12 \
+         primitives; {} known that a limit left open",
+        sum(|w| w.steps),
+        sum(|w| w.contacts),
+        sum(|w| w.overlaps),
+        sum(|w| w.clear),
+        sum(|w| w.known),
+        sum(|w| w.large),
+        sum(|w| w.open)
+    );
+    let differences: Vec<&String> = all.iter().filter_map(|w| w.difference.as_ref()).collect();
+    for d in differences.iter().take(5) {
+        println!("{d}");
+    }
+    let proven: [usize; 5] = std::array::from_fn(|k| all.iter().map(|w| w.proven[k]).sum());
+    let (unproven, unshown) = (sum(|w| w.unproven), sum(|w| w.unshown));
+    println!(
+        "certificates that hold: {} clearances, {} by directions, {} predictions, {} answers, {} overlaps; {unproven} without one, {unshown} that \
+         the checker's budget left open",
+        proven[0], proven[1], proven[2], proven[3], proven[4]
+    );
+    let refused: Vec<&String> = all.iter().filter_map(|w| w.refused.as_ref()).collect();
+    for r in refused.iter().take(5) {
+        println!("{r}");
+    }
+    assert!(refused.is_empty(), "{} certificates do not hold: {}", refused.len(), refused[0]);
+    assert!(differences.is_empty(), "{} of {plays} plays: {}", differences.len(), differences[0]);
+    assert!(unshown * 500 <= proven[2] + proven[3], "{unshown} certificates are not shown");
+    let steps = sum(|w| w.steps);
+    assert!(sum(|w| w.contacts) * 20 > steps && sum(|w| w.clear) * 5 > steps, "too few of a kind to say anything");
+    assert!(sum(|w| w.known) * 4 > sum(|w| w.clear), "hardly anything is remembered");
+}
+
+/// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,
+/// discrete pairs, pairs later than the first contact, unbounded bodies, multipliers that all but vanish on their way, overlaps whose
+/// depth was worked out within a limit.
+#[test]
+fn plays_that_were_told_wrong_once_are_told_right() {
+    let seeds =
+        [40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_000_682, 40_001_917, 40_001_935, 40_002_375, 40_002_817];
+    for seed in seeds {
+        let work = run(seed, STEPS);
+        assert_eq!((work.difference, work.refused, work.steps), (None, None, STEPS), "seed {seed}");
+    }
+}
+
+/// Two objects in a world.
+fn two(parts: [&Arc<MeasuredModel>; 2], poses: [Pose; 2], margin: f64) -> World {
+    let mut world = World::new(2, 8);
+    for (i, (part, pose)) in parts.iter().zip(poses).enumerate() {
+        world.add_object(ObjectSpec::new(i as u32 + 1, part, pose)).expect("an object");
+    }
+    let rule = Rule { margin, ..Rule::new(["default".into(), "default".into()]) };
+    world.set_rules(vec![rule]).expect("a rule");
+    world
+}
+
+/// Boxes, L's and prisms fall on plates with 4 to 16 holes: the step in which they meet is told as by a fresh world. A predicted motion is a
+/// search at a negative depth, whose boxes must reach as far as its level does.
+#[test]
+fn what_falls_on_a_plate_with_holes_is_told_in_the_step_in_which_it_meets() {
+    let options = StepOptions { clear: true, cell_limit: 20_000, ..StepOptions::default() };
+    let found: Vec<Option<usize>> = (0..120u64)
+        .into_par_iter()
+        .map(|seed| {
+            let mut r = Random::new(910_000 + seed);
+            let (below, above) = (part(&plate(&mut r)), part(&block(&mut r)));
+            let dt = [0.02, 0.05, 0.2][r.below(3)];
+            let pace = [0.0, 1.0, 3.0][r.below(3)] * dt;
+            let spin = r.vector(pace);
+            let velocity = (DVec3::new(r.within(-0.3, 0.3), r.within(-0.3, 0.3), -1.0)) * dt;
+            let height = r.within(1.2, 2.0);
+            let mut pose = Pose::new(DVec3::new(r.within(-0.5, 0.5), r.within(-0.5, 0.5), height), r.rotation());
+            let mut warm = two([&below, &above], [Pose::IDENTITY, pose], 0.0);
+            for step in 0..(3.0 / dt) as usize {
+                let motion = contactd_proto::Motion::turning(pose, pose.position + velocity, spin);
+                let end = motion.at(1.0);
+                let record = [PoseRecord::end(2, &end)];
+                let mut cold = two([&below, &above], [Pose::IDENTITY, pose], 0.0);
+                cold.restore(&[(2, MotionState::resting(pose))]).expect("a motion_state");
+                cold.step(&record, &options).expect("a step");
+                warm.step(&record, &options).expect("a step");
+                assert!(
+                    same(&reported(&warm), &reported(&cold)),
+                    "seed {seed}, step {step}: {}",
+                    differing(&reported(&warm), &reported(&cold))
+                );
+                if warm.outcome().contact {
+                    return Some(step);
+                }
+                pose = warm.body(2).expect("a body").motion_state.end;
+            }
+            None
+        })
+        .collect();
+    let met = found.iter().flatten().count();
+    let late = found.iter().flatten().filter(|step| **step >= 5).count();
+    assert!(met > 80 && late > 40, "{met} of 120 meet, {late} of them after five steps");
+}
+
+/// A body that stands in the list where one without bounds stood is followed like any other: ways beyond all numbers are not
+/// inherited.
+#[test]
+fn a_body_in_the_place_of_one_without_bounds_is_followed() {
+    let half = part(&Recipe::of(contactd::solid::primitive::HalfSpace));
+    let cube = part(&Recipe::cuboid(0.5, 0.5, 0.5));
+    let mut world = World::new(3, 8);
+    let far = Pose::at(DVec3::Z * -50.0);
+    for (id, part, pose) in [(1, &half, far), (2, &cube, Pose::at(DVec3::X * 9.0)), (3, &cube, Pose::IDENTITY)] {
+        world.add_object(ObjectSpec::new(id, part, pose)).expect("an object");
+    }
+    let options = StepOptions::default();
+    let tilted = Pose::new(DVec3::Z * -50.0, glam::DQuat::from_rotation_x(0.01));
+    world.step(&[PoseRecord::end(1, &tilted)], &options).expect("a step");
+    world.remove_object(1).expect("an object to remove");
+    let mut met = 0;
+    for k in 1..=20 {
+        let at = Pose::at(DVec3::X * (9.0 - 0.5 * f64::from(k)));
+        met += usize::from(world.step(&[PoseRecord::end(2, &at)], &options).expect("a step").contact);
+    }
+    assert_eq!(met, 4, "from the step that goes on beyond 1");
+}
+
+/// A body that ends a tenth of a millionth above a plate is within any larger margin before, whatever its faces are.
+#[test]
+fn a_small_margin_is_entered_by_boxes_as_by_others() {
+    let shapes = [
+        Recipe::cuboid(0.5, 0.4, 0.3),
+        Recipe::cuboid(0.5, 0.15, 0.3).union(Recipe::cuboid(0.15, 0.15, 0.4).at(0.35, 0.0, 0.3)),
+        Recipe::cylinder(0.4, 0.3),
+        Recipe::cuboid(0.5, 0.4, 0.3).union(Recipe::sphere(0.45)),
+    ];
+    let options = StepOptions { clear: true, cell_limit: 50_000, ..StepOptions::default() };
+    let mut r = Random::new(77);
+    for (k, shape) in shapes.iter().cycle().take(12).enumerate() {
+        let (below, above) = (part(&plate(&mut r)), part(shape));
+        let start = Pose::new(DVec3::new(r.within(-0.4, 0.4), r.within(-0.4, 0.4), 1.6), r.rotation());
+        let fall = DVec3::new(r.within(-0.2, 0.2), r.within(-0.2, 0.2), -2.5);
+        let to = |t: f64| [PoseRecord::end(2, &Pose { position: start.position + fall * t, ..start })];
+        let mut world = two([&below, &above], [Pose::IDENTITY, start], 0.0);
+        let out = world.step(&to(1.0), &options).expect("a step");
+        if out.pairs[0].outcome.status != Status::Contact {
+            continue;
+        }
+        let met = out.pairs[0].outcome.time;
+        for margin in [1e-6, 1e-5, 1e-4, 1e-2] {
+            let mut world = two([&below, &above], [Pose::IDENTITY, start], margin);
+            let o = world.step(&to(met - 4e-8), &options).expect("a step").pairs[0].outcome;
+            assert_eq!(o.status, Status::Clear, "{k}, margin {margin}");
+            // No sooner than where faces moved out by half the margin on both sides meet, at sharp corners.
+            let soonest = 1.0 - 20.0 * margin / 2.5;
+            assert!(o.margin_time < 1.0 && o.margin_time > soonest, "{k}, margin {margin}: {}", o.margin_time);
+        }
+    }
+}
