@@ -1,12 +1,15 @@
 //! Independent truth and harnesses shared by the integration tests.
 #![forbid(unsafe_code)]
 
+pub mod certified;
 pub mod closed;
 pub mod engine;
 pub mod families;
+pub mod formula;
 pub mod fuzz;
 pub mod judge;
 pub mod lanes;
+pub mod meshes;
 pub mod openscad;
 pub mod primitive_pairs;
 pub mod random_solids;

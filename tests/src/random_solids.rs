@@ -90,6 +90,11 @@ pub fn shape_or_torus(r: &mut Random, size: f64) -> Shape {
     if r.below(3) == 0 { torus(r, size).into() } else { shape(r, size) }
 }
 
+/// The same as `shape`, or a mesh, one in three.
+pub fn shape_or_mesh(r: &mut Random, size: f64) -> Shape {
+    if r.below(3) == 0 { crate::meshes::solid(&crate::meshes::random(r, size)).into() } else { shape(r, size) }
+}
+
 /// A random solid whose tree has up to `depth` levels of operations; bounded, its plain box not empty.
 pub fn solid(r: &mut Random, depth: usize) -> Solid {
     solid_of(r, depth, shape)

@@ -18,6 +18,7 @@
 //! line or a patch of contact is told by any of its points, its border included, so that its kind may be smoother than
 //! the point is.
 
+use crate::formula::{Formula, formula_of};
 use crate::reference::Moving;
 use crate::reference::field::Literal;
 use contactd::contact::{Extent, Kind, Outcome, Status};
@@ -197,14 +198,12 @@ fn lower(
     match &solid.nodes[id as usize] {
         TreeNode::Empty => Node::Constant(if negated { f64::NEG_INFINITY } else { f64::INFINITY }),
         TreeNode::Primitive(p) => {
-            let sign = if negated { -1.0 } else { 1.0 };
-            let leaves = solid.primitives[*p as usize].faces.iter().enumerate().map(|(k, face)| {
-                literals.push(Literal { face: *face, sign, owner: *p });
-                ids.push(first[*p as usize] + k as u32);
+            let primitive = &solid.primitives[*p as usize];
+            of_formula(&formula_of(primitive), negated, &mut |k, sign| {
+                literals.push(Literal { face: primitive.faces[k as usize], sign, owner: *p });
+                ids.push(first[*p as usize] + k);
                 Node::Literal(literals.len() - 1)
-            });
-            let leaves = leaves.collect();
-            if negated { Node::Min(leaves) } else { Node::Max(leaves) }
+            })
         }
         TreeNode::Op(op, children) => {
             let flips = |i: usize| negated != (*op == Op::Difference && i > 0);
@@ -212,6 +211,18 @@ fn lower(
             let lowered = lowered.map(|(i, c)| lower(solid, first, *c, flips(i), literals, ids)).collect();
             if (*op == Op::Union) != negated { Node::Min(lowered) } else { Node::Max(lowered) }
         }
+    }
+}
+
+fn of_formula(e: &Formula, negated: bool, literal: &mut dyn FnMut(u32, f64) -> Node) -> Node {
+    let mut many = |all: &[Formula], max: bool| {
+        let each = all.iter().map(|e| of_formula(e, negated, literal)).collect();
+        if max != negated { Node::Max(each) } else { Node::Min(each) }
+    };
+    match e {
+        Formula::One(face, flipped) => literal(*face, if negated != *flipped { -1.0 } else { 1.0 }),
+        Formula::And(all) => many(all, true),
+        Formula::Or(all) => many(all, false),
     }
 }
 

@@ -6,7 +6,7 @@
 
 use crate::random_solids::Random;
 use crate::reference::{self, Effort, Moving, Truth};
-use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere, Torus};
+use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere, Torus, TriangleMesh};
 use contactd::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
 use glam::{DQuat, DVec3};
@@ -114,6 +114,10 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
         }
         .into(),
         Shape::HalfSpace(h) => h.clone().into(),
+        Shape::TriangleMesh(m) => {
+            let points: Vec<DVec3> = m.vertices().iter().map(|v| *v * k).collect();
+            TriangleMesh::new(&points, m.triangles()).expect("closed as before").0.into()
+        }
         Shape::Torus(t) => Torus { major: t.major * k, minor: t.minor * k }.into(),
     }
 }

@@ -106,7 +106,9 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     let still = task.relative;
     task.relative = Relative::new(reference.placed, other.placed);
     task.delta = DEPTH * depth;
-    let hull = task.a.aabb();
+    // A formula is seen to be bounded by the planes that cut it off, which stand a little outside of what it holds.
+    let with_formula = task.a.primitives.iter().any(|p| p.shape.formula().is_some());
+    let hull = if with_formula { extent(task.a, task.a.root, 0.0) } else { task.a.aabb() };
     // Coordinates of the box and of what it holds are right to a few units in the last place.
     let slack = hull.half() * 1e-9 + DVec3::splat(depth);
     let root = Aabb::new(hull.min - slack, hull.max + slack);

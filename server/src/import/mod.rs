@@ -116,6 +116,8 @@ pub struct Limits {
     pub faces: usize,
     /// Faces of one polyhedron, whose checks grow with their square.
     pub polyhedron_faces: usize,
+    /// Triangles of one mesh that is not convex.
+    pub mesh_facets: usize,
     /// Values in one list.
     pub values: usize,
 }
@@ -129,6 +131,7 @@ impl Default for Limits {
             depth: 1_000,
             faces: 1_000_000,
             polyhedron_faces: 5_000,
+            mesh_facets: 10_000,
             values: 1_000_000,
         }
     }

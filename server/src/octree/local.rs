@@ -310,18 +310,7 @@ fn write(
     }
     match &solid.nodes[head.node() as usize] {
         Node::Empty => never,
-        Node::Primitive(p) => {
-            let p = &solid.primitives[*p as usize];
-            let kind = if sense == Sense::Positive { AND } else { OR };
-            fold(kind, 0..p.faces.len() as u32, out, |i, out| {
-                let id = LiteralId::new(p.first_face + i, sense);
-                let known = truth(id);
-                if known == Truth::Open {
-                    out.push(id.0);
-                }
-                known
-            })
-        }
+        Node::Primitive(p) => solid.primitives[*p as usize].expression(sense, out, truth),
         Node::Op(op, _) => {
             let kind = match (op, sense) {
                 (Op::Union, Sense::Positive) | (Op::Intersection | Op::Difference, Sense::Negative) => OR,

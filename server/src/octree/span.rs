@@ -11,7 +11,7 @@
 //! | torus | the larger of the tangent less what it dips and that of ρ and z | largest corner value of the ball at c, or ρ and z |
 //!
 //! v is psi(c) and n its gradient: psi is convex (but for a torus), so it lies above its tangents and is largest at a corner. The maximum
-//! over a primitive's faces is exact from above and a lower bound from below. Both are moved outwards by the rounding.
+//! over a primitive's faces is exact from above and a lower bound from below; a formula's minima and maxima are bounds of both kinds. Both are moved outwards by the rounding.
 
 use crate::math::tolerance::OUTWARD;
 use crate::solid::{Face, Primitive};
@@ -19,6 +19,9 @@ use glam::DVec3;
 
 /// (lower, upper) bound of psi of the primitive over the box center ± half.
 pub fn primitive_span(p: &Primitive, center: DVec3, half: DVec3) -> (f64, f64) {
+    if let Some(formula) = p.shape.formula() {
+        return formula.span(&mut |f| face_span(&p.faces[f as usize], center, half));
+    }
     p.faces.iter().fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |(lo, hi), f| {
         let (l, h) = face_span(f, center, half);
         (lo.max(l), hi.max(h))

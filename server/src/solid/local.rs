@@ -18,7 +18,7 @@ pub type Token = u32;
 
 pub(crate) const AND: u32 = 1 << 30;
 pub(crate) const OR: u32 = 2 << 30;
-const KIND: u32 = 3 << 30;
+pub(crate) const KIND: u32 = 3 << 30;
 const NEGATED: u32 = 1 << 29;
 
 /// A face with the sense in which it takes part.

@@ -1,6 +1,7 @@
 //! Solids as they were designed: a tree of set operations over exact primitives.
 //!
-//! A primitive is an intersection of convex faces psi <= 0 (`surface`), a solid is a tree of them (`tree`), and `f`
+//! A primitive is an intersection of convex faces psi <= 0 (`surface`), or an and/or of faces (`formula`); a solid is a tree of
+//! them (`tree`), and `f`
 //! (`classify`) is the tree's min/max: union = min, intersection = max, difference A - B = max(f_A, -f_B). f < 0 inside,
 //! > 0 outside, 1-Lipschitz.
 //!
@@ -11,6 +12,7 @@
 
 pub mod alike;
 pub mod classify;
+pub mod formula;
 pub mod local;
 pub mod parts;
 pub mod primitive;

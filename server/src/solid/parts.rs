@@ -106,7 +106,9 @@ impl Parts {
     /// Adds the parts below a node, from which the holes of `outer` are taken.
     fn take(&mut self, solid: &Solid, node: NodeId, outer: Option<u32>) -> Option<()> {
         match &solid.nodes[node as usize] {
-            Node::Primitive(p) if self.parts.len() < MOST_PARTS => self.parts.push(Part { main: *p, holes: outer }),
+            Node::Primitive(p) if self.parts.len() < MOST_PARTS && has_no_formula(solid, *p) => {
+                self.parts.push(Part { main: *p, holes: outer });
+            }
             Node::Op(Op::Union, children) => children.iter().try_for_each(|c| self.take(solid, *c, outer))?,
             Node::Op(Op::Difference, children) => {
                 let (first, rest) = children.split_first()?;
@@ -132,11 +134,16 @@ impl Parts {
 /// The convex primitives of which a subtracted node is the union; holes in it would be material.
 fn convex(solid: &Solid, node: NodeId, out: &mut Vec<u32>) -> Option<()> {
     match &solid.nodes[node as usize] {
-        Node::Primitive(p) => out.push(*p),
+        Node::Primitive(p) if has_no_formula(solid, *p) => out.push(*p),
         Node::Op(Op::Union, children) => children.iter().try_for_each(|c| convex(solid, *c, out))?,
-        Node::Op(..) | Node::Empty => return None,
+        Node::Primitive(_) | Node::Op(..) | Node::Empty => return None,
     }
     Some(())
+}
+
+/// True for an intersection of faces, the kind of primitive that parts are made of.
+fn has_no_formula(solid: &Solid, primitive: u32) -> bool {
+    solid.primitives[primitive as usize].shape.formula().is_none()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::math::Aabb;
 use crate::solid::alike::Alike;
-use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::local::{self, Token, Truth};
 use crate::solid::sense::Sense;
 use crate::solid::{Face, Primitive, Shape};
 use contactd_proto::Pose;
@@ -244,15 +244,7 @@ pub fn write_node(
     match kept {
         Node::Empty if sense == Sense::Positive => Truth::False,
         Node::Empty => Truth::True,
-        Node::Primitive(p) => {
-            let p = &solid.primitives[*p as usize];
-            let kind = if sense == Sense::Positive { local::AND } else { local::OR };
-            let ids = (0..p.faces.len() as u32).map(|i| p.first_face + i);
-            local::fold(kind, ids, out, |face, out| {
-                out.push(local::literal_token(LiteralId::new(face, sense)));
-                Truth::Open
-            })
-        }
+        Node::Primitive(p) => solid.primitives[*p as usize].expression(sense, out, &mut |_| Truth::Open),
         Node::Op(op, children) => {
             let kind = match (op, sense) {
                 (Op::Union, Sense::Positive) | (Op::Intersection | Op::Difference, Sense::Negative) => local::OR,

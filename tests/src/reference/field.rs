@@ -4,6 +4,7 @@
 //! De Morgan's laws, so that a subtracted primitive is the min of its −psi. Near a point most literals cannot decide f;
 //! `clauses` lists what can, as alternatives (min) of conjunctions (max).
 
+use crate::formula::{Formula, formula_of};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Solid, surface};
 use contactd_proto::Pose;
 use glam::DVec3;
@@ -100,13 +101,12 @@ impl Field {
         match &solid.nodes[id as usize] {
             TreeNode::Empty => Node::Constant(if negated { f64::NEG_INFINITY } else { f64::INFINITY }),
             TreeNode::Primitive(p) => {
-                let leaves = solid.primitives[*p as usize].faces.iter().map(|face| {
-                    let sign = if negated { -1.0 } else { 1.0 };
-                    self.literals.push(Literal { face: moved(face, place), sign, owner: *p });
-                    Node::Literal(self.literals.len() as u32 - 1)
-                });
-                let leaves = leaves.collect();
-                if negated { Node::Min(leaves) } else { Node::Max(leaves) }
+                let faces = &solid.primitives[*p as usize].faces;
+                self.of_formula(&formula_of(&solid.primitives[*p as usize]), negated, &|face, sign| Literal {
+                    face: moved(&faces[face as usize], place),
+                    sign,
+                    owner: *p,
+                })
             }
             TreeNode::Op(op, children) => {
                 let flips = |i: usize| negated != (*op == Op::Difference && i > 0);
@@ -114,6 +114,21 @@ impl Field {
                     children.iter().enumerate().map(|(i, c)| self.lower(solid, place, *c, flips(i))).collect();
                 if (*op == Op::Union) != negated { Node::Min(lowered) } else { Node::Max(lowered) }
             }
+        }
+    }
+
+    fn of_formula(&mut self, e: &Formula, negated: bool, literal: &dyn Fn(u32, f64) -> Literal) -> Node {
+        let mut many = |all: &[Formula], max: bool| {
+            let each = all.iter().map(|e| self.of_formula(e, negated, literal)).collect();
+            if max != negated { Node::Max(each) } else { Node::Min(each) }
+        };
+        match e {
+            Formula::One(face, flipped) => {
+                self.literals.push(literal(*face, if negated != *flipped { -1.0 } else { 1.0 }));
+                Node::Literal(self.literals.len() as u32 - 1)
+            }
+            Formula::And(all) => many(all, true),
+            Formula::Or(all) => many(all, false),
         }
     }
 

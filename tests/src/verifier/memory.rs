@@ -148,6 +148,10 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
             let each = p.vertices.iter().map(|v| dot(vector(v.to_array()), n).hi);
             point(each.fold(f64::NEG_INFINITY, f64::max))
         }
+        Shape::TriangleMesh(m) => {
+            let each = m.vertices().iter().map(|v| dot(vector(v.to_array()), n).hi);
+            point(each.fold(f64::NEG_INFINITY, f64::max))
+        }
         Shape::Torus(t) => {
             point(t.major) * across + point(t.minor) * (n[0].square() + n[1].square() + n[2].square()).sqrt()
         }

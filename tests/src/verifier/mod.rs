@@ -14,11 +14,13 @@ pub mod interval;
 pub mod memory;
 pub mod motion;
 
+use crate::formula::{Formula, formula_of};
 use bound::{Bounder, Literal, Region, Term};
 use contactd::motion::Placed;
+use contactd::solid::primitive::{Geometry, HalfSpace};
 use contactd::solid::{Node, NodeId, Op, Shape, Solid};
 use glam::DVec3;
-use interval::{Interval, point};
+use interval::Interval;
 use motion::Motions;
 
 /// What was checked.
@@ -60,9 +62,11 @@ fn expression(solid: &Solid, node: NodeId, negative: bool, on_b: bool) -> Expr {
         Node::Empty => Expr::Or(vec![]),
         Node::Primitive(p) => {
             let p = &solid.primitives[*p as usize];
-            let faces = p.first_face..p.first_face + p.faces.len() as u32;
-            let all = faces.map(|face| Expr::One(Literal { on_b, face, negative })).collect();
-            if negative { Expr::Or(all) } else { Expr::And(all) }
+            of_formula(&formula_of(p), negative, &|face, negative| Literal {
+                on_b,
+                face: p.first_face + face,
+                negative,
+            })
         }
         Node::Op(op, children) => {
             let flips = |i: usize| *op == Op::Difference && i > 0;
@@ -70,6 +74,17 @@ fn expression(solid: &Solid, node: NodeId, negative: bool, on_b: bool) -> Expr {
                 children.iter().enumerate().map(|(i, c)| expression(solid, *c, negative != flips(i), on_b)).collect();
             if (*op == Op::Union) != negative { Expr::Or(all) } else { Expr::And(all) }
         }
+    }
+}
+
+fn of_formula(e: &Formula, negative: bool, literal: &dyn Fn(u32, bool) -> Literal) -> Expr {
+    let many = |all: &[Formula]| all.iter().map(|e| of_formula(e, negative, literal)).collect();
+    match e {
+        Formula::One(face, flipped) => Expr::One(literal(*face, negative != *flipped)),
+        Formula::And(all) if negative => Expr::Or(many(all)),
+        Formula::Or(all) if negative => Expr::And(many(all)),
+        Formula::And(all) => Expr::And(many(all)),
+        Formula::Or(all) => Expr::Or(many(all)),
     }
 }
 
@@ -395,7 +410,10 @@ fn extent_in(solid: &Solid, node: NodeId, level: f64, clip: [Interval; 3]) -> Op
     match &solid.nodes[node as usize] {
         Node::Empty => None,
         Node::Primitive(p) => {
-            let own = primitive_box(solid, *p, level);
+            let own = match &solid.primitives[*p as usize] {
+                p if p.shape == Shape::HalfSpace(HalfSpace) => below_plane(&p.frame, level, &clip),
+                _ => primitive_box(solid, *p, level),
+            };
             let common = std::array::from_fn(|k| (own[k].lo.max(clip[k].lo), own[k].hi.min(clip[k].hi)));
             common.iter().all(|(lo, hi)| lo <= hi).then(|| common.map(|(lo, hi)| Interval::new(lo, hi)))
         }
@@ -410,10 +428,39 @@ fn extent_in(solid: &Solid, node: NodeId, level: f64, clip: [Interval; 3]) -> Op
     }
 }
 
+const EVERYWHERE: Interval = Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
+
 /// True when the box holds all points of the solid with f <= `level`.
 fn holds_solid(root: &[(f64, f64); 3], solid: &Solid, level: f64) -> bool {
     let Some(all) = extent(solid, solid.root, level) else { return true };
     (0..3).all(|k| root[k].0 <= all[k].lo && all[k].hi <= root[k].1)
+}
+
+/// A box around those points of a box that lie below the plane z = `level` of a frame: as far as the box lets the plane's own
+/// coordinates go along the axis that it faces most.
+fn below_plane(frame: &contactd_proto::Pose, level: f64, clip: &[Interval; 3]) -> [Interval; 3] {
+    let mut all = *clip;
+    let n = frame.vector(DVec3::Z);
+    let k = n.abs().max_position();
+    let d = n.dot(frame.position) + level;
+    let others = (0..3).filter(|i| *i != k && n[*i] != 0.0);
+    // The least that the others add to n·x, and the sizes of what is added.
+    let (least, size) = others.fold((0.0, d.abs()), |(sum, size): (f64, f64), i| {
+        let ends = [n[i] * clip[i].lo, n[i] * clip[i].hi];
+        (sum + ends[0].min(ends[1]), size + ends[0].abs().max(ends[1].abs()))
+    });
+    if least.is_finite() {
+        let most = d - least + 1e-14 * (size + frame.position.abs().element_sum());
+        if n[k] > 0.0 {
+            all[k].hi = all[k].hi.min(most / n[k]);
+        } else {
+            all[k].lo = all[k].lo.max(most / n[k]);
+        }
+        if all[k].lo > all[k].hi {
+            all[k] = Interval { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
+        }
+    }
+    all
 }
 
 /// A box around {psi <= level} of a primitive. A convex psi that is −rho at a point grows from there along every ray at least as
@@ -464,8 +511,28 @@ fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
             let all: Vec<DVec3> = p.vertices.iter().map(|v| middle + (*v - middle) * scale(rho)).collect();
             around(&all, &|_| 0.0)
         }
+        // The planes along its axes that the whole formula is and-ed with.
+        Shape::TriangleMesh(m) => {
+            let Formula::And(all) = formula_of(p) else { return [EVERYWHERE; 3] };
+            let (mut least, mut most) = (DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY));
+            let own = m.faces();
+            for e in &all {
+                let Formula::One(face, false) = e else { continue };
+                let Some((n, d)) = own[*face as usize].flat() else { continue };
+                for k in 0..3 {
+                    if n == DVec3::AXES[k] {
+                        most[k] = most[k].min(grown(d));
+                    } else if n == -DVec3::AXES[k] {
+                        least[k] = least[k].max(-grown(d));
+                    }
+                }
+            }
+            let at = |i: u32, k: usize| if i >> k & 1 == 0 { least[k] } else { most[k] };
+            let corners: Vec<DVec3> = (0..8).map(|i| DVec3::new(at(i, 0), at(i, 1), at(i, 2))).collect();
+            around(&corners, &|_| 0.0)
+        }
         // Its psi is the exact distance.
         Shape::Torus(t) => around(&[DVec3::ZERO], &|k| disc(t.major)(k) + grown(t.minor)),
-        Shape::HalfSpace(_) => [point(0.0); 3].map(|_| Interval::new(f64::NEG_INFINITY, f64::INFINITY)),
+        Shape::HalfSpace(_) => [EVERYWHERE; 3],
     }
 }

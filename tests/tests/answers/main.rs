@@ -10,6 +10,7 @@ mod contact_regions;
 mod families;
 mod hard_cases;
 mod laws;
+mod meshes;
 mod overlap;
 mod primitive_pairs;
 mod records;

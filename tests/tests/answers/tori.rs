@@ -6,20 +6,19 @@
 //! `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers tori:: -- --nocapture` sets the number of
 //! pairs, and of trees.
 
-use contactd::contact::certificate::certify;
 use contactd::contact::region::{regions, threshold};
-use contactd::contact::{Extent, Outcome, QueryOptions, Scratch, Status, earliest_contact};
+use contactd::contact::{Extent, QueryOptions, Scratch, Status, earliest_contact};
 use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
 use contactd::solid::Shape;
 use contactd_proto::{MassOptions, Motion, Pose};
+use contactd_tests::certified::certify_all;
 use contactd_tests::engine::question;
 use contactd_tests::random_solids::{Random, placed, shape, shape_or_torus, solid_of, torus};
 use contactd_tests::rays::integrals;
 use contactd_tests::reference::field::Field;
 use contactd_tests::scenes::Recipe;
-use contactd_tests::verifier::check;
 use glam::{DVec3, dvec3};
 use std::f64::consts::PI;
 
@@ -192,67 +191,16 @@ fn a_torus_meets_a_ball_and_a_plane_and_leaves_round_walls_when_closed_forms_say
     });
 }
 
-/// The answer to a pair, and what the verifier says of its certificate.
-fn certified(a: (&Model, Placed), b: (&Model, Placed)) -> (Outcome, Result<(), String>) {
-    let query = question(a, b, QueryOptions::DEPTH);
-    let o = earliest_contact(&query, &mut Scratch::default());
-    if o.status == Status::Overlap {
-        return (o, Ok(()));
-    }
-    let Some(made) = certify(&query, &o) else { return (o, Err("no certificate".into())) };
-    let mut text = String::new();
-    made.write((0, 1), &mut text);
-    let checked = check(&text, (0, 1), (&a.0.solid, &a.1), (&b.0.solid, &b.1));
-    let slack = if o.status == Status::Undecided { 1e-5 } else { 0.0 };
-    let proven = checked.and_then(|c| {
-        if c.until >= o.time_lower - slack { Ok(()) } else { Err(format!("{c:?} proves less than {}", o.time_lower)) }
-    });
-    (o, proven)
-}
-
-/// Certificates of so many pairs.
-fn certify_all(name: &str, count: usize, make: impl Fn(&mut Random) -> [(Model, Placed); 2] + Sync) {
-    let run = |first: usize| {
-        let (mut told, mut refused) = ([0usize; 4], Vec::new());
-        for i in (first..count).step_by(2) {
-            let [a, b] = make(&mut Random::new(0x70_7105 + i as u64));
-            let (o, proven) = certified((&a.0, a.1), (&b.0, b.1));
-            told[o.status as usize] += 1;
-            if let Err(e) = proven {
-                refused.push(format!("{i}: {e}: {o:?}"));
-            }
-        }
-        (told, refused)
-    };
-    let parts: Vec<_> = std::thread::scope(|s| {
-        let started: Vec<_> = (0..2).map(|first| s.spawn(move || run(first))).collect();
-        started.into_iter().map(|t| t.join().expect("a thread of the test")).collect()
-    });
-    let told: [usize; 4] = std::array::from_fn(|k| parts.iter().map(|p| p.0[k]).sum());
-    let refused: Vec<String> = parts.into_iter().flat_map(|p| p.1).collect();
-    let of = |status: Status| told[status as usize];
-    println!(
-        "{name}: {} contacts, {} clear, {} overlap, {} undecided, {} refused",
-        of(Status::Contact),
-        of(Status::Clear),
-        of(Status::Overlap),
-        of(Status::Undecided),
-        refused.len()
-    );
-    assert!(refused.is_empty(), "{name}:\n{}", refused.join("\n"));
-    assert!(of(Status::Contact) * 5 > count && of(Status::Undecided) * 50 <= count, "{name}: {told:?}");
-}
-
 #[test]
 fn certificates_of_tori_against_every_kind_and_of_trees_with_them_hold() {
     let count = pairs(120);
     let alone = |shape: Shape| Model::new(Recipe::of(shape).build());
-    certify_all("kinds", count, |r| {
+    certify_all("kinds", (count, 0x70_7105), |r| {
         let other = if r.chance(0.3) { torus(r, 0.8).into() } else { shape(r, 0.8) };
         let place = |motion| Placed { place: Pose::IDENTITY, motion };
         [(alone(torus(r, 0.8).into()), place(turning(r))), (alone(other), place(past(r, 2.2)))]
     });
-    certify_all("trees", count, |r| {
+    certify_all("trees", (count, 0x70_7105), |r| {
         let tree = |r: &mut Random| {
             let depth = 1 + r.below(2);
             Model::new(solid_of(r, depth, shape_or_torus))

@@ -89,7 +89,8 @@ impl Element {
     }
 }
 
-/// What a primitive is the hull of; `None` for what has no bounds, and for a torus, which is no hull.
+/// What a primitive is the hull of; `None` for what has no bounds, and for a torus, which is no hull. Of a mesh: what its hull
+/// is the hull of.
 pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>> {
     let axes = frame.matrix();
     let disc = |z: f64, radius: f64| Element {
@@ -105,6 +106,7 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
         Shape::Cone(c) => Some(vec![disc(-c.half_height, c.bottom), disc(c.half_height, c.top)]),
         Shape::Cuboid(c) => corners(&crate::math::Aabb::around(DVec3::ZERO, c.half).corners()),
         Shape::Polyhedron(p) => corners(&p.vertices),
+        Shape::TriangleMesh(m) => corners(m.vertices()),
         Shape::HalfSpace(_) | Shape::Torus(_) => None,
     }
 }
@@ -112,7 +114,8 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
 /// The pieces of a union of convex solids, as what each is the hull of; `None` where it is no such union.
 pub fn pieces(parts: &Parts<'_>, root: PartId) -> Option<Vec<Vec<Element>>> {
     let (leaves, false) = parts.leaves(root)? else { return None };
-    leaves.iter().map(|p| of_leaf(parts, *p)).collect()
+    let convex = |p: &PartId| !matches!(&parts.list[*p], Part::Leaf(shape, ..) if shape.formula().is_some());
+    leaves.iter().map(|p| if convex(p) { of_leaf(parts, *p) } else { None }).collect()
 }
 
 fn of_leaf(parts: &Parts<'_>, p: PartId) -> Option<Vec<Element>> {
@@ -150,7 +153,11 @@ fn clearance(parts: &Parts<'_>, root: PartId, x: DVec3) -> f64 {
     match &parts.list[root] {
         Part::Leaf(shape, frame, _) => {
             let local = frame.rotation.inverse() * (x - frame.position);
-            shape.geometry().faces().iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(local)))
+            let faces = shape.geometry().faces();
+            match shape.formula() {
+                Some(formula) => formula.value(&mut |f| faces[f as usize].value(local)),
+                None => faces.iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(local))),
+            }
         }
         Part::Empty | Part::Flat(_) | Part::Stray(..) => f64::INFINITY,
         Part::Op(Op::Union, _, of) => of.iter().map(|p| clearance(parts, *p, x)).fold(f64::INFINITY, f64::min),

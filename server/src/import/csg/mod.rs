@@ -35,7 +35,7 @@ mod syntax;
 mod tests;
 
 use super::{Facets, Format, Import, ImportError, Limits, Place};
-use crate::solid::primitive::MeshError;
+use crate::solid::primitive::{MeshError, MeshFault};
 
 /// What is wrong with a model's text.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,9 +56,12 @@ pub enum Problem {
         /// What to do about it, as a parenthesis; may be empty.
         hint: &'static str,
     },
-    /// A mesh that is not a convex polyhedron.
-    #[error("expected a closed convex polyhedron, found {0}")]
+    /// A mesh that is no polyhedron.
+    #[error("expected a closed polyhedron, found {0}")]
     Mesh(#[from] MeshError),
+    /// A mesh that is not the surface of a solid.
+    #[error("expected a closed mesh, found {0}")]
+    Surface(#[from] MeshFault),
     /// A limit was reached.
     #[error("expected at most {limit} {what}, found more")]
     Limit {

@@ -9,7 +9,9 @@
 
 use super::Problem;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
-use crate::solid::primitive::{Cone, Cuboid, Cylinder, Fit, HalfSpace, Polyhedron, Shape, Sphere};
+use crate::solid::primitive::{
+    Cone, Cuboid, Cylinder, Fit, HalfSpace, Polyhedron, Repair, Shape, Sphere, TriangleMesh,
+};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -160,6 +162,15 @@ pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<
         Polyhedron::from_faces(&points, faces)?
     };
     Ok((Placed::new(shape, frame).off(off, "polyhedron"), fit))
+}
+
+/// The solid within a mesh, faces clockwise from outside, its corners where the transform puts them.
+pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Placed, Repair), Problem> {
+    let points: Vec<DVec3> = points.iter().map(|p| a.transform_point3(*p)).collect();
+    let mirrored = a.matrix3.determinant() < 0.0;
+    let turned = |f: &Vec<u32>| if mirrored { f.clone() } else { f.iter().rev().copied().collect() };
+    let (shape, repair) = TriangleMesh::of_polygons(&points, &faces.iter().map(turned).collect::<Vec<_>>())?;
+    Ok((Placed::new(shape, Pose::IDENTITY), repair))
 }
 
 /// The half-space n·x <= d.

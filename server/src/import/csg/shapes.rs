@@ -11,7 +11,7 @@ use super::place;
 use super::syntax::Call;
 use super::{Facets, Limits, Place, Problem};
 use crate::solid::Op;
-use crate::solid::primitive::MeshError;
+use crate::solid::primitive::{MeshError, MeshFault};
 use glam::{DAffine3, DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -161,8 +161,14 @@ impl Shapes<'_> {
         let arguments = Arguments::new(call, &["points", "faces"])?;
         let points: Vec<DVec3> = arguments.points::<3>("points")?.into_iter().map(DVec3::from_array).collect();
         let faces = arguments.index_lists("faces", points.len())?;
+        if faces.len() > self.limits.polyhedron_faces && !hull {
+            return self.mesh(call, outer, (&points, &faces), None);
+        }
         self.parts.affordable(call.at, faces.len())?;
         let mut mesh = place::polyhedron(outer, &points, &faces);
+        if !hull && matches!(mesh, Err(Problem::Mesh(ref e)) if *e != MeshError::Flat) {
+            return self.mesh(call, outer, (&points, &faces), mesh.err());
+        }
         if hull && matches!(mesh, Err(Problem::Mesh(_))) {
             let used: Vec<DVec3> = faces.iter().flatten().map(|i| points[*i as usize]).collect();
             if let Some(faces) = point_hull(&used) {
@@ -187,6 +193,32 @@ impl Shapes<'_> {
                 "a polyhedron that is not quite convex or not quite planar: taken as the hull of its planes",
                 Some(fit.moved),
             );
+        }
+        self.leaf(call, Ok(placed))
+    }
+
+    /// A mesh that need not be convex; what it is not closed for was told by `before` where that is known.
+    fn mesh(
+        &mut self,
+        call: &Call,
+        outer: &DAffine3,
+        (points, faces): (&[DVec3], &[Vec<u32>]),
+        before: Option<Problem>,
+    ) -> Result<PartId> {
+        let triangles: usize = faces.iter().map(|f| f.len().saturating_sub(2)).sum();
+        if triangles > self.limits.mesh_facets {
+            let problem = Problem::Limit { what: "triangles of a mesh", limit: self.limits.mesh_facets };
+            return Err((call.at, problem));
+        }
+        let (placed, repair) = match place::mesh(outer, points, faces) {
+            Err(Problem::Surface(MeshFault::Flat)) => return Ok(self.nothing(call, "without volume")),
+            Err(Problem::Surface(MeshFault::Open(..) | MeshFault::Mixed(..))) if before.is_some() => {
+                return Err((call.at, before.unwrap_or_else(|| Problem::syntax("a mesh", "none"))));
+            }
+            placed => placed.map_err(|p| (call.at, p))?,
+        };
+        for (text, amount) in repair.notes("a polyhedron") {
+            self.parts.note(call.at, text, amount);
         }
         self.leaf(call, Ok(placed))
     }

@@ -87,6 +87,48 @@ fn primitives_are_what_was_written() {
 }
 
 #[test]
+fn a_polyhedron_that_is_not_convex_is_the_solid_within_its_faces() {
+    // An L of three unit cubes, 1 high, its lids polygons of six corners; whatever the transform, its volume is 3 |det|.
+    let outline = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]];
+    let points: Vec<String> =
+        (0..2).flat_map(|z| outline.iter().map(move |[x, y]| format!("[{x}, {y}, {z}]"))).collect();
+    let sides: Vec<String> =
+        (0..6).map(|i| format!("[{}, {}, {}, {i}]", i + 6, (i + 1) % 6 + 6, (i + 1) % 6)).collect();
+    let faces = format!("[0, 1, 2, 3, 4, 5], [11, 10, 9, 8, 7, 6], {}", sides.join(", "));
+    let text = format!("polyhedron(points = [{}], faces = [{faces}]);", points.join(", "));
+    for rows in [
+        "[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]",
+        "[-2, 0.3, 0, 5], [0.1, 1, 0, 7], [0, 0.5, 1, 9]",
+        "[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0]",
+    ] {
+        let import = import(&under(rows, &text));
+        let primitive = &import.solid.primitives[0];
+        assert!(matches!(&primitive.shape, Shape::TriangleMesh(m) if m.bounding_faces() == 8), "{:?}", primitive.shape);
+        assert_eq!(import.notes, vec![], "{rows}");
+        let m: Vec<f64> = rows.replace(['[', ']'], "").split(", ").map(|n| n.parse().expect("a number")).collect();
+        let at = |x: f64, y: f64, z: f64| {
+            let row = |k: usize| m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z + m[4 * k + 3];
+            import.solid.value(DVec3::new(row(0), row(1), row(2)))
+        };
+        for (x, y, z, inside) in
+            [(0.5, 0.5, 0.5, true), (1.9, 0.9, 0.1, true), (0.9, 1.9, 0.9, true), (1.01, 1.01, 0.5, false)]
+        {
+            assert_eq!(at(x, y, z) < 0.0, inside, "{rows}: {x} {y} {z}");
+        }
+        // On the edge that is bent inwards, and beyond its planes.
+        assert!(at(1.0, 1.0, 0.5).abs() < 1e-14 && at(1.0, 0.5, 0.5) < -0.1 && at(0.5, 1.0, 0.5) < -0.1, "{rows}");
+        let det = if rows.starts_with("[-2") { 2.03 } else { 1.0 };
+        let volume = primitive.shape.geometry().moments().expect("closed").volume();
+        assert!((volume - 3.0 * det).abs() < 1e-12, "{rows}: {volume}");
+    }
+    let back = |face: &str| face.trim_matches(['[', ']']).rsplit(", ").collect::<Vec<_>>().join(", ");
+    let inward: Vec<String> = faces.split("], [").map(|face| format!("[{}]", back(face))).collect();
+    let reversed = import(&format!("polyhedron(points = [{}], faces = [{}]);", points.join(", "), inward.join(", ")));
+    assert_eq!(reversed.notes[0].text, "a polyhedron with all faces reversed: flipped");
+    assert_eq!(reversed.solid.value(DVec3::splat(0.5)), import(&text).solid.value(DVec3::splat(0.5)));
+}
+
+#[test]
 fn low_fn_gives_openscads_own_prisms() {
     let hexagon = "cylinder($fn = 6, $fa = 12, $fs = 2, h = 2, r1 = 1, r2 = 1, center = true);";
     let p = &import(hexagon).solid.primitives[0];
@@ -124,6 +166,7 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::Polyhedron(_) => "polyhedron",
         Shape::HalfSpace(_) => "half-space",
         Shape::Torus(_) => "torus",
+        Shape::TriangleMesh(_) => "mesh",
     }
 }
 
@@ -245,7 +288,7 @@ fn infinite_primitives_are_half_spaces() {
 fn every_refusal_is_a_sentence_with_its_place() {
     let cube_faces = "[[2,6,4,0],[5,7,3,1],[4,5,1,0],[3,7,6,2],[1,3,2,0],[6,7,5,4]]";
     let cube_points = "[[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1,1]]";
-    let dented = cube_points.replace("[1,1,1]", "[0.2,0.2,0.2]");
+    let crossed = cube_points.replace("[1,1,1]", "[-0.5,-0.5,-0.5]");
     let triangles = "[[2,6,4],[2,4,0],[5,7,3],[5,3,1],[4,5,1],[4,1,0],[3,7,6],[3,6,2],[1,3,2],[1,2,0],[6,7,5],[6,5,4]]";
     let table: Vec<(String, &str)> = vec![
         (
@@ -324,17 +367,17 @@ fn every_refusal_is_a_sentence_with_its_place() {
         ),
         (
             format!("polyhedron(points = {cube_points}, faces = {});", cube_faces.replace("[3,7,6,2]", "[2,6,7,3]")),
-            "1:1: expected a closed convex polyhedron, found mixed orientation: two faces run along the edge from point 2 \
+            "1:1: expected a closed polyhedron, found mixed orientation: two faces run along the edge from point 2 \
              to point 6 in the same direction",
         ),
         (
             format!("polyhedron(points = {cube_points}, faces = {});", cube_faces.replace("[3,7,6,2],", "")),
-            "1:1: expected a closed convex polyhedron, found an open mesh: the edge between points 2 and 6 belongs to one \
+            "1:1: expected a closed polyhedron, found an open mesh: the edge between points 2 and 6 belongs to one \
              face only",
         ),
         (
-            format!("polyhedron(points = {dented}, faces = {triangles});"),
-            "1:1: expected a closed convex polyhedron, found a non-convex polyhedron: point 2 lies 4.685e-1 outside of face 2",
+            format!("polyhedron(points = {crossed}, faces = {triangles});"),
+            "1:1: expected a closed mesh, found one that crosses itself, lies on itself or is inside out near [",
         ),
         (
             "polyhedron(points = [[0, 0, 0]], faces = [[0, 1, 2]]);".into(),
@@ -356,7 +399,7 @@ fn every_refusal_is_a_sentence_with_its_place() {
 
 #[test]
 fn limits_are_named() {
-    let limits = Limits { bytes: 1000, nodes: 5, depth: 3, faces: 20, polyhedron_faces: 6, values: 8 };
+    let limits = Limits { bytes: 1000, nodes: 5, depth: 3, faces: 20, polyhedron_faces: 6, mesh_facets: 9, values: 8 };
     let table = [
         (" ".repeat(1001), "m.csg:1:1: expected at most 1000 bytes of text, found more"),
         ("group();".repeat(6), "m.csg:1:41: expected at most 5 nodes, found more"),

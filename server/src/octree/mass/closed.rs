@@ -10,6 +10,7 @@
 //! | cone, frustum | πh(a² + ab + b²)/3 | πh(a⁴ + a³b + a²b² + ab³ + b⁴)/20 | πh³(a² + 3ab + 6b²)/30 | πh²(a² + 2ab + 3b²)/12 |
 //! | box | 8 e₁e₂e₃ | V eₖ²/3 | V e₃²/3 | 0 |
 //! | polyhedron | signed tetrahedra (`cell`) | | | |
+//! | mesh | signed tetrahedra of its triangles | | | |
 //!
 //! The frustum's last two are about its bottom disc, radius a. A frame turns ∫ xxᵀ into R ∫ xxᵀ Rᵀ and moves it by the
 //! parallel-axis theorem.
@@ -21,7 +22,7 @@ use super::voxel::Evaluator;
 use crate::math::Aabb;
 use crate::math::moments::{Moments, PAIRS};
 use crate::math::tolerance::BOX_ROUNDING;
-use crate::octree::span::{face_span, rounding};
+use crate::octree::span::{face_span, primitive_span, rounding};
 use crate::solid::write_node;
 use crate::solid::{Face, Node, NodeId, Op, Primitive, Sense, Solid};
 use contactd_proto::Pose;
@@ -93,6 +94,9 @@ fn apart(boxes: &[Aabb]) -> bool {
 
 /// True when a primitive holds a box: of a convex face its corners tell.
 fn holds(p: &Primitive, b: &Aabb) -> bool {
+    if p.shape.formula().is_some() {
+        return b.is_empty() || b.is_finite() && primitive_span(p, b.center(), b.half()).1 < 0.0;
+    }
     b.is_empty()
         || b.is_finite()
             && p.faces.iter().all(|f| {
@@ -109,7 +113,8 @@ fn of_primitive(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> Op
         let is_polyhedron = p.aabb.is_finite() && p.faces.iter().all(Face::is_flat);
         return if is_polyhedron { of_polyhedron(solid, node, p, origin) } else { None };
     };
-    Some((placed(&own, &p.frame, origin), FORMULA_ROUNDING * own.volume()))
+    let doubt = FORMULA_ROUNDING * own.volume() + p.shape.geometry().moments_doubt();
+    Some((placed(&own, &p.frame, origin), doubt))
 }
 
 /// A body's moments about a point of the parent of `frame`. One shift: there and back again would cancel.

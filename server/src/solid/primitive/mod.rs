@@ -4,7 +4,9 @@
 //! outside of this folder asks of what kind a primitive is: [`Form`] tells what a convex one is to those who compute with it.
 
 use crate::math::{Aabb, Ball, Moments};
-use crate::solid::{Face, Label};
+use crate::solid::formula::Formula;
+use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::{Face, Label, Sense};
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -16,6 +18,7 @@ mod half_space;
 mod polyhedron;
 mod sphere;
 mod torus;
+mod triangle_mesh;
 
 pub use cone::Cone;
 pub use cuboid::Cuboid;
@@ -25,11 +28,21 @@ pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use sphere::Sphere;
 pub use torus::Torus;
+pub use triangle_mesh::{MeshFault, Repair, TriangleMesh, WELD};
 
 /// What every primitive answers about itself, in its own frame.
 pub trait Geometry {
-    /// The faces psi <= 0 whose intersection it is, in a fixed order.
+    /// The faces psi <= 0 whose intersection it is, or those that its formula names, in a fixed order.
     fn faces(&self) -> Vec<Face>;
+    /// What it is of its faces, where it is not their intersection.
+    fn formula(&self) -> Option<&Formula> {
+        None
+    }
+    /// Of what has a formula: a box in its frame whose six planes it is and-ed with, so that psi is at most a margin only in the
+    /// box grown by that margin.
+    fn domain(&self) -> Option<Aabb> {
+        None
+    }
     /// Name of face `index` of `faces`, in the field's words: "side", "top", "+x", "face 3".
     fn face_name(&self, index: usize) -> String;
     /// Tight axis-aligned box after the placement `frame`.
@@ -44,6 +57,10 @@ pub trait Geometry {
     fn form(&self) -> Form<'_>;
     /// Its moments in its frame, by a formula (`octree::mass::closed` has them all); `None` where there is none.
     fn moments(&self) -> Option<Moments>;
+    /// What they leave open of its volume beside the rounding of a few formulas.
+    fn moments_doubt(&self) -> f64 {
+        0.0
+    }
     /// A primitive of its kind and in its frame that holds all points at which f of it is at most `margin` (a length);
     /// `None` where edges or corners reach out farther than that.
     fn grown(&self, margin: f64) -> Option<Shape>;
@@ -119,6 +136,12 @@ macro_rules! shapes {
                 match self { $(Shape::$variant(s) => s.form()),+ }
             }
 
+            /// What it is of its faces, where it is not their intersection.
+            #[inline]
+            pub fn formula(&self) -> Option<&Formula> {
+                match self { $(Shape::$variant(s) => s.formula()),+ }
+            }
+
             /// The byte that tells its kind in a kept model.
             pub fn tag(&self) -> u8 {
                 match self { $(Shape::$variant(_) => $tag),+ }
@@ -142,7 +165,7 @@ macro_rules! shapes {
     };
 }
 
-shapes!(Sphere = 0, Cylinder = 1, Cone = 2, Cuboid = 3, Polyhedron = 4, HalfSpace = 5, Torus = 6);
+shapes!(Sphere = 0, Cylinder = 1, Cone = 2, Cuboid = 3, Polyhedron = 4, HalfSpace = 5, Torus = 6, TriangleMesh = 7);
 
 /// A primitive placed in a model.
 #[derive(Clone, Debug)]
@@ -181,13 +204,35 @@ impl Primitive {
         geometry.face_name(if self.label.mirrored { geometry.mirrored_face(index) } else { index })
     }
 
-    /// True where all of its faces are convex; another one has one face alone, whose psi is the exact distance.
+    /// True where it is the intersection of convex faces; another one has a formula, or one face alone whose psi is the exact
+    /// distance.
     pub fn is_convex(&self) -> bool {
-        self.faces.len() != 1 || self.faces[0].is_convex()
+        self.shape.formula().is_none() && (self.faces.len() != 1 || self.faces[0].is_convex())
     }
 
-    /// psi of the whole primitive: the largest of its faces' values. 1-Lipschitz, negative inside.
+    /// psi of the whole primitive: the largest of its faces' values, or what its formula makes of them. 1-Lipschitz, negative
+    /// inside.
     pub fn value(&self, x: DVec3) -> f64 {
-        self.faces.iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(x)))
+        match self.shape.formula() {
+            Some(formula) => formula.value(&mut |f| self.faces[f as usize].value(x)),
+            None => self.faces.iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(x))),
+        }
+    }
+
+    /// Appends it as and/or of its literals (`local`), complemented where `sense` is negative, with what `truth` says of each: the
+    /// third of a solid's contracts.
+    pub fn expression(&self, sense: Sense, out: &mut Vec<Token>, truth: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+        if let Some(formula) = self.shape.formula() {
+            return formula.write((self.first_face, sense), out, truth);
+        }
+        let kind = if sense == Sense::Positive { local::AND } else { local::OR };
+        local::fold(kind, 0..self.faces.len() as u32, out, |i, out| {
+            let id = LiteralId::new(self.first_face + i, sense);
+            let known = truth(id);
+            if known == Truth::Open {
+                out.push(local::literal_token(id));
+            }
+            known
+        })
     }
 }

@@ -1,0 +1,179 @@
+//! Meshes against judges of their own: solid angles for what is inside, distances from triangles for |f|.
+
+use super::*;
+use crate::math::random::Random;
+use std::f64::consts::{PI, TAU};
+
+type Mesh = (Vec<DVec3>, Vec<[u32; 3]>);
+
+/// How often a mesh winds around a point: its solid angle there over 4π (A. van Oosterom, J. Strackee 1983).
+fn winding(m: &TriangleMesh, x: DVec3) -> f64 {
+    let angle = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| m.vertices[v as usize] - x);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let under = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        2.0 * a.dot(b.cross(c)).atan2(under)
+    };
+    m.triangles.iter().map(angle).sum::<f64>() / (4.0 * PI)
+}
+
+/// Distance of a point from a triangle, by its regions.
+fn distance(x: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let n = (b - a).cross(c - a);
+    let beyond = |p: DVec3, q: DVec3| (q - p).cross(x - p).dot(n) < 0.0;
+    if !beyond(a, b) && !beyond(b, c) && !beyond(c, a) {
+        return ((x - a).dot(n) / n.length()).abs();
+    }
+    let segment = |p: DVec3, q: DVec3| {
+        let t = ((x - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+        x.distance(p + (q - p) * t)
+    };
+    segment(a, b).min(segment(b, c)).min(segment(c, a))
+}
+
+fn off(m: &TriangleMesh, x: DVec3) -> f64 {
+    let each = m.triangles.iter().map(|t| distance(x, t.map(|v| m.vertices[v as usize])));
+    each.fold(f64::INFINITY, f64::min)
+}
+
+/// Triangles of a grid that is closed both ways.
+fn closed_grid(n: u32, m: u32, at: impl Fn(f64, f64) -> DVec3) -> Mesh {
+    let points = (0..n * m).map(|i| at(f64::from(i / m) / f64::from(n) * TAU, f64::from(i % m) / f64::from(m) * TAU));
+    let id = |i: u32, j: u32| i % n * m + j % m;
+    let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
+    let triangles = quads
+        .flat_map(|(i, j)| [[id(i, j), id(i + 1, j), id(i + 1, j + 1)], [id(i, j), id(i + 1, j + 1), id(i, j + 1)]]);
+    (points.collect(), triangles.collect())
+}
+
+fn torus(n: u32, m: u32) -> Mesh {
+    closed_grid(n, m, |u, v| {
+        let r = 1.0 + 0.4 * v.cos();
+        DVec3::new(r * u.cos(), r * u.sin(), 0.4 * v.sin())
+    })
+}
+
+/// A ball with random bumps: no vertex is like another, and many are saddles.
+fn bumps(r: &mut Random, n: u32, m: u32, rough: f64) -> Mesh {
+    let mut points = vec![DVec3::Z, -DVec3::Z];
+    for i in 1..n {
+        for j in 0..m {
+            let (u, v) = (f64::from(i) / f64::from(n) * PI, f64::from(j) / f64::from(m) * TAU);
+            let d = DVec3::new(u.sin() * v.cos(), u.sin() * v.sin(), u.cos());
+            points.push(d * r.within(1.0 - rough, 1.0 + rough));
+        }
+    }
+    let id = |i: u32, j: u32| {
+        if i == 0 {
+            0
+        } else if i == n {
+            1
+        } else {
+            2 + (i - 1) * m + j % m
+        }
+    };
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        for j in 0..m {
+            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            triangles
+                .extend([[a, b, c], [a, c, d]].into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]));
+        }
+    }
+    (points, triangles)
+}
+
+/// A prism over a polygon that is star-shaped about the origin; its lids are fans from a corner or from the middle.
+fn star(radii: &[f64], height: f64) -> Mesh {
+    let n = radii.len() as u32;
+    let ring = |z: f64| {
+        let each = radii.iter().enumerate().map(move |(i, r)| (i as f64 / radii.len() as f64 * TAU, r));
+        each.map(move |(u, r)| DVec3::new(r * u.cos(), r * u.sin(), z)).collect::<Vec<_>>()
+    };
+    let mut points = [ring(0.0), ring(height)].concat();
+    points.extend([DVec3::ZERO, DVec3::Z * height]);
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        let j = (i + 1) % n;
+        triangles.extend([[i, j, n + j], [i, n + j, n + i], [2 * n, j, i], [2 * n + 1, n + i, n + j]]);
+    }
+    (points, triangles)
+}
+
+fn turned((points, triangles): Mesh, r: &mut Random, single: bool) -> Mesh {
+    let q = contactd_proto::motion::quat_of_rotation_vector(r.vector(2.0));
+    let shift = r.vector(1.0);
+    let round = |p: DVec3| if single { p.as_vec3().as_dvec3() } else { p };
+    (points.into_iter().map(|p| round(q * p + shift)).collect(), triangles)
+}
+
+/// Signs against the winding number, and |f| against the distance.
+fn judge(name: &str, (points, triangles): &Mesh, r: &mut Random, count: usize) {
+    let start = std::time::Instant::now();
+    let (m, repair) = TriangleMesh::new(points, triangles).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let took = start.elapsed();
+    assert_eq!(repair, Repair::default(), "{name}");
+    let around = Aabb::of_points(points.iter().copied());
+    let size = around.half().length();
+    let (mut inside, mut least) = (0, f64::INFINITY);
+    for i in 0..count {
+        let x = if i % 2 == 0 {
+            around.center() + around.half() * r.vector(1.2)
+        } else {
+            // Near a corner, where formulas are hardest.
+            points[(r.unit() * points.len() as f64) as usize] + r.vector(1.0) * size * 10f64.powf(r.within(-6.0, -0.5))
+        };
+        let (f, d, w) = (m.value(x), off(&m, x), winding(&m, x));
+        if d > 1e-9 * size {
+            assert!((w - w.round()).abs() < 1e-3, "{name}: {w}");
+            assert_eq!(f < 0.0, w.round() == 1.0, "{name}: f {f} at {x}, winds {w}, {d} off");
+            least = least.min(f.abs() / d.min(size));
+            inside += usize::from(f < 0.0);
+        }
+        assert!(f < 0.0 && -f <= d + 1e-12 * size || f >= 0.0 && f <= d + 1e-12 * size, "{name}: f {f}, {d} off");
+    }
+    let tokens = m.formula.tokens().len();
+    println!(
+        "{name}: {} triangles, {} faces, {} cuts, {tokens} tokens in {took:?}; {inside} of {count} inside; |f| >= {least:.1e} of the distance",
+        triangles.len(),
+        m.faces,
+        m.planes.len() - m.faces,
+    );
+    assert!(inside > 0 && least > 1e-4, "{name}: {least}");
+}
+
+#[test]
+fn f_has_the_sign_of_the_winding_number_and_at_most_the_distance() {
+    let mut r = Random(9);
+    for n in [3, 5, 8, 16, 32] {
+        judge(&format!("torus {n}"), &torus(n, n.max(4)), &mut r, 2000);
+    }
+    for (n, rough) in [(3, 0.3), (4, 0.5), (6, 0.3), (12, 0.2), (24, 0.1), (24, 1e-9)] {
+        judge(&format!("bumps {n} {rough}"), &bumps(&mut r, n, 2 * n, rough), &mut r, 2000);
+    }
+    for n in [5, 6, 12, 40] {
+        let radii: Vec<f64> = (0..n).map(|_| r.within(0.5, 1.5)).collect();
+        let mesh = star(&radii, 0.7);
+        judge(&format!("star {n}"), &mesh, &mut r, 2000);
+        for single in [false, true] {
+            let mesh = turned(star(&radii, 0.7), &mut r, single);
+            judge(&format!("star {n}, turned, single {single}"), &mesh, &mut r, 2000);
+        }
+    }
+    for single in [false, true] {
+        let mesh = turned(torus(24, 12), &mut r, single);
+        judge(&format!("torus, turned, single {single}"), &mesh, &mut r, 2000);
+        let mesh = turned(star(&[1.0; 64], 0.7), &mut r, single);
+        judge(&format!("cylinder, turned, single {single}"), &mesh, &mut r, 2000);
+    }
+}
+
+#[test]
+#[ignore = "how long large meshes take"]
+fn large() {
+    let mut r = Random(9);
+    for n in [64, 128, 224] {
+        judge(&format!("torus {n}"), &torus(n, n), &mut r, 100);
+        judge(&format!("bumps {n}"), &bumps(&mut r, n, n, 0.02), &mut r, 100);
+    }
+}

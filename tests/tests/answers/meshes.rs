@@ -1,0 +1,244 @@
+//! Meshes as operands: membership, values, volumes, certificates; against convex polyhedra and the exact solids that they facet.
+//!
+//! `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers meshes:: -- --nocapture` sets the number of
+//! pairs.
+
+use contactd::contact::{Outcome, QueryOptions, Scratch, Status, earliest_contact};
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd::octree::mass::mass_properties;
+use contactd::solid::Shape;
+use contactd::solid::primitive::Polyhedron;
+use contactd_proto::{MassOptions, Motion, Pose};
+use contactd_tests::certified::certify_all;
+use contactd_tests::engine::question;
+use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, winding};
+use contactd_tests::random_solids::{Random, placed, shape, shape_or_mesh, solid_of};
+use contactd_tests::rays::integrals;
+use contactd_tests::reference::field::Field;
+use contactd_tests::scenes::Recipe;
+use glam::DVec3;
+
+fn pairs(default: usize) -> usize {
+    std::env::var("CONTACTD_PAIRS").ok().map_or(default, |n| n.parse().expect("a number of pairs"))
+}
+
+fn alone(shape: impl Into<Shape>) -> Model {
+    Model::new(Recipe::of(shape).build())
+}
+
+/// A motion from a place next to the origin past it.
+fn past(r: &mut Random, from: f64) -> Motion {
+    let start = r.direction() * from;
+    let aim = r.vector(0.7);
+    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.5) };
+    Motion { start: Pose::new(start, r.rotation()), velocity: (aim - start) * r.within(0.8, 1.6), spin }
+}
+
+fn turning(r: &mut Random) -> Motion {
+    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.0) };
+    Motion { start: Pose::new(DVec3::ZERO, r.rotation()), velocity: r.vector(0.3), spin }
+}
+
+fn ask(a: &Model, b: &Model, motions: [Motion; 2]) -> Outcome {
+    let [ma, mb] = motions.map(|motion| Placed { place: Pose::IDENTITY, motion });
+    earliest_contact(&question((a, ma), (b, mb), QueryOptions::DEPTH), &mut Scratch::default())
+}
+
+#[test]
+fn a_point_is_inside_where_the_mesh_winds_around_it_and_f_is_no_more_than_its_distance() {
+    let mut r = Random::new(5);
+    let (mut inside, mut seen) = (0, 0);
+    for i in 0..pairs(150) {
+        let mesh = meshes::random(&mut r, 1.0);
+        let model = alone(meshes::solid(&mesh));
+        let around = model.solid.aabb();
+        for k in 0..200 {
+            let near = mesh.0[r.below(mesh.0.len())] + r.vector(1.0) * 10f64.powf(r.within(-8.0, -1.0));
+            let x = if k % 2 == 0 { r.point_in(&around) } else { near };
+            let (f, off) = (model.solid.value(x), distance(&mesh, x));
+            assert!(f.abs() <= off + 1e-12, "mesh {i} at {x}: {f}, {off} off");
+            if off > 1e-10 {
+                let winds = winding(&mesh, x).round();
+                assert!(winds == 0.0 || winds == 1.0);
+                assert_eq!(f < 0.0, winds == 1.0, "mesh {i} at {x}: {f}, {off} off");
+                assert!(f.abs() > 1e-3 * off.min(0.1), "mesh {i}: a seam at {x}, f {f}, {off} off");
+                (inside, seen) = (inside + usize::from(f < 0.0), seen + 1);
+            }
+            let margin = model.margin();
+            let within = model.value_within(x, margin).clamp(-margin, margin);
+            let (off_margin, clamped) = (within - f.clamp(-margin, margin), f.abs() < margin);
+            assert!(off_margin.abs() < 1e-13 || !clamped, "mesh {i} at {x}: {within} {f}");
+        }
+    }
+    assert!(inside * 5 > seen, "{inside} of {seen}");
+}
+
+#[test]
+fn trees_with_meshes_have_the_values_and_the_volumes_of_an_independent_evaluation() {
+    let mut r = Random::new(31);
+    let mut volumes = 0;
+    for i in 0..9 {
+        let solid = solid_of(&mut r, 1 + i % 2, shape_or_mesh);
+        let (model, around) = (Model::new(solid.clone()), solid.aabb());
+        let field = Field::new(&solid, &Pose::IDENTITY);
+        for _ in 0..pairs(150) * 4 {
+            let x = r.point_in(&around);
+            let (f, other) = (solid.value(x), field.value(x));
+            assert!((f - other).abs() < 1e-13, "solid {i} at {x}: {f} {other}");
+            let margin = model.margin();
+            let within = model.value_within(x, margin).clamp(-margin, margin);
+            assert!((within - f.clamp(-margin, margin)).abs() < 1e-13, "solid {i} at {x}: {within} {f}");
+            let y = x + r.vector(0.3);
+            assert!((solid.value(y) - f).abs() <= x.distance(y) * (1.0 + 1e-12) + 1e-13);
+        }
+        let (fine, coarse) = (integrals(&solid, &around, 120), integrals(&solid, &around, 77));
+        if fine[0] < 1e-2 {
+            continue;
+        }
+        let m = mass_properties(&model, &MassOptions { tolerance: 0.03, boxes: 300_000 }).expect("bounded");
+        let doubt = 4.0 * (fine[0] - coarse[0]).abs() + 2e-3 * fine[0];
+        assert!((m.volume - fine[0]).abs() <= m.volume_error + doubt, "solid {i}: {m:?} {}", fine[0]);
+        assert!(m.volume_error <= 0.03 * m.volume, "solid {i}: {m:?}");
+        volumes += 1;
+    }
+    assert!(volumes > 4, "{volumes}");
+}
+
+/// Enclosed volume, by signed tetrahedra.
+fn volume((points, triangles): &Mesh) -> f64 {
+    triangles.iter().map(|t| t.map(|v| points[v as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}
+
+#[test]
+fn the_volume_of_a_mesh_is_that_of_its_tetrahedra() {
+    let mut r = Random::new(77);
+    for i in 0..20 {
+        let mesh = meshes::random(&mut r, 1.0);
+        let m = mass_properties(&alone(meshes::solid(&mesh)), &MassOptions { tolerance: 1e-3, boxes: 300_000 });
+        let m = m.expect("bounded");
+        let exact = volume(&mesh);
+        assert!((m.volume - exact).abs() <= m.volume_error && m.volume_error <= 1e-3 * exact, "{i}: {m:?}, {exact}");
+    }
+}
+
+#[test]
+fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
+    let count = pairs(120);
+    certify_all("kinds", (count, 0x3e_5105), |r| {
+        let mesh = |r: &mut Random| Shape::from(meshes::solid(&meshes::random(r, 0.8)));
+        let other = if r.chance(0.3) { mesh(r) } else { shape(r, 0.8) };
+        let place = |motion| Placed { place: Pose::IDENTITY, motion };
+        [(alone(mesh(r)), place(turning(r))), (alone(other), place(past(r, 2.2)))]
+    });
+    certify_all("trees", (count, 0x3e_5105), |r| {
+        let tree = |r: &mut Random| {
+            let depth = 1 + r.below(2);
+            Model::new(solid_of(r, depth, shape_or_mesh))
+        };
+        let (a, b) = (tree(r), tree(r));
+        let mut motions = [placed(r, 0.5), placed(r, 0.5)];
+        let aside = r.direction() * 2.2;
+        motions[1].motion.start.position += aside;
+        motions[1].motion.velocity -= aside * r.within(0.3, 1.0);
+        [(a, motions[0]), (b, motions[1])]
+    });
+}
+
+#[test]
+fn a_convex_mesh_meets_when_the_polyhedron_of_its_points_does() {
+    let mut r = Random::new(3);
+    let (mut contacts, mut worst) = (0, 0.0_f64);
+    let count = pairs(100);
+    for i in 0..count {
+        let mesh = if r.chance(0.5) {
+            let radius = r.within(0.3, 0.8);
+            prism(&vec![radius; 3 + r.below(20)], r.within(0.2, 0.8))
+        } else {
+            bumps(&mut r, (3, 5), (0.7, 0.7))
+        };
+        let faces: Vec<Vec<u32>> = mesh.1.iter().map(|t| vec![t[0], t[2], t[1]]).collect();
+        let (polyhedron, fit) = Polyhedron::from_faces(&mesh.0, &faces).expect("a convex one");
+        assert!(fit.moved == 0.0 && !fit.flipped, "{i}: {fit:?}");
+        let [as_mesh, convex] = [alone(meshes::solid(&mesh)), alone(polyhedron)];
+        let other = Model::new(solid_of(&mut r, 1, shape));
+        let motions = [turning(&mut r), past(&mut r, 2.5)];
+        let (o, p) = (ask(&as_mesh, &other, motions), ask(&convex, &other, motions));
+        let decided = |o: &Outcome| o.status != Status::Undecided;
+        assert!(decided(&o) && decided(&p), "{i}: {o:?}, {p:?}");
+        if o.status == Status::Contact && p.status == Status::Contact {
+            if o.not_continued || p.not_continued {
+                continue;
+            }
+            contacts += 1;
+            let off = (o.time - p.time).abs() * o.normal_speed.abs().min(p.normal_speed.abs());
+            worst = worst.max(off);
+            assert!(off <= 1e-12, "{i}: {off:e}: {o:?}, {p:?}");
+        } else {
+            assert_eq!(o.status, p.status, "{i}: {o:?}, {p:?}");
+        }
+    }
+    println!("{contacts} contacts of {count}, the same to {worst:.1e}");
+    assert!(contacts * 4 > count, "{contacts}");
+}
+
+/// Facets with their corners on a solid lie no farther from it than `deviation`, and within a convex one: a mesh of them is met as
+/// much earlier or later, and no earlier than what is convex.
+fn facets_close_in(name: &str, (exact, is_convex): (Recipe, bool), counts: &[u32], make: impl Fn(u32) -> (Mesh, f64)) {
+    let exact = Model::new(exact.build());
+    let meshes: Vec<(Model, f64)> = counts
+        .iter()
+        .map(|n| {
+            let (mesh, deviation) = make(*n);
+            (alone(meshes::solid(&mesh)), deviation)
+        })
+        .collect();
+    let mut r = Random::new(11);
+    let mut contacts = vec![0; counts.len()];
+    for i in 0..pairs(30) {
+        // A ball small enough to come in from all sides, straight: its depth in the exact solid grows no faster than it moves.
+        let ball = alone(contactd::solid::primitive::Sphere { radius: r.within(0.05, 0.5) });
+        let start = r.direction() * 2.5;
+        let velocity = (r.vector(0.8) - start) * 1.3;
+        let motions = [Motion::resting(Pose::IDENTITY), Motion { start: Pose::at(start), velocity, spin: DVec3::ZERO }];
+        let o = ask(&exact, &ball, motions);
+        assert_ne!(o.status, Status::Undecided, "{name} {i}");
+        for (k, (model, deviation)) in meshes.iter().enumerate() {
+            let m = ask(model, &ball, motions);
+            assert_ne!(m.status, Status::Undecided, "{name} {i}, {} facets: {m:?}", counts[k]);
+            if m.status != Status::Contact {
+                continue;
+            }
+            assert!(o.status == Status::Contact || !is_convex, "{name} {i}: {o:?}, {m:?}");
+            assert!(m.time >= o.time - 1e-12 || !is_convex, "{name} {i}, {}: {m:?} before {o:?}", counts[k]);
+            // Where it meets the mesh the exact solid is no farther than the deviation.
+            let depth = ball.solid.value(m.point - (start + velocity * m.time)).abs();
+            assert!(depth < 1e-9, "{name} {i}: {depth}");
+            let inside = -exact.solid.value(m.point);
+            let most = deviation * (1.0 + 1e-9) + 1e-9;
+            assert!(
+                inside <= most && inside >= if is_convex { -1e-9 } else { -most },
+                "{name} {i}: {inside} {deviation}"
+            );
+            contacts[k] += 1;
+            if o.status == Status::Contact && o.normal_speed > 0.5 * velocity.length() {
+                let late = (m.time - o.time).abs() * velocity.length();
+                assert!(late <= 8.0 * deviation, "{name} {i}: {late} {deviation}");
+            }
+        }
+    }
+    println!("{name}: contacts {contacts:?}");
+    assert!(contacts.iter().all(|c| *c * 5 > pairs(30)), "{contacts:?}");
+}
+
+#[test]
+fn finer_facets_meet_as_what_they_facet() {
+    let counts = [16, 32, 64, 128];
+    let sagitta = |radius: f64, n: u32| radius * (1.0 - (std::f64::consts::PI / f64::from(n)).cos());
+    facets_close_in("cylinder", (Recipe::cylinder(0.8, 0.5), true), &counts, |n| {
+        (prism(&vec![0.8; n as usize], 0.5), sagitta(0.8, n))
+    });
+    facets_close_in("torus", (Recipe::torus(0.9, 0.3), false), &counts[..3], |n| {
+        (meshes::torus((0.9, 0.3), n, n), sagitta(0.3, n) + sagitta(1.2, n))
+    });
+}
