@@ -113,6 +113,18 @@ struct Open {
     found: Option<Found>,
 }
 
+/// How far a pair has come.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one a pair, which stays in its place: a box would be an allocation more"
+)]
+enum State<'a> {
+    /// Answered without a search, whose memory is given back.
+    Reported(Outcome, Scratch),
+    /// Searched; and the ending that a shortcut in front of the search has found.
+    Searching(Search<'a>, Option<Ending>),
+}
+
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
 /// further than the earliest contact known.
 pub struct PairSearch<'a> {
@@ -121,11 +133,8 @@ pub struct PairSearch<'a> {
     swapped: bool,
     /// 1 or 2: the depth that is searched, in resolutions.
     level: f64,
-    search: Option<Search<'a>>,
-    /// The ending that a shortcut in front of the search has found.
-    ending: Option<Ending>,
-    /// The answer of two whole primitives, found without a search.
-    reported: Option<Outcome>,
+    state: State<'a>,
+    /// The answer as far as it is known; its counters are of the searches that have ended.
     outcome: Outcome,
     resolution: f64,
     /// How often the resolution was raised since rounding left its depth untold.
@@ -147,7 +156,7 @@ pub struct PairSearch<'a> {
 impl<'a> PairSearch<'a> {
     /// Runs as `run` does, but refines at most `cells` more cells: a search that would need more is undecided.
     pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
-        if let Some(search) = &mut self.search {
+        if let State::Searching(search, _) = &mut self.state {
             let limit =
                 self.limit.saturating_sub(self.spent).min(search.counters().spent(self.limit).saturating_add(cells));
             search.limit_to(limit);
@@ -162,27 +171,28 @@ impl<'a> PairSearch<'a> {
         let mut outcome = clear(query);
         let quick = quick(query, &mut outcome);
         if let Quick::Told = quick {
-            let (resolution, limit) = (task.delta, query.cell_limit);
-            let reported = Some(outcome);
-            return Self {
-                task,
-                swapped,
-                level: 1.0,
-                search: None,
-                ending: None,
-                reported,
-                outcome,
-                resolution,
-                raised: 0,
-                coarser: 0,
-                insists: false,
-                open: None,
-                spun: None,
-                limit,
-                spent: 0,
-            };
+            return Self::at(query, task, swapped, outcome, State::Reported(outcome, scratch));
         }
         Self::of_task(query, task, swapped, (quick, &outcome), scratch)
+    }
+
+    /// A pair that has come so far, at the resolution of its task.
+    fn at(query: &PairQuery<'a>, task: Task<'a>, swapped: bool, outcome: Outcome, state: State<'a>) -> Self {
+        Self {
+            task,
+            swapped,
+            level: 1.0,
+            state,
+            outcome,
+            resolution: task.delta,
+            raised: 0,
+            coarser: 0,
+            insists: false,
+            open: None,
+            spun: None,
+            limit: query.cell_limit,
+            spent: 0,
+        }
     }
 
     /// Prepares the search of a task, of which a quick look has told something.
@@ -194,8 +204,7 @@ impl<'a> PairSearch<'a> {
         scratch: Scratch,
     ) -> Self {
         let (a, b) = (task.a, task.b);
-        let resolution = task.delta;
-        let mut outcome = Outcome::clear(resolution);
+        let mut outcome = Outcome::clear(task.delta);
         outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
         outcome.counters.closed_forms = before.counters.closed_forms;
         let mut contacts = Contacts::new(task);
@@ -217,31 +226,15 @@ impl<'a> PairSearch<'a> {
         if query.strategies.coarser {
             search.patience = PATIENCE;
         }
-        let (search, limit) = (Some(search), query.cell_limit);
         let spins = |(a, b): (Placed, Placed)| [a.motion.spin, b.motion.spin];
         let moving = if swapped { (query.b.placed, query.a.placed) } else { (query.a.placed, query.b.placed) };
         let spun = (spins(moving) != spins(task.relative.placed())).then(|| Box::new([query.a.placed, query.b.placed]));
-        let mut pair = Self {
-            task,
-            swapped,
-            level: 1.0,
-            search,
-            ending,
-            reported: None,
-            outcome,
-            resolution,
-            raised: 0,
-            coarser: 0,
-            insists: false,
-            open: None,
-            spun,
-            limit,
-            spent: 0,
-        };
+        let mut pair = Self::at(query, task, swapped, outcome, State::Searching(search, ending));
+        pair.spun = spun;
         if let Some(x) = overlap
             && !pair.goes_past(x, 0)
         {
-            pair.reported = Some(pair.overlaps(x, Some(before)));
+            pair.state = State::Reported(pair.overlaps(x, Some(before)), pair.take_scratch());
         }
         pair
     }
@@ -299,86 +292,121 @@ impl<'a> PairSearch<'a> {
 
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
-        if let Some(reported) = &self.reported {
-            return if reported.status == Status::Clear { f64::INFINITY } else { reported.time_lower };
-        }
-        match &self.ending {
-            Some(Ending::Contact(found)) => found.goal,
-            Some(_) => f64::INFINITY,
-            None => self.search.as_ref().map_or(f64::INFINITY, Search::earliest),
+        match &self.state {
+            State::Reported(reported, _) if reported.status == Status::Clear => f64::INFINITY,
+            State::Reported(reported, _) => reported.time_lower,
+            State::Searching(_, Some(Ending::Contact(found))) => found.goal,
+            State::Searching(_, Some(_)) => f64::INFINITY,
+            State::Searching(search, None) => search.earliest(),
         }
     }
 
     /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Outcome> {
-        if let Some(reported) = self.reported {
-            return (reported.status == Status::Clear || reported.time_lower <= until).then_some(reported);
+        if let State::Reported(reported, _) = &self.state {
+            return (reported.status == Status::Clear || reported.time_lower <= until).then_some(*reported);
         }
         loop {
-            let search = self.search.as_mut()?;
-            let ending = match self.ending.take() {
-                Some(Ending::Contact(found)) if found.goal > until => {
-                    self.ending = Some(Ending::Contact(found));
-                    return None;
-                }
-                Some(ending) => ending,
-                None => search.run(until)?,
-            };
-            // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
-            let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
-            let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
-            let cells = search.counters().spent(self.limit);
-            self.spent += cells;
-            self.outcome.counters += search.take_counters();
-            match ending {
-                // What a finer search has found is there all the same.
-                Ending::Clear if self.open.as_ref().is_some_and(|open| open.found.is_some()) => self.leave_open(0.0),
-                Ending::Clear => {}
-                Ending::Contact(found) => self.meets(&found),
-                Ending::Long(t, found) => {
-                    if self.coarsen(t, found) || !std::mem::replace(&mut self.insists, true) {
-                        self.restart(cells);
-                        continue;
-                    }
-                    self.leave_open(t);
-                }
-                Ending::Limit(t) => self.leave_open(t),
-                Ending::Rounding(t) => {
-                    // A depth that the motion comes to and stays at is told apart from a slightly larger one.
-                    if self.raise() || self.coarsen(t, None) {
-                        self.restart(cells);
-                        continue;
-                    }
-                    self.leave_open(t);
-                }
-                Ending::Deep(x) => {
-                    self.outcome.touching = true;
-                    if self.level == 1.0 && self.task.ignored_depth == 0.0 {
-                        // A body that was stopped at its contact starts at depth 0 ± rounding: search at twice the depth.
-                        self.level = 2.0;
-                        self.task.start_tolerance = 0.0;
-                        self.restart(cells);
-                        continue;
-                    }
-                    // A step that raised the resolution may have left the bodies a little deeper than 2 delta.
-                    let most = 2.0 * most_raised(self.resolution, self.task.rounding);
-                    let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x);
-                    if self.task.ignored_depth == 0.0 && depth <= most && self.raise() {
-                        self.restart(cells);
-                        continue;
-                    }
-                    if self.goes_past(x, cells) {
-                        continue;
-                    }
-                    return Some(self.overlaps(x, None));
-                }
+            let (ending, cells) = self.ending(until)?;
+            let answer = self.answer(ending, cells);
+            if answer.is_some() {
+                return answer;
             }
-            if self.swapped {
-                self.outcome.swap_sides();
-            }
-            self.outcome.depth = self.task.delta;
-            return Some(self.outcome);
         }
+    }
+
+    /// How the search ends, and the cells' worth of work that it took; `None` where it comes to `until` first.
+    fn ending(&mut self, until: f64) -> Option<(Ending, u64)> {
+        let State::Searching(search, known) = &mut self.state else { return None };
+        let ending = match known {
+            Some(Ending::Contact(found)) if found.goal > until => None,
+            Some(_) => known.take(),
+            None => search.run(until),
+        }?;
+        // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
+        let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
+        let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
+        let cells = search.counters().spent(self.limit);
+        self.spent += cells;
+        self.outcome.counters += search.take_counters();
+        Some((ending, cells))
+    }
+
+    /// The answer that an ending is, `cells` after its search began; `None` where a search begins anew, at another depth.
+    fn answer(&mut self, ending: Ending, cells: u64) -> Option<Outcome> {
+        let anew = match ending {
+            Ending::Deep(x) => return self.answer_within(x, cells),
+            Ending::Contact(found) => {
+                self.meets(&found);
+                false
+            }
+            Ending::Clear => {
+                // What a finer search has found is there all the same.
+                if self.open.as_ref().is_some_and(|open| open.found.is_some()) {
+                    self.leave_open(0.0);
+                }
+                false
+            }
+            Ending::Limit(t) => {
+                self.leave_open(t);
+                false
+            }
+            Ending::Long(t, found) => {
+                let anew = self.coarsen(t, found) || !std::mem::replace(&mut self.insists, true);
+                self.leave_open_unless(anew, t)
+            }
+            Ending::Rounding(t) => {
+                // A depth that the motion comes to and stays at is told apart from a slightly larger one.
+                let anew = self.raise() || self.coarsen(t, None);
+                self.leave_open_unless(anew, t)
+            }
+        };
+        if anew {
+            self.restart(cells);
+            return None;
+        }
+        if self.swapped {
+            self.outcome.swap_sides();
+        }
+        self.outcome.depth = self.task.delta;
+        Some(self.outcome)
+    }
+
+    /// The answer where x is deep in both bodies at the start: `None` where a search begins anew, at a larger depth.
+    fn answer_within(&mut self, x: DVec3, cells: u64) -> Option<Outcome> {
+        self.outcome.touching = true;
+        if self.doubles_depth() || self.raises_depth(x) {
+            self.restart(cells);
+            return None;
+        }
+        (!self.goes_past(x, cells)).then(|| self.overlaps(x, None))
+    }
+
+    /// A body that was stopped at its contact starts at depth 0 ± rounding: the search is for twice the depth. False when it
+    /// was, or when an overlap is searched past.
+    fn doubles_depth(&mut self) -> bool {
+        if self.level != 1.0 || self.task.ignored_depth != 0.0 {
+            return false;
+        }
+        self.level = 2.0;
+        self.task.start_tolerance = 0.0;
+        true
+    }
+
+    /// A step that raised the resolution may have left the bodies a little deeper than 2 delta: raises it, too, where x is no
+    /// deeper than that.
+    fn raises_depth(&mut self, x: DVec3) -> bool {
+        let most = 2.0 * most_raised(self.resolution, self.task.rounding);
+        let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x);
+        self.task.ignored_depth == 0.0 && depth <= most && self.raise()
+    }
+
+    /// Leaves open what comes after `t`, unless the search begins `anew`; says whether it does.
+    fn leave_open_unless(&mut self, anew: bool, t: f64) -> bool {
+        if !anew {
+            self.leave_open(t);
+        }
+        anew
     }
 
     /// The answer that a contact was found.
@@ -455,35 +483,50 @@ impl<'a> PairSearch<'a> {
     fn restart(&mut self, cells: u64) {
         self.task.delta = self.task.ignored_depth + self.level * self.resolution;
         self.task.limit = self.task.limit.saturating_sub(cells);
-        let scratch = self.search.take().map(Search::into_scratch).unwrap_or_default();
         let mut contacts = Contacts::new(self.task);
-        if self.coarser > 0 && self.task.strategies.cavities {
-            self.ending = cavity::answer(&mut contacts);
-        }
-        let mut search = Search::new(contacts, scratch);
-        if self.ending.is_none() {
+        let again = self.coarser > 0 && self.task.strategies.cavities;
+        let ending = if again { cavity::answer(&mut contacts) } else { None };
+        let mut search = Search::new(contacts, self.take_scratch());
+        if ending.is_none() {
             search.start();
         }
         let tries = self.task.strategies.coarser && self.coarser < COARSENINGS && !self.insists;
         search.patience = if tries { PATIENCE } else { u64::MAX };
-        self.search = Some(search);
+        self.state = State::Searching(search, ending);
+    }
+
+    /// The memory of what has ended; the state is to be set anew.
+    fn take_scratch(&mut self) -> Scratch {
+        match std::mem::replace(&mut self.state, State::Reported(self.outcome, Scratch::default())) {
+            State::Reported(_, scratch) => scratch,
+            State::Searching(search, _) => search.into_scratch(),
+        }
     }
 
     /// Cells' worth of work done so far.
     pub fn spent(&self) -> u64 {
-        self.spent + self.search.as_ref().map_or(0, |search| search.counters().spent(self.limit))
+        self.spent
+            + match &self.state {
+                State::Reported(..) => 0,
+                State::Searching(search, _) => search.counters().spent(self.limit),
+            }
     }
 
     /// Work done so far.
     pub fn counters(&self) -> Counters {
         let mut counters = self.outcome.counters;
-        counters += self.search.as_ref().map_or_else(Counters::default, |search| *search.counters());
+        if let State::Searching(search, _) = &self.state {
+            counters += *search.counters();
+        }
         counters
     }
 
     /// Ends the search and gives its memory back.
     pub fn into_scratch(self) -> Scratch {
-        self.search.map(Search::into_scratch).unwrap_or_default()
+        match self.state {
+            State::Reported(_, scratch) => scratch,
+            State::Searching(search, _) => search.into_scratch(),
+        }
     }
 }
 

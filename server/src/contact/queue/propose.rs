@@ -12,12 +12,15 @@ use crate::contact::witness::contacts::{Contacts, Guess};
 use crate::contact::witness::known::Known;
 use crate::contact::witness::newton::{Constraint, MAX_ACTIVE};
 use crate::motion::Instant;
-use crate::solid::Sense;
 use crate::solid::local::{self, LiteralId};
+use crate::solid::{Face, Sense};
 use glam::DVec3;
 
 /// A cell thinner than this part of the pair's scale may be held by one body alone.
 const THIN: f64 = 1e-6;
+
+/// A literal of a body and its weight in a clause.
+type Weighed = (Side, LiteralId, f64);
 
 /// What proposes contacts: the cells' expressions, and what confirms them.
 pub(super) struct Proposals<'s, 'a> {
@@ -30,8 +33,28 @@ impl Proposals<'_, '_> {
     pub(super) fn attempt(&mut self, cell: &Cell, advance: &Advance, at: &Instant) {
         let level = advance.cost.element_sum().log2().floor() as i32;
         let x = cell.center + advance.y;
+        let Some(support) = self.support(cell, advance, x, at) else { return };
+        let mut key: Vec<_> = support.iter().map(|l| (l.0, l.1)).collect();
+        key.sort_unstable();
+        if self.items.scratch.tried.iter().any(|(k, l)| *l == level && *k == key) {
+            return;
+        }
+        self.items.scratch.tried.push((key, level));
+        let t = cell.t + advance.dt.max(0.0);
+        let active: Vec<_> = support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
+        // A fit weighs both of its literals: together they are 1 again.
+        let total: f64 = support.iter().map(|l| l.2).sum();
+        let lambda: Vec<_> = support.iter().map(|l| l.2 / total).collect();
+        let _ = self.solve(active.clone(), x, t, lambda.clone())
+            || self.attempt_fit(&advance.support, x, t, (&active, &lambda))
+            || self.attempt_with_others(cell, x, t, (&active, &lambda))
+            || self.attempt_apexes(cell, &support, t, at);
+    }
+
+    /// The literals of a cell's weakest clause: of both bodies. A thin cell is held by one body alone: what decides of the other
+    /// there stands beside it. `None` where a body has none.
+    fn support(&self, cell: &Cell, advance: &Advance, x: DVec3, at: &Instant) -> Option<Vec<Weighed>> {
         let mut support = advance.support.clone();
-        // A thin cell is held by one body alone: what decides of the other there stands beside it.
         let bodies = [
             (Side::A, Faces { solid: self.contacts.task.a, clip_planes: &[] }, cell.a, x),
             (
@@ -44,70 +67,58 @@ impl Proposals<'_, '_> {
         for (side, faces, range, y) in bodies {
             if support.iter().all(|l| l.0 != side) {
                 if cell.half.min_element() > THIN * self.contacts.task.scale {
-                    return;
+                    return None;
                 }
                 let tokens = &self.items.scratch.pool[range.0 as usize..range.1 as usize];
                 if tokens.is_empty() {
-                    return;
+                    return None;
                 }
                 let (_, id) = local::deciding(tokens, &mut |f| faces.get(f).value(y));
                 if faces.is_guard(id.face()) {
-                    return;
+                    return None;
                 }
                 support.push((side, id, 1.0));
             }
         }
-        let mut key: Vec<_> = support.iter().map(|l| (l.0, l.1)).collect();
-        key.sort_unstable();
-        if self.items.scratch.tried.iter().any(|(k, l)| *l == level && *k == key) {
-            return;
+        Some(support)
+    }
+
+    /// Two like faces in a fit: their bound leaves open in which direction they meet.
+    fn attempt_fit(&mut self, support: &[Weighed], x: DVec3, t: f64, guess: (&[Constraint], &[f64])) -> bool {
+        let &[p, q] = support else { return false };
+        let (p, q) = if p.1.sense() == Sense::Positive { (p, q) } else { (q, p) };
+        if q.1.sense() != Sense::Negative || p.0 == q.0 {
+            return false;
         }
-        self.items.scratch.tried.push((key, level));
-        let t = cell.t + advance.dt.max(0.0);
-        let active: Vec<_> = support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
-        // A fit weighs both of its literals: together they are 1 again.
-        let total: f64 = support.iter().map(|l| l.2).sum();
-        let lambda: Vec<_> = support.iter().map(|l| l.2 / total).collect();
-        if self.solve(active.clone(), x, t, lambda.clone()) {
-            return;
+        let later = self.contacts.task.relative.at(t);
+        let off = fit::first_off_axis(&later, (p.0, self.face(&p)), self.face(&q), x);
+        off.is_some_and(|x| self.solve(guess.0.to_vec(), x, t, guess.1.to_vec()))
+    }
+
+    /// A surface that touches there too with next to no weight (a rim that lies almost in a face) is not in the support, but
+    /// without it the system has its solution elsewhere.
+    fn attempt_with_others(&mut self, cell: &Cell, x: DVec3, t: f64, guess: (&[Constraint], &[f64])) -> bool {
+        let (active, lambda) = guess;
+        if active.len() >= MAX_ACTIVE {
+            return false;
         }
-        // Two like faces in a fit: their bound leaves open in which direction they meet.
-        if let [p, q] = advance.support[..] {
-            let (p, q) = if p.1.sense() == Sense::Positive { (p, q) } else { (q, p) };
-            let face = |l: &(Side, LiteralId, f64)| {
-                let solid = if l.0 == Side::A { self.contacts.task.a } else { self.contacts.task.b };
-                &solid.faces[l.1.face() as usize]
-            };
-            let later = self.contacts.task.relative.at(t);
-            if q.1.sense() == Sense::Negative
-                && p.0 != q.0
-                && let Some(x) = fit::first_off_axis(&later, (p.0, face(&p)), face(&q), x)
-                && self.solve(active.clone(), x, t, lambda.clone())
-            {
-                return;
-            }
-        }
-        // A surface that touches there too with next to no weight (a rim that lies almost in a face) is not in the
-        // support, but without it the system has its solution elsewhere.
-        if active.len() < MAX_ACTIVE {
-            for close in self.closest_others(cell, &active, x, &self.contacts.task.relative.at(t)).into_iter().flatten()
-            {
-                let more = active.iter().copied().chain([close]).collect();
-                if self.solve(more, x, t, lambda.iter().copied().chain([0.0]).collect()) {
-                    return;
-                }
-            }
-        }
-        // A cone whose apex is near: the apex is a vertex of its own.
-        let apex_of = |l: &(Side, LiteralId, f64)| {
-            let solid = if l.0 == Side::A { self.contacts.task.a } else { self.contacts.task.b };
-            let apex = solid.faces[l.1.face() as usize].apex()?.point;
+        let close = self.closest_others(cell, active, x, &self.contacts.task.relative.at(t));
+        close.into_iter().flatten().any(|close| {
+            let more = active.iter().copied().chain([close]).collect();
+            self.solve(more, x, t, lambda.iter().copied().chain([0.0]).collect())
+        })
+    }
+
+    /// A cone whose apex is near: the apex is a vertex of its own.
+    fn attempt_apexes(&mut self, cell: &Cell, support: &[Weighed], t: f64, at: &Instant) -> bool {
+        let apex_of = |l: &Weighed| {
+            let apex = self.face(l).apex()?.point;
             let apex = if l.0 == Side::A { apex } else { at.a_point(apex) };
             let near = (apex - cell.center).length() <= 4.0 * cell.half.length();
             (l.1.sense() == Sense::Positive && near).then_some(apex)
         };
         let apexes: Vec<_> = support.iter().filter_map(|l| Some((*l, apex_of(l)?))).collect();
-        let vertex = |l: &(Side, LiteralId, f64)| {
+        let vertex = |l: &Weighed| {
             let (side, id, weight) = *l;
             (0..3).map(move |k| (Constraint::Apex(side, id, k), if k == 0 { -weight } else { 0.0 }))
         };
@@ -116,15 +127,21 @@ impl Proposals<'_, '_> {
             let others = others.map(|o| (Constraint::Literal(o.0, o.1), o.2));
             let (active, lambda) = vertex(l).chain(others).take(MAX_ACTIVE).unzip();
             if self.solve(active, *apex, t, lambda) {
-                return;
+                return true;
             }
         }
         if let [(l, apex), (m, _)] = apexes[..]
             && l.0 != m.0
         {
             let (active, lambda) = vertex(&l).chain(vertex(&m)).unzip();
-            self.solve(active, apex, t, lambda);
+            return self.solve(active, apex, t, lambda);
         }
+        false
+    }
+
+    fn face(&self, l: &Weighed) -> &'_ Face {
+        let solid = if l.0 == Side::A { self.contacts.task.a } else { self.contacts.task.b };
+        &solid.faces[l.1.face() as usize]
     }
 
     /// The two literals of a cell, other than `active`, whose surfaces are nearest to x: no farther than the cell is large.

@@ -11,7 +11,7 @@
 //! was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for clearances, too. At t = 0 such cells are refined like any other, and a
 //! witness found there restarts the search at 2 delta, then means overlap.
 
-use super::cell::{Cell, Source};
+use super::cell::{Cell, Range, Source};
 use super::clock::Stage;
 use super::items::{Items, prune_in_pool};
 use super::propose::Proposals;
@@ -24,9 +24,10 @@ use crate::contact::witness::climb;
 use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
-use crate::motion::Instant;
+use crate::motion::{Bounds, Instant};
 use crate::solid::local::{self, LiteralId, Truth};
 use glam::DVec3;
+use std::ops::ControlFlow;
 
 /// Cells after which a witness is looked for; again whenever as many more were refined.
 const FIRST_PROBE: u64 = 2_000;
@@ -62,6 +63,33 @@ const LAST: u64 = 16_000;
 
 /// A bracket this wide, a fraction of the step, is told where no coarser resolution has a narrower one.
 const WIDE: f64 = 1e-3;
+
+/// How far a cell's bounds look ahead: not beyond `h` of the `end` that is left of its time, within which a point of the cell, at
+/// most `x_max` from A's centre, moves like `motion`.
+#[derive(Clone, Copy)]
+struct Span {
+    x_max: f64,
+    end: f64,
+    h: f64,
+    motion: Bounds,
+}
+
+/// What a cell's bounds say.
+struct Bounded {
+    /// What is left of b in it.
+    b: Range,
+    /// Its weakest clause, from its own time on.
+    found: Advance,
+    /// Where the bounds are lowest at the start itself: offset from the cell's centre.
+    now: DVec3,
+}
+
+impl Bounded {
+    /// True where the cell lies in one of the bodies.
+    fn is_one_sided(&self, cell: &Cell) -> bool {
+        self.b.0 == self.b.1 || cell.a.0 == cell.a.1
+    }
+}
 
 /// A search in progress.
 pub struct Search<'a> {
@@ -201,8 +229,6 @@ impl<'a> Search<'a> {
             self.contacts.now = self.instant.t;
         }
         let at = self.instant;
-        let start = cell.t == 0.0;
-        let beyond = cell.t >= self.contacts.goal();
         match cell.source {
             Source::Cell => self.contacts.counters.cells += 1,
             Source::Slice => {
@@ -213,21 +239,55 @@ impl<'a> Search<'a> {
                 return None;
             }
         }
-        if cell.a.0 == cell.a.1 && !start {
+        if cell.a.0 == cell.a.1 && cell.t != 0.0 {
             return None;
         }
+        let span = self.span(&cell, &at);
+        let bounded = self.bound(&mut cell, &span, &at)?;
+        if self.is_free(&cell, &span, &bounded) {
+            return None;
+        }
+        if cell.t == 0.0 {
+            for x in [cell.center, cell.center + bounded.found.y, cell.center + bounded.now] {
+                if self.contacts.task.is_deep_at_start(x, &at) {
+                    return Some(Ending::Deep(x));
+                }
+            }
+        }
+        // Bodies that stand still to each other meet at the start or never.
+        if !bounded.is_one_sided(&cell) && span.motion.speed > 0.0 {
+            self.propose(&cell, &bounded.found, &at);
+            if cell.t >= self.contacts.goal() {
+                return None;
+            }
+            if let ControlFlow::Break(ending) = self.look_closer(&cell, &span, &bounded, &at) {
+                return ending;
+            }
+        }
+        self.split(cell, bounded.found.cost);
+        None
+    }
+
+    /// How far a cell's bounds are to look ahead.
+    fn span(&self, cell: &Cell, at: &Instant) -> Span {
+        let relative = &self.contacts.task.relative;
         let radius = cell.half.length();
         let x_max = (cell.center - at.center_a).length() + radius;
         let end = self.contacts.horizon().min(cell.until) - cell.t;
         // Speed bounds need a span, the span a speed: take the whole rest first, then cut.
-        let whole = self.contacts.task.relative.bounds(cell.t, end, x_max);
+        let whole = relative.bounds(cell.t, end, x_max);
         let h = if whole.speed * end > cell.reach * radius { cell.reach * radius / whole.speed } else { end };
-        let motion = if h < end { self.contacts.task.relative.bounds(cell.t, h, x_max) } else { whole };
+        let motion = if h < end { relative.bounds(cell.t, h, x_max) } else { whole };
+        Span { x_max, end, h, motion }
+    }
 
+    /// Bounds a cell's clauses, of b's those that may hold something in it. `None` where b alone keeps it free.
+    fn bound(&mut self, cell: &mut Cell, span: &Span, at: &Instant) -> Option<Bounded> {
+        let (start, h) = (cell.t == 0.0, span.h);
         let scratch = &mut self.items.scratch;
         let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
         let hints: &[Hint] = if self.contacts.task.strategies.hints { &self.contacts.hints } else { &[] };
-        let view = self.contacts.task.view((cell.center, cell.half), &at, motion, &scratch.clip_planes_b);
+        let view = self.contacts.task.view((cell.center, cell.half), at, span.motion, &scratch.clip_planes_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
         let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
         let b = match b_truth {
@@ -238,103 +298,104 @@ impl<'a> Search<'a> {
             }
             (Truth::True, _) => (0, 0),
             (Truth::False, _) => {
-                self.again(cell, h, end, true);
+                self.again(*cell, h, span.end, true);
                 return None;
             }
         };
         let b_full = b.0 == b.1;
         if b_full && !start {
-            self.again(cell, h, end, true);
+            self.again(*cell, h, span.end, true);
             return None;
         }
-        let one_sided = b_full || cell.a.0 == cell.a.1;
         let found = if b_full && cell.a.0 == cell.a.1 {
             Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 }
         } else {
             let pair = clause::Expressions { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch)
         };
-        let still = self.contacts.task.relative.bounds(cell.t, 0.0, x_max);
         // Where the bounds are lowest at the start itself: two faces a few resolutions inside each other leave a layer that
         // the lowest point of a later time misses.
         let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
-            let view = View { motion: still, ..view };
+            let view = View { motion: self.contacts.task.relative.bounds(cell.t, 0.0, span.x_max), ..view };
             let pair = clause::Expressions { pool, a: cell.a, b };
             clause::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch).y
         } else {
             found.y
         };
-        if one_sided {
+        Some(Bounded { b, found, now })
+    }
+
+    /// True where a cell's bounds keep it free for good, or for as long as makes it worth to be put back as it is.
+    fn is_free(&mut self, cell: &Cell, span: &Span, bounded: &Bounded) -> bool {
+        let (Bounded { b, found, .. }, Span { end, h, motion, .. }) = (bounded, *span);
+        let b_full = b.0 == b.1;
+        if bounded.is_one_sided(cell) {
             // At the start only: exclusion now suffices. Inside A nothing first happens later; inside B not before h.
-            if found.dt >= 0.0 {
-                if b_full && cell.a.0 != cell.a.1 {
-                    self.again(cell, h, end, true);
-                }
-                return None;
+            let free = found.dt >= 0.0;
+            if free && b_full && cell.a.0 != cell.a.1 {
+                self.again(*cell, h, end, true);
             }
-        } else if found.dt >= h {
-            self.again(cell, h, end, true);
-            return None;
-        } else if found.dt > LEAST_ADVANCE.max(LEAST_STEP * self.contacts.task.rounding / motion.speed) && !beyond {
+            return free;
+        }
+        if found.dt >= h {
+            self.again(*cell, h, end, true);
+            return true;
+        }
+        let beyond = cell.t >= self.contacts.goal();
+        if found.dt > LEAST_ADVANCE.max(LEAST_STEP * self.contacts.task.rounding / motion.speed) && !beyond {
             // What splitting could gain is what the cell's extents cost the bound.
-            let gain = found.cost.element_sum().min(radius);
+            let gain = found.cost.element_sum().min(cell.half.length());
             let proven = cell.t + found.dt >= self.contacts.goal();
             let far = found.dt * motion.speed >= 0.25 * gain && found.now >= 0.25 * gain;
             if far || found.dt >= self.worthwhile() * end || proven {
-                self.again(cell, found.dt, end, false);
-                return None;
+                self.again(*cell, found.dt, end, false);
+                return true;
             }
         }
-        if start {
-            for x in [cell.center, cell.center + found.y, cell.center + now] {
-                if self.contacts.task.is_deep_at_start(x, &at) {
-                    return Some(Ending::Deep(x));
-                }
-            }
+        false
+    }
+
+    /// Looks for a contact where a cell's bound is as good as rounding lets it be, and at thin walls. Breaks off where nothing is
+    /// left to halve the cell for: with the ending, where rounding keeps a point there from being told.
+    fn look_closer(
+        &mut self,
+        cell: &Cell,
+        span: &Span,
+        bounded: &Bounded,
+        at: &Instant,
+    ) -> ControlFlow<Option<Ending>> {
+        let found = &bounded.found;
+        let rounding = self.contacts.task.rounding;
+        let walls = self.contacts.task.has_walls();
+        // At the edge of a crescent its two faces part slower than a bound's rounding: fits know better.
+        let fine = if walls { SHARP * rounding } else { rounding };
+        if walls && self.contacts.found.is_none() && self.contacts.counters.cells.is_multiple_of(DEEPEN_EVERY) {
+            self.deepen(cell.center + found.y, cell.t, &found.support);
         }
-        // Bodies that stand still to each other meet at the start or never.
-        if !one_sided && motion.speed > 0.0 {
-            self.propose(&cell, &found, &at);
-            if cell.t >= self.contacts.goal() {
-                return None;
-            }
-            let walls = self.contacts.task.has_walls();
-            // At the edge of a crescent its two faces part slower than a bound's rounding: fits know better.
-            let fine = if walls { SHARP * self.contacts.task.rounding } else { self.contacts.task.rounding };
-            if walls && self.contacts.found.is_none() && self.contacts.counters.cells.is_multiple_of(DEEPEN_EVERY) {
-                self.deepen(cell.center + found.y, cell.t, &found.support);
-            }
-            if found.cost.element_sum() <= fine {
-                // The bound is as good as rounding lets it be, and its faces may be those of a later time: what of now?
-                let view =
-                    self.contacts.task.view((cell.center, cell.half), &at, still, &self.items.scratch.clip_planes_b);
-                let pair = clause::Expressions { pool: &self.items.scratch.pool, a: cell.a, b };
-                let now = clause::advance(
-                    &view,
-                    &pair,
-                    &[],
-                    self.contacts.task.rounding,
-                    0.0,
-                    &mut self.items.scratch.clause,
-                );
-                self.propose(&cell, &now, &at);
-                if cell.t >= self.contacts.goal() {
-                    return None;
-                }
-                if self.contacts.task.is_deep(cell.center + now.y, &at, -NEARLY * self.contacts.task.rounding) {
-                    if walls && self.contacts.found.is_none() {
-                        self.deepen(cell.center + now.y, cell.t, &found.support);
-                    }
-                    if walls && let Some(ending) = self.settle_for(cell.t) {
-                        return Some(ending);
-                    }
-                    self.stuck = Some((cell.t, cell.center + now.y));
-                    return Some(Ending::Rounding(cell.t));
-                }
-            }
+        let as_good = found.cost.element_sum() <= fine;
+        if !as_good {
+            return ControlFlow::Continue(());
         }
-        self.split(cell, found.cost);
-        None
+        // The bound is as good as rounding lets it be, and its faces may be those of a later time: what of now?
+        let still = self.contacts.task.relative.bounds(cell.t, 0.0, span.x_max);
+        let view = self.contacts.task.view((cell.center, cell.half), at, still, &self.items.scratch.clip_planes_b);
+        let pair = clause::Expressions { pool: &self.items.scratch.pool, a: cell.a, b: bounded.b };
+        let now = clause::advance(&view, &pair, &[], rounding, 0.0, &mut self.items.scratch.clause);
+        self.propose(cell, &now, at);
+        if cell.t >= self.contacts.goal() {
+            return ControlFlow::Break(None);
+        }
+        if !self.contacts.task.is_deep(cell.center + now.y, at, -NEARLY * rounding) {
+            return ControlFlow::Continue(());
+        }
+        if walls && self.contacts.found.is_none() {
+            self.deepen(cell.center + now.y, cell.t, &found.support);
+        }
+        let settled = if walls { self.settle_for(cell.t) } else { None };
+        if settled.is_none() {
+            self.stuck = Some((cell.t, cell.center + now.y));
+        }
+        ControlFlow::Break(settled.or(Some(Ending::Rounding(cell.t))))
     }
 
     /// Tries to find the contact that a cell's weakest clause points to.

@@ -235,11 +235,44 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
     others.sort_unstable();
     others.dedup();
     let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
-    let Some(range) = range else { return Vec::new() };
+    let Some(stops) = range.and_then(|range| stops(bodies, c, &others, range)) else { return Vec::new() };
+    let round = matches!(c.curve, Curve::Circle { .. });
+    let pieces = stops.windows(2).map(|w| {
+        let x = c.curve.point(0.5 * (w[0] + w[1]));
+        Piece { from: w[0], to: w[1], feet: touches(bodies, &c.faces, &others, x).filter(|_| !in_patch(x)) }
+    });
+    let mut out = joined(&c.curve, pieces.collect());
+    // A curve that only bends close to a face is no line: it would leave it if it went on. One that lies in it stays.
+    out.retain(|run| {
+        let on = |side: Side| {
+            // The faces that make it hold it by construction.
+            let own = c.faces.iter().any(|l| l.0 == side);
+            own || others.iter().any(|l| l.0 == side && lies_in(bodies, &c.curve, (run.from, run.to), *l))
+        };
+        on(Side::A) && on(Side::B)
+    });
+    let key = [key_of(c.faces[0]), key_of(c.faces[1]), 0];
+    for run in &mut out {
+        let corner = |(i, s): (usize, f64)| {
+            let x = c.curve.point(s);
+            // Gaps are linear along a line to first order; where its very end has no feet, those of the middle tell.
+            let (x, gap) = touches(bodies, &c.faces, &others, x).map_or_else(
+                || (x, (run.feet[1] - run.feet[0]).length()),
+                |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()),
+            );
+            Corner { x, gap, key: [key[0], key[1], i as u64] }
+        };
+        run.ends = ends(run, round).into_iter().enumerate().map(corner).collect();
+    }
+    out
+}
+
+/// Where a candidate's curve may begin or cease to touch, in order; of a circle once around. `None` where the work is spent.
+fn stops(bodies: &Bodies, c: &Candidate, others: &[Lit], range: (f64, f64)) -> Option<Vec<f64>> {
     let mut stops = Vec::new();
-    for lit in &others {
+    for lit in others {
         if bodies.work.is_spent() {
-            return Vec::new();
+            return None;
         }
         roots(bodies, &c.curve, *lit, range, &mut stops);
     }
@@ -252,8 +285,7 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
     stops.sort_by(f64::total_cmp);
     let merge = 1e-9 * bodies.size / c.curve.speed();
     stops.dedup_by(|b, a| *b - *a <= merge);
-    let round = matches!(c.curve, Curve::Circle { .. });
-    if round {
+    if let Curve::Circle { .. } = c.curve {
         // Once around, starting at the first stop.
         let first = stops.first().copied().unwrap_or(0.0);
         if stops.is_empty() {
@@ -261,78 +293,58 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
         }
         stops.push(first + TAU);
     }
-    let mut pieces: Vec<(f64, f64, Option<[DVec3; 2]>)> = stops
-        .windows(2)
-        .map(|w| {
-            let x = c.curve.point(0.5 * (w[0] + w[1]));
-            (w[0], w[1], touches(bodies, &c.faces, &others, x).filter(|_| !in_patch(x)))
-        })
-        .collect();
+    Some(stops)
+}
+
+/// A curve between two stops, and the feet of its middle where the bodies touch there.
+struct Piece {
+    from: f64,
+    to: f64,
+    feet: Option<[DVec3; 2]>,
+}
+
+/// Runs of pieces that follow each other and touch; without their ends.
+fn joined(curve: &Curve, mut pieces: Vec<Piece>) -> Vec<Run> {
     // A circle starts behind a piece that does not touch, so that no run is cut at its first stop.
-    if round && let Some(i) = pieces.iter().position(|p| p.2.is_none()) {
+    if let Curve::Circle { .. } = curve
+        && let Some(i) = pieces.iter().position(|p| p.feet.is_none())
+    {
         pieces.rotate_left(i);
         for k in 1..pieces.len() {
-            while pieces[k].0 < pieces[k - 1].0 {
-                pieces[k].0 += TAU;
-                pieces[k].1 += TAU;
+            while pieces[k].from < pieces[k - 1].from {
+                pieces[k].from += TAU;
+                pieces[k].to += TAU;
             }
         }
     }
     let mut out: Vec<Run> = Vec::new();
     let mut open = false;
-    for (from, to, feet) in pieces {
+    for Piece { from, to, feet } in pieces {
         let Some(feet) = feet else {
             open = false;
             continue;
         };
         match out.last_mut().filter(|_| open) {
             Some(run) => run.to = to,
-            None => out.push(Run {
-                curve: c.curve,
-                from,
-                to,
-                middle: c.curve.point(0.5 * (from + to)),
-                feet,
-                ends: Vec::new(),
-            }),
+            None => {
+                let middle = curve.point(0.5 * (from + to));
+                out.push(Run { curve: *curve, from, to, middle, feet, ends: Vec::new() });
+            }
         }
         open = true;
     }
-    // A curve that only bends close to a face is no line: it would leave it if it went on. One that lies in it stays.
-    out.retain(|run| {
-        let on = |side: Side| {
-            // The faces that make it hold it by construction.
-            let own = c.faces.iter().any(|l| l.0 == side);
-            own || others.iter().any(|l| l.0 == side && lies_in(bodies, &c.curve, (run.from, run.to), *l))
-        };
-        on(Side::A) && on(Side::B)
-    });
-    for run in &mut out {
-        let whole = round && run.to - run.from >= TAU - 1e-9;
-        let mut params = if whole { Vec::new() } else { vec![run.from, run.to] };
-        if round {
-            // Points of an arc in eight directions that are fixed in a body.
-            let marks = (0..16).map(|k| f64::from(k) * FRAC_PI_4);
-            let inside = |s: &f64| *s > run.from + 1e-6 && *s < run.to - 1e-6;
-            match whole {
-                true => params.extend((0..8).map(|k| f64::from(k) * FRAC_PI_4)),
-                false => params.extend(marks.filter(inside)),
-            }
-        }
-        let key = [key_of(c.faces[0]), key_of(c.faces[1]), 0];
-        run.ends = params
-            .into_iter()
-            .enumerate()
-            .map(|(i, s)| {
-                let x = c.curve.point(s);
-                // Gaps are linear along a line to first order; where its very end has no feet, those of the middle tell.
-                let (x, gap) = touches(bodies, &c.faces, &others, x).map_or_else(
-                    || (x, (run.feet[1] - run.feet[0]).length()),
-                    |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()),
-                );
-                Corner { x, gap, key: [key[0], key[1], i as u64] }
-            })
-            .collect();
-    }
     out
+}
+
+/// Parameters of the points by which a run is told: its ends, of arcs also points in eight directions that are fixed in a body.
+fn ends(run: &Run, round: bool) -> Vec<f64> {
+    if round && run.to - run.from >= TAU - 1e-9 {
+        return (0..8).map(|k| f64::from(k) * FRAC_PI_4).collect();
+    }
+    let mut ends = vec![run.from, run.to];
+    if round {
+        let marks = (0..16).map(|k| f64::from(k) * FRAC_PI_4);
+        ends.extend(marks.filter(|s| *s > run.from + 1e-6 && *s < run.to - 1e-6));
+    }
+    ends
 }

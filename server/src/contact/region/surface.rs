@@ -9,7 +9,7 @@ use super::local::{ANGLE, At, Bodies, Lit, holds};
 use crate::contact::exclusion::literal::Side;
 use crate::math::any_perpendicular;
 use crate::solid::Sense;
-use crate::solid::local::{LiteralId, Truth};
+use crate::solid::local::{LiteralId, Token, Truth};
 use crate::solid::surface::{Axis, Symmetry};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -85,6 +85,89 @@ struct SurfacePart {
     across: DVec3,
 }
 
+/// The surroundings of a point in the tangent plane of a pair's surface: which directions lead into the patch.
+struct Around<'t> {
+    /// Normal of the surface.
+    normal: DVec3,
+    surface: At,
+    parts: Vec<SurfacePart>,
+    /// Where faces lean against each other and the point lies on the end of their half-space: its normal, outwards.
+    limit: Option<DVec3>,
+    /// What is open of both bodies there.
+    open: [&'t [Token]; 2],
+    size: f64,
+}
+
+impl Around<'_> {
+    /// True where a step in the direction `d` stays in the patch.
+    fn holds(&self, d: DVec3) -> bool {
+        if self.limit.is_some_and(|m| m.dot(d) > 0.0) {
+            return false;
+        }
+        let sign = |side: Side, id: LiteralId| {
+            let Some(p) = self.parts.iter().find(|p| (p.side, p.id) == (side, id)) else { return false };
+            if p.across != DVec3::ZERO {
+                return p.across.dot(d) < 0.0;
+            }
+            // Tangent: how it bends away from the surface, then on which side of it the body lies.
+            let surface = &self.surface;
+            let bend = d.dot(p.at.hessian * d) - p.at.normal.dot(surface.normal) * d.dot(surface.hessian * d);
+            if bend.abs() * self.size > 1e-6 {
+                return bend < 0.0;
+            }
+            let into = if side == Side::A { -1.0 } else { 1.0 };
+            into * p.at.normal.dot(self.normal) < 0.0
+        };
+        holds(self.open[0], &mut |id| sign(Side::A, id)) && holds(self.open[1], &mut |id| sign(Side::B, id))
+    }
+
+    /// What the point is to the patch: by the sectors between the lines in which the parts cut the tangent plane.
+    fn standing(&self) -> Standing {
+        let n = self.normal;
+        let e1 = any_perpendicular(n);
+        let e2 = n.cross(e1);
+        let angle = |d: DVec3| d.dot(e2).atan2(d.dot(e1)).rem_euclid(TAU);
+        let mut cuts: Vec<(f64, Option<usize>)> = Vec::new();
+        for (i, part) in self.parts.iter().enumerate().filter(|(_, p)| p.across != DVec3::ZERO) {
+            let t = n.cross(part.across);
+            cuts.extend([(angle(t), Some(i)), (angle(-t), Some(i))]);
+        }
+        if let Some(m) = self.limit {
+            let t = n.cross(m);
+            cuts.extend([(angle(t), None), (angle(-t), None)]);
+        }
+        cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        cuts.dedup_by(|b, a| b.0 - a.0 <= ANGLE);
+        if cuts.is_empty() {
+            return if self.holds(e1) { Standing::Inside } else { Standing::Outside };
+        }
+        let count = cuts.len();
+        let inside: Vec<bool> = (0..count)
+            .map(|i| {
+                let (from, to) = (cuts[i].0, if i + 1 < count { cuts[i + 1].0 } else { cuts[0].0 + TAU });
+                let (s, c) = libm::sincos(0.5 * (from + to));
+                self.holds(e1 * c + e2 * s)
+            })
+            .collect();
+        match inside.iter().filter(|i| **i).count() {
+            0 => return Standing::Outside,
+            n if n == count => return Standing::Inside,
+            _ => {}
+        }
+        let turns: Vec<&(f64, Option<usize>)> =
+            (0..count).filter(|i| inside[*i] != inside[(*i + count - 1) % count]).map(|i| &cuts[i]).collect();
+        let straight = turns.len() == 2 && ((turns[1].0 - turns[0].0) - PI).abs() <= 10.0 * ANGLE;
+        // A line that runs into an arc: as straight, but another curve.
+        let bend = |i: Option<usize>| {
+            let Some(i) = i else { return 0.0 };
+            let t = n.cross(self.parts[i].across);
+            t.dot(self.parts[i].at.hessian * t)
+        };
+        let same = straight && (bend(turns[0].1) - bend(turns[1].1)).abs() * self.size <= 1e-6;
+        if same { Standing::Boundary } else { Standing::Corner }
+    }
+}
+
 /// What the point `x` of a pair's surface is to its patch.
 pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
     let (x_a, x_b, n) = pair.feet(bodies, x);
@@ -105,71 +188,12 @@ pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
         }
     }
     let limit = pair.limit.map(|(m, offset)| ((m - n * m.dot(n)).normalize_or_zero(), m.dot(x) - offset));
-    let at_limit = limit.is_some_and(|(_, v)| v.abs() <= bodies.eps / (bodies.tau / bodies.size).min(1.0));
-    if limit.is_some_and(|(_, v)| v > 0.0) && !at_limit {
+    let at_limit = |v: f64| v.abs() <= bodies.eps / (bodies.tau / bodies.size).min(1.0);
+    if limit.is_some_and(|(_, v)| v > 0.0 && !at_limit(v)) {
         return Standing::Outside;
     }
-    // Directions in which the sectors meet.
-    let e1 = any_perpendicular(n);
-    let e2 = n.cross(e1);
-    let angle = |d: DVec3| d.dot(e2).atan2(d.dot(e1)).rem_euclid(TAU);
-    let mut cuts: Vec<(f64, Option<usize>)> = Vec::new();
-    for (i, part) in parts.iter().enumerate().filter(|(_, p)| p.across != DVec3::ZERO) {
-        let t = n.cross(part.across);
-        cuts.extend([(angle(t), Some(i)), (angle(-t), Some(i))]);
-    }
-    if let (Some((m, _)), true) = (limit, at_limit) {
-        let t = n.cross(m);
-        cuts.extend([(angle(t), None), (angle(-t), None)]);
-    }
-    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    cuts.dedup_by(|b, a| b.0 - a.0 <= ANGLE);
-    let full = |d: DVec3| {
-        if at_limit && limit.is_some_and(|(m, _)| m.dot(d) > 0.0) {
-            return false;
-        }
-        let sign = |side: Side, id: LiteralId| {
-            let Some(p) = parts.iter().find(|p| (p.side, p.id) == (side, id)) else { return false };
-            if p.across != DVec3::ZERO {
-                return p.across.dot(d) < 0.0;
-            }
-            // Tangent: how it bends away from the surface, then on which side of it the body lies.
-            let bend = d.dot(p.at.hessian * d) - p.at.normal.dot(surface.normal) * d.dot(surface.hessian * d);
-            if bend.abs() * bodies.size > 1e-6 {
-                return bend < 0.0;
-            }
-            let into = if side == Side::A { -1.0 } else { 1.0 };
-            into * p.at.normal.dot(n) < 0.0
-        };
-        holds(&tokens_a, &mut |id| sign(Side::A, id)) && holds(&tokens_b, &mut |id| sign(Side::B, id))
-    };
-    if cuts.is_empty() {
-        return if full(e1) { Standing::Inside } else { Standing::Outside };
-    }
-    let count = cuts.len();
-    let inside: Vec<bool> = (0..count)
-        .map(|i| {
-            let (from, to) = (cuts[i].0, if i + 1 < count { cuts[i + 1].0 } else { cuts[0].0 + TAU });
-            let (s, c) = libm::sincos(0.5 * (from + to));
-            full(e1 * c + e2 * s)
-        })
-        .collect();
-    match inside.iter().filter(|i| **i).count() {
-        0 => return Standing::Outside,
-        n if n == count => return Standing::Inside,
-        _ => {}
-    }
-    let turns: Vec<&(f64, Option<usize>)> =
-        (0..count).filter(|i| inside[*i] != inside[(*i + count - 1) % count]).map(|i| &cuts[i]).collect();
-    let straight = turns.len() == 2 && ((turns[1].0 - turns[0].0) - PI).abs() <= 10.0 * ANGLE;
-    // A line that runs into an arc: as straight, but another curve.
-    let bend = |i: Option<usize>| {
-        let Some(i) = i else { return 0.0 };
-        let t = n.cross(parts[i].across);
-        t.dot(parts[i].at.hessian * t)
-    };
-    let same = straight && (bend(turns[0].1) - bend(turns[1].1)).abs() * bodies.size <= 1e-6;
-    if same { Standing::Boundary } else { Standing::Corner }
+    let limit = limit.filter(|(_, v)| at_limit(*v)).map(|(m, _)| m);
+    Around { normal: n, surface, parts, limit, open: [&tokens_a, &tokens_b], size: bodies.size }.standing()
 }
 
 /// The literals of a list by surface: the first one that coincides with each stands for it.
