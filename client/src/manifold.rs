@@ -105,8 +105,8 @@ pub struct Manifold<'m> {
 /// The points of all pairs, from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Manifolds {
-    now: Told,
-    before: Told,
+    now: Reported,
+    before: Reported,
     candidates: Vec<Candidate>,
     matches: Vec<Match>,
     taken: Vec<bool>,
@@ -115,7 +115,7 @@ pub struct Manifolds {
 
 /// What one step told.
 #[derive(Clone, Debug, Default)]
-struct Told {
+struct Reported {
     pairs: Vec<Pair>,
     groups: Vec<Group>,
     points: Vec<Point>,
@@ -363,7 +363,7 @@ impl Manifolds {
     }
 }
 
-impl Told {
+impl Reported {
     fn find(&self, objects: [u32; 2]) -> Option<Pair> {
         self.pairs.binary_search_by_key(&objects, |p| p.objects).ok().map(|at| self.pairs[at])
     }

@@ -18,11 +18,11 @@ pub const PROTOCOL_VERSION: u32 = 2;
 /// The service whose layout never changes.
 pub const STATUS_SERVICE: &str = "contactd/status";
 /// Request-response service of steps.
-pub const STEP_SERVICE: &str = "contactd/1/step";
+pub const STEP_SERVICE: &str = "contactd/2/step";
 /// Request-response service of commands.
-pub const CONTROL_SERVICE: &str = "contactd/1/control";
+pub const CONTROL_SERVICE: &str = "contactd/2/control";
 /// Event service by which clients wake the server.
-pub const WAKE_SERVICE: &str = "contactd/1/wake";
+pub const WAKE_SERVICE: &str = "contactd/2/wake";
 /// The server's name when none is given.
 pub const DEFAULT_NAME: &str = "default";
 
@@ -250,6 +250,13 @@ mod tests {
         for bad in ["", "A", "a b", "../x", "a/b", "é", &"x".repeat(33)] {
             let message = check_name(bad).unwrap_err().to_string();
             assert!(message.contains("a-z, 0-9, _ and -"), "{message}");
+        }
+    }
+
+    #[test]
+    fn services_carry_the_version_of_the_protocol() {
+        for name in [STEP_SERVICE, CONTROL_SERVICE, WAKE_SERVICE] {
+            assert!(name.starts_with(&format!("contactd/{PROTOCOL_VERSION}/")), "{name}");
         }
     }
 

@@ -89,7 +89,7 @@ pub struct State {
 
 /// How a body answers to impulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum BodyKind {
     /// Never moves.
     Fixed,
     /// Moves as told.
@@ -125,7 +125,7 @@ pub struct Entry {
     /// Id of its object.
     pub id: u32,
     /// What moves it.
-    pub kind: Kind,
+    pub kind: BodyKind,
     /// Mass properties; those of a unit ball where none count.
     pub inertia: Inertia,
     /// Inverse of the tensor in its own frame.
@@ -176,9 +176,9 @@ pub struct Plan {
 impl Entry {
     pub(super) fn new(id: u32, body: &Body) -> Self {
         let kind = match (body.inertia, body.driven) {
-            (Some(_), _) => Kind::Free,
-            (None, true) => Kind::Driven,
-            (None, false) => Kind::Fixed,
+            (Some(_), _) => BodyKind::Free,
+            (None, true) => BodyKind::Driven,
+            (None, false) => BodyKind::Fixed,
         };
         let inertia = body.inertia.unwrap_or(Inertia::sphere(1.0, 1.0));
         let mut entry = Self {
@@ -199,7 +199,7 @@ impl Entry {
             still: 0,
             plan: Plan::default(),
         };
-        if kind == Kind::Free {
+        if kind == BodyKind::Free {
             let r = body.pose.matrix();
             entry.momentum = r * (inertia.tensor * (r.transpose() * body.omega));
         }
@@ -209,7 +209,7 @@ impl Entry {
 
     /// True for a free body that is awake.
     pub fn is_active(&self) -> bool {
-        self.kind == Kind::Free && !self.asleep
+        self.kind == BodyKind::Free && !self.asleep
     }
 
     /// Speed that no point of the body at the distance of `x` exceeds in its plan.
@@ -243,7 +243,7 @@ impl Entry {
     /// Kinetic energy.
     pub fn kinetic(&self) -> f64 {
         match self.kind {
-            Kind::Free => {
+            BodyKind::Free => {
                 let w = spin::inverse_in_world(&self.inverse, self.pose.rotation) * self.momentum;
                 0.5 * (self.inertia.mass * self.now.v.length_squared() + self.momentum.dot(w))
             }

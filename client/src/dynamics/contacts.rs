@@ -3,7 +3,7 @@
 //! Order: pairs by their bodies, points as the engine lists them. A body at rest keeps its list, so that a point finds its
 //! force of the solve before in the same place of the same pair (warm start); where the number has changed, it begins at 0.
 
-use super::body::{Entry, Kind, Twist};
+use super::body::{BodyKind, Entry, Twist};
 use super::report::Frame;
 use crate::Reply;
 use contactd_proto::ContactRecord;
@@ -134,12 +134,12 @@ impl Contacts {
             put(record.point, record.normal, record.separation);
         }
         let kinds = bodies.map(|i| reading.entries[i].kind);
-        if closed && kinds == [Kind::Free, Kind::Free] {
+        if closed && kinds == [BodyKind::Free, BodyKind::Free] {
             self.links.push(bodies);
         }
-        let drives = |i: usize| kinds[i] == Kind::Driven && reading.entries[bodies[i]].now != Twist::default();
+        let drives = |i: usize| kinds[i] == BodyKind::Driven && reading.entries[bodies[i]].now != Twist::default();
         for (driven, free) in [(0, 1), (1, 0)] {
-            if closed && drives(driven) && kinds[free] == Kind::Free {
+            if closed && drives(driven) && kinds[free] == BodyKind::Free {
                 self.stirred.push(bodies[free]);
             }
         }

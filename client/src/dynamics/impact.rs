@@ -6,7 +6,7 @@
 //! largest share of the rebound that keeps the energy is taken between the two: impulses stay in their cones and
 //! bodies apart, since both sets are convex.
 
-use super::body::{Entry, Kind, Twist};
+use super::body::{BodyKind, Entry, Twist};
 use super::contacts::Point;
 use super::solver::{self, Ends, Scratch, Solved};
 use glam::DVec3;
@@ -130,7 +130,7 @@ pub fn solve(points: &mut [Point], entries: &mut [Entry], law: &Law, memory: &mu
 /// Energy that changes of momentum bring, Σ p·v + ½ p²/m and the same of rotation; `from` and `share`: between two changes.
 fn gained(entries: &[Entry], changes: &[[DVec3; 2]], from: Option<&[[DVec3; 2]]>, share: f64) -> f64 {
     let mut sum = 0.0;
-    for (i, e) in entries.iter().enumerate().filter(|(_, e)| e.kind == Kind::Free && !e.asleep) {
+    for (i, e) in entries.iter().enumerate().filter(|(_, e)| e.kind == BodyKind::Free && !e.asleep) {
         let [mut p, mut l] = changes[i];
         if let Some(from) = from {
             p = from[i][0] + (p - from[i][0]) * share;

@@ -42,7 +42,7 @@ impl Islands {
             let root = self.root(i);
             let asleep = self.still[root] >= sleep.frames;
             let e = &mut entries[i];
-            if e.kind == super::body::Kind::Free {
+            if e.kind == super::body::BodyKind::Free {
                 woke |= e.asleep && !asleep;
                 e.set_asleep(asleep);
             }

@@ -4,7 +4,7 @@
 //! constant acceleration is exact then, and so is the energy (midpoint rule; with contacts: J. J. Moreau's time stepping with
 //! θ = ½). Contacts ask v₁ to part: a closed point at 0 or more; one with a gap may use it up within the time.
 
-use super::body::{Entry, Kind, Twist};
+use super::body::{BodyKind, Entry, Twist};
 use super::contacts::Point;
 use super::report::Frame;
 use super::solver::{self, Ends};
@@ -38,7 +38,7 @@ impl<T: Transport> World<T> {
     fn pull(&mut self, t: f64, frame: &mut Frame) {
         let effects = &self.settings.effects;
         for e in &mut self.entries {
-            e.plan.mean = if e.kind == Kind::Driven { e.now } else { Twist::default() };
+            e.plan.mean = if e.kind == BodyKind::Driven { e.now } else { Twist::default() };
             e.plan.end = e.now;
             e.plan.momentum = e.momentum;
             e.plan.touches = false;
@@ -67,7 +67,7 @@ impl<T: Transport> World<T> {
             let arms = o.bodies.map(|i| o.position - self.entries[i].pose.position);
             let [a, b] = o.bodies.map(|i| &self.entries[i]);
             let ahead = |e: &Entry| match e.kind {
-                Kind::Free => Twist { v: e.plan.end.v, w: e.inverse_inertia * e.plan.momentum },
+                BodyKind::Free => Twist { v: e.plan.end.v, w: e.inverse_inertia * e.plan.momentum },
                 _ => e.now,
             };
             let parting = (ahead(b).at(arms[1]) - ahead(a).at(arms[0])).dot(o.normal);

@@ -207,7 +207,7 @@ impl<T: Transport> World<T> {
         let mut stop: Option<Stop> = None;
         for record in reply.records() {
             let Some(bodies) = reading.bodies(record) else { continue };
-            let free = bodies.iter().any(|i| self.entries[*i].kind == super::body::Kind::Free);
+            let free = bodies.iter().any(|i| self.entries[*i].kind == super::body::BodyKind::Free);
             let at = match record.status {
                 CONTACT if record.flags & SENSOR != 0 => {
                     frame.sensed += 1;

@@ -1,6 +1,6 @@
 //! The world of the loop: a session, its bodies, the settings.
 
-use super::body::{Entry, Kind, Twist};
+use super::body::{BodyKind, Entry, Twist};
 use super::contacts::Contacts;
 use super::islands::Islands;
 use super::{Body, Effects, Energy, Frame, Overlap, Point, State, impact, solver};
@@ -181,13 +181,13 @@ impl<T: Transport> World<T> {
     /// Sets the velocities of a body and wakes it: the only way to move a driven one.
     pub fn set_velocity(&mut self, body: usize, velocity: DVec3, omega: DVec3) {
         let e = &mut self.entries[body];
-        if e.kind == Kind::Fixed {
+        if e.kind == BodyKind::Fixed {
             return;
         }
         e.still = 0;
         e.set_asleep(false);
         e.now = Twist { v: velocity, w: omega };
-        if e.kind == Kind::Free {
+        if e.kind == BodyKind::Free {
             let r = e.pose.matrix();
             e.momentum = r * (e.inertia.tensor * (r.transpose() * omega));
         }
@@ -214,7 +214,7 @@ impl<T: Transport> World<T> {
     pub fn energy(&self) -> Energy {
         let g = self.settings.effects.gravity.unwrap_or(DVec3::ZERO);
         let mut sum = Energy::default();
-        for e in self.entries.iter().filter(|e| e.kind == Kind::Free) {
+        for e in self.entries.iter().filter(|e| e.kind == BodyKind::Free) {
             let p = e.now.v * e.inertia.mass;
             sum.kinetic += e.kinetic();
             sum.potential -= e.inertia.mass * g.dot(e.pose.position);
@@ -255,7 +255,7 @@ impl<T: Transport> World<T> {
     /// Counts for how long bodies have been still.
     fn count_still(&mut self, frame: &mut Frame) {
         let Some(sleep) = self.settings.effects.sleep else { return };
-        for e in self.entries.iter_mut().filter(|e| e.kind == Kind::Free) {
+        for e in self.entries.iter_mut().filter(|e| e.kind == BodyKind::Free) {
             if e.asleep {
                 frame.counters.sleep += 1;
             } else if e.now.speed(e.radius) <= sleep.speed {

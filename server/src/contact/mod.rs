@@ -17,7 +17,7 @@ pub mod region;
 mod tests;
 pub mod witness;
 
-pub(crate) use convex::{Glancing, Hull, SeparatingAxisTest, SweptShape};
+pub(crate) use convex::{AxisSearch, Hull, SeparatingAxisTest, SweptShape};
 pub use instant::within;
 pub use pair::{PairSearch, earliest_contact, find_earliest, resolution_of};
 pub use query::options::QueryOptions;

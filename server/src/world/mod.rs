@@ -27,9 +27,9 @@ pub mod record;
 mod roster;
 pub mod scene;
 mod search;
-mod stances;
 mod state;
 pub mod step;
+mod swept_shapes;
 #[cfg(test)]
 mod tests;
 mod touch;

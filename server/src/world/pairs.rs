@@ -6,21 +6,21 @@ use super::notes::{Decided, Notes};
 use super::options::StepOptions;
 use super::roster::Roster;
 use super::search::PairJob;
-use super::stances::Stances;
 use super::state::StepState;
-use crate::contact::{Glancing, SeparatingAxisTest};
+use super::swept_shapes::SweptShapes;
+use crate::contact::{AxisSearch, SeparatingAxisTest};
 use crate::solid::Shape;
 
 /// Fills the jobs: the pairs to ask about, plan by plan in the order of their ids; every pair when all are to be told.
 pub(super) fn find(roster: &Roster, state: &mut StepState, options: &StepOptions) {
-    let StepState { neighbours, boxes, stances, near, jobs, notes, moving, serial, glanced, .. } = state;
+    let StepState { neighbours, boxes, swept_shapes, near, jobs, notes, moving, serial, glanced, .. } = state;
     if let Some(notes) = notes {
         notes.begin(*options);
     }
     neighbours.update(&roster.bodies, moving, |body| roster.reach(body), |i, j| roster.pair(i, j));
     boxes.begin(*serial, roster.bodies.len());
     jobs.clear();
-    let mut sieve = Sieve { roster, neighbours, boxes, stances, notes: notes.as_deref_mut(), glanced: 0 };
+    let mut sieve = Sieve { roster, neighbours, boxes, swept_shapes, notes: notes.as_deref_mut(), glanced: 0 };
     if options.clear {
         sieve.all_pairs(jobs)
     } else {
@@ -34,7 +34,7 @@ struct Sieve<'a> {
     roster: &'a Roster,
     neighbours: &'a mut Neighbours,
     boxes: &'a mut SweptBoxes,
-    stances: &'a mut Stances,
+    swept_shapes: &'a mut SweptShapes,
     notes: Option<&'a mut Notes>,
     /// How many pairs a direction has proved apart.
     glanced: u32,
@@ -170,13 +170,13 @@ impl Sieve<'_> {
         &'b mut self,
         (i, j): (u32, u32),
         hint: &PairHint,
-    ) -> Option<Glancing<'b, impl Fn(usize) -> Option<&'b Shape>>> {
+    ) -> Option<AxisSearch<'b, impl Fn(usize) -> Option<&'b Shape>>> {
         let (indices, bodies) = ([i as usize, j as usize], &self.roster.bodies);
-        let seen = self.stances.look(indices, bodies)?;
+        let seen = self.swept_shapes.look(indices, bodies)?;
         let shapes = move |k: usize| {
             let body = &bodies[indices[k]];
             body.hull.as_ref()?.shape(&body.part.model)
         };
-        Glancing::new(seen, shapes, hint.touch)
+        AxisSearch::new(seen, shapes, hint.touch)
     }
 }

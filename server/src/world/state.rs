@@ -6,7 +6,7 @@ use super::neighbours::Neighbours;
 use super::notes::Notes;
 use super::outcome::StepOutcome;
 use super::search::{self, PairJob};
-use super::stances::Stances;
+use super::swept_shapes::SweptShapes;
 use crate::contact::Scratch;
 use contactd_proto::Pose;
 use contactd_proto::pose_record::PoseCommand;
@@ -25,7 +25,7 @@ pub struct StepState {
     pub(super) clock: f64,
     pub(super) neighbours: Neighbours,
     pub(super) boxes: SweptBoxes,
-    pub(super) stances: Stances,
+    pub(super) swept_shapes: SweptShapes,
     /// Neighbours that their path lengths don't prove apart.
     pub(super) near: Vec<usize>,
     /// How many of them a direction proved apart.
@@ -52,7 +52,7 @@ impl StepState {
             clock: 0.0,
             neighbours: Neighbours::default(),
             boxes: SweptBoxes::default(),
-            stances: Stances::default(),
+            swept_shapes: SweptShapes::default(),
             near: Vec::new(),
             glanced: 0,
             jobs: Vec::new(),

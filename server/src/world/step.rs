@@ -118,10 +118,10 @@ impl World {
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
         let Self { roster: Roster { bodies, .. }, state, .. } = self;
-        let StepState { neighbours, moving, commands, put, serial, stances, .. } = state;
+        let StepState { neighbours, moving, commands, put, serial, swept_shapes, .. } = state;
         state.clock += options.advance;
         neighbours.count(bodies.len());
-        stances.begin(*serial, bodies.len());
+        swept_shapes.begin(*serial, bodies.len());
         // What moved and is not named comes to rest.
         moving.retain(|index| {
             let body = &mut bodies[*index as usize];
@@ -147,7 +147,7 @@ impl World {
             let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
             neighbours.moved(index, jump, body.travel(1.0));
             moving.push(index);
-            stances.moved(index as usize, body);
+            swept_shapes.moved(index as usize, body);
         }
     }
 

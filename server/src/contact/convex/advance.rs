@@ -4,7 +4,7 @@
 
 use super::gjk::{GOOD, Nearest, nearest};
 use super::proof::{Gap, Pace};
-use super::support::Body;
+use super::support::ConvexBody;
 use super::whole::{APART, body_of, excluded};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
@@ -127,20 +127,20 @@ impl<'a> Convex<'a> {
 /// An instant with B as A sees it.
 struct Moment<'a> {
     at: Instant,
-    b: Body<'a>,
+    b: ConvexBody<'a>,
 }
 
 struct Advance<'a> {
     task: Task<'a>,
-    a: (&'a Primitive, Body<'a>),
-    b: (&'a Primitive, Body<'a>),
+    a: (&'a Primitive, ConvexBody<'a>),
+    b: (&'a Primitive, ConvexBody<'a>),
     pace: Pace,
     /// ρ_A + ρ_B.
     reach: f64,
 }
 
 impl<'a> Advance<'a> {
-    fn new(task: Task<'a>, a: (&'a Primitive, Body<'a>), b: (&'a Primitive, Body<'a>)) -> Self {
+    fn new(task: Task<'a>, a: (&'a Primitive, ConvexBody<'a>), b: (&'a Primitive, ConvexBody<'a>)) -> Self {
         let (pa, pb) = task.relative.placed();
         let far = |p: &Primitive, center: DVec3| (p.ball.center - center).length() + p.ball.radius;
         let rho_a = far(a.0, task.relative.center_a());
@@ -177,7 +177,7 @@ impl<'a> Advance<'a> {
 
     /// B a few resolutions off: of bodies that lie in each other by less a direction is found that separates them, but for
     /// that much.
-    fn set_off(&self, m: &Moment<'a>) -> Body<'a> {
+    fn set_off(&self, m: &Moment<'a>) -> ConvexBody<'a> {
         let way = m.b.support(DVec3::ZERO) - self.a.0.ball.center;
         m.b.seen(&DMat3::IDENTITY, way.normalize_or(DVec3::X) * (OFF * self.task.delta))
     }
@@ -217,7 +217,7 @@ impl<'a> Advance<'a> {
             let first = along
                 .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
             contacts.counters.closed_forms += 1;
-            let seen = |b: &Body| {
+            let seen = |b: &ConvexBody| {
                 let found = nearest(&self.a.1, b, first, GOOD)?;
                 let n = (m.at.world_from_a * found.normal).normalize();
                 Some((found, self.gap(&m, n))).filter(|(_, gap)| gap.phi > self.pace.least)

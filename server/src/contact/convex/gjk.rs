@@ -5,7 +5,7 @@
 //! Source: E. G. Gilbert, D. W. Johnson, S. S. Keerthi, IEEE J. Robotics and Automation 4(2), 1988; the nearest point of a
 //! simplex by its regions after C. Ericson, Real-Time Collision Detection, 5.1.
 
-use super::support::Body;
+use super::support::ConvexBody;
 use glam::{DMat3, DVec3};
 
 /// Points tried at most: curved bodies converge to this accuracy long before.
@@ -44,13 +44,13 @@ pub enum Meeting {
 }
 
 /// Distance of `a` and `b`, as `meeting` finds it; `None` if their cores overlap, or nearly so.
-pub fn nearest(a: &Body, b: &Body, start: DVec3, good: f64) -> Option<Nearest> {
+pub fn nearest(a: &ConvexBody, b: &ConvexBody, start: DVec3, good: f64) -> Option<Nearest> {
     if let Meeting::Apart(found) = meeting(a, b, start, good) { Some(found) } else { None }
 }
 
 /// The nearest points of `a` and `b`, from a first direction, to a relative gap of `good` between their distance and its
 /// lower bound; or a common point.
-pub fn meeting(a: &Body, b: &Body, start: DVec3, good: f64) -> Meeting {
+pub fn meeting(a: &ConvexBody, b: &ConvexBody, start: DVec3, good: f64) -> Meeting {
     let mut simplex = [Corner::default(); 4];
     let mut count = 0;
     let mut v = start;

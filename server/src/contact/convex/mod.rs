@@ -46,14 +46,14 @@ pub(super) use balls::quick as balls;
 use glam::DVec3;
 use overlap::{Look, Start};
 use straight::Straight;
-pub use swept_shape::{Glancing, Hull, SeparatingAxisTest, SweptShape};
+pub use swept_shape::{AxisSearch, Hull, SeparatingAxisTest, SweptShape};
 use turning::Turning;
 use whole::PrimitivePair;
 
 /// What is known of a pair of whole primitives from its start and from moving along.
 pub(super) enum Quick {
     /// The answer.
-    Told,
+    Reported,
     /// They overlap at the start, as is told, and more is asked: a point of both, in the frame of the body that carries.
     Overlap(DVec3),
     /// Not the answer; perhaps a direction (world axes) that separates them at the start.
@@ -117,5 +117,5 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     if swapped && outcome.status != Status::Clear {
         outcome.swap_sides();
     }
-    Quick::Told
+    Quick::Reported
 }

@@ -11,7 +11,7 @@
 //! nearest to, and the way between the centres.
 
 use super::gjk::{self, Meeting};
-use super::support::{Body, Slope};
+use super::support::{ConvexBody, Slope};
 use super::whole::PrimitivePair;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::{Outcome, Status};
@@ -60,7 +60,7 @@ pub struct Start<'a> {
     /// World from primitive.
     pub frames: [DMat3; 2],
     /// The primitives.
-    pub bodies: [Body<'a>; 2],
+    pub bodies: [ConvexBody<'a>; 2],
     centers: [DVec3; 2],
 }
 
@@ -70,7 +70,7 @@ impl<'a> Start<'a> {
         let axes = [pair.axes(0), pair.axes(1)];
         // (Arrays of two are written out where they are hot: a map over them stays a call.)
         let frames = [pair.frame(0, &axes[0]), pair.frame(1, &axes[1])];
-        let body = |k: usize, origin: DVec3| Body::new(&pair.primitives[k].shape, frames[k], origin);
+        let body = |k: usize, origin: DVec3| ConvexBody::new(&pair.primitives[k].shape, frames[k], origin);
         let bodies = [body(0, DVec3::ZERO)?, body(1, pair.way)?];
         Some(Self { pair, axes, frames, bodies, centers: [bodies[0].center(), bodies[1].center()] })
     }

@@ -20,7 +20,7 @@ pub struct Slope {
 
 /// A bounded convex primitive in a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Body<'s> {
+pub struct ConvexBody<'s> {
     form: Form<'s>,
     axes: DMat3,
     origin: DVec3,
@@ -28,7 +28,7 @@ pub struct Body<'s> {
     pub margin: f64,
 }
 
-impl<'s> Body<'s> {
+impl<'s> ConvexBody<'s> {
     /// A primitive's shape with its own frame; `None` for one without bounds.
     pub fn new(shape: &'s Shape, axes: DMat3, origin: DVec3) -> Option<Self> {
         let form = shape.form();
@@ -199,7 +199,7 @@ mod tests {
         for shape in &shapes {
             let frame = Pose::new(v(2.0), quat_of_rotation_vector(v(3.0)));
             let primitive = Primitive::new(shape.clone(), frame, Label::default(), 0);
-            let body = Body::new(shape, frame.matrix(), frame.position).expect("bounded");
+            let body = ConvexBody::new(shape, frame.matrix(), frame.position).expect("bounded");
             let mut inside = 0;
             for _ in 0..20_000 {
                 let x = frame.position + v(1.2);

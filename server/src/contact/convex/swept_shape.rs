@@ -17,7 +17,7 @@
 //! asked about beyond that level has no separating-axis test.
 
 use super::gjk;
-use super::support::Body;
+use super::support::ConvexBody;
 use super::whole::body_of;
 use crate::math::{F64x2, Lanes};
 use crate::octree::Model;
@@ -188,9 +188,9 @@ fn enclosing(model: &Model) -> Option<(Shape, Pose)> {
 }
 
 /// Two bodies in one step; `S` gives the shape of each.
-pub struct Glancing<'a, S> {
+pub struct AxisSearch<'a, S> {
     forms: [Form<'a>; 2],
-    stances: [&'a SweptShape; 2],
+    swept: [&'a SweptShape; 2],
     shapes: S,
     /// From A's centre to B's at both ends.
     ways: [F64x2; 3],
@@ -198,27 +198,27 @@ pub struct Glancing<'a, S> {
     least: f64,
 }
 
-impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
+impl<'a, S: Fn(usize) -> Option<&'a Shape>> AxisSearch<'a, S> {
     /// Two bodies by their swept shapes and shapes (of their hulls), asked whether they stay farther apart than `touch` (a length).
     /// `None` where one's hull does not enclose it that far.
     #[inline]
-    pub fn new(stances: [&'a SweptShape; 2], shapes: S, touch: f64) -> Option<Self> {
-        let [a, b] = stances;
+    pub fn new(swept: [&'a SweptShape; 2], shapes: S, touch: f64) -> Option<Self> {
+        let [a, b] = swept;
         if 0.5 * touch > a.level.min(b.level) {
             return None;
         }
-        let form = |k: usize| stances[k].form.or_else(|| shapes(k).map(Shape::form));
+        let form = |k: usize| swept[k].form.or_else(|| shapes(k).map(Shape::form));
         let forms = [form(0)?, form(1)?];
         let ways = [b.center[0] - a.center[0], b.center[1] - a.center[1], b.center[2] - a.center[2]];
         let [first, last] = (ways[0].abs() + ways[1].abs() + ways[2].abs()).0;
         let extent = first + last + a.size + b.size;
-        Some(Self { forms, stances, shapes, ways, least: touch + CRUDE * extent })
+        Some(Self { forms, swept, shapes, ways, least: touch + CRUDE * extent })
     }
 
     /// The gap along a unit direction at both ends.
     #[inline]
     fn gap(&self, n: DVec3) -> [f64; 2] {
-        let ([a, b], [of_a, of_b]) = (self.stances, &self.forms);
+        let ([a, b], [of_a, of_b]) = (self.swept, &self.forms);
         let own_a = of_a.extent([dot(&a.axes[0], n), dot(&a.axes[1], n), dot(&a.axes[2], n)]);
         let back = -n;
         let own_b = of_b.extent([dot(&b.axes[0], back), dot(&b.axes[1], back), dot(&b.axes[2], back)]);
@@ -229,8 +229,8 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
     fn find(&self, end: usize, from: DVec3) -> Option<DVec3> {
         let at = |v: &[F64x2; 3]| DVec3::new(v[0].0[end], v[1].0[end], v[2].0[end]);
         let body = |k: usize, origin: DVec3| {
-            let [x, y, z] = &self.stances[k].axes;
-            Body::new((self.shapes)(k)?, DMat3::from_cols(at(x), at(y), at(z)), origin)
+            let [x, y, z] = &self.swept[k].axes;
+            ConvexBody::new((self.shapes)(k)?, DMat3::from_cols(at(x), at(y), at(z)), origin)
         };
         let (a, b) = (body(0, DVec3::ZERO)?, body(1, at(&self.ways))?);
         Some(gjk::nearest(&a, &b, from, ROUGH)?.normal)
@@ -238,7 +238,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
 
     /// What two directions prove, the one at the start and the other at the end.
     fn proves(&self, (n0, gap0): (DVec3, f64), (n1, gap1): (DVec3, f64)) -> bool {
-        let [a, b] = self.stances;
+        let [a, b] = self.swept;
         let turned = (n1 - n0).length();
         // Of the centres of rotation, which go what the centres go but for their swing.
         let way = || DVec3::from_array(self.ways.map(|w| w.0[1] - w.0[0])).length();
@@ -304,7 +304,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> Glancing<'a, S> {
     fn sides(&self, k: usize) -> impl Iterator<Item = DVec3> + use<S> {
         let at = |v: &[F64x2; 3]| DVec3::from_array(v.map(|x| x.0[0]));
         let way = self.way();
-        let [x, y, z] = self.stances[k].axes.each_ref().map(at);
+        let [x, y, z] = self.swept[k].axes.each_ref().map(at);
         let sides = match self.forms[k] {
             Form::Cuboid(_) => [x, y, z],
             Form::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
@@ -340,9 +340,9 @@ mod tests {
 
     fn axis_test(models: [&Model; 2], motion_states: [&MotionState; 2], touch: f64) -> SeparatingAxisTest {
         let hulls = [0, 1].map(|k| Hull::new(models[k], &Pose::IDENTITY).expect("bounded"));
-        let stances = [0, 1].map(|k| hulls[k].swept_shape(motion_states[k]));
+        let swept = [0, 1].map(|k| hulls[k].swept_shape(motion_states[k]));
         let shapes = |k: usize| hulls[k].shape(models[k]);
-        Glancing::new(stances.each_ref(), shapes, touch).expect("within").look(DVec3::ZERO)
+        AxisSearch::new(swept.each_ref(), shapes, touch).expect("within").look(DVec3::ZERO)
     }
 
     #[test]
@@ -434,8 +434,8 @@ mod tests {
         let far = motion_state(DVec3::X * 9.0, DVec3::X * 9.0, DVec3::ZERO);
         let near = motion_state(DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         let hulls = [0, 1].map(|k| Hull::new(&models[k], &Pose::IDENTITY).expect("bounded"));
-        let stances = [hulls[0].swept_shape(&near), hulls[1].swept_shape(&far)];
-        let glance = |touch| Glancing::new(stances.each_ref(), |k| hulls[k].shape(&models[k]), touch);
+        let swept = [hulls[0].swept_shape(&near), hulls[1].swept_shape(&far)];
+        let glance = |touch| AxisSearch::new(swept.each_ref(), |k| hulls[k].shape(&models[k]), touch);
         assert!(glance(0.0).is_some_and(|g| g.look(DVec3::ZERO).apart) && glance(0.1).is_none());
     }
 

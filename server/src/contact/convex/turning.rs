@@ -20,7 +20,7 @@ use super::overlap::Start;
 use super::part::{ConvexPart, Shown};
 use super::proof::{Gap, Pace};
 use super::steer::steer;
-use super::support::Body;
+use super::support::ConvexBody;
 use super::touch::{Stand, Touch};
 use super::turns::{Posed, Turns};
 use super::whole::{APART, PrimitivePair, excluded};
@@ -107,8 +107,8 @@ impl<'a> Turning<'a> {
     /// The direction of nearest points at a time, and the gap along it.
     fn nearest(&self, m: &Posed, first: DVec3, good: f64) -> Option<Gap> {
         let [a, b] = [0, 1].map(|k| &self.parts[k].primitive.shape);
-        let a = Body::new(a, m.axes[0], DVec3::ZERO)?;
-        let b = Body::new(b, m.axes[1], m.way)?;
+        let a = ConvexBody::new(a, m.axes[0], DVec3::ZERO)?;
+        let b = ConvexBody::new(b, m.axes[1], m.way)?;
         Some(self.gap(m, nearest(&a, &b, first, good)?.normal))
     }
 

@@ -1,6 +1,6 @@
 //! Two whole primitives as they stand at the start and move along: what every way of answering them begins with.
 
-use super::support::Body;
+use super::support::ConvexBody;
 use crate::contact::exclusion::rounding;
 use crate::contact::query::question;
 use crate::contact::query::task::witness_level;
@@ -112,6 +112,6 @@ pub(super) fn excluded(delta: f64, rounding: f64) -> f64 {
     -2.0 * delta + 4.0 * rounding
 }
 
-pub(super) fn body_of(p: &Primitive) -> Option<Body<'_>> {
-    Body::new(&p.shape, p.frame.matrix(), p.frame.position)
+pub(super) fn body_of(p: &Primitive) -> Option<ConvexBody<'_>> {
+    ConvexBody::new(&p.shape, p.frame.matrix(), p.frame.position)
 }

@@ -51,7 +51,7 @@ pub fn find_earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Out
 fn earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
     *outcome = clear(query);
     let quick = whole(query, outcome);
-    if !matches!(quick, Quick::Told) {
+    if !matches!(quick, Quick::Reported) {
         search(query, quick, outcome, scratch);
     }
 }
@@ -60,7 +60,7 @@ fn earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
 fn whole(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     if let Some(reported) = unbounded::answer(query) {
         *outcome = reported;
-        return Quick::Told;
+        return Quick::Reported;
     }
     convex::quick(query, outcome)
 }
@@ -86,7 +86,7 @@ fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     match convex::balls(query) {
         Some(passage) => {
             *outcome = passage.outcome(query);
-            Quick::Told
+            Quick::Reported
         }
         None => whole(query, outcome),
     }
@@ -170,7 +170,7 @@ impl<'a> PairSearch<'a> {
         let (task, swapped) = Task::of(query);
         let mut outcome = clear(query);
         let quick = quick(query, &mut outcome);
-        if let Quick::Told = quick {
+        if let Quick::Reported = quick {
             return Self::at(query, task, swapped, outcome, State::Reported(outcome, scratch));
         }
         Self::of_task(query, task, swapped, (quick, &outcome), scratch)

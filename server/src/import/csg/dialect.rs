@@ -17,7 +17,7 @@ use Fate::{Harmless, Read, Refused};
 
 /// A kind of node that is supported: its name, arguments that make something of it, what is inside of it, and every argument
 /// that OpenSCAD writes or reads for it (the node's `toString` and its module's parameters, 2015.03 to the snapshots of 2026).
-struct Kind {
+struct Construct {
     name: &'static str,
     arguments: &'static [(&'static str, &'static str)],
     inside: &'static str,
@@ -32,14 +32,14 @@ const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin
 /// Written for drawings of other files by rotate_extrude, and without one by old versions of OpenSCAD.
 const WITHOUT_FILE: [&str; 3] = ["layer", "origin", "timestamp"];
 
-const KINDS: [Kind; 19] = [
-    Kind { name: "group", arguments: &[], inside: BALL, fates: &[] },
-    Kind { name: "union", arguments: &[], inside: BALL, fates: &[] },
-    Kind { name: "difference", arguments: &[], inside: BALL, fates: &[] },
-    Kind { name: "intersection", arguments: &[], inside: BALL, fates: &[] },
-    Kind { name: "render", arguments: &[], inside: BALL, fates: &[] },
-    Kind { name: "color", arguments: &[], inside: BALL, fates: &[("c", Harmless), ("alpha", Harmless)] },
-    Kind {
+const KINDS: [Construct; 19] = [
+    Construct { name: "group", arguments: &[], inside: BALL, fates: &[] },
+    Construct { name: "union", arguments: &[], inside: BALL, fates: &[] },
+    Construct { name: "difference", arguments: &[], inside: BALL, fates: &[] },
+    Construct { name: "intersection", arguments: &[], inside: BALL, fates: &[] },
+    Construct { name: "render", arguments: &[], inside: BALL, fates: &[] },
+    Construct { name: "color", arguments: &[], inside: BALL, fates: &[("c", Harmless), ("alpha", Harmless)] },
+    Construct {
         name: "multmatrix",
         arguments: &[("m", "[[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")],
         inside: BALL,
@@ -51,7 +51,7 @@ const KINDS: [Kind; 19] = [
             ),
         )],
     },
-    Kind {
+    Construct {
         name: "linear_extrude",
         arguments: &[("height", "2")],
         inside: SQUARE,
@@ -66,7 +66,7 @@ const KINDS: [Kind; 19] = [
             ("h", Refused),
         ],
     },
-    Kind {
+    Construct {
         name: "rotate_extrude",
         arguments: &[],
         inside: SQUARE,
@@ -80,16 +80,21 @@ const KINDS: [Kind; 19] = [
             ("h", Refused),
         ],
     },
-    Kind { name: "hull", arguments: &[], inside: BALL, fates: &[] },
-    Kind { name: "minkowski", arguments: &[], inside: BALL, fates: &[] },
-    Kind {
+    Construct { name: "hull", arguments: &[], inside: BALL, fates: &[] },
+    Construct { name: "minkowski", arguments: &[], inside: BALL, fates: &[] },
+    Construct {
         name: "offset",
         arguments: &[("r", "1")],
         inside: SQUARE,
         fates: &[("r", Read("2", "3")), ("delta", Harmless)],
     },
-    Kind { name: "sphere", arguments: &[("r", "1")], inside: ";", fates: &[("r", Read("1", "2")), ("d", Refused)] },
-    Kind {
+    Construct {
+        name: "sphere",
+        arguments: &[("r", "1")],
+        inside: ";",
+        fates: &[("r", Read("1", "2")), ("d", Refused)],
+    },
+    Construct {
         name: "cylinder",
         arguments: &[("h", "1"), ("r1", "1"), ("r2", "1")],
         inside: ";",
@@ -104,13 +109,13 @@ const KINDS: [Kind; 19] = [
             ("d2", Refused),
         ],
     },
-    Kind {
+    Construct {
         name: "cube",
         arguments: &[("size", "[1, 2, 3]")],
         inside: ";",
         fates: &[("size", Read("1", "[1, 1, 2]")), ("center", Read("true", "false"))],
     },
-    Kind {
+    Construct {
         name: "polyhedron",
         arguments: &[
             ("points", "[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]"),
@@ -126,14 +131,19 @@ const KINDS: [Kind; 19] = [
             ("triangles", Refused),
         ],
     },
-    Kind { name: "circle", arguments: &[("r", "1")], inside: ";", fates: &[("r", Read("1", "2")), ("d", Refused)] },
-    Kind {
+    Construct {
+        name: "circle",
+        arguments: &[("r", "1")],
+        inside: ";",
+        fates: &[("r", Read("1", "2")), ("d", Refused)],
+    },
+    Construct {
         name: "square",
         arguments: &[("size", "[1, 2]")],
         inside: ";",
         fates: &[("size", Read("1", "[1, 3]")), ("center", Read("true", "false"))],
     },
-    Kind {
+    Construct {
         name: "polygon",
         arguments: &[("points", "[[0, 0], [1, 0], [0, 1], [5, 5]]"), ("paths", "[[0, 1, 2]]")],
         inside: ";",
@@ -180,7 +190,7 @@ const REFUSED: [&str; 28] = [
 const ANY: [&str; 10] = ["0", "7", "-1", "0.5", "inf", "nan", "true", "undef", "\"a\"", "[1, [2]]"];
 
 /// The text of a call in its place, on line 2.
-fn text(kind: &Kind, changed: Option<(&str, &str)>) -> String {
+fn text(kind: &Construct, changed: Option<(&str, &str)>) -> String {
     let mut arguments: Vec<(&str, &str)> = kind.arguments.to_vec();
     if let Some((name, value)) = changed {
         arguments.retain(|a| a.0 != name);

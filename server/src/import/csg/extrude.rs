@@ -13,7 +13,7 @@ use super::facets::prism;
 use super::flat::{Flat, Outline};
 use super::outlines::crossing;
 use super::parts::{Part, PartId, Parts, Signed};
-use super::place::{self, Placed};
+use super::place::{self, PlacedShape};
 use super::polygon::{Edge, Region};
 use super::syntax::{Call, ValueKind};
 use super::{Place, Problem};
@@ -182,7 +182,7 @@ impl Extrusion {
         inner: &DAffine3,
         radius: f64,
         overshoot: u32,
-    ) -> std::result::Result<Placed, Problem> {
+    ) -> std::result::Result<PlacedShape, Problem> {
         let (low, high) = self.span(overshoot);
         let center = DVec3::new(0.0, 0.0, 0.5 * (low + high));
         if self.scale.x != self.scale.y {
@@ -203,7 +203,7 @@ impl Extrusion {
         corner: DVec2,
         size: DVec2,
         overshoot: u32,
-    ) -> std::result::Result<Placed, Problem> {
+    ) -> std::result::Result<PlacedShape, Problem> {
         if self.scale == DVec2::ONE {
             let (low, high) = self.span(overshoot);
             let center = (corner + size * 0.5).extend(0.5 * (low + high));
@@ -220,7 +220,7 @@ impl Extrusion {
         inner: &DAffine3,
         outline: &[DVec2],
         overshoot: u32,
-    ) -> std::result::Result<Placed, Problem> {
+    ) -> std::result::Result<PlacedShape, Problem> {
         let (low, high) = self.span(overshoot);
         let bottom: Vec<DVec2> = outline.iter().map(|p| inner.transform_point3(p.extend(0.0)).truncate()).collect();
         let top: Vec<DVec2> = bottom.iter().map(|p| *p * self.scale).collect();

@@ -68,7 +68,7 @@ struct Plane {
 
 /// What a call makes of what is inside of it.
 #[derive(Clone)]
-enum Kind {
+enum CallKind {
     Set(Op),
     Extrude(Extrusion),
     Revolve(Turn),
@@ -82,7 +82,7 @@ struct Open<'a> {
     call: Option<&'a Call>,
     children: &'a [CallId],
     next: usize,
-    kind: Kind,
+    kind: CallKind,
     /// That of the call itself; the children's differs inside of an extrusion.
     outside: Context,
     context: Context,
@@ -98,11 +98,11 @@ impl Open<'_> {
 /// What a call is at first sight.
 enum Step {
     Leaf(PartId),
-    Open(Box<(Kind, Context)>),
+    Open(Box<(CallKind, Context)>),
 }
 
 impl Step {
-    fn open(kind: Kind, context: Context) -> Self {
+    fn open(kind: CallKind, context: Context) -> Self {
         Self::Open(Box::new((kind, context)))
     }
 }
@@ -122,7 +122,7 @@ impl<'a> Lowering<'a> {
             self.roots(root);
         }
         let context = Context { outer: DAffine3::IDENTITY, plane: None, hull: false };
-        let (kind, outside) = (Kind::Set(Op::Union), context);
+        let (kind, outside) = (CallKind::Set(Op::Union), context);
         let mut open = vec![Open { call: None, children: top, next: 0, kind, outside, context, built: Vec::new() }];
         while let Some(current) = open.last_mut() {
             if let Some(&id) = current.children.get(current.next) {
@@ -135,7 +135,7 @@ impl<'a> Lowering<'a> {
                 }
                 let mut context = current.context;
                 if let Some(plane) = &mut context.plane
-                    && matches!(current.kind, Kind::Set(Op::Difference))
+                    && matches!(current.kind, CallKind::Set(Op::Difference))
                     && !current.built.is_empty()
                 {
                     plane.overshoot += 1;
@@ -177,28 +177,28 @@ impl<'a> Lowering<'a> {
 
     fn step(&mut self, call: &'a Call, context: Context) -> Result<Step> {
         let inside = |kind| {
-            let hull = matches!(kind, Kind::Hull) || context.hull && matches!(kind, Kind::Set(Op::Union));
+            let hull = matches!(kind, CallKind::Hull) || context.hull && matches!(kind, CallKind::Set(Op::Union));
             Ok(Step::open(kind, Context { hull, ..context }))
         };
         match call.name.as_str() {
-            "group" | "union" => Arguments::new(call, &[]).and_then(|_| inside(Kind::Set(Op::Union))),
-            "difference" => Arguments::new(call, &[]).and_then(|_| inside(Kind::Set(Op::Difference))),
-            "intersection" => Arguments::new(call, &[]).and_then(|_| inside(Kind::Set(Op::Intersection))),
-            "render" => Arguments::new(call, &["convexity"]).and_then(|_| inside(Kind::Set(Op::Union))),
-            "color" => Arguments::new(call, &["c", "alpha"]).and_then(|_| inside(Kind::Set(Op::Union))),
+            "group" | "union" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Union))),
+            "difference" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Difference))),
+            "intersection" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Intersection))),
+            "render" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Set(Op::Union))),
+            "color" => Arguments::new(call, &["c", "alpha"]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "multmatrix" => Ok(match self.multmatrix(call, context)? {
-                Some(context) => Step::open(Kind::Set(Op::Union), context),
+                Some(context) => Step::open(CallKind::Set(Op::Union), context),
                 None => Step::Leaf(self.shapes.nothing(call, "that flattens what is inside of it")),
             }),
-            "hull" => Arguments::new(call, &[]).and_then(|_| inside(Kind::Hull)),
-            "minkowski" => Arguments::new(call, &["convexity"]).and_then(|_| inside(Kind::Minkowski)),
+            "hull" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Hull)),
+            "minkowski" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Minkowski)),
             "offset" => {
                 let offset = Offset::new(call)?;
                 let pieces = self.shapes.pieces(&Offset::arguments(call)?, offset.by().abs())?;
-                let Some(plane) = context.plane else { return inside(Kind::Set(Op::Union)) };
+                let Some(plane) = context.plane else { return inside(CallKind::Set(Op::Union)) };
                 // Distances are those of the call's own coordinates.
                 let local = Plane { inner: DAffine3::IDENTITY, ..plane };
-                Ok(Step::open(Kind::Offset(offset, pieces), Context { plane: Some(local), ..context }))
+                Ok(Step::open(CallKind::Offset(offset, pieces), Context { plane: Some(local), ..context }))
             }
             "linear_extrude" | "rotate_extrude" => self.extrusion(call, context),
             "sphere" | "cylinder" | "cube" | "polyhedron" => {
@@ -249,12 +249,12 @@ impl<'a> Lowering<'a> {
                 return Ok(Step::Leaf(self.shapes.nothing(call, "of no height")));
             };
             let outer = extrusion.slanted(&context.outer);
-            return Ok(Step::open(Kind::Extrude(extrusion), Context { outer, plane, hull: false }));
+            return Ok(Step::open(CallKind::Extrude(extrusion), Context { outer, plane, hull: false }));
         }
         let Some(turn) = Turn::new(call)? else {
             return Ok(Step::Leaf(self.shapes.nothing(call, "by no angle")));
         };
-        Ok(Step::open(Kind::Revolve(turn), Context { plane, hull: false, ..context }))
+        Ok(Step::open(CallKind::Revolve(turn), Context { plane, hull: false, ..context }))
     }
 
     /// What a call has become, all that is inside of it being there.
@@ -266,10 +266,10 @@ impl<'a> Lowering<'a> {
                 return Ok(self.shapes.parts.push(Part::Stray(at, name)));
             }
             let part = match open.kind {
-                Kind::Set(op) => Part::Op(op, at, built),
-                Kind::Hull => self.hull(at, &built)?,
-                Kind::Minkowski => self.minkowski(at, &built, open.outside.outer.translation)?,
-                Kind::Extrude(_) | Kind::Revolve(_) | Kind::Offset(..) => Part::Empty,
+                CallKind::Set(op) => Part::Op(op, at, built),
+                CallKind::Hull => self.hull(at, &built)?,
+                CallKind::Minkowski => self.minkowski(at, &built, open.outside.outer.translation)?,
+                CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) => Part::Empty,
             };
             return Ok(self.shapes.parts.push(part));
         }
@@ -285,22 +285,22 @@ impl<'a> Lowering<'a> {
         let most = most.iter().filter_map(|f| flat_of(&self.shapes.parts, *f)).map(|f| f.pieces).max().unwrap_or(1);
         let parts = &mut self.shapes.parts;
         let part = match (&open.kind, open.call) {
-            (Kind::Set(op), _) => Part::Op(*op, at, open.built),
+            (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
             (_, None) => Part::Empty,
-            (Kind::Extrude(extrusion), _) => {
+            (CallKind::Extrude(extrusion), _) => {
                 for leaf in flats(parts, &open.built) {
                     let Part::Flat(flat) = std::mem::replace(&mut parts.list[leaf], Part::Empty) else { continue };
                     parts.list[leaf] = extrusion.part(parts, &open.context.outer, &flat)?;
                 }
                 Part::Op(Op::Union, at, open.built)
             }
-            (Kind::Revolve(turn), Some(call)) => return self.revolve(call, *turn, &open.context.outer, open.built),
-            (Kind::Hull, Some(call)) => outlines::hull(parts, at, &like(most, call), &open.built)?,
-            (Kind::Minkowski, Some(call)) => {
+            (CallKind::Revolve(turn), Some(call)) => return self.revolve(call, *turn, &open.context.outer, open.built),
+            (CallKind::Hull, Some(call)) => outlines::hull(parts, at, &like(most, call), &open.built)?,
+            (CallKind::Minkowski, Some(call)) => {
                 let origin = open.outside.plane.map_or(DVec3::ZERO, |p| p.inner.translation);
                 outlines::minkowski(parts, at, &like(most, call), &open.built, origin)?
             }
-            (Kind::Offset(offset, pieces), Some(call)) => {
+            (CallKind::Offset(offset, pieces), Some(call)) => {
                 let part = offset.of(parts, at, &like((*pieces).max(most), call), &open.built)?;
                 let id = parts.push(part);
                 let inner = open.outside.plane.map_or(DAffine3::IDENTITY, |p| p.inner);

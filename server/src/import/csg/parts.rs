@@ -1,7 +1,7 @@
 //! What calls have become before it is known which primitives stay: a list of parts, and the solid made of it.
 
 use super::flat::Flat;
-use super::place::Placed;
+use super::place::PlacedShape;
 use super::polygon::Formula;
 use super::{Limits, Place, Problem};
 use crate::import::Note;
@@ -93,8 +93,8 @@ impl<'a> Parts<'a> {
     }
 
     /// A primitive as it was placed.
-    pub fn leaf(&mut self, name: &str, at: Place, placed: std::result::Result<Placed, Problem>) -> Result<Part> {
-        let Placed { shape, frame, mirrored, notes } = placed.map_err(|p| (at, p))?;
+    pub fn leaf(&mut self, name: &str, at: Place, placed: std::result::Result<PlacedShape, Problem>) -> Result<Part> {
+        let PlacedShape { shape, frame, mirrored, notes } = placed.map_err(|p| (at, p))?;
         let geometry = shape.geometry();
         self.faces += geometry.faces().len();
         if self.faces > self.limits.faces {

@@ -16,7 +16,7 @@ use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// A shape, its frame in the model, and what had to be snapped for it.
-pub struct Placed {
+pub struct PlacedShape {
     /// The shape in its own frame.
     pub shape: Shape,
     /// That frame in the model.
@@ -27,7 +27,7 @@ pub struct Placed {
     pub notes: Vec<(String, Option<f64>)>,
 }
 
-impl Placed {
+impl PlacedShape {
     fn new(shape: impl Into<Shape>, frame: Pose) -> Self {
         Self { shape: shape.into(), frame, mirrored: false, notes: Vec::new() }
     }
@@ -95,13 +95,13 @@ pub fn snapped(m: DMat3) -> (DMat3, Option<f64>) {
 }
 
 /// A ball of radius `radius` around the origin.
-pub fn sphere(a: &DAffine3, radius: f64) -> Result<Placed, Problem> {
+pub fn sphere(a: &DAffine3, radius: f64) -> Result<PlacedShape, Problem> {
     let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "sphere"))?;
-    Ok(Placed::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
+    Ok(PlacedShape::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
 }
 
 /// A cylinder, cone or frustum around `center`, along z, with radii `bottom` (low z) and `top`.
-pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64) -> Result<Placed, Problem> {
+pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64) -> Result<PlacedShape, Problem> {
     let kind = if bottom == top { "cylinder" } else { "cone" };
     let uneven = |l: &DVec3| (l.x - l.y).abs() / l.x;
     let Some((lengths, rotation, off)) = along_axes(a.matrix3).filter(|(l, ..)| uneven(l) <= SIMILARITY) else {
@@ -114,21 +114,21 @@ pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64)
     let frame = Pose::new(a.transform_point3(center), rotation);
     let larger = bottom.max(top);
     if (bottom - top).abs() <= SAME_RADIUS * larger {
-        let mut placed = Placed::new(Cylinder { radius: larger * across, half_height }, frame);
+        let mut placed = PlacedShape::new(Cylinder { radius: larger * across, half_height }, frame);
         if bottom != top {
             placed.notes.push(("radii that differ by less than 1e-9 of themselves: taken as a cylinder".into(), None));
         }
         return Ok(placed.off(off, kind));
     }
-    Ok(Placed::new(Cone { bottom: bottom * across, top: top * across, half_height }, frame).off(off, kind))
+    Ok(PlacedShape::new(Cone { bottom: bottom * across, top: top * across, half_height }, frame).off(off, kind))
 }
 
 /// A box around `center` with half extents `half`.
-pub fn cuboid(a: &DAffine3, center: DVec3, half: DVec3) -> Result<Placed, Problem> {
+pub fn cuboid(a: &DAffine3, center: DVec3, half: DVec3) -> Result<PlacedShape, Problem> {
     if let Some((lengths, frame, off)) = along_axes(a.matrix3) {
         let frame = Pose::new(a.transform_point3(center), frame);
         let mirrored = a.matrix3.determinant() < 0.0;
-        let placed = Placed { mirrored, ..Placed::new(Cuboid { half: half * lengths }, frame) };
+        let placed = PlacedShape { mirrored, ..PlacedShape::new(Cuboid { half: half * lengths }, frame) };
         return Ok(placed.off(off, "box"));
     }
     // Corner i has the signs of i's bits; faces clockwise from outside.
@@ -146,7 +146,7 @@ pub fn cuboid(a: &DAffine3, center: DVec3, half: DVec3) -> Result<Placed, Proble
 
 /// The polyhedron of a mesh, faces clockwise from outside; the frame follows similarities, other transforms are applied
 /// to the points.
-pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Placed, Fit), Problem> {
+pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(PlacedShape, Fit), Problem> {
     let (points, frame, off): (Vec<DVec3>, Pose, f64) = match similarity(a.matrix3) {
         Some(s) if s.off <= SIMILARITY => {
             let (rotation, mirrored) = proper(s.orthogonal);
@@ -161,29 +161,29 @@ pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<
     } else {
         Polyhedron::from_faces(&points, faces)?
     };
-    Ok((Placed::new(shape, frame).off(off, "polyhedron"), fit))
+    Ok((PlacedShape::new(shape, frame).off(off, "polyhedron"), fit))
 }
 
 /// The solid within a mesh, faces clockwise from outside, its corners where the transform puts them.
-pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Placed, Repair), Problem> {
+pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(PlacedShape, Repair), Problem> {
     let points: Vec<DVec3> = points.iter().map(|p| a.transform_point3(*p)).collect();
     let mirrored = a.matrix3.determinant() < 0.0;
     let turned = |f: &Vec<u32>| if mirrored { f.clone() } else { f.iter().rev().copied().collect() };
     let (shape, repair) = TriangleMesh::of_polygons(&points, &faces.iter().map(turned).collect::<Vec<_>>())?;
-    Ok((Placed::new(shape, Pose::IDENTITY), repair))
+    Ok((PlacedShape::new(shape, Pose::IDENTITY), repair))
 }
 
 /// The half-space n·x <= d.
-pub fn half_space(a: &DAffine3, n: DVec3, d: f64) -> Placed {
+pub fn half_space(a: &DAffine3, n: DVec3, d: f64) -> PlacedShape {
     let normal = (a.matrix3.inverse().transpose() * n).normalize();
     let point = a.transform_point3(n * (d / n.length_squared()));
-    Placed::new(HalfSpace, Pose::new(point, DQuat::from_rotation_arc(DVec3::Z, normal)))
+    PlacedShape::new(HalfSpace, Pose::new(point, DQuat::from_rotation_arc(DVec3::Z, normal)))
 }
 
 /// The half-space with an outward normal (of any length) through a point.
-pub fn half_space_at(a: &DAffine3, n: DVec3, point: DVec3) -> Placed {
+pub fn half_space_at(a: &DAffine3, n: DVec3, point: DVec3) -> PlacedShape {
     let normal = (a.matrix3.inverse().transpose() * n).normalize();
-    Placed::new(HalfSpace, Pose::new(a.transform_point3(point), DQuat::from_rotation_arc(DVec3::Z, normal)))
+    PlacedShape::new(HalfSpace, Pose::new(a.transform_point3(point), DQuat::from_rotation_arc(DVec3::Z, normal)))
 }
 
 /// Why a curved primitive cannot follow `m`.
@@ -199,7 +199,7 @@ fn columns_are_perpendicular(m: DMat3) -> bool {
 }
 
 /// `m` as scaling along x, y, z, then a rotation (a mirror goes into x, of which boxes and cylinders notice no more than the
-/// names of two faces: `Placed::mirrored`), and how far its axes are off a right angle.
+/// names of two faces: `PlacedShape::mirrored`), and how far its axes are off a right angle.
 fn along_axes(m: DMat3) -> Option<(DVec3, DQuat, f64)> {
     if !columns_are_perpendicular(m) {
         return None;

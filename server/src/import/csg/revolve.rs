@@ -140,7 +140,7 @@ impl Lathe<'_> {
     }
 
     /// An outline with one side, between two heights or to an apex, is one cylinder or cone.
-    fn round(&self, sides: &[Edge], heights: (f64, f64)) -> Option<std::result::Result<place::Placed, Problem>> {
+    fn round(&self, sides: &[Edge], heights: (f64, f64)) -> Option<std::result::Result<place::PlacedShape, Problem>> {
         if !self.sides.is_empty() {
             return None;
         }

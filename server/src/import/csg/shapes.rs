@@ -36,7 +36,7 @@ impl Shapes<'_> {
         self.parts.push(Part::Empty)
     }
 
-    fn leaf(&mut self, call: &Call, placed: std::result::Result<place::Placed, Problem>) -> Result<PartId> {
+    fn leaf(&mut self, call: &Call, placed: std::result::Result<place::PlacedShape, Problem>) -> Result<PartId> {
         let leaf = self.parts.leaf(&call.name, call.at, placed)?;
         Ok(self.parts.push(leaf))
     }
@@ -46,7 +46,7 @@ impl Shapes<'_> {
         &mut self,
         call: &Call,
         outer: &DAffine3,
-        placed: std::result::Result<place::Placed, Problem>,
+        placed: std::result::Result<place::PlacedShape, Problem>,
         (pieces, radius): (u32, f64),
         mesh: &dyn Fn(u32) -> (Vec<DVec3>, Vec<Vec<u32>>),
     ) -> Result<PartId> {

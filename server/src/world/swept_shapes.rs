@@ -6,10 +6,10 @@
 use super::body::Body;
 use crate::contact::SweptShape;
 
-/// Stances by bodies' indices.
+/// Swept shapes by bodies' indices.
 #[derive(Debug, Default)]
-pub struct Stances {
-    stances: Vec<SweptShape>,
+pub struct SweptShapes {
+    swept_shapes: Vec<SweptShape>,
     uses: Vec<Use>,
     /// The step that they are of.
     serial: u64,
@@ -22,11 +22,11 @@ struct Use {
     looked: u64,
 }
 
-impl Stances {
+impl SweptShapes {
     /// A step of so many bodies begins; serials go up by one and begin with 1.
     pub fn begin(&mut self, serial: u64, bodies: usize) {
         self.serial = serial;
-        self.stances.resize(bodies, SweptShape::default());
+        self.swept_shapes.resize(bodies, SweptShape::default());
         self.uses.resize(bodies, Use::default());
     }
 
@@ -47,12 +47,12 @@ impl Stances {
             }
             self.uses[i].looked = self.serial;
         }
-        Some(indices.map(|i| &self.stances[i]))
+        Some(indices.map(|i| &self.swept_shapes[i]))
     }
 
     #[inline]
     fn take(&mut self, index: usize, body: &Body) -> Option<()> {
-        self.stances[index] = body.hull.as_ref()?.swept_shape(&body.motion_state);
+        self.swept_shapes[index] = body.hull.as_ref()?.swept_shape(&body.motion_state);
         self.uses[index].taken = self.serial;
         Some(())
     }
