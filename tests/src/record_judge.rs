@@ -179,6 +179,14 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// True for the same face of two primitives that are one another's copy to the bit, with the same sign: whether f
+    /// depends on the one or on the other cannot be told.
+    fn is_copy(&self, i: usize, k: usize) -> bool {
+        let (a, b) = (&self.literals[i], &self.literals[k]);
+        let faces = |l: &Literal| &self.moving.solid.primitives[l.owner as usize].faces;
+        a.sign == b.sign && a.face == b.face && faces(a) == faces(b)
+    }
+
     fn is_apex(&self, i: usize, x: DVec3, tau: f64) -> bool {
         match self.literals[i].face {
             Face::Cone(surface::Cone { apex, sin, .. }) => apex.distance(x) <= tau / sin,
@@ -269,7 +277,8 @@ impl Spot {
                 break;
             }
             for i in &through {
-                let moved = |by: f64| value(&side.root, &mut |k| if k == *i { slopes[k] + by } else { slopes[k] });
+                let one = |k: usize| k == *i || side.is_copy(k, *i);
+                let moved = |by: f64| value(&side.root, &mut |k| if one(k) { slopes[k] + by } else { slopes[k] });
                 is_active[*i] |= moved(1e-7) != now || moved(-1e-7) != now;
             }
         }
@@ -439,9 +448,10 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let mut doubts: Option<Vec<(Lie, String)>> = None;
     let measures = [4, 0, 2, 6, 8, 10, 12, 14, 16, 18, 20].map(|k| least * f64::from(1 << k));
     let measures: Vec<f64> = measures.into_iter().filter(|t| *t < most).chain([most]).collect();
-    // A point that is deep may lie deeper in the one than in the other: then each has a measure of its own.
+    // A point that is deep may lie deeper in the one than in the other, and of a body that is small or far away numbers
+    // are rounded otherwise than of the other one: each has a measure of its own.
     let same = measures.iter().map(|tau| [*tau; 2]);
-    let each = measures.iter().flat_map(|a| measures.iter().map(|b| [*a, *b])).filter(|_| at_depth);
+    let each = measures.iter().flat_map(|a| measures.iter().map(|b| [*a, *b]));
     for taus in same.chain(each) {
         let mut wrong = vec![];
         features(sides, &points, &normals, taus, o, &mut wrong);

@@ -218,19 +218,24 @@ impl Pair {
     }
 
     /// Is there a common point about as deep as `delta` at the start? Looked for from x first, then everywhere.
-    fn starts_within(&self, x: DVec3, delta: f64, draw: &mut Draw) -> bool {
+    fn starts_within(&self, t: f64, x: DVec3, delta: f64, draw: &mut Draw) -> bool {
         // Few places show it as a rule; a contradiction must have looked at many.
-        [(90, 24), (4000, 400)].into_iter().any(|(points, kept)| self.starts_within_of(x, delta, points, kept, draw))
+        [(90, 24), (4000, 400)].into_iter().any(|(points, kept)| self.starts_within_of(t, x, delta, points, kept, draw))
     }
 
-    fn starts_within_of(&self, x: DVec3, delta: f64, points: usize, kept: usize, draw: &mut Draw) -> bool {
+    fn starts_within_of(&self, t: f64, x: DVec3, delta: f64, points: usize, kept: usize, draw: &mut Draw) -> bool {
         let m = self.at(0.0);
-        let mut places = vec![x];
+        // The place itself, as each body has carried it there, and as the second one would without turning: in a fit it
+        // is hardly downhill to the deepest one from anywhere else.
+        let later = self.at(t);
+        let carried = m.a.transpose() * (m.b * later.in_b(x) + m.apart);
+        let moved = m.a.transpose() * (later.a * x - later.apart + m.apart);
+        let mut places = vec![x, carried, moved];
         places.extend(self.a.surface_points(points, draw));
         let seen = |x: DVec3| m.a.transpose() * (m.b * x + m.apart);
         places.extend(self.b.surface_points(points, draw).into_iter().map(seen));
         let mut places: Vec<(f64, DVec3)> = places.into_iter().map(|x| (self.common(&m, x), x)).collect();
-        places[1..].sort_by(|x, y| x.0.total_cmp(&y.0));
+        places[3..].sort_by(|x, y| x.0.total_cmp(&y.0));
         places.truncate(kept);
         // Between like round faces the deepest place is far away and hardly downhill.
         let firsts = [10.0, 1e3, 1e5, 1e7].map(|k| (k * delta).min(0.3 * self.size));
@@ -329,7 +334,7 @@ pub fn judge(
             let (g, t, x) = pair.deepen(t, x, Some(until), first, evaluations, &mut draw);
             // At a start within depth delta the promise is one for twice that.
             let doubtful = -g > allowed(1.0) && -g <= allowed(2.0);
-            let level = if doubtful && !pair.starts_within(x, delta, &mut draw) { 1.0 } else { 2.0 };
+            let level = if doubtful && !pair.starts_within(t, x, delta, &mut draw) { 1.0 } else { 2.0 };
             if -g > allowed(level) {
                 let depth = -g;
                 fault(

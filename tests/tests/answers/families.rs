@@ -155,3 +155,86 @@ fn long_searches_are_answered_at_a_coarser_resolution_that_is_reported() {
         assert!(faults.is_empty(), "{name}: {faults:?}");
     }
 }
+
+/// Witnesses from which no equations lead back: the faces that decide change on the way, or two like faces have a line
+/// in common. Climbs lead to a touch, which both judges find nothing wrong with.
+#[test]
+fn witnesses_are_followed_back_to_a_touch() {
+    for (family, index) in [(12, 2074), (12, 4766), (12, 5575), (12, 13727), (7, 11533), (6, 1427)] {
+        let name = format!("{} {index}", NAMES[family]);
+        let scene = scene(1, family, index);
+        let answer = ask(&scene, 0).expect("a scene");
+        let o = &answer.pair.outcome;
+        assert_eq!(o.status, Status::Contact, "{name}: {o:?}");
+        assert!(!o.not_continued, "{name}: {o:?}");
+        let verdict = examine(&scene, 0, Effort::Quick);
+        assert!(verdict.is_right(), "{name}: {:?}", verdict.faults);
+    }
+}
+
+/// A face that decides at depth delta and is passed by before the surfaces meet is none of the touch's: in skins
+/// thinner than the resolution, at corners cut out of a body.
+#[test]
+fn faces_that_are_passed_by_are_not_told() {
+    let skins = [1985, 4712, 9115, 9504, 14657, 17255].map(|index| (11, index));
+    for (family, index) in skins.into_iter().chain([(12, 2934), (12, 17466), (12, 19012), (6, 18324)]) {
+        let verdict = examine(&scene(1, family, index), 0, Effort::Quick);
+        assert_eq!(verdict.status, Some(Status::Contact));
+        assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[family], verdict.faults);
+    }
+}
+
+/// Contacts of bodies whose faces lie in common planes: the tip of a cone against an edge, and a face behind which
+/// another one of its plane always decides.
+#[test]
+fn contacts_at_tips_and_in_common_planes_are_told_of_the_faces_that_decide() {
+    for index in [2882, 5661, 10443, 12921, 14594, 16632, 10089, 16258, 11197] {
+        let verdict = examine(&scene(1, 2, index), 0, Effort::Quick);
+        assert_eq!(verdict.status, Some(Status::Contact));
+        assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[2], verdict.faults);
+    }
+}
+
+/// Bodies that start in each other by less than two resolutions: what is told of the start is a point that lies that
+/// deep in both.
+#[test]
+fn contacts_at_the_start_are_told_at_a_common_point() {
+    for index in [4401, 5148, 15680, 18596] {
+        let scene = scene(1, 6, index);
+        let o = ask(&scene, 0).expect("a scene").pair.outcome;
+        assert_eq!((o.status, o.time), (Status::Contact, 0.0), "{index}");
+        let verdict = examine(&scene, 0, Effort::Quick);
+        assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[6], verdict.faults);
+    }
+}
+
+/// A ball that starts off the axis of its hole by a little more than the gap and sinks along it: the depth at the start
+/// is half of what the two circles have in common. From one to two resolutions nothing is promised before twice that;
+/// if the same ball starts on the axis and moves there, "clear" is a miss.
+#[test]
+fn the_judge_knows_what_starts_in_touch() {
+    let (radius, gap, delta) = (0.75, 6e-8, 2.6e-9);
+    let round = |r: f64, h: f64| Node::Leaf(Shape::Round { h, bottom: r, top: r });
+    let block = Node::Leaf(Shape::Box { size: dvec3(3.0, 3.0, 3.2) }).at(dvec3(0.0, 0.0, -1.6));
+    let a = block.less(round(radius, 4.0));
+    let still = Course { start: DVec3::ZERO, rotation: DQuat::IDENTITY, end: DVec3::ZERO, spin: DVec3::ZERO };
+    for (depth, is_miss) in [(1.5 * delta, false), (1.9 * delta, false), (2.2 * delta, true)] {
+        let off = dvec3(0.6, -0.8, 0.0) * (gap + 2.0 * depth);
+        let from = |start: DVec3| {
+            let end = off + dvec3(0.0, 0.0, -0.31);
+            let moving = Course { start, rotation: DQuat::IDENTITY, end, spin: dvec3(0.0, 0.0, 16.8) };
+            let b = Node::Leaf(Shape::Ball { r: radius - gap });
+            Scene { a: a.clone(), b, courses: [still, moving], resolution: Some(delta) }
+        };
+        let starts_in_touch = from(off + dvec3(0.0, 0.0, -0.3));
+        let comes_to_touch = from(dvec3(0.0, 0.0, -0.3));
+        let answer = ask(&starts_in_touch, 0).expect("an answer");
+        let clear = Outcome::clear(delta);
+        let misses = |scene: &Scene| {
+            let found = judge(scene, &clear, Effort::Thorough, || None);
+            found.iter().any(|f| f.kind == "miss")
+        };
+        assert_eq!(misses(&starts_in_touch), is_miss, "depth {depth:e}: {:?}", answer.pair.outcome);
+        assert!(misses(&comes_to_touch), "depth {depth:e}");
+    }
+}

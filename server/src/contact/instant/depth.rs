@@ -116,27 +116,36 @@ pub fn climb(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
 }
 
 fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
-    let (x, depth, support) = ascend(rounds, f64::INFINITY, task, at, start, work);
+    let (x, depth, support) = ascend((rounds, WIDE * task.scale), task, at, start, work);
     (x, normal(task, at, x, &support), depth, support.iter().map(|s| (s.0, s.1)).collect())
 }
 
-/// A locally deepest point near `start`, its depth and the literals that hold it with their weights; the climb ends once it
-/// is as deep as `enough`.
-pub(in crate::contact) fn climb_to(enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
-    ascend(ROUNDS, enough, task, at, start, work)
+/// A locally deepest point near `start`, its depth and the literals that hold it with their weights. The first trust
+/// box reaches as far as `reach` (a length), by default half the pair's scale.
+pub(in crate::contact) fn climb_within(
+    reach: Option<f64>,
+    task: &Task,
+    at: &Instant,
+    start: DVec3,
+    work: &Work,
+) -> Held {
+    ascend((ROUNDS, reach.unwrap_or(WIDE * task.scale)), task, at, start, work)
 }
 
 /// A point, its depth, what holds it there.
 pub(in crate::contact) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
 
-fn ascend(rounds: usize, enough: f64, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
+/// Half the sides of the first trust box, in scales of the pair.
+const WIDE: f64 = 0.5;
+
+fn ascend((rounds, reach): (usize, f64), task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
     let f = |x: DVec3| separation::value(task, at, x);
     let (mut x, mut best) = (start, f(start));
-    let mut size = 0.5 * task.scale;
+    let mut size = reach;
     let mut scratch = clause::Scratch::default();
     let mut support: Vec<(Side, LiteralId, f64)> = Vec::new();
     for _ in 0..rounds {
-        if size < 1e-13 * task.scale || -best >= enough {
+        if size < 1e-13 * task.scale {
             break;
         }
         work.bound();

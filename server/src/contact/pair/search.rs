@@ -18,7 +18,10 @@ use crate::contact::witness::extent::{ACTIVE, INCIDENT, extent, note, noted, ran
 use crate::contact::witness::features::Features;
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::found::Found;
+use crate::contact::witness::known::Known;
 use crate::contact::witness::newton::{Constraint, Problem, Solution};
+use crate::contact::witness::retreat::{BACK, Climber};
+use crate::contact::witness::touch::{CLIMBED, Touch};
 use crate::motion::{Instant, Placed};
 use crate::solid::Sense;
 use glam::{DMat3, DVec3};
@@ -411,6 +414,8 @@ impl<'a> PairSearch<'a> {
 
     /// The answer that a contact was found.
     fn meets(&mut self, found: &Found) {
+        let continued = (found.touch.is_none() && self.task.continues()).then(|| self.continued(found));
+        let found = continued.as_ref().unwrap_or(found);
         fill_contact(&mut self.outcome, &self.task, found);
         let x = found.witness;
         let x = if self.swapped { self.task.relative.at(found.upper).b_point(x) } else { x };
@@ -427,6 +432,23 @@ impl<'a> PairSearch<'a> {
             let sign = if self.swapped { -1.0 } else { 1.0 };
             o.normal_speed = sign * (velocity(&bodies[0]) - velocity(&bodies[1])).dot(o.normal);
         }
+    }
+
+    /// A contact whose witness was kept for its time alone, with its touch. Where it has none: with the deepest point
+    /// beside the witness, which lies as deep in the one body as in the other.
+    fn continued(&mut self, found: &Found) -> Found {
+        let climber = Climber::new(&self.task, BACK);
+        let back = Touch { task: &self.task, known: Known::All };
+        let touch = back.back(&found.deep, &climber);
+        let mut deep = found.deep.clone();
+        if touch.is_none() && deep.t == found.upper {
+            let held = climber.deepest(deep.t, deep.x);
+            if held.1 >= self.task.delta {
+                deep = back.climbed(deep.t, &held);
+            }
+        }
+        self.outcome.counters.instant_cells += climber.cells();
+        Found { touch, deep, ..found.clone() }
     }
 
     /// The answer that nothing more is known than that nothing is met before `t`, or what a finer search has proven and found.
@@ -565,12 +587,14 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let start = start
         .filter(|_| s.active.iter().zip(&s.lambda).map(|(c, l)| balance(c) * *l).sum::<DVec3>().length() > BENT)
         .and_then(|touch| at_the_start(task, touch, deep));
+    let start =
+        start.or_else(|| (o.time == 0.0).then(|| climbed_at_the_start(task, &at, x, 2.0 * o.resolution)).flatten());
     let s = start.as_ref().unwrap_or(s);
     x = start.as_ref().map_or(x, |s| s.x);
     o.point = task.relative.world_point(&at, x);
-    // Where the point is no touch, faces pass as far from it as it is deep.
-    let is_touch = found.touch.as_ref().is_some_and(|touch| touch.t >= 0.0);
-    let off = if is_touch { 0.0 } else { task.model_a.value(x).abs().max(task.model_b.value(at.b_point(x)).abs()) };
+    // Where the point is no touch, or one that was climbed to, faces pass as far from it as it is deep.
+    let off = task.model_a.value(x).abs().max(task.model_b.value(at.b_point(x)).abs());
+    let off = if off <= INCIDENT * task.rounding { 0.0 } else { off };
     // Deep in each other bodies show no faces in one point: those of the solution are told.
     let features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(off + INCIDENT * task.rounding));
     let mut active = Active::of(&problem, s, (x, &at), &features);
@@ -621,6 +645,19 @@ fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Soluti
     (held && values.iter().all(|v| v.abs() <= most)).then_some(s)
 }
 
+/// The deepest point beside one that is deeper than `most` in a body, or in one of them alone, at the start: between
+/// like faces and at edges the way from the touch to the witness leads off.
+fn climbed_at_the_start(task: &Task, at: &Instant, x: DVec3, most: f64) -> Option<Solution> {
+    let values = |x: DVec3| [task.model_a.value(x), task.model_b.value(at.b_point(x))];
+    let fits = |v: [f64; 2]| v.iter().all(|v| *v <= INCIDENT * task.rounding && *v >= -most);
+    if !task.continues() || fits(values(x)) {
+        return None;
+    }
+    let known = Known::All;
+    let held = Climber::new(task, BACK).deepest(0.0, x);
+    fits(values(held.0)).then(|| Touch { task, known }.climbed(0.0, &held))
+}
+
 /// What a solution's multipliers say about the contact.
 struct Active {
     count: [usize; 2],
@@ -644,6 +681,13 @@ impl Active {
             Constraint::Apex(..) => true,
         };
         let known = features.active.iter().all(|ids| !ids.is_empty());
+        let balance = |held: &[(Constraint, f64)]| {
+            held.iter().map(|(c, l)| problem.row(c, x, at, 0.0).gradient * *l).sum::<DVec3>().length()
+        };
+        if known && s.stationarity >= CLIMBED && balance(&held) > BENT {
+            // Where a climb ended: what holds the bodies there is near what did on the way.
+            held = features.held().map_or(held, SmallVec::from_vec);
+        }
         if known && !held.iter().all(|(c, l)| is_active(c, *l)) {
             // Of faces in one plane that which is there; else what holds the bodies there is worked out anew.
             let mut renamed = held.clone();
@@ -658,7 +702,7 @@ impl Active {
             if all {
                 held = renamed;
             } else if let Some(anew) = features.held() {
-                held = anew.into_iter().map(|(side, id, l)| (Constraint::Literal(side, id), l)).collect();
+                held = SmallVec::from_vec(anew);
             }
         }
         let (mut count, mut apex) = ([0; 2], [false; 2]);

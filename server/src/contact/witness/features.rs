@@ -2,12 +2,13 @@
 //!
 //! A solution of the contact's equations is confirmed by the values of both trees alone. Where faces of several
 //! primitives lie in one plane, or the plane of a subtracted one's face passes by far from its cube, a literal of the
-//! solution may have the right value and yet decide nothing there. A face is *active* at a point if it passes through it
-//! and f depends on it there: the tree's literals are folded by what is known of them at the point (`Model::literals_at`),
-//! and of the open rest those count that the expression depends on, faces of one tangent plane counting as one. So
-//! neither a satisfied alternative of a complement is active nor the side of a body whose end lies flush in another's.
+//! solution may have the right value and yet decide nothing there. A face is *active* at a point if it passes through
+//! it and f depends on it there: the tree's literals are folded by what is known of them at the point
+//! (`Model::literals_at`), and of the open rest those count that the expression depends on, faces of one tangent plane
+//! counting as one. So neither a satisfied alternative of a complement is active nor the side of a body whose end lies
+//! flush in another's; and of faces in one plane none that another one always precedes.
 
-use super::newton::cholesky_solve;
+use super::newton::{Constraint, cholesky_solve};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
@@ -107,14 +108,19 @@ impl<'t, 'a> Features<'t, 'a> {
         active.find(|other| (self.gradient(side, *other) - gradient).length() <= ONE_PLANE)
     }
 
-    /// Active faces of both sides that hold each other at the point, as few as there are, with their multipliers (sum 1).
-    pub fn held(&self) -> Option<Vec<(Side, LiteralId, f64)>> {
+    /// What holds the bodies at the point, as few active faces as there are, with their multipliers.
+    pub fn held(&self) -> Option<Vec<(Constraint, f64)>> {
         let each = [Side::A, Side::B].map(|side| {
             let ids = self.active[side as usize].iter();
             let smooth = ids.filter(|id| !self.is_apex(side, **id));
             smooth.map(|id| (side, *id, self.gradient(side, *id))).collect::<Vec<_>>()
         });
-        let mut best: Option<(f64, Vec<(Side, LiteralId, f64)>)> = None;
+        self.held_by_faces(&each).or_else(|| self.held_by_an_apex(&each))
+    }
+
+    /// Active faces of both sides that hold each other, with their multipliers (sum 1).
+    fn held_by_faces(&self, each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<Vec<(Constraint, f64)>> {
+        let mut best: Option<(f64, Vec<(Constraint, f64)>)> = None;
         for count in 2..=4usize {
             for of_a in 1..count {
                 for p in choices(&each[0], of_a) {
@@ -124,7 +130,8 @@ impl<'t, 'a> Features<'t, 'a> {
                             continue;
                         };
                         if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
-                            best = Some((rest, all.iter().zip(lambda).map(|(l, w)| (l.0, l.1, w)).collect()));
+                            let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
+                            best = Some((rest, held.zip(lambda).collect()));
                         }
                     }
                 }
@@ -134,6 +141,59 @@ impl<'t, 'a> Features<'t, 'a> {
             }
         }
         best.filter(|b| b.0 <= NEARLY_BALANCED).map(|b| b.1)
+    }
+
+    /// An apex of one body against faces of the other: of the directions between these faces' normals the one that is
+    /// nearest to the apex' axis, if it lies in its normal cone.
+    fn held_by_an_apex(&self, each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<Vec<(Constraint, f64)>> {
+        for (side, faces) in [(Side::A, &each[1]), (Side::B, &each[0])] {
+            let ids = self.active[side as usize].iter();
+            for id in ids.filter(|id| id.sense() == Sense::Positive && self.is_apex(side, **id)) {
+                let (face, _) = self.face(side, *id);
+                let Some(apex) = face.apex() else { continue };
+                let turned = |v: DVec3| if side == Side::A { v } else { self.at.a_vector(v) };
+                let outward = turned(-apex.axis);
+                let mut best: Option<(f64, Vec<(Constraint, f64)>, DVec3)> = None;
+                for set in (1..=2).flat_map(|count| choices(faces, count)) {
+                    let Some((weights, sum)) = towards(-outward, &set.iter().map(|f| f.2).collect::<Vec<_>>()) else {
+                        continue;
+                    };
+                    let along = -sum.dot(outward);
+                    if best.as_ref().is_none_or(|b| along > b.0 + BALANCED) {
+                        let held = set.iter().map(|f| Constraint::Literal(f.0, f.1));
+                        best = Some((along, held.zip(weights).collect(), sum));
+                    }
+                }
+                let Some((along, mut held, sum)) = best.filter(|b| b.0 >= apex.sin - NEARLY_BALANCED) else { continue };
+                debug_assert!(along <= 1.0 + 1e-9);
+                let directions = apex.directions();
+                held.extend((0..3).map(|k| {
+                    let plane = turned(directions[usize::from(k)]);
+                    (Constraint::Apex(side, *id, k), -sum.dot(plane))
+                }));
+                return Some(held);
+            }
+        }
+        None
+    }
+}
+
+/// The unit vector between some unit vectors (one or two) that is nearest to a direction, with their weights in it.
+fn towards(direction: DVec3, between: &[DVec3]) -> Option<(SmallVec<[f64; 2]>, DVec3)> {
+    match *between {
+        [g] => Some((SmallVec::from_slice(&[1.0]), g)),
+        [g, h] => {
+            let c = g.dot(h);
+            let det = 1.0 - c * c;
+            let (p, q) = (g.dot(direction), h.dot(direction));
+            let weights = [(p - c * q) / det, (q - c * p) / det];
+            let sum = g * weights[0] + h * weights[1];
+            let length = sum.length();
+            // Also false for what is not a number.
+            (weights.iter().all(|w| *w > 0.0) && length > 0.0)
+                .then(|| (weights.iter().map(|w| w / length).collect(), sum / length))
+        }
+        _ => None,
     }
 }
 
@@ -201,10 +261,24 @@ fn active(open: &[Token], gradient: impl Fn(LiteralId) -> DVec3) -> Literals {
         return ids;
     }
     let plane = |id: LiteralId| plane_of[ids.binary_search(&id).expect("a literal of the expression")];
-    let table: Vec<bool> =
-        (0..1usize << planes.len()).map(|true_ones| holds(open, &|id| true_ones >> plane(id) & 1 == 1)).collect();
-    let depends = |k: usize| (0..table.len()).any(|i| i >> k & 1 == 0 && table[i] != table[i | 1 << k]);
-    let kept: Literals = ids.iter().zip(&plane_of).filter(|(_, k)| depends(**k)).map(|(id, _)| *id).collect();
+    let worlds = || 0..1usize << planes.len();
+    let table: Vec<bool> = worlds().map(|w| holds(open, &|id| w >> plane(id) & 1 == 1)).collect();
+    let depends = |k: usize| worlds().any(|w| w >> k & 1 == 0 && table[w] != table[w | 1 << k]);
+    // Of the faces in one plane those count that decide when they are the first or the last of it.
+    let alone = |own: LiteralId| {
+        let k = plane(own);
+        worlds().any(|w| table[w] != holds(open, &|id| (w >> plane(id) & 1 == 1) != (id == own)) && depends(k))
+    };
+    let of_plane = |k: usize| ids.iter().zip(&plane_of).filter(move |(_, p)| **p == k).map(|(id, _)| *id);
+    let mut kept = Literals::new();
+    for k in (0..planes.len()).filter(|k| depends(*k)) {
+        let before = kept.len();
+        kept.extend(of_plane(k).filter(|id| alone(*id)));
+        if kept.len() == before {
+            kept.extend(of_plane(k));
+        }
+    }
+    kept.sort_unstable();
     if kept.is_empty() { ids } else { kept }
 }
 

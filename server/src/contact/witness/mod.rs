@@ -8,5 +8,6 @@ pub mod features;
 pub mod found;
 pub mod known;
 pub mod newton;
+pub mod retreat;
 mod sides;
-mod touch;
+pub mod touch;

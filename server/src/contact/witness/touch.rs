@@ -1,10 +1,14 @@
 //! From a confirmed witness of depth delta back to where the surfaces touch.
 
+use super::extent::{ACTIVE, INCIDENT};
+use super::features::Features;
 use super::found::SAME_POINT;
 use super::known::Known;
-use super::newton::{Constraint, MAX_ACTIVE, Problem, SETTLED, Solution};
+use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution, Weights};
+use super::retreat::{BACK, Climber, ON_SURFACE, held};
 use super::sides::{deciding, has_both_sides};
 use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::depth;
 use crate::contact::query::task::{Task, witness_level};
 use crate::octree::Model;
 use glam::DVec3;
@@ -12,19 +16,29 @@ use glam::DVec3;
 /// Halvings of the depth on the way from a witness back to its touch.
 const CONTINUATIONS: usize = 40;
 
+/// What a climb's end counts as: settled, and no better than that.
+pub(in crate::contact) const CLIMBED: f64 = 0.5 * SETTLED;
+
+/// |Σ λ g| of two like faces that is small enough for either normal to be told.
+const BALANCED: f64 = 1e-7;
+
 /// Size of a small feature against its body.
 const FEATURE: f64 = 1e-3;
 
 /// Exchanges of faces at one depth.
 const MENDS: usize = 8;
 
+/// How far from either surface the end of a climb may lie that is told as a touch, relative to the bodies. Where none
+/// lies so near the witness alone is told (`Outcome::not_continued`).
+const TOUCHES: f64 = 1e-11;
+
 /// A continuation that leads farther from its witness than this, in scales of the pair, is another contact's.
 const NOT_FAR: f64 = 1e-2;
 
 /// The way back to the touch.
-pub(super) struct Touch<'t, 'a> {
-    pub(super) task: &'t Task<'a>,
-    pub(super) known: Known<'t>,
+pub(in crate::contact) struct Touch<'t, 'a> {
+    pub(in crate::contact) task: &'t Task<'a>,
+    pub(in crate::contact) known: Known<'t>,
 }
 
 impl Touch<'_, '_> {
@@ -46,8 +60,11 @@ impl Touch<'_, '_> {
         });
         let touch = touch.and_then(|s| if self.is_touch(&s, deep.t) { Some(s) } else { self.touch_beside(s, deep.t) });
         match touch {
-            Some(s) if holds(&s) => Some(s),
-            other if continues => self.continued_by_steps(deep).or(other),
+            Some(s) if self.is_held(&s) => Some(s),
+            other if continues => {
+                let climbed = || self.back(deep, &Climber::new(self.task, BACK));
+                self.continued_by_steps(deep).or_else(climbed).or(other.filter(|s| self.is_there(s)))
+            }
             other => other,
         }
     }
@@ -60,6 +77,30 @@ impl Touch<'_, '_> {
         s.t <= latest && touches(self.task.model_a, s.x) && touches(self.task.model_b, at.b_point(s.x))
     }
 
+    /// True when a solution's multipliers balance, none pulls, and its faces are there.
+    fn is_held(&self, s: &Solution) -> bool {
+        holds(s) && self.is_there(s)
+    }
+
+    /// True when f depends on each face that pushes, or on another one in its plane. In a thin wall a face that decides
+    /// at depth delta may be passed by long before the surfaces meet.
+    fn is_there(&self, s: &Solution) -> bool {
+        if self.task.a.primitives.len() + self.task.b.primitives.len() <= 2 {
+            return true;
+        }
+        let at = self.task.relative.at(s.t);
+        let features = Features::at(self.task, s.x, &at, Some(INCIDENT * self.task.rounding));
+        if features.active.iter().any(|ids| ids.is_empty()) {
+            return true;
+        }
+        s.active.iter().zip(&s.lambda).all(|(c, l)| match *c {
+            Constraint::Literal(side, id) if *l > ACTIVE => {
+                features.has(side, id) || features.in_plane_of(side, id).is_some()
+            }
+            Constraint::Literal(..) | Constraint::Apex(..) => true,
+        })
+    }
+
     /// The touch of a witness that its own equations do not lead to: because other faces decide where the bodies are less
     /// deep, or because they bend too much on the way. The depth is taken back by halves, the set of faces mended by what
     /// both trees say at each; from every depth the last step is tried.
@@ -67,7 +108,7 @@ impl Touch<'_, '_> {
         let mut from = deep.clone();
         let mut level = witness_level(self.task.delta, self.task.rounding);
         for _ in 0..CONTINUATIONS {
-            let last = self.mended(&from, 0.0).filter(|s| holds(s) && self.is_touch(s, deep.t));
+            let last = self.mended(&from, 0.0).filter(|s| self.is_held(s) && self.is_touch(s, deep.t));
             if last.is_some() || level < self.task.rounding {
                 return last;
             }
@@ -80,6 +121,42 @@ impl Touch<'_, '_> {
             from = next;
         }
         None
+    }
+
+    /// The touch that climbs lead back to. Solved for where its faces' equations have a solution there; else the
+    /// climb's own end, if that lies on both surfaces or at the start.
+    pub(in crate::contact) fn back(&self, deep: &Solution, climber: &Climber) -> Option<Solution> {
+        let level = witness_level(self.task.delta, self.task.rounding);
+        let solve = |t: f64, held: &depth::Held| {
+            let near = |s: &Solution| (s.x - held.0).length() <= NOT_FAR * self.task.scale;
+            let balances = |s: &Solution| s.stationarity < BALANCED;
+            let touches = |s: &Solution| near(s) && balances(s) && self.is_held(s) && self.is_touch(s, deep.t);
+            self.mended(&self.climbed(t, held), 0.0).filter(touches)
+        };
+        let (t, held) = match climber.back((deep.t, deep.x, level), solve)? {
+            Ok(solved) => return Some(solved),
+            Err(end) => end,
+        };
+        // A climb may end on one of the surfaces.
+        let at = self.task.relative.at(t);
+        let values = [self.task.model_a.value(held.0), self.task.model_b.value(at.b_point(held.0))];
+        let off = values[0].abs().max(values[1].abs());
+        let most = TOUCHES * self.task.scale + 4.0 * ON_SURFACE * self.task.rounding;
+        let is_deep_at_start = t == 0.0 && held.1 > ON_SURFACE * self.task.rounding;
+        (is_deep_at_start || off <= most).then(|| self.climbed(t, &held))
+    }
+
+    /// Where a climb has ended, as a solution of the faces that hold it.
+    pub(in crate::contact) fn climbed(&self, t: f64, (x, _, support): &depth::Held) -> Solution {
+        let (mut active, mut lambda): (Actives, Weights) = held(support).unzip();
+        if !has_both_sides(&active) {
+            // What is no thicker than rounding holds itself.
+            let at = self.task.relative.at(t);
+            let (a, b) = (self.task.model_a.deciding(*x).1, self.task.model_b.deciding(at.b_point(*x)).1);
+            active = [Constraint::Literal(Side::A, a), Constraint::Literal(Side::B, b)].into_iter().collect();
+            lambda = [0.5; 2].into_iter().collect();
+        }
+        Solution { x: *x, t, active, lambda, stationarity: CLIMBED }
     }
 
     /// The contact at a depth from one at another, its faces exchanged until both trees have that depth at its point.
