@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use contactd::cache::{self, Cache, Prepared};
 use contactd::check::Check;
 use contactd::contact::Status;
-use contactd::import::{self, Facets, Limits, Scene, Source};
+use contactd::import::{self, Facets, Limits, ModelBytes, Scene};
 use contactd::inspect;
 use contactd::ipc::{CacheFolder, ServerConfig};
 use contactd::octree::Model;
@@ -67,7 +67,7 @@ enum Command {
     },
     /// What is in a model or scene file, and how it was imported.
     Inspect {
-        /// A .csg or .toml file.
+        /// A model (.csg, .stl, .off, .obj) or a scene (.toml).
         file: PathBuf,
         /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
         #[arg(long, default_value = "auto", value_parser = facets)]
@@ -282,8 +282,8 @@ fn inspect_file(
         text
     } else {
         let (limits, name) = (Limits::default(), file.display().to_string());
-        let bytes = import::read_bytes(file, &limits)?;
-        let prepared = cache::prepare(cache.open().as_ref(), &Source::named(&name, &bytes), facets, &limits)?;
+        let read = ModelBytes::read(file, &limits)?;
+        let prepared = cache::prepare(cache.open().as_ref(), &read.source(), facets, &limits)?;
         prepared.trouble.as_deref().into_iter().for_each(warn);
         let text = inspect::model(&name, &prepared.model, &prepared.notes);
         if let Some(to) = picture {

@@ -1,6 +1,6 @@
 //! What a kept model is known by: a hash of everything from outside the program that decides what an import makes of it.
 
-use crate::import::{Facets, Format, Limits};
+use crate::import::{Attachment, Facets, Format, Limits};
 
 /// A BLAKE3 hash of 256 bits: no two files are taken for each other, not even two that were made for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +18,24 @@ impl Key {
         hasher.update(format.name.as_bytes());
         // Last, for its length is not told.
         hasher.update(bytes);
+        Self(*hasher.finalize().as_bytes())
+    }
+
+    /// The key of a file that names others, from its own.
+    pub fn with(self, attached: &[Attachment]) -> Self {
+        if attached.is_empty() {
+            return self;
+        }
+        let mut hasher = blake3::Hasher::new_derive_key("contactd 2026 key of a preprocessed model of several files");
+        hasher.update(&self.0);
+        for file in attached {
+            let bytes = file.bytes.as_deref().unwrap_or_default();
+            hasher.update(&[u8::from(file.bytes.is_ok())]);
+            for part in [file.name.as_bytes(), bytes] {
+                hasher.update(&(part.len() as u64).to_le_bytes());
+                hasher.update(part);
+            }
+        }
         Self(*hasher.finalize().as_bytes())
     }
 }

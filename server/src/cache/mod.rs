@@ -19,7 +19,7 @@ mod tests;
 pub use file::{Flaw, decode, encode};
 pub use key::Key;
 
-use crate::import::{Facets, ImportError, Limits, Note, Scene, SceneError, Source};
+use crate::import::{Attachment, Facets, ImportError, Limits, Note, Scene, SceneError, Source};
 use crate::octree::Model;
 use std::collections::HashMap;
 use std::fs::{self, DirBuilder, File};
@@ -185,7 +185,7 @@ pub fn prepare(
     let build = || source.import(facets, limits).map(|i| (Model::new(i.solid), i.notes));
     let prepared = |(model, notes), origin, trouble| Prepared { model: Arc::new(model), notes, origin, trouble };
     let Some(cache) = cache else { return Ok(prepared(build()?, Origin::Built, None)) };
-    let key = Key::of(source.format()?, source.bytes, facets, limits);
+    let key = Key::of(source.format()?, source.bytes, facets, limits).with(source.attached.unwrap_or_default());
     let flaw = match cache.read(&key) {
         Ok(kept) => return Ok(prepared(kept, Origin::Kept, None)),
         Err(flaw) => flaw,
@@ -212,9 +212,10 @@ pub fn prepare_scene(
     facets: Facets,
     limits: &Limits,
 ) -> Result<Vec<Prepared>, SceneError> {
-    let mut known: HashMap<(&str, Vec<u8>), Prepared> = HashMap::new();
+    let mut known: HashMap<(&str, Vec<u8>, Vec<Attachment>), Prepared> = HashMap::new();
     scene.each_model(limits, |source| {
-        let key = (source.format()?.name, source.bytes.to_vec());
+        let attached = source.attached.unwrap_or_default().to_vec();
+        let key = (source.format()?.name, source.bytes.to_vec(), attached);
         if let Some(same) = known.get(&key) {
             return Ok(Prepared { trouble: None, ..same.clone() });
         }

@@ -3,7 +3,7 @@
 //! A new format is a folder beside `csg` and a row of `FORMATS`. Nothing else names one: the wire, the cache, the journal and the
 //! clients carry a format's name and a file's bytes.
 
-use super::{Facets, Import, ImportError, Limits, csg};
+use super::{Facets, Import, ImportError, Limits, csg, mesh};
 use std::path::Path;
 
 /// A file format.
@@ -13,12 +13,23 @@ pub struct Format {
     pub name: &'static str,
     /// How names of its files end, without the dot, in lower case.
     pub endings: &'static [&'static str],
-    /// Reads a model; the first argument is what errors call the file.
-    pub read: fn(&str, &[u8], Facets, &Limits) -> Result<Import, ImportError>,
+    /// Reads a model.
+    pub read: fn(&Source, Facets, &Limits) -> Result<Import, ImportError>,
+    /// The other files that such a file names, as it names them.
+    pub names: fn(&[u8], &Limits) -> Vec<String>,
+}
+
+/// A file that another one names, in memory.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Attachment {
+    /// As the other one names it.
+    pub name: String,
+    /// What it has in it, or why it was not read.
+    pub bytes: Result<Vec<u8>, String>,
 }
 
 /// Every format that is read. A file whose name ends in none of these ways is taken for one of the first.
-pub const FORMATS: &[Format] = &[csg::FORMAT];
+pub const FORMATS: &[Format] = &[csg::FORMAT, mesh::stl::FORMAT, mesh::off::FORMAT, mesh::obj::FORMAT];
 
 /// A file that is in memory.
 #[derive(Clone, Copy, Debug)]
@@ -29,12 +40,14 @@ pub struct Source<'a> {
     pub format: &'a str,
     /// What it has in it.
     pub bytes: &'a [u8],
+    /// The files that it names; `None` where it was sent, and names none.
+    pub attached: Option<&'a [Attachment]>,
 }
 
 impl<'a> Source<'a> {
     /// A file whose name says what it is.
     pub fn named(name: &'a str, bytes: &'a [u8]) -> Self {
-        Self { name, format: "", bytes }
+        Self { name, format: "", bytes, attached: None }
     }
 
     /// Its format.
@@ -59,7 +72,7 @@ impl<'a> Source<'a> {
     /// # Errors
     /// What is wrong with it.
     pub fn import(&self, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
-        (self.format()?.read)(self.name, self.bytes, facets, limits)
+        (self.format()?.read)(self, facets, limits)
     }
 }
 
@@ -76,12 +89,55 @@ pub fn read_bytes(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError> 
     std::fs::read(path).map_err(read)
 }
 
+/// A file and those that it names.
+#[derive(Clone, Debug)]
+pub struct ModelBytes {
+    name: String,
+    bytes: Vec<u8>,
+    attached: Vec<Attachment>,
+}
+
+impl ModelBytes {
+    /// Reads a file whose name says what it is, and those that it names: from its own folder and below, nowhere else.
+    ///
+    /// # Errors
+    /// `Read`, and `Large` when there are more bytes than the limit says; what is wrong with a file that it names is kept for
+    /// who asks for that.
+    pub fn read(path: &Path, limits: &Limits) -> Result<Self, ImportError> {
+        let (name, bytes) = (path.display().to_string(), read_bytes(path, limits)?);
+        let names = (Source::named(&name, &bytes).format()?.names)(&bytes, limits);
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let attached =
+            names.into_iter().map(|name| Attachment { bytes: beside(folder, &name, limits), name }).collect();
+        Ok(Self { name, bytes, attached })
+    }
+
+    /// What is read of it.
+    pub fn source(&self) -> Source<'_> {
+        Source { attached: Some(&self.attached), ..Source::named(&self.name, &self.bytes) }
+    }
+}
+
+/// The bytes of a file in a folder or below it.
+fn beside(folder: &Path, name: &str, limits: &Limits) -> Result<Vec<u8>, String> {
+    let unreadable = |e: std::io::Error| format!("{name:?}: {e}");
+    let (root, path) = (folder.canonicalize().map_err(unreadable)?, folder.join(name));
+    let path = path.canonicalize().map_err(unreadable)?;
+    if !path.starts_with(&root) {
+        return Err(format!("{name:?}, which is not in the folder of the text that names it"));
+    }
+    if !path.is_file() {
+        return Err(format!("{name:?}, which is no plain file"));
+    }
+    read_bytes(&path, limits).map_err(|e| e.to_string())
+}
+
 /// Reads a model from a file whose name says what it is.
 ///
 /// # Errors
 /// What is wrong with the file.
 pub fn read_model(path: &Path, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
-    Source::named(&path.display().to_string(), &read_bytes(path, limits)?).import(facets, limits)
+    ModelBytes::read(path, limits)?.source().import(facets, limits)
 }
 
 #[cfg(test)]
@@ -90,13 +146,14 @@ mod tests {
 
     #[test]
     fn a_format_is_what_is_stated_else_what_the_name_says() {
-        let of =
-            |name: &'static str, format: &'static str| Source { name, format, bytes: b"" }.format().map(|f| f.name);
+        let of = |name: &'static str, format: &'static str| {
+            Source { name, format, bytes: b"", attached: None }.format().map(|f| f.name)
+        };
         for (name, format) in [("a.csg", ""), ("a", ""), ("a.b/c", ""), ("a.CSG", ""), ("a.txt", "csg"), ("a", "CSG")] {
             assert_eq!(of(name, format).unwrap(), "csg", "{name} {format}");
         }
         let sentence = of("part.csg", "step").unwrap_err().to_string();
-        assert_eq!(sentence, "part.csg: expected one of the formats csg, found \"step\"");
+        assert_eq!(sentence, "part.csg: expected one of the formats csg, stl, off, obj, found \"step\"");
     }
 
     #[test]

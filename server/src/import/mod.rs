@@ -1,4 +1,4 @@
-//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`) and scene files (`scene`).
+//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; meshes: `mesh`) and scene files (`scene`).
 //!
 //! A file is read completely or refused with one sentence that names the file, the line, the column, what was expected
 //! and what stands there. Real files are rough; whatever is snapped, flipped, merged or taken in another way than
@@ -9,10 +9,13 @@
 
 pub mod csg;
 pub mod format;
+pub mod mesh;
+pub mod problem;
 pub mod scene;
 
-pub use csg::{Problem, import_csg};
-pub use format::{FORMATS, Format, Source, read_bytes, read_model};
+pub use csg::import_csg;
+pub use format::{Attachment, FORMATS, Format, ModelBytes, Source, read_bytes, read_model};
+pub use problem::Problem;
 pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
 
 use crate::solid::Solid;

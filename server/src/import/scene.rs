@@ -8,7 +8,7 @@
 mod rules;
 
 use self::rules::RawRule;
-use super::format::{Source, read_bytes};
+use super::format::{ModelBytes, Source};
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Motion, MotionState, Pose, Rule};
@@ -188,8 +188,7 @@ impl Scene {
         mut read: impl FnMut(&Source) -> Result<T, ImportError>,
     ) -> Result<Vec<T>, SceneError> {
         let each = self.models.iter().map(|m| {
-            let (name, bytes) = (m.path.display().to_string(), read_bytes(&m.path, limits));
-            bytes.and_then(|bytes| read(&Source::named(&name, &bytes))).map_err(|e| match e {
+            ModelBytes::read(&m.path, limits).and_then(|file| read(&file.source())).map_err(|e| match e {
                 ImportError::Read { file, reason } => SceneError::Value {
                     file: self.file.clone(),
                     at: m.at,

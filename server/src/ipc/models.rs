@@ -51,7 +51,7 @@ impl Models {
     /// `Model` or a limit, with line and column in the sentence.
     pub fn load(&self, file: &ModelFile, facets: Facets) -> Result<Arc<Loaded>, Refusal> {
         let ModelFile { name, format, bytes } = file;
-        let source = Source { name, format, bytes };
+        let source = Source { name, format, bytes, attached: None };
         let format = source.format().map_err(|e| Refusal::new(ErrorCode::Model, e.to_string()))?;
         let key = (facets, format.name, Arc::<[u8]>::from(bytes.as_slice()));
         let known = self.loaded.lock().unwrap_or_else(PoisonError::into_inner).get(&key).and_then(Weak::upgrade);

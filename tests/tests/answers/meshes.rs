@@ -9,6 +9,7 @@ use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
 use contactd::solid::Shape;
 use contactd::solid::primitive::Polyhedron;
+use contactd_proto::control::{Facets, ModelFile};
 use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::certify_all;
 use contactd_tests::engine::question;
@@ -241,4 +242,30 @@ fn finer_facets_meet_as_what_they_facet() {
     facets_close_in("torus", (Recipe::torus(0.9, 0.3), false), &counts[..3], |n| {
         (meshes::torus((0.9, 0.3), n, n), sagitta(0.3, n) + sagitta(1.2, n))
     });
+}
+
+#[test]
+fn a_session_takes_the_bytes_of_a_mesh_by_the_name_of_their_format() {
+    let config = contactd::ipc::ServerConfig::default();
+    let mut session = contactd::embedded(&config).expect("a session");
+    let tetrahedron = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+    let mut load = |name: &str, format: &str, bytes: &[u8]| {
+        let file = ModelFile { name: name.into(), format: format.into(), bytes: bytes.into() };
+        session.load_model_file(file, Facets::Auto)
+    };
+    let info = load("a part", "off", tetrahedron.as_bytes()).expect("a tetrahedron");
+    assert_eq!(info.faces.len(), 4);
+    let (points, triangles) = meshes::torus((1.0, 0.3), 6, 5);
+    let mut stl = vec![0; 80];
+    stl.extend((triangles.len() as u32).to_le_bytes());
+    for t in &triangles {
+        stl.extend([0; 12]);
+        let corners = t.iter().flat_map(|v| points[*v as usize].to_array());
+        corners.for_each(|x| stl.extend((x as f32).to_le_bytes()));
+        stl.extend([0; 2]);
+    }
+    let info = load("ring.stl", "", &stl).expect("a ring");
+    assert!(info.warnings.iter().any(|w| w.to_string().contains("neither its unit")), "{:?}", info.warnings);
+    let error = load("ring.stl", "", &stl[..stl.len() - 1]).expect_err("a byte is missing").to_string();
+    assert!(error.contains("ring.stl:1:1: expected "), "{error}");
 }

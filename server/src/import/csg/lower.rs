@@ -9,6 +9,7 @@ use super::arguments::{Arguments, OTHER_FILES, finite};
 use super::convex;
 use super::extrude::Extrusion;
 use super::flat::{Flat, Outline};
+use super::imports;
 use super::offset::Offset;
 use super::outlines::{self, flat_of, flats};
 use super::parts::{Part, PartId, Parts, emit, is_unbounded};
@@ -18,7 +19,7 @@ use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
 use super::syntax::{Call, CallId, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
-use crate::import::Note;
+use crate::import::{Attachment, Note};
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
 use crate::solid::Op;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -26,8 +27,9 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
 /// Makes a solid of a parsed file.
-pub fn lower(file: &File, facets: Facets, limits: &Limits) -> Result<Import> {
-    let mut lowering = Lowering { file, shapes: Shapes { facets, limits, parts: Parts::new(limits) } };
+pub fn lower(file: &File, (facets, attached): (Facets, Option<&[Attachment]>), limits: &Limits) -> Result<Import> {
+    let shapes = Shapes { facets, limits, parts: Parts::new(limits) };
+    let mut lowering = Lowering { file, attached, shapes };
     let root = lowering.tree()?;
     let Parts { mut notes, list, .. } = lowering.shapes.parts;
     let solid = emit(list, root, &mut notes);
@@ -109,6 +111,8 @@ impl Step {
 
 struct Lowering<'a> {
     file: &'a File,
+    /// The files that it names.
+    attached: Option<&'a [Attachment]>,
     shapes: Shapes<'a>,
 }
 
@@ -223,6 +227,14 @@ impl<'a> Lowering<'a> {
                         self.shapes.parts.push(Part::Stray(call.at, call.name.clone()))
                     }
                 };
+                Ok(Step::Leaf(id))
+            }
+            "import" if context.plane.is_some() && self.attached.is_some() => {
+                Err((call.at, Problem::unsupported("import inside of a 2D shape")))
+            }
+            "import" => {
+                let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
+                no_children(call)?;
                 Ok(Step::Leaf(id))
             }
             other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
@@ -558,7 +570,7 @@ fn hint(name: &str) -> &'static str {
     match name {
         "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
         | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
-        "import" | "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
+        "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
         "resize" | "projection" | "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
         "text" | "fill" => " (write the outline out in circles, squares and polygons)",
         _ => "",

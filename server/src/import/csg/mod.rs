@@ -21,6 +21,7 @@ mod extrude;
 mod facets;
 mod flat;
 mod hull;
+mod imports;
 mod lexer;
 mod lower;
 mod offset;
@@ -34,70 +35,46 @@ mod syntax;
 #[cfg(test)]
 mod tests;
 
-use super::{Facets, Format, Import, ImportError, Limits, Place};
-use crate::solid::primitive::{MeshError, MeshFault};
-
-/// What is wrong with a model's text.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Problem {
-    /// Something else stands where the format wants something.
-    #[error("expected {expected}, found {found}")]
-    Syntax {
-        /// What could stand there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
-    /// A construct of the language that has no exact solid here.
-    #[error("expected a supported construct, found {construct}, which is not supported{hint}")]
-    Unsupported {
-        /// The construct.
-        construct: String,
-        /// What to do about it, as a parenthesis; may be empty.
-        hint: &'static str,
-    },
-    /// A mesh that is no polyhedron.
-    #[error("expected a closed polyhedron, found {0}")]
-    Mesh(#[from] MeshError),
-    /// A mesh that is not the surface of a solid.
-    #[error("expected a closed mesh, found {0}")]
-    Surface(#[from] MeshFault),
-    /// A limit was reached.
-    #[error("expected at most {limit} {what}, found more")]
-    Limit {
-        /// Of what.
-        what: &'static str,
-        /// How many.
-        limit: usize,
-    },
-}
-
-impl Problem {
-    pub(super) fn syntax(expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Self::Syntax { expected: expected.into(), found: found.into() }
-    }
-
-    pub(super) fn unsupported(construct: impl Into<String>) -> Self {
-        Self::Unsupported { construct: construct.into(), hint: "" }
-    }
-}
+use super::problem::Problem;
+use super::{Attachment, Facets, Format, Import, ImportError, Limits, Place, Source};
 
 /// Reads a model from the text of a flattened file; `file` is what errors call it.
 pub fn import_csg(file: &str, text: &str, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
+    import_with(file, text, (facets, None), limits)
+}
+
+fn import_with(
+    file: &str,
+    text: &str,
+    (facets, attached): (Facets, Option<&[Attachment]>),
+    limits: &Limits,
+) -> Result<Import, ImportError> {
     syntax::parse(text, limits)
-        .and_then(|tree| lower::lower(&tree, facets, limits))
+        .and_then(|tree| lower::lower(&tree, (facets, attached), limits))
         .map_err(|(at, problem)| ImportError::Content { file: file.to_owned(), at, problem })
 }
 
 /// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: import_bytes };
+pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: import_bytes, names: named };
 
-fn import_bytes(file: &str, bytes: &[u8], facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
+/// The files that the text imports, each once.
+fn named(bytes: &[u8], limits: &Limits) -> Vec<String> {
+    let tree = std::str::from_utf8(bytes).ok().and_then(|text| syntax::parse(text, limits).ok());
+    let Some(tree) = tree else { return Vec::new() };
+    let mut names: Vec<String> =
+        tree.calls.iter().filter(|c| c.name == "import").filter_map(imports::file_of).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+fn import_bytes(source: &Source, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
+    let (file, bytes) = (source.name, source.bytes);
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let before = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
         let at = Place::of_offset(&before, before.len());
         let found = format!("the byte 0x{:02x}", bytes[e.valid_up_to()]);
         ImportError::Content { file: file.to_owned(), at, problem: Problem::syntax("text in UTF-8", found) }
     })?;
-    import_csg(file, text, facets, limits)
+    import_with(file, text, (facets, source.attached), limits)
 }

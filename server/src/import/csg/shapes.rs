@@ -161,6 +161,17 @@ impl Shapes<'_> {
         let arguments = Arguments::new(call, &["points", "faces"])?;
         let points: Vec<DVec3> = arguments.points::<3>("points")?.into_iter().map(DVec3::from_array).collect();
         let faces = arguments.index_lists("faces", points.len())?;
+        self.of_faces(call, outer, hull, (points, faces))
+    }
+
+    /// The solid within faces that run clockwise as seen from outside.
+    pub fn of_faces(
+        &mut self,
+        call: &Call,
+        outer: &DAffine3,
+        hull: bool,
+        (points, faces): (Vec<DVec3>, Vec<Vec<u32>>),
+    ) -> Result<PartId> {
         if faces.len() > self.limits.polyhedron_faces && !hull {
             return self.mesh(call, outer, (&points, &faces), None);
         }

@@ -1,0 +1,59 @@
+//! Wavefront OBJ: points, faces by their points' numbers from 1, or from the last one backwards. All groups are one mesh.
+//!
+//! Normals, texture coordinates, groups, materials and smoothing change no shape and are not read.
+
+use super::{Line, Polygons, Result};
+use crate::import::{Facets, Format, Import, ImportError, Limits, Source};
+
+/// The row of `format::FORMATS`.
+pub const FORMAT: Format = Format { name: "obj", endings: &["obj"], read: import, names: |_, _| Vec::new() };
+
+fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
+    super::import(source.name, "OBJ", read(source.bytes, limits), limits)
+}
+
+/// What changes no shape.
+const HARMLESS: [&str; 9] = ["vn", "vt", "vp", "o", "g", "s", "usemtl", "mtllib", "l"];
+
+/// Reads a mesh.
+///
+/// # Errors
+/// What is wrong, with its place.
+pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
+    let (mut mesh, mut triangles) = (Polygons::default(), 0);
+    for line in Line::all(super::text(bytes)?) {
+        let mut words = line.words();
+        let word = words.next();
+        match word.unwrap_or_default() {
+            "v" => mesh.points.push(line.point(&mut words)?),
+            "f" => {
+                let mut face = Vec::new();
+                for corner in words {
+                    face.push(index(&line, corner, mesh.points.len())?);
+                }
+                if face.len() < 3 {
+                    return line.wrong("three corners or more", None);
+                }
+                mesh.push(face, line.at(word), &mut triangles, limits)?;
+            }
+            other if HARMLESS.contains(&other) => {}
+            _ => return line.wrong("v, f, or what changes no shape (vn, vt, g, o, s, usemtl, mtllib)", word),
+        }
+    }
+    Ok(mesh)
+}
+
+/// The place in the list of `count` points that a corner such as 3/1/2 or -1 names.
+fn index(line: &Line<'_>, corner: &str, count: usize) -> Result<u32> {
+    let number = corner.split('/').next().and_then(|w| w.parse::<i64>().ok());
+    let place = match number {
+        Some(n) if n > 0 => n - 1,
+        Some(n) if n < 0 => count as i64 + n,
+        Some(_) | None => -1,
+    };
+    if (0..count as i64).contains(&place) {
+        Ok(place as u32)
+    } else {
+        line.wrong(format!("a point's number up to {count}"), Some(corner))
+    }
+}

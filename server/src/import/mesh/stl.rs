@@ -1,0 +1,102 @@
+//! STL, both kinds: triangles with their corners; normals are not read, the order of corners tells the outside.
+
+use super::{Line, Polygons, Result};
+use crate::import::problem::Problem;
+use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
+use glam::DVec3;
+
+/// The row of `format::FORMATS`.
+pub const FORMAT: Format = Format { name: "stl", endings: &["stl"], read: import, names: |_, _| Vec::new() };
+
+fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
+    super::import(source.name, "STL", read(source.bytes, limits), limits)
+}
+
+/// Bytes before the triangles of a binary file: a remark, then their count.
+const HEAD: usize = 84;
+/// Bytes of one triangle: a normal, three corners, two bytes without meaning.
+const TRIANGLE: usize = 50;
+
+/// Reads a mesh.
+///
+/// # Errors
+/// What is wrong, with its place; of a binary file it is the number of the triangle.
+pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
+    let counted = bytes.get(80..HEAD).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]) as usize);
+    let fits = counted.is_some_and(|n| bytes.len() == HEAD.saturating_add(n.saturating_mul(TRIANGLE)));
+    match counted {
+        Some(count) if fits => binary(&bytes[HEAD..], count, limits),
+        _ if is_text(bytes) => ascii(super::text(bytes)?, limits),
+        Some(count) => {
+            let expected = format!(
+                "{count} triangles of {TRIANGLE} bytes after {HEAD} bytes, or a text that begins with \"solid\""
+            );
+            Err((Place::START, Problem::syntax(expected, format!("{} bytes", bytes.len()))))
+        }
+        None => Err((Place::START, Problem::syntax("an STL file", format!("{} bytes", bytes.len())))),
+    }
+}
+
+/// Binary files, too, may begin with that word.
+fn is_text(bytes: &[u8]) -> bool {
+    bytes.trim_ascii_start().starts_with(b"solid") && std::str::from_utf8(bytes).is_ok()
+}
+
+fn binary(bytes: &[u8], count: usize, limits: &Limits) -> Result<Polygons> {
+    let (mut mesh, mut triangles) = (Polygons::default(), 0);
+    if count > limits.mesh_facets {
+        return Err((Place::START, Problem::Limit { what: "triangles of a mesh", limit: limits.mesh_facets }));
+    }
+    for (i, triangle) in bytes.chunks_exact(TRIANGLE).enumerate() {
+        let number = |k: usize| {
+            let b = &triangle[12 + 4 * k..16 + 4 * k];
+            f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        };
+        let first = mesh.points.len() as u32;
+        for k in 0..3 {
+            let point = DVec3::new(number(3 * k), number(3 * k + 1), number(3 * k + 2));
+            if !point.is_finite() {
+                let found = format!("{point} in triangle {i}");
+                return Err((Place::START, Problem::syntax("finite numbers", found)));
+            }
+            mesh.points.push(point);
+        }
+        mesh.push(vec![first, first + 1, first + 2], Place::START, &mut triangles, limits)?;
+    }
+    Ok(mesh)
+}
+
+fn ascii(text: &str, limits: &Limits) -> Result<Polygons> {
+    let (mut mesh, mut triangles) = (Polygons::default(), 0);
+    let mut facet: Option<Vec<u32>> = None;
+    let mut lines = Line::all(text).peekable();
+    let mut closed = true;
+    while let Some(line) = lines.next() {
+        let mut words = line.words();
+        let word = words.next();
+        match (word.unwrap_or_default().to_ascii_lowercase().as_str(), &mut facet) {
+            ("solid", None) if closed => closed = false,
+            ("endsolid", None) if !closed => closed = true,
+            ("facet", None) if !closed => facet = Some(Vec::with_capacity(3)),
+            ("outer", Some(_)) | ("endloop", Some(_)) => {}
+            ("vertex", Some(corners)) if corners.len() < 3 => {
+                let point = line.point(&mut words)?;
+                corners.push(mesh.points.len() as u32);
+                mesh.points.push(point);
+            }
+            ("endfacet", Some(corners)) if corners.len() == 3 => {
+                let corners = std::mem::take(corners);
+                mesh.push(corners, line.at(word), &mut triangles, limits)?;
+                facet = None;
+            }
+            (_, Some(corners)) if corners.len() < 3 => return line.wrong("a vertex", word),
+            (_, Some(_)) => return line.wrong("endfacet", word),
+            (_, None) if closed => return line.wrong("solid", word),
+            (_, None) => return line.wrong("facet or endsolid", word),
+        }
+        if lines.peek().is_none() && !closed {
+            return line.wrong("endsolid", None);
+        }
+    }
+    Ok(mesh)
+}
