@@ -35,8 +35,10 @@ use smallvec::SmallVec;
 
 /// Clauses bounded per cell before the remaining ones share their common literals' bound.
 const MAX_CLAUSES: u32 = 96;
-/// Rounds of looking ahead and re-touching curved faces.
+/// Rounds of looking ahead and re-touching curved faces: of a clause that is complete, and of one that lists may still complete,
+/// whose bound is better served by their alternatives.
 const ROUNDS: usize = 5;
+const ROUNDS_BEFORE_LISTS: usize = 1;
 /// Weight of a concave literal's own cost in the choice of the axis to split, whether it holds the bound or not.
 const IDLE_COST: f64 = 0.25;
 /// The same of a convex one that curves.
@@ -404,7 +406,8 @@ impl Run<'_, '_> {
         if !self.scratch.lits.is_empty() {
             self.left = self.left.saturating_sub(1);
             self.scratch.clauses += 1;
-            own = self.clause(enough);
+            let rounds = if from < self.scratch.ors.len() { ROUNDS_BEFORE_LISTS } else { ROUNDS };
+            own = self.clause(rounds, enough);
         }
         if own.advance.dt >= enough || from == self.scratch.ors.len() || self.left == 0 {
             return own;
@@ -588,9 +591,9 @@ impl Run<'_, '_> {
         self.touched(l, low).map_or(own, |t| own.max(value(&t)))
     }
 
-    /// Bounds the clause of all literals taken so far, until that is `enough`. Tangents that were added stay for its
+    /// Bounds the clause of all literals taken so far, in at most so many rounds, until that is `enough`. Tangents that were added stay for its
     /// completions.
-    fn clause(&mut self, enough: f64) -> Bounded {
+    fn clause(&mut self, rounds: usize, enough: f64) -> Bounded {
         let h = self.view.motion.h;
         let last = self.solve(h);
         let mut best = Reach { dt: f64::NEG_INFINITY, path: [last; 2], enough };
@@ -609,7 +612,7 @@ impl Run<'_, '_> {
         let half = self.view.half;
         let beyond = LOOK_BEYOND * self.view.radius / self.view.motion.speed.max(f64::MIN_POSITIVE);
         let mut lowest = first;
-        for round in 0..ROUNDS {
+        for round in 0..rounds {
             let (before, gone_before) = (best.dt, gone.look);
             let mut touched = false;
             for ahead in [false, true] {
@@ -625,13 +628,19 @@ impl Run<'_, '_> {
                         look = look.max(fails);
                     }
                 }
-                lowest = self.solve(look);
-                if look == 0.0 {
-                    first = lowest;
-                }
-                if self.improve(&mut best, None, &lowest, look) || self.improve(&mut best, Some(&first), &lowest, look)
-                {
-                    return self.finish(&best, &lowest, &gone);
+                if look == 0.0 && round == 0 {
+                    // Solved already.
+                    lowest = first;
+                } else {
+                    lowest = self.solve(look);
+                    if look == 0.0 {
+                        first = lowest;
+                    }
+                    if self.improve(&mut best, None, &lowest, look)
+                        || self.improve(&mut best, Some(&first), &lowest, look)
+                    {
+                        return self.finish(&best, &lowest, &gone);
+                    }
                 }
                 touched |= self.touch(&lowest, look);
                 let course = self.course(&lowest);
