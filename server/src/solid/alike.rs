@@ -29,8 +29,9 @@ const NEAR: f64 = 1e-3;
 const MOST_NEIGHBOURS: usize = 256;
 /// Tokens that the simplification of one normal form may look at, for each of its own …
 const WORK: usize = 64;
-/// … and beside that.
+/// … and beside that; no more in all, or the formula of a mesh of thousands of facets would take longer than all else.
 const LEAST_WORK: usize = 100_000;
+const MOST_WORK: usize = 4_000_000;
 /// Operands of one operator up to which each is compared with each.
 const FEW: usize = 64;
 
@@ -195,7 +196,7 @@ impl Alike {
             out.extend_from_slice(tokens);
             return if tokens.is_empty() { Truth::True } else { Truth::Open };
         }
-        let left = WORK * tokens.len() + LEAST_WORK;
+        let left = (WORK * tokens.len() + LEAST_WORK).min(MOST_WORK);
         let mut s = Simplifier { alike: self, state: HashMap::new(), trail: Vec::new(), left, look: true };
         let mut tree = Tree::of(tokens);
         for _ in 0..4 {
@@ -457,9 +458,11 @@ impl Simplifier<'_> {
     /// Leaves out operands that say nothing beside others: the same again, and of those that hold some operands in common one
     /// that has more of them (A ∪ (A ∩ B) = A, A ∩ (A ∪ B) = A).
     fn without_dominated(&mut self, and: bool, all: Vec<Tree>) -> Vec<Tree> {
-        if all.len() < 2 {
+        let looked: usize = all.iter().map(Tree::size).sum();
+        if all.len() < 2 || self.left < looked {
             return all;
         }
+        self.left -= looked;
         let names: Vec<Vec<Tree>> = all.iter().map(|e| self.operands(and, e)).collect();
         let mut seen: HashMap<&[Tree], usize> = HashMap::new();
         let mut keep = vec![true; all.len()];
@@ -474,7 +477,6 @@ impl Simplifier<'_> {
                 keep[i] &= !dominated;
             }
         }
-        self.left = self.left.saturating_sub(names.iter().map(Vec::len).sum());
         all.into_iter().zip(keep).filter(|(_, keep)| *keep).map(|(e, _)| e).collect()
     }
 

@@ -38,6 +38,9 @@ const SPANS: u64 = 2;
 /// Slabs among which one is looked up that cost as much.
 const LOOKUPS: u64 = 16;
 
+/// A face without a slab in the box at hand.
+const NO_SLAB: u32 = u32::MAX;
+
 /// Rounding of the moments of a cell, as a fraction of its box' volume (times the extents, for the others): the signed
 /// tetrahedra of a few dozen triangles, each of a volume below that of the box and right to 8 ε.
 const CELL_ROUNDING: f64 = 512.0 * f64::EPSILON;
@@ -98,8 +101,10 @@ enum VoxelBody {
 /// Evaluates boxes of one solid; keeps its memory.
 pub struct Evaluator<'a> {
     faces: &'a [Face],
-    /// The slabs of the box at hand by face, and those of the cell at hand.
+    /// The slabs of the box at hand with their faces, and those of the cell at hand.
     slabs: Vec<(u32, Slab)>,
+    /// Where the slab of a face is in `slabs`, for each face of the solid.
+    places: Vec<u32>,
     closer: Vec<(u32, Slab)>,
     half: DVec3,
     cube: Cell,
@@ -116,7 +121,8 @@ impl<'a> Evaluator<'a> {
     pub fn new(faces: &'a [Face]) -> Self {
         let (slabs, closer, cells, expressions) = Default::default();
         let (half, cube) = (DVec3::ZERO, Cell::cube());
-        Self { faces, slabs, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS, work: 0 }
+        let places = vec![NO_SLAB; faces.len()];
+        Self { faces, slabs, places, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS, work: 0 }
     }
 
     /// The same without a limit of cuts: for a solid that shall be one box.
@@ -154,9 +160,13 @@ impl<'a> Evaluator<'a> {
     fn cut_up(&mut self, voxel: &mut Voxel, kept: &[Token], center: DVec3, half: DVec3) {
         let cube = std::mem::take(&mut self.cube);
         (self.cuts, self.half) = (0, half);
-        self.slabs.clear();
+        for (face, _) in self.slabs.drain(..) {
+            self.places[face as usize] = NO_SLAB;
+        }
         for id in literals(kept) {
-            if self.slabs.iter().all(|(face, _)| *face != id.face()) {
+            let place = &mut self.places[id.face() as usize];
+            if *place == NO_SLAB {
+                *place = self.slabs.len() as u32;
                 self.slabs.push((id.face(), Slab::new(&self.faces[id.face() as usize], center, half)));
             }
         }
@@ -188,9 +198,11 @@ impl<'a> Evaluator<'a> {
     }
 
     fn slab(&self, id: LiteralId, body: VoxelBody) -> &Slab {
-        let slabs = if body == VoxelBody::Solid { &self.slabs } else { &self.closer };
-        let found = slabs.iter().find(|(face, _)| *face == id.face());
-        &found.expect("every literal of the box has its slab").1
+        if body == VoxelBody::Solid {
+            return &self.slabs[self.places[id.face() as usize] as usize].1;
+        }
+        let found = self.closer.iter().find(|(face, _)| *face == id.face());
+        &found.expect("every curved literal of the cell has its slab").1
     }
 
     /// What a literal is over a cell of the body.
