@@ -448,10 +448,9 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let mut doubts: Option<Vec<(Lie, String)>> = None;
     let measures = [4, 0, 2, 6, 8, 10, 12, 14, 16, 18, 20].map(|k| least * f64::from(1 << k));
     let measures: Vec<f64> = measures.into_iter().filter(|t| *t < most).chain([most]).collect();
-    // A point that is deep may lie deeper in the one than in the other, and of a body that is small or far away numbers
-    // are rounded otherwise than of the other one: each has a measure of its own.
+    // A point that is deep may lie deeper in the one than in the other: then each has a measure of its own.
     let same = measures.iter().map(|tau| [*tau; 2]);
-    let each = measures.iter().flat_map(|a| measures.iter().map(|b| [*a, *b]));
+    let each = measures.iter().flat_map(|a| measures.iter().map(|b| [*a, *b])).filter(|_| at_depth);
     for taus in same.chain(each) {
         let mut wrong = vec![];
         features(sides, &points, &normals, taus, o, &mut wrong);

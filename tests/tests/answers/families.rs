@@ -172,6 +172,17 @@ fn witnesses_are_followed_back_to_a_touch() {
     }
 }
 
+/// Climbs that come to rest beside the touch: at a point that lies off both surfaces, or where the normals of small round
+/// faces are not yet opposite. No touch is told there that the judges object to.
+#[test]
+fn ends_of_climbs_beside_the_touch_are_not_told() {
+    for index in [3603, 8524, 13019, 17852, 18187, 19540] {
+        let verdict = examine(&scene(1, 9, index), 0, Effort::Quick);
+        assert_eq!(verdict.status, Some(Status::Contact), "{} {index}", NAMES[9]);
+        assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[9], verdict.faults);
+    }
+}
+
 /// A face that decides at depth delta and is passed by before the surfaces meet is none of the touch's: in skins
 /// thinner than the resolution, at corners cut out of a body.
 #[test]

@@ -110,37 +110,25 @@ impl<'t, 'a> Features<'t, 'a> {
 
     /// What holds the bodies at the point, as few active faces as there are, with their multipliers.
     pub fn held(&self) -> Option<Vec<(Constraint, f64)>> {
-        let each = [Side::A, Side::B].map(|side| {
+        let each = self.smooth();
+        let by_faces = held_by_faces(&each).filter(|held| held.0 <= NEARLY_BALANCED).map(|held| held.1);
+        by_faces.or_else(|| self.held_by_an_apex(&each))
+    }
+
+    /// True when active faces of both bodies oppose each other, up to what is left of their gradients' weighted sum, or
+    /// an apex holds.
+    pub fn is_balanced(&self, within: f64) -> bool {
+        let each = self.smooth();
+        held_by_faces(&each).is_some_and(|held| held.0 <= within) || self.held_by_an_apex(&each).is_some()
+    }
+
+    /// The active faces of either side that have a gradient at the point, with it.
+    fn smooth(&self) -> [Vec<(Side, LiteralId, DVec3)>; 2] {
+        [Side::A, Side::B].map(|side| {
             let ids = self.active[side as usize].iter();
             let smooth = ids.filter(|id| !self.is_apex(side, **id));
             smooth.map(|id| (side, *id, self.gradient(side, *id))).collect::<Vec<_>>()
-        });
-        self.held_by_faces(&each).or_else(|| self.held_by_an_apex(&each))
-    }
-
-    /// Active faces of both sides that hold each other, with their multipliers (sum 1).
-    fn held_by_faces(&self, each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<Vec<(Constraint, f64)>> {
-        let mut best: Option<(f64, Vec<(Constraint, f64)>)> = None;
-        for count in 2..=4usize {
-            for of_a in 1..count {
-                for p in choices(&each[0], of_a) {
-                    for q in choices(&each[1], count - of_a) {
-                        let all: Vec<_> = p.iter().chain(&q).copied().collect();
-                        let Some((lambda, rest)) = balance(&all.iter().map(|l| l.2).collect::<Vec<_>>()) else {
-                            continue;
-                        };
-                        if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
-                            let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
-                            best = Some((rest, held.zip(lambda).collect()));
-                        }
-                    }
-                }
-            }
-            if best.as_ref().is_some_and(|b| b.0 <= BALANCED) {
-                break;
-            }
-        }
-        best.filter(|b| b.0 <= NEARLY_BALANCED).map(|b| b.1)
+        })
     }
 
     /// An apex of one body against faces of the other: of the directions between these faces' normals the one that is
@@ -176,6 +164,32 @@ impl<'t, 'a> Features<'t, 'a> {
         }
         None
     }
+}
+
+/// Active faces of both sides that hold each other best: what is left of their gradients' weighted sum, and their
+/// multipliers (sum 1).
+fn held_by_faces(each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<(f64, Vec<(Constraint, f64)>)> {
+    let mut best: Option<(f64, Vec<(Constraint, f64)>)> = None;
+    for count in 2..=4usize {
+        for of_a in 1..count {
+            for p in choices(&each[0], of_a) {
+                for q in choices(&each[1], count - of_a) {
+                    let all: Vec<_> = p.iter().chain(&q).copied().collect();
+                    let Some((lambda, rest)) = balance(&all.iter().map(|l| l.2).collect::<Vec<_>>()) else {
+                        continue;
+                    };
+                    if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
+                        let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
+                        best = Some((rest, held.zip(lambda).collect()));
+                    }
+                }
+            }
+        }
+        if best.as_ref().is_some_and(|b| b.0 <= BALANCED) {
+            break;
+        }
+    }
+    best
 }
 
 /// The unit vector between some unit vectors (one or two) that is nearest to a direction, with their weights in it.

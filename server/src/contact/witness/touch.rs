@@ -10,6 +10,7 @@ use super::sides::{deciding, has_both_sides};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth;
 use crate::contact::query::task::{Task, witness_level};
+use crate::motion::Instant;
 use crate::octree::Model;
 use glam::DVec3;
 
@@ -19,7 +20,7 @@ const CONTINUATIONS: usize = 40;
 /// What a climb's end counts as: settled, and no better than that.
 pub(in crate::contact) const CLIMBED: f64 = 0.5 * SETTLED;
 
-/// |Σ λ g| of two like faces that is small enough for either normal to be told.
+/// |Σ λ g| that is small enough for either body's normal to be told.
 const BALANCED: f64 = 1e-7;
 
 /// Size of a small feature against its body.
@@ -141,9 +142,17 @@ impl Touch<'_, '_> {
         let at = self.task.relative.at(t);
         let values = [self.task.model_a.value(held.0), self.task.model_b.value(at.b_point(held.0))];
         let off = values[0].abs().max(values[1].abs());
-        let most = TOUCHES * self.task.scale + 4.0 * ON_SURFACE * self.task.rounding;
+        let most = TOUCHES * self.task.scale + self.task.rounding;
         let is_deep_at_start = t == 0.0 && held.1 > ON_SURFACE * self.task.rounding;
-        (is_deep_at_start || off <= most).then(|| self.climbed(t, &held))
+        ((is_deep_at_start || off <= most) && self.is_balanced(held.0, &at, off)).then(|| self.climbed(t, &held))
+    }
+
+    /// True when faces of both bodies oppose each other at the end of a climb that lies `off` their surfaces. Where none
+    /// do the climb has come to rest beside the touch.
+    fn is_balanced(&self, x: DVec3, at: &Instant, off: f64) -> bool {
+        // Bodies whose common depth is ignored in part show no faces in one point.
+        self.task.ignored_depth > 0.0
+            || Features::at(self.task, x, at, Some(off + INCIDENT * self.task.rounding)).is_balanced(BALANCED)
     }
 
     /// Where a climb has ended, as a solution of the faces that hold it.
