@@ -133,6 +133,14 @@ fn long_searches_without_a_coarser_resolution_go_on() {
     }
 }
 
+/// Of two screws a fine search finds a deep point, and no coarser one does: what is known is told.
+#[test]
+fn what_a_finer_search_has_found_stays_where_a_coarser_one_finds_nothing() {
+    let answer = ask(&scene(1, 7, 12880), 0).expect("a scene");
+    let o = &answer.pair.outcome;
+    assert_eq!((o.status, o.resolution), (Status::Contact, answer.own_resolution));
+}
+
 /// Bodies that spin in holes of nearly their own shape, where a search at the resolution asked for takes too long: a coarser one
 /// answers, says so, and no point contradicts it.
 #[test]
