@@ -3,12 +3,15 @@
 //! Idea (S. Roth, "Ray casting for modeling solids", CGIP 18, 1982): a line meets a convex primitive in one span, cut out by
 //! its faces, and a torus in two; the tree's operations then combine lists of spans. Planes give a half-line, spheres and
 //! cylinders the two roots of a quadratic, the cone's nappe at most one span of its quadratic's sign.
+//! A mesh is a formula of planes: the line is halved until what is left of the formula beside a piece is short.
 //! Invariant: spans are disjoint, ascending, none a skin (`THIN`).
 //! Not promised: skins thinner than `THIN`, and rays that graze a face, may go either way. Pictures only.
 
 use crate::math::Aabb;
-use crate::solid::{Node, NodeId, Op, Primitive, Solid};
+use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::{Node, NodeId, Op, Primitive, Sense, Solid};
 use glam::DVec3;
+use smallvec::SmallVec;
 
 /// A line with unit direction; positions are lengths along it.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +102,13 @@ impl<'a> Traced<'a> {
         }
         match &self.solid.nodes[node as usize] {
             Node::Empty => vec![],
-            Node::Primitive(p) => spans_of_primitive(&self.solid.primitives[*p as usize], ray),
+            Node::Primitive(p) => {
+                let primitive = &self.solid.primitives[*p as usize];
+                match primitive.shape.formula() {
+                    Some(_) => Pieces::of(primitive, ray),
+                    None => spans_of_primitive(primitive, ray),
+                }
+            }
             Node::Op(op, children) => {
                 let mut lists: Vec<(usize, Vec<Span>)> = Vec::with_capacity(children.len());
                 for (i, child) in children.iter().enumerate() {
@@ -175,6 +184,111 @@ fn spans_of_primitive(primitive: &Primitive, ray: &Ray) -> Vec<Span> {
     }
     spans.retain(|(enter, leave)| leave.at - enter.at > THIN * enter.at.abs().min(leave.at.abs()));
     spans
+}
+
+/// Tokens up to which what is left of a formula is looked at from crossing to crossing.
+const FEW_TOKENS: usize = 24;
+/// A piece of a line that is this fraction of the whole is halved no more.
+const SHORTEST: f64 = 1e-9;
+
+/// The pieces of a line that are inside a primitive with a formula.
+struct Pieces<'a> {
+    primitive: &'a Primitive,
+    ray: &'a Ray,
+    shortest: f64,
+    spans: Vec<Span>,
+    /// Where the last piece that is inside has begun.
+    open: Option<Crossing>,
+}
+
+impl<'a> Pieces<'a> {
+    fn of(primitive: &'a Primitive, ray: &'a Ray) -> Vec<Span> {
+        let Some((from, to)) = ray.through(&primitive.aabb) else { return vec![] };
+        let mut pieces = Self { primitive, ray, shortest: SHORTEST * (to - from), spans: Vec::new(), open: None };
+        pieces.piece(from, to, None);
+        pieces.turns(to, None, false);
+        pieces.spans
+    }
+
+    /// Goes on with the piece from one length to another, beside which some tokens are left; all, where none is said.
+    fn piece(&mut self, from: f64, to: f64, around: Option<&[Token]>) {
+        let (a, b) = (self.ray.at(from), self.ray.at(to));
+        let (center, half) = (0.5 * (a + b), 0.5 * (b - a).abs());
+        let (primitive, mut left) = (self.primitive, Vec::new());
+        let mut known = |id: LiteralId| {
+            let (low, high) = primitive.faces[(id.face() - primitive.first_face) as usize].span(center, half);
+            let (low, high) = if id.sense() == Sense::Positive { (low, high) } else { (-high, -low) };
+            match (low > 0.0, high < 0.0) {
+                (true, _) => Truth::False,
+                (_, true) => Truth::True,
+                _ => Truth::Open,
+            }
+        };
+        let truth = match around {
+            Some(tokens) => local::prune(tokens, &mut left, &mut known),
+            None => primitive.expression(Sense::Positive, &mut left, &mut known),
+        };
+        match truth {
+            Truth::True => self.turns(from, None, true),
+            Truth::False => self.turns(from, None, false),
+            Truth::Open if left.len() <= FEW_TOKENS || to - from <= self.shortest => self.crossings(&left, from, to),
+            Truth::Open => {
+                let middle = 0.5 * (from + to);
+                self.piece(from, middle, Some(&left));
+                self.piece(middle, to, Some(&left));
+            }
+        }
+    }
+
+    /// From one crossing of a face to the next.
+    fn crossings(&mut self, left: &[Token], from: f64, to: f64) {
+        let mut at: SmallVec<[(f64, Option<u32>); 16]> = SmallVec::new();
+        at.push((from, None));
+        for id in local::literals(left) {
+            let face = &self.primitive.faces[(id.face() - self.primitive.first_face) as usize];
+            for (enter, leave) in face.inside(self.ray.origin, self.ray.direction) {
+                at.extend([enter, leave].into_iter().filter(|t| (from..to).contains(t)).map(|t| (t, Some(id.face()))));
+            }
+        }
+        at.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for i in 0..at.len() {
+            let next = at.get(i + 1).map_or(to, |next| next.0);
+            if next - at[i].0 > 0.0 {
+                let inside = self.value(left, 0.5 * (at[i].0 + next)) < 0.0;
+                self.turns(at[i].0, at[i].1, inside);
+            }
+        }
+    }
+
+    fn value(&self, tokens: &[Token], t: f64) -> f64 {
+        let x = self.ray.at(t);
+        local::value(tokens, &mut |f| self.primitive.faces[(f - self.primitive.first_face) as usize].value(x))
+    }
+
+    /// From here on the line is inside, or it is not; `face` is the one that it crosses, where that is known.
+    fn turns(&mut self, at: f64, face: Option<u32>, inside: bool) {
+        if inside == self.open.is_some() {
+            return;
+        }
+        let face = face.unwrap_or_else(|| self.nearest(at));
+        let normal = self.primitive.faces[(face - self.primitive.first_face) as usize].at(self.ray.at(at)).normal;
+        let outward = (normal.dot(self.ray.direction) < 0.0) == inside;
+        let crossing = Crossing { at, face, outward };
+        match self.open.take() {
+            None => self.open = Some(crossing),
+            Some(enter) if at - enter.at > THIN * enter.at.abs().min(at.abs()) => self.spans.push((enter, crossing)),
+            Some(_) => {}
+        }
+    }
+
+    /// The face that decides at a point of the surface which lies between two pieces.
+    fn nearest(&self, at: f64) -> u32 {
+        let x = self.ray.at(at);
+        let mut tokens = Vec::new();
+        self.primitive.expression(Sense::Positive, &mut tokens, &mut |_| Truth::Open);
+        let psi = |f: u32| self.primitive.faces[(f - self.primitive.first_face) as usize].value(x);
+        local::deciding(&tokens, &mut |f| psi(f)).1.face()
+    }
 }
 
 /// Combines the spans of several children; children without spans are left out of `lists` but counted in `arity`.
@@ -282,5 +396,47 @@ mod tests {
             }
         }
         assert!(inside > 5_000 && crossings > 3_000, "{inside} {crossings}");
+    }
+
+    #[test]
+    fn a_mesh_has_the_spans_of_the_solid_that_it_is() {
+        // A brick with a step, as a mesh of six walls and of an L of two cuboids.
+        let outline = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)];
+        let points: Vec<DVec3> =
+            [0.0, 1.0].iter().flat_map(|z| outline.iter().map(move |(x, y)| DVec3::new(*x, *y, *z))).collect();
+        let mut faces: Vec<Vec<u32>> = vec![(0..6).rev().collect(), (6..12).collect()];
+        faces.extend((0..6).map(|i| vec![i, (i + 1) % 6, 6 + (i + 1) % 6, 6 + i]));
+        let (mesh, _) = crate::solid::primitive::TriangleMesh::of_polygons(&points, &faces).expect("a closed mesh");
+        let tilt = glam::DQuat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize();
+        let pose = |at: DVec3| Pose::new(tilt * at, tilt);
+        let mut b = SolidBuilder::new();
+        let root = b.primitive(mesh, pose(DVec3::ZERO), Label::default());
+        let of_mesh = b.finish(root);
+        let mut b = SolidBuilder::new();
+        let long =
+            b.primitive(Cuboid { half: DVec3::new(1.0, 0.5, 0.5) }, pose(DVec3::new(1.0, 0.5, 0.5)), Label::default());
+        let high =
+            b.primitive(Cuboid { half: DVec3::new(0.5, 1.0, 0.5) }, pose(DVec3::new(0.5, 1.0, 0.5)), Label::default());
+        let root = b.operation(Op::Union, &[long, high]);
+        let of_cuboids = b.finish(root);
+        let (one, other) = (Traced::new(&of_mesh), Traced::new(&of_cuboids));
+        let (mut state, mut hits) = (3, 0);
+        for _ in 0..2000 {
+            let mut next = || DVec3::new(noise(&mut state), noise(&mut state), noise(&mut state));
+            let (origin, target) = (next() * 6.0, tilt * (next() * 1.2 + DVec3::new(1.0, 1.0, 0.5)));
+            let ray = Ray { origin, direction: (target - origin).normalize() };
+            let (a, b) = (one.spans(&ray), other.spans(&ray));
+            assert_eq!(a.len(), b.len(), "{a:?} {b:?}");
+            for ((enter, leave), (enter_too, leave_too)) in a.iter().zip(&b) {
+                assert!((enter.at - enter_too.at).abs() < 1e-9 && (leave.at - leave_too.at).abs() < 1e-9);
+                for (c, entering) in [(enter, true), (leave, false)] {
+                    let normal =
+                        of_mesh.faces[c.face as usize].at(ray.at(c.at)).normal * if c.outward { 1.0 } else { -1.0 };
+                    assert!((normal.dot(ray.direction) < 0.0) == entering);
+                }
+                hits += 1;
+            }
+        }
+        assert!(hits > 800, "{hits}");
     }
 }
