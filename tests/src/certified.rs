@@ -1,12 +1,13 @@
 //! Answers of the search with their certificates, which the independent verifier checks.
 
 use crate::engine::question;
-use crate::random_solids::Random;
+use crate::random_solids::{Random, placed, solid_of};
 use crate::verifier::check;
 use contactd::contact::certificate::certify;
 use contactd::contact::{Outcome, QueryOptions, Scratch, Status, earliest_contact};
 use contactd::motion::Placed;
 use contactd::octree::Model;
+use contactd::solid::Shape;
 
 /// The answer to a pair, and what the verifier says of its certificate.
 pub fn certified(a: (&Model, Placed), b: (&Model, Placed)) -> (Outcome, Result<(), String>) {
@@ -57,4 +58,20 @@ pub fn certify_all(name: &str, (count, seed): (usize, u64), make: impl Fn(&mut R
     );
     assert!(refused.is_empty(), "{name}:\n{}", refused.join("\n"));
     assert!(of(Status::Contact) * 5 > count && of(Status::Undecided) * 50 <= count, "{name}: {told:?}");
+}
+
+/// The same of trees whose primitives `shape` draws: two that meet at random, or pass each other.
+pub fn certify_trees(counted: (usize, u64), shape: fn(&mut Random, f64) -> Shape) {
+    certify_all("trees", counted, |r| {
+        let tree = |r: &mut Random| {
+            let depth = 1 + r.below(2);
+            Model::new(solid_of(r, depth, shape))
+        };
+        let (a, b) = (tree(r), tree(r));
+        let mut motions = [placed(r, 0.5), placed(r, 0.5)];
+        let aside = r.direction() * 2.2;
+        motions[1].motion.start.position += aside;
+        motions[1].motion.velocity -= aside * r.within(0.3, 1.0);
+        [(a, motions[0]), (b, motions[1])]
+    });
 }

@@ -12,6 +12,7 @@
 
 use crate::bound::{Bound, Volumes};
 use crate::contact::exclusion::clause::{self, Hint, Proof, Term};
+use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Faces, Side, View};
 use crate::contact::instant::depth;
 use crate::contact::instant::work::Work;
@@ -370,7 +371,7 @@ impl<'a> Maker<'a> {
         if let Some(record) = &mut self.scratch.record {
             record.clear();
         }
-        let found = clause::advance(&view, &pair, self.hints, self.task.rounding, 0.0, self.scratch);
+        let found = enumeration::advance(&view, &pair, self.hints, self.task.rounding, 0.0, self.scratch);
         if found.dt < 0.0 {
             return (h, None, 0.0, found.cost);
         }

@@ -26,6 +26,12 @@ impl Ball {
         Self { center, radius }
     }
 
+    /// A ball around points, about the middle of their box; at least one is needed.
+    pub fn of_points(points: &[DVec3]) -> Self {
+        let center = Aabb::of_points(points.iter().copied()).center();
+        Self::new(center, points.iter().fold(0.0, |r: f64, p| r.max((*p - center).length())))
+    }
+
     /// True when it holds no point.
     pub fn is_empty(&self) -> bool {
         self.radius < 0.0

@@ -11,10 +11,10 @@ use contactd::solid::Shape;
 use contactd::solid::primitive::Polyhedron;
 use contactd_proto::control::{Facets, ModelFile};
 use contactd_proto::{MassOptions, Motion, Pose};
-use contactd_tests::certified::certify_all;
+use contactd_tests::certified::{certify_all, certify_trees};
 use contactd_tests::engine::question;
 use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, winding};
-use contactd_tests::random_solids::{Random, placed, shape, shape_or_mesh, solid_of};
+use contactd_tests::random_solids::{Random, shape, shape_or_mesh, solid_of};
 use contactd_tests::rays::integrals;
 use contactd_tests::reference::field::Field;
 use contactd_tests::scenes::Recipe;
@@ -132,18 +132,7 @@ fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
         let place = |motion| Placed { place: Pose::IDENTITY, motion };
         [(alone(mesh(r)), place(turning(r))), (alone(other), place(past(r, 2.2)))]
     });
-    certify_all("trees", (count, 0x3e_5105), |r| {
-        let tree = |r: &mut Random| {
-            let depth = 1 + r.below(2);
-            Model::new(solid_of(r, depth, shape_or_mesh))
-        };
-        let (a, b) = (tree(r), tree(r));
-        let mut motions = [placed(r, 0.5), placed(r, 0.5)];
-        let aside = r.direction() * 2.2;
-        motions[1].motion.start.position += aside;
-        motions[1].motion.velocity -= aside * r.within(0.3, 1.0);
-        [(a, motions[0]), (b, motions[1])]
-    });
+    certify_trees((count, 0x3e_5105), shape_or_mesh);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! `CONTACTD_EVALUATIONS=10000000 cargo test --release -p contactd-tests --test search rounding:: -- --nocapture`
 
 use contactd::contact::exclusion::clause::{self, Expressions};
+use contactd::contact::exclusion::enumeration;
 use contactd::contact::exclusion::literal::{Faces, Side, View};
 use contactd::contact::exclusion::{fit, rounding};
 use contactd::motion::{Placed, Relative};
@@ -403,7 +404,7 @@ fn evaluate(r: &mut Random, models: &[Model], wanted: u64, name: &str) {
             let pool = [literal_token(on_a), literal_token(on_b)];
             let alone = r.chance(0.5);
             let pair = Expressions { pool: &pool, a: if alone { (0, 0) } else { (0, 1) }, b: (1, 2) };
-            let free = clause::advance(&view, &pair, &[], budget, 0.0, &mut clause::Scratch::default()).dt;
+            let free = enumeration::advance(&view, &pair, &[], budget, 0.0, &mut clause::Scratch::default()).dt;
             if free > 0.0 && r.chance(0.5) {
                 let later = t + free.min(h);
                 let later = if later - t > free.min(h) { later.next_down() } else { later };

@@ -2,6 +2,8 @@
 //! rounding may take from each.
 
 pub mod clause;
+mod course;
+pub mod enumeration;
 pub mod fit;
 pub mod literal;
 pub mod lp;

@@ -11,6 +11,7 @@
 use super::separation::{self, Cover};
 use super::work::Work;
 use crate::contact::exclusion::clause::{self, Expressions};
+use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Faces, Side, View};
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
@@ -177,7 +178,7 @@ fn ascend((rounds, reach): (usize, f64), task: &Task, at: &Instant, start: DVec3
             continue;
         }
         let pair = Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
-        let step = clause::advance(&view, &pair, &[], 0.0, f64::INFINITY, &mut scratch);
+        let step = enumeration::advance(&view, &pair, &[], 0.0, f64::INFINITY, &mut scratch);
         if !step.support.is_empty() {
             support = step.support.clone();
         }

@@ -12,6 +12,7 @@
 
 use super::work::Work;
 use crate::contact::exclusion::clause;
+use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Faces, Side, View};
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
@@ -159,7 +160,7 @@ impl<'t, 'a> Cover<'t, 'a> {
             if end > 0 {
                 let pair = clause::Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
                 let view = self.view(&place, -level);
-                let found = clause::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch);
+                let found = enumeration::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch);
                 if found.dt >= 0.0 {
                     continue;
                 }

@@ -18,6 +18,7 @@ use super::propose::Proposals;
 use super::scratch::Scratch;
 use super::slices::Slices;
 use crate::contact::exclusion::clause::{self, Advance, Hint};
+use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::outcome::Counters;
 use crate::contact::witness::climb;
@@ -311,14 +312,14 @@ impl<'a> Search<'a> {
             Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 }
         } else {
             let pair = clause::Expressions { pool, a: cell.a, b };
-            clause::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch)
+            enumeration::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch)
         };
         // Where the bounds are lowest at the start itself: two faces a few resolutions inside each other leave a layer that
         // the lowest point of a later time misses.
         let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
             let view = View { motion: self.contacts.task.relative.bounds(cell.t, 0.0, span.x_max), ..view };
             let pair = clause::Expressions { pool, a: cell.a, b };
-            clause::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch).y
+            enumeration::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch).y
         } else {
             found.y
         };
@@ -380,7 +381,7 @@ impl<'a> Search<'a> {
         let still = self.contacts.task.relative.bounds(cell.t, 0.0, span.x_max);
         let view = self.contacts.task.view((cell.center, cell.half), at, still, &self.items.scratch.clip_planes_b);
         let pair = clause::Expressions { pool: &self.items.scratch.pool, a: cell.a, b: bounded.b };
-        let now = clause::advance(&view, &pair, &[], rounding, 0.0, &mut self.items.scratch.clause);
+        let now = enumeration::advance(&view, &pair, &[], rounding, 0.0, &mut self.items.scratch.clause);
         self.propose(cell, &now, at);
         if cell.t >= self.contacts.goal() {
             return ControlFlow::Break(None);

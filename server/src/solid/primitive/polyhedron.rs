@@ -104,8 +104,7 @@ impl Geometry for Polyhedron {
         Aabb::of_points(self.vertices.iter().map(|v| frame.point(*v)))
     }
     fn ball(&self) -> Ball {
-        let c = Aabb::of_points(self.vertices.iter().copied()).center();
-        Ball::new(c, self.vertices.iter().fold(0.0, |r: f64, v| r.max((*v - c).length())))
+        Ball::of_points(&self.vertices)
     }
     fn smallest_dimension(&self) -> f64 {
         // Width across each face; the smallest width of a polytope is attained at a face or at a pair of edges, and

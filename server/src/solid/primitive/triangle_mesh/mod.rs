@@ -185,8 +185,7 @@ impl Geometry for TriangleMesh {
         Aabb::of_points(self.vertices.iter().map(|v| frame.point(*v)))
     }
     fn ball(&self) -> Ball {
-        let c = Aabb::of_points(self.vertices.iter().copied()).center();
-        Ball::new(c, self.vertices.iter().fold(0.0, |r: f64, v| r.max((*v - c).length())))
+        Ball::of_points(&self.vertices)
     }
     fn smallest_dimension(&self) -> f64 {
         2.0 * Aabb::of_points(self.vertices.iter().copied()).half().min_element()
