@@ -13,6 +13,7 @@ use contactd::contact::{
     Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
 };
 use contactd::motion::{Placed, Relative};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::reference::{self, Effort, Moving, Verdict};
 
 /// The default resolution, in sizes.
@@ -109,8 +110,8 @@ impl Known {
             "reference" => by_reference(c),
             _ => {
                 let o = ask(c, &Setting::at(1e-13), &mut scratch);
-                match o.status {
-                    Status::Contact => Truth::Meets(o.time),
+                match o.status() {
+                    Status::Contact => Truth::Meets(o.time()),
                     Status::Clear => Truth::Clear,
                     Status::Overlap | Status::Undecided => Truth::Unknown,
                 }
@@ -124,8 +125,8 @@ impl Known {
 fn tabled(case: &Case, scratch: &mut Scratch) -> Truth {
     let Truth::Meets(time) = case.truth else { return case.truth };
     let o = ask(case, &Setting::default(), scratch);
-    let off = (o.time - time).abs() * o.normal_speed.abs() / case.size();
-    if o.status == Status::Contact && off <= TABLED { case.truth } else { by_reference(case) }
+    let off = (o.time() - time).abs() * o.at().normal_speed.abs() / case.size();
+    if o.status() == Status::Contact && off <= TABLED { case.truth } else { by_reference(case) }
 }
 
 /// What the tests' slow reference says, which shares no code with the search; what it has not proven is unknown.
@@ -180,22 +181,22 @@ pub fn measure(
     let laps = race(
         plan,
         allowed.len(),
-        |k| ask(&class.cases[allowed[k]], setting, &mut scratch).time,
-        |k| ask(&base_class.cases[allowed[k]], base, &mut other).time,
+        |k| ask(&class.cases[allowed[k]], setting, &mut scratch).time(),
+        |k| ask(&base_class.cases[allowed[k]], base, &mut other).time(),
     );
     let mut m = Measured { laps, refused: class.cases.len() - allowed.len(), ..Measured::default() };
     for (i, o) in allowed.iter().zip(&answers) {
         let case = &class.cases[*i];
         let size = case.size();
-        let length = |dt: f64| dt.abs() * o.normal_speed.abs() / size;
+        let length = |dt: f64| dt.abs() * o.at().normal_speed.abs() / size;
         m.budgets.push(budget(case) * size / o.resolution);
         m.raised += usize::from(o.resolution > setting.resolution * size * (1.0 + 1e-9));
-        match (o.status, known.truths[*i]) {
+        match (o.status(), known.truths[*i]) {
             (Status::Undecided, _) => m.undecided += 1,
             (Status::Contact, truth) => {
-                m.brackets.push([length(o.time_upper - o.time_lower), o.time_upper - o.time_lower]);
+                m.brackets.push([length(o.time_upper() - o.time_lower()), o.time_upper() - o.time_lower()]);
                 match truth {
-                    Truth::Meets(t) => m.errors.push(length(o.time - t)),
+                    Truth::Meets(t) => m.errors.push(length(o.time() - t)),
                     Truth::Clear => m.wrong += 1,
                     Truth::Unknown => {}
                 }

@@ -124,8 +124,8 @@ pub fn walk(scene: &Scene, steps: usize) -> Result<Walked, Box<dyn std::error::E
         let same = warm
             .pairs
             .iter()
-            .map(|p| (p.a, p.b, p.outcome.time))
-            .eq(cold.pairs.iter().map(|p| (p.a, p.b, p.outcome.time)));
+            .map(|p| (p.a, p.b, p.outcome.time()))
+            .eq(cold.pairs.iter().map(|p| (p.a, p.b, p.outcome.time())));
         if !same || warm.safe_time != cold.safe_time {
             return Err(format!("{}: step {step} has another answer when all is forgotten", scene.name).into());
         }
@@ -207,6 +207,6 @@ fn timed(world: &mut World, record: PoseRecord) -> Result<(bool, (f64, f64)), St
     let from = Instant::now();
     let out = world.step(&[record], &StepOptions::default())?;
     let took = from.elapsed().as_secs_f64();
-    let met = out.pairs.iter().any(|p| p.outcome.status == Status::Contact);
+    let met = out.pairs.iter().any(|p| p.outcome.status() == Status::Contact);
     Ok((met, (took, (out.counters.cells + out.counters.instant_cells) as f64)))
 }

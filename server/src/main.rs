@@ -205,7 +205,7 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
             eprintln!("{}: {without} pairs have no certificate", to.display());
         }
     }
-    let undecided = outcome.undecided || outcome.pairs.iter().any(|p| p.outcome.status == Status::Undecided);
+    let undecided = outcome.undecided || outcome.pairs.iter().any(|p| p.outcome.status() == Status::Undecided);
     let bodies = check.world.bodies();
     let pairs: Vec<PairReport<'_>> = outcome
         .pairs

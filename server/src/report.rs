@@ -144,7 +144,7 @@ impl Feature {
 impl Answer {
     /// The answer made of some pairs; `safe_time` covers exactly these.
     pub fn of_pairs(pairs: &[PairReport<'_>]) -> Self {
-        let safe_time = pairs.iter().fold(1.0, |t: f64, p| t.min(p.outcome.time_lower));
+        let safe_time = pairs.iter().fold(1.0, |t: f64, p| t.min(p.outcome.time_lower()));
         Self { safe_time, pairs: pairs.iter().map(PairAnswer::of_pair).collect() }
     }
 
@@ -207,36 +207,37 @@ impl PairAnswer {
     fn of_pair(pair: &PairReport<'_>) -> Self {
         let o = pair.outcome;
         let reported = |least| pair.report >= least;
-        let meets = matches!(o.status, Status::Contact | Status::Overlap) && reported(Report::Contact);
-        let met = o.status == Status::Contact && reported(Report::Contact);
         // A clear pair that touches has the fields of its nearest region.
-        let rests = o.status == Status::Clear && !pair.regions.is_empty();
+        let rests = o.status() == Status::Clear && !pair.regions.is_empty();
+        let point = o.point().filter(|_| rests || o.meets() && reported(Report::Contact));
+        // Bodies that overlap meet in no one way.
+        let met = point.filter(|_| o.status() != Status::Overlap);
         let features = |solid: &Solid, faces: &[u32; 3]| {
             faces.iter().filter_map(|f| Feature::of_face(solid, *f)).collect::<Vec<_>>()
         };
         Self {
             a: pair.names[0].to_owned(),
             b: pair.names[1].to_owned(),
-            status: o.status.name(),
-            time: reported(Report::Time).then_some(o.time),
-            time_lower: reported(Report::Time).then_some(o.time_lower),
-            time_upper: reported(Report::Time).then_some(o.time_upper),
+            status: o.status().name(),
+            time: reported(Report::Time).then_some(o.time()),
+            time_lower: reported(Report::Time).then_some(o.time_lower()),
+            time_upper: reported(Report::Time).then_some(o.time_upper()),
             touching: o.touching,
-            not_continued: o.not_continued && reported(Report::Time),
-            point: (meets || rests).then(|| o.point.to_array()),
-            normal: (meets || rests).then(|| o.normal.to_array()),
-            separation: (meets || rests).then_some(o.separation),
-            normal_speed: (meets || rests).then_some(o.normal_speed),
-            kind: (met || rests).then(|| o.kind.name()),
-            extent: (met || rests).then(|| o.extent.name()),
+            not_continued: o.not_continued() && reported(Report::Time),
+            point: point.map(|p| p.point.to_array()),
+            normal: point.map(|p| p.normal.to_array()),
+            separation: point.map(|p| p.separation),
+            normal_speed: point.map(|p| p.normal_speed),
+            kind: met.map(|p| p.kind.name()),
+            extent: met.map(|p| p.extent.name()),
             resolution: o.resolution,
-            features: (meets || rests)
-                .then(|| Features { a: features(pair.solids[0], &o.faces_a), b: features(pair.solids[1], &o.faces_b) }),
+            features: point
+                .map(|p| Features { a: features(pair.solids[0], &p.faces_a), b: features(pair.solids[1], &p.faces_b) }),
             cells: o.counters.cells,
-            penetration: (o.penetration > 0.0).then(|| Penetration {
-                depth: o.penetration,
-                direction: o.direction.to_array(),
-                point: o.deepest.to_array(),
+            penetration: o.penetration().map(|p| Penetration {
+                depth: p.depth,
+                direction: p.direction.to_array(),
+                point: p.point.to_array(),
             }),
             margin_time: (o.margin_time < 1.0).then_some(o.margin_time),
             regions: pair
@@ -363,7 +364,7 @@ fn vector(v: [f64; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{Extent, Kind};
+    use crate::contact::{Contact, ContactKind, ContactPoint, Extent, Verdict};
     use crate::import::{Facets, Limits, import_csg};
 
     fn plate() -> Solid {
@@ -373,18 +374,24 @@ mod tests {
     }
 
     fn contact() -> Outcome {
-        Outcome {
-            status: Status::Contact,
-            time: 0.1 + 0.2,
-            time_lower: 0.1,
+        let point = ContactPoint {
             point: DVec3::new(1.0, 0.0, 0.0),
             normal: DVec3::X,
-            kind: Kind::EdgeFace,
+            kind: ContactKind::EdgeFace,
             extent: Extent::Line,
             faces_a: [6, u32::MAX, u32::MAX],
             faces_b: [0, 4, u32::MAX],
-            ..Outcome::clear(1e-9)
-        }
+            ..ContactPoint::default()
+        };
+        let contact = Contact {
+            time_lower: 0.1,
+            time: 0.1 + 0.2,
+            time_upper: 1.0,
+            not_continued: false,
+            witness: None,
+            point: Some(point),
+        };
+        Outcome { verdict: Verdict::Contact(contact), ..Outcome::clear(1e-9) }
     }
 
     /// What is reported of the solid and itself, without regions.
@@ -419,7 +426,10 @@ mod tests {
     #[test]
     fn a_time_that_was_not_continued_is_told_so() {
         let solid = plate();
-        let outcome = Outcome { not_continued: true, ..contact() };
+        let mut outcome = contact();
+        if let Verdict::Contact(contact) = &mut outcome.verdict {
+            contact.not_continued = true;
+        }
         let answer = Answer::of_pairs(&[report(&solid, &outcome)]);
         assert!(answer.json().expect("json").contains(r#""touching":false,"not_continued":true,"point""#));
         assert!(answer.table().contains("contact (not continued)"), "{}", answer.table());

@@ -68,9 +68,17 @@ fn every_row_of_the_table_is_what_check_says_bit_for_bit() {
         let path = scene::write(row.step, folder.path()).unwrap_or_else(|e| panic!("{e}"));
         let o = checked(&path, a, b);
         let bits = |x: f64| format!("{x:?}");
-        assert_eq!(line[4..6], [bits(o.time), bits(o.time_lower)], "step {}", row.step);
-        assert_eq!(line[6..8], [o.kind.name(), o.extent.name()], "step {}", row.step);
-        let vectors: Vec<String> = o.point.to_array().into_iter().chain(o.normal.to_array()).map(bits).collect();
+        assert_eq!(line[4..6], [bits(o.time()), bits(o.time_lower())], "step {}", row.step);
+        assert_eq!(line[6..8], [o.point().unwrap().kind.name(), o.point().unwrap().extent.name()], "step {}", row.step);
+        let vectors: Vec<String> = o
+            .point()
+            .unwrap()
+            .point
+            .to_array()
+            .into_iter()
+            .chain(o.point().unwrap().normal.to_array())
+            .map(bits)
+            .collect();
         assert_eq!(line[9..15], vectors[..], "step {}", row.step);
     }
 }

@@ -13,16 +13,20 @@ use contactd::solid::Shape;
 pub fn certified(a: (&Model, Placed), b: (&Model, Placed)) -> (Outcome, Result<(), String>) {
     let query = question(a, b, QueryOptions::DEPTH);
     let o = earliest_contact(&query, &mut Scratch::default());
-    if o.status == Status::Overlap {
+    if o.status() == Status::Overlap {
         return (o, Ok(()));
     }
     let Some(made) = certify(&query, &o) else { return (o, Err("no certificate".into())) };
     let mut text = String::new();
     made.write((0, 1), &mut text);
     let checked = check(&text, (0, 1), (&a.0.solid, &a.1), (&b.0.solid, &b.1));
-    let slack = if o.status == Status::Undecided { 1e-5 } else { 0.0 };
+    let slack = if o.status() == Status::Undecided { 1e-5 } else { 0.0 };
     let proven = checked.and_then(|c| {
-        if c.until >= o.time_lower - slack { Ok(()) } else { Err(format!("{c:?} proves less than {}", o.time_lower)) }
+        if c.until >= o.time_lower() - slack {
+            Ok(())
+        } else {
+            Err(format!("{c:?} proves less than {}", o.time_lower()))
+        }
     });
     (o, proven)
 }
@@ -34,7 +38,7 @@ pub fn certify_all(name: &str, (count, seed): (usize, u64), make: impl Fn(&mut R
         for i in (first..count).step_by(2) {
             let [a, b] = make(&mut Random::new(seed + i as u64));
             let (o, proven) = certified((&a.0, a.1), (&b.0, b.1));
-            told[o.status as usize] += 1;
+            told[o.status() as usize] += 1;
             if let Err(e) = proven {
                 refused.push(format!("{i}: {e}: {o:?}"));
             }

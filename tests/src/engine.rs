@@ -2,7 +2,8 @@
 
 use crate::scenes::Scene;
 use contactd::contact::{
-    Body, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Body, Contact, ContactPoint, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, Verdict,
+    default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -11,6 +12,43 @@ use contactd_proto::Pose;
 
 /// Cells that a test may spend on a pair, far below the default: what needs more should be told so.
 pub const CELL_LIMIT: u64 = 60_000;
+
+/// What a record tells of its point, for comparisons of all of its fields.
+pub trait ReportedPoint {
+    /// The point, zeros where there is none.
+    fn at(&self) -> ContactPoint;
+}
+
+/// The contact of an outcome, to be changed.
+///
+/// # Panics
+/// When the outcome is no contact.
+pub fn contact_mut(o: &mut Outcome) -> &mut Contact {
+    match &mut o.verdict {
+        Verdict::Contact(contact) => contact,
+        other => panic!("no contact: {other:?}"),
+    }
+}
+
+/// The point of a contact or an overlap, to be changed.
+///
+/// # Panics
+/// When the outcome has none.
+pub fn point_mut(o: &mut Outcome) -> &mut ContactPoint {
+    let point = match &mut o.verdict {
+        Verdict::Clear { rest, .. } => rest,
+        Verdict::Contact(contact) => &mut contact.point,
+        Verdict::Overlap(overlap) => &mut overlap.point,
+        other => panic!("no point: {other:?}"),
+    };
+    point.as_mut().expect("a point that was asked for")
+}
+
+impl ReportedPoint for Outcome {
+    fn at(&self) -> ContactPoint {
+        self.point().copied().unwrap_or_default()
+    }
+}
 
 /// Asks about two placed solids; `None` is the default resolution.
 pub fn ask_solids(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>) -> Outcome {
@@ -83,30 +121,33 @@ pub fn differences(x: &Outcome, y: &Outcome, size: f64) -> Vec<String> {
             out.push(what);
         }
     };
-    demand(x.status == y.status, format!("status {:?} {:?}", x.status, y.status));
-    let speed = x.normal_speed.abs().max(y.normal_speed.abs()) / size;
+    demand(x.status() == y.status(), format!("status {:?} {:?}", x.status(), y.status()));
+    let speed = x.at().normal_speed.abs().max(y.at().normal_speed.abs()) / size;
     for (name, s, t) in [
-        ("time_lower", x.time_lower, y.time_lower),
-        ("time", x.time, y.time),
-        ("time_upper", x.time_upper, y.time_upper),
+        ("time_lower", x.time_lower(), y.time_lower()),
+        ("time", x.time(), y.time()),
+        ("time_upper", x.time_upper(), y.time_upper()),
     ] {
         demand((s - t).abs() * speed <= 1e-12, format!("{name} {s} {t} at speed {speed}"));
     }
-    if x.status == Status::Contact && y.status == Status::Contact {
-        let off = (x.point - y.point).length() / size;
-        demand(x.extent != Extent::Point || off <= 1e-6, format!("points {off:e} apart"));
-        let turned = (x.normal - y.normal).length();
+    if x.status() == Status::Contact && y.status() == Status::Contact {
+        let off = (x.at().point - y.at().point).length() / size;
+        demand(x.at().extent != Extent::Point || off <= 1e-6, format!("points {off:e} apart"));
+        let turned = (x.at().normal - y.at().normal).length();
         demand(turned <= 1e-6, format!("normals {turned:e} apart"));
-        demand((x.kind, x.extent) == (y.kind, y.extent), format!("{:?} {:?}", (x.kind, x.extent), (y.kind, y.extent)));
+        demand(
+            (x.at().kind, x.at().extent) == (y.at().kind, y.at().extent),
+            format!("{:?} {:?}", (x.at().kind, x.at().extent), (y.at().kind, y.at().extent)),
+        );
         let sorted = |mut f: [u32; 3]| {
             f.sort_unstable();
             f
         };
-        let faces = |o: &Outcome| (sorted(o.faces_a), sorted(o.faces_b));
+        let faces = |o: &Outcome| (sorted(o.at().faces_a), sorted(o.at().faces_b));
         demand(faces(x) == faces(y), format!("faces {:?} {:?}", faces(x), faces(y)));
-        demand((x.normal_speed - y.normal_speed).abs() <= 1e-6 * size, "normal speed".into());
+        demand((x.at().normal_speed - y.at().normal_speed).abs() <= 1e-6 * size, "normal speed".into());
     }
-    let flags = |o: &Outcome| (o.touching, o.not_continued, o.averaged_normal, o.resolution);
+    let flags = |o: &Outcome| (o.touching, o.not_continued(), o.at().averaged_normal, o.resolution);
     demand(flags(x) == flags(y), format!("flags {:?} {:?}", flags(x), flags(y)));
     out
 }

@@ -1,6 +1,7 @@
 //! Known answers of the case folders, and whether an answer holds against them.
 
-use contactd::contact::{Kind, Outcome, Status};
+use crate::engine::ReportedPoint as _;
+use contactd::contact::{ContactKind, Outcome, Status};
 use contactd::import::{Facets, Limits, read_scene};
 use contactd::motion::Placed;
 use contactd::solid::Solid;
@@ -84,36 +85,36 @@ impl KnownAnswer {
     /// What is wrong with an answer, if anything. `tolerance` is a fraction of the step.
     pub fn judge(&self, o: &Outcome, tolerance: f64) -> Result<(), String> {
         let Some(time) = self.time else {
-            return match o.status {
+            return match o.status() {
                 Status::Clear => Ok(()),
-                s => Err(format!("expected clear, got {} at {}", s.name(), o.time)),
+                s => Err(format!("expected clear, got {} at {}", s.name(), o.time())),
             };
         };
         let wrong = |what: String| Err(what);
-        if o.status != Status::Contact {
-            return wrong(format!("expected contact at {time}, got {}", o.status.name()));
+        if o.status() != Status::Contact {
+            return wrong(format!("expected contact at {time}, got {}", o.status().name()));
         }
-        if !(o.time - time).abs().le(&(tolerance + self.margin)) {
-            return wrong(format!("time {}, expected {time}: off by {:.1e}", o.time, o.time - time));
+        if !(o.time() - time).abs().le(&(tolerance + self.margin)) {
+            return wrong(format!("time {}, expected {time}: off by {:.1e}", o.time(), o.time() - time));
         }
-        if !(o.time_lower <= o.time && o.time <= o.time_upper) {
-            return wrong(format!("bracket out of order: {} {} {}", o.time_lower, o.time, o.time_upper));
+        if !(o.time_lower() <= o.time() && o.time() <= o.time_upper()) {
+            return wrong(format!("bracket out of order: {} {} {}", o.time_lower(), o.time(), o.time_upper()));
         }
-        if o.time - o.time_lower > tolerance {
-            return wrong(format!("time_lower is {:.1e} before time", o.time - o.time_lower));
+        if o.time() - o.time_lower() > tolerance {
+            return wrong(format!("time_lower is {:.1e} before time", o.time() - o.time_lower()));
         }
-        if !((o.normal.length() - 1.0).abs() <= 1e-9 && o.point.is_finite()) {
-            return wrong(format!("normal {} or point {} is no vector", o.normal, o.point));
+        if !((o.at().normal.length() - 1.0).abs() <= 1e-9 && o.at().point.is_finite()) {
+            return wrong(format!("normal {} or point {} is no vector", o.at().normal, o.at().point));
         }
         let Some((normal, point, (a, b))) = self.features else { return Ok(()) };
-        if o.normal.distance(normal) > 1e-6 {
-            return wrong(format!("normal {}, expected {normal}", o.normal));
+        if o.at().normal.distance(normal) > 1e-6 {
+            return wrong(format!("normal {}, expected {normal}", o.at().normal));
         }
-        if o.point.distance(point) > 1e-5 {
-            return wrong(format!("point {}, expected {point}", o.point));
+        if o.at().point.distance(point) > 1e-5 {
+            return wrong(format!("point {}, expected {point}", o.at().point));
         }
-        if o.kind != Kind::of_active(a, b) {
-            return wrong(format!("kind {}, expected {}", o.kind.name(), Kind::of_active(a, b).name()));
+        if o.at().kind != ContactKind::of_active(a, b) {
+            return wrong(format!("kind {}, expected {}", o.at().kind.name(), ContactKind::of_active(a, b).name()));
         }
         Ok(())
     }

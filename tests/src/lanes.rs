@@ -59,7 +59,7 @@ impl Lane {
     /// What becomes of it by the default rule.
     pub fn status(&self) -> Status {
         let mut lanes = Lanes::new(&[(self, PLAIN)], &[rule(PLAIN, |_| ())]);
-        lanes.step().pairs.first().map_or(Status::Clear, |p| p.outcome.status)
+        lanes.step().pairs.first().map_or(Status::Clear, |p| p.outcome.status())
     }
 
     /// No point of its bodies is farther from the lane's origin during the step.

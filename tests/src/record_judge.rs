@@ -18,10 +18,11 @@
 //! line or a patch of contact is told by any of its points, its border included, so that its kind may be smoother than
 //! the point is.
 
+use crate::engine::ReportedPoint as _;
 use crate::formula::{Formula, formula_of};
 use crate::reference::Moving;
 use crate::reference::field::Literal;
-use contactd::contact::{Extent, Kind, Outcome, Status};
+use contactd::contact::{ContactKind, Extent, Outcome, Status};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Sense, Shape, Solid, surface};
 use contactd_proto::contact_record::NO_FACE;
 use glam::DVec3;
@@ -55,11 +56,11 @@ pub enum Lie {
 pub fn lies(a: &Moving, b: &Moving, o: &Outcome) -> Vec<(Lie, String)> {
     let mut out = Vec::new();
     if !times_in_order(o) {
-        out.push((Lie::Bracket, format!("{} {} {} {}", o.status.name(), o.time_lower, o.time, o.time_upper)));
+        out.push((Lie::Bracket, format!("{} {} {} {}", o.status().name(), o.time_lower(), o.time(), o.time_upper())));
         return out;
     }
-    match o.status {
-        Status::Contact => contact(&[Side::new(a, o.time), Side::new(b, o.time)], o, &mut out),
+    match o.status() {
+        Status::Contact => contact(&[Side::new(a, o.time()), Side::new(b, o.time())], o, &mut out),
         Status::Overlap => overlap(&[Side::new(a, 0.0), Side::new(b, 0.0)], o, &mut out),
         Status::Clear | Status::Undecided => {}
     }
@@ -76,8 +77,8 @@ pub fn holds(name: &str, a: &Moving, b: &Moving, o: &Outcome) -> bool {
 }
 
 fn times_in_order(o: &Outcome) -> bool {
-    let (l, t, u) = (o.time_lower, o.time, o.time_upper);
-    match o.status {
+    let (l, t, u) = (o.time_lower(), o.time(), o.time_upper());
+    match o.status() {
         Status::Contact => 0.0 <= l && l <= t && t <= u && u <= 1.0,
         Status::Clear => l == 1.0 && t == 1.0 && u == 1.0,
         Status::Overlap => l == 0.0 && t == 0.0 && u == 0.0,
@@ -401,45 +402,47 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let size = sides[0].radius.max(sides[1].radius);
     let extent = sides[0].extent + sides[1].extent;
     let rounding = 64.0 * f64::EPSILON * extent;
-    let normals = [o.normal, -o.normal];
-    if (o.normal.length() - 1.0).abs() > 1e-12 || !o.normal.is_finite() || !o.point.is_finite() {
-        out.push((Lie::Normal, format!("point {}, normal {}", o.point, o.normal)));
+    let normals = [o.at().normal, -o.at().normal];
+    if (o.at().normal.length() - 1.0).abs() > 1e-12 || !o.at().normal.is_finite() || !o.at().point.is_finite() {
+        out.push((Lie::Normal, format!("point {}, normal {}", o.at().point, o.at().normal)));
         return;
     }
-    let points = [sides[0].local(o.point), sides[1].local(o.point)];
+    let points = [sides[0].local(o.at().point), sides[1].local(o.at().point)];
     let values = [sides[0].value(points[0]), sides[1].value(points[1])];
     // What starts in touch, or was not continued, is told where it is deep.
-    let at_depth = o.not_continued || o.time == 0.0;
+    let at_depth = o.not_continued() || o.time() == 0.0;
     let near = (1e-11 * size).max(rounding);
     // What was not continued is told how deep it is.
-    let reported = if o.not_continued { -0.5 * o.separation } else { 0.0 };
+    let reported = if o.not_continued() { -0.5 * o.at().separation } else { 0.0 };
     let off = if at_depth { near + reported.max(2.001 * o.resolution) } else { near };
     if values.iter().any(|v| v.abs() > off) {
-        out.push((Lie::Point, format!("f {:e} {:e} at {}, within {off:e}", values[0], values[1], o.point)));
+        out.push((Lie::Point, format!("f {:e} {:e} at {}, within {off:e}", values[0], values[1], o.at().point)));
     }
     let apart = values[0].max(values[1]);
-    let exactly = if o.not_continued { near } else { off };
-    if !o.past && (o.separation - 2.0 * apart.min(0.0)).abs() > 2.0 * exactly {
-        out.push((Lie::Separation, format!("{:e}, f {apart:e}", o.separation)));
+    let exactly = if o.not_continued() { near } else { off };
+    if !o.past && (o.at().separation - 2.0 * apart.min(0.0)).abs() > 2.0 * exactly {
+        out.push((Lie::Separation, format!("{:e}, f {apart:e}", o.at().separation)));
     }
-    let closing = (sides[0].velocity(o.point) - sides[1].velocity(o.point)).dot(o.normal);
+    let closing = (sides[0].velocity(o.at().point) - sides[1].velocity(o.at().point)).dot(o.at().normal);
     let fastest: f64 =
         sides.iter().map(|s| s.moving.motion.velocity.length() + s.moving.motion.spin.length() * (s.extent)).sum();
     // A ball's spin about its centre moves nothing of it: what the rounding of a normal makes of it is no speed.
-    let carried = |s: &Side| if s.is_ball_about_its_centre() { s.moving.motion.velocity } else { s.velocity(o.point) };
-    let without = (carried(&sides[0]) - carried(&sides[1])).dot(o.normal);
+    let carried = |s: &Side| {
+        if s.is_ball_about_its_centre() { s.moving.motion.velocity } else { s.velocity(o.at().point) }
+    };
+    let without = (carried(&sides[0]) - carried(&sides[1])).dot(o.at().normal);
     if [closing, without].iter().all(|closing| {
-        (closing - o.normal_speed).abs()
-            > 1e-9 * fastest.min(1e3 * (closing.abs() + o.normal_speed.abs())) + 1e-13 * fastest
-    }) && !o.averaged_normal
+        (closing - o.at().normal_speed).abs()
+            > 1e-9 * fastest.min(1e3 * (closing.abs() + o.at().normal_speed.abs())) + 1e-13 * fastest
+    }) && !o.at().averaged_normal
     {
-        out.push((Lie::NormalSpeed, format!("{}, the bodies close in by {closing}", o.normal_speed)));
+        out.push((Lie::NormalSpeed, format!("{}, the bodies close in by {closing}", o.at().normal_speed)));
     }
-    if o.time == o.time_upper && !o.not_continued && o.time > 0.0 {
+    if o.time() == o.time_upper() && !o.not_continued() && o.time() > 0.0 {
         // Between touch and depth delta the step must pass, if a double can tell.
         let lag = o.resolution / closing.abs().max(f64::MIN_POSITIVE);
         if lag > 16.0 * f64::EPSILON && closing > 0.0 {
-            out.push((Lie::NotContinued, format!("time {} is time_upper, delta takes {lag:e}", o.time)));
+            out.push((Lie::NotContinued, format!("time {} is time_upper, delta takes {lag:e}", o.time())));
         }
     }
     // Which faces pass through the point is a matter of what counts as through: any sensible measure will do for all.
@@ -474,7 +477,7 @@ fn features(
 ) {
     let spots: [Spot; 2] =
         std::array::from_fn(|k| Spot::of(&sides[k], points[k], taus[k], sides[k].turned(normals[k])));
-    let at_depth = o.not_continued || o.time == 0.0;
+    let at_depth = o.not_continued() || o.time() == 0.0;
     // Of a round feature the gradient turns while a point moves: by its rounding, or, of one that is told where it is
     // deep, by how deep it is; then both sides' gradients are what the normal lies between.
     let turns: [f64; 2] = std::array::from_fn(|k| {
@@ -499,7 +502,7 @@ fn features(
     let mut ranks = [None; 2];
     for (k, (side, spot)) in sides.iter().zip(&spots).enumerate() {
         let (name, tau) = (["a", "b"][k], taus[k]);
-        let named: Vec<u32> = [o.faces_a, o.faces_b][k].into_iter().filter(|f| *f != NO_FACE).collect();
+        let named: Vec<u32> = [o.at().faces_a, o.at().faces_b][k].into_iter().filter(|f| *f != NO_FACE).collect();
         if named.is_empty() || spot.active.is_empty() {
             out.push((Lie::FaceInactive, format!("{name}: {named:?} named, {} active", spot.active.len())));
             continue;
@@ -525,7 +528,7 @@ fn features(
         let allowed = NORMAL + turns[k].min(0.5) + if at_depth { turns[1 - k].min(0.5) } else { 0.0 };
         let off = off_cone(n, &spot.generators);
         let allowed = if spot.apex { allowed.max(2e-4) } else { allowed };
-        if !o.averaged_normal && off > allowed {
+        if !o.at().averaged_normal && off > allowed {
             out.push((Lie::Normal, format!("{name}: {off:e} off the cone of faces {:?}", ids(side, spot))));
         }
         let at = side.moving.motion.at(side.time).rotation * side.moving.place.rotation;
@@ -538,38 +541,42 @@ fn features(
                 .map(|i| side.literals[i].gradient(points[k]))
                 .collect();
             ranks[k] = Some(rank(&gradients));
-            if o.extent == Extent::Point && rank(&gradients) != spot.rank {
+            if o.at().extent == Extent::Point && rank(&gradients) != spot.rank {
                 out.push((Lie::FaceInactive, format!("{name}: of {:?} only {named:?} named", ids(side, spot))));
             }
         }
     }
     if let [Some(a), Some(b)] = ranks
-        && Kind::of_active(a, b) != o.kind
+        && ContactKind::of_active(a, b) != o.at().kind
     {
-        out.push((Lie::FaceInactive, format!("{} by {a} and {b} named", o.kind.name())));
+        out.push((Lie::FaceInactive, format!("{} by {a} and {b} named", o.at().kind.name())));
     }
-    if o.averaged_normal && off_cone(o.normal, &together) > 2e-4 {
-        out.push((Lie::Normal, format!("the averaged {} is not between the faces", o.normal)));
+    if o.at().averaged_normal && off_cone(o.at().normal, &together) > 2e-4 {
+        out.push((Lie::Normal, format!("the averaged {} is not between the faces", o.at().normal)));
     }
-    let kind = Kind::of_active(spots[0].rank, spots[1].rank);
+    let kind = ContactKind::of_active(spots[0].rank, spots[1].rank);
     // A point that is deep beside an apex may be of the apex or of the face around it.
     let of = |spot: &Spot| if at_depth && spot.apex { [spot.rank, 1] } else { [spot.rank; 2] };
-    let kinds = of(&spots[0]).map(|a| of(&spots[1]).map(|b| Kind::of_active(a, b)));
-    let fits = match o.extent {
-        Extent::Point => kinds.as_flattened().contains(&o.kind),
+    let kinds = of(&spots[0]).map(|a| of(&spots[1]).map(|b| ContactKind::of_active(a, b)));
+    let fits = match o.at().extent {
+        Extent::Point => kinds.as_flattened().contains(&o.at().kind),
         // Any point of a line or a patch, its border included.
         Extent::Line => {
-            let has_vertex = matches!(o.kind, Kind::VertexFace | Kind::VertexEdge | Kind::VertexVertex);
-            (o.kind as usize) <= kind as usize && !has_vertex
+            let has_vertex =
+                matches!(o.at().kind, ContactKind::VertexFace | ContactKind::VertexEdge | ContactKind::VertexVertex);
+            (o.at().kind as usize) <= kind as usize && !has_vertex
         }
-        Extent::Patch => o.kind == Kind::FaceFace,
+        Extent::Patch => o.at().kind == ContactKind::FaceFace,
     };
     if !fits {
         let at = [ids(&sides[0], &spots[0]), ids(&sides[1], &spots[1])];
-        out.push((Lie::Kind, format!("{} {}, faces {at:?} make {}", o.kind.name(), o.extent.name(), kind.name())));
+        out.push((
+            Lie::Kind,
+            format!("{} {}, faces {at:?} make {}", o.at().kind.name(), o.at().extent.name(), kind.name()),
+        ));
     }
-    if o.averaged_normal != (o.kind == Kind::VertexVertex) {
-        out.push((Lie::Kind, format!("{} and averaged {}", o.kind.name(), o.averaged_normal)));
+    if o.at().averaged_normal != (o.at().kind == ContactKind::VertexVertex) {
+        out.push((Lie::Kind, format!("{} and averaged {}", o.at().kind.name(), o.at().averaged_normal)));
     }
 }
 
@@ -579,32 +586,41 @@ fn ids(side: &Side, spot: &Spot) -> Vec<u32> {
 
 fn overlap(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let rounding = 64.0 * f64::EPSILON * (sides[0].extent + sides[1].extent);
-    if (o.normal.length() - 1.0).abs() > 1e-12 || !o.normal.is_finite() || !o.point.is_finite() {
-        out.push((Lie::Normal, format!("point {}, normal {}", o.point, o.normal)));
+    if (o.at().normal.length() - 1.0).abs() > 1e-12 || !o.at().normal.is_finite() || !o.at().point.is_finite() {
+        out.push((Lie::Normal, format!("point {}, normal {}", o.at().point, o.at().normal)));
         return;
     }
     let depth = |p: DVec3| -sides[0].value(sides[0].local(p)).max(sides[1].value(sides[1].local(p)));
-    let at = depth(o.point);
+    let at = depth(o.at().point);
     if at < 2.0 * o.resolution - rounding {
-        out.push((Lie::Point, format!("depth {at:e} at {}, 2 delta are {:e}", o.point, 2.0 * o.resolution)));
+        out.push((Lie::Point, format!("depth {at:e} at {}, 2 delta are {:e}", o.at().point, 2.0 * o.resolution)));
     }
-    if -o.separation > 2.0 * at + rounding || o.separation > 0.0 {
-        out.push((Lie::Separation, format!("{:e}, the point proves {:e}", o.separation, -2.0 * at)));
+    if -o.at().separation > 2.0 * at + rounding || o.at().separation > 0.0 {
+        out.push((Lie::Separation, format!("{:e}, the point proves {:e}", o.at().separation, -2.0 * at)));
     }
-    if o.penetration > 0.0 && o.penetration > 2.0 * depth(o.deepest) + rounding {
-        out.push((Lie::Separation, format!("penetration {:e}, deepest {:e}", o.penetration, 2.0 * depth(o.deepest))));
+    if o.penetration().map_or(0.0, |p| p.depth) > 0.0
+        && o.penetration().map_or(0.0, |p| p.depth) > 2.0 * depth(o.penetration().unwrap().point) + rounding
+    {
+        out.push((
+            Lie::Separation,
+            format!(
+                "penetration {:e}, deepest {:e}",
+                o.penetration().map_or(0.0, |p| p.depth),
+                2.0 * depth(o.penetration().unwrap().point)
+            ),
+        ));
     }
     // A spin about a body's own axis of revolution moves nothing of it, so it may be left out. Inside of the bodies that makes a
     // difference: the point is on neither surface.
-    let turning = |s: &Side| s.velocity(o.point);
+    let turning = |s: &Side| s.velocity(o.at().point);
     let carried = |s: &Side| s.moving.motion.velocity;
     let speeds = [turning(&sides[0]), carried(&sides[0])]
-        .map(|a| [turning(&sides[1]), carried(&sides[1])].map(|b| (a - b).dot(o.normal)));
+        .map(|a| [turning(&sides[1]), carried(&sides[1])].map(|b| (a - b).dot(o.at().normal)));
     let closing = speeds[0][0];
     let fastest: f64 =
         sides.iter().map(|s| s.moving.motion.velocity.length() + s.moving.motion.spin.length() * (s.extent)).sum();
-    let off = speeds.as_flattened().iter().map(|v| (v - o.normal_speed).abs()).fold(f64::INFINITY, f64::min);
-    if off > 1e-9 * fastest && rank(&[o.normal]) == 1 {
-        out.push((Lie::NormalSpeed, format!("{}, the bodies close in by {closing}", o.normal_speed)));
+    let off = speeds.as_flattened().iter().map(|v| (v - o.at().normal_speed).abs()).fold(f64::INFINITY, f64::min);
+    if off > 1e-9 * fastest && rank(&[o.at().normal]) == 1 {
+        out.push((Lie::NormalSpeed, format!("{}, the bodies close in by {closing}", o.at().normal_speed)));
     }
 }

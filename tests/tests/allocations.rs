@@ -80,7 +80,7 @@ fn a_warm_step_of_bodies_that_meet_allocates_nothing() {
     let recipes = [Recipe::sphere(0.4), Recipe::cuboid(0.3, 0.35, 0.3), Recipe::cylinder(0.3, 0.4)];
     let (mut warm, mut kept, mut contacts, mut overlaps) = (0, 0, 0, 0);
     walk(0.75, &recipes, |step, out, allocations| {
-        let reported = |status: Status| out.pairs.iter().filter(|p| p.outcome.status == status).count();
+        let reported = |status: Status| out.pairs.iter().filter(|p| p.outcome.status() == status).count();
         if step > WARM && out.counters.after_stage1 == 0 {
             warm += 1;
             contacts += reported(Status::Contact);

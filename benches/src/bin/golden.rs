@@ -10,7 +10,10 @@
 
 use clap::Parser;
 use contactd::check::Check;
-use contactd::contact::{Outcome, QueryOptions, Region, Scratch, Status, earliest_contact};
+use contactd::contact::{
+    Contact, ContactPoint, Outcome, Overlap, Penetration, QueryOptions, Region, Scratch, Status, Verdict,
+    earliest_contact,
+};
 use contactd::import::{Facets, Limits, read_scene};
 use contactd::ipc::ServerConfig;
 use contactd::octree::Model;
@@ -103,33 +106,20 @@ impl Told {
     /// Every field of an answer but its work, `apart`, a bound for the engine's own use, and the witness, which proves and tells nothing. A new field does not compile until
     /// it is decided which it is.
     fn outcome(&mut self, o: &Outcome) {
-        let Outcome {
-            status,
-            time_lower,
-            time,
-            time_upper,
-            touching,
-            apart: _,
-            not_continued,
-            averaged_normal,
-            witness: _,
-            point,
-            normal,
-            separation,
-            normal_speed,
-            kind,
-            extent,
-            resolution,
-            depth,
-            faces_a,
-            faces_b,
-            penetration,
-            deepest,
-            direction,
-            margin_time,
-            past,
-            counters: _,
-        } = *o;
+        let Outcome { verdict, touching, apart: _, resolution, depth, margin_time, past, counters: _ } = *o;
+        let ([time_lower, time, time_upper], not_continued, point, penetration) = match verdict {
+            Verdict::Clear { until, rest } => ([until, 1.0, 1.0], false, rest, None),
+            Verdict::Contact(Contact { time_lower, time, time_upper, not_continued, witness: _, point }) => {
+                ([time_lower, time, time_upper], not_continued, point, None)
+            }
+            Verdict::Overlap(Overlap { time, point, penetration }) => ([time; 3], false, point, penetration),
+            Verdict::Undecided { time_lower } => ([time_lower, 1.0, 1.0], false, None, None),
+        };
+        let ContactPoint { point, normal, averaged_normal, separation, normal_speed, kind, extent, faces_a, faces_b } =
+            point.unwrap_or_default();
+        let Penetration { depth: penetration, point: deepest, direction } =
+            penetration.unwrap_or(Penetration { depth: 0.0, point: DVec3::ZERO, direction: DVec3::ZERO });
+        let status = verdict.status();
         self.statuses[status as usize] += 1;
         let flags = [touching, not_continued, averaged_normal, past];
         let words = [status as u64, kind as u64, extent as u64].into_iter().chain(flags.map(u64::from));

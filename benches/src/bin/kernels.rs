@@ -103,17 +103,17 @@ fn main() -> std::io::Result<()> {
         let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
         let theirs: Vec<Option<f64>> = other.iter().map(peer::Question::time).collect();
         let met = |k: usize| cases[k].1 >= 0.0;
-        let wrong = (0..cases.len()).filter(|k| met(*k) != (answers[*k].status == Status::Contact)).count();
+        let wrong = (0..cases.len()).filter(|k| met(*k) != (answers[*k].status() == Status::Contact)).count();
         let peer_wrong = (0..cases.len()).filter(|k| met(*k) != theirs[*k].is_some()).count();
-        let both = || (0..cases.len()).filter(|k| met(*k) && answers[*k].status == Status::Contact);
+        let both = || (0..cases.len()).filter(|k| met(*k) && answers[*k].status() == Status::Contact);
         let known: Vec<f64> = (0..cases.len())
             .map(|k| {
                 let ((scene, time), own) = (&cases[k], &answers[k]);
-                let doubtful = met(k) && own.status == Status::Contact && (own.time - time).abs() > DOUBTFUL;
+                let doubtful = met(k) && own.status() == Status::Contact && (own.time() - time).abs() > DOUBTFUL;
                 if doubtful { scene.truth(Effort::QUICK).time } else { *time }
             })
             .collect();
-        let errors = both().map(|k| (answers[k].time - known[k]).abs());
+        let errors = both().map(|k| (answers[k].time() - known[k]).abs());
         let peer_errors = both().filter_map(|k| theirs[k].map(|t| (t - known[k]).abs()));
         let known_off = (0..cases.len()).map(|k| (known[k] - cases[k].1).abs());
 

@@ -247,7 +247,7 @@ fn main() -> std::io::Result<()> {
             model.seconds / compound.seconds,
             model.megabytes / compound.megabytes,
             own.len(),
-            answers.iter().filter(|o| o.status == Status::Contact).count(),
+            answers.iter().filter(|o| o.status() == Status::Contact).count(),
             1e6 * median(laps.iter().map(|l| l.own)),
             1e6 * median(laps.iter().map(|l| l.peer)),
             median(laps.iter().map(|l| l.ratio)),

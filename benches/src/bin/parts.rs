@@ -255,7 +255,7 @@ fn main() -> std::io::Result<()> {
         let mut scratch = Scratch::default();
         let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
         let cells = || answers.iter().map(|o| o.counters.cells as f64);
-        let met = |o: &Outcome| o.status == Status::Contact;
+        let met = |o: &Outcome| o.status() == Status::Contact;
         let mut too_slow = [false; 2];
         for n in FACETS {
             if (options.quick && n > 16) || too_slow == [true; 2] {
@@ -278,9 +278,9 @@ fn main() -> std::io::Result<()> {
                 too_slow[k] = each > budget;
                 let other: Vec<peer::Question> = (0..count).map(ask).collect();
                 let theirs: Vec<Option<f64>> = other.iter().map(peer::Question::time).collect();
-                let decided = || answers.iter().zip(&theirs).filter(|(o, _)| o.status != Status::Undecided);
+                let decided = || answers.iter().zip(&theirs).filter(|(o, _)| o.status() != Status::Undecided);
                 let wrong = decided().filter(|(o, t)| met(o) != t.is_some()).count();
-                let errors = || decided().filter(|(o, _)| met(o)).filter_map(|(o, t)| t.map(|t| (t - o.time).abs()));
+                let errors = || decided().filter(|(o, _)| met(o)).filter_map(|(o, t)| t.map(|t| (t - o.time()).abs()));
                 let plan = Plan { blocks: if too_slow[k] { 1 } else { plan.blocks }, ..plan };
                 let laps = race(plan, count, |i| own[i].ask(&mut scratch), |i| other[i].ask());
                 table.push(row![
@@ -300,7 +300,7 @@ fn main() -> std::io::Result<()> {
                     median(errors()),
                     worst(errors()),
                     wrong,
-                    answers.iter().filter(|o| o.status == Status::Undecided).count(),
+                    answers.iter().filter(|o| o.status() == Status::Undecided).count(),
                 ]);
             }
         }

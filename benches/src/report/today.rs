@@ -11,6 +11,7 @@ use crate::row;
 use crate::table::{Cell, Table, shown};
 use crate::workload::{Case, Class, Peer, Truth};
 use contactd::contact::Scratch;
+use contactd_tests::engine::ReportedPoint as _;
 use parry3d_f64::query;
 use parry3d_f64::shape::SharedShape;
 use std::time::Instant;
@@ -91,7 +92,7 @@ fn run(class: &Class, plan: Plan, budget: f64, ask_peer: impl Fn(&Case) -> Optio
         plan,
         count,
         |i| ask_peer(&class.cases[i]),
-        |i| ask(&class.cases[i], &Setting::default(), &mut scratch).time,
+        |i| ask(&class.cases[i], &Setting::default(), &mut scratch).time(),
     );
     Way { laps, times }
 }
@@ -128,7 +129,7 @@ pub fn today(context: &Context) -> Section {
         let mut scratch = Scratch::default();
         // Closing speed at the contact, of the certified answer: errors in time become lengths.
         let speeds: Vec<f64> =
-            class.cases.iter().map(|c| ask(c, &Setting::default(), &mut scratch).normal_speed.abs()).collect();
+            class.cases.iter().map(|c| ask(c, &Setting::default(), &mut scratch).at().normal_speed.abs()).collect();
         let us = |laps: &[Lap], q: f64| 1e6 * quantile(laps.iter().map(|l| l.least[0]), q);
         let mut lines = Vec::new();
         let (mut own, mut wide) = (Vec::new(), Vec::new());

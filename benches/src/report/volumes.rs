@@ -92,7 +92,8 @@ pub fn volumes(context: &Context) -> Section {
             let spent = |q: f64| 1e6 * quantile(timed.iter().map(|(_, c)| c.of(Stage::Region).as_secs_f64()), q);
             let sum = |of: fn(&Outcome) -> u64| timed.iter().map(|(o, _)| of(o) as f64).sum::<f64>();
             let left = 100.0 * sum(|o| o.counters.after_stage1) / sum(|o| o.counters.primitives);
-            let reported = timed.iter().filter(|(o, c)| o.status == Status::Clear && c.last() == Stage::Region).count();
+            let reported =
+                timed.iter().filter(|(o, c)| o.status() == Status::Clear && c.last() == Stage::Region).count();
             let us = |q: f64| 1e6 * quantile(m.laps.iter().map(|l| l.least[0]), q);
             let ratio = |q: f64| quantile(m.laps.iter().map(|l| l.least_ratio()), q);
             let cells = |q: f64| quantile(m.answers.iter().map(|o| o.counters.cells as f64), q);

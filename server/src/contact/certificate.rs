@@ -16,7 +16,7 @@ use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Faces, Side, View};
 use crate::contact::instant::depth;
 use crate::contact::instant::work::Work;
-use crate::contact::query::outcome::{NO_FACE, Outcome, Status};
+use crate::contact::query::outcome::{Contact, NO_FACE, Outcome, Status};
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
@@ -97,7 +97,7 @@ pub enum Rest {
 
 /// Proves what an answer says; `None` when it says nothing about any time (overlap), or the limit of cells is reached.
 pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
-    if outcome.status == Status::Overlap {
+    if outcome.status() == Status::Overlap {
         return None;
     }
     let (mut task, swapped) = Task::of(query);
@@ -116,7 +116,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     let made = Certificate {
         swapped,
         depth,
-        until: outcome.time_lower.min(1.0),
+        until: outcome.time_lower().min(1.0),
         root,
         witness: witness(&task, (swapped, &still), outcome, depth),
         cells: Vec::new(),
@@ -127,7 +127,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     if !root.is_finite() {
         return None;
     }
-    if outcome.status != Status::Undecided {
+    if outcome.status() != Status::Undecided {
         return cover(&task, swapped, outcome, made, query.cell_limit);
     }
     // The limit may have run out where the bodies are as good as at the depth, too near for what a checker needs: then the
@@ -195,16 +195,14 @@ fn cover(task: &Task, swapped: bool, outcome: &Outcome, mut made: Certificate, l
 
 /// The point of a contact, deepened to what both bodies share when it is decided.
 fn witness(task: &Task, (swapped, still): (bool, &Relative), o: &Outcome, depth: f64) -> Option<(f64, DVec3)> {
-    if o.status != Status::Contact {
-        return None;
-    }
-    let x = carried(task, o);
-    let at = task.relative.at(o.time_upper);
+    let contact = o.contact()?;
+    let x = carried(task, contact)?;
+    let at = task.relative.at(contact.time_upper);
     let deep = |x: DVec3| -task.a.value(x).max(task.b.value(at.b_point(x)));
     let enough = |x: &DVec3| deep(*x) >= WITNESS * depth;
     // The search has left out a spin that moves nothing; the frame that carries the point here takes part in it.
-    let named = o.witness.map(|x| {
-        let searched = still.at(o.time_upper);
+    let named = contact.witness.map(|x| {
+        let searched = still.at(contact.time_upper);
         let x = if swapped { searched.a_point(x) } else { x };
         let off = still.world_point(&searched, DVec3::ZERO) - task.relative.world_point(&at, DVec3::ZERO);
         at.world_from_a.transpose() * (searched.world_from_a * x + off)
@@ -213,23 +211,22 @@ fn witness(task: &Task, (swapped, still): (bool, &Relative), o: &Outcome, depth:
         let (deepest, ..) = depth::climb(task, &at, x, &Work::new(u64::MAX));
         Some(deepest).filter(enough)
     });
-    found.map(|x| (o.time_upper, x))
+    found.map(|x| (contact.time_upper, x))
 }
 
 /// The contact's point in the reference body's frame.
-fn carried(task: &Task, o: &Outcome) -> DVec3 {
-    let at = task.relative.at(o.time);
-    at.world_from_a.transpose() * (o.point - task.relative.world_point(&at, DVec3::ZERO))
+fn carried(task: &Task, contact: &Contact) -> Option<DVec3> {
+    let at = task.relative.at(contact.time);
+    let point = contact.point?.point;
+    Some(at.world_from_a.transpose() * (point - task.relative.world_point(&at, DVec3::ZERO)))
 }
 
 /// Where the contact touches curved faces is where they are worth touching all along.
 fn hints(task: &Task, swapped: bool, o: &Outcome) -> Vec<Hint> {
-    if o.status != Status::Contact {
-        return Vec::new();
-    }
-    let at = task.relative.at(o.time);
-    let x = carried(task, o);
-    let (faces_a, faces_b) = if swapped { (&o.faces_b, &o.faces_a) } else { (&o.faces_a, &o.faces_b) };
+    let Some(contact) = o.contact() else { return Vec::new() };
+    let (Some(x), Some(point)) = (carried(task, contact), &contact.point) else { return Vec::new() };
+    let at = task.relative.at(contact.time);
+    let (faces_a, faces_b) = if swapped { (&point.faces_b, &point.faces_a) } else { (&point.faces_a, &point.faces_b) };
     let mut hints = Vec::new();
     for (side, solid, faces, point) in [(Side::A, task.a, faces_a, x), (Side::B, task.b, faces_b, at.b_point(x))] {
         for face in faces.iter().filter(|f| **f != NO_FACE && (**f as usize) < solid.faces.len()) {

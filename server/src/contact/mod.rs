@@ -21,7 +21,10 @@ pub(crate) use convex::{AxisSearch, Hull, SeparatingAxisTest, SweptShape};
 pub use instant::within;
 pub use pair::{PairSearch, earliest_contact, find_earliest, resolution_of};
 pub use query::options::QueryOptions;
-pub use query::outcome::{Counters, DEFAULT_CELL_LIMIT, Extent, Kind, Outcome, Status};
+pub use query::outcome::{
+    Contact, ContactKind, ContactPoint, Counters, DEFAULT_CELL_LIMIT, Extent, Outcome, Overlap, Penetration, Status,
+    Verdict,
+};
 pub use query::question::{Body, PairQuery, Strategies, default_resolution};
 pub use queue::clock::{Clock, Stage};
 pub use queue::scratch::Scratch;

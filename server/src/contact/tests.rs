@@ -34,20 +34,23 @@ fn tilt(v: DVec3) -> glam::DQuat {
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
     let o = ask_with(name, a, ma, b, mb, Strategies { convex: false, cavities: false, ..Strategies::default() });
     let fronted = ask_with(name, a, ma, b, mb, Strategies::default());
-    assert_eq!(o.status, fronted.status, "{name}");
-    if o.status != Status::Overlap {
-        assert_eq!((o.kind, o.extent), (fronted.kind, fronted.extent), "{name}");
+    assert_eq!(o.status(), fronted.status(), "{name}");
+    if o.status() != Status::Overlap {
+        assert_eq!(o.point().map(|p| (p.kind, p.extent)), fronted.point().map(|p| (p.kind, p.extent)), "{name}");
     }
-    assert!((o.time - fronted.time).abs() < 1e-12, "{name}: {} and {}", o.time, fronted.time);
+    assert!((o.time() - fronted.time()).abs() < 1e-12, "{name}: {} and {}", o.time(), fronted.time());
     assert!(
-        (o.penetration - fronted.penetration).abs() < 1e-12,
+        (o.penetration().map_or(0.0, |p| p.depth) - fronted.penetration().map_or(0.0, |p| p.depth)).abs() < 1e-12,
         "{name}: {} and {}",
-        o.penetration,
-        fronted.penetration
+        o.penetration().map_or(0.0, |p| p.depth),
+        fronted.penetration().map_or(0.0, |p| p.depth)
     );
-    assert!(fronted.time_lower <= fronted.time && fronted.time <= fronted.time_upper, "{name}");
+    assert!(fronted.time_lower() <= fronted.time() && fronted.time() <= fronted.time_upper(), "{name}");
     // Of an overlap any direction out of one body is a normal; the shortest is asked for.
-    let of = |o: &Outcome| if o.status == Status::Overlap { o.direction } else { o.normal };
+    let of = |o: &Outcome| {
+        let normal = o.point().copied().unwrap_or_default().normal;
+        o.penetration().map_or(normal, |p| p.direction)
+    };
     assert!((of(&o) - of(&fronted)).length() < 1e-6, "{name}: {} and {}", of(&o), of(&fronted));
     o
 }
@@ -65,14 +68,12 @@ fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, strategies
     let began = std::time::Instant::now();
     let o = earliest_contact(&q, &mut Scratch::default());
     println!(
-        "{name:36} {:?} {:.12} [{:.1e} {:.1e}] {:?} {:?} n {:.4} cells {} clauses {} newton {} {:?}",
-        o.status,
-        o.time,
-        o.time - o.time_lower,
-        o.time_upper - o.time,
-        o.kind,
-        o.extent,
-        o.normal,
+        "{name:36} {:?} {:.12} [{:.1e} {:.1e}] {:?} cells {} clauses {} newton {} {:?}",
+        o.status(),
+        o.time(),
+        o.time() - o.time_lower(),
+        o.time_upper() - o.time(),
+        o.point(),
         o.counters.cells,
         o.counters.clauses,
         o.counters.newton,
@@ -83,15 +84,15 @@ fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, strategies
 
 fn hits(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, time: f64) -> Outcome {
     let o = ask(name, a, ma, b, mb);
-    assert_eq!(o.status, Status::Contact, "{name}");
-    assert!((o.time - time).abs() < 1e-9, "{name}: {} for {time}", o.time);
-    assert!(o.time_lower <= o.time && o.time <= o.time_upper, "{name}");
-    assert!(o.time - o.time_lower < 1e-8, "{name}");
+    assert_eq!(o.status(), Status::Contact, "{name}");
+    assert!((o.time() - time).abs() < 1e-9, "{name}: {} for {time}", o.time());
+    assert!(o.time_lower() <= o.time() && o.time() <= o.time_upper(), "{name}");
+    assert!(o.time() - o.time_lower() < 1e-8, "{name}");
     o
 }
 
 fn clear(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) {
-    assert_eq!(ask(name, a, ma, b, mb).status, Status::Clear, "{name}");
+    assert_eq!(ask(name, a, ma, b, mb).status(), Status::Clear, "{name}");
 }
 
 fn plate(hole: f64) -> Model {
@@ -112,7 +113,7 @@ fn spheres_and_boxes() {
     hits("sphere on box face", &ball, slide(v(0.1, 0.2, 2.0), v(0., 0., -2.)), &cube, rest(), 0.5);
     hits("sphere on sphere", &ball, slide(v(-2.0, 0., 0.), v(2., 0., 0.)), &ball, rest(), 0.5);
     let o = hits("faces closing parallel", &cube, slide(v(0.1, 0.2, 2.0), v(0., 0., -2.)), &cube, rest(), 0.5);
-    assert_eq!((o.kind, o.extent), (Kind::FaceFace, Extent::Patch));
+    assert_eq!(o.point().map(|p| (p.kind, p.extent)), Some((ContactKind::FaceFace, Extent::Patch)));
     clear("box sliding on box", &cube, slide(v(0.1, 0.2, 1.0), v(0.5, 0.1, 0.)), &cube, rest());
     clear(
         "box spinning at rest on box",
@@ -130,7 +131,7 @@ fn spheres_and_boxes() {
         rest(),
         0.625,
     );
-    assert_eq!(o.extent, Extent::Line);
+    assert_eq!(o.point().unwrap().extent, Extent::Line);
     let o = hits(
         "edge on edge",
         &cube,
@@ -139,7 +140,7 @@ fn spheres_and_boxes() {
         turn(Pose::new(v(0., 0., 0.), tilt(v(0., std::f64::consts::FRAC_PI_4, 0.))), DVec3::ZERO, DVec3::ZERO),
         (2.0 - 2f64.sqrt()) / 2.0,
     );
-    assert_eq!(o.kind, Kind::EdgeEdge);
+    assert_eq!(o.point().unwrap().kind, ContactKind::EdgeEdge);
     let falling = turn(Pose::at(v(0., 0., 0.6)), DVec3::ZERO, v(std::f64::consts::FRAC_PI_2, 0., 0.));
     let floor = simple(Cuboid { half: v(5., 5., 1.) });
     let angle = (0.6 / 0.5f64.sqrt()).asin() - std::f64::consts::FRAC_PI_4;
@@ -226,21 +227,25 @@ fn overlaps_and_cavities() {
     let cube = simple(Cuboid { half: DVec3::splat(0.5) });
     let small = simple(Cuboid { half: DVec3::splat(0.1) });
     let o = ask("small inside large", &cube, rest(), &small, rest());
-    assert_eq!(o.status, Status::Overlap);
+    assert_eq!(o.status(), Status::Overlap);
     let o = ask("large around small", &small, rest(), &cube, rest());
-    assert_eq!(o.status, Status::Overlap);
+    assert_eq!(o.status(), Status::Overlap);
     let o = ask("pressed by a tenth", &cube, rest(), &cube, slide(v(0.0, 0.0, 0.9), v(0., 0., 1.)));
-    assert_eq!(o.status, Status::Overlap);
-    assert!((o.penetration - 0.1).abs() < 1e-9 && (o.direction - DVec3::Z).length() < 1e-9, "{o:?}");
+    assert_eq!(o.status(), Status::Overlap);
+    assert!(
+        (o.penetration().map_or(0.0, |p| p.depth) - 0.1).abs() < 1e-9
+            && (o.penetration().unwrap().direction - DVec3::Z).length() < 1e-9,
+        "{o:?}"
+    );
     let shell = pierced(Sphere { radius: 1.1 }, vec![(Sphere { radius: 1.0 }.into(), Pose::IDENTITY)]);
     let ball = simple(Sphere { radius: 0.2 });
     let o = hits("ball meets the cavity's wall", &shell, rest(), &ball, slide(v(0.1, 0., 0.), v(1., 0., 0.)), 0.7);
-    assert!((o.normal + DVec3::X).length() < 1e-6, "{:?}", o.normal);
+    assert!((o.point().unwrap().normal + DVec3::X).length() < 1e-6, "{:?}", o.point().unwrap().normal);
     let rod = simple(Cylinder { radius: 0.01, half_height: 2.0 });
     let spin = turn(Pose::new(DVec3::ZERO, tilt(v(0., std::f64::consts::FRAC_PI_2, 0.))), DVec3::ZERO, v(0., 0., 50.0));
     let at = v(0.5f64.cos(), 0.5f64.sin(), 0.) * 1.5;
     let o = ask("spinning rod", &rod, spin, &simple(Sphere { radius: 0.05 }), slide(at, DVec3::ZERO));
-    assert!((o.time - 0.00919978651).abs() < 1e-10, "{}", o.time);
+    assert!((o.time() - 0.00919978651).abs() < 1e-10, "{}", o.time());
 }
 
 #[test]
@@ -264,7 +269,7 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
     let search = Strategies { convex: false, cavities: false, ..Strategies::default() };
     let mut timed = Scratch::timed();
     let own = ask(&plate, down, search, &mut Scratch::default());
-    assert!(own.status == Status::Contact && own.counters.cells > 0, "{own:?}");
+    assert!(own.status() == Status::Contact && own.counters.cells > 0, "{own:?}");
     assert_eq!(ask(&plate, down, search, &mut timed), own);
     let clock = timed.take_clock().expect("a clock");
     assert!([Stage::Region, Stage::Walk, Stage::Cells].iter().all(|s| !clock.of(*s).is_zero()), "{clock:?}");
@@ -324,7 +329,7 @@ fn a_limit_of_cells_cuts_the_same_bits() {
         let o = earliest_contact(&query, &mut Scratch::default());
         assert_eq!(o, earliest_contact(&query, &mut Scratch::default()));
         assert!(o.counters.cells <= LIMIT && (o.counters.cells == 0) == (o.counters.evaluations == 0), "{o:?}");
-        if o.status == Status::Undecided {
+        if o.status() == Status::Undecided {
             assert!(o.counters.spent(LIMIT) >= LIMIT, "{o:?}");
             cut += 1;
         }
@@ -332,8 +337,8 @@ fn a_limit_of_cells_cuts_the_same_bits() {
         let halt = std::sync::Arc::new(crate::math::halt::Halt::default());
         halt.set();
         let ended = earliest_contact(&query, &mut Scratch::heeding(Some(halt)));
-        assert!(ended.counters.cells == 0 && matches!(ended.status, Status::Undecided | Status::Clear), "{ended:?}");
-        assert!(ended.time_lower <= o.time_upper);
+        assert!(ended.counters.cells == 0 && matches!(ended.status(), Status::Undecided | Status::Clear), "{ended:?}");
+        assert!(ended.time_lower() <= o.time_upper());
     }
     assert!(cut > 3, "{cut} of 60 were cut");
 }

@@ -63,14 +63,13 @@ pub const COLORS: [Rgb; 8] = [
 
 /// Draws the scene; `title` above, `note` below.
 pub fn scene(title: &str, note: &str, actors: &[Actor], meetings: &[Meeting], quality: Quality) -> Drawing {
-    let mut met: Vec<&Meeting> =
-        meetings.iter().filter(|m| matches!(m.outcome.status, Status::Contact | Status::Overlap)).collect();
-    met.sort_by(|a, b| a.outcome.time.total_cmp(&b.outcome.time).then(a.pair.cmp(&b.pair)));
+    let mut met: Vec<&Meeting> = meetings.iter().filter(|m| m.outcome.meets()).collect();
+    met.sort_by(|a, b| a.outcome.time().total_cmp(&b.outcome.time()).then(a.pair.cmp(&b.pair)));
     // Each object at its own earliest contact, else at the end of the step.
     let mut times = vec![1.0; actors.len()];
     for m in met.iter().rev() {
         for i in m.pair {
-            times[i] = m.outcome.time;
+            times[i] = m.outcome.time();
         }
     }
     let traced: Vec<Traced> = actors.iter().map(|a| Traced::new(a.solid)).collect();
@@ -90,7 +89,7 @@ pub fn scene(title: &str, note: &str, actors: &[Actor], meetings: &[Meeting], qu
     if boxes.is_empty() {
         return Drawing::new(quality.size.0, 64);
     }
-    let marks: Vec<Mark> = met.iter().map(|m| mark(actors, m)).collect();
+    let marks: Vec<Mark> = met.iter().filter_map(|m| mark(actors, m)).collect();
     let from = DVec3::new(0.5, -1.0, 0.95);
     let camera = Camera::framing(&boxes, from, quality.size);
     let low = boxes.iter().map(|b| b.min.z).fold(f64::INFINITY, f64::min);
@@ -106,17 +105,19 @@ pub fn scene(title: &str, note: &str, actors: &[Actor], meetings: &[Meeting], qu
     annotated(&view, title, &marks, note)
 }
 
-fn mark(actors: &[Actor], m: &Meeting) -> Mark {
+/// `None` where no point was asked for.
+fn mark(actors: &[Actor], m: &Meeting) -> Option<Mark> {
     let o = m.outcome;
+    let at = o.point()?;
     let [a, b] = m.pair.map(|i| &actors[i]);
     let negative = |actor: &Actor, faces: &[u32; 3]| {
         let owner = |f: &u32| actor.solid.face_owner.get(*f as usize).copied();
         faces.iter().filter_map(owner).any(|p| actor.solid.senses[p as usize] == Sense::Negative)
     };
-    let cut = if negative(a, &o.faces_a) || negative(b, &o.faces_b) { ", subtracted" } else { "" };
-    let text = match o.status {
-        Status::Overlap => format!("t {:.9}  {} - {}  overlap", o.time, a.name, b.name),
-        _ => format!("t {:.9}  {} - {}  {} {}{cut}", o.time, a.name, b.name, o.kind.name(), o.extent.name()),
+    let cut = if negative(a, &at.faces_a) || negative(b, &at.faces_b) { ", subtracted" } else { "" };
+    let text = match o.status() {
+        Status::Overlap => format!("t {:.9}  {} - {}  overlap", o.time(), a.name, b.name),
+        _ => format!("t {:.9}  {} - {}  {} {}{cut}", o.time(), a.name, b.name, at.kind.name(), at.extent.name()),
     };
-    Mark { point: o.point, normal: o.normal, text }
+    Some(Mark { point: at.point, normal: at.normal, text })
 }

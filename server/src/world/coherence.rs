@@ -270,13 +270,13 @@ impl PairCache {
     /// Learns from a search that was allowed so much work.
     pub fn learn(&mut self, q: &Question, limit: u64, outcome: &Outcome) {
         self.via = Via::Search;
-        self.cells = (outcome.status == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
+        self.cells = (outcome.status() == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
         // More work might tell an overlap that was to be searched past.
-        let open = outcome.status == Status::Overlap && q.query.query_options.past_overlap;
+        let open = outcome.status() == Status::Overlap && q.query.query_options.past_overlap;
         // What moves is hardly ever asked the same again, and what took no search is found as quickly as it is kept.
         let cheap = outcome.counters.cells + outcome.counters.instant_cells == 0;
         let moves = || [&q.query.a, &q.query.b].iter().any(|body| !body.placed.motion.is_rest());
-        self.answered = outcome.status != Status::Undecided && !open && !(cheap && moves());
+        self.answered = outcome.status() != Status::Undecided && !open && !(cheap && moves());
         if self.answered {
             let (motions, query_options) = (q.motions(), q.query.query_options);
             put(&mut self.answer, Answer { motions, query_options, limit, outcome: *outcome });

@@ -156,10 +156,10 @@ impl World {
                 let _ = write!(out, "pair {a} {b} answer");
                 motions.iter().for_each(|m| write_motion(&mut out, m));
                 out.push('\n');
-                if outcome.status == Status::Overlap {
+                if outcome.status() == Status::Overlap {
                     // Less may have been asked for than a point.
                     let found = contact::earliest_contact(&query, &mut Scratch::default());
-                    let _ = writeln!(out, "overlap {}", numbers(&[found.point]));
+                    let _ = writeln!(out, "overlap {}", numbers(&[found.point()?.point]));
                 } else {
                     write_cells(&certificate::certify(&query, &outcome)?, &mut out);
                 }

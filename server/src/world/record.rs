@@ -119,7 +119,7 @@ pub fn reply(out: &StepOutcome, details: bool) -> StepReply {
 fn record(p: &PairOutcome) -> ContactRecord {
     let o = &p.outcome;
     let mut r = ContactRecord { a: p.a, b: p.b, faces_a: [0; 3], ..ContactRecord::default() };
-    r.status = match o.status {
+    r.status = match o.status() {
         Status::Contact => wire::CONTACT,
         Status::Clear => wire::CLEAR,
         Status::Overlap => wire::OVERLAP,
@@ -128,8 +128,8 @@ fn record(p: &PairOutcome) -> ContactRecord {
     r.flags |= if p.plan.sensor { wire::SENSOR } else { 0 };
     if p.plan.report >= Report::Time {
         r.valid |= wire::VALID_TIME;
-        (r.time, r.time_lower) = (o.time, o.time_lower);
-        r.flags |= if o.not_continued { wire::NOT_CONTINUED } else { 0 };
+        (r.time, r.time_lower) = (o.time(), o.time_lower());
+        r.flags |= if o.not_continued() { wire::NOT_CONTINUED } else { 0 };
     }
     if p.plan.report >= Report::Time || p.plan.margin > 0.0 {
         r.flags |= if o.touching { wire::TOUCHING } else { 0 };
@@ -137,44 +137,42 @@ fn record(p: &PairOutcome) -> ContactRecord {
     }
     r.flags |= if o.margin_time < 1.0 { wire::WITHIN_MARGIN } else { 0 };
     r.flags |= if p.coarser { wire::COARSER_RESOLUTION } else { 0 };
-    let meets = matches!(o.status, Status::Contact | Status::Overlap);
     // A clear pair that touches has the fields of its nearest region, where its rule asks for them.
-    let rests = o.status == Status::Clear && p.regions.1 > 0;
-    if p.plan.report >= Report::Contact && (meets || rests) {
+    let is_reported = p.plan.report >= Report::Contact && (o.meets() || p.regions.1 > 0);
+    if let Some(point) = o.point().filter(|_| is_reported) {
         r.valid |= wire::VALID_POINT | wire::VALID_NORMAL | wire::VALID_SEPARATION | wire::VALID_NORMAL_SPEED;
         r.valid |= wire::VALID_FACES;
-        r.flags |= if o.averaged_normal { wire::AVERAGED_NORMAL } else { 0 };
+        r.flags |= if point.averaged_normal { wire::AVERAGED_NORMAL } else { 0 };
         // Bodies that overlap meet in no one way.
-        if o.status != Status::Overlap {
+        if o.status() != Status::Overlap {
             r.valid |= wire::VALID_KIND;
-            (r.kind, r.extent) = (o.kind as u8 + 1, o.extent as u8 + 1);
+            (r.kind, r.extent) = (point.kind as u8 + 1, point.extent as u8 + 1);
         }
-        r.point = o.point.to_array();
-        r.normal = o.normal.to_array();
-        r.separation = o.separation;
-        r.normal_speed = o.normal_speed;
-        (r.faces_a, r.faces_b) = (o.faces_a, o.faces_b);
+        r.point = point.point.to_array();
+        r.normal = point.normal.to_array();
+        r.separation = point.separation;
+        r.normal_speed = point.normal_speed;
+        (r.faces_a, r.faces_b) = (point.faces_a, point.faces_b);
     }
     r
 }
 
 fn detail(world: &World, p: &PairOutcome) -> DetailSlot {
     let o = &p.outcome;
-    let meets = matches!(o.status, Status::Contact | Status::Overlap);
     // The point that is told: of an overlap the deepest one, where it was asked for.
-    let measured = o.penetration > 0.0;
-    let reported = measured || (meets && p.plan.report >= Report::Contact);
-    let point_a = world.body(p.a).filter(|_| reported).map(|body| {
-        let pose = body.motion_state.motion.at(o.time);
-        pose.rotation.conjugate() * (if measured { o.deepest } else { o.point } - pose.position)
+    let of_contact = o.point().filter(|_| o.meets() && p.plan.report >= Report::Contact);
+    let point = o.penetration().map(|deepest| deepest.point).or(of_contact.map(|point| point.point));
+    let point_a = world.body(p.a).zip(point).map(|(body, point)| {
+        let pose = body.motion_state.motion.at(o.time());
+        pose.rotation.conjugate() * (point - pose.position)
     });
     DetailSlot {
         tag: wire::DETAIL_SLOT,
-        time_upper: if p.plan.report >= Report::Time { o.time_upper } else { 0.0 },
+        time_upper: if p.plan.report >= Report::Time { o.time_upper() } else { 0.0 },
         resolution: o.resolution,
         point_a: point_a.map_or([0.0; 3], |x| x.to_array()),
-        penetration: o.penetration,
-        direction: o.direction.to_array(),
+        penetration: o.penetration().map_or(0.0, |p| p.depth),
+        direction: o.penetration().map_or([0.0; 3], |p| p.direction.to_array()),
         cells: o.counters.cells,
         margin_time: if p.plan.margin > 0.0 { o.margin_time } else { 0.0 },
         ..DetailSlot::default()

@@ -12,7 +12,7 @@ use super::coherence::{Finding, PairCache, Question};
 use super::heed::Heed;
 use super::options::StepOptions;
 use super::plan::PairPlan;
-use crate::contact::{self, Counters, Outcome, PairQuery, PairSearch, QueryOptions, Scratch, Status};
+use crate::contact::{self, Counters, Outcome, PairQuery, PairSearch, QueryOptions, Scratch, Status, Verdict};
 use crate::math::halt::Halt;
 use crate::math::tolerance;
 use crate::motion::Placed;
@@ -162,8 +162,7 @@ pub fn run(
         // Nothing is proven of pairs that were not come to.
         for job in jobs.iter_mut().filter(|job| job.pair.is_some() && (!job.is_done || first && !job.found.known)) {
             (job.found.known, job.found.apart) = (false, false);
-            job.found.outcome.status = Status::Undecided;
-            job.found.outcome.time_lower = 0.0;
+            job.found.outcome.verdict = Verdict::Undecided { time_lower: 0.0 };
         }
     } else if first || searches.beyond.into_inner() {
         run_queue(bodies, jobs, options, first, clock, heed);
@@ -250,7 +249,7 @@ impl Searches<'_> {
         // Outcomes are large: it is written where it is to be.
         let outcome = &mut job.found.outcome;
         contact::find_earliest(&q.query, &mut thread_scratch.scratch, outcome);
-        if outcome.status == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
+        if outcome.status() == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
             if !self.is_over() {
                 // Cut short, perhaps, to be searched elsewhere: it counts for nothing.
                 job.found.outcome = Outcome::clear(job.resolution);
@@ -262,7 +261,7 @@ impl Searches<'_> {
             return 0;
         }
         let cells = outcome.counters.spent(q.query.cell_limit);
-        if cut && outcome.status == Status::Undecided {
+        if cut && outcome.status() == Status::Undecided {
             self.beyond.store(true, Relaxed);
         }
         outcome.counters += asked;
@@ -307,8 +306,8 @@ fn run_queue(
         let time = f64::from_bits(key);
         let search = &mut searches[i];
         if time > horizon {
-            let outcome = Outcome { time_lower: time.min(1.0), counters: search.counters(), ..open[i].found.outcome };
-            open[i].found.outcome = outcome;
+            let verdict = Verdict::Clear { until: time.min(1.0), rest: None };
+            open[i].found.outcome = Outcome { verdict, counters: search.counters(), ..open[i].found.outcome };
             continue;
         }
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
@@ -321,8 +320,8 @@ fn run_queue(
             Some(outcome) => {
                 open[i].found.outcome = outcome;
                 open[i].take(&questions[i], questions[i].query.cell_limit.min(allowed));
-                if first && !open[i].plan.sensor && matches!(outcome.status, Status::Contact | Status::Overlap) {
-                    horizon = horizon.min(open[i].found.outcome.time_upper + tolerance::FIRST_SLACK);
+                if first && !open[i].plan.sensor && outcome.meets() {
+                    horizon = horizon.min(open[i].found.outcome.time_upper() + tolerance::FIRST_SLACK);
                 }
             }
         }
@@ -358,7 +357,12 @@ fn query_options(plan: &PairPlan, options: &StepOptions) -> QueryOptions {
 
 /// A discrete pair's answer is about the end of the step.
 fn finish(plan: &PairPlan, outcome: &mut Outcome) {
-    if plan.detect == Detect::Discrete && outcome.status != Status::Undecided {
-        (outcome.time_lower, outcome.time, outcome.time_upper) = (1.0, 1.0, 1.0);
+    if plan.detect != Detect::Discrete {
+        return;
+    }
+    match &mut outcome.verdict {
+        Verdict::Contact(contact) => (contact.time_lower, contact.time, contact.time_upper) = (1.0, 1.0, 1.0),
+        Verdict::Overlap(overlap) => overlap.time = 1.0,
+        Verdict::Clear { .. } | Verdict::Undecided { .. } => {}
     }
 }

@@ -189,15 +189,15 @@ fn decide(bodies: &[Body], state: &mut StepState, options: &StepOptions, left: &
             out.counters += outcome.counters;
             out.searched += u32::from(job.near);
             out.known += u32::from(job.near && job.found.known);
-            out.safe_time = out.safe_time.min(outcome.time_lower);
-            if discrete && job.near && outcome.status == Status::Clear && passes(job, bodies) {
+            out.safe_time = out.safe_time.min(outcome.time_lower());
+            if discrete && job.near && outcome.status() == Status::Clear && passes(job, bodies) {
                 out.may_have_passed += 1;
             }
-            if matches!(outcome.status, Status::Contact | Status::Overlap) {
+            if outcome.meets() {
                 out.contact = true;
                 // A sensor stops nothing, and of a mere hit nobody knows when it comes.
                 if !plan.sensor && plan.report >= Report::Time {
-                    earliest = earliest.min(outcome.time);
+                    earliest = earliest.min(outcome.time());
                 }
             }
             if is_reported(&plan, outcome, options) {
@@ -241,7 +241,7 @@ fn learn(bodies: &[Body], state: &mut StepState, options: &StepOptions) {
                 notes.measured(job, bodies, options);
             }
             // What meets now will mostly do so in the next step: no look is worth its while.
-            let met = job.found.outcome.status != Status::Clear;
+            let met = job.found.outcome.status() != Status::Clear;
             neighbours.learned(pair, job.pair_cache.take(), clearance, met);
         }
     }
@@ -280,7 +280,7 @@ fn passes(job: &PairJob, bodies: &[Body]) -> bool {
 }
 
 fn is_reported(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
-    match o.status {
+    match o.status() {
         Status::Contact | Status::Overlap | Status::Undecided => true,
         Status::Clear => {
             let near = o.touching && plan.reports_nearness();
@@ -290,23 +290,24 @@ fn is_reported(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
 }
 
 fn is_undecided_before(o: &Outcome, earliest: f64) -> bool {
-    o.status == Status::Undecided && o.time_lower < earliest
+    o.status() == Status::Undecided && o.time_lower() < earliest
 }
 
 /// The time that is told of a pair, ordered as `f64::total_cmp` does.
 fn key_of(plan: &PairPlan, o: &Outcome) -> i64 {
     // A mere hit has no time that is told: its field is 0.
-    let is_reported = plan.report >= Report::Time || o.status == Status::Clear;
-    let bits = if is_reported { o.time.to_bits() as i64 } else { 0 };
+    let is_reported = plan.report >= Report::Time || o.status() == Status::Clear;
+    let bits = if is_reported { o.time().to_bits() as i64 } else { 0 };
     bits ^ (((bits >> 63) as u64) >> 1) as i64
 }
 
 /// Keeps the pairs whose bracket meets that of the earliest contact; sensors stop nothing.
 fn keep_first(pairs: &mut Vec<PairOutcome>) {
-    let stops = |p: &&PairOutcome| !p.plan.sensor && matches!(p.outcome.status, Status::Contact | Status::Overlap);
-    let Some(first) = pairs.iter().filter(stops).map(|p| &p.outcome).min_by(|p, q| p.time.total_cmp(&q.time)) else {
+    let stops = |p: &&PairOutcome| !p.plan.sensor && p.outcome.meets();
+    let Some(first) = pairs.iter().filter(stops).map(|p| &p.outcome).min_by(|p, q| p.time().total_cmp(&q.time()))
+    else {
         return;
     };
-    let until = first.time_upper;
-    pairs.retain(|p| p.outcome.status != Status::Clear && p.outcome.time_lower <= until);
+    let until = first.time_upper();
+    pairs.retain(|p| p.outcome.status() != Status::Clear && p.outcome.time_lower() <= until);
 }

@@ -55,7 +55,7 @@ fn to(id: u32, x: f64, z: f64) -> PoseRecord {
 }
 
 fn keys(out: &StepOutcome) -> Vec<(u32, u32, Status)> {
-    out.pairs.iter().map(|p| (p.a, p.b, p.outcome.status)).collect()
+    out.pairs.iter().map(|p| (p.a, p.b, p.outcome.status())).collect()
 }
 
 #[test]
@@ -70,12 +70,15 @@ fn contacts_come_by_time_whatever_the_order_of_the_batch() {
         let out = world.step(&batch, &StepOptions::default()).unwrap();
         assert!(out.contact && !out.undecided && !out.truncated);
         for (p, (a, b, time)) in out.pairs.iter().zip(expected) {
-            assert_eq!((p.a, p.b, p.outcome.status), (a, b, Status::Contact));
-            assert!((p.outcome.time - time).abs() < 1e-9, "{}", p.outcome.time);
-            assert!((p.outcome.normal - DVec3::Z).length() < 1e-9, "from the floor, the smaller id, to the ball");
+            assert_eq!((p.a, p.b, p.outcome.status()), (a, b, Status::Contact));
+            assert!((p.outcome.time() - time).abs() < 1e-9, "{}", p.outcome.time());
+            assert!(
+                (p.outcome.point().unwrap().normal - DVec3::Z).length() < 1e-9,
+                "from the floor, the smaller id, to the ball"
+            );
         }
         assert_eq!(out.pairs.len(), 2);
-        assert_eq!(out.safe_time, out.pairs[0].outcome.time_lower);
+        assert_eq!(out.safe_time, out.pairs[0].outcome.time_lower());
         answers.push(out.pairs.iter().map(|p| p.outcome).collect::<Vec<_>>());
     }
     assert_eq!(answers[0], answers[1]);
@@ -158,7 +161,7 @@ fn bodies_that_swing_about_their_places_are_not_paired_anew() {
     }
     let out = world.step(&[to(2, 2.1, 3.0)], &StepOptions::default()).unwrap();
     assert_eq!(keys(out), [(2, 3, Status::Contact)]);
-    assert!((out.pairs[0].outcome.time - 0.2 / 0.3).abs() < 1e-9);
+    assert!((out.pairs[0].outcome.time() - 0.2 / 0.3).abs() < 1e-9);
 }
 
 #[test]
@@ -194,7 +197,7 @@ fn a_turn_is_kept_whole() {
     assert!(!world.step(&[still], &StepOptions::default()).unwrap().contact);
     let turn = PoseRecord::turn(1, DVec3::ZERO, DVec3::Z * std::f64::consts::TAU);
     let out = world.step(&[turn], &StepOptions::default()).unwrap();
-    assert!(out.contact && out.pairs[0].outcome.time < 0.25, "{out:?}");
+    assert!(out.contact && out.pairs[0].outcome.time() < 0.25, "{out:?}");
 }
 
 #[test]
@@ -228,8 +231,8 @@ fn a_discrete_pair_is_tested_at_its_end() {
     let through = world.step(&[to(2, 0.0, -9.0)], &StepOptions::default()).unwrap();
     assert_eq!((through.pairs.len(), through.may_have_passed), (0, 1), "passed through, and said so");
     let into = world.step(&[to(2, 0.0, 0.5)], &StepOptions::default()).unwrap();
-    assert_eq!(into.pairs[0].outcome.status, Status::Overlap);
-    assert_eq!((into.pairs[0].outcome.time, into.safe_time), (1.0, 1.0));
+    assert_eq!(into.pairs[0].outcome.status(), Status::Overlap);
+    assert_eq!((into.pairs[0].outcome.time(), into.safe_time), (1.0, 1.0));
 }
 
 #[test]
@@ -257,7 +260,7 @@ fn every_pair_is_told_when_asked_and_far_ones_cost_nothing() {
     let mut world = balls(4);
     let out = world.step(&[to(2, 0.0, 2.5)], &clear).unwrap();
     assert_eq!(out.pairs.len(), 10, "4 balls and the floor");
-    assert!(out.pairs.iter().all(|p| p.outcome.status == Status::Clear && p.outcome.time == 1.0));
+    assert!(out.pairs.iter().all(|p| p.outcome.status() == Status::Clear && p.outcome.time() == 1.0));
     assert_eq!((out.searched, out.counters.cells), (0, 0));
 }
 
@@ -304,8 +307,8 @@ fn a_contact_says_whether_the_pair_touched_at_the_start() {
         world.add_object(object(2, &slab(DVec3::ONE), DVec3::new(0.0, 0.0, height))).unwrap();
         let out = world.step(&[to(2, x, height + down)], &StepOptions::default()).unwrap();
         let o = out.pairs[0].outcome;
-        assert_eq!((o.touching, o.status), (expected.0, Status::Contact), "{height} {x} {down}");
-        assert!((o.time - expected.1).abs() < 1e-15, "{height} {x} {down}: {}", o.time);
+        assert_eq!((o.touching, o.status()), (expected.0, Status::Contact), "{height} {x} {down}");
+        assert!((o.time() - expected.1).abs() < 1e-15, "{height} {x} {down}: {}", o.time());
     }
 }
 

@@ -18,7 +18,7 @@ use contactd_proto::{Detect, EffectCounters, Report};
 /// True when regions are told of a pair. A step that asks for its first contact has no use for clear pairs.
 fn is_asked(job: &PairJob, options: &StepOptions, outcome: &Outcome) -> bool {
     // Where bodies are in each other their surfaces cut: no place in which they touch.
-    job.near && job.plan.reports_regions() && !outcome.past && (outcome.status == Status::Contact || !options.first)
+    job.near && job.plan.reports_regions() && !outcome.past && (outcome.status() == Status::Contact || !options.first)
 }
 
 /// A question about a pair beside its search, and what may be spent on it: the pair's limit once more, whatever its search has
@@ -44,7 +44,7 @@ pub(super) fn decide(
     // their rule or the step asks for them.
     let margin = job.near && job.plan.margin > 0.0;
     let outcome = &mut job.found.outcome;
-    let (status, resolution) = (outcome.status, outcome.resolution);
+    let (status, resolution) = (outcome.status(), outcome.resolution);
     let clear = status == Status::Clear;
     if outcome.touching && margin && clear {
         outcome.margin_time = 0.0;
@@ -60,7 +60,7 @@ pub(super) fn decide(
         return true;
     }
     let outcome = &mut job.found.outcome;
-    if status == Status::Contact && outcome.time == 0.0 {
+    if status == Status::Contact && outcome.time() == 0.0 {
         outcome.touching = true;
         return true;
     }
@@ -138,7 +138,7 @@ pub(super) fn find_regions(
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
             let found = region::complete(&query, &mut p.outcome, threshold);
             let touches =
-                p.outcome.status == Status::Contact || (p.outcome.status == Status::Clear && p.outcome.touching);
+                p.outcome.status() == Status::Contact || (p.outcome.status() == Status::Clear && p.outcome.touching);
             out.effect_counters.patches += u64::from(touches);
             out.counters.instant_cells += found.cells;
             left = left.saturating_sub(found.cells);

@@ -7,6 +7,7 @@
 
 use super::draw::Draw;
 use super::{Course, Field, Scene};
+use crate::engine::ReportedPoint as _;
 use contactd::contact::{Outcome, Status};
 use glam::{DMat3, DVec3};
 
@@ -246,7 +247,7 @@ impl Pair {
     /// The deepest common point found at `time_upper`, near the contact first (x in a's frame), then anywhere; the search
     /// ends once one is as deep as `enough` (f, below 0).
     fn witness(&self, o: &Outcome, x: DVec3, enough: f64, effort: Effort, draw: &mut Draw) -> f64 {
-        let (t, delta) = (o.time_upper, o.resolution);
+        let (t, delta) = (o.time_upper(), o.resolution);
         let mut found = f64::INFINITY;
         let mut best = x;
         for first in [3.0, 30.0, 1e3, 3e4, 1.0, 3.0] {
@@ -291,14 +292,15 @@ pub fn judge(
 ) -> Vec<Fault> {
     let mut faults = Vec::new();
     let mut fault = |kind: &str, text: String| faults.push(Fault { kind: kind.into(), text });
-    let numbers = [o.time_lower, o.time, o.time_upper, o.resolution, o.normal_speed, o.separation];
-    if !numbers.iter().all(|x| x.is_finite()) || !o.point.is_finite() || !o.normal.is_finite() {
+    let numbers = [o.time_lower(), o.time(), o.time_upper(), o.resolution, o.at().normal_speed, o.at().separation];
+    if !numbers.iter().all(|x| x.is_finite()) || !o.at().point.is_finite() || !o.at().normal.is_finite() {
         fault("not finite", format!("{o:?}"));
         return faults;
     }
-    let ordered = 0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0;
+    let ordered =
+        0.0 <= o.time_lower() && o.time_lower() <= o.time() && o.time() <= o.time_upper() && o.time_upper() <= 1.0;
     if !ordered {
-        fault("bracket", format!("{} {} {}", o.time_lower, o.time, o.time_upper));
+        fault("bracket", format!("{} {} {}", o.time_lower(), o.time(), o.time_upper()));
         return faults;
     }
     let pair = Pair::new(scene);
@@ -314,17 +316,17 @@ pub fn judge(
         m.a.transpose() * ((x - scene.courses[0].start) - (scene.courses[0].end - scene.courses[0].start) * t)
     };
 
-    if o.status != Status::Overlap && o.time_lower > 0.0 {
+    if o.status() != Status::Overlap && o.time_lower() > 0.0 {
         let mut places = Vec::new();
-        let until = o.time_lower;
+        let until = o.time_lower();
         let (pa, pb) = (pair.a.surface_points(most, &mut draw), pair.b.surface_points(most, &mut draw));
         pair.follow(true, &pa, until, steps, &mut places);
         pair.follow(false, &pb, until, steps, &mut places);
         places.sort_by(|x, y| x.0.total_cmp(&y.0));
         places.truncate(descents);
-        if o.status == Status::Contact {
+        if o.status() == Status::Contact {
             // Just before the contact, from its point.
-            places.push((0.0, until, world(o.point, until)));
+            places.push((0.0, until, world(o.at().point, until)));
         }
         for (v, t, x) in places {
             if v > 0.05 * pair.size {
@@ -341,7 +343,7 @@ pub fn judge(
                     "miss",
                     format!(
                         "{} from {until}: depth {depth:e} ({:.3} delta) at t = {t}, a's point {x}",
-                        o.status.name(),
+                        o.status().name(),
                         depth / delta
                     ),
                 );
@@ -350,45 +352,45 @@ pub fn judge(
         }
     }
 
-    match o.status {
+    match o.status() {
         Status::Contact => {
-            if (o.normal.length() - 1.0).abs() > 1e-9 {
-                fault("normal", format!("length {}", o.normal.length()));
+            if (o.at().normal.length() - 1.0).abs() > 1e-9 {
+                fault("normal", format!("length {}", o.at().normal.length()));
             }
-            let x = world(o.point, o.time);
-            let m = pair.at(o.time);
+            let x = world(o.at().point, o.time());
+            let m = pair.at(o.time());
             let (fa, fb) = (pair.a.value(x), pair.b.value(m.in_b(x)));
             let far = (scene.courses[0].start.length() + scene.courses[0].end.length()) * f64::EPSILON * 4.0;
             // A contact that starts the step may have sunk in by twice the resolution.
-            let sunk = if o.time == 0.0 { 2.1 * delta } else { 0.0 };
+            let sunk = if o.time() == 0.0 { 2.1 * delta } else { 0.0 };
             let near = 1e-9 * pair.size + pair.rounding + far + sunk;
-            if !o.not_continued && (fa.abs() > near || fb.abs() > near) {
+            if !o.not_continued() && (fa.abs() > near || fb.abs() > near) {
                 fault("off surface", format!("f_a = {fa:e}, f_b = {fb:e} at the point"));
             }
             // A search by lot ends a little above the deepest point.
             let enough = -0.85 * delta + pair.rounding + far;
-            let found = pair.witness(o, world(o.point, o.time_upper), enough, effort, &mut draw);
+            let found = pair.witness(o, world(o.at().point, o.time_upper()), enough, effort, &mut draw);
             if found > enough {
                 // What the engine's own proof names, seen with the judge's eyes.
                 let named = named().is_some_and(|(of_a, t, x)| {
                     let m = pair.at(t);
                     let x = if of_a { x } else { m.a.transpose() * (m.b * x + m.apart) };
-                    t <= o.time_upper && pair.common(&m, x) <= -0.98 * delta + pair.rounding
+                    t <= o.time_upper() && pair.common(&m, x) <= -0.98 * delta + pair.rounding
                 });
                 // Where there is none, the answer's own: as the body turns, and without a spin about its own axis.
-                let m = pair.at(o.time_upper);
-                let reported = o.witness.is_some_and(|x| {
+                let m = pair.at(o.time_upper());
+                let reported = o.contact().and_then(|c| c.witness).is_some_and(|x| {
                     let places = [x, m.a.transpose() * (pair.at(0.0).a * x)];
                     places.iter().any(|x| pair.common(&m, *x) <= -0.98 * delta + pair.rounding)
                 });
                 if !(named || reported) {
                     let depth = -found / delta;
-                    fault("witness", format!("at time_upper = {} no more than {depth:.4} delta", o.time_upper));
+                    fault("witness", format!("at time_upper = {} no more than {depth:.4} delta", o.time_upper()));
                 }
             }
         }
         Status::Overlap => {
-            let x = world(o.point, 0.0);
+            let x = world(o.at().point, 0.0);
             let m = pair.at(0.0);
             let far = scene.courses[0].start.length() * f64::EPSILON * 4.0;
             let g = pair.common(&m, x);

@@ -120,8 +120,8 @@ pub fn examine(scene: &Scene, cells: u64, effort: Effort) -> Verdict {
         Ok(Err(refusal)) => verdict.faults.push(fault("refused", refusal)),
         Ok(Ok(answer)) => {
             let o = &answer.pair.outcome;
-            verdict.status = Some(o.status);
-            verdict.not_continued = o.not_continued;
+            verdict.status = Some(o.status());
+            verdict.not_continued = o.not_continued();
             verdict.cells = o.counters.cells;
             verdict.seconds = answer.seconds;
             verdict.faults = judge(scene, o, effort, || answer.witness());

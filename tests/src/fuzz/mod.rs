@@ -18,6 +18,7 @@ mod steps;
 pub use drive::{Campaign, Finding, checked};
 pub use reader::Reader;
 
+use crate::engine::ReportedPoint as _;
 use contactd::contact::Outcome;
 use std::path::Path;
 
@@ -43,17 +44,17 @@ pub const TARGETS: [Target; 5] = [csg::TARGET, control::TARGET, steps::TARGET, s
 
 /// What must hold of any outcome, whatever was asked.
 fn sound(o: &Outcome) -> Result<(), String> {
-    let times = [o.time_lower, o.time, o.time_upper];
-    if times.iter().any(|t| !(0.0..=1.0).contains(t)) || o.time_lower > o.time || o.time > o.time_upper {
+    let times = [o.time_lower(), o.time(), o.time_upper()];
+    if times.iter().any(|t| !(0.0..=1.0).contains(t)) || o.time_lower() > o.time() || o.time() > o.time_upper() {
         return Err(format!("bracket out of order: {times:?}"));
     }
-    let numbers = [o.separation, o.normal_speed, o.resolution, o.point.length(), o.normal.length()];
-    if numbers.iter().any(|n| n.is_nan()) || !o.point.is_finite() {
+    let numbers = [o.at().separation, o.at().normal_speed, o.resolution, o.at().point.length(), o.at().normal.length()];
+    if numbers.iter().any(|n| n.is_nan()) || !o.at().point.is_finite() {
         return Err(format!("a NaN in {o:?}"));
     }
-    let reported = matches!(o.status, contactd::contact::Status::Contact | contactd::contact::Status::Overlap);
-    if reported && (o.normal.length() - 1.0).abs() > 1e-9 {
-        return Err(format!("a normal of length {}", o.normal.length()));
+    let reported = matches!(o.status(), contactd::contact::Status::Contact | contactd::contact::Status::Overlap);
+    if reported && (o.at().normal.length() - 1.0).abs() > 1e-9 {
+        return Err(format!("a normal of length {}", o.at().normal.length()));
     }
     Ok(())
 }

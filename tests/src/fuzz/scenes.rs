@@ -2,6 +2,7 @@
 //! hardly move, asked in one step. Sampled, the slow reference is asked as well and must not refute the answer.
 
 use super::{Reader, Target, sound};
+use crate::engine::ReportedPoint as _;
 use crate::reference::{self, Effort, Moving, Verdict};
 use crate::scenes::Recipe;
 use contactd::contact::{
@@ -120,10 +121,10 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
     };
     let o = earliest_contact(&query, &mut Scratch::default());
     sound(&o)?;
-    if matches!(o.status, Status::Contact | Status::Overlap) {
+    if matches!(o.status(), Status::Contact | Status::Overlap) {
         witness(&o, &query)?;
     }
-    if thorough && tame.0 && o.status != Status::Undecided {
+    if thorough && tame.0 && o.status() != Status::Undecided {
         let moving = |model, placed: Placed| Moving { solid: model, place: placed.place, motion: placed.motion };
         let truth = reference::earliest_contact(
             moving(&a.solid, placed_a),
@@ -133,20 +134,20 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
         );
         unrefuted(&o, &truth)?;
     }
-    Ok(format!("{} {:?} {:?} {} {}", o.status.name(), o.kind, o.extent, o.touching, o.not_continued))
+    Ok(format!("{} {:?} {:?} {} {}", o.status().name(), o.at().kind, o.at().extent, o.touching, o.not_continued()))
 }
 
 /// The point of an answer lies in or on both bodies, as far as its place in the world can tell.
 fn witness(o: &Outcome, query: &PairQuery) -> Result<(), String> {
     for (name, body) in [("a", &query.a), ("b", &query.b)] {
         let Placed { place, motion } = body.placed;
-        let x = place.inverse().point(motion.at(o.time).inverse().point(o.point));
-        let reach = o.point.length() + motion.at(o.time).position.length() + body.model.radius;
+        let x = place.inverse().point(motion.at(o.time()).inverse().point(o.at().point));
+        let reach = o.at().point.length() + motion.at(o.time()).position.length() + body.model.radius;
         // Turning by an angle rounds in proportion to it.
         let slack = 4.0 * query.resolution + 1e-13 * reach * (1.0 + motion.spin.length());
         let f = body.model.solid.value(x);
         if f.is_nan() || f > slack {
-            return Err(format!("{} at {}: its point lies {f:e} outside {name} ({o:?})", o.status.name(), o.time));
+            return Err(format!("{} at {}: its point lies {f:e} outside {name} ({o:?})", o.status().name(), o.time()));
         }
     }
     Ok(())
@@ -154,8 +155,8 @@ fn witness(o: &Outcome, query: &PairQuery) -> Result<(), String> {
 
 /// Nothing that the reference has proven or has seen contradicts the answer.
 fn unrefuted(o: &Outcome, truth: &reference::Truth) -> Result<(), String> {
-    let reported = format!("{} {:?}", o.status.name(), [o.time_lower, o.time, o.time_upper]);
-    if o.status != Status::Clear && o.time_upper < truth.lower - SAME {
+    let reported = format!("{} {:?}", o.status().name(), [o.time_lower(), o.time(), o.time_upper()]);
+    if o.status() != Status::Clear && o.time_upper() < truth.lower - SAME {
         return Err(format!("{reported}, but nothing is common before {}", truth.lower));
     }
     let seen = match truth.verdict {
@@ -163,7 +164,7 @@ fn unrefuted(o: &Outcome, truth: &reference::Truth) -> Result<(), String> {
         Verdict::Overlap => 0.0,
         Verdict::Clear => return Ok(()),
     };
-    let free = if o.status == Status::Clear { 1.0 } else { o.time_lower };
+    let free = if o.status() == Status::Clear { 1.0 } else { o.time_lower() };
     if free > seen + SAME && seen < 1.0 - SAME {
         return Err(format!("{reported}, but {:?} with depth at {seen} ({})", truth.verdict, truth.point));
     }

@@ -135,16 +135,16 @@ fn taken(world: &mut World, records: &[PoseRecord], options: &StepOptions) -> Re
         if pair.a >= pair.b {
             return Err(format!("objects {} and {} in this order", pair.a, pair.b));
         }
-        earliest = earliest.min(pair.outcome.time_lower);
+        earliest = earliest.min(pair.outcome.time_lower());
     }
-    let key = |p: &contactd::world::PairOutcome| (p.outcome.time, p.a, p.b);
+    let key = |p: &contactd::world::PairOutcome| (p.outcome.time(), p.a, p.b);
     if !out.pairs.is_sorted_by(|p, q| key(p) < key(q)) {
         return Err("pairs out of order".into());
     }
     if !(0.0..=1.0).contains(&out.safe_time) || out.safe_time > earliest {
         return Err(format!("safe until {}, and yet a pair's bracket begins at {earliest}", out.safe_time));
     }
-    let count = |s: Status| out.pairs.iter().filter(|p| p.outcome.status == s).count().min(2);
+    let count = |s: Status| out.pairs.iter().filter(|p| p.outcome.status() == s).count().min(2);
     let counts = [Status::Contact, Status::Clear, Status::Overlap, Status::Undecided].map(count);
     Ok(format!("{counts:?}{}{} ", out.truncated, out.may_have_passed.min(1)))
 }

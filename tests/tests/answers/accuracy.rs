@@ -10,6 +10,7 @@ use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, StepOutcome, World};
 use contactd_proto::{Motion, Pose, PoseRecord};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{CELL_LIMIT, ask};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe, Scene};
@@ -80,14 +81,14 @@ fn known() -> Vec<(&'static str, Scene, f64, f64)> {
 fn a_bracket_is_as_wide_as_the_resolution_over_the_closing_speed() {
     for (name, scene, time, lag) in known() {
         let o = ask(&scene);
-        assert_eq!(o.status, Status::Contact, "{name}: {o:?}");
-        assert!((o.time - time).abs() <= 1e-12, "{name}: {} and not {time}", o.time);
+        assert_eq!(o.status(), Status::Contact, "{name}: {o:?}");
+        assert!((o.time() - time).abs() <= 1e-12, "{name}: {} and not {time}", o.time());
         let speed = (scene.motion_b.velocity - scene.motion_a.velocity).length();
-        let width = (o.time_upper - o.time_lower) * speed / o.resolution;
-        println!("{name}: bracket {:.2e}, {width:.3} resolutions of travel", o.time_upper - o.time_lower);
+        let width = (o.time_upper() - o.time_lower()) * speed / o.resolution;
+        println!("{name}: bracket {:.2e}, {width:.3} resolutions of travel", o.time_upper() - o.time_lower());
         // Some thousandths for the witness' own reserve.
         assert!(width <= 1.01 * lag, "{name}: {width} resolutions, expected {lag}");
-        assert!(o.time_lower <= time + 1e-12 && time <= o.time_upper, "{name}: {o:?}");
+        assert!(o.time_lower() <= time + 1e-12 && time <= o.time_upper(), "{name}: {o:?}");
     }
 }
 
@@ -97,11 +98,11 @@ fn brackets_of_random_scenes_hold_their_time_and_are_a_few_resolutions_wide() {
     let (mut widths, mut retreats) = (Vec::new(), 0);
     for _ in 0..150 {
         let o = ask(&scenes::any(&mut r));
-        if o.status != Status::Contact || o.normal_speed <= 0.0 {
+        if o.status() != Status::Contact || o.at().normal_speed <= 0.0 {
             continue;
         }
-        assert!(o.time_lower <= o.time && o.time <= o.time_upper, "{o:?}");
-        let width = (o.time_upper - o.time_lower) * o.normal_speed / o.resolution;
+        assert!(o.time_lower() <= o.time() && o.time() <= o.time_upper(), "{o:?}");
+        let width = (o.time_upper() - o.time_lower()) * o.at().normal_speed / o.resolution;
         retreats += usize::from(width > 2.01);
         widths.push(width);
     }
@@ -132,10 +133,13 @@ fn shifted(scene: &Scene, by: DVec3) -> Scene {
 }
 
 fn same(near: &Outcome, far: &Outcome, what: &str) {
-    let times = |o: &Outcome| [o.time_lower, o.time, o.time_upper].map(f64::to_bits);
-    assert_eq!((near.status, times(near)), (far.status, times(far)), "{what}: {near:?} and {far:?}");
-    assert_eq!((near.kind, near.extent, near.faces_a, near.faces_b), (far.kind, far.extent, far.faces_a, far.faces_b));
-    assert_eq!(near.normal.to_array().map(f64::to_bits), far.normal.to_array().map(f64::to_bits), "{what}");
+    let times = |o: &Outcome| [o.time_lower(), o.time(), o.time_upper()].map(f64::to_bits);
+    assert_eq!((near.status(), times(near)), (far.status(), times(far)), "{what}: {near:?} and {far:?}");
+    assert_eq!(
+        (near.at().kind, near.at().extent, near.at().faces_a, near.at().faces_b),
+        (far.at().kind, far.at().extent, far.at().faces_a, far.at().faces_b)
+    );
+    assert_eq!(near.at().normal.to_array().map(f64::to_bits), far.at().normal.to_array().map(f64::to_bits), "{what}");
 }
 
 #[test]
@@ -150,7 +154,7 @@ fn ten_million_sizes_from_the_origin_the_same_bits_come_out() {
     for i in 0..60 {
         let scene = on_a_grid(&scenes::any(&mut r));
         let near = ask(&scene);
-        met += usize::from(near.status == Status::Contact);
+        met += usize::from(near.status() == Status::Contact);
         same(&near, &ask(&shifted(&scene, far)), &format!("{} {i}", scene.class));
     }
     assert!(met >= 20, "{met} contacts");
@@ -164,16 +168,16 @@ fn positions_that_cannot_hold_the_offset_cost_what_they_lost_over_the_closing_sp
     for i in 0..60 {
         let scene = scenes::any(&mut r);
         let (near, away) = (ask(&scene), ask(&shifted(&scene, far)));
-        if near.status != Status::Contact || near.normal_speed < 0.05 || near.time == 0.0 {
+        if near.status() != Status::Contact || near.at().normal_speed < 0.05 || near.time() == 0.0 {
             continue;
         }
         met += 1;
-        assert_eq!(away.status, Status::Contact, "{i}: {near:?} and {away:?}");
+        assert_eq!(away.status(), Status::Contact, "{i}: {near:?} and {away:?}");
         // Each position loses half a unit in the last place of 1e7, on three axes, for two bodies.
         let lost = 2.0 * 3f64.sqrt() * 0.5 * (1e7f64.next_up() - 1e7);
-        let allowed = (lost + 1e-12) / near.normal_speed;
-        worst = worst.max((near.time - away.time).abs() / allowed);
-        assert!((near.time - away.time).abs() <= 8.0 * allowed, "{i}: {near:?} and {away:?}");
+        let allowed = (lost + 1e-12) / near.at().normal_speed;
+        worst = worst.max((near.time() - away.time()).abs() / allowed);
+        assert!((near.time() - away.time()).abs() <= 8.0 * allowed, "{i}: {near:?} and {away:?}");
     }
     println!("{met} contacts, worst {worst:.2} of what the positions lost");
     assert!(met >= 15, "{met} contacts");
@@ -191,11 +195,11 @@ fn of_two_contacts_within_one_bracket_the_one_that_touches_first_is_reported() {
         let mut scene = Scene::falling(floor, pair, DVec3::Z * 0.5, DOWN);
         scene.resolution = Some(delta);
         let o = ask(&scene);
-        assert_eq!(o.status, Status::Contact, "{o:?}");
+        assert_eq!(o.status(), Status::Contact, "{o:?}");
         let time = 0.5 - f64::max(lower, 0.0) * delta;
-        assert!((o.time - time).abs() <= 1e-12, "lower by {lower}: {} and not {time}: {o:?}", o.time);
-        assert_eq!(o.kind.name(), kind, "{o:?}");
-        assert!(o.time_lower <= o.time && o.time <= o.time_upper, "{o:?}");
+        assert!((o.time() - time).abs() <= 1e-12, "lower by {lower}: {} and not {time}: {o:?}", o.time());
+        assert_eq!(o.at().kind.name(), kind, "{o:?}");
+        assert!(o.time_lower() <= o.time() && o.time() <= o.time_upper(), "{o:?}");
     }
 }
 
@@ -211,10 +215,10 @@ fn the_parts_of_the_assembly_meet_at_the_same_times_at_a_thousandth_of_the_resol
     };
     let (coarse, fine) = (outcome(None), outcome(Some(8e-11)));
     let mut met = 0;
-    for p in coarse.pairs.iter().filter(|p| p.outcome.status == Status::Contact) {
+    for p in coarse.pairs.iter().filter(|p| p.outcome.status() == Status::Contact) {
         let q = fine.pairs.iter().find(|q| (q.a, q.b) == (p.a, p.b)).expect("the same pairs");
-        assert_eq!((q.outcome.status, q.outcome.kind), (p.outcome.status, p.outcome.kind), "{p:?} {q:?}");
-        assert!((p.outcome.time - q.outcome.time).abs() <= 1e-12, "{p:?} {q:?}");
+        assert_eq!((q.outcome.status(), q.outcome.at().kind), (p.outcome.status(), p.outcome.at().kind), "{p:?} {q:?}");
+        assert!((p.outcome.time() - q.outcome.time()).abs() <= 1e-12, "{p:?} {q:?}");
         met += 1;
     }
     assert_eq!(met, 7);
@@ -246,25 +250,25 @@ fn a_pair_stops_at_its_limit_with_what_is_proven_by_then() {
         earliest_contact(&query, &mut Scratch::default())
     };
     let whole = with(CELL_LIMIT);
-    assert!(whole.status == Status::Contact && whole.counters.cells > 20, "{whole:?}");
+    assert!(whole.status() == Status::Contact && whole.counters.cells > 20, "{whole:?}");
     let mut before = 0.0;
     for limit in [0, 1, 2, 3, 5, 10, 20, whole.counters.cells / 2] {
         let o = with(limit);
-        assert_eq!(o.status, Status::Undecided, "limit {limit}: {o:?}");
-        assert_eq!((o.time, o.time_upper, o.counters.cells), (1.0, 1.0, limit), "{o:?}");
-        println!("limit {limit}: free until {}", o.time_lower);
-        assert!(before <= o.time_lower && o.time_lower <= whole.time_upper, "limit {limit}, {before}: {o:?}");
-        before = o.time_lower;
+        assert_eq!(o.status(), Status::Undecided, "limit {limit}: {o:?}");
+        assert_eq!((o.time(), o.time_upper(), o.counters.cells), (1.0, 1.0, limit), "{o:?}");
+        println!("limit {limit}: free until {}", o.time_lower());
+        assert!(before <= o.time_lower() && o.time_lower() <= whole.time_upper(), "limit {limit}, {before}: {o:?}");
+        before = o.time_lower();
     }
     // What is found with exactly the cells that it takes is the answer, to the bit.
     assert_eq!(with(whole.counters.cells), whole);
     // Stages 1 and 2 need no cells: what they prove clear is clear without any.
     let away = Scene::falling(plate(0.25), Recipe::cylinder(0.24, 0.5), DVec3::Z * 5.0, DVec3::Z);
     let mut o = ask(&away);
-    assert_eq!((o.status, o.counters.cells), (Status::Clear, 0), "{o:?}");
+    assert_eq!((o.status(), o.counters.cells), (Status::Clear, 0), "{o:?}");
     // Both levels of a search count together: a body pressed on where it rests.
     o = ask(&Scene::falling(cube(), cube(), DVec3::Z * (1.0 - 2.5e-9), DOWN));
-    assert!(o.status == Status::Contact && o.touching, "{o:?}");
+    assert!(o.status() == Status::Contact && o.touching, "{o:?}");
 }
 
 /// Four plates in a row and a tilted peg above each; peg i falls i + 2 lengths a step, so that the last meets first.
@@ -298,7 +302,7 @@ fn stepped(options: &StepOptions) -> StepOutcome {
 fn a_batch_spends_its_limit_on_what_meets_first() {
     let whole = stepped(&StepOptions::default());
     let cells = whole.counters.cells;
-    assert_eq!(whole.pairs.iter().filter(|p| p.outcome.status == Status::Contact).count(), 4);
+    assert_eq!(whole.pairs.iter().filter(|p| p.outcome.status() == Status::Contact).count(), 4);
     assert!(cells >= 80, "{cells} cells");
     let mut decided_before = 0;
     for share in [0.0, 0.05, 0.3, 0.55, 0.8] {
@@ -307,15 +311,15 @@ fn a_batch_spends_its_limit_on_what_meets_first() {
         let out = stepped(&options);
         assert!(out.counters.cells <= limit, "{} cells of {limit}", out.counters.cells);
         assert_eq!(out.pairs.len(), 4, "every pair is reported");
-        let decided = out.pairs.iter().filter(|p| p.outcome.status == Status::Contact).count();
+        let decided = out.pairs.iter().filter(|p| p.outcome.status() == Status::Contact).count();
         // The earliest are decided, with the answers that they have without a limit; the latest are given up.
         for (i, p) in whole.pairs.iter().enumerate() {
             let q = out.pairs.iter().find(|q| (q.a, q.b) == (p.a, p.b)).expect("the pair");
             if i < decided {
                 assert_eq!(q.outcome, p.outcome, "limit {limit}");
             } else {
-                assert_eq!(q.outcome.status, Status::Undecided, "limit {limit}");
-                assert!(q.outcome.time_lower <= p.outcome.time && q.outcome.time == 1.0, "{q:?}");
+                assert_eq!(q.outcome.status(), Status::Undecided, "limit {limit}");
+                assert!(q.outcome.time_lower() <= p.outcome.time() && q.outcome.time() == 1.0, "{q:?}");
             }
         }
         assert!(out.safe_time <= whole.safe_time);

@@ -13,6 +13,7 @@ use contactd::octree::Model;
 use contactd::solid::Primitive;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::closed::{Meeting, time_of_contact, time_of_leaving};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{SEARCH_ALONE, ask_models, ask_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
@@ -76,41 +77,46 @@ impl Tally {
         let closed = closed.expect("convex primitives");
         let o: Outcome = ask_with((a, scene.a.1), (b, scene.b.1), None, SEARCH_ALONE);
         assert_eq!(o.counters.closed_forms, 0, "the search must stand on its own");
-        assert!(o.counters.cells > 0 || o.status == Status::Clear, "an answer without a cell: {o:?}");
+        assert!(o.counters.cells > 0 || o.status() == Status::Clear, "an answer without a cell: {o:?}");
         // The same forms in front of the search must say the same.
         let fronted = ask_models((a, scene.a.1), (b, scene.b.1), None);
         self.answered += usize::from(fronted.counters.cells == 0);
-        if o.status == Status::Undecided {
+        if o.status() == Status::Undecided {
             self.unanswered.push(i);
             return;
         }
-        if !o.not_continued {
+        if !o.not_continued() {
             self.differ.extend(differences(&o, &fronted, size).into_iter().map(|d| format!("{i}: {d}")));
         }
         match closed {
             // The search says that it could not follow the contact back from depth delta to the touch.
-            Meeting::Contact(c) if o.status == Status::Contact && o.not_continued => {
+            Meeting::Contact(c) if o.status() == Status::Contact && o.not_continued() => {
                 self.flagged.push(i);
-                let late = (o.time - c.time) * c.speed;
+                let late = (o.time() - c.time) * c.speed;
                 assert!((0.0..=4.0 * o.resolution).contains(&late), "{i}: {late:e} late at depth {:e}", o.resolution);
             }
-            Meeting::Contact(c) if o.status == Status::Contact => {
+            Meeting::Contact(c) if o.status() == Status::Contact => {
                 self.open += usize::from(c.upper.is_infinite());
-                let speed = c.speed.abs().max(o.normal_speed.abs());
-                let gap = (c.time - o.time).abs() * speed / size;
+                let speed = c.speed.abs().max(o.at().normal_speed.abs());
+                let gap = (c.time - o.time()).abs() * speed / size;
                 self.gaps.push(gap);
                 if gap > 1e-12 {
-                    self.far_off.push(format!("{i}: {gap:.1e} at speed {speed:.1e} ({:?})", o.kind));
+                    self.far_off.push(format!("{i}: {gap:.1e} at speed {speed:.1e} ({:?})", o.at().kind));
                 }
                 // Brackets that exclude each other cannot both be right.
-                if c.lower > o.time_upper + 1e-12 || c.upper < o.time_lower - 1e-12 {
-                    self.refuted.push(format!("{i}: {c:?} against [{} {} {}]", o.time_lower, o.time, o.time_upper));
+                if c.lower > o.time_upper() + 1e-12 || c.upper < o.time_lower() - 1e-12 {
+                    self.refuted.push(format!(
+                        "{i}: {c:?} against [{} {} {}]",
+                        o.time_lower(),
+                        o.time(),
+                        o.time_upper()
+                    ));
                 }
             }
-            Meeting::Clear if o.status == Status::Clear => self.clear += 1,
-            Meeting::Overlap(_) if o.status == Status::Overlap => self.overlaps += 1,
+            Meeting::Clear if o.status() == Status::Clear => self.clear += 1,
+            Meeting::Overlap(_) if o.status() == Status::Overlap => self.overlaps += 1,
             Meeting::Undecided(_) => self.undecided += 1,
-            _ => self.refuted.push(format!("{i}: {closed:?} against {:?} at {}", o.status, o.time)),
+            _ => self.refuted.push(format!("{i}: {closed:?} against {:?} at {}", o.status(), o.time())),
         }
     }
 

@@ -10,6 +10,7 @@ use contactd::octree::Model;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere};
 use contactd::solid::{Shape, Solid};
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question_of;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe, Scene};
@@ -229,46 +230,49 @@ fn wrong(rng: &mut Random, known: &Known, o: &Outcome) -> Option<String> {
     let solids = [scene.a.build(), scene.b.build()];
     let motions = [scene.motion_a, scene.motion_b];
     let depth = (1.0 + 1e-6) * o.depth + 1e-13;
-    for side in 0..if o.status == Status::Overlap { 0 } else { 2 } {
+    for side in 0..if o.status() == Status::Overlap { 0 } else { 2 } {
         let (own, other) = (side, 1 - side);
         for x in deep_points(rng, &solids[own], depth, 300) {
             for k in 0..40 {
-                let t = o.time_lower * (k as f64 + rng.within(0.0, 1.0)) / 40.0;
+                let t = o.time_lower() * (k as f64 + rng.within(0.0, 1.0)) / 40.0;
                 if solids[other].value(within(&motions[other], t, motions[own].at(t).point(x))) <= -depth {
                     return Some(format!("common point at {t}, {x} of side {own}"));
                 }
             }
         }
     }
-    if o.status == Status::Contact {
-        let size = 1.0 + o.point.length();
+    if o.status() == Status::Contact {
+        let size = 1.0 + o.at().point.length();
         for side in 0..2 {
-            let f = solids[side].value(within(&motions[side], o.time, o.point));
-            if f.abs() > 1e-9 * size + if o.not_continued { 4.0 * o.resolution } else { 0.0 } {
+            let f = solids[side].value(within(&motions[side], o.time(), o.at().point));
+            if f.abs() > 1e-9 * size + if o.not_continued() { 4.0 * o.resolution } else { 0.0 } {
                 return Some(format!("f of side {side} is {f:e} at the point of contact"));
             }
         }
     }
     if let Some(plain) = &known.plain {
         let p = ask(plain, DEFAULT_CELL_LIMIT);
-        if p.status == Status::Undecided {
+        if p.status() == Status::Undecided {
             return None;
         }
         let speed = scene.speed();
         // Sharp edges and slow contacts: the depth is reached later than the touch; both answers say by how much.
         let slack = known.off + 1e-9;
-        let late = (p.time_upper - p.time_lower).max(o.time_upper - o.time_lower);
-        let same = p.status == o.status && (p.time - o.time).abs() <= late + slack;
-        let touches = |o: &Outcome| o.touching || o.status != Status::Clear && o.time < 1e-6;
+        let late = (p.time_upper() - p.time_lower()).max(o.time_upper() - o.time_lower());
+        let same = p.status() == o.status() && (p.time() - o.time()).abs() <= late + slack;
+        let touches = |o: &Outcome| o.touching || o.status() != Status::Clear && o.time() < 1e-6;
         let grazes = known.off > 0.0 || (touches(&p) && touches(o));
         if !same && !grazes {
             return Some(format!(
                 "{:?} at {}, the plain solid {:?} at {} (speed {speed})",
-                o.status, o.time, p.status, p.time
+                o.status(),
+                o.time(),
+                p.status(),
+                p.time()
             ));
         }
-    } else if known.scene.class == "skin" && o.status != Status::Clear {
-        return Some(format!("{:?} at {} with nothing", o.status, o.time));
+    } else if known.scene.class == "skin" && o.status() != Status::Clear {
+        return Some(format!("{:?} at {} with nothing", o.status(), o.time()));
     }
     None
 }
@@ -286,22 +290,22 @@ fn hold(name: &str, draw: fn(&mut Random) -> Known, [median, most]: [u64; 2]) {
         let o = ask(&known.scene, limit);
         cells.push(o.counters.cells);
         *shares
-            .entry(match o.status {
+            .entry(match o.status() {
                 Status::Contact => "contact",
                 Status::Clear => "clear",
                 Status::Overlap => "overlap",
                 Status::Undecided => "undecided",
             })
             .or_default() += 1;
-        if o.status == Status::Undecided {
-            faults.push(format!("{name} {i}: undecided from {} at {:e}", o.time_lower, o.resolution));
+        if o.status() == Status::Undecided {
+            faults.push(format!("{name} {i}: undecided from {} at {:e}", o.time_lower(), o.resolution));
         } else if let Some(what) = wrong(&mut rng, &known, &o) {
             faults.push(format!("{name} {i}: {what}"));
         }
         if (o.counters.cells > most && std::env::var_os("CONTACTD_COINCIDENT_SCENES").is_some())
             || std::env::var_os("CONTACTD_COINCIDENT_SHOW").is_some()
         {
-            println!("{name} {i}: {} cells, {:?} at {:e}", o.counters.cells, o.status, o.resolution);
+            println!("{name} {i}: {} cells, {:?} at {:e}", o.counters.cells, o.status(), o.resolution);
             if std::env::var_os("CONTACTD_COINCIDENT_SHOW").is_some() {
                 println!("{o:?}");
             }

@@ -12,6 +12,7 @@ use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::scenes::Recipe;
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
@@ -289,11 +290,11 @@ fn a_tilted_peg_touches_the_rim_of_its_hole_on_both_sides() {
     let turn = turned(DVec3::Y, 0.1);
     let s = rest(plate, Recipe::cylinder(0.25, 0.5), Pose::new(DVec3::Z * 1.2, turn));
     let (o, found) = s.answer(dvec3(0.0, 0.0, -1.0), 0.0);
-    assert_eq!(o.status, Status::Contact);
+    assert_eq!(o.status(), Status::Contact);
     assert!(found.complete, "{found:#?}");
     // The contact is among the regions, and every region is mirrored in the plane of the tilt.
     let points: Vec<DVec3> = found.regions.iter().flat_map(|r| r.points.iter().map(|p| p.point)).collect();
-    assert!(points.iter().any(|p| p.distance(o.point) < 1e-7), "{o:?}: {found:#?}");
+    assert!(points.iter().any(|p| p.distance(o.at().point) < 1e-7), "{o:?}: {found:#?}");
     for p in &points {
         let mirrored = dvec3(p.x, -p.y, p.z);
         assert!(points.iter().any(|q| q.distance(mirrored) < 1e-6), "{p} has no mirror image: {found:#?}");
@@ -307,24 +308,24 @@ fn touching_is_decided_by_the_margin() {
         [(0.0, 0.0, true), (1e-3, 0.0, false), (1e-3, 0.9e-3, false), (1e-3, 1.1e-3, true), (1e-12, 0.0, true)]
     {
         let (o, found) = s(gap).answer(DVec3::ZERO, margin);
-        assert_eq!((o.status, o.touching), (Status::Clear, expected), "gap {gap}, margin {margin}");
+        assert_eq!((o.status(), o.touching), (Status::Clear, expected), "gap {gap}, margin {margin}");
         assert_eq!(found.regions.len(), usize::from(expected), "gap {gap}, margin {margin}: {found:#?}");
         if expected {
-            assert!((o.separation - gap).abs() < 1e-12, "{o:?}");
+            assert!((o.at().separation - gap).abs() < 1e-12, "{o:?}");
             assert!(found.regions[0].points.iter().all(|p| (p.separation - gap).abs() < 1e-12), "{found:#?}");
-            assert!(o.normal.distance(DVec3::Z) < 1e-12 && o.normal_speed == 0.0);
+            assert!(o.at().normal.distance(DVec3::Z) < 1e-12 && o.at().normal_speed == 0.0);
         }
     }
     // Sliding and receding pairs are clear and touch; their speeds along the normal tell which is which.
     let (o, _) = s(0.0).answer(dvec3(0.3, 0.0, 0.0), 0.0);
-    assert_eq!((o.status, o.touching, o.normal_speed), (Status::Clear, true, 0.0));
+    assert_eq!((o.status(), o.touching, o.at().normal_speed), (Status::Clear, true, 0.0));
     let (o, found) = s(0.0).answer(dvec3(0.0, 0.0, 0.5), 0.0);
-    assert_eq!((o.status, o.touching, o.normal_speed), (Status::Clear, true, -0.5));
+    assert_eq!((o.status(), o.touching, o.at().normal_speed), (Status::Clear, true, -0.5));
     assert_eq!(found.regions[0].points.len(), 4);
     // Beside contact too: a body pressed on.
     let (o, found) = s(0.0).answer(dvec3(0.0, 0.0, -0.5), 0.0);
-    assert_eq!((o.status, o.touching), (Status::Contact, true));
-    assert!(o.time < 1e-15, "{o:?}");
+    assert_eq!((o.status(), o.touching), (Status::Contact, true));
+    assert!(o.time() < 1e-15, "{o:?}");
     assert_eq!(found.regions[0].points.len(), 4);
     // A curved pair that comes near only at one point is proven apart just above the threshold.
     let ball = rest(floor(), Recipe::sphere(0.5), Pose::at(dvec3(0.1, 0.2, 0.501)));

@@ -3,9 +3,10 @@
 //! In the command 40 scenes of each; `CONTACTD_FAMILY_SCENES` says how many in the long form, `CONTACTD_FAMILY_SEED` which
 //! (1 by default). `cargo run --release -p contactd-benches --bin families` tells what they cost.
 
-use contactd::contact::{Outcome, Status};
+use contactd::contact::{Contact, Outcome, Overlap, Status, Verdict};
 use contactd::world::{StepOutcome, record};
 use contactd_proto::contact_record::COARSER_RESOLUTION;
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::families::{Course, Effort, Fault, NAMES, Node, Scene, Shape, ask, examine, judge, scene};
 use glam::{DQuat, DVec3, dvec3};
 use rayon::prelude::*;
@@ -67,16 +68,21 @@ fn the_judge_notices_wrong_answers() {
         let scene = scene(1, 0, index);
         let answer = ask(&scene, 0).expect("an answer");
         let o = answer.pair.outcome;
-        if o.status != Status::Contact || o.time < 0.05 || o.time > 0.8 || o.normal_speed < 1e-3 {
+        if o.status() != Status::Contact || o.time() < 0.05 || o.time() > 0.8 || o.at().normal_speed < 1e-3 {
             continue;
         }
         contacts += 1;
-        let clear = Outcome { status: Status::Clear, time_lower: 1.0, time: 1.0, time_upper: 1.0, ..o };
+        let contact = *o.contact().expect("a contact");
+        let with = |verdict: Verdict| Outcome { verdict, ..o };
+        let meets = |time_lower: f64, time: f64| {
+            with(Verdict::Contact(Contact { time_lower, time, time_upper: time, ..contact }))
+        };
+        let clear = with(Verdict::Clear { until: 1.0, rest: None });
         // Late by a hundredth of the step: the contact is then this much deeper.
-        let late = Outcome { time_lower: o.time + 0.01, time: o.time + 0.01, time_upper: o.time + 0.01, ..o };
-        let early = Outcome { time_lower: 0.0, time: o.time - 0.01, time_upper: o.time - 0.01, ..o };
-        let overlap = Outcome { status: Status::Overlap, time_lower: 0.0, time: 0.0, time_upper: 0.0, ..o };
-        let nan = Outcome { time: f64::NAN, ..o };
+        let late = meets(o.time() + 0.01, o.time() + 0.01);
+        let early = meets(0.0, o.time() - 0.01);
+        let overlap = with(Verdict::Overlap(Overlap { time: 0.0, point: contact.point, penetration: None }));
+        let nan = with(Verdict::Contact(Contact { time: f64::NAN, ..contact }));
         for (k, (wrong, kind)) in
             [(clear, "miss"), (late, "miss"), (early, "witness"), (overlap, "overlap"), (nan, "not finite")]
                 .into_iter()
@@ -112,10 +118,10 @@ fn a_peg_that_hardly_leans_meets_its_hole() {
                 ask(&Scene { a, b, courses: [still, moving], resolution: None }, 0).expect("an answer").pair.outcome;
             // At the mouth the peg's axis is off by way·t + lean·height; half of what is beyond the gap is common to both.
             let known = (2.0 * o.resolution + gap - lean * height) / way;
-            let reported = (o.status, o.time_lower, o.time, o.time_upper);
-            assert_eq!(o.status, Status::Contact, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
-            assert!(o.time_lower <= known + 1e-6, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
-            assert!((o.time_upper - known).abs() < 0.02, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
+            let reported = (o.status(), o.time_lower(), o.time(), o.time_upper());
+            assert_eq!(o.status(), Status::Contact, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
+            assert!(o.time_lower() <= known + 1e-6, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
+            assert!((o.time_upper() - known).abs() < 0.02, "lean {lean:e}, angle {angle}: {reported:?}, known {known}");
         }
     }
 }
@@ -127,7 +133,7 @@ fn long_searches_without_a_coarser_resolution_go_on() {
         let scene = scene(1, 1, index);
         let answer = ask(&scene, 0).expect("a scene");
         let o = &answer.pair.outcome;
-        assert_eq!(o.status, if met { Status::Contact } else { Status::Clear }, "{} {index}: {o:?}", NAMES[1]);
+        assert_eq!(o.status(), if met { Status::Contact } else { Status::Clear }, "{} {index}: {o:?}", NAMES[1]);
         let faults = judge(&scene, o, Effort::Thorough, || answer.witness());
         assert!(faults.is_empty(), "{index}: {faults:?}");
     }
@@ -138,7 +144,7 @@ fn long_searches_without_a_coarser_resolution_go_on() {
 fn what_a_finer_search_has_found_stays_where_a_coarser_one_finds_nothing() {
     let answer = ask(&scene(1, 7, 12880), 0).expect("a scene");
     let o = &answer.pair.outcome;
-    assert_eq!((o.status, o.resolution), (Status::Contact, answer.own_resolution));
+    assert_eq!((o.status(), o.resolution), (Status::Contact, answer.own_resolution));
 }
 
 /// Bodies that spin in holes of nearly their own shape, where a search at the resolution asked for takes too long: a coarser one
@@ -150,7 +156,7 @@ fn long_searches_are_answered_at_a_coarser_resolution_that_is_reported() {
         let answer = ask(&scene, 0).expect("a scene");
         let o = &answer.pair.outcome;
         let name = format!("{} {index}", NAMES[family]);
-        assert_eq!(o.status, if met { Status::Contact } else { Status::Clear }, "{name}");
+        assert_eq!(o.status(), if met { Status::Contact } else { Status::Clear }, "{name}");
         let coarser = o.resolution / answer.own_resolution;
         assert!((16.0..=4e4).contains(&coarser), "{name}: {coarser} times as coarse");
         let step = StepOutcome { pairs: vec![answer.pair], ..StepOutcome::default() };
@@ -173,8 +179,8 @@ fn witnesses_are_followed_back_to_a_touch() {
         let scene = scene(1, family, index);
         let answer = ask(&scene, 0).expect("a scene");
         let o = &answer.pair.outcome;
-        assert_eq!(o.status, Status::Contact, "{name}: {o:?}");
-        assert!(!o.not_continued, "{name}: {o:?}");
+        assert_eq!(o.status(), Status::Contact, "{name}: {o:?}");
+        assert!(!o.not_continued(), "{name}: {o:?}");
         let verdict = examine(&scene, 0, Effort::Quick);
         assert!(verdict.is_right(), "{name}: {:?}", verdict.faults);
     }
@@ -221,7 +227,7 @@ fn contacts_at_the_start_are_told_at_a_common_point() {
     for index in [4401, 5148, 15680, 18596] {
         let scene = scene(1, 6, index);
         let o = ask(&scene, 0).expect("a scene").pair.outcome;
-        assert_eq!((o.status, o.time), (Status::Contact, 0.0), "{index}");
+        assert_eq!((o.status(), o.time()), (Status::Contact, 0.0), "{index}");
         let verdict = examine(&scene, 0, Effort::Quick);
         assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[6], verdict.faults);
     }

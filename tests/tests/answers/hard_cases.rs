@@ -4,12 +4,14 @@
 //! `cell_ceilings.toml` holds twice the cells each cost when it was recorded: `CONTACTD_RECORD=1` prints new lines for it.
 
 use contactd::contact::{
-    Body, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
+    Body, ContactPoint, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd_proto::{Motion, Pose};
-use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences};
+use contactd_tests::engine::{
+    ReportedPoint as _, SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences, point_mut,
+};
 use contactd_tests::scenes::{Recipe, Scene};
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
@@ -39,8 +41,11 @@ fn answer_or(name: &str, scene: &Scene, mirrored: impl Fn(Outcome) -> Outcome) -
     let differ = differences(&o, &fronted, scene.delta() / 1e-9);
     let f64x2 = differences(&o, &mirrored(fronted), scene.delta() / 1e-9);
     assert!(differ.is_empty() || f64x2.is_empty(), "{name}: {differ:?}\n{o:?}\n{fronted:?}");
-    assert_ne!(o.status, Status::Undecided, "{name}: {o:?}");
-    assert!(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0, "{o:?}");
+    assert_ne!(o.status(), Status::Undecided, "{name}: {o:?}");
+    assert!(
+        0.0 <= o.time_lower() && o.time_lower() <= o.time() && o.time() <= o.time_upper() && o.time_upper() <= 1.0,
+        "{o:?}"
+    );
     if std::env::var_os("CONTACTD_RECORD").is_some() {
         println!("RECORD {name} = {}", 2 * o.counters.cells.max(4));
     } else {
@@ -53,31 +58,31 @@ fn answer_or(name: &str, scene: &Scene, mirrored: impl Fn(Outcome) -> Outcome) -
 #[track_caller]
 fn meets(name: &str, scene: &Scene, time: f64) -> Outcome {
     let o = answer(name, scene);
-    assert_eq!(o.status, Status::Contact, "{name}: expected contact at {time}, {o:?}");
-    assert!((o.time - time).abs() <= 1e-9, "{name}: time {}, expected {time}", o.time);
-    assert!((o.normal.length() - 1.0).abs() < 1e-9 && o.point.is_finite(), "{name}: {o:?}");
+    assert_eq!(o.status(), Status::Contact, "{name}: expected contact at {time}, {o:?}");
+    assert!((o.time() - time).abs() <= 1e-9, "{name}: time {}, expected {time}", o.time());
+    assert!((o.at().normal.length() - 1.0).abs() < 1e-9 && o.at().point.is_finite(), "{name}: {o:?}");
     o
 }
 
 #[track_caller]
 fn meets_along(name: &str, scene: &Scene, time: f64, normal: DVec3) -> Outcome {
     let o = meets(name, scene, time);
-    assert!(o.normal.distance(normal) < 1e-6, "{name}: normal {}, expected {normal}", o.normal);
+    assert!(o.at().normal.distance(normal) < 1e-6, "{name}: normal {}, expected {normal}", o.at().normal);
     o
 }
 
 #[track_caller]
 fn misses(name: &str, scene: &Scene) -> Outcome {
     let o = answer(name, scene);
-    assert_eq!(o.status, Status::Clear, "{name}: {o:?}");
+    assert_eq!(o.status(), Status::Clear, "{name}: {o:?}");
     o
 }
 
 #[track_caller]
 fn overlaps(name: &str, scene: &Scene) -> Outcome {
     let o = answer(name, scene);
-    assert_eq!((o.status, o.time), (Status::Overlap, 0.0), "{name}: {o:?}");
-    assert!((o.normal.length() - 1.0).abs() < 1e-9 && o.point.is_finite(), "{name}: {o:?}");
+    assert_eq!((o.status(), o.time()), (Status::Overlap, 0.0), "{name}: {o:?}");
+    assert!((o.at().normal.length() - 1.0).abs() < 1e-9 && o.at().point.is_finite(), "{name}: {o:?}");
     o
 }
 
@@ -107,21 +112,21 @@ const DOWN: DVec3 = DVec3::NEG_Z;
 fn a_sphere_falls_on_a_box_face() {
     let s = Scene::falling(cube(), Recipe::sphere(0.5), dvec3(0.1, 0.2, 1.5), DOWN);
     let o = meets_along("sphere_box_face", &s, 0.5, DVec3::Z);
-    assert_eq!((o.kind.name(), o.extent), ("face-face", Extent::Point));
+    assert_eq!((o.at().kind.name(), o.at().extent), ("face-face", Extent::Point));
 }
 
 #[test]
 fn a_sphere_meets_a_sphere() {
     let s = Scene::falling(Recipe::sphere(0.5), Recipe::sphere(0.25), dvec3(0.0, 0.0, 1.25), DOWN);
     let o = meets_along("sphere_sphere", &s, 0.5, DVec3::Z);
-    assert_eq!((o.kind.name(), o.extent), ("face-face", Extent::Point));
+    assert_eq!((o.at().kind.name(), o.at().extent), ("face-face", Extent::Point));
 }
 
 #[test]
 fn parallel_box_faces_close_as_a_patch_at_the_exact_time() {
     let s = Scene::falling(cube(), cube(), dvec3(0.2, 0.1, 1.5), DOWN);
     let o = meets_along("box_box_patch", &s, 0.5, DVec3::Z);
-    assert_eq!((o.time, o.kind.name(), o.extent), (0.5, "face-face", Extent::Patch));
+    assert_eq!((o.time(), o.at().kind.name(), o.at().extent), (0.5, "face-face", Extent::Patch));
 }
 
 #[test]
@@ -139,7 +144,7 @@ fn a_box_spins_at_rest_on_a_box() {
 fn a_cylinder_lies_down_on_a_face_along_a_line() {
     let lying = going(DVec3::Z * 1.25, DQuat::from_rotation_x(FRAC_PI_2), DOWN, DVec3::ZERO);
     let o = meets_along("cylinder_on_face", &scene(cube(), still(), Recipe::cylinder(0.25, 0.4), lying), 0.5, DVec3::Z);
-    assert_eq!((o.kind.name(), o.extent), ("face-face", Extent::Line));
+    assert_eq!((o.at().kind.name(), o.at().extent), ("face-face", Extent::Line));
 }
 
 #[test]
@@ -162,7 +167,7 @@ fn a_peg_spins_in_a_hole_of_its_own_size() {
 fn a_peg_moves_sideways_in_its_hole() {
     let s = Scene::falling(plate(0.25), peg(0.24), DVec3::ZERO, DVec3::X * 0.1);
     let o = meets_along("peg_sideways", &s, 0.1, -DVec3::X);
-    assert_eq!((o.kind.name(), o.extent), ("face-face", Extent::Line));
+    assert_eq!((o.at().kind.name(), o.at().extent), ("face-face", Extent::Line));
 }
 
 #[test]
@@ -176,12 +181,14 @@ fn a_tilted_peg_meets_the_rim_at_two_edges() {
     let tilted = going(DVec3::Z, DQuat::from_rotation_x(3f64.to_radians()), DOWN, DVec3::ZERO);
     let mirror = |o: Outcome| {
         let x = |v: DVec3| DVec3 { x: -v.x, ..v };
-        Outcome { point: x(o.point), normal: x(o.normal), ..o }
+        let mut mirrored = o;
+        *point_mut(&mut mirrored) = ContactPoint { point: x(o.at().point), normal: x(o.at().normal), ..o.at() };
+        mirrored
     };
     let o = answer_or("peg_tilted", &scene(plate(0.25), still(), peg(0.24), tilted), mirror);
-    assert_eq!(o.status, Status::Contact, "{o:?}");
-    assert!((o.time - 0.404924248220538).abs() <= 1e-9, "{o:?}");
-    assert_eq!(o.kind.name(), "edge-edge");
+    assert_eq!(o.status(), Status::Contact, "{o:?}");
+    assert!((o.time() - 0.404924248220538).abs() <= 1e-9, "{o:?}");
+    assert_eq!(o.at().kind.name(), "edge-edge");
 }
 
 #[test]
@@ -193,10 +200,10 @@ fn a_peg_tilts_in_its_hole() {
     let time = angle.abs() / 0.2;
     // They are met at the same time, so each way of answering may tell either.
     for (o, most) in [(ask_scene_with(&s, SEARCH_ALONE), cell_ceiling("peg_tilting")), (ask(&s), 0)] {
-        assert_eq!(o.status, Status::Contact, "{o:?}");
-        assert!((o.time - time).abs() <= 1e-12, "{o:?}");
-        assert!((o.point.z.abs() - 0.1).abs() < 1e-9 && (o.point.y.abs() - 0.25).abs() < 1e-9, "{o:?}");
-        assert!(o.normal.y * o.point.y < 0.0 && o.normal.z * o.point.z > 0.0, "{o:?}");
+        assert_eq!(o.status(), Status::Contact, "{o:?}");
+        assert!((o.time() - time).abs() <= 1e-12, "{o:?}");
+        assert!((o.at().point.z.abs() - 0.1).abs() < 1e-9 && (o.at().point.y.abs() - 0.25).abs() < 1e-9, "{o:?}");
+        assert!(o.at().normal.y * o.at().point.y < 0.0 && o.at().normal.z * o.at().point.z > 0.0, "{o:?}");
         assert!(o.counters.cells <= most, "{} cells, ceiling {most}", o.counters.cells);
     }
 }
@@ -207,7 +214,7 @@ fn edge_meets_edge() {
     let across = bar().moved(&Pose::new(DVec3::ZERO, DQuat::from_rotation_z(FRAC_PI_2)));
     let s = Scene::falling(bar(), across, DVec3::Z, DOWN);
     let o = meets_along("edge_edge", &s, 1.0 - 0.4 * SQRT_2, DVec3::Z);
-    assert_eq!(o.kind.name(), "edge-edge");
+    assert_eq!(o.at().kind.name(), "edge-edge");
 }
 
 #[test]
@@ -217,10 +224,13 @@ fn vertex_meets_vertex() {
         scene(Recipe::platonic(8, 0.5), still(), Recipe::platonic(8, 0.25), b)
     };
     let o = meets("vertex_vertex", &turned(0.3), 0.5);
-    assert!(o.kind.name() == "vertex-vertex" && o.averaged_normal && o.normal.distance(DVec3::Z) < 1e-9, "{o:?}");
+    assert!(
+        o.at().kind.name() == "vertex-vertex" && o.at().averaged_normal && o.at().normal.distance(DVec3::Z) < 1e-9,
+        "{o:?}"
+    );
     // With faces of both in one plane face-face is as true.
     let aligned = meets("vertex_vertex_aligned", &turned(0.0), 0.5);
-    assert!(["vertex-vertex", "face-face"].contains(&aligned.kind.name()), "{aligned:?}");
+    assert!(["vertex-vertex", "face-face"].contains(&aligned.at().kind.name()), "{aligned:?}");
 }
 
 #[test]
@@ -228,14 +238,14 @@ fn a_cone_apex_meets_a_face_straight_tilted_and_as_a_needle() {
     for (name, tilt, r) in [("apex_face", 0.0, 0.3), ("apex_tilted", 0.4, 0.3), ("apex_needle", 0.1, 1e-3)] {
         let m = going(DVec3::Z, DQuat::from_rotation_x(tilt), DOWN, DVec3::ZERO);
         let o = meets_along(name, &scene(cube(), still(), tip_down(r, 1.0), m), 0.5, DVec3::Z);
-        assert_eq!(o.kind.name(), "vertex-face", "{name}");
+        assert_eq!(o.at().kind.name(), "vertex-face", "{name}");
     }
 }
 
 #[test]
 fn a_cone_apex_meets_a_sphere_and_an_apex() {
     let s = Scene::falling(Recipe::sphere(0.5), tip_down(0.3, 1.0), DVec3::Z, DOWN);
-    assert_eq!(meets_along("apex_sphere", &s, 0.5, DVec3::Z).kind.name(), "vertex-face");
+    assert_eq!(meets_along("apex_sphere", &s, 0.5, DVec3::Z).at().kind.name(), "vertex-face");
     let up = Recipe::cone(0.3, 0.0, 0.5);
     meets("apex_apex", &Scene::falling(up, tip_down(0.3, 1.0), DVec3::Z, DOWN), 0.5);
 }
@@ -245,7 +255,7 @@ fn a_cone_goes_into_an_equal_cone_hole() {
     // The hole's cone stands on its apex at the origin and opens at the block's top, z = 1.
     let block = Recipe::cuboid(1.0, 1.0, 0.75).at(0.0, 0.0, 0.25).minus(tip_down(0.5, 1.0));
     let o = meets("cone_in_cone", &Scene::falling(block, tip_down(0.5, 1.0), DVec3::Z, DOWN * 1.5), 2.0 / 3.0);
-    assert_eq!(o.kind.name(), "face-face");
+    assert_eq!(o.at().kind.name(), "face-face");
 }
 
 #[test]
@@ -256,7 +266,7 @@ fn balls_go_into_a_socket() {
     meets_along("ball_smaller", &drop(0.499), 0.901, DVec3::Z);
     // Too large by a thousandth: it rests on the rim.
     let height = (0.501f64 * 0.501 - 0.25).sqrt();
-    assert_eq!(meets("ball_larger", &drop(0.501), 0.9 - height).kind.name(), "edge-face");
+    assert_eq!(meets("ball_larger", &drop(0.501), 0.9 - height).at().kind.name(), "edge-face");
 }
 
 // Sweeps.
@@ -337,7 +347,7 @@ fn a_peg_stopped_at_the_wall_of_its_hole_is_pressed_on() {
         dvec3(7.356451249988529e-5, 7.869422349378583e-6, 3.431548692215216e-5),
     );
     let o = meets("pressed_into_wall_on", &scene(large, still(), large_peg(), third), 0.0);
-    assert!(o.normal.z.abs() < 1e-9, "{o:?}");
+    assert!(o.at().normal.z.abs() < 1e-9, "{o:?}");
 }
 
 /// Flat on a floor and pressed to the resolution's depth: the bound comes to an end at what rounding leaves of it, and
@@ -459,8 +469,8 @@ fn nearly_parallel_cylinders_keep_their_distance() {
             ),
         );
         let o = answer(name, &scene(peg(0.25), still(), peg(0.25), m(-0.1)));
-        assert_eq!(o.status, Status::Contact);
-        assert!((o.time - 0.5).abs() < 10.0 * angle + 1e-9, "{name}: {}", o.time);
+        assert_eq!(o.status(), Status::Contact);
+        assert!((o.time() - 0.5).abs() < 10.0 * angle + 1e-9, "{name}: {}", o.time());
     }
 }
 
@@ -472,8 +482,8 @@ fn a_ball_partly_over_the_hole_lands_on_its_rim() {
     let s = Scene::falling(plate(0.25), Recipe::sphere(0.3), dvec3(0.1, 0.0, 1.0), DOWN);
     let time = 1.0 - (0.1 + (0.09f64 - 0.15 * 0.15).sqrt());
     let o = meets("ball_over_hole", &s, time);
-    assert_eq!(o.kind.name(), "edge-face");
-    assert!((o.point - dvec3(0.25, 0.0, 0.1)).length() < 1e-6, "{o:?}");
+    assert_eq!(o.at().kind.name(), "edge-face");
+    assert!((o.at().point - dvec3(0.25, 0.0, 0.1)).length() < 1e-6, "{o:?}");
 }
 
 #[test]
@@ -500,7 +510,7 @@ fn a_ball_inside_a_ball_shaped_hole_meets_its_wall() {
     let shell = Recipe::cuboid(1.0, 1.0, 1.0).minus(Recipe::sphere(0.8));
     let dir = dvec3(0.6, 0.0, 0.8);
     let o = meets_along("ball_in_ball_hole", &Scene::falling(shell, Recipe::sphere(0.3), DVec3::ZERO, dir), 0.5, -dir);
-    assert_eq!((o.kind.name(), o.extent), ("face-face", Extent::Point));
+    assert_eq!((o.at().kind.name(), o.at().extent), ("face-face", Extent::Point));
 }
 
 #[test]
@@ -544,8 +554,8 @@ fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
         };
         let o = earliest_contact(&query, &mut Scratch::default());
         let time = (angle - 0.15f64.asin()) / spin.z;
-        assert_eq!(o.status, Status::Contact, "from {angle}: {o:?}");
-        assert!((o.time - time).abs() < 1e-9, "from {angle}: {} and not {time}", o.time);
+        assert_eq!(o.status(), Status::Contact, "from {angle}: {o:?}");
+        assert!((o.time() - time).abs() < 1e-9, "from {angle}: {} and not {time}", o.time());
     }
 }
 
@@ -553,7 +563,7 @@ fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
 fn what_lies_wholly_inside_overlaps_also_as_the_smaller_part_of_a_larger_body() {
     let inside = Recipe::sphere(0.01).at(0.1, 0.05, -0.1).union(Recipe::sphere(2.0).at(9.0, 0.0, 0.0));
     let o = ask(&scene(Recipe::cuboid(0.5, 0.5, 0.5), still(), inside, still()));
-    assert_eq!((o.status, o.time), (Status::Overlap, 0.0), "{o:?}");
+    assert_eq!((o.status(), o.time()), (Status::Overlap, 0.0), "{o:?}");
 }
 
 #[test]
@@ -564,8 +574,8 @@ fn a_cone_moved_sideways_in_its_hole_meets_the_wall() {
     for direction in [dvec3(1.0, 0.0, 0.0), dvec3(0.6, 0.8, 0.0)] {
         let motion = going(dvec3(0.0, 0.0, 0.1), DQuat::IDENTITY, 0.2 * direction, DVec3::ZERO);
         let o = ask(&scene(plate.clone(), still(), cone(), motion));
-        assert_eq!(o.status, Status::Contact, "{direction}: {o:?}");
-        assert!((o.time - 0.25).abs() < 1e-8, "{direction}: {} and not 0.25", o.time);
+        assert_eq!(o.status(), Status::Contact, "{direction}: {o:?}");
+        assert!((o.time() - 0.25).abs() < 1e-8, "{direction}: {} and not 0.25", o.time());
     }
 }
 
@@ -576,7 +586,7 @@ fn a_body_stopped_a_little_inside_its_contact_touches_and_does_not_overlap() {
     for (depth, status) in [(3.0, Status::Clear), (5.0, Status::Overlap)] {
         let start = dvec3(2.0 - depth * resolution, 0.0, 0.0);
         let o = ask(&scene(ball(), still(), ball(), going(start, DQuat::IDENTITY, DVec3::X, DVec3::ZERO)));
-        assert_eq!((o.status, o.touching), (status, true), "{depth} resolutions deep: {o:?}");
+        assert_eq!((o.status(), o.touching), (status, true), "{depth} resolutions deep: {o:?}");
     }
 }
 
@@ -602,8 +612,8 @@ fn a_skin_of_no_thickness_is_not_there() {
         let beside = Recipe::cuboid(0.3, 0.4, 0.2).at(0.0, 0.0, -0.9);
         let skin = part.clone().union(beside.clone()).minus(part.clone());
         let alone = ask_scene_with(&through_a_plate(beside.minus(part)), SEARCH_ALONE);
-        assert_eq!(alone.status, Status::Contact);
-        meets(&format!("skin_{name}_and_a_box"), &through_a_plate(skin), alone.time);
+        assert_eq!(alone.status(), Status::Contact);
+        meets(&format!("skin_{name}_and_a_box"), &through_a_plate(skin), alone.time());
     }
 }
 
@@ -617,8 +627,11 @@ fn the_same_part_twice_costs_what_it_costs_once() {
     for (name, twice) in
         [("union", once.clone().union(once.clone())), ("common", once.clone().intersection(once.clone()))]
     {
-        let o = meets(&format!("twice_{name}"), &scene(twice, still(), body(), way()), alone.time);
-        assert!(o.normal.distance(alone.normal) < 1e-9 && o.kind == alone.kind, "{name}: {o:?}, alone {alone:?}");
+        let o = meets(&format!("twice_{name}"), &scene(twice, still(), body(), way()), alone.time());
+        assert!(
+            o.at().normal.distance(alone.at().normal) < 1e-9 && o.at().kind == alone.at().kind,
+            "{name}: {o:?}, alone {alone:?}"
+        );
         assert!(o.counters.cells <= 2 * alone.counters.cells + 50, "{name}: {o:?}, alone {alone:?}");
     }
 }
@@ -634,5 +647,5 @@ fn a_curved_wall_is_there_from_twice_the_resolution_on() {
         assert_eq!(o.resolution > 1e-6, times == 2.0, "{name}: {}", o.resolution);
     }
     let there = Scene { resolution: Some(1e-6), ..through_a_plate(shell(2.1e-6)) };
-    meets("wall_2.1", &there, ask(&through_a_plate(Recipe::sphere(1.0))).time);
+    meets("wall_2.1", &there, ask(&through_a_plate(Recipe::sphere(1.0))).time());
 }

@@ -13,6 +13,7 @@ use contactd::solid::primitive::HalfSpace;
 use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_proto::{Motion, Pose, PoseRecord};
 use contactd_tests::engine;
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
 use contactd_tests::reference::{Verdict, field::Field};
 use contactd_tests::scenes::{self, Recipe, Scene, Share};
@@ -37,15 +38,15 @@ thread_local! {
 fn ask(scene: &Scene) -> Outcome {
     let o = engine::ask(scene);
     let (asked, undecided) = ASKED.get();
-    ASKED.set((asked + 1, undecided + usize::from(o.status == Status::Undecided)));
-    if o.status == Status::Undecided {
+    ASKED.set((asked + 1, undecided + usize::from(o.status() == Status::Undecided)));
+    if o.status() == Status::Undecided {
         let (place, first) = SCENE.with_borrow(Clone::clone);
         let cells = o.counters.cells;
         println!(
             "UNDECIDED {place}, ask {} ({}): free before {}, {cells} cells",
             asked - first,
             scene.class,
-            o.time_lower
+            o.time_lower()
         );
         if std::env::var_os("CONTACTD_LAW_SHOW").is_some() {
             println!("{scene:?}");
@@ -83,7 +84,7 @@ fn hold_over(
         let scene = draw(&mut random);
         let outcome = ask(&scene);
         count_share(&mut share, &scene, &outcome);
-        let before = ASKED.get().1 - usize::from(outcome.status == Status::Undecided);
+        let before = ASKED.get().1 - usize::from(outcome.status() == Status::Undecided);
         let verdict = law(&mut random, &scene, &outcome);
         // Without an answer a law says nothing.
         if let (Err(what), true) = (verdict, ASKED.get().1 == before) {
@@ -98,13 +99,13 @@ fn hold_over(
 }
 
 fn count_share(share: &mut Share, scene: &Scene, o: &Outcome) {
-    match o.status {
+    match o.status() {
         Status::Contact => share.contact += 1,
         Status::Clear => share.clear += 1,
         Status::Overlap => share.overlap += 1,
         Status::Undecided => share.undecided += 1,
     }
-    if o.status == Status::Contact {
+    if o.status() == Status::Contact {
         let negative = |recipe: &Recipe, faces: &[u32; 3]| {
             let solid = recipe.build();
             faces.iter().any(|f| {
@@ -114,25 +115,25 @@ fn count_share(share: &mut Share, scene: &Scene, o: &Outcome) {
                     .is_some_and(|p| solid.senses[*p as usize] == contactd::solid::Sense::Negative)
             })
         };
-        share.subtracted += usize::from(negative(&scene.a, &o.faces_a) || negative(&scene.b, &o.faces_b));
+        share.subtracted += usize::from(negative(&scene.a, &o.at().faces_a) || negative(&scene.b, &o.at().faces_b));
     }
 }
 
 /// Two answers to the same question: same status, same time.
 fn same(x: &Outcome, y: &Outcome) -> Result<(), String> {
-    if x.status != y.status {
-        return Err(format!("{} at {}, but {} at {}", x.status.name(), x.time, y.status.name(), y.time));
+    if x.status() != y.status() {
+        return Err(format!("{} at {}, but {} at {}", x.status().name(), x.time(), y.status().name(), y.time()));
     }
-    if (x.time - y.time).abs() > SAME {
-        return Err(format!("time {} and {}: {:.1e} apart", x.time, y.time, (x.time - y.time).abs()));
+    if (x.time() - y.time()).abs() > SAME {
+        return Err(format!("time {} and {}: {:.1e} apart", x.time(), y.time(), (x.time() - y.time()).abs()));
     }
     Ok(())
 }
 
 /// When the pair first touches: 0 in overlap, infinite when it never does.
 fn first(o: &Outcome) -> f64 {
-    match o.status {
-        Status::Contact | Status::Overlap => o.time,
+    match o.status() {
+        Status::Contact | Status::Overlap => o.time(),
         _ => f64::INFINITY,
     }
 }
@@ -153,22 +154,22 @@ fn with_motions(scene: &Scene, f: impl Fn(&Motion) -> Motion) -> Scene {
 fn every_answer_is_in_order_and_the_reference_agrees() {
     hold_over("reference", 1, SLOW_SCENES, scenes::any, |_, scene, o| {
         let truth = scene.truth_with_care();
-        if ![o.time_lower, o.time, o.time_upper].iter().all(|t| (0.0..=1.0).contains(t)) {
-            return Err(format!("times {} {} {}", o.time_lower, o.time, o.time_upper));
+        if ![o.time_lower(), o.time(), o.time_upper()].iter().all(|t| (0.0..=1.0).contains(t)) {
+            return Err(format!("times {} {} {}", o.time_lower(), o.time(), o.time_upper()));
         }
-        if !(o.time_lower <= o.time && o.time <= o.time_upper) {
-            return Err(format!("bracket out of order: {} {} {}", o.time_lower, o.time, o.time_upper));
+        if !(o.time_lower() <= o.time() && o.time() <= o.time_upper()) {
+            return Err(format!("bracket out of order: {} {} {}", o.time_lower(), o.time(), o.time_upper()));
         }
-        match (o.status, truth.verdict) {
+        match (o.status(), truth.verdict) {
             (Status::Contact, Verdict::Contact) => {
-                if (o.time - truth.time).abs() > SAME {
-                    return Err(format!("time {}, reference {} proven from {}", o.time, truth.time, truth.lower));
+                if (o.time() - truth.time).abs() > SAME {
+                    return Err(format!("time {}, reference {} proven from {}", o.time(), truth.time, truth.lower));
                 }
-                if o.time_lower > truth.upper {
-                    return Err(format!("time_lower {} is after depth at {}", o.time_lower, truth.upper));
+                if o.time_lower() > truth.upper {
+                    return Err(format!("time_lower {} is after depth at {}", o.time_lower(), truth.upper));
                 }
-                if truth.active.0 + truth.active.1 <= 3 && o.normal.distance(truth.normal) > 1e-6 {
-                    return Err(format!("normal {}, reference {}", o.normal, truth.normal));
+                if truth.active.0 + truth.active.1 <= 3 && o.at().normal.distance(truth.normal) > 1e-6 {
+                    return Err(format!("normal {}, reference {}", o.at().normal, truth.normal));
                 }
                 Ok(())
             }
@@ -176,7 +177,7 @@ fn every_answer_is_in_order_and_the_reference_agrees() {
             (s, v) => Err(format!(
                 "{} at {}, reference {v:?} at {} proven from {}",
                 s.name(),
-                o.time,
+                o.time(),
                 truth.time,
                 truth.lower
             )),
@@ -187,12 +188,12 @@ fn every_answer_is_in_order_and_the_reference_agrees() {
 #[test]
 fn the_witness_is_on_both_surfaces_at_time() {
     hold("witness", 2, |_, scene, o| {
-        if o.status != Status::Contact {
+        if o.status() != Status::Contact {
             return Ok(());
         }
         let depth = |recipe: &Recipe, m: &Motion| {
-            let pose = m.at(o.time);
-            let local = pose.rotation.conjugate() * (o.point - pose.position);
+            let pose = m.at(o.time());
+            let local = pose.rotation.conjugate() * (o.at().point - pose.position);
             Field::new(&recipe.build(), &Pose::IDENTITY).value(local)
         };
         let (a, b) = (depth(&scene.a, &scene.motion_a), depth(&scene.b, &scene.motion_b));
@@ -200,8 +201,8 @@ fn the_witness_is_on_both_surfaces_at_time() {
         if a.abs() > slack || b.abs() > slack {
             return Err(format!("f at the point: {a:e}, {b:e}"));
         }
-        if (o.normal.length() - 1.0).abs() > 1e-12 {
-            return Err(format!("normal {} is not of unit length", o.normal));
+        if (o.at().normal.length() - 1.0).abs() > 1e-12 {
+            return Err(format!("normal {} is not of unit length", o.at().normal));
         }
         Ok(())
     });
@@ -212,8 +213,11 @@ fn swapping_the_pair_negates_the_normal() {
     hold("swap", 3, |_, scene, o| {
         let s = ask(&scene.swapped());
         same(o, &s)?;
-        if o.status == Status::Contact && o.point.distance(s.point) < 1e-7 && (o.normal + s.normal).length() > 1e-6 {
-            return Err(format!("normals {} and {}", o.normal, s.normal));
+        if o.status() == Status::Contact
+            && o.at().point.distance(s.at().point) < 1e-7
+            && (o.at().normal + s.at().normal).length() > 1e-6
+        {
+            return Err(format!("normals {} and {}", o.at().normal, s.at().normal));
         }
         Ok(())
     });
@@ -229,10 +233,10 @@ fn a_common_rigid_motion_of_the_scene_changes_nothing() {
         let by = Pose::new(random.vector(10.0), random.rotation());
         let moved = ask(&with_motions(scene, |m| carried(m, &by)));
         same(o, &moved)?;
-        if o.status == Status::Contact && moved.normal.distance(by.rotation * o.normal) > 1e-6 {
-            let point = by.rotation * o.point + by.position;
-            if moved.point.distance(point) < 1e-7 {
-                return Err(format!("normal {}, expected {}", moved.normal, by.rotation * o.normal));
+        if o.status() == Status::Contact && moved.at().normal.distance(by.rotation * o.at().normal) > 1e-6 {
+            let point = by.rotation * o.at().point + by.position;
+            if moved.at().point.distance(point) < 1e-7 {
+                return Err(format!("normal {}, expected {}", moved.at().normal, by.rotation * o.at().normal));
             }
         }
         Ok(())
@@ -256,15 +260,17 @@ fn a_shift_by_powers_of_two_changes_no_bit() {
             start: Pose::new(m.start.position + shift, m.start.rotation),
             ..*m
         }));
-        let bits =
-            |o: &Outcome| [o.time_lower, o.time, o.time_upper, o.normal.x, o.normal.y, o.normal.z].map(f64::to_bits);
-        if moved.status != o.status || bits(&moved) != bits(o) {
+        let bits = |o: &Outcome| {
+            [o.time_lower(), o.time(), o.time_upper(), o.at().normal.x, o.at().normal.y, o.at().normal.z]
+                .map(f64::to_bits)
+        };
+        if moved.status() != o.status() || bits(&moved) != bits(o) {
             return Err(format!(
                 "shifted by {shift}: {} {:e} for {} {:e}",
-                moved.status.name(),
-                moved.time,
-                o.status.name(),
-                o.time
+                moved.status().name(),
+                moved.time(),
+                o.status().name(),
+                o.time()
             ));
         }
         Ok(())
@@ -292,8 +298,8 @@ fn scaling_by_a_power_of_two_scales_lengths_and_leaves_time() {
         (scaled.a, scaled.b) = (scene.a.scaled(k), scene.b.scaled(k));
         let s = ask(&scaled);
         same(o, &s)?;
-        if o.status == Status::Contact && s.point.distance(o.point * k) > 1e-7 * k {
-            return Err(format!("point {} scaled by {k}: {}", o.point, s.point));
+        if o.status() == Status::Contact && s.at().point.distance(o.at().point * k) > 1e-7 * k {
+            return Err(format!("point {} scaled by {k}: {}", o.at().point, s.at().point));
         }
         Ok(())
     });
@@ -304,20 +310,20 @@ fn splitting_a_step_finds_the_same_first_contact() {
     hold("splitting", 8, |random, scene, o| {
         let s = random.within(0.2, 0.8);
         let t = first(o);
-        if (t - s).abs() < 1e-6 || o.status == Status::Overlap {
+        if (t - s).abs() < 1e-6 || o.status() == Status::Overlap {
             return Ok(());
         }
         let head = ask(&with_motions(scene, |m| earlier_part(m, s)));
-        let found = if head.status == Status::Contact {
-            head.time * s
-        } else if head.status == Status::Clear {
+        let found = if head.status() == Status::Contact {
+            head.time() * s
+        } else if head.status() == Status::Clear {
             let tail = ask(&with_motions(scene, |m| later_part(m, s)));
-            if tail.status == Status::Overlap {
+            if tail.status() == Status::Overlap {
                 return Err(format!("clear until {s}, overlap after"));
             }
             s + first(&tail) * (1.0 - s)
         } else {
-            return Err(format!("the first part is {}", head.status.name()));
+            return Err(format!("the first part is {}", head.status().name()));
         };
         let same = found == t || (found - t).abs() <= SAME;
         if same { Ok(()) } else { Err(format!("whole {t}, in parts {found} (split at {s})")) }
@@ -329,14 +335,14 @@ fn shortening_a_step_moves_the_contact_or_loses_it() {
     hold("shortening", 9, |random, scene, o| {
         let s = random.within(0.3, 0.95);
         let t = first(o);
-        if (t - s).abs() < 1e-6 || o.status == Status::Overlap {
+        if (t - s).abs() < 1e-6 || o.status() == Status::Overlap {
             return Ok(());
         }
         let short = ask(&with_motions(scene, |m| earlier_part(m, s)));
-        match (t < s, short.status) {
-            (true, Status::Contact) if (short.time * s - t).abs() <= SAME => Ok(()),
+        match (t < s, short.status()) {
+            (true, Status::Contact) if (short.time() * s - t).abs() <= SAME => Ok(()),
             (false, Status::Clear) => Ok(()),
-            (_, status) => Err(format!("contact at {t}, shortened to {s}: {} at {}", status.name(), short.time * s)),
+            (_, status) => Err(format!("contact at {t}, shortened to {s}: {} at {}", status.name(), short.time() * s)),
         }
     });
 }
@@ -345,11 +351,11 @@ fn shortening_a_step_moves_the_contact_or_loses_it() {
 fn reversing_time_turns_the_last_exit_into_the_first_entry() {
     hold("reversal", 10, |_, scene, o| {
         let back = ask(&with_motions(scene, |m| Motion { start: m.at(1.0), velocity: -m.velocity, spin: -m.spin }));
-        match o.status {
-            Status::Clear if back.status == Status::Clear => Ok(()),
-            Status::Contact if first(&back) <= 1.0 - o.time_upper + SAME => Ok(()),
+        match o.status() {
+            Status::Clear if back.status() == Status::Clear => Ok(()),
+            Status::Contact if first(&back) <= 1.0 - o.time_upper() + SAME => Ok(()),
             Status::Overlap if first(&back) <= 1.0 => Ok(()),
-            s => Err(format!("{} at {}, backwards {} at {}", s.name(), o.time, back.status.name(), back.time)),
+            s => Err(format!("{} at {}, backwards {} at {}", s.name(), o.time(), back.status().name(), back.time())),
         }
     });
 }
@@ -474,20 +480,31 @@ fn a_nudge_by_one_unit_in_the_last_place_stays_within_the_bracket() {
         let n = ask(&nudged);
         same(o, &n)?;
         let room = NUDGE;
-        if n.time < o.time_lower - room || n.time > o.time_upper + room {
-            return Err(format!("time {}, bracket {} to {}", n.time, o.time_lower, o.time_upper));
+        if n.time() < o.time_lower() - room || n.time() > o.time_upper() + room {
+            return Err(format!("time {}, bracket {} to {}", n.time(), o.time_lower(), o.time_upper()));
         }
         Ok(())
     });
 }
 
 fn bits(o: &Outcome) -> [u64; 9] {
-    [o.time_lower, o.time, o.time_upper, o.normal.x, o.normal.y, o.normal.z, o.point.x, o.point.y, o.point.z]
-        .map(f64::to_bits)
+    [
+        o.time_lower(),
+        o.time(),
+        o.time_upper(),
+        o.at().normal.x,
+        o.at().normal.y,
+        o.at().normal.z,
+        o.at().point.x,
+        o.at().point.y,
+        o.at().point.z,
+    ]
+    .map(f64::to_bits)
 }
 
 fn same_bits(x: &Outcome, y: &Outcome, what: &str) -> Result<(), String> {
-    if (x.status, x.kind, x.extent, x.faces_a, x.faces_b) != (y.status, y.kind, y.extent, y.faces_a, y.faces_b)
+    if (x.status(), x.at().kind, x.at().extent, x.at().faces_a, x.at().faces_b)
+        != (y.status(), y.at().kind, y.at().extent, y.at().faces_a, y.at().faces_b)
         || bits(x) != bits(y)
     {
         return Err(format!("{what}: {:?} for {:?}", y, x));

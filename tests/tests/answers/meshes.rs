@@ -12,6 +12,7 @@ use contactd::solid::primitive::Polyhedron;
 use contactd_proto::control::{Facets, ModelFile};
 use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::{certify_all, certify_trees};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question;
 use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, winding};
 use contactd_tests::random_solids::{Random, shape, shape_or_mesh, solid_of};
@@ -154,18 +155,18 @@ fn a_convex_mesh_meets_when_the_polyhedron_of_its_points_does() {
         let other = Model::new(solid_of(&mut r, 1, shape));
         let motions = [turning(&mut r), past(&mut r, 2.5)];
         let (o, p) = (ask(&as_mesh, &other, motions), ask(&convex, &other, motions));
-        let decided = |o: &Outcome| o.status != Status::Undecided;
+        let decided = |o: &Outcome| o.status() != Status::Undecided;
         assert!(decided(&o) && decided(&p), "{i}: {o:?}, {p:?}");
-        if o.status == Status::Contact && p.status == Status::Contact {
-            if o.not_continued || p.not_continued {
+        if o.status() == Status::Contact && p.status() == Status::Contact {
+            if o.not_continued() || p.not_continued() {
                 continue;
             }
             contacts += 1;
-            let off = (o.time - p.time).abs() * o.normal_speed.abs().min(p.normal_speed.abs());
+            let off = (o.time() - p.time()).abs() * o.at().normal_speed.abs().min(p.at().normal_speed.abs());
             worst = worst.max(off);
             assert!(off <= 1e-12, "{i}: {off:e}: {o:?}, {p:?}");
         } else {
-            assert_eq!(o.status, p.status, "{i}: {o:?}, {p:?}");
+            assert_eq!(o.status(), p.status(), "{i}: {o:?}, {p:?}");
         }
     }
     println!("{contacts} contacts of {count}, the same to {worst:.1e}");
@@ -192,27 +193,27 @@ fn facets_close_in(name: &str, (exact, is_convex): (Recipe, bool), counts: &[u32
         let velocity = (r.vector(0.8) - start) * 1.3;
         let motions = [Motion::resting(Pose::IDENTITY), Motion { start: Pose::at(start), velocity, spin: DVec3::ZERO }];
         let o = ask(&exact, &ball, motions);
-        assert_ne!(o.status, Status::Undecided, "{name} {i}");
+        assert_ne!(o.status(), Status::Undecided, "{name} {i}");
         for (k, (model, deviation)) in meshes.iter().enumerate() {
             let m = ask(model, &ball, motions);
-            assert_ne!(m.status, Status::Undecided, "{name} {i}, {} facets: {m:?}", counts[k]);
-            if m.status != Status::Contact {
+            assert_ne!(m.status(), Status::Undecided, "{name} {i}, {} facets: {m:?}", counts[k]);
+            if m.status() != Status::Contact {
                 continue;
             }
-            assert!(o.status == Status::Contact || !is_convex, "{name} {i}: {o:?}, {m:?}");
-            assert!(m.time >= o.time - 1e-12 || !is_convex, "{name} {i}, {}: {m:?} before {o:?}", counts[k]);
+            assert!(o.status() == Status::Contact || !is_convex, "{name} {i}: {o:?}, {m:?}");
+            assert!(m.time() >= o.time() - 1e-12 || !is_convex, "{name} {i}, {}: {m:?} before {o:?}", counts[k]);
             // Where it meets the mesh the exact solid is no farther than the deviation.
-            let depth = ball.solid.value(m.point - (start + velocity * m.time)).abs();
+            let depth = ball.solid.value(m.at().point - (start + velocity * m.time())).abs();
             assert!(depth < 1e-9, "{name} {i}: {depth}");
-            let inside = -exact.solid.value(m.point);
+            let inside = -exact.solid.value(m.at().point);
             let most = deviation * (1.0 + 1e-9) + 1e-9;
             assert!(
                 inside <= most && inside >= if is_convex { -1e-9 } else { -most },
                 "{name} {i}: {inside} {deviation}"
             );
             contacts[k] += 1;
-            if o.status == Status::Contact && o.normal_speed > 0.5 * velocity.length() {
-                let late = (m.time - o.time).abs() * velocity.length();
+            if o.status() == Status::Contact && o.at().normal_speed > 0.5 * velocity.length() {
+                let late = (m.time() - o.time()).abs() * velocity.length();
                 assert!(late <= 8.0 * deviation, "{name} {i}: {late} {deviation}");
             }
         }

@@ -2,6 +2,7 @@
 
 use contactd::contact::Status;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::ask;
 use contactd_tests::random_solids::Random;
 use contactd_tests::reference::{Moving, deepest};
@@ -15,18 +16,29 @@ const PROMISED: f64 = 1.0 - 2e-3;
 #[track_caller]
 fn reported(scene: &Scene) -> (f64, DVec3) {
     let o = ask(scene);
-    assert_eq!(o.status, Status::Overlap, "{o:?}");
-    assert!((o.normal.length() - 1.0).abs() < 1e-9 && (o.time_lower, o.time, o.time_upper) == (0.0, 0.0, 0.0), "{o:?}");
+    assert_eq!(o.status(), Status::Overlap, "{o:?}");
+    assert!(
+        (o.at().normal.length() - 1.0).abs() < 1e-9 && (o.time_lower(), o.time(), o.time_upper()) == (0.0, 0.0, 0.0),
+        "{o:?}"
+    );
     assert!(o.counters.instant_cells > 0, "its work is counted: {o:?}");
     let value = |r: &Recipe, m: &Motion, x: DVec3| r.build().value(m.start.inverse().point(x));
     let common = |x| value(&scene.a, &scene.motion_a, x).max(value(&scene.b, &scene.motion_b, x));
     // The point that proves the overlap proves no more than it says, and no more than the deepest one.
-    assert!((2.0 * common(o.point) - o.separation).abs() < 1e-9, "{o:?}");
-    assert!(-o.separation <= o.penetration + 1e-12 && o.separation < -2.0 * o.resolution, "{o:?}");
-    let f = common(o.deepest);
-    assert!((2.0 * f + o.penetration).abs() < 1e-9, "depth {} where f is {f}", o.penetration);
-    assert!((o.direction.length() - 1.0).abs() < 1e-9, "{o:?}");
-    (0.5 * o.penetration, o.deepest)
+    assert!((2.0 * common(o.at().point) - o.at().separation).abs() < 1e-9, "{o:?}");
+    assert!(
+        -o.at().separation <= o.penetration().map_or(0.0, |p| p.depth) + 1e-12
+            && o.at().separation < -2.0 * o.resolution,
+        "{o:?}"
+    );
+    let f = common(o.penetration().unwrap().point);
+    assert!(
+        (2.0 * f + o.penetration().map_or(0.0, |p| p.depth)).abs() < 1e-9,
+        "depth {} where f is {f}",
+        o.penetration().map_or(0.0, |p| p.depth)
+    );
+    assert!((o.penetration().unwrap().direction.length() - 1.0).abs() < 1e-9, "{o:?}");
+    (0.5 * o.penetration().map_or(0.0, |p| p.depth), o.penetration().unwrap().point)
 }
 
 /// A body on many feet stands in a slab, each foot as deep as a random number says: the deepest counts, wherever the search

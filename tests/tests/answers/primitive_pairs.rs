@@ -4,6 +4,7 @@
 //! and its time badly. The known times themselves leave a residual of up to 5e-10.
 
 use contactd::contact::{Extent, Outcome, Status};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
 use contactd_tests::primitive_pairs::{FAMILIES, rows};
 use contactd_tests::reference::{Effort, Verdict};
@@ -24,10 +25,10 @@ struct Tally {
 
 impl Tally {
     fn take(&mut self, i: usize, scene: &Scene, time: f64, o: &Outcome) {
-        match (time >= 0.0, o.status) {
+        match (time >= 0.0, o.status()) {
             (true, Status::Contact) => {
-                assert!(o.time_lower <= o.time && o.time <= o.time_upper, "row {i}: {o:?}");
-                let gap = |t: f64| (o.time - t).abs() * o.normal_speed.abs() / size(scene);
+                assert!(o.time_lower() <= o.time() && o.time() <= o.time_upper(), "row {i}: {o:?}");
+                let gap = |t: f64| (o.time() - t).abs() * o.at().normal_speed.abs() / size(scene);
                 let mut known = gap(time);
                 if known > 1e-10 {
                     // Above the table's own residual the reference decides.
@@ -59,13 +60,16 @@ fn check(file: &str) {
     let (mut slowest, mut evaluations, mut left, mut differ) = (0, vec![], vec![], vec![]);
     for (i, (scene, time)) in rows(file).into_iter().enumerate() {
         let (o, p) = (ask_scene_with(&scene, SEARCH_ALONE), ask(&scene));
-        assert!(o.counters.closed_forms == 0 && (o.counters.cells > 0 || o.status == Status::Clear), "row {i}: {o:?}");
+        assert!(
+            o.counters.closed_forms == 0 && (o.counters.cells > 0 || o.status() == Status::Clear),
+            "row {i}: {o:?}"
+        );
         slowest = slowest.max(o.counters.cells);
         alone.take(i, &scene, time, &o);
         fronted.take(i, &scene, time, &p);
         if p.counters.cells > 0 {
             left.push(i);
-        } else if p.status == Status::Contact {
+        } else if p.status() == Status::Contact {
             evaluations.push(p.counters.closed_forms);
         }
         differ.extend(differences(&o, &p, size(&scene)).into_iter().map(|d| format!("row {i}: {d}")));
@@ -116,7 +120,7 @@ fn parallel_cylinders_touch_when_their_axes_say_so() {
     let mut late = vec![];
     for (i, (scene, known)) in rows("cylinder_cylinder_parallel_turning").into_iter().enumerate() {
         let o = ask(&scene);
-        if o.status != Status::Contact || o.faces_a[0] != o.faces_b[0] || o.extent != Extent::Line {
+        if o.status() != Status::Contact || o.at().faces_a[0] != o.at().faces_b[0] || o.at().extent != Extent::Line {
             continue;
         }
         let gap = |t: f64| {
@@ -125,7 +129,7 @@ fn parallel_cylinders_touch_when_their_axes_say_so() {
             let radii = [&scene.a, &scene.b].map(|r| r.build().aabb().half().x).iter().sum::<f64>();
             (between - axis * axis.dot(between)).length() - radii
         };
-        assert!(gap(o.time).abs() <= 1e-14, "row {i}: the gap at the time reported is {:e}", gap(o.time));
+        assert!(gap(o.time()).abs() <= 1e-14, "row {i}: the gap at the time reported is {:e}", gap(o.time()));
         if gap(known) < -5e-10 {
             late.push(i);
         }

@@ -7,7 +7,7 @@
 //! `CONTACTD_RECORD_SCENES=FILE:FILE…` judges scene files.
 
 use contactd::check::Check;
-use contactd::contact::{Extent, Kind, Outcome, Status};
+use contactd::contact::{ContactKind, ContactPoint, Extent, Outcome, Overlap, Penetration, Status, Verdict};
 use contactd::import::{Facets, Limits, import_csg, read_scene};
 use contactd::ipc::ServerConfig;
 use contactd::octree::Model;
@@ -17,7 +17,7 @@ use contactd_client::Object;
 use contactd_proto::control::WireTrack;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
-use contactd_tests::engine;
+use contactd_tests::engine::{self, ReportedPoint as _, contact_mut, point_mut};
 use contactd_tests::random_solids::Random;
 use contactd_tests::record_judge::{Lie, holds, lies};
 use contactd_tests::record_scenes::FAMILIES;
@@ -52,7 +52,7 @@ fn judge_family(name: &str, few: u64, draw: impl Fn(&mut Random) -> Scene + Sync
         for (lie, what) in &found {
             println!("{name} {seed}: {lie:?}: {what}");
         }
-        [o.status == Status::Contact, !found.is_empty(), o.not_continued].map(usize::from)
+        [o.status() == Status::Contact, !found.is_empty(), o.not_continued()].map(usize::from)
     });
     let sum = each.reduce(|| [0; 3], |p, q| [0, 1, 2].map(|k| p[k] + q[k]));
     println!("{name}: {} scenes, {} contacts, {} records wrong, {} not continued", rounds(few), sum[0], sum[1], sum[2]);
@@ -82,7 +82,7 @@ fn records_at_coincident_faces_small_features_and_unequal_sizes_are_true() {
 fn from_touch(rng: &mut Random, draw: fn(&mut Random) -> Scene) -> Scene {
     let scene = draw(rng);
     let o = engine::ask(&scene);
-    let t = if o.status == Status::Contact { [o.time, o.time_lower, o.time_upper][rng.below(3)] } else { 0.0 };
+    let t = if o.status() == Status::Contact { [o.time(), o.time_lower(), o.time_upper()][rng.below(3)] } else { 0.0 };
     let on = |m: Motion| Motion { start: m.at(t), ..m };
     Scene { motion_a: on(scene.motion_a), motion_b: on(scene.motion_b), ..scene }
 }
@@ -117,12 +117,12 @@ fn records_of_scene_files_are_true() {
             let o = &p.outcome;
             println!(
                 "{file}: {} at {} {:?} {:?} touching {} not continued {}",
-                o.status.name(),
-                o.time,
-                o.kind,
-                o.extent,
+                o.status().name(),
+                o.time(),
+                o.at().kind,
+                o.at().extent,
                 o.touching,
-                o.not_continued
+                o.not_continued()
             );
             wrong += usize::from(!holds(file, &side(p.a), &side(p.b), o));
         }
@@ -145,7 +145,7 @@ fn the_judge_notices_every_kind_of_lie() {
     let edge = falls(turned, DVec3::new(-0.5, 0.0, 1.25));
     let reported = |scene: &Scene| {
         let (o, found) = judged(scene);
-        assert!(o.status == Status::Contact && found.is_empty(), "{found:?}");
+        assert!(o.status() == Status::Contact && found.is_empty(), "{found:?}");
         o
     };
     let is_noticed = |scene: &Scene, lie: Lie, change: &dyn Fn(&mut Outcome, &mut Solid)| {
@@ -157,38 +157,53 @@ fn the_judge_notices_every_kind_of_lie() {
     };
     // Face ids of the plate: +x −x +y −y +z −z, then those of the cube that is taken out.
     let (top, bottom, phantom) = (4, 5, 6 + 3);
-    assert_eq!(reported(&ball).faces_a[0], top);
-    is_noticed(&ball, Lie::Bracket, &|o, _| o.time_lower = o.time_upper);
-    is_noticed(&ball, Lie::Bracket, &|o, _| o.time_upper = 1.5);
-    is_noticed(&ball, Lie::Point, &|o, _| o.point.z += 1e-7);
-    is_noticed(&ball, Lie::Point, &|o, _| (o.time_lower, o.time) = (0.0, o.time - 1e-7));
-    is_noticed(&ball, Lie::FaceElsewhere, &|o, _| o.faces_a[0] = bottom);
-    is_noticed(&ball, Lie::FaceElsewhere, &|o, _| o.faces_a[1] = 99);
+    assert_eq!(reported(&ball).at().faces_a[0], top);
+    is_noticed(&ball, Lie::Bracket, &|o, _| contact_mut(o).time_lower = o.time_upper());
+    is_noticed(&ball, Lie::Bracket, &|o, _| contact_mut(o).time_upper = 1.5);
+    is_noticed(&ball, Lie::Point, &|o, _| point_mut(o).point.z += 1e-7);
+    is_noticed(&ball, Lie::Point, &|o, _| {
+        let contact = contact_mut(o);
+        (contact.time_lower, contact.time) = (0.0, contact.time - 1e-7);
+    });
+    is_noticed(&ball, Lie::FaceElsewhere, &|o, _| point_mut(o).faces_a[0] = bottom);
+    is_noticed(&ball, Lie::FaceElsewhere, &|o, _| point_mut(o).faces_a[1] = 99);
     // The plane of the cube's −y face goes through the contact, and the cube is .25 away.
-    is_noticed(&ball, Lie::FaceInactive, &|o, _| o.faces_a[1] = phantom);
-    is_noticed(&ball, Lie::FaceInactive, &|o, _| o.faces_a = [u32::MAX; 3]);
-    is_noticed(&edge, Lie::FaceInactive, &|o, _| o.faces_b[1] = u32::MAX);
-    is_noticed(&ball, Lie::Normal, &|o, _| o.normal = (o.normal + DVec3::Y * 1e-5).normalize());
-    is_noticed(&ball, Lie::Normal, &|o, _| o.normal = -o.normal);
-    is_noticed(&ball, Lie::Normal, &|o, _| o.normal *= 1.001);
-    is_noticed(&edge, Lie::Normal, &|o, _| o.normal = (o.normal + DVec3::Y * 1e-5).normalize());
-    is_noticed(&ball, Lie::Kind, &|o, _| o.kind = Kind::EdgeFace);
-    is_noticed(&edge, Lie::Kind, &|o, _| (o.kind, o.extent) = (Kind::FaceFace, Extent::Point));
-    is_noticed(&edge, Lie::Kind, &|o, _| (o.kind, o.extent) = (Kind::VertexFace, Extent::Line));
+    is_noticed(&ball, Lie::FaceInactive, &|o, _| point_mut(o).faces_a[1] = phantom);
+    is_noticed(&ball, Lie::FaceInactive, &|o, _| point_mut(o).faces_a = [u32::MAX; 3]);
+    is_noticed(&edge, Lie::FaceInactive, &|o, _| point_mut(o).faces_b[1] = u32::MAX);
+    is_noticed(&ball, Lie::Normal, &|o, _| point_mut(o).normal = (o.at().normal + DVec3::Y * 1e-5).normalize());
+    is_noticed(&ball, Lie::Normal, &|o, _| point_mut(o).normal = -o.at().normal);
+    is_noticed(&ball, Lie::Normal, &|o, _| point_mut(o).normal *= 1.001);
+    is_noticed(&edge, Lie::Normal, &|o, _| point_mut(o).normal = (o.at().normal + DVec3::Y * 1e-5).normalize());
+    is_noticed(&ball, Lie::Kind, &|o, _| point_mut(o).kind = ContactKind::EdgeFace);
+    is_noticed(&edge, Lie::Kind, &|o, _| {
+        *point_mut(o) = ContactPoint { kind: ContactKind::FaceFace, extent: Extent::Point, ..o.at() }
+    });
+    is_noticed(&edge, Lie::Kind, &|o, _| {
+        *point_mut(o) = ContactPoint { kind: ContactKind::VertexFace, extent: Extent::Line, ..o.at() }
+    });
     is_noticed(&ball, Lie::Sense, &|_, a| a.senses[0] = Sense::Negative);
-    is_noticed(&ball, Lie::Separation, &|o, _| o.separation = 1e-6);
-    is_noticed(&ball, Lie::NormalSpeed, &|o, _| o.normal_speed *= 1.0 + 1e-6);
-    is_noticed(&ball, Lie::NotContinued, &|o, _| o.time = o.time_upper);
+    is_noticed(&ball, Lie::Separation, &|o, _| point_mut(o).separation = 1e-6);
+    is_noticed(&ball, Lie::NormalSpeed, &|o, _| point_mut(o).normal_speed *= 1.0 + 1e-6);
+    is_noticed(&ball, Lie::NotContinued, &|o, _| contact_mut(o).time = o.time_upper());
     // Of an overlap the point and its depth.
     let inside = Scene::falling(plate(), Recipe::sphere(0.25), DVec3::new(-0.5, 0.0, 0.375), DVec3::X * 0.1);
     let (a, b) = (inside.a.build(), inside.b.build());
     let (o, found) = judged(&inside);
-    assert!(o.status == Status::Overlap && found.is_empty(), "{found:?}");
+    assert!(o.status() == Status::Overlap && found.is_empty(), "{found:?}");
     let sides = (moving(&a, inside.motion_a), moving(&b, inside.motion_b));
-    let lies = |o: Outcome| lies(&sides.0, &sides.1, &o).into_iter().map(|l| l.0).collect::<Vec<_>>();
-    assert!(lies(Outcome { point: o.point + DVec3::Z, ..o }).contains(&Lie::Point));
-    assert!(lies(Outcome { separation: o.separation - 0.3, ..o }).contains(&Lie::Separation));
-    assert!(lies(Outcome { penetration: o.penetration + 0.3, ..o }).contains(&Lie::Separation));
+    let Verdict::Overlap(overlap) = o.verdict else { panic!("{o:?}") };
+    let deep = overlap.penetration.map_or(0.0, |p| p.depth);
+    let is_noticed = |lie: Lie, wrong: Overlap| {
+        let o = Outcome { verdict: Verdict::Overlap(wrong), ..o };
+        assert!(lies(&sides.0, &sides.1, &o).iter().any(|l| l.0 == lie), "{lie:?}");
+    };
+    let at = o.at();
+    is_noticed(Lie::Point, Overlap { point: Some(ContactPoint { point: at.point + DVec3::Z, ..at }), ..overlap });
+    let separation = at.separation - 0.3;
+    is_noticed(Lie::Separation, Overlap { point: Some(ContactPoint { separation, ..at }), ..overlap });
+    let penetration = Some(Penetration { depth: deep + 0.3, point: at.point, direction: at.normal });
+    is_noticed(Lie::Separation, Overlap { penetration, ..overlap });
 }
 
 #[test]
@@ -198,7 +213,7 @@ fn a_plane_that_passes_by_is_no_face_of_the_contact() {
     let b = Recipe::cylinder(0.25, 0.5).moved(&Pose::new(DVec3::ZERO, quat_of_rotation_vector(DVec3::Y * 0.6)));
     let scene = Scene::falling(a, b, DVec3::new(-0.125, 0.0, 2.0), DVec3::NEG_Z * 2.0);
     let (o, found) = judged(&scene);
-    assert_eq!((o.status, found), (Status::Contact, vec![]));
+    assert_eq!((o.status(), found), (Status::Contact, vec![]));
     // Many bottoms in one plane land at once: the point is told with a face that is there.
     let feet =
         |k: f64| Recipe::cylinder(0.2, 0.25).at(k, 0.1 * k, 0.0).union(Recipe::cuboid(0.1, 0.3, 0.25).at(k, 0.8, 0.0));
@@ -208,7 +223,7 @@ fn a_plane_that_passes_by_is_no_face_of_the_contact() {
         let motion = Motion::turning(start, start.position - DVec3::Z * 3.0, DVec3::Z * turn);
         let scene = Scene::new("feet", plate(), Motion::resting(Pose::IDENTITY), many.clone(), motion);
         let (o, found) = judged(&scene);
-        assert_eq!((o.status, o.extent, found), (Status::Contact, Extent::Patch, vec![]), "turned by {turn}");
+        assert_eq!((o.status(), o.at().extent, found), (Status::Contact, Extent::Patch, vec![]), "turned by {turn}");
     }
 }
 
@@ -275,7 +290,7 @@ fn a_contact_beside_a_far_larger_body_is_continued() {
         let motion = Motion::turning(start, start.position - DVec3::Z * 14.0, rng.vector(0.9));
         let still = Motion::turning(Pose::IDENTITY, DVec3::ZERO, DVec3::splat(4e-6));
         let (o, found) = judged(&Scene::new("block", block.clone(), still, rim.clone(), motion));
-        assert_eq!((o.status, o.not_continued, found), (Status::Contact, false, vec![]), "{k}");
+        assert_eq!((o.status(), o.not_continued(), found), (Status::Contact, false, vec![]), "{k}");
     }
 }
 
@@ -308,7 +323,7 @@ fn touching_is_told_of_clear_pairs_without_being_asked_for() {
                     let out = world.step(&[], &options).unwrap();
                     let [pair] = out.pairs.as_slice() else { panic!("one pair") };
                     let o = &pair.outcome;
-                    assert_eq!((o.status, o.touching), (Status::Clear, expected), "gap {gap:e}, {rule:?}, {warm}");
+                    assert_eq!((o.status(), o.touching), (Status::Clear, expected), "gap {gap:e}, {rule:?}, {warm}");
                 }
             }
         }
@@ -410,20 +425,6 @@ fn an_end_that_differs_by_its_last_bit_is_where_the_next_step_starts() {
 }
 
 #[test]
-fn fields_that_are_not_asked_for_are_plus_zero() {
-    // The larger body first, and last: one of both is searched with its sides exchanged.
-    for (a, b) in [(3.0, 1.0), (1.0, 3.0)] {
-        let solid = |size: f64| Recipe::cuboid(size, size, size).minus(Recipe::sphere(0.3 * size));
-        let scene = Scene::falling(solid(a), solid(b), DVec3::Z * 9.0, DVec3::Z * -8.0);
-        let o = engine::ask(&scene);
-        assert_eq!(o.status, Status::Contact);
-        for v in [o.direction, o.deepest] {
-            assert_eq!(v.to_array().map(f64::to_bits), [0; 3], "{v:?}");
-        }
-    }
-}
-
-#[test]
 fn a_world_that_is_restored_goes_on_with_the_same_bits() {
     let mut rng = Random::new(5);
     let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(plate().scaled(0.5).build()))));
@@ -499,10 +500,19 @@ fn a_world_that_is_restored_goes_on_with_the_same_bits() {
 
 /// What is told of a pair, to the bit.
 fn outcome_bits(o: &Outcome) -> (Vec<u64>, [u32; 6], [bool; 4], [usize; 3]) {
-    let numbers = [o.time, o.time_lower, o.time_upper, o.separation, o.normal_speed, o.resolution, o.penetration];
-    let vectors = [o.point, o.normal, o.deepest, o.direction];
+    let numbers = [
+        o.time(),
+        o.time_lower(),
+        o.time_upper(),
+        o.at().separation,
+        o.at().normal_speed,
+        o.resolution,
+        o.penetration().map_or(0.0, |p| p.depth),
+    ];
+    let deepest = o.penetration().map_or([DVec3::ZERO; 2], |p| [p.point, p.direction]);
+    let vectors = [o.at().point, o.at().normal, deepest[0], deepest[1]];
     let numbers = numbers.into_iter().chain(vectors.iter().flat_map(DVec3::to_array)).map(f64::to_bits).collect();
-    let faces: Vec<u32> = o.faces_a.into_iter().chain(o.faces_b).collect();
-    let flags = [o.touching, o.not_continued, o.averaged_normal, o.past];
-    (numbers, faces.try_into().unwrap(), flags, [o.status as usize, o.kind as usize, o.extent as usize])
+    let faces: Vec<u32> = o.at().faces_a.into_iter().chain(o.at().faces_b).collect();
+    let flags = [o.touching, o.not_continued(), o.at().averaged_normal, o.past];
+    (numbers, faces.try_into().unwrap(), flags, [o.status() as usize, o.at().kind as usize, o.at().extent as usize])
 }

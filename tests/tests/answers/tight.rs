@@ -15,6 +15,7 @@ use contactd::solid::local;
 use contactd::solid::primitive::Polyhedron;
 use contactd::solid::{Sense, Solid};
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe, Scene};
 use glam::{DMat3, DQuat, DVec3, dvec3};
@@ -286,35 +287,35 @@ fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -> Option<St
         }
         best
     };
-    match o.status {
+    match o.status() {
         Status::Undecided => return Some("undecided".into()),
         Status::Overlap => {
             // Deeper than 2 delta: how deep is told by a point.
-            let value = deepest(rng, 0.0, Some(o.point));
+            let value = deepest(rng, 0.0, Some(o.at().point));
             return (value > -1.9 * o.resolution).then(|| format!("overlap, but {value:e} at the start"));
         }
         Status::Contact | Status::Clear => {}
     }
-    if !(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0) {
+    if !(0.0 <= o.time_lower() && o.time_lower() <= o.time() && o.time() <= o.time_upper() && o.time_upper() <= 1.0) {
         return Some("times out of order".into());
     }
-    let near = (o.status == Status::Contact).then_some(o.point);
-    let travel = |k: usize| pair.motions[k].at(o.time_lower).position - pair.motions[k].at(0.0).position;
+    let near = (o.status() == Status::Contact).then_some(o.at().point);
+    let travel = |k: usize| pair.motions[k].at(o.time_lower()).position - pair.motions[k].at(0.0).position;
     for part in [1.0 - 1e-12, 0.999, 0.9, 0.5, rng.within(0.0, 1.0)] {
-        let t = o.time_lower * part;
+        let t = o.time_lower() * part;
         let near = near.map(|x| x + travel(small) * (part - 1.0));
         let value = deepest(rng, t, near);
         if value < -(1.0 + ROOM) * depth {
             return Some(format!("{value:e} at {t}, before time_lower"));
         }
     }
-    if o.status == Status::Contact {
-        let mut value = deepest(rng, o.time_upper, near);
+    if o.status() == Status::Contact {
+        let mut value = deepest(rng, o.time_upper(), near);
         if value > -(1.0 - ROOM) * depth {
             let (a, b) = (scene.a.build(), scene.b.build());
             let moving = |solid, motion| contactd_tests::reference::Moving { solid, place: Pose::IDENTITY, motion };
             let (a, b) = (moving(&a, scene.motion_a), moving(&b, scene.motion_b));
-            value = value.min(contactd_tests::reference::deepest(a, b, o.time_upper).1);
+            value = value.min(contactd_tests::reference::deepest(a, b, o.time_upper()).1);
         }
         if value > -(1.0 - ROOM) * depth {
             return Some(format!("{value:e} at time_upper, depth {depth:e}"));
@@ -385,9 +386,9 @@ fn a_small_apex_on_a_large_body() {
             (pose.position + pose.rotation * dvec3(0.0, 0.0, 0.5 * size)).z - 1.0
         };
         let o = decided("apex", &Scene::new("apex", large(), still(), cone, motion), 100);
-        assert_eq!(o.status, Status::Contact, "{o:?}");
+        assert_eq!(o.status(), Status::Contact, "{o:?}");
         let time = root(0.0, 1.0, apex);
-        assert!((o.time - time).abs() * size <= 1e-12 && !o.not_continued, "{size}: {time}, {o:?}");
+        assert!((o.time() - time).abs() * size <= 1e-12 && !o.not_continued(), "{size}: {time}, {o:?}");
     }
 }
 
@@ -422,8 +423,8 @@ fn a_leaning_peg_on_the_rim_of_its_hole() {
         }
         let o =
             decided("rim", &Scene::new("rim", plate.clone(), still(), Recipe::cylinder(narrow, half), motion), 1_000);
-        assert_eq!(o.status, if time < 1.0 { Status::Contact } else { Status::Clear }, "{o:?}");
-        assert!((o.time - time).abs() <= 1e-7 && o.time <= time + 1e-10, "{time}, {o:?}");
+        assert_eq!(o.status(), if time < 1.0 { Status::Contact } else { Status::Clear }, "{o:?}");
+        assert!((o.time() - time).abs() <= 1e-7 && o.time() <= time + 1e-10, "{time}, {o:?}");
         met += u32::from(time < 1.0);
     }
     assert!(met >= 2);
@@ -440,11 +441,11 @@ fn bodies_in_pockets_of_their_own_size_that_turn() {
     let a = Motion::turning(pose, pose.position, common);
     let b = Motion::turning(pose, pose.position, common + dvec3(0.3, 0.0, -1.2));
     let o = decided("frustum", &Scene::new("frustum", block().minus(frustum.clone()), a, frustum, b), 40_000);
-    assert_eq!(o.status, Status::Contact, "{o:?}");
+    assert_eq!(o.status(), Status::Contact, "{o:?}");
     let (ball, socket) = (Recipe::sphere(0.5).at(0.0, 0.0, 0.5), Recipe::sphere(0.5 - 2.2e-9).at(0.0, 0.0, 0.5));
     let b = Motion::turning(pose, pose.position + dvec3(0.01, -0.02, -0.015), common);
     let o = decided("ball", &Scene::new("ball", block().minus(socket), a, ball, b), 80_000);
-    assert_eq!(o.status, Status::Contact, "{o:?}");
+    assert_eq!(o.status(), Status::Contact, "{o:?}");
 }
 
 /// A cone in a pocket that is deeper but no wider sticks in its upper half, by a thousand resolutions. A witness at the very start
@@ -458,7 +459,7 @@ fn like_cones_that_overlap_at_the_start() {
     let (a, b) = (Motion::turning(at, end, spin), Motion::turning(at, end, DVec3 { z: 2.041897399739378, ..spin }));
     let mut scene = Scene::new("cones", body, a, Recipe::cuboid(1.5, 1.5, 0.5).minus(pocket), b);
     scene.resolution = Some(5.9385943291392684e-9);
-    assert_eq!(decided("cones", &scene, 1_000).status, Status::Overlap);
+    assert_eq!(decided("cones", &scene, 1_000).status(), Status::Overlap);
 }
 
 /// A prism spins while it slides into a round hole with a clearance of 1e-4 to 1e-7 of its size: the hole's wall is the same from
@@ -472,7 +473,7 @@ fn a_prism_spins_into_a_round_hole() {
         let motion = Motion::turning(start, start.position - DVec3::Z, dvec3(0.0, 0.0, 19.0));
         let body = prism(sides, wide - clearance, 0.5);
         let o = decided("prism", &Scene::new("prism", plate(), still(), body, motion), 20_000);
-        assert_eq!(o.status, Status::Clear, "{sides} {clearance}: {o:?}");
+        assert_eq!(o.status(), Status::Clear, "{sides} {clearance}: {o:?}");
     }
 }
 
@@ -507,7 +508,7 @@ fn a_round_peg_turns_in_a_hole_with_flat_walls() {
         let Some((scene, what)) = turning_peg(rng, 1.0) else { continue };
         // By the search alone.
         let o = decided_with(&format!("peg {k}"), &scene, 400, Strategies { cavities: false, ..Strategies::default() });
-        assert_eq!(o.status, Status::Clear, "{k}: {what}");
+        assert_eq!(o.status(), Status::Clear, "{k}: {what}");
     }
 }
 
@@ -519,7 +520,7 @@ fn a_round_peg_turns_many_times_in_a_hole_with_flat_walls() {
     for k in 0..120 {
         let Some((scene, what)) = turning_peg(rng, 5.0 * TAU) else { continue };
         let o = decided(&format!("peg {k}"), &scene, 0);
-        assert_eq!(o.status, Status::Clear, "{k}: {what}");
+        assert_eq!(o.status(), Status::Clear, "{k}: {what}");
     }
 }
 
@@ -544,8 +545,8 @@ fn a_leaning_peg_that_turns_many_times_comes_to_the_walls_of_its_hole() {
         let scene =
             Scene::new("leaning peg", hole, still(), Recipe::cylinder(radius, half), Motion { start, velocity, spin });
         let o = decided(&format!("leaning peg {k}"), &scene, CEILING);
-        met += usize::from(o.status == Status::Contact);
-        clear += usize::from(o.status == Status::Clear);
+        met += usize::from(o.status() == Status::Contact);
+        clear += usize::from(o.status() == Status::Clear);
         searched += usize::from(o.counters.cells > 0);
     }
     println!("{met} met, {clear} clear, {searched} of them searched");
@@ -573,7 +574,7 @@ fn tight_and_tiny_scenes_are_decided() {
             let models = [&Model::new(scene.a.build()), &Model::new(scene.b.build())];
             let o = ask(&scene, models);
             let pair = Pair { models, motions: [scene.motion_a, scene.motion_b] };
-            status[match o.status {
+            status[match o.status() {
                 Status::Contact => 0,
                 Status::Clear => 1,
                 Status::Overlap => 2,
@@ -589,7 +590,12 @@ fn tight_and_tiny_scenes_are_decided() {
                 bad.push(format!("{name} {own}: {wrong}"));
                 eprintln!(
                     "{name} {own}: {wrong}; {:?} {} {} {} delta {:e} cells {}",
-                    o.status, o.time_lower, o.time, o.time_upper, o.resolution, o.counters.cells
+                    o.status(),
+                    o.time_lower(),
+                    o.time(),
+                    o.time_upper(),
+                    o.resolution,
+                    o.counters.cells
                 );
                 if std::env::var_os("CONTACTD_TIGHT_SHOW").is_some() {
                     eprintln!("{scene:#?}");

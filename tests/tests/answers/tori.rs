@@ -14,6 +14,7 @@ use contactd::octree::mass::mass_properties;
 use contactd::solid::Shape;
 use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::{certify_all, certify_trees};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question;
 use contactd_tests::random_solids::{Random, shape, shape_or_torus, solid_of, torus};
 use contactd_tests::rays::integrals;
@@ -95,21 +96,25 @@ fn compare(name: &str, count: usize, seed: u64, make: impl Fn(&mut Random) -> Sc
         let size = query.resolution / 1e-9;
         cells += o.counters.cells;
         if s.at(0.0) <= 4.0 * query.resolution {
-            assert!(s.at(0.0) > 0.0 || o.status != Status::Clear, "{name} {i}: {o:?}");
+            assert!(s.at(0.0) > 0.0 || o.status() != Status::Clear, "{name} {i}: {o:?}");
             overlap += 1;
             continue;
         }
-        match (s.first(), o.status) {
+        match (s.first(), o.status()) {
             (_, Status::Undecided) => undecided += 1,
             (None, Status::Clear) => clear += 1,
             (Some((t, speed)), Status::Contact) => {
                 contacts += 1;
-                assert!(o.time_lower <= t + 1e-12 * size / speed.max(1e-9), "{name} {i}: {t} before {}", o.time_lower);
-                if o.not_continued {
+                assert!(
+                    o.time_lower() <= t + 1e-12 * size / speed.max(1e-9),
+                    "{name} {i}: {t} before {}",
+                    o.time_lower()
+                );
+                if o.not_continued() {
                     flagged += 1;
                     continue;
                 }
-                let off = (t - o.time).abs() * speed.abs().max(o.normal_speed.abs()) / size;
+                let off = (t - o.time()).abs() * speed.abs().max(o.at().normal_speed.abs()) / size;
                 worst = worst.max(off);
                 assert!(off <= 1e-12, "{name} {i}: {off:e}: {t} at {speed}, not {o:?}");
             }

@@ -5,6 +5,7 @@ use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::solid::primitive::HalfSpace;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe};
@@ -35,12 +36,12 @@ fn unbounded_bodies_overlap_far_out_and_are_told_so_at_once() {
         });
         let query = question((&models[0], placed[0]), (&models[1], placed[1]), QueryOptions::DEPTH);
         let o = earliest_contact(&query, &mut Scratch::default());
-        assert_eq!((o.status, o.counters.cells), (Status::Overlap, 0), "{k}");
+        assert_eq!((o.status(), o.counters.cells), (Status::Overlap, 0), "{k}");
         for i in 0..2 {
-            let depth = -models[i].solid.value(placed[i].motion.start.inverse().point(o.point));
-            assert!(depth >= 0.999 * -0.5 * o.separation && o.separation < 0.0, "{k}: {depth}");
+            let depth = -models[i].solid.value(placed[i].motion.start.inverse().point(o.at().point));
+            assert!(depth >= 0.999 * -0.5 * o.at().separation && o.at().separation < 0.0, "{k}: {depth}");
         }
-        assert!((o.normal.length() - 1.0).abs() < 1e-12, "{k}");
+        assert!((o.at().normal.length() - 1.0).abs() < 1e-12, "{k}");
     }
 }
 
@@ -65,10 +66,10 @@ fn half_spaces_that_look_at_each_other_are_clear_while_their_planes_are_apart() 
         );
         assert_eq!(o.counters.cells, 0, "{k}");
         let least = gap.min(gap + speed);
-        match o.status {
+        match o.status() {
             Status::Clear => assert!(least > 0.0, "{k}: {least}"),
             // They meet all over at once, or are in each other all over: no record tells that.
-            Status::Undecided => assert!(least < 1e-6 && o.time_lower == 0.0, "{k}: {least}"),
+            Status::Undecided => assert!(least < 1e-6 && o.time_lower() == 0.0, "{k}: {least}"),
             Status::Overlap => assert!(gap < -1e-6, "{k}: {gap}"),
             Status::Contact => panic!("{k}: a contact"),
         }

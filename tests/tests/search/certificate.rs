@@ -54,14 +54,14 @@ impl Certified {
     /// Its certificate proves all of `time_lower`, and both ends of a contact's bracket; nothing to prove in overlap.
     fn proven(&self) -> Result<Option<Checked>, String> {
         let Some(text) = &self.text else {
-            let overlap = self.outcome.status == Status::Overlap;
+            let overlap = self.outcome.status() == Status::Overlap;
             return if overlap { Ok(None) } else { Err(format!("no certificate of {:?}", self.outcome)) };
         };
         let checked = self.check(text)?;
-        let witness = (self.outcome.status == Status::Contact).then_some(self.outcome.time_upper);
+        let witness = (self.outcome.status() == Status::Contact).then_some(self.outcome.time_upper());
         // Where the search gave up, the proof may end a little before.
-        let least = self.outcome.time_lower - if self.outcome.status == Status::Undecided { 1e-5 } else { 0.0 };
-        if checked.until < least || checked.until > self.outcome.time_lower || checked.witness != witness {
+        let least = self.outcome.time_lower() - if self.outcome.status() == Status::Undecided { 1e-5 } else { 0.0 };
+        if checked.until < least || checked.until > self.outcome.time_lower() || checked.witness != witness {
             return Err(format!("{checked:?} proves less than {:?}", self.outcome));
         }
         Ok(Some(checked))
@@ -89,7 +89,7 @@ fn over(count: u64, make: impl Fn(u64) -> (String, Certified) + Sync) -> Sum {
         let mut sum = Sum { proven: 0, overlap: 0, undecided: 0, refused: vec![], work: Checked::default() };
         for i in (first..count).step_by(threads as usize) {
             let (name, c) = make(i);
-            sum.undecided += usize::from(c.outcome.status == Status::Undecided);
+            sum.undecided += usize::from(c.outcome.status() == Status::Undecided);
             match c.proven() {
                 Ok(None) => sum.overlap += 1,
                 Ok(Some(k)) => {
@@ -160,7 +160,7 @@ fn an_undecided_answer_has_a_certificate_up_to_its_time_lower() {
     let mut found = 0;
     for i in 0..40 {
         let c = of_scene(&scenes::any(&mut Random::new(90_000 + i)), 12);
-        if c.outcome.status == Status::Undecided && c.outcome.time_lower > 0.05 {
+        if c.outcome.status() == Status::Undecided && c.outcome.time_lower() > 0.05 {
             c.proven().unwrap_or_else(|e| panic!("scene {i}: {e}"));
             found += 1;
         }
@@ -226,8 +226,8 @@ fn a_deleted_or_altered_exclusion_is_caught() {
         }
         altered.word("the reference", 0, 4, if head[4] == "0" { "1" } else { "0" });
         altered.word("a smaller depth", 0, 6, &format!("{:e}", number(&head, 6) * 1e-3));
-        if c.outcome.time_upper < 1.0 {
-            altered.word("a later end", 0, 8, &format!("{:e}", 0.5 * (c.outcome.time_upper + 1.0)));
+        if c.outcome.time_upper() < 1.0 {
+            altered.word("a later end", 0, 8, &format!("{:e}", 0.5 * (c.outcome.time_upper() + 1.0)));
         }
         let fewer = head[10].parse::<usize>().expect("a number of cells") - 1;
         altered.word("the number of cells", 0, 10, &fewer.to_string());
@@ -249,7 +249,7 @@ fn a_deleted_or_altered_exclusion_is_caught() {
                 *altered.caught.entry("a witness elsewhere").or_default() += 1;
             }
         }
-        altered.word("a witness too early", 1, 1, &format!("{:e}", c.outcome.time_lower * (1.0 - 1e-6)));
+        altered.word("a witness too early", 1, 1, &format!("{:e}", c.outcome.time_lower() * (1.0 - 1e-6)));
         altered.word("a witness far away", 1, 2, &format!("{:e}", number(&words, 2) + 10.0));
         // The last cell missing, with and without the count of cells set right.
         let ends = |w: &str| ["done", "inside", "split"].contains(&w);
@@ -294,7 +294,7 @@ fn a_deleted_or_altered_exclusion_is_caught() {
             // A span until the end of the proof, not the last of its cell's: whatever closes it gives out before.
             let last = !lines[i + 1].starts_with("until");
             if parts.len() == 2 && !last && lines[i + 1].split(" |").count() == 2 {
-                altered.word("a time span", i, 1, &format!("{:e}", c.outcome.time_lower));
+                altered.word("a time span", i, 1, &format!("{:e}", c.outcome.time_lower()));
             }
             altered.word("a span backwards", i, 1, "-1e-3");
             let Some(k) = (2..words.len()).find(|k| words[*k] == "|" && words.get(k + 1) != Some(&"fit")) else {
@@ -382,7 +382,7 @@ fn what_lies_on_itself_is_certified() {
             let mut scene = Scene::new("itself", plate.clone(), Motion::resting(Pose::IDENTITY), body, falling);
             scene.resolution = Some(1e-6);
             let c = of_scene(&scene, CELLS);
-            assert_ne!(c.outcome.status, Status::Undecided, "{i}: {:?}", c.outcome);
+            assert_ne!(c.outcome.status(), Status::Undecided, "{i}: {:?}", c.outcome);
             let checked = c.proven().unwrap_or_else(|e| panic!("{i}: {e}"));
             assert!(checked.is_some(), "{i}: {:?}", c.outcome);
         }

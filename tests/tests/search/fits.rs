@@ -5,6 +5,7 @@
 
 use contactd::contact::{Outcome, Status};
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{SEARCH_ALONE, ask_scene_with, cell_ceiling};
 use contactd_tests::scenes::{Recipe, Scene};
 use glam::{DQuat, DVec3, dvec3};
@@ -35,14 +36,14 @@ impl Cost {
         let still = Motion::resting(Pose::IDENTITY);
         let scene = Scene::new("fit", hole.clone(), still, body.clone(), motion);
         let o = ask_scene_with(&scene, SEARCH_ALONE);
-        assert!(matches!(o.status, Status::Contact | Status::Clear), "{} {what}: {o:?}", self.kind);
+        assert!(matches!(o.status(), Status::Contact | Status::Clear), "{} {what}: {o:?}", self.kind);
         self.cells = self.cells.max(o.counters.cells);
         o
     }
 
     fn clear(&mut self, what: &str, hole: &Recipe, body: &Recipe, motion: Motion) {
         let o = self.ask(what, hole, body, motion);
-        assert_eq!(o.status, Status::Clear, "{} {what}: {o:?}", self.kind);
+        assert_eq!(o.status(), Status::Clear, "{} {what}: {o:?}", self.kind);
     }
 
     /// A contact at `time`, closing at `speed`, with the normal's part along `up` at least `least`.
@@ -56,10 +57,13 @@ impl Cost {
         (up, least): (DVec3, f64),
     ) {
         let o = self.ask(what, hole, body, motion);
-        assert_eq!(o.status, Status::Contact, "{} {what}: {o:?}", self.kind);
-        assert!((o.time - time).abs() * speed <= SAME, "{} {what}: {} for {time}", self.kind, o.time);
-        assert!(o.time_lower <= o.time && (o.time_upper - o.time_lower) * speed <= 10.0 * SAME, "{what}: {o:?}");
-        assert!(o.normal.dot(up) >= least, "{} {what}: normal {}", self.kind, o.normal);
+        assert_eq!(o.status(), Status::Contact, "{} {what}: {o:?}", self.kind);
+        assert!((o.time() - time).abs() * speed <= SAME, "{} {what}: {} for {time}", self.kind, o.time());
+        assert!(
+            o.time_lower() <= o.time() && (o.time_upper() - o.time_lower()) * speed <= 10.0 * SAME,
+            "{what}: {o:?}"
+        );
+        assert!(o.at().normal.dot(up) >= least, "{} {what}: normal {}", self.kind, o.at().normal);
     }
 
     fn end(self) {

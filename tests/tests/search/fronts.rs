@@ -5,6 +5,7 @@
 //! The two share the trees' values and Newton's equations, and nothing of how time before a contact is excluded.
 
 use contactd::contact::{Outcome, Status};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes;
@@ -12,8 +13,8 @@ use rayon::prelude::*;
 
 /// Of two contacts that come at one time, as mirror images do, either may be told.
 fn are_tied(x: &Outcome, y: &Outcome, size: f64) -> bool {
-    let speed = x.normal_speed.abs().max(y.normal_speed.abs()) / size;
-    x.status == Status::Contact && y.status == Status::Contact && (x.time - y.time).abs() * speed <= 1e-12
+    let speed = x.at().normal_speed.abs().max(y.at().normal_speed.abs()) / size;
+    x.status() == Status::Contact && y.status() == Status::Contact && (x.time() - y.time()).abs() * speed <= 1e-12
 }
 
 #[test]
@@ -32,7 +33,7 @@ fn what_is_told_in_front_of_the_search_is_what_the_search_says() {
             let (fronted, alone) = (ask(&scene), ask_scene_with(&scene, SEARCH_ALONE));
             let size = scene.delta() / 1e-9;
             let differ = differences(&alone, &fronted, size);
-            let undecided = [&fronted, &alone].iter().any(|o| o.status == Status::Undecided);
+            let undecided = [&fronted, &alone].iter().any(|o| o.status() == Status::Undecided);
             let wrong = !(differ.is_empty() || undecided || are_tied(&alone, &fronted, size));
             let in_front = fronted.counters.cells == 0 && fronted.counters.closed_forms > 0;
             let what = format!("scene {i} ({}): {differ:?}\nalone {alone:?}\nfronted {fronted:?}", scene.class);

@@ -9,7 +9,7 @@ use contactd_tests::judge::{Case, cases};
 fn work(case: &Case, strategies: Strategies) -> Counters {
     let (a, b) = (Model::new(case.a.0.clone()), Model::new(case.b.0.clone()));
     let o = ask_with((&a, case.a.1), (&b, case.b.1), case.resolution, strategies);
-    assert_ne!(o.status, Status::Undecided, "{}", case.name);
+    assert_ne!(o.status(), Status::Undecided, "{}", case.name);
     assert!(case.known.judge(&o, 1e-8).is_ok(), "{}: {o:?}", case.name);
     o.counters
 }

@@ -94,12 +94,12 @@ fn alone(bodies: &[world::body::Body], plan: &PairPlan) -> Counters {
     };
     let query = PairQuery { cell_limit: DEFAULT_CELL_LIMIT, ..question(side(0), side(1), plan.query_options()) };
     let mut outcome = earliest_contact(&query, &mut Scratch::default());
-    let flagged = outcome.status == Status::Contact && plan.report >= Report::Time || plan.margin > 0.0;
-    if flagged && !outcome.touching && (outcome.status != Status::Contact || outcome.time > 0.0) {
+    let flagged = outcome.status() == Status::Contact && plan.report >= Report::Time || plan.margin > 0.0;
+    if flagged && !outcome.touching && (outcome.status() != Status::Contact || outcome.time() > 0.0) {
         let threshold = region::threshold(outcome.resolution, plan.margin);
         let (within, cells) = clearance::touching(&query, threshold, &mut Scratch::default());
         outcome.counters.instant_cells += cells;
-        if plan.margin > 0.0 && within == Within::Apart && outcome.status == Status::Clear {
+        if plan.margin > 0.0 && within == Within::Apart && outcome.status() == Status::Clear {
             let query = PairQuery { cell_limit: region::MOST_CELLS, ..query };
             let (.., work) = clearance::apart_until(&query, threshold, &mut Scratch::default());
             outcome.counters.instant_cells += work.cells + work.instant_cells;

@@ -179,8 +179,8 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
                     let Remembered::Answer { outcome, .. } = remembered else {
                         return Err(format!("{a}, {b}: {remembered:?} is reported as an answer"));
                     };
-                    let lower = outcome.time_lower;
-                    if warm.outcome().pairs.iter().any(|p| (p.a, p.b) == (*a, *b) && p.outcome.time_lower != lower) {
+                    let lower = outcome.time_lower();
+                    if warm.outcome().pairs.iter().any(|p| (p.a, p.b) == (*a, *b) && p.outcome.time_lower() != lower) {
                         return Err(format!("{a}, {b}: remembered until {lower}, reported otherwise"));
                     }
                     if checked.until < lower && plan.detect != Detect::Discrete {
@@ -233,7 +233,7 @@ fn run(seed: u64, steps: usize) -> Work {
         if !same(&reported(&warm), &reported(&cold)) {
             // What a limit left open may be known; then it is what no limit leaves open.
             // An overlap that was to be searched past, too: how deep it is was not proven.
-            let is_left = |p: &PairOutcome| match p.outcome.status {
+            let is_left = |p: &PairOutcome| match p.outcome.status() {
                 Status::Undecided => true,
                 Status::Overlap => p.plan.initial_overlap == InitialOverlap::IgnoreIfSeparating,
                 _ => false,
@@ -250,9 +250,10 @@ fn run(seed: u64, steps: usize) -> Work {
                 // pair stays undecided from a time on before which it is free.
                 let meets = |p: &PairOutcome| {
                     let same = found.pairs.iter().find(|q| (q.a, q.b) == (p.a, p.b));
-                    same.filter(|q| q.outcome.status != Status::Clear).map_or(f64::INFINITY, |q| q.outcome.time_upper)
+                    same.filter(|q| q.outcome.status() != Status::Clear)
+                        .map_or(f64::INFINITY, |q| q.outcome.time_upper())
                 };
-                let cut = |p: &PairOutcome| options.batch_limit > 0 && is_left(p) && p.outcome.time_lower <= meets(p);
+                let cut = |p: &PairOutcome| options.batch_limit > 0 && is_left(p) && p.outcome.time_lower() <= meets(p);
                 // Regions that a limit cuts short are those that were looked at first.
                 let (heads, others) = (lines(answer, false), lines(expected, false));
                 let few = |k: usize| !answer.pairs[k].regions_complete && others.contains(&heads[k]);
@@ -278,7 +279,7 @@ fn run(seed: u64, steps: usize) -> Work {
             break;
         }
         work.steps += 1;
-        let has = |status| expected.pairs.iter().any(|p| p.outcome.status == status);
+        let has = |status| expected.pairs.iter().any(|p| p.outcome.status() == status);
         work.contacts += usize::from(has(Status::Contact));
         work.overlaps += usize::from(!has(Status::Contact) && has(Status::Overlap));
         if !expected.contact && !expected.undecided {
@@ -444,14 +445,14 @@ fn a_small_margin_is_entered_by_boxes_as_by_others() {
         let to = |t: f64| [PoseRecord::end(2, &Pose { position: start.position + fall * t, ..start })];
         let mut world = two([&below, &above], [Pose::IDENTITY, start], 0.0);
         let out = world.step(&to(1.0), &options).expect("a step");
-        if out.pairs[0].outcome.status != Status::Contact {
+        if out.pairs[0].outcome.status() != Status::Contact {
             continue;
         }
-        let met = out.pairs[0].outcome.time;
+        let met = out.pairs[0].outcome.time();
         for margin in [1e-6, 1e-5, 1e-4, 1e-2] {
             let mut world = two([&below, &above], [Pose::IDENTITY, start], margin);
             let o = world.step(&to(met - 4e-8), &options).expect("a step").pairs[0].outcome;
-            assert_eq!(o.status, Status::Clear, "{k}, margin {margin}");
+            assert_eq!(o.status(), Status::Clear, "{k}, margin {margin}");
             // No sooner than where faces moved out by half the margin on both sides meet, at sharp corners.
             let soonest = 1.0 - 20.0 * margin / 2.5;
             assert!(o.margin_time < 1.0 && o.margin_time > soonest, "{k}, margin {margin}: {}", o.margin_time);

@@ -17,6 +17,7 @@ use contactd::octree::Model;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere};
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
 use glam::{DQuat, DVec3, dvec3};
@@ -56,18 +57,20 @@ impl Table {
         };
         let o = earliest_contact(&query, &mut self.scratch);
         assert!(
-            o.status != Status::Overlap,
+            o.status() != Status::Overlap,
             "a stopped body met {}: {motion:?} of {:?} at {:?} of {:?}: {o:?}",
-            o.status.name(),
+            o.status().name(),
             self.moving.solid.primitives,
             self.place,
             self.fixed.solid.primitives
         );
-        if o.status == Status::Undecided {
+        if o.status() == Status::Undecided {
             let (moving, fixed) = (&self.moving.solid.primitives, &self.fixed.solid.primitives);
             println!("undecided: {motion:?} of {moving:?} at {:?} of {fixed:?}: {o:?}", self.place);
         }
-        assert!(0.0 <= o.time_lower && o.time_lower <= o.time && o.time <= o.time_upper && o.time_upper <= 1.0);
+        assert!(
+            0.0 <= o.time_lower() && o.time_lower() <= o.time() && o.time() <= o.time_upper() && o.time_upper() <= 1.0
+        );
         o
     }
 
@@ -126,16 +129,17 @@ fn run(
         let (mut table, approach, size, low) = make(&mut r);
         let delta = table.delta;
         let o = table.ask(approach);
-        if o.status == Status::Undecided {
+        if o.status() == Status::Undecided {
             seen[2] += 1;
             stopped += 1;
             continue;
         }
-        assert_eq!(o.status, Status::Contact, "{approach:?}: {o:?}");
-        let stop = |r: &mut Random, o: &Outcome, m: &Motion| m.at(if r.chance(0.5) { o.time } else { o.time_lower });
+        assert_eq!(o.status(), Status::Contact, "{approach:?}: {o:?}");
+        let stop =
+            |r: &mut Random, o: &Outcome, m: &Motion| m.at(if r.chance(0.5) { o.time() } else { o.time_lower() });
         let mut pose = stop(&mut r, &o, &approach);
         // From the fixed body to the moving one, as the caller sees it.
-        let mut normal = o.normal;
+        let mut normal = o.at().normal;
         stopped += 1;
         for _ in 0..PRESSES {
             // Pressed on by much or by hardly anything, straight or askew; a push below the resolution may be clear.
@@ -143,20 +147,24 @@ fn run(
             let askew = any_perpendicular(normal) * (push * r.within(-1.0, 1.0));
             let press = Motion { start: pose, velocity: askew - normal * push, spin: DVec3::ZERO };
             let o = table.ask(press);
-            match o.status {
+            match o.status() {
                 Status::Contact => {
                     seen[0] += 1;
                     // What is left to the touch is what the stop before left: no more than the resolution.
-                    assert!(o.time * push <= 8.0 * delta, "pressed on by {push}, stops after {}: {o:?}", o.time * push);
-                    assert!((o.normal.length() - 1.0).abs() < 1e-9 && o.point.is_finite(), "{o:?}");
-                    assert!(o.normal_speed >= 0.0, "pressed on, and yet receding: {o:?}");
-                    normal = o.normal;
+                    assert!(
+                        o.time() * push <= 8.0 * delta,
+                        "pressed on by {push}, stops after {}: {o:?}",
+                        o.time() * push
+                    );
+                    assert!((o.at().normal.length() - 1.0).abs() < 1e-9 && o.at().point.is_finite(), "{o:?}");
+                    assert!(o.at().normal_speed >= 0.0, "pressed on, and yet receding: {o:?}");
+                    normal = o.at().normal;
                     pose = stop(&mut r, &o, &press);
                 }
                 // Where the work limit ran out the proven time is still safe to go to.
                 Status::Undecided => {
                     seen[2] += 1;
-                    pose = press.at(o.time_lower);
+                    pose = press.at(o.time_lower());
                 }
                 _ => {
                     assert!(push <= 16.0 * delta, "pressed on by {push}, nothing met: {o:?}");
@@ -177,11 +185,11 @@ fn run(
                 _ => normal * way.min(1e-4 * size),
             };
             let o = table.ask(Motion { start: pose, velocity: free, spin: DVec3::ZERO });
-            if o.status == Status::Undecided {
+            if o.status() == Status::Undecided {
                 seen[2] += 1;
                 continue;
             }
-            assert_eq!(o.status, Status::Clear, "free to go along {free} (normal {normal}) from {pose:?}: {o:?}");
+            assert_eq!(o.status(), Status::Clear, "free to go along {free} (normal {normal}) from {pose:?}: {o:?}");
             seen[1] += 1;
         }
     }

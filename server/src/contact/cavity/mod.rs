@@ -23,7 +23,7 @@ use crate::contact::witness::found::Ending;
 use crate::motion::Relative;
 use glam::DVec3;
 use pierced::{CavityPair, First, Guess, Wall};
-use proof::Verdict;
+use proof::ProofEnd;
 use smallvec::SmallVec;
 
 /// Pairs of parts beyond which the search does better.
@@ -56,7 +56,7 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
                 First::Near => {
                     let (verdict, looks) = pair.prove(1.0, None);
                     contacts.counters.closed_forms += looks;
-                    if verdict != Verdict::Proven {
+                    if verdict != ProofEnd::Proven {
                         return None;
                     }
                 }
@@ -82,9 +82,9 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
             let (verdict, looks) = pair.prove(end, *toward);
             contacts.counters.closed_forms += looks;
             match verdict {
-                Verdict::Proven => break,
-                Verdict::Open => return None,
-                Verdict::Met(t, wall) => {
+                ProofEnd::Proven => break,
+                ProofEnd::Open => return None,
+                ProofEnd::Met(t, wall) => {
                     solved += 1;
                     let goal = contacts.goal();
                     let guess = pair.settle(t, wall, 0.0, &mut contacts.counters.closed_forms);

@@ -56,7 +56,7 @@ const CLAIMED: f64 = 1.0 - 1e-12;
 
 /// How a proof ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum ProofEnd {
     Proven,
     /// The bounds say that something is met at this moment in this direction.
     Met(f64, Wall),
@@ -239,12 +239,12 @@ impl CavityPair<'_> {
     }
 
     /// Proves that nothing is met from t = 0 to `end`, the round wall divided in the direction `toward` first.
-    pub(super) fn prove(&self, end: f64, toward: Option<DVec3>) -> (Verdict, u64) {
+    pub(super) fn prove(&self, end: f64, toward: Option<DVec3>) -> (ProofEnd, u64) {
         let mut moments: SmallVec<[Moment; 6]> = SmallVec::new();
         moments.push(self.moment(0.0));
         moments.push(self.moment(end));
         if self.kept_out(&moments[0], &moments[1]) {
-            return (Verdict::Proven, 2);
+            return (ProofEnd::Proven, 2);
         }
         let mut stack: SmallVec<[Rectangle; 16]> = SmallVec::new();
         let row = |wall: Wall, moments: &[Moment]| [self.corner(&moments[0], wall), self.corner(&moments[1], wall)];
@@ -264,11 +264,11 @@ impl CavityPair<'_> {
             }
         }
         for _ in 0..MOST_RECTANGLES {
-            let Some(r) = stack.pop() else { return (Verdict::Proven, moments.len() as u64) };
+            let Some(r) = stack.pop() else { return (ProofEnd::Proven, moments.len() as u64) };
             for (e, row) in r.best.iter().enumerate() {
                 for (best, wall) in row.iter().zip(r.walls) {
                     if best.phi + best.reserve <= 0.0 {
-                        return (Verdict::Met(moments[r.times[e]].at.t, wall), moments.len() as u64);
+                        return (ProofEnd::Met(moments[r.times[e]].at.t, wall), moments.len() as u64);
                     }
                 }
             }
@@ -311,7 +311,7 @@ impl CavityPair<'_> {
                 }
             }
         }
-        (Verdict::Open, moments.len() as u64)
+        (ProofEnd::Open, moments.len() as u64)
     }
 
     /// The direction between two at which φ is lowest at a moment; regula falsi on its slope.

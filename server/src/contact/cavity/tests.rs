@@ -2,7 +2,7 @@
 
 use super::body::{Moment, Plane};
 use super::pierced::{CavityPair, Wall};
-use super::proof::Verdict;
+use super::proof::ProofEnd;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::{
@@ -64,23 +64,33 @@ fn compare(name: &str, count: u64, mut draw: impl FnMut(&mut Random) -> (Motion,
         sum.looks += fronted.counters.closed_forms;
         sum.newton += fronted.counters.newton;
         let alone = ask(x, y, Strategies { convex: false, cavities: false, ..Strategies::default() });
-        if alone.status == Status::Undecided {
+        if alone.status() == Status::Undecided {
             continue;
         }
-        assert_eq!(fronted.status, alone.status, "{name} {i}: {fronted:?} {alone:?}");
-        assert!(fronted.time_lower <= fronted.time && fronted.time <= fronted.time_upper, "{name} {i}: {fronted:?}");
-        if fronted.status != Status::Contact {
+        assert_eq!(fronted.status(), alone.status(), "{name} {i}: {fronted:?} {alone:?}");
+        assert!(
+            fronted.time_lower() <= fronted.time() && fronted.time() <= fronted.time_upper(),
+            "{name} {i}: {fronted:?}"
+        );
+        if fronted.status() != Status::Contact {
             continue;
         }
         sum.met += 1;
-        let speed = fronted.normal_speed.abs().max(alone.normal_speed.abs());
+        let speed = fronted.point().unwrap().normal_speed.abs().max(alone.point().unwrap().normal_speed.abs());
         // Two contacts at about one time may be told either way.
-        let off = (fronted.time - alone.time).abs() * speed;
+        let off = (fronted.time() - alone.time()).abs() * speed;
         assert!(off < 2e-9, "{name} {i}: {off:e}: {fronted:?} {alone:?}");
-        assert!(fronted.time_lower <= alone.time_upper && alone.time_lower <= fronted.time_upper, "{name} {i}");
-        if (fronted.point - alone.point).length() < 1e-6 {
-            assert!((fronted.normal - alone.normal).length() < 1e-5, "{name} {i}: {fronted:?} {alone:?}");
-            assert_eq!((fronted.kind, fronted.extent), (alone.kind, alone.extent), "{name} {i}: {fronted:?} {alone:?}");
+        assert!(fronted.time_lower() <= alone.time_upper() && alone.time_lower() <= fronted.time_upper(), "{name} {i}");
+        if (fronted.point().unwrap().point - alone.point().unwrap().point).length() < 1e-6 {
+            assert!(
+                (fronted.point().unwrap().normal - alone.point().unwrap().normal).length() < 1e-5,
+                "{name} {i}: {fronted:?} {alone:?}"
+            );
+            assert_eq!(
+                fronted.point().map(|p| (p.kind, p.extent)),
+                alone.point().map(|p| (p.kind, p.extent)),
+                "{name} {i}: {fronted:?} {alone:?}"
+            );
         }
     }
     println!("{name}: {sum:?}");
@@ -143,7 +153,7 @@ fn a_peg_that_grazes_its_hole_is_reported() {
     let o = ask((&plate, rest()), (&peg, moving(at, tilt, DVec3::Z * -0.9, DVec3::ZERO)), Strategies::default());
     println!("{o:?}");
     assert!(o.counters.cells == 0 && o.counters.closed_forms > 0, "{o:?}");
-    assert!(matches!(o.status, Status::Contact | Status::Clear), "{o:?}");
+    assert!(matches!(o.status(), Status::Contact | Status::Clear), "{o:?}");
 }
 
 #[test]
@@ -253,7 +263,7 @@ fn combs_of_pegs_are_reported() {
         let (at, tilt) = (across(&mut r, off), r.vector(1.0).normalize() * angle);
         let motion = moving(at + DVec3::Z * (1.0 + 3.5 * angle), tilt, DVec3::Z * -0.7, DVec3::ZERO);
         let o = ask((&plate, rest()), (&comb, motion), Strategies::default());
-        assert_ne!(o.status, Status::Undecided, "{i}: {o:?}");
+        assert_ne!(o.status(), Status::Undecided, "{i}: {o:?}");
         reported += u32::from(o.counters.cells == 0);
         if i % 8 == 0 {
             let alone = ask(
@@ -261,8 +271,8 @@ fn combs_of_pegs_are_reported() {
                 (&comb, motion),
                 Strategies { convex: false, cavities: false, ..Strategies::default() },
             );
-            assert_eq!(o.status, alone.status, "{i}: {o:?} {alone:?}");
-            assert!((o.time - alone.time).abs() < 1e-8, "{i}: {o:?} {alone:?}");
+            assert_eq!(o.status(), alone.status(), "{i}: {o:?} {alone:?}");
+            assert!((o.time() - alone.time()).abs() < 1e-8, "{i}: {o:?} {alone:?}");
         }
     }
     println!("comb: {reported} of {count}");
@@ -308,7 +318,7 @@ fn a_proof_does_not_jump_over_an_arc() {
         let ends = [0.0, 1.0].map(|t| pair.best(&pair.moment(t), Wall::Round(DVec3::X)).phi);
         assert!(ends.iter().all(|phi| *phi > 0.0), "{ends:?}");
         let (verdict, _) = pair.prove(1.0, None);
-        assert_eq!(verdict == Verdict::Proven, !met, "{turn}: {verdict:?}");
+        assert_eq!(verdict == ProofEnd::Proven, !met, "{turn}: {verdict:?}");
     }
 }
 

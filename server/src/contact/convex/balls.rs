@@ -16,7 +16,7 @@
 use super::whole::{APART, PrimitivePair, excluded};
 use crate::contact::exclusion::rounding;
 use crate::contact::query::options::QueryOptions;
-use crate::contact::query::outcome::{Counters, NO_FACE, Outcome, Status};
+use crate::contact::query::outcome::{Contact, ContactPoint, Counters, NO_FACE, Outcome, Verdict};
 use crate::contact::query::question::{self, PairQuery};
 use crate::contact::query::task::witness_level;
 use crate::contact::witness::extent::INCIDENT;
@@ -72,22 +72,12 @@ impl Passage {
         };
         let (first, second) = if self.swapped { (1, 0) } else { (0, 1) };
         let sign = if self.swapped { -1.0 } else { 1.0 };
-        let (point, normal, speed, faces) = if query_options.point() {
-            (met.point, met.normal * sign, met.speed, [met.faces[first], met.faces[second]])
-        } else {
-            (DVec3::ZERO, DVec3::ZERO, 0.0, [NO_FACE; 2])
-        };
         Outcome {
-            status: Status::Contact,
-            time_lower: met.touch,
-            time: met.touch,
-            time_upper: met.deep,
+            verdict: Verdict::Contact(Contact {
+                point: query_options.point().then(|| met.point([first, second], sign)),
+                ..Contact::at(met.touch, met.deep)
+            }),
             apart: met.apart,
-            point,
-            normal,
-            normal_speed: speed,
-            faces_a: [faces[0], NO_FACE, NO_FACE],
-            faces_b: [faces[1], NO_FACE, NO_FACE],
             counters: met.counters(query_options, counters),
             ..Outcome::clear(resolution)
         }
@@ -95,6 +85,19 @@ impl Passage {
 }
 
 impl Met {
+    /// Where the balls meet, with a's face and b's in this order; `sign` is that of the normal.
+    #[inline(always)]
+    fn point(&self, order: [usize; 2], sign: f64) -> ContactPoint {
+        ContactPoint {
+            point: self.point,
+            normal: self.normal * sign,
+            normal_speed: self.speed,
+            faces_a: [self.faces[order[0]], NO_FACE, NO_FACE],
+            faces_b: [self.faces[order[1]], NO_FACE, NO_FACE],
+            ..ContactPoint::default()
+        }
+    }
+
     fn counters(&self, query_options: QueryOptions, counters: Counters) -> Counters {
         Counters {
             closed_forms: counters.closed_forms + 1,
@@ -176,14 +179,10 @@ pub fn meet(pair: &PrimitivePair, radii: [f64; 2], query_options: QueryOptions, 
         rounding: pair.rounding,
     };
     if let Some(met) = balls.meet()? {
-        out.status = Status::Contact;
-        (out.time_lower, out.time, out.time_upper) = (met.touch, met.touch, met.deep);
+        let point = query_options.point().then(|| met.point([0, 1], 1.0));
+        out.verdict = Verdict::Contact(Contact { point, ..Contact::at(met.touch, met.deep) });
         out.apart = met.apart;
         out.counters = met.counters(query_options, out.counters);
-        if query_options.point() {
-            (out.point, out.normal, out.normal_speed) = (met.point, met.normal, met.speed);
-            (out.faces_a[0], out.faces_b[0]) = (met.faces[0], met.faces[1]);
-        }
     }
     Some(())
 }

@@ -14,7 +14,7 @@
 use super::slabs::{Across, Boxes, Features, Passage};
 use super::whole::{APART, PrimitivePair, excluded};
 use crate::contact::query::options::QueryOptions;
-use crate::contact::query::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::query::outcome::{Contact, ContactKind, ContactPoint, NO_FACE, Outcome, Verdict};
 use crate::contact::witness::extent::INCIDENT;
 use glam::{DMat3, DVec3};
 
@@ -139,25 +139,29 @@ impl<'a> Met<'a> {
         if !(is_on && inside[0].max(inside[1]).max_element() <= -(pair.delta + pair.rounding)) {
             return None;
         }
-        out.status = Status::Contact;
-        (out.time_lower, out.time, out.time_upper) = (touch, touch, deep);
-        out.apart = phi;
+        let point = query_options.point().then(|| {
+            let (faces_a, faces_b) = self.faces(pair);
+            ContactPoint {
+                point: pair.point(pair.offsets[0], *a * x, touch),
+                normal: (*a * self.n).normalize(),
+                normal_speed: speed,
+                kind: self.kind(),
+                faces_a,
+                faces_b,
+                ..ContactPoint::default()
+            }
+        });
         out.counters.times += u64::from(query_options.time());
-        if query_options.point() {
-            out.counters.contacts += 1;
-            out.point = pair.point(pair.offsets[0], *a * x, touch);
-            out.normal = (*a * self.n).normalize();
-            out.normal_speed = speed;
-            (out.kind, out.extent) = (self.kind(), Extent::Point);
-            (out.faces_a, out.faces_b) = self.faces(pair);
-        }
+        out.counters.contacts += u64::from(query_options.point());
+        out.verdict = Verdict::Contact(Contact { point, ..Contact::at(touch, deep) });
+        out.apart = phi;
         Some(())
     }
 
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> ContactKind {
         match self.features {
-            Features::Edges(..) => Kind::EdgeEdge,
-            _ => Kind::VertexFace,
+            Features::Edges(..) => ContactKind::EdgeEdge,
+            _ => ContactKind::VertexFace,
         }
     }
 

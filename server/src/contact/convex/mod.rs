@@ -38,7 +38,7 @@ mod turning;
 mod turns;
 mod whole;
 
-use crate::contact::query::outcome::{Outcome, Status};
+use crate::contact::query::outcome::Outcome;
 use crate::contact::query::question::PairQuery;
 use crate::solid::primitive::Form;
 pub(super) use advance::{Convex, answer};
@@ -107,14 +107,14 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
                 if reported.is_none() {
                     return Quick::Open(Some(n));
                 }
-                if outcome.status == Status::Contact {
+                if outcome.contact().is_some() {
                     outcome.apart = start.gap(n) / n.length();
                 }
             }
             Look::Open => return nothing,
         }
     }
-    if swapped && outcome.status != Status::Clear {
+    if swapped && outcome.meets() {
         outcome.swap_sides();
     }
     Quick::Reported

@@ -14,7 +14,7 @@ use super::gjk::{self, Meeting};
 use super::support::{ConvexBody, Slope};
 use super::whole::PrimitivePair;
 use crate::contact::query::options::QueryOptions;
-use crate::contact::query::outcome::{Outcome, Status};
+use crate::contact::query::outcome::{ContactPoint, NO_FACE, Outcome, Overlap, Verdict};
 use crate::contact::query::task::most_raised;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -113,9 +113,8 @@ impl<'a> Start<'a> {
     /// Tells an overlap as it was found.
     pub fn report(&self, common: &Common, query_options: QueryOptions, out: &mut Outcome) {
         let pair = self.pair;
-        out.status = Status::Overlap;
+        out.verdict = Verdict::OVERLAP;
         out.touching = true;
-        (out.time_lower, out.time, out.time_upper) = (0.0, 0.0, 0.0);
         if !query_options.point() {
             return;
         }
@@ -130,16 +129,22 @@ impl<'a> Start<'a> {
                 normal = (gap, n);
             }
         }
-        out.point = pair.point(pair.offsets[0], *x, 0.0);
-        out.normal = normal.1.normalize();
-        out.separation = -2.0 * depth(&common.slopes);
+        let normal = normal.1.normalize();
         // From the centres of rotation.
         let arms = [pair.offsets[0] + x, pair.offsets[1] + (x - pair.way)];
         let swing = |k: usize| pair.bodies[k].placed.motion.spin.cross(arms[k]);
         let (a, b) = (swing(0), swing(1));
-        out.normal_speed = (pair.velocity + a - b).dot(out.normal);
         let [p, q] = pair.primitives;
-        (out.faces_a[0], out.faces_b[0]) = (p.first_face + of_a.face, q.first_face + of_b.face);
+        let point = ContactPoint {
+            point: pair.point(pair.offsets[0], *x, 0.0),
+            normal,
+            separation: -2.0 * depth(&common.slopes),
+            normal_speed: (pair.velocity + a - b).dot(normal),
+            faces_a: [p.first_face + of_a.face, NO_FACE, NO_FACE],
+            faces_b: [q.first_face + of_b.face, NO_FACE, NO_FACE],
+            ..ContactPoint::default()
+        };
+        out.verdict = Verdict::Overlap(Overlap { time: 0.0, point: Some(point), penetration: None });
     }
 
     /// The gap along a direction, times its length; negative: how far they overlap along it.

@@ -3,7 +3,7 @@
 use super::*;
 use crate::contact::pair::search::earliest_contact;
 use crate::contact::query::question::{self, default_resolution};
-use crate::contact::{DEFAULT_CELL_LIMIT, Extent, Kind, QueryOptions, Scratch, Strategies};
+use crate::contact::{ContactKind, DEFAULT_CELL_LIMIT, Extent, QueryOptions, Scratch, Status, Strategies};
 use crate::math::random::Random;
 use crate::motion::Placed;
 use crate::octree::Model;
@@ -106,19 +106,25 @@ fn slabs_tell_of_boxes_what_cutting_planes_tell() {
             left += u32::from(reported.is_none());
             left_aligned += u32::from(reported.is_none() && aligned);
             let (Some(reported), Some(())) = (reported, general) else { return };
-            assert_eq!(reported.status, expected.status, "{i}: {reported:?}, {expected:?}");
-            if reported.status == Status::Clear {
+            assert_eq!(reported.status(), expected.status(), "{i}: {reported:?}, {expected:?}");
+            if reported.status() == Status::Clear {
                 misses += 1;
                 return;
             }
             hits += 1;
             // A grazing contact knows its place well and its time badly.
-            let near = |t: f64, u: f64| (t - u).abs() * reported.normal_speed <= 1e-13;
-            let times = [(reported.time_lower, expected.time), (reported.time_upper, expected.time_upper)];
+            let near = |t: f64, u: f64| (t - u).abs() * reported.point().unwrap().normal_speed <= 1e-13;
+            let times = [(reported.time_lower(), expected.time()), (reported.time_upper(), expected.time_upper())];
             assert!(times.iter().all(|(t, u)| near(*t, *u)), "{i}: {reported:?}, {expected:?}");
-            assert!(reported.normal.distance(expected.normal) <= 1e-13, "{i}: {reported:?}, {expected:?}");
-            assert!(reported.point.distance(expected.point) <= 1e-11, "{i}: {reported:?}, {expected:?}");
-            let features = |o: &Outcome| (o.kind, o.extent, o.faces_a, o.faces_b);
+            assert!(
+                reported.point().unwrap().normal.distance(expected.point().unwrap().normal) <= 1e-13,
+                "{i}: {reported:?}, {expected:?}"
+            );
+            assert!(
+                reported.point().unwrap().point.distance(expected.point().unwrap().point) <= 1e-11,
+                "{i}: {reported:?}, {expected:?}"
+            );
+            let features = |o: &Outcome| o.point().map(|p| (p.kind, p.extent, p.faces_a, p.faces_b));
             assert_eq!(features(&reported), features(&expected), "{i}");
         });
     }
@@ -144,11 +150,15 @@ fn dropped(inside: f64) -> Bodies {
 #[test]
 fn a_corner_that_falls_on_an_edge_is_not_told_as_one_on_a_face() {
     let inside = dropped(1e-6).with(by_slabs).expect("a corner on a face");
-    assert_eq!((inside.kind, inside.extent), (Kind::VertexFace, Extent::Point));
-    assert!((inside.time - 0.5).abs() <= 1e-15 && inside.time_lower <= inside.time);
+    assert_eq!(inside.point().map(|p| (p.kind, p.extent)), Some((ContactKind::VertexFace, Extent::Point)));
+    assert!((inside.time() - 0.5).abs() <= 1e-15 && inside.time_lower() <= inside.time());
     let bodies = dropped(0.0);
     assert!(bodies.with(by_slabs).is_none());
     let reported = earliest_contact(&bodies.query(), &mut Scratch::default());
-    assert_eq!((reported.status, reported.kind), (Status::Contact, Kind::VertexEdge), "{reported:?}");
-    assert!((reported.time - 0.5).abs() <= 1e-12, "{reported:?}");
+    assert_eq!(
+        (reported.status(), reported.point().unwrap().kind),
+        (Status::Contact, ContactKind::VertexEdge),
+        "{reported:?}"
+    );
+    assert!((reported.time() - 0.5).abs() <= 1e-12, "{reported:?}");
 }

@@ -9,7 +9,7 @@ use super::turns::Turns;
 use super::whole::PrimitivePair;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::options::QueryOptions;
-use crate::contact::query::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::query::outcome::{Contact, ContactKind, ContactPoint, Extent, NO_FACE, Outcome, Verdict};
 use crate::contact::witness::extent::{self, INCIDENT};
 use crate::contact::witness::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
 use glam::{DMat3, DQuat, DVec3};
@@ -57,26 +57,33 @@ pub struct Touch {
     /// Unit direction from a to b.
     pub normal: DVec3,
     speed: f64,
-    kind: Kind,
+    kind: ContactKind,
     extent: Extent,
     faces: [[u32; 3]; 2],
 }
 
 impl Touch {
+    /// Tells that they meet, where nothing is proven to be free after `time_lower`: a witness is all of a hit.
+    pub fn report_hit(&self, time_lower: f64, out: &mut Outcome) {
+        out.verdict = Verdict::Contact(Contact { time_lower, ..Contact::at(self.deep, self.deep) });
+    }
+
     /// Tells the contact, before which everything is proven to be free.
     pub fn report(&self, pair: &PrimitivePair, query_options: QueryOptions, out: &mut Outcome) {
-        out.status = Status::Contact;
-        (out.time_lower, out.time, out.time_upper) = (self.t, self.t, self.deep);
         out.counters.times += u64::from(query_options.time());
-        if !query_options.point() {
-            return;
-        }
-        out.counters.contacts += 1;
-        out.point = pair.point(self.offset, self.x, self.t);
-        out.normal = self.normal;
-        out.normal_speed = self.speed;
-        (out.kind, out.extent) = (self.kind, self.extent);
-        [out.faces_a, out.faces_b] = self.faces;
+        out.counters.contacts += u64::from(query_options.point());
+        let [faces_a, faces_b] = self.faces;
+        let point = query_options.point().then(|| ContactPoint {
+            point: pair.point(self.offset, self.x, self.t),
+            normal: self.normal,
+            normal_speed: self.speed,
+            kind: self.kind,
+            extent: self.extent,
+            faces_a,
+            faces_b,
+            ..ContactPoint::default()
+        });
+        out.verdict = Verdict::Contact(Contact { point, ..Contact::at(self.t, self.deep) });
     }
 }
 
@@ -207,14 +214,14 @@ impl<'a> Stand<'a> {
             deep: t,
             normal: n,
             speed: (a - b).dot(n),
-            kind: Kind::FaceFace,
+            kind: ContactKind::FaceFace,
             extent: Extent::Point,
             faces: [[NO_FACE; 3]; 2],
         };
         touch.describe(&active, of_a, &rows, pair.scale);
         let noted = [0, 1].map(|k| extent::noted(&touch.faces[k]));
         // Faces that pass through the point and hold nothing are the search's to tell.
-        if touch.kind == Kind::VertexVertex || (touch.extent == Extent::Point && passing != noted) {
+        if touch.kind == ContactKind::VertexVertex || (touch.extent == Extent::Point && passing != noted) {
             return None;
         }
         // Round faces bend away from the first order: the deeper, the farther.
@@ -365,7 +372,7 @@ impl<'a> Stand<'a> {
 }
 
 impl Touch {
-    /// Kind, extent and faces from the active constraints, of which the first `of_a` are A's.
+    /// ContactKind, extent and faces from the active constraints, of which the first `of_a` are A's.
     fn describe(&mut self, active: &[(Constraint, f64)], of_a: usize, rows: &[Row], scale: f64) {
         let literal = |c: &Constraint| matches!(c, Constraint::Literal(..));
         let sum: f64 = active.iter().filter(|c| literal(&c.0)).map(|c| c.1).sum();
@@ -385,6 +392,6 @@ impl Touch {
             }
         }
         self.extent = extent::extent(&gradients, curvature, scale);
-        self.kind = Kind::of_active(count[0], count[1]);
+        self.kind = ContactKind::of_active(count[0], count[1]);
     }
 }

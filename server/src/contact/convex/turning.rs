@@ -162,9 +162,7 @@ impl<'a> Turning<'a> {
                 continue;
             };
             if !query_options.time() {
-                // A witness is all of a hit.
-                touch.report(self.pair, query_options, out);
-                (out.time_lower, out.time) = (t.max(f64::MIN_POSITIVE), touch.deep);
+                touch.report_hit(t.max(f64::MIN_POSITIVE), out);
                 return Some(());
             }
             // With the contact's own normal, which needs one gap more.

@@ -7,7 +7,9 @@ use crate::contact::exclusion::literal::{Faces, Side};
 use crate::contact::instant::depth;
 use crate::contact::instant::separation;
 use crate::contact::instant::work::Work;
-use crate::contact::query::outcome::{Counters, Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::query::outcome::{
+    Contact, ContactKind, ContactPoint, Counters, Extent, NO_FACE, Outcome, Overlap, Penetration, Status, Verdict,
+};
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::{RAISES, Task, clear_of_walls, most_raised, raised, witness_level};
 use crate::contact::queue::clock::Stage;
@@ -260,9 +262,14 @@ impl<'a> PairSearch<'a> {
             let work = Work::new(task.limit.min(depth::MOST_CELLS));
             let (deepest, direction, depth, _) = depth::deepest(task, &at, x, &work);
             let sign = if self.swapped { -1.0 } else { 1.0 };
-            outcome.penetration = 2.0 * depth;
-            outcome.deepest = task.relative.world_point(&at, deepest);
-            outcome.direction = (at.world_from_a * direction * sign).normalize();
+            let penetration = Penetration {
+                depth: 2.0 * depth,
+                point: task.relative.world_point(&at, deepest),
+                direction: (at.world_from_a * direction * sign).normalize(),
+            };
+            if let Verdict::Overlap(overlap) = &mut outcome.verdict {
+                overlap.penetration = Some(penetration);
+            }
             outcome.counters.instant_cells += work.cells();
             outcome.counters.penetrations += 1;
         }
@@ -296,8 +303,8 @@ impl<'a> PairSearch<'a> {
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
         match &self.state {
-            State::Reported(reported, _) if reported.status == Status::Clear => f64::INFINITY,
-            State::Reported(reported, _) => reported.time_lower,
+            State::Reported(Outcome { verdict: Verdict::Clear { .. }, .. }, _) => f64::INFINITY,
+            State::Reported(reported, _) => reported.time_lower(),
             State::Searching(_, Some(Ending::Contact(found))) => found.goal,
             State::Searching(_, Some(_)) => f64::INFINITY,
             State::Searching(search, None) => search.earliest(),
@@ -307,7 +314,7 @@ impl<'a> PairSearch<'a> {
     /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Outcome> {
         if let State::Reported(reported, _) = &self.state {
-            return (reported.status == Status::Clear || reported.time_lower <= until).then_some(*reported);
+            return (reported.status() == Status::Clear || reported.time_lower() <= until).then_some(*reported);
         }
         loop {
             let (ending, cells) = self.ending(until)?;
@@ -416,22 +423,22 @@ impl<'a> PairSearch<'a> {
     fn meets(&mut self, found: &Found) {
         let continued = (found.touch.is_none() && self.task.continues()).then(|| self.continued(found));
         let found = continued.as_ref().unwrap_or(found);
-        fill_contact(&mut self.outcome, &self.task, found);
+        let mut contact = contact_of(&self.task, self.outcome.resolution, found);
         let x = found.witness;
         let x = if self.swapped { self.task.relative.at(found.upper).b_point(x) } else { x };
-        self.outcome.witness = Some(x);
-        if let Some(bodies) = &self.spun
-            && self.task.query_options.point()
-        {
-            let o = &mut self.outcome;
+        contact.witness = Some(x);
+        if let (Some(bodies), Some(o)) = (&self.spun, &mut contact.point) {
             let velocity = |body: &Placed| {
                 let motion = &body.motion;
-                motion.velocity + motion.spin.cross(o.point - motion.at(o.time).position)
+                motion.velocity + motion.spin.cross(o.point - motion.at(contact.time).position)
             };
             // The normal still points from the reference body.
             let sign = if self.swapped { -1.0 } else { 1.0 };
             o.normal_speed = sign * (velocity(&bodies[0]) - velocity(&bodies[1])).dot(o.normal);
         }
+        self.outcome.counters.times += u64::from(self.task.query_options.time());
+        self.outcome.counters.contacts += u64::from(contact.point.is_some());
+        self.outcome.verdict = Verdict::Contact(contact);
     }
 
     /// A contact whose witness was kept for its time alone, with its touch. Where it has none: with the deepest point
@@ -459,10 +466,7 @@ impl<'a> PairSearch<'a> {
         self.task.delta = open.depth;
         match open.found {
             Some(found) => self.meets(&found),
-            None => {
-                self.outcome.status = Status::Undecided;
-                self.outcome.time_lower = open.free_until;
-            }
+            None => self.outcome.verdict = Verdict::Undecided { time_lower: open.free_until },
         }
     }
 
@@ -552,7 +556,20 @@ impl<'a> PairSearch<'a> {
     }
 }
 
-fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
+/// What is told of a contact, along a's axes where it is the reference body; its witness is still along these.
+fn contact_of(task: &Task, resolution: f64, found: &Found) -> Contact {
+    let time = found.touch.as_ref().map_or(found.upper, |s| s.t.clamp(0.0, found.upper));
+    let mut contact = Contact {
+        time_lower: time.min(found.goal.max(0.0)),
+        not_continued: found.touch.is_none(),
+        ..Contact::at(time, found.upper)
+    };
+    contact.point = task.query_options.point().then(|| point_of(task, resolution, found, &contact));
+    contact
+}
+
+/// Where bodies meet, and how.
+fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> ContactPoint {
     let deep = &found.deep;
     let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
     // Where the touch was before the start: the point on the way from it to the witness, now.
@@ -560,17 +577,8 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
         let share = -s.t / (deep.t - s.t);
         s.x + (deep.x - s.x) * share
     });
-    o.status = Status::Contact;
-    o.time_upper = found.upper;
-    o.time = found.touch.as_ref().map_or(found.upper, |s| s.t.clamp(0.0, found.upper));
-    o.not_continued = found.touch.is_none();
-    o.time_lower = o.time.min(found.goal.max(0.0));
-    o.counters.times += u64::from(task.query_options.time());
-    if !task.query_options.point() {
-        return;
-    }
-    o.counters.contacts += 1;
-    let at = task.relative.at(o.time);
+    let time = contact.time;
+    let at = task.relative.at(time);
     let problem = Problem {
         a: Faces { solid: task.a, clip_planes: &[] },
         b: Faces { solid: task.b, clip_planes: &[] },
@@ -587,11 +595,9 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     let start = start
         .filter(|_| s.active.iter().zip(&s.lambda).map(|(c, l)| balance(c) * *l).sum::<DVec3>().length() > BENT)
         .and_then(|touch| at_the_start(task, touch, deep));
-    let start =
-        start.or_else(|| (o.time == 0.0).then(|| climbed_at_the_start(task, &at, x, 2.0 * o.resolution)).flatten());
+    let start = start.or_else(|| (time == 0.0).then(|| climbed_at_the_start(task, &at, x, 2.0 * resolution)).flatten());
     let s = start.as_ref().unwrap_or(s);
     x = start.as_ref().map_or(x, |s| s.x);
-    o.point = task.relative.world_point(&at, x);
     // Where the point is no touch, or one that was climbed to, faces pass as far from it as it is deep.
     let off = task.model_a.value(x).abs().max(task.model_b.value(at.b_point(x)).abs());
     let off = if off <= INCIDENT * task.rounding { 0.0 } else { off };
@@ -601,20 +607,26 @@ fn fill_contact(o: &mut Outcome, task: &Task, found: &Found) {
     if active.extent == Extent::Point {
         active.add_incident(&features);
     }
-    o.kind = Kind::of_active(active.count[0], active.count[1]);
-    o.faces_a = active.faces[0];
-    o.faces_b = active.faces[1];
-    o.extent = active.extent;
-    o.averaged_normal = o.kind == Kind::VertexVertex;
-    let normal = if o.averaged_normal { active.average.unwrap_or(active.normal) } else { active.normal };
-    o.normal = (at.world_from_a * normal).normalize();
-    o.normal_speed = at.velocity(x).dot(normal);
-    // Of an overlap that is searched past: how deep the bodies then are.
-    o.separation = match () {
-        () if task.ignored_depth > 0.0 => -2.0 * task.delta,
-        () if o.not_continued => 2.0 * common(x).min(0.0),
-        () => 0.0,
-    };
+    let kind = ContactKind::of_active(active.count[0], active.count[1]);
+    let averaged_normal = kind == ContactKind::VertexVertex;
+    let normal = if averaged_normal { active.average.unwrap_or(active.normal) } else { active.normal };
+    let [faces_a, faces_b] = active.faces;
+    ContactPoint {
+        point: task.relative.world_point(&at, x),
+        normal: (at.world_from_a * normal).normalize(),
+        averaged_normal,
+        // Of an overlap that is searched past: how deep the bodies then are.
+        separation: match () {
+            () if task.ignored_depth > 0.0 => -2.0 * task.delta,
+            () if contact.not_continued => 2.0 * common(x).min(0.0),
+            () => 0.0,
+        },
+        normal_speed: at.velocity(x).dot(normal),
+        kind,
+        extent: active.extent,
+        faces_a,
+        faces_b,
+    }
 }
 
 /// Gradients that miss each other by more than this are not of the point where the bodies hold each other.
@@ -773,8 +785,7 @@ impl Active {
 
 /// Overlap at the start: from a common point to one that tells a direction.
 fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
-    o.status = Status::Overlap;
-    (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
+    o.verdict = Verdict::OVERLAP;
     o.touching = true;
     if !task.query_options.point() {
         return;
@@ -784,13 +795,20 @@ fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     let work = Work::new(task.limit.min(depth::MOST_CELLS));
     let (x, normal, depth, faces) = depth::some(task, &at, x, &work);
     o.counters.instant_cells += work.cells();
-    o.point = task.relative.world_point(&at, x);
-    o.normal = (at.world_from_a * normal).normalize();
-    o.separation = -2.0 * depth;
-    o.normal_speed = at.velocity(x).dot(normal);
+    let [mut faces_a, mut faces_b] = [[NO_FACE; 3]; 2];
     for (side, id) in faces {
-        let list = if side == Side::A { &mut o.faces_a } else { &mut o.faces_b };
+        let list = if side == Side::A { &mut faces_a } else { &mut faces_b };
         note(list, id.face());
     }
-    o.kind = Kind::of_active(noted(&o.faces_a), noted(&o.faces_b));
+    let point = ContactPoint {
+        point: task.relative.world_point(&at, x),
+        normal: (at.world_from_a * normal).normalize(),
+        separation: -2.0 * depth,
+        normal_speed: at.velocity(x).dot(normal),
+        kind: ContactKind::of_active(noted(&faces_a), noted(&faces_b)),
+        faces_a,
+        faces_b,
+        ..ContactPoint::default()
+    };
+    o.verdict = Verdict::Overlap(Overlap { time: 0.0, point: Some(point), penetration: None });
 }

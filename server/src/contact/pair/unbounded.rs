@@ -4,7 +4,7 @@
 //! What else is unbounded mostly has common points far out, which are looked for along a few directions. A pair of which this
 //! tells nothing is undecided, at once.
 
-use crate::contact::query::outcome::{Kind, Outcome, Status};
+use crate::contact::query::outcome::{ContactPoint, Outcome, Overlap, Penetration, Verdict};
 use crate::contact::query::question::{Body, PairQuery};
 use crate::math::tolerance;
 use crate::solid::{Face, Node, Solid};
@@ -32,23 +32,21 @@ pub fn answer(query: &PairQuery) -> Option<Outcome> {
     }
     o.touching = true;
     let Some((x, depth)) = common(&bodies, resolution) else {
-        (o.status, o.time_lower) = (Status::Undecided, 0.0);
+        o.verdict = Verdict::Undecided { time_lower: 0.0 };
         return Some(o);
     };
-    o.status = Status::Overlap;
-    (o.time_lower, o.time, o.time_upper) = (0.0, 0.0, 0.0);
-    if query.query_options.point() {
-        o.counters.contacts += 1;
-        o.point = x;
-        o.separation = -2.0 * depth;
-        o.kind = Kind::FaceFace;
-        // No translation takes them apart: any direction is as good as the one that the point was found along.
-        o.normal = bodies[0].normals().next().unwrap_or(DVec3::Z);
-    }
-    if query.query_options.penetration {
-        (o.penetration, o.deepest, o.direction) = (2.0 * depth, x, bodies[0].normals().next().unwrap_or(DVec3::Z));
-        o.counters.penetrations += 1;
-    }
+    // No translation takes them apart: any direction is as good as the one that the point was found along.
+    let normal = bodies[0].normals().next().unwrap_or(DVec3::Z);
+    let of_point = || ContactPoint { point: x, normal, separation: -2.0 * depth, ..ContactPoint::default() };
+    let of_depth = || Penetration { depth: 2.0 * depth, point: x, direction: normal };
+    let options = &query.query_options;
+    o.verdict = Verdict::Overlap(Overlap {
+        time: 0.0,
+        point: options.point().then(of_point),
+        penetration: options.penetration.then(of_depth),
+    });
+    o.counters.contacts += u64::from(options.point());
+    o.counters.penetrations += u64::from(options.penetration);
     Some(o)
 }
 

@@ -25,7 +25,7 @@ use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth;
 use crate::contact::instant::separation::{Cover, Place};
 use crate::contact::instant::work::Work;
-use crate::contact::query::outcome::{Extent, Kind, NO_FACE, Outcome, Status};
+use crate::contact::query::outcome::{ContactKind, ContactPoint, Extent, NO_FACE, Outcome, Verdict};
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::Task;
 use glam::DVec3;
@@ -48,7 +48,7 @@ pub struct RegionPoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// Which features meet.
-    pub kind: Kind,
+    pub kind: ContactKind,
     /// Point, line or patch.
     pub extent: Extent,
     /// Unit normal from a to b, world frame; of a curved patch the mean one.
@@ -128,40 +128,60 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
 /// The regions of an answered question: at the contact, or at the start where the pair touches and does not meet; such a
 /// pair's answer gets the separation, normal and features of its nearest region.
 pub fn complete(query: &PairQuery, outcome: &mut Outcome, threshold: f64) -> Regions {
-    let time = match outcome.status {
-        Status::Contact => outcome.time,
-        Status::Clear if outcome.touching => 0.0,
-        _ => return Regions { complete: true, ..Regions::default() },
+    let touching = outcome.touching;
+    let found = match &mut outcome.verdict {
+        Verdict::Contact(contact) => {
+            let mut found = regions(query, contact.time, threshold);
+            if let (Some(p), true) = (&contact.point, found.regions.is_empty()) {
+                // A contact that its own faces cannot be followed to: the point is what is known.
+                found.regions.push(Region::of_point(p));
+                found.complete = false;
+            }
+            found
+        }
+        Verdict::Clear { rest, .. } if touching => {
+            let found = regions(query, 0.0, threshold);
+            let nearest = found.regions.iter().min_by(|r, s| r.separation().total_cmp(&s.separation()));
+            *rest = nearest.map(|r| r.at_rest(query));
+            found
+        }
+        Verdict::Clear { .. } | Verdict::Overlap(_) | Verdict::Undecided { .. } => {
+            return Regions { complete: true, ..Regions::default() };
+        }
     };
-    let mut found = regions(query, time, threshold);
-    if outcome.status == Status::Contact && found.regions.is_empty() {
-        // A contact that its own faces cannot be followed to: the point is what is known.
-        found.regions.push(Region {
-            kind: outcome.kind,
-            extent: Extent::Point,
-            normal: outcome.normal,
-            faces_a: outcome.faces_a,
-            faces_b: outcome.faces_b,
-            points: vec![RegionPoint { point: outcome.point, separation: 0.0 }],
-        });
-        found.complete = false;
-    }
-    if outcome.status == Status::Clear
-        && let Some(r) = found.regions.iter().min_by(|r, s| r.separation().total_cmp(&s.separation()))
-    {
-        outcome.point = r.points.iter().map(|p| p.point).sum::<DVec3>() / r.points.len() as f64;
-        outcome.normal = r.normal;
-        outcome.separation = r.separation();
-        outcome.normal_speed = normal_speed(query, outcome.point, r.normal);
-        (outcome.kind, outcome.extent) = (r.kind, r.extent);
-        (outcome.faces_a, outcome.faces_b) = (r.faces_a, r.faces_b);
-        outcome.averaged_normal = r.kind == Kind::VertexVertex;
-    }
     outcome.counters.instant_cells += found.cells;
     found
 }
 
 impl Region {
+    /// The region that a contact's point is.
+    fn of_point(p: &ContactPoint) -> Self {
+        Self {
+            kind: p.kind,
+            extent: Extent::Point,
+            normal: p.normal,
+            faces_a: p.faces_a,
+            faces_b: p.faces_b,
+            points: vec![RegionPoint { point: p.point, separation: 0.0 }],
+        }
+    }
+
+    /// What a record tells of two bodies that rest on each other here at the start.
+    fn at_rest(&self, query: &PairQuery) -> ContactPoint {
+        let point = self.points.iter().map(|p| p.point).sum::<DVec3>() / self.points.len() as f64;
+        ContactPoint {
+            point,
+            normal: self.normal,
+            averaged_normal: self.kind == ContactKind::VertexVertex,
+            separation: self.separation(),
+            normal_speed: normal_speed(query, point, self.normal),
+            kind: self.kind,
+            extent: self.extent,
+            faces_a: self.faces_a,
+            faces_b: self.faces_b,
+        }
+    }
+
     /// Smallest separation of its points.
     pub fn separation(&self) -> f64 {
         self.points.iter().map(|p| p.separation).fold(f64::INFINITY, f64::min)
@@ -392,7 +412,7 @@ fn patch_region(bodies: &Bodies, pair: &FacePair, corners: &[Corner]) -> Region 
     let mean = normals.clone().sum::<DVec3>();
     let normal = if mean.length() > 1e-3 { mean.normalize() } else { normals.clone().next().unwrap_or(DVec3::Z) };
     Region {
-        kind: Kind::FaceFace,
+        kind: ContactKind::FaceFace,
         extent: Extent::Patch,
         normal,
         faces_a: three([pair.alpha.1.face()]),
@@ -412,7 +432,7 @@ fn line_region(bodies: &Bodies, run: &line::Run) -> Region {
         _ => (of_a - of_b).normalize_or(of_a),
     };
     Region {
-        kind: Kind::of_active(rank_a.min(2), rank_b.min(2)),
+        kind: ContactKind::of_active(rank_a.min(2), rank_b.min(2)),
         extent: Extent::Line,
         normal,
         faces_a: faces_at(bodies, Side::A, on_a),
@@ -423,10 +443,10 @@ fn line_region(bodies: &Bodies, run: &line::Run) -> Region {
 
 fn point_region(bodies: &Bodies, m: &point::Meeting) -> Region {
     let [on_a, on_b] = m.feet;
-    let kind = Kind::of_active(bodies.rank(Side::A, on_a), bodies.rank(Side::B, on_b));
+    let kind = ContactKind::of_active(bodies.rank(Side::A, on_a), bodies.rank(Side::B, on_b));
     // Where a vertex meets a vertex the average of the adjacent normals stands for the normal, as in the paper.
     let average = bodies.average(Side::A, on_a) - bodies.average(Side::B, on_b);
-    let normal = if kind == Kind::VertexVertex { average.normalize_or(m.normal) } else { m.normal };
+    let normal = if kind == ContactKind::VertexVertex { average.normalize_or(m.normal) } else { m.normal };
     Region {
         kind,
         extent: Extent::Point,

@@ -81,14 +81,15 @@ fn what_is_told_of_a_turning_pair_leaves_a_gap_at_all_times_before() {
         if turning.meet(n, QueryOptions::CONTACT, &mut out).is_none() {
             return;
         }
-        (hits, misses) = (hits + u32::from(out.time < 1.0), misses + u32::from(out.time == 1.0));
+        (hits, misses) = (hits + u32::from(out.time() < 1.0), misses + u32::from(out.time() == 1.0));
         let mut along = n;
         for k in 0..200 {
-            let m = turning.turns.at(out.time * f64::from(k) / 200.0);
-            let near = [Some(along), turning.nearest(&m, along, TRIES[1].0).map(|g| g.n), Some(out.normal)];
+            let m = turning.turns.at(out.time() * f64::from(k) / 200.0);
+            let near =
+                [Some(along), turning.nearest(&m, along, TRIES[1].0).map(|g| g.n), out.point().map(|p| p.normal)];
             let wide = near.into_iter().flatten().map(|n| widened(turning, &m, n, &mut numbers));
             let wide = wide.max_by(|p, q| p.phi.total_cmp(&q.phi)).expect("a direction");
-            assert!(wide.phi > turning.pace.least, "{i}: {} at {} of {}", wide.phi, m.t, out.time);
+            assert!(wide.phi > turning.pace.least, "{i}: {} at {} of {}", wide.phi, m.t, out.time());
             along = wide.n;
         }
     });
