@@ -212,8 +212,8 @@ fn certificates_of_tori_against_every_kind_and_of_trees_with_them_hold() {
 fn trees_with_tori_have_the_values_and_the_volumes_of_an_independent_evaluation() {
     let mut r = Random::new(31);
     let (mut inside, mut seen) = (0, 0);
-    // A volume by rays takes a second: a quarter of them in the command.
-    for i in 0..pairs(150).div_ceil(25).min(24) {
+    // A volume by rays takes a second: an eighth of them in the command.
+    for i in 0..pairs(150).div_ceil(50).min(24) {
         let solid = solid_of(&mut r, 1 + i % 3, shape_or_torus);
         let (model, around) = (Model::new(solid.clone()), solid.aabb());
         let field = Field::new(&solid, &Pose::IDENTITY);
@@ -230,7 +230,7 @@ fn trees_with_tori_have_the_values_and_the_volumes_of_an_independent_evaluation(
             inside += usize::from(f < 0.0);
             seen += 1;
         }
-        let (fine, coarse) = (integrals(&solid, &around, 160), integrals(&solid, &around, 97));
+        let (fine, coarse) = (integrals(&solid, &around, 96), integrals(&solid, &around, 61));
         if fine[0] < 1e-2 {
             continue;
         }

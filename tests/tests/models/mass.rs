@@ -183,10 +183,10 @@ fn bounds_are_true_where_the_volume_is_known() {
 fn bounds_are_true_for_random_trees() {
     let mut r = Random::new(2);
     let (mut reported, mut empty) = (0, 0);
-    for i in 0..40 {
+    for i in 0..30 {
         let solid: Solid = solid(&mut r, 1 + i % 3);
         let around = solid.aabb();
-        let (fine, coarse) = (integrals(&solid, &around, 160), integrals(&solid, &around, 97));
+        let (fine, coarse) = (integrals(&solid, &around, 112), integrals(&solid, &around, 71));
         let model = Model::new(solid);
         if fine[0] < 1e-3 {
             empty += 1;

@@ -146,7 +146,7 @@ fn certificates_of_the_cases_hold() {
 #[test]
 fn certificates_of_random_scenes_hold() {
     let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
-    let count = number("CONTACTD_CERTIFICATES").unwrap_or(300);
+    let count = number("CONTACTD_CERTIFICATES").unwrap_or(200);
     let first = number("CONTACTD_CERTIFICATE_FIRST").unwrap_or(0);
     let sum = over(count, |i| {
         let scene = scenes::any(&mut Random::new(0x00CE_27F1_0000 + first + i));
@@ -209,7 +209,10 @@ impl Altered<'_> {
 fn a_deleted_or_altered_exclusion_is_caught() {
     let mut rng = Random::new(7);
     let mut caught: BTreeMap<&str, usize> = BTreeMap::new();
-    let chosen = ["edge_00", "edge_03", "hole_04", "inside_08", "pair_01", "pair_08"];
+    // The dearer half where it is asked for.
+    let chosen = ["edge_03", "inside_08", "pair_01", "edge_00", "hole_04", "pair_08"];
+    let halves = 1 + usize::from(std::env::var_os("CONTACTD_CERTIFICATES").is_some());
+    let chosen = &chosen[..3 * halves];
     for case in cases().into_iter().filter(|c| chosen.contains(&&*c.name)) {
         let c = certified(case.a, case.b, case.resolution, CELLS);
         let text = c.text.as_ref().expect("a certificate");
@@ -352,7 +355,7 @@ fn a_deleted_or_altered_exclusion_is_caught() {
     ];
     for (kind, least) in kinds {
         let n = caught.get(kind).copied().unwrap_or_default();
-        assert!(n >= least, "{kind}: {n} caught");
+        assert!(2 * n >= halves * least, "{kind}: {n} caught");
     }
 }
 
