@@ -7,7 +7,7 @@
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
 use crate::contact::certificate::{self, Certificate};
-use crate::contact::convex::Convex;
+use crate::contact::convex::ConvexPair;
 use crate::contact::instant::depth;
 use crate::contact::instant::within::{Within, within};
 use crate::contact::instant::work::Work;
@@ -76,13 +76,13 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
 /// distance (`margin`, at least 2 delta); `None` for anything else. A length; negative when they may touch.
 pub fn at_start(query: &PairQuery, margin: f64) -> Option<f64> {
     let (task, _) = Task::of(query);
-    Some(Convex::new(task)?.distance() - touch(&task, margin) - 8.0 * task.rounding)
+    Some(ConvexPair::new(task)?.distance() - touch(&task, margin) - 8.0 * task.rounding)
 }
 
 /// The direction that proves `clearance`: unit, world axes, from the query's first body to its second.
 pub fn direction_of_clearance(query: &PairQuery) -> Option<DVec3> {
     let (task, swapped) = Task::of(query);
-    let n = Convex::new(task)?.direction().normalize();
+    let n = ConvexPair::new(task)?.direction().normalize();
     Some(if swapped { -n } else { n })
 }
 
@@ -100,7 +100,7 @@ pub enum Distance {
 pub fn certify_kept(query: &PairQuery, margin: f64, (way, clearance): (f64, f64), until: f64) -> Option<Distance> {
     let (task, swapped) = Task::of(query);
     let touch = touch(&task, margin);
-    if let Some(pair) = Convex::new(task) {
+    if let Some(pair) = ConvexPair::new(task) {
         let sign = if swapped { -1.0 } else { 1.0 };
         let all = pair.directions(clearance + touch + 8.0 * task.rounding);
         return Some(Distance::Directions(all.into_iter().map(|(t, n)| (t, n * sign)).collect()));
@@ -116,11 +116,11 @@ pub fn certify_kept(query: &PairQuery, margin: f64, (way, clearance): (f64, f64)
 pub fn keep(query: &PairQuery, margin: f64, clearance: f64, proof_slack: f64, scratch: &mut Scratch) -> Kept {
     let (mut task, _) = Task::of(query);
     task.query_options = QueryOptions::CONTACT;
-    if let Some(pair) = Convex::new(task) {
+    if let Some(pair) = ConvexPair::new(task) {
         let (until, count) = pair.keeps(clearance + touch(&task, margin) + 8.0 * task.rounding);
         return Kept { until, clearance, counters: Counters { closed_forms: count, ..Counters::default() } };
     }
-    if Convex::are_two(&task) {
+    if ConvexPair::are_two(&task) {
         // No direction separates them: there is no distance to keep.
         return Kept { until: 0.0, clearance, counters: Counters { closed_forms: 1, ..Counters::default() } };
     }
@@ -152,7 +152,7 @@ pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (
     if task.a.is_empty() || task.b.is_empty() {
         return (1.0, true, Counters::default());
     }
-    if let Some(pair) = Convex::new(task) {
+    if let Some(pair) = ConvexPair::new(task) {
         let (until, nearest, count) = pair.nears(distance + 8.0 * task.rounding);
         let counters = Counters { closed_forms: count, ..Counters::default() };
         return (until, until >= 1.0 || nearest <= distance * (1.0 + MARGIN_SLACK), counters);
@@ -229,7 +229,7 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
         return (Within::Apart, 0);
     }
     // Of two convex primitives the nearest points tell, where they are apart.
-    if Convex::new(task).is_some_and(|c| c.distance() > distance + 8.0 * task.rounding) {
+    if ConvexPair::new(task).is_some_and(|c| c.distance() > distance + 8.0 * task.rounding) {
         return (Within::Apart, 0);
     }
     let level = 0.5 * distance;

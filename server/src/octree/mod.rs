@@ -28,7 +28,6 @@ use crate::bound::{SBounds, Volumes};
 use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};
 use crate::solid;
 use crate::solid::local::{LiteralId, Token, Truth};
-use crate::solid::primitive::Form;
 use crate::solid::revolution::Revolution;
 use crate::solid::surface::Axis;
 use crate::solid::{Face, Parts, Sense, Solid};
@@ -103,13 +102,7 @@ impl Model {
             [aabb.min.abs().max(aabb.max.abs()), aabb.half()].map(DVec3::length)
         };
         let ball = match solid.whole() {
-            Some(p) if p.frame.position == DVec3::ZERO => {
-                if let Form::Ball(radius) = p.shape.form() {
-                    Some((radius, p.first_face))
-                } else {
-                    None
-                }
-            }
+            Some(p) if p.frame.position == DVec3::ZERO => p.shape.convex().ball().map(|radius| (radius, p.first_face)),
             _ => None,
         };
         let hollow = solid.senses.contains(&Sense::Negative);

@@ -9,7 +9,7 @@
 
 use super::directions::{Rim, Ruled};
 use contactd::math::{any_perpendicular, tolerance::CARRIED};
-use contactd::solid::primitive::Form;
+use contactd::solid::primitive;
 use contactd::solid::{Face, Shape};
 use glam::{DMat3, DVec3};
 
@@ -315,16 +315,18 @@ impl Convex {
             lean: (r0 - r1) / (r0 - r1).hypot(2.0 * h),
         };
         let planes = || shape.geometry().faces().iter().filter_map(Face::flat).collect();
-        Some(match shape.form() {
-            Form::Ball(radius) => Convex::Ball(Ball { center: DVec3::ZERO, radius }),
-            Form::Round { bottom, top, half } if bottom == top => Convex::Cylinder(round(bottom, top, half)),
-            Form::Round { bottom, top, half } => Convex::Cone(round(bottom, top, half)),
-            Form::Corners(corners) => Convex::Poly(Poly::new(corners.to_vec(), planes())),
-            Form::Cuboid(half) => {
+        Some(match shape.convex() {
+            primitive::Convex::Ball(radius) => Convex::Ball(Ball { center: DVec3::ZERO, radius }),
+            primitive::Convex::Round { bottom, top, half } if bottom == top => {
+                Convex::Cylinder(round(bottom, top, half))
+            }
+            primitive::Convex::Round { bottom, top, half } => Convex::Cone(round(bottom, top, half)),
+            primitive::Convex::Corners(corners) => Convex::Poly(Poly::new(corners.to_vec(), planes())),
+            primitive::Convex::Cuboid(half) => {
                 let corners = contactd::math::Aabb::around(DVec3::ZERO, half).corners();
                 Convex::Poly(Poly::new(corners.to_vec(), planes()))
             }
-            Form::Other => return None,
+            primitive::Convex::Other => return None,
         })
     }
 

@@ -16,7 +16,7 @@
 use crate::math::any_perpendicular;
 use crate::motion::Instant;
 use crate::solid::Primitive;
-use crate::solid::primitive::Form;
+use crate::solid::primitive::{Convex, Discs};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -27,9 +27,6 @@ const STEPS: usize = 8;
 
 /// Corners of a polyhedron up to which each is a disc.
 const MOST_CORNERS: usize = 32;
-
-/// Discs: centres and radii.
-pub(super) type Discs = SmallVec<[(DVec3, f64); 8]>;
 
 /// True when three faces meet in every corner of a polyhedron: 2E = 3V, and V − E + F = 2 (Euler).
 fn is_simple(p: &Primitive, corners: &[DVec3]) -> bool {
@@ -49,24 +46,15 @@ impl CavityBody {
     /// them hold it is for the search to say.
     pub fn of(p: &Primitive) -> Option<Self> {
         let (at, z) = (&p.frame, p.frame.vector(DVec3::Z).normalize());
-        let rim = |h: f64, r: f64| (at.point(DVec3::Z * h), r);
-        Some(match p.shape.form() {
-            Form::Ball(radius) => Self { discs: SmallVec::from_slice(&[(at.position, radius)]), axis: None },
-            Form::Round { bottom, top, half } => {
-                Self { discs: SmallVec::from_slice(&[rim(-half, bottom), rim(half, top)]), axis: Some(z) }
-            }
-            Form::Cuboid(half) => {
-                let corner = |k: usize| {
-                    let sign = |bit: usize| if k & bit == 0 { -1.0 } else { 1.0 };
-                    (at.point(half * DVec3::new(sign(1), sign(2), sign(4))), 0.0)
-                };
-                Self { discs: (0..8).map(corner).collect(), axis: Some(z) }
-            }
-            Form::Corners(c) if c.len() <= MOST_CORNERS && is_simple(p, c) => {
-                Self { discs: c.iter().map(|v| (at.point(*v), 0.0)).collect(), axis: Some(z) }
-            }
-            Form::Corners(_) | Form::Other => return None,
-        })
+        let shape = p.shape.convex();
+        if let Convex::Corners(c) = shape
+            && !(c.len() <= MOST_CORNERS && is_simple(p, c))
+        {
+            return None;
+        }
+        let mut discs = shape.discs()?;
+        discs.iter_mut().for_each(|(c, _)| *c = at.point(*c));
+        Some(Self { discs, axis: shape.ball().is_none().then_some(z) })
     }
 }
 

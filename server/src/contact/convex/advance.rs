@@ -50,13 +50,13 @@ pub fn answer(contacts: &mut Contacts, along: Option<DVec3>) -> Option<Ending> {
 }
 
 /// Two solids that are one convex primitive each, to be asked how far apart they are.
-pub struct Convex<'a> {
+pub struct ConvexPair<'a> {
     advance: Advance<'a>,
     /// The distance at the start, in its direction.
     start: Gap,
 }
 
-impl<'a> Convex<'a> {
+impl<'a> ConvexPair<'a> {
     /// `None` for other solids, and where no direction is found that separates them.
     pub fn new(task: Task<'a>) -> Option<Self> {
         let (a, b) = (task.a.whole()?, task.b.whole()?);

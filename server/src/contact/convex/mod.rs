@@ -40,8 +40,8 @@ mod whole;
 
 use crate::contact::query::outcome::Outcome;
 use crate::contact::query::question::PairQuery;
-use crate::solid::primitive::Form;
-pub(super) use advance::{Convex, answer};
+use crate::solid::primitive::Convex;
+pub(super) use advance::{ConvexPair, answer};
 pub(super) use balls::quick as balls;
 use glam::DVec3;
 use overlap::{Look, Start};
@@ -73,13 +73,15 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     let Some(pair) = PrimitivePair::new(bodies, primitives, query.resolution) else { return nothing };
     let turns = |spins: &[DVec3; 2]| *spins != [DVec3::ZERO; 2];
     let moves_along = || bodies.iter().all(|body| body.placed.motion.spin == DVec3::ZERO);
-    let forms = primitives.map(|p| p.shape.form());
-    let balls = matches!(forms, [Form::Ball(_), Form::Ball(_)]);
+    let forms = primitives.map(|p| p.shape.convex());
+    let balls = matches!(forms, [Convex::Ball(_), Convex::Ball(_)]);
     let met = match forms {
-        [Form::Ball(p), Form::Ball(q)] if !turns(&pair.spins()) => {
+        [Convex::Ball(p), Convex::Ball(q)] if !turns(&pair.spins()) => {
             balls::meet(&pair, [p, q], query.query_options, outcome)
         }
-        [Form::Cuboid(p), Form::Cuboid(q)] if moves_along() => boxes::meet(&pair, [p, q], query.query_options, outcome),
+        [Convex::Cuboid(p), Convex::Cuboid(q)] if moves_along() => {
+            boxes::meet(&pair, [p, q], query.query_options, outcome)
+        }
         // Every other pair is open here, of whatever forms.
         [_, _] => None,
     };

@@ -11,11 +11,12 @@
 //! nearest to, and the way between the centres.
 
 use super::gjk::{self, Meeting};
-use super::support::{ConvexBody, Slope};
+use super::support::ConvexBody;
 use super::whole::PrimitivePair;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::{ContactPoint, NO_FACE, Outcome, Overlap, Verdict};
 use crate::contact::query::task::most_raised;
+use crate::solid::primitive::Slope;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 

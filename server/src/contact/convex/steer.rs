@@ -3,8 +3,9 @@
 //! A body that shows an edge or a side along n holds n to a circle of directions, two circles hold it altogether, else the
 //! gap is smooth on what is left; see `straight` and `turning` for the equations.
 
-use super::part::{ConvexPart, Shown};
+use super::part::ConvexPart;
 use crate::math::any_perpendicular;
+use crate::solid::primitive::Shown;
 use glam::{DVec2, DVec3};
 
 /// A circle of directions n·a = lean, flattened at a direction.

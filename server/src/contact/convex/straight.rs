@@ -20,13 +20,14 @@
 //! What does not settle, starts near, or meets in more than its faces tell (`touch`) is left to the advance.
 
 use super::overlap::Start;
-use super::part::{ConvexPart, Shown};
+use super::part::ConvexPart;
 use super::steer::steer;
 use super::touch::Stand;
 use super::whole::{APART, PrimitivePair, excluded};
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Outcome;
 use crate::math::any_perpendicular;
+use crate::solid::primitive::Shown;
 use glam::{DVec2, DVec3};
 
 /// Cutting planes at most.

@@ -21,7 +21,7 @@ use super::support::ConvexBody;
 use super::whole::body_of;
 use crate::math::{F64x2, Lanes};
 use crate::octree::Model;
-use crate::solid::primitive::{Cuboid, Form};
+use crate::solid::primitive::{Convex, Cuboid};
 use crate::solid::{Node, Op, Primitive, Shape};
 use contactd_proto::{MotionState, Pose};
 use glam::{DMat3, DQuat, DVec3};
@@ -40,7 +40,7 @@ pub struct Hull {
     /// The level of the body's f up to which it is enclosed.
     level: f64,
     /// How far the primitive reaches; `None` for a polyhedron.
-    form: Option<Form<'static>>,
+    form: Option<Convex<'static>>,
     /// The primitive's frame in the object's.
     turned: DQuat,
     center: DVec3,
@@ -61,7 +61,7 @@ pub struct SweptShape {
     /// Its centre.
     center: [F64x2; 3],
     /// How far it reaches, but for a polyhedron, whose corners are many.
-    form: Option<Form<'static>>,
+    form: Option<Convex<'static>>,
     /// The level of f up to which the primitive encloses the body.
     level: f64,
     /// ω ρ and ω² ρ.
@@ -101,12 +101,12 @@ impl Hull {
         let whole = model.solid.whole().filter(|p| p.is_convex());
         let (around, level, form, frame, ball) = if let Some(p) = whole {
             body_of(p)?;
-            (None, f64::INFINITY, p.shape.form().of_few(), p.frame, p.ball)
+            (None, f64::INFINITY, p.shape.convex().of_few(), p.frame, p.ball)
         } else {
             let (shape, frame) = enclosing(model)?;
             let mut ball = shape.geometry().ball();
             ball.center = frame.point(ball.center);
-            let form = shape.form().of_few();
+            let form = shape.convex().of_few();
             (Some(shape), model.bounds.margin(), form, frame, ball)
         };
         let rho = (place.point(ball.center).length() + ball.radius) * (1.0 + 1e-14);
@@ -189,7 +189,7 @@ fn enclosing(model: &Model) -> Option<(Shape, Pose)> {
 
 /// Two bodies in one step; `S` gives the shape of each.
 pub struct AxisSearch<'a, S> {
-    forms: [Form<'a>; 2],
+    forms: [Convex<'a>; 2],
     swept: [&'a SweptShape; 2],
     shapes: S,
     /// From A's centre to B's at both ends.
@@ -207,7 +207,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> AxisSearch<'a, S> {
         if 0.5 * touch > a.level.min(b.level) {
             return None;
         }
-        let form = |k: usize| swept[k].form.or_else(|| shapes(k).map(Shape::form));
+        let form = |k: usize| swept[k].form.or_else(|| shapes(k).map(Shape::convex));
         let forms = [form(0)?, form(1)?];
         let ways = [b.center[0] - a.center[0], b.center[1] - a.center[1], b.center[2] - a.center[2]];
         let [first, last] = (ways[0].abs() + ways[1].abs() + ways[2].abs()).0;
@@ -305,11 +305,7 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> AxisSearch<'a, S> {
         let at = |v: &[F64x2; 3]| DVec3::from_array(v.map(|x| x.0[0]));
         let way = self.way();
         let [x, y, z] = self.swept[k].axes.each_ref().map(at);
-        let sides = match self.forms[k] {
-            Form::Cuboid(_) => [x, y, z],
-            Form::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
-            Form::Ball(_) | Form::Corners(_) | Form::Other => [DVec3::ZERO; 3],
-        };
+        let sides = self.forms[k].sides([x, y, z], way);
         let towards = move |n: DVec3| if n.dot(way) < 0.0 { -n } else { n };
         sides.into_iter().filter(|n| *n != DVec3::ZERO).map(towards)
     }

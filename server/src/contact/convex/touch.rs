@@ -4,7 +4,7 @@
 //! The point follows from the features, the witness from one linear step or a few, and both trees confirm both. What meets in
 //! more than its features tell is left to others.
 
-use super::part::{Active, ConvexPart, Core, Shown};
+use super::part::{Active, ConvexPart};
 use super::turns::Turns;
 use super::whole::PrimitivePair;
 use crate::contact::exclusion::literal::Side;
@@ -12,6 +12,7 @@ use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::{Contact, ContactKind, ContactPoint, Extent, NO_FACE, Outcome, Verdict};
 use crate::contact::witness::extent::{self, INCIDENT};
 use crate::contact::witness::newton::{Constraint, MAX_ACTIVE, cholesky_solve};
+use crate::solid::primitive::Shown;
 use glam::{DMat3, DQuat, DVec3};
 use smallvec::SmallVec;
 
@@ -270,10 +271,9 @@ impl<'a> Stand<'a> {
     fn on_flat(&self, n: DVec3, shown: &[Shown; 2]) -> Option<DVec3> {
         let centers = [DVec3::ZERO, self.way];
         let disc = |k: usize| {
-            let Core::Round { radii, half, .. } = self.parts[k].core else { return None };
             let outward = if k == 0 { n } else { -n };
-            let upper = usize::from(outward.dot(self.parts[k].axes.z_axis) >= 0.0);
-            Some((centers[k] + outward * half, radii[upper]))
+            let (half, radius) = self.parts[k].features.disc(outward.dot(self.parts[k].axes.z_axis) >= 0.0)?;
+            Some((centers[k] + outward * half, radius))
         };
         let across = |v: DVec3| v - n * v.dot(n);
         match (shown[0].flat, shown[1].flat) {

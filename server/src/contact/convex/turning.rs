@@ -17,7 +17,7 @@
 
 use super::gjk::nearest;
 use super::overlap::Start;
-use super::part::{ConvexPart, Shown};
+use super::part::ConvexPart;
 use super::proof::{Gap, Pace};
 use super::steer::steer;
 use super::support::ConvexBody;
@@ -26,6 +26,7 @@ use super::turns::{Posed, Turns};
 use super::whole::{APART, PrimitivePair, excluded};
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Outcome;
+use crate::solid::primitive::Shown;
 use glam::{DMat3, DVec3};
 
 /// Distance evaluations before a pair is left to others.
@@ -86,7 +87,7 @@ impl<'a> Turning<'a> {
 
     /// φ along a unit direction.
     fn gap(&self, m: &Posed, n: DVec3) -> Gap {
-        let [a, b] = [0, 1].map(|k| self.parts[k].primitive.shape.form());
+        let [a, b] = [0, 1].map(|k| self.parts[k].primitive.shape.convex());
         Gap { t: m.t, n, phi: n.dot(m.way) - a.reach(&m.axes[0], n) - b.reach(&m.axes[1], -n) }
     }
 

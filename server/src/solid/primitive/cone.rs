@@ -1,6 +1,6 @@
 //! Right circular cone or frustum along z.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source, cylinder::disc_half_extents};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source, cylinder::disc_half_extents};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface::{self, Plane};
@@ -75,8 +75,8 @@ impl Geometry for Cone {
         DVec3::new(0.0, 0.0, z * self.half_height)
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Round { bottom: self.bottom, top: self.top, half: self.half_height }
+    fn convex(&self) -> Convex<'_> {
+        Convex::Round { bottom: self.bottom, top: self.top, half: self.half_height }
     }
     fn moments(&self) -> Option<Moments> {
         let (a, b, h) = (self.bottom, self.top, 2.0 * self.half_height);

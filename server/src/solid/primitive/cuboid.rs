@@ -1,6 +1,6 @@
 //! Rectangular box.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source, read_vector, write_vector};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface::Plane;
@@ -40,8 +40,8 @@ impl Geometry for Cuboid {
         DVec3::ZERO
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Cuboid(self.half)
+    fn convex(&self) -> Convex<'_> {
+        Convex::Cuboid(self.half)
     }
     fn moments(&self) -> Option<Moments> {
         Some(Moments::of_box(self.half))

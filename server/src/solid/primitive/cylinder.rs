@@ -1,6 +1,6 @@
 //! Right circular cylinder along z.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface::{self, Plane};
@@ -53,8 +53,8 @@ impl Geometry for Cylinder {
         DVec3::ZERO
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Round { bottom: self.radius, top: self.radius, half: self.half_height }
+    fn convex(&self) -> Convex<'_> {
+        Convex::Round { bottom: self.radius, top: self.radius, half: self.half_height }
     }
     fn moments(&self) -> Option<Moments> {
         let (rr, h) = (self.radius * self.radius, 2.0 * self.half_height);

@@ -1,6 +1,6 @@
 //! Half-space z <= 0: only as an operand that something bounded cuts down.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface::Plane;
@@ -40,8 +40,8 @@ impl Geometry for HalfSpace {
         -DVec3::Z
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Other
+    fn convex(&self) -> Convex<'_> {
+        Convex::Other
     }
     fn moments(&self) -> Option<Moments> {
         None

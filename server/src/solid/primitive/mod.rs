@@ -1,7 +1,7 @@
 //! The primitives, one file each: shape in its own frame, faces, bounds, moments, names, bytes.
 //!
 //! Adding a primitive: a file here, and one row in the `shapes!` table below, which writes the enum and its dispatch. Nobody
-//! outside of this folder asks of what kind a primitive is: [`Form`] tells what a convex one is to those who compute with it.
+//! outside of this folder asks of what kind a primitive is: [`Convex`] tells what a convex one is to those who compute with it.
 
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::formula::Formula;
@@ -11,9 +11,9 @@ use contactd_proto::Pose;
 use glam::DVec3;
 
 mod cone;
+mod convex;
 mod cuboid;
 mod cylinder;
-mod form;
 mod half_space;
 mod polyhedron;
 mod sphere;
@@ -21,9 +21,9 @@ mod torus;
 mod triangle_mesh;
 
 pub use cone::Cone;
+pub use convex::{Convex, Discs, Features, Hold, Shown, Slope};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
-pub use form::Form;
 pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use sphere::Sphere;
@@ -54,7 +54,7 @@ pub trait Geometry {
     /// A point in its interior, in its frame.
     fn interior_point(&self) -> DVec3;
     /// What it is to those who compute with convex bodies, in its frame.
-    fn form(&self) -> Form<'_>;
+    fn convex(&self) -> Convex<'_>;
     /// Its moments in its frame, by a formula (`octree::mass::closed` has them all); `None` where there is none.
     fn moments(&self) -> Option<Moments>;
     /// What they leave open of its volume beside the rounding of a few formulas.
@@ -132,8 +132,8 @@ macro_rules! shapes {
 
             /// What it is to those who compute with convex bodies, in its frame.
             #[inline]
-            pub fn form(&self) -> Form<'_> {
-                match self { $(Shape::$variant(s) => s.form()),+ }
+            pub fn convex(&self) -> Convex<'_> {
+                match self { $(Shape::$variant(s) => s.convex()),+ }
             }
 
             /// What it is of its faces, where it is not their intersection.

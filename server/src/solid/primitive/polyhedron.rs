@@ -2,7 +2,7 @@
 //!
 //! The tetrahedron, octahedron, dodecahedron and icosahedron of the paper are of this kind.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source, read_vector, write_vector};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface::Plane;
@@ -118,8 +118,8 @@ impl Geometry for Polyhedron {
         middle(&self.vertices)
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Corners(&self.vertices)
+    fn convex(&self) -> Convex<'_> {
+        Convex::Corners(&self.vertices)
     }
     fn moments(&self) -> Option<Moments> {
         None

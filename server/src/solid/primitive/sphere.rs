@@ -1,6 +1,6 @@
 //! Ball of radius r around the origin.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::{Face, surface};
 use contactd_proto::Pose;
@@ -34,8 +34,8 @@ impl Geometry for Sphere {
         DVec3::ZERO
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Ball(self.radius)
+    fn convex(&self) -> Convex<'_> {
+        Convex::Ball(self.radius)
     }
     fn moments(&self) -> Option<Moments> {
         let volume = 4.0 / 3.0 * PI * self.radius.powi(3);

@@ -1,7 +1,7 @@
 //! Torus around z.
 
 use super::cylinder::disc_half_extents;
-use super::{Checked, Cylinder, Form, Geometry, Shape, Sink, Source};
+use super::{Checked, Convex, Cylinder, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface;
@@ -40,8 +40,8 @@ impl Geometry for Torus {
         DVec3::X * self.major
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Other
+    fn convex(&self) -> Convex<'_> {
+        Convex::Other
     }
     /// Pappus: 2π²Rr², and moments over the disc that is revolved. Of a tube that meets itself there is no such formula.
     fn moments(&self) -> Option<Moments> {

@@ -3,7 +3,7 @@
 //! Its faces are the planes of its facets, neighbours in one plane being one face, then planes that bound nothing (`cells`). What it
 //! is of them a formula tells (`local`), not their intersection.
 
-use super::{Checked, Form, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source, read_vector, write_vector};
 use crate::math::{Aabb, Ball, Moments, tolerance::ROUNDING};
 use crate::solid::surface::Plane;
 use crate::solid::{Face, formula::Formula};
@@ -203,8 +203,8 @@ impl Geometry for TriangleMesh {
         tries.into_iter().find(|x| self.value(*x) < 0.0).unwrap_or(middle)
     }
     #[inline]
-    fn form(&self) -> Form<'_> {
-        Form::Other
+    fn convex(&self) -> Convex<'_> {
+        Convex::Other
     }
     fn moments(&self) -> Option<Moments> {
         Some(self.measured().0)

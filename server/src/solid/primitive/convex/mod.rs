@@ -1,0 +1,243 @@
+//! What a convex primitive is to those who compute with it: one capability, asked in its own frame or where it stands with some axes.
+//!
+//! How far it reaches along a direction and with which point, how deep a point lies in it, and what it shows along a direction
+//! (`feature`). Nobody outside of this folder asks which of these it is, but who chooses between closed forms.
+
+mod feature;
+
+use super::polyhedron::middle;
+use crate::math::Lanes;
+use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
+
+pub use feature::{Features, Hold, Shown};
+
+/// A convex shape in its own frame, centred there but for corners: the few numbers that tell it, or its corners. Two kinds of
+/// primitives may be of one form; a cylinder is round with equal radii, which a frustum never has.
+#[derive(Clone, Copy, Debug)]
+pub enum Convex<'a> {
+    /// Radius.
+    Ball(f64),
+    /// Half sizes.
+    Cuboid(DVec3),
+    /// A solid of revolution about z between two discs.
+    Round {
+        /// Radius at z = −half.
+        bottom: f64,
+        /// Radius at z = +half.
+        top: f64,
+        /// Half the height.
+        half: f64,
+    },
+    /// The corners.
+    Corners(&'a [DVec3]),
+    /// None of these: without bounds, or of a kind that those who compute with forms do not know. They leave it to the search.
+    Other,
+}
+
+/// How deep a point is.
+#[derive(Clone, Copy, Debug)]
+pub struct Slope {
+    /// f, the largest of the faces' values; negative inside.
+    pub f: f64,
+    /// The unit normal of the face that tells it, outwards; f lies nowhere below the plane that they make.
+    pub normal: DVec3,
+    /// Which face that is, of those of the primitive.
+    pub face: u32,
+}
+
+/// Discs about one axis whose hull a shape is: centres and radii, corners with radius 0.
+pub type Discs = SmallVec<[(DVec3, f64); 8]>;
+
+impl Convex<'_> {
+    /// A point inside a bounded one.
+    pub fn middle(&self) -> DVec3 {
+        match self {
+            Convex::Corners(corners) => middle(corners),
+            Convex::Ball(_) | Convex::Cuboid(_) | Convex::Round { .. } | Convex::Other => DVec3::ZERO,
+        }
+    }
+
+    /// The same, to be kept, where few numbers tell it.
+    pub fn of_few(self) -> Option<Convex<'static>> {
+        match self {
+            Convex::Ball(radius) => Some(Convex::Ball(radius)),
+            Convex::Cuboid(half) => Some(Convex::Cuboid(half)),
+            Convex::Round { bottom, top, half } => Some(Convex::Round { bottom, top, half }),
+            Convex::Other => Some(Convex::Other),
+            Convex::Corners(_) => None,
+        }
+    }
+
+    /// Largest m·x over the shape, in its own frame; m is a unit vector, or two of them. Of any length but for a ball.
+    #[inline]
+    pub fn extent<T: Lanes>(&self, m: [T; 3]) -> T {
+        match self {
+            Convex::Ball(radius) => T::all(*radius),
+            Convex::Cuboid(half) => m[0].abs() * half.x + m[1].abs() * half.y + m[2].abs() * half.z,
+            Convex::Round { bottom, top, half } => {
+                let (across, up) = ((m[0] * m[0] + m[1] * m[1]).sqrt(), m[2] * *half);
+                (across * *top + up).max(across * *bottom - up)
+            }
+            Convex::Corners(corners) => {
+                corners.iter().fold(T::all(f64::NEG_INFINITY), |far, v| far.max(m[0] * v.x + m[1] * v.y + m[2] * v.z))
+            }
+            Convex::Other => T::all(f64::INFINITY),
+        }
+    }
+
+    /// Largest n·x over the shape where it stands with these axes; n is a unit vector.
+    #[inline]
+    pub fn reach(&self, axes: &DMat3, n: DVec3) -> f64 {
+        if let Convex::Ball(radius) = self {
+            return *radius;
+        }
+        self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)])
+    }
+
+    /// False for what those who compute with forms leave to the search.
+    pub fn is_known(&self) -> bool {
+        !matches!(self, Convex::Other)
+    }
+
+    /// The radius of a ball.
+    pub fn ball(&self) -> Option<f64> {
+        if let Convex::Ball(radius) = self { Some(*radius) } else { None }
+    }
+
+    /// The farthest point along n, which may have any length, from the frame's centre; `None` where that is the centre itself: of a ball, whose
+    /// core is a point.
+    #[inline]
+    pub fn support(&self, axes: &DMat3, n: DVec3) -> Option<DVec3> {
+        let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
+        let round = |bottom: f64, top: f64, half: f64| {
+            let len = (m.x * m.x + m.y * m.y).sqrt();
+            let above = top * len + half * m.z >= bottom * len - half * m.z;
+            let (r, z) = if above { (top, half) } else { (bottom, -half) };
+            let k = if len > 0.0 { r / len } else { 0.0 };
+            DVec3::new(k * m.x, k * m.y, z)
+        };
+        let local = match *self {
+            Convex::Ball(_) | Convex::Other => return None,
+            Convex::Round { bottom, top, half } => round(bottom, top, half),
+            Convex::Cuboid(half) => DVec3::new(half.x.copysign(m.x), half.y.copysign(m.y), half.z.copysign(m.z)),
+            Convex::Corners(corners) => {
+                let mut best = (f64::NEG_INFINITY, corners[0]);
+                for v in corners {
+                    let d = m.dot(*v);
+                    if d > best.0 {
+                        best = (d, *v);
+                    }
+                }
+                best.1
+            }
+        };
+        Some(*axes * local)
+    }
+
+    /// How deep a point is, seen `from` the frame's centre, by f, the largest of its faces' values: the same as `Primitive::value` but for rounding,
+    /// in a fraction of the time. `None` for a polyhedron.
+    #[inline]
+    pub fn slope(&self, axes: &DMat3, from: DVec3) -> Option<Slope> {
+        let own = || DVec3::new(axes.x_axis.dot(from), axes.y_axis.dot(from), axes.z_axis.dot(from));
+        let across = |l: DVec3| (l.x * l.x + l.y * l.y).sqrt();
+        // Away from the axis of revolution; on it any direction will do.
+        let radial = |l: DVec3, rho: f64| {
+            if rho > 0.0 { axes.x_axis * (l.x / rho) + axes.y_axis * (l.y / rho) } else { axes.x_axis }
+        };
+        let reported = |f, normal, face: usize| Slope { f, normal, face: face as u32 };
+        Some(match *self {
+            Convex::Ball(radius) => {
+                let length = from.length();
+                reported(length - radius, if length > 0.0 { from / length } else { DVec3::X }, 0)
+            }
+            Convex::Cuboid(half) => {
+                let l = own();
+                let beyond = l.abs() - half;
+                let axis = beyond.max_position();
+                let below = l[axis].is_sign_negative();
+                let normal = axes.col(axis);
+                reported(beyond[axis], if below { -normal } else { normal }, 2 * axis + usize::from(below))
+            }
+            Convex::Round { bottom, top, half } if bottom == top => {
+                let l = own();
+                let rho = across(l);
+                let (side, end) = (rho - bottom, l.z.abs() - half);
+                let below = l.z.is_sign_negative();
+                if side >= end {
+                    reported(side, radial(l, rho), 0)
+                } else {
+                    reported(end, if below { -axes.z_axis } else { axes.z_axis }, 1 + usize::from(below))
+                }
+            }
+            Convex::Round { bottom, top, half } => {
+                let l = own();
+                let rho = across(l);
+                let (at_bottom, at_top) = (bottom, top);
+                let slope = (at_bottom - at_top) / (2.0 * half);
+                let tilt = (1.0 + slope * slope).sqrt();
+                let side = (rho - 0.5 * (at_bottom + at_top) + slope * l.z) / tilt;
+                // An end without a disc has no face there.
+                let disc = |radius: f64, beyond: f64| if radius > 0.0 { beyond } else { f64::NEG_INFINITY };
+                let (top, bottom) = (disc(at_top, l.z - half), disc(at_bottom, -l.z - half));
+                if side >= top.max(bottom) {
+                    reported(side, (radial(l, rho) + axes.z_axis * slope) / tilt, 0)
+                } else if top > bottom {
+                    reported(top, axes.z_axis, 1)
+                } else {
+                    reported(bottom, -axes.z_axis, 1 + usize::from(at_top > 0.0))
+                }
+            }
+            Convex::Corners(_) | Convex::Other => return None,
+        })
+    }
+
+    /// How many faces it takes to hold what a polyhedron shows along the unit direction n: 3 for a corner, 2 for an edge, 1
+    /// for a face. 0 for round bodies.
+    pub fn corner(&self, axes: &DMat3, n: DVec3) -> usize {
+        const FLAT: f64 = 1e-6;
+        let m = axes.transpose() * n;
+        match self {
+            Convex::Cuboid(_) => m.to_array().iter().filter(|c| c.abs() > FLAT).count(),
+            Convex::Corners(corners) => {
+                let reach = corners.iter().fold(f64::NEG_INFINITY, |d, v| d.max(m.dot(*v)));
+                let slack = FLAT * corners[0].distance(corners[1]);
+                match corners.iter().filter(|v| m.dot(**v) > reach - slack).count() {
+                    1 => 3,
+                    2 => 2,
+                    _ => 1,
+                }
+            }
+            Convex::Ball(_) | Convex::Round { .. } | Convex::Other => 0,
+        }
+    }
+
+    /// Normals of its sides where it stands with these axes, towards what lies along `way`: one of them mostly keeps apart
+    /// what is near. Zero where there is none.
+    pub fn sides(&self, [x, y, z]: [DVec3; 3], way: DVec3) -> [DVec3; 3] {
+        match self {
+            Convex::Cuboid(_) => [x, y, z],
+            Convex::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
+            Convex::Ball(_) | Convex::Corners(_) | Convex::Other => [DVec3::ZERO; 3],
+        }
+    }
+
+    /// The discs about z whose hull it is, in its own frame; `None` for what is not known. Of a cuboid and of corners these are points.
+    pub fn discs(&self) -> Option<Discs> {
+        Some(match self {
+            Convex::Ball(radius) => SmallVec::from_slice(&[(DVec3::ZERO, *radius)]),
+            Convex::Round { bottom, top, half } => {
+                SmallVec::from_slice(&[(DVec3::Z * -half, *bottom), (DVec3::Z * *half, *top)])
+            }
+            Convex::Cuboid(half) => {
+                let corner = |k: usize| {
+                    let sign = |bit: usize| if k & bit == 0 { -1.0 } else { 1.0 };
+                    (*half * DVec3::new(sign(1), sign(2), sign(4)), 0.0)
+                };
+                (0..8).map(corner).collect()
+            }
+            Convex::Corners(corners) => corners.iter().map(|v| (*v, 0.0)).collect(),
+            Convex::Other => return None,
+        })
+    }
+}
