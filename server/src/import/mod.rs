@@ -134,7 +134,7 @@ impl Default for Limits {
             depth: 1_000,
             faces: 1_000_000,
             polyhedron_faces: 5_000,
-            mesh_facets: 10_000,
+            mesh_facets: 200_000,
             values: 1_000_000,
         }
     }

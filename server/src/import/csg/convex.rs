@@ -228,8 +228,9 @@ pub fn sums(parts: &mut Parts<'_>, at: Place, operands: &[Vec<Vec<Element>>]) ->
         sums = next;
         parts.affordable(at, sums.iter().map(Vec::len).sum::<usize>() / 64)?;
     }
-    if off.is_some() {
-        parts.note(at, "minkowski faceted: no exact form, its curves taken in OpenSCAD's pieces", off);
+    if let Some(off) = off {
+        let points = sums.iter().map(Vec::len).sum();
+        parts.note(at, format!("minkowski: faceted, {points} points, max deviation {off:.1e}"), None);
     }
     Ok(sums)
 }
@@ -260,13 +261,12 @@ impl Hull<'_> {
     /// With every curve in pieces.
     fn faceted(&self, parts: &mut Parts<'_>, elements: &[Element]) -> Result<Part> {
         let points: Vec<DVec3> = elements.iter().flat_map(Element::facets).collect();
-        let part = self.polyhedron(parts, &points)?;
+        let name = format!("faceted {}", self.name);
+        let part = Hull { name: &name, at: self.at }.polyhedron(parts, &points)?;
         let off = elements.iter().map(Element::deviation).fold(0.0, f64::max);
         if let Part::Leaf(shape, ..) = &part {
             let count = shape.geometry().faces().len();
-            let text =
-                format!("{} faceted: no exact form, taken as OpenSCAD's polyhedron of {count} facets", self.name);
-            parts.note(self.at, text, Some(off));
+            parts.faceted(self.at, self.name, count, off);
         }
         Ok(part)
     }

@@ -16,6 +16,7 @@ use super::parts::{Part, PartId, Parts, Signed};
 use super::place::{self, PlacedShape};
 use super::polygon::{Edge, Region};
 use super::syntax::{Call, ValueKind};
+use super::twist;
 use super::{Place, Problem};
 use crate::math::tolerance::ROUNDING;
 use crate::solid::Op;
@@ -24,18 +25,47 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
+/// Into how many pieces curves are cut.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Curve {
+    /// Pieces of a whole turn; 0 where the other two say it.
+    pub fn_: f64,
+    /// The least angle of a piece, in degrees.
+    pub fa: f64,
+    /// Its least length.
+    pub fs: f64,
+}
+
+impl Curve {
+    /// As a call has it, or OpenSCAD's own.
+    pub fn of(arguments: &Arguments<'_>) -> Result<Self> {
+        let number = |name, default| arguments.number_or(name, default);
+        let fn_ = number("$fn", 0.0)?;
+        let fn_ = if fn_.is_finite() { fn_.max(0.0) } else { 0.0 };
+        Ok(Self { fn_, fa: number("$fa", 12.0)?.max(0.01), fs: number("$fs", 2.0)?.max(0.01) })
+    }
+}
+
 /// A `linear_extrude`: outlines at z = `low`, scaled by `scale` at z = `low + height`.
 #[derive(Clone, Copy, Debug)]
 pub struct Extrusion {
-    low: f64,
-    height: f64,
-    scale: DVec2,
+    /// z of its lower end.
+    pub low: f64,
+    /// How high it is.
+    pub height: f64,
+    /// Of the outline at the upper end.
+    pub scale: DVec2,
+    /// Degrees by which that is turned, clockwise.
+    pub twist: f64,
+    /// Slices that the text asks for.
+    slices: Option<f64>,
+    curve: Curve,
     /// Columns of the outer transform: a slanted extrusion is a sheared straight one.
     slant: DMat3,
 }
 
 impl Extrusion {
-    /// Its arguments by name. Without twist, `slices` and `segments` cut flat walls into flat pieces: they change nothing.
+    /// Its arguments by name. With straight walls, `slices` and `segments` cut flat walls into flat pieces: they change nothing.
     pub fn arguments(call: &Call) -> Result<Arguments<'_>> {
         Arguments::new(call, &["height", "center", "twist", "slices", "scale", "segments", "v"])
     }
@@ -46,8 +76,9 @@ impl Extrusion {
     pub fn new(call: &Call) -> Result<Option<Self>> {
         let arguments = Self::arguments(call)?;
         let Some(mut height) = arguments.finite_size("height")? else { return Ok(None) };
-        if arguments.number_or("twist", 0.0)? != 0.0 {
-            return Err((call.at, Problem::unsupported("twist of linear_extrude")));
+        let twist = arguments.number_or("twist", 0.0)?;
+        if !twist.is_finite() {
+            return Err((call.at, Problem::syntax("a finite number as twist of linear_extrude", twist.to_string())));
         }
         let scale = arguments.pair_or("scale", DVec2::ONE)?;
         if scale.min_element() < 0.0 {
@@ -67,7 +98,33 @@ impl Extrusion {
             slant.z_axis = along / along.z;
         }
         let low = if arguments.bool_or("center", false)? { -0.5 * height } else { 0.0 };
-        Ok(Some(Self { low, height, scale, slant }))
+        let mut extrusion = Self { low, height, scale, twist, slices: None, curve: Curve::default(), slant };
+        if twist != 0.0 || scale.x != scale.y {
+            // Where they count; elsewhere they may be anything.
+            extrusion.slices = Some(arguments.number_or("slices", 0.0)?.floor()).filter(|n| *n >= 1.0);
+            extrusion.curve = Curve::of(&arguments)?;
+        }
+        Ok(Some(extrusion))
+    }
+
+    /// True where the walls of some flat shapes are no planes, cylinders or cones.
+    pub fn bends<'f>(&self, mut flats: impl Iterator<Item = &'f Flat>) -> bool {
+        let straight = |flat: &Flat| match flat.outline {
+            Outline::Circle(_) => false,
+            Outline::Square { .. } | Outline::Paths(_) => flat.paths().iter().all(|path| {
+                (0..path.len()).all(|i| {
+                    let t = path[(i + 1) % path.len()] - path[i];
+                    t.perp_dot(t * self.scale).abs() <= ROUNDING * t.length_squared()
+                })
+            }),
+        };
+        self.twist != 0.0 || self.scale.x != self.scale.y && !flats.all(straight)
+    }
+
+    /// Slices that OpenSCAD cuts it into, of an outline with some corners.
+    pub fn slices(&self, corners: &[DVec2]) -> usize {
+        let own = || twist::slices(corners, self.height, self.twist, self.scale, &self.curve);
+        self.slices.unwrap_or_else(own).min(f64::from(u32::MAX)) as usize
     }
 
     /// `outer` with the slant.
@@ -88,9 +145,7 @@ impl Extrusion {
             Outline::Circle(radius) => match self.circle(outer, &flat.inner, *radius, flat.overshoot) {
                 Err(Problem::Unsupported { construct, .. }) => {
                     let part = self.paths(parts, outer, flat, &flat.paths())?;
-                    let count = flat.pieces + 2;
-                    let text = format!("{construct} faceted: taken as OpenSCAD's polygon, {count} facets");
-                    parts.note(flat.at, text, Some(flat.deviation()));
+                    parts.faceted(flat.at, &construct, flat.pieces as usize + 2, flat.deviation());
                     Ok(part)
                 }
                 placed => leaf(parts, placed),

@@ -43,6 +43,16 @@ pub fn turn(i: u32, n: u32) -> DVec2 {
     DVec2::new(cos, sin)
 }
 
+/// Cosine and sine of an angle in degrees, those of whole degrees as exact as OpenSCAD has them.
+pub fn direction(degrees: f64) -> DVec2 {
+    let within = degrees.rem_euclid(360.0);
+    if within.fract() == 0.0 {
+        return turn(within as u32, 360);
+    }
+    let (sin, cos) = libm::sincos(within.to_radians());
+    DVec2::new(cos, sin)
+}
+
 /// OpenSCAD's sphere: `rings` rings of `n` corners at polar angles (i + ½)·180°/rings, caps on the outermost rings.
 pub fn faceted_sphere(r: f64, n: u32, rings: u32) -> (Vec<DVec3>, Vec<Vec<u32>>) {
     let mut points = Vec::with_capacity((n * rings) as usize);

@@ -18,6 +18,7 @@ use super::polygon::Region;
 use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
 use super::syntax::{Call, CallId, File, Value, ValueKind};
+use super::twist;
 use super::{Facets, Import, Limits, Place, Problem};
 use crate::import::{Attachment, Note};
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
@@ -299,6 +300,11 @@ impl<'a> Lowering<'a> {
         let part = match (&open.kind, open.call) {
             (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
             (_, None) => Part::Empty,
+            (CallKind::Extrude(extrusion), _)
+                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f))) =>
+            {
+                twist::extruded(parts, at, &open.context.outer, extrusion, &open.built)?
+            }
             (CallKind::Extrude(extrusion), _) => {
                 for leaf in flats(parts, &open.built) {
                     let Part::Flat(flat) = std::mem::replace(&mut parts.list[leaf], Part::Empty) else { continue };

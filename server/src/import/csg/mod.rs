@@ -34,6 +34,7 @@ mod shapes;
 mod syntax;
 #[cfg(test)]
 mod tests;
+mod twist;
 
 use super::problem::Problem;
 use super::{Attachment, Facets, Format, Import, ImportError, Limits, Place, Source};

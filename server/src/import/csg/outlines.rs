@@ -56,8 +56,7 @@ pub fn note_facets(parts: &mut Parts<'_>, at: Place, leaves: &[PartId], who: &st
     let round = leaves.iter().filter_map(|l| flat_of(parts, *l)).filter(|f| matches!(f.outline, Outline::Circle(_)));
     let (count, sides, off) = round.fold((0, 0, 0.0_f64), |(n, s, d), f| (n + 1, s + f.pieces, d.max(f.deviation())));
     if count > 0 {
-        let text = format!("{who}: {count} circle(s) faceted, taken as OpenSCAD's polygons of {sides} sides together");
-        parts.note(at, text, Some(off));
+        parts.faceted(at, &format!("{count} circle(s) of {who}"), sides as usize, off);
     }
 }
 

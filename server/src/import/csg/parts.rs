@@ -76,6 +76,11 @@ impl<'a> Parts<'a> {
         self.notes.push(Note { at, text: text.into(), amount });
     }
 
+    /// Tells that something has no exact form and is taken in OpenSCAD's pieces: how many, and how far they lie off at most.
+    pub fn faceted(&mut self, at: Place, what: &str, facets: usize, off: f64) {
+        self.note(at, format!("{what}: faceted, {facets} facets, max deviation {off:.1e}"), None);
+    }
+
     /// An operation.
     pub fn op(&mut self, op: Op, at: Place, operands: Vec<PartId>) -> PartId {
         match operands.as_slice() {
@@ -88,6 +93,14 @@ impl<'a> Parts<'a> {
     pub fn affordable(&self, at: Place, faces: usize) -> Result<()> {
         if faces > self.limits.polyhedron_faces {
             return Err((at, Problem::Limit { what: "faces of a primitive", limit: self.limits.polyhedron_faces }));
+        }
+        Ok(())
+    }
+
+    /// Refuses more triangles of one mesh than the limit says.
+    pub fn meshable(&self, at: Place, triangles: usize) -> Result<()> {
+        if triangles > self.limits.mesh_facets {
+            return Err((at, Problem::Limit { what: "triangles of a mesh", limit: self.limits.mesh_facets }));
         }
         Ok(())
     }

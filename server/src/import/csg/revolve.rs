@@ -5,7 +5,7 @@
 //! the outline's hull ends before them. What is always true on the outline's side of the axis is left out.
 
 use super::arguments::Arguments;
-use super::facets::{prism, ring, turn};
+use super::facets::{direction, prism, ring};
 use super::parts::{Part, PartId, Parts, Signed};
 use super::place;
 use super::polygon::{Edge, Island, Region};
@@ -67,16 +67,6 @@ impl Turn {
         let op = if self.angle <= 180.0 { Op::Intersection } else { Op::Union };
         Ok(Some(parts.op(op, at, sides)))
     }
-}
-
-/// Cosine and sine of an angle in degrees, those of whole degrees as exact as OpenSCAD has them.
-fn direction(degrees: f64) -> DVec2 {
-    let within = degrees.rem_euclid(360.0);
-    if within.fract() == 0.0 {
-        return turn(within as u32, 360);
-    }
-    let (sin, cos) = libm::sincos(within.to_radians());
-    DVec2::new(cos, sin)
 }
 
 /// What a revolved outline is made into.

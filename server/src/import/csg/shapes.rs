@@ -60,10 +60,10 @@ impl Shapes<'_> {
         let m = outer.matrix3;
         let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
         let off = radius * size * (1.0 - libm::cos(std::f64::consts::PI / f64::from(pieces)));
-        let count = faces.len();
-        let text = format!("{construct} faceted: taken as OpenSCAD's polyhedron of {count} facets");
-        self.parts.note(call.at, text, Some(off));
-        self.leaf(call, place::polyhedron(outer, &points, &faces).map(|p| p.0))
+        self.parts.faceted(call.at, &construct, faces.len(), off);
+        let name = format!("faceted {}", call.name);
+        let leaf = self.parts.leaf(&name, call.at, place::polyhedron(outer, &points, &faces).map(|p| p.0))?;
+        Ok(self.parts.push(leaf))
     }
 
     /// `sphere`.

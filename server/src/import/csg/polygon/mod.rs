@@ -8,9 +8,11 @@
 mod overlay;
 mod peterson;
 mod rings;
+mod triangles;
 
 pub use overlay::overlay;
 pub use peterson::Formula;
+pub use triangles::triangles;
 
 use glam::DVec2;
 use robust::{Coord, orient2d};

@@ -1,0 +1,340 @@
+//! Extrusions with bent walls: with a twist, or scaled unevenly.
+//!
+//! Their walls are ruled surfaces that no face here is, so they are taken as OpenSCAD has them: slices, whose quads are cut along the
+//! shorter diagonal, between caps (linear_extrude of OpenSCAD 2021.01; how many slices: its Calc). Slices so coarse that their facets
+//! cross are halved until they do not.
+
+use super::extrude::{Curve, Extrusion};
+use super::facets::direction;
+use super::outlines::{crossing, paths};
+use super::parts::{Part, PartId, Parts};
+use super::place;
+use super::polygon::{Region, triangles};
+use super::{Place, Problem};
+use crate::solid::primitive::MeshFault;
+use glam::{DAffine3, DVec2, DVec3};
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// Lengths below which OpenSCAD takes points as one: its finer grid.
+const GRID: f64 = 1.0 / (1u64 << 20) as f64;
+/// Diagonals that differ by less than this, relative to their half sum, are equally long to OpenSCAD.
+const SAME_DIAGONAL: f64 = 1e-5;
+/// How often slices are halved where facets cross.
+const HALVINGS: u32 = 4;
+
+/// The extrusion of all that some parts make together.
+///
+/// # Errors
+/// Outlines whose crossings no double can tell; more facets than the limit says; facets that cross however fine the slices are.
+pub fn extruded(
+    parts: &mut Parts<'_>,
+    at: Place,
+    outer: &DAffine3,
+    extrusion: &Extrusion,
+    roots: &[PartId],
+) -> Result<Part> {
+    let region = Region::of_paths(&paths(parts, at, roots, "linear_extrude")?);
+    if region.open {
+        return Err((at, crossing()));
+    }
+    if region.rings.is_empty() {
+        parts.note(at, "a linear_extrude without area: left out, as OpenSCAD does", None);
+        return Ok(Part::Empty);
+    }
+    let corners: Vec<DVec2> = region.rings.iter().flatten().copied().collect();
+    let wanted = extrusion.slices(&corners);
+    let mut slices = wanted;
+    for halved in 0.. {
+        let bent = Bent { extrusion, rings: &region.rings, slices };
+        let facets = bent.facets();
+        parts.meshable(at, facets)?;
+        let (points, faces) = bent.mesh();
+        match place::mesh(outer, &points, &faces) {
+            Err(Problem::Surface(MeshFault::Crossing(_))) if halved < HALVINGS => slices *= 2,
+            Err(Problem::Surface(MeshFault::Flat)) => {
+                parts.note(at, "a linear_extrude without volume: left out, as OpenSCAD does", None);
+                return Ok(Part::Empty);
+            }
+            placed => {
+                let m = outer.matrix3;
+                let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+                let what = if slices == wanted {
+                    "linear_extrude with bent walls".to_owned()
+                } else {
+                    format!("linear_extrude with bent walls, {slices} slices in place of {wanted}, whose facets cross")
+                };
+                parts.faceted(at, &what, facets, bent.deviation() * size);
+                return parts.leaf("faceted linear_extrude", at, placed.map(|p| p.0));
+            }
+        }
+    }
+    Ok(Part::Empty)
+}
+
+/// OpenSCAD's number of slices of a twist, or of an uneven scale without one, of an outline with some corners.
+pub fn slices(corners: &[DVec2], height: f64, twist: f64, scale: DVec2, curve: &Curve) -> f64 {
+    let largest = |all: &dyn Fn(DVec2) -> f64| corners.iter().map(|p| all(*p)).fold(0.0, f64::max);
+    if twist == 0.0 {
+        let way = largest(&|p| (p - p * scale).length());
+        return if way < GRID {
+            1.0
+        } else if curve.fn_ > 0.0 {
+            curve.fn_.floor().max(1.0)
+        } else {
+            (way.hypot(height) / curve.fs).ceil().max(1.0)
+        };
+    }
+    let (turned, radius) = (twist.abs(), largest(&|p| p.length()));
+    let least = (turned / 120.0).ceil().max(1.0);
+    if radius < GRID {
+        return least;
+    }
+    if curve.fn_ > 0.0 {
+        return (turned / 360.0 * curve.fn_).ceil().max(least);
+    }
+    let angle = turned.to_radians();
+    let length = if scale.x == scale.y && scale.x != 1.0 {
+        // Along a spiral of Archimedes that ends where the scale would be 0.
+        let end = angle * if scale.x > 1.0 { scale.x / (scale.x - 1.0) } else { 1.0 / (1.0 - scale.x) };
+        let arc = |t: f64| 0.5 * (radius / end) * (t * (1.0 + t * t).sqrt() + libm::asinh(t));
+        (arc(end) - arc(end - angle)).hypot(height)
+    } else {
+        (angle * radius).hypot(height)
+    };
+    (turned / curve.fa).ceil().min((length / curve.fs).ceil()).max(least)
+}
+
+/// A mesh in the making.
+struct Bent<'e> {
+    extrusion: &'e Extrusion,
+    /// Outlines with the inside on their left.
+    rings: &'e [Vec<DVec2>],
+    slices: usize,
+}
+
+impl Bent<'_> {
+    /// Scale and direction of +x at a level.
+    fn level(&self, k: usize) -> (DVec2, DVec2) {
+        let t = k as f64 / self.slices as f64;
+        let scale = DVec2::ONE - (DVec2::ONE - self.extrusion.scale) * t;
+        // Counted from the upper end there: it is as the text says.
+        let scale = if k == self.slices { self.extrusion.scale } else { scale };
+        (scale, direction(-self.extrusion.twist * t))
+    }
+
+    /// All corners at a level.
+    fn corners(&self, k: usize) -> Vec<DVec2> {
+        let (scale, x) = self.level(k);
+        self.rings.iter().flatten().map(|p| scale * x.rotate(*p)).collect()
+    }
+
+    /// The largest number of its facets.
+    fn facets(&self) -> usize {
+        let corners: usize = self.rings.iter().map(Vec::len).sum();
+        2 * corners * (self.slices + 1)
+    }
+
+    /// Points, and faces that run clockwise as seen from outside.
+    fn mesh(&self) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+        let extrusion = self.extrusion;
+        let stride: usize = self.rings.iter().map(Vec::len).sum();
+        let (mut points, mut faces) = (Vec::with_capacity(stride * (self.slices + 1)), Vec::new());
+        let mut below: Vec<DVec2> = Vec::new();
+        for k in 0..=self.slices {
+            let here = self.corners(k);
+            let z = extrusion.low + extrusion.height * k as f64 / self.slices as f64;
+            points.extend(here.iter().map(|p| p.extend(z)));
+            if k > 0 {
+                self.walls(&below, &here, ((k - 1) * stride, k * stride), &mut faces);
+            }
+            below = here;
+        }
+        let caps = triangles(self.rings);
+        let top = self.slices * stride;
+        faces.extend(caps.iter().map(|t| t.map(|i| i as u32).to_vec()));
+        if extrusion.scale.min_element() > 0.0 {
+            faces.extend(caps.iter().map(|t| [t[2], t[1], t[0]].map(|i| (top + i) as u32).to_vec()));
+        }
+        (points, faces)
+    }
+
+    /// The walls of one slice; what an end that is a point or a line takes the area of is left out.
+    fn walls(&self, low: &[DVec2], high: &[DVec2], (down, up): (usize, usize), faces: &mut Vec<Vec<u32>>) {
+        let flat = high.iter().all(|p| p.x == 0.0) || high.iter().all(|p| p.y == 0.0);
+        let mut first = 0;
+        for ring in self.rings {
+            let hole = area(ring) < 0.0;
+            for i in 0..ring.len() {
+                let (a, b) = (first + i, first + (i + 1) % ring.len());
+                let (to_next, from_next) = (low[a].distance(high[b]), low[b].distance(high[a]));
+                let even = (to_next - from_next).abs() <= SAME_DIAGONAL * 0.5 * (to_next + from_next);
+                // Equally long ones follow the twist.
+                let flip = hole != (self.extrusion.twist <= 0.0);
+                let rising = if even { !flip } else { to_next < from_next };
+                let [p, q, r, s] = [down + a, down + b, up + b, up + a].map(|i| i as u32);
+                let quads = if rising != flat { [[p, r, q], [p, s, r]] } else { [[p, s, q], [q, s, r]] };
+                let at = |i: u32| {
+                    let i = i as usize;
+                    if i >= up { (high[i - up], true) } else { (low[i - down], false) }
+                };
+                let thin = |t: &[u32; 3]| (0..3).any(|k| at(t[k]) == at(t[(k + 1) % 3]));
+                faces.extend(quads.iter().filter(|t| !thin(t)).map(|t| t.to_vec()));
+            }
+            first += ring.len();
+        }
+    }
+
+    /// How far facets lie off the ruled walls at most: the sagitta of the way that a corner turns in a slice, and half of how far the
+    /// two diagonals of a quad pass each other.
+    fn deviation(&self) -> f64 {
+        let turned = (self.extrusion.twist / self.slices as f64).to_radians().abs().min(std::f64::consts::PI);
+        let mut most = 0.0_f64;
+        let mut below = self.corners(0);
+        let reach = |all: &[DVec2]| all.iter().map(|p| p.length()).fold(0.0, f64::max);
+        for k in 1..=self.slices {
+            let here = self.corners(k);
+            let radius = reach(&below).max(reach(&here));
+            let mut first = 0;
+            for ring in self.rings {
+                for i in 0..ring.len() {
+                    let (a, b) = (first + i, first + (i + 1) % ring.len());
+                    most = most.max(0.25 * (below[a] + here[b] - below[b] - here[a]).length());
+                }
+                first += ring.len();
+            }
+            most = most.max(radius * (1.0 - libm::cos(0.5 * turned)));
+            below = here;
+        }
+        if turned > 0.0 { 2.0 * most } else { most }
+    }
+}
+
+/// Twice the area, positive counter-clockwise.
+fn area(ring: &[DVec2]) -> f64 {
+    (0..ring.len()).map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::import::{Facets, Import, Limits, import_csg};
+    use crate::math::random::Random;
+    use glam::{DVec2, DVec3};
+
+    fn read(text: &str) -> Import {
+        import_csg("m.csg", text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}"))
+    }
+
+    /// The number behind a word of the note about bent walls.
+    fn told(import: &Import, behind: &str) -> f64 {
+        let note = import.notes.iter().find(|n| n.text.starts_with("linear_extrude with bent walls")).expect("a note");
+        let text = &note.text[note.text.find(behind).expect("the word") + behind.len()..];
+        text.split([' ', ',']).next().expect("a number").parse().expect("a number")
+    }
+
+    fn crossings(path: &[DVec2], p: DVec2) -> usize {
+        let edges = (0..path.len()).map(|i| (path[i], path[(i + 1) % path.len()]));
+        edges.filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y)).count()
+    }
+
+    fn distance(path: &[DVec2], p: DVec2) -> f64 {
+        let edges = (0..path.len()).map(|i| (path[i], path[(i + 1) % path.len()]));
+        edges.fold(f64::INFINITY, |least, (a, b)| {
+            let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            least.min((a + (b - a) * t - p).length())
+        })
+    }
+
+    #[test]
+    fn twisted_and_unevenly_scaled_outlines_are_the_outline_turned_and_scaled_at_each_height() {
+        let mut r = Random(31);
+        for round in 0..12 {
+            let ring = |size: f64, r: &mut Random| -> Vec<DVec2> {
+                let n = 3 + (r.unit() * 7.0) as usize;
+                let at = |i: usize| libm::sincos(std::f64::consts::TAU * i as f64 / n as f64);
+                (0..n).map(|i| DVec2::new(at(i).1, at(i).0) * size * r.within(0.6, 1.0)).collect()
+            };
+            let aside = DVec2::new(r.within(-4.0, 4.0), r.within(-4.0, 4.0));
+            let rings: Vec<Vec<DVec2>> =
+                [3.0, 1.0].map(|s| ring(s, &mut r).into_iter().map(|p| p + aside).collect()).into();
+            let (height, scale) = (r.within(1.0, 9.0), [r.within(0.3, 2.0), r.within(0.3, 2.0)]);
+            let twist = if round % 4 == 0 { 0.0 } else { r.within(-300.0, 300.0) };
+            let center = round % 2 == 0;
+            let points: Vec<[f64; 2]> = rings.iter().flatten().map(|p| p.to_array()).collect();
+            let (first, all): (Vec<usize>, Vec<usize>) = ((0..rings[0].len()).collect(), (0..points.len()).collect());
+            let paths = [&first[..], &all[rings[0].len()..]];
+            let text = format!(
+                "linear_extrude(height = {height}, center = {center}, twist = {twist}, scale = {scale:?}, slices = 40) \
+                 {{ polygon({points:?}, {paths:?}); }}"
+            );
+            let import = read(&text);
+            let off = told(&import, "max deviation ") * 1.01 + 1e-9;
+            let b = import.solid.aabb();
+            let mut sure = [0, 0];
+            for _ in 0..800 {
+                let x = b.center() + r.vector(1.0) * 1.1 * b.half();
+                let low = if center { -0.5 * height } else { 0.0 };
+                let t = (x.z - low) / height;
+                let f = import.solid.value(x);
+                // A wall that leans lies off sideways by more than the facets do.
+                if !(0.0..1.0).contains(&t) {
+                    assert!(f > 0.0, "{x}, f {f}: {text}");
+                    continue;
+                }
+                let (sin, cos) = libm::sincos((-twist * t).to_radians());
+                let here = |p: DVec2| {
+                    let s = DVec2::new(1.0 + (scale[0] - 1.0) * t, 1.0 + (scale[1] - 1.0) * t);
+                    s * DVec2::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y)
+                };
+                let outlines: Vec<Vec<DVec2>> =
+                    rings.iter().map(|ring| ring.iter().map(|p| here(*p)).collect()).collect();
+                let q = x.truncate();
+                if outlines.iter().any(|o| distance(o, q) <= off) {
+                    continue;
+                }
+                let inside = outlines.iter().map(|o| crossings(o, q)).sum::<usize>() % 2 == 1;
+                assert_eq!(f < 0.0, inside, "{x}, f {f}, facets within {off}: {text}");
+                sure[usize::from(inside)] += 1;
+            }
+            assert!(sure[0] > 100 && sure[1] > 5, "{sure:?}: {text}");
+        }
+    }
+
+    #[test]
+    fn slices_are_those_of_openscad() {
+        let square = |arguments: &str| format!("linear_extrude({arguments}) {{ square(10, center = true); }}");
+        // Two facets a wall and slice, and room for the caps.
+        for (arguments, slices) in [
+            ("height = 10, twist = 90, slices = 7", 7.0),
+            ("height = 10, twist = -90, $fn = 30", 8.0),
+            ("height = 10, twist = 90, $fn = 0, $fa = 12, $fs = 2", 8.0),
+            ("height = 10, twist = 90, $fn = 0, $fa = 12, $fs = 4", 4.0),
+            ("height = 10, twist = 360, $fn = 1", 3.0),
+            ("height = 10, twist = 90, scale = 0.5, $fn = 0, $fa = 1, $fs = 1", 14.0),
+        ] {
+            let facets = told(&read(&square(arguments)), "faceted, ");
+            assert_eq!(facets, 8.0 * (slices + 1.0), "{arguments}");
+        }
+        let turned = "multmatrix([[0.8, -0.6, 0, 0], [0.6, 0.8, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) { square(10); }";
+        for (arguments, slices) in [("$fn = 6", 6.0), ("$fn = 0, $fs = 2", 8.0)] {
+            let text = format!("linear_extrude(height = 12, scale = [2, 1], {arguments}) {{ {turned} }}");
+            assert_eq!(told(&read(&text), "faceted, "), 8.0 * (slices + 1.0), "{arguments}");
+        }
+    }
+
+    #[test]
+    fn ends_that_are_a_point_or_a_line_and_slices_that_are_too_coarse_load() {
+        let value = |text: &str, x: [f64; 3]| read(text).solid.value(DVec3::from_array(x));
+        let point = "linear_extrude(height = 10, twist = 90, scale = 0) { square(10, center = true); }";
+        assert!(value(point, [0.0, 0.0, 9.0]) < 0.0 && value(point, [1.0, 0.0, 9.5]) > 0.0);
+        let line = "linear_extrude(height = 10, scale = [1, 0], slices = 5) { circle(5); }";
+        assert!(value(line, [0.0, 0.0, 9.5]) < 0.0 && value(line, [4.0, 0.0, 9.9]) < 0.0);
+        assert!(value(line, [4.0, 1.0, 8.0]) > 0.0 && value(line, [0.0, 1.0, 9.5]) > 0.0);
+        let coarse = "linear_extrude(height = 1, twist = 400, slices = 2) { polygon([[0.93, 0], [0.494, 0.855], \
+                      [-2.343, 4.059], [-4.726, 0], [-0.476, -0.825], [2.276, -3.943]]); }";
+        assert!(read(coarse).notes.iter().any(|n| n.text.contains("slices in place of 2, whose facets cross")));
+        // What needs no facets has none.
+        let wedge = read("linear_extrude(height = 10, scale = [2, 1], $fn = 8) { square(10); }");
+        assert!(wedge.notes.is_empty() && wedge.solid.primitives.len() == 1, "{:?}", wedge.notes);
+    }
+}
