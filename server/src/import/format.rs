@@ -3,6 +3,7 @@
 //! A new format is a folder beside `csg` and a row of `FORMATS`. Nothing else names one: the wire, the cache, the journal and the
 //! clients carry a format's name and a file's bytes.
 
+use super::font::{Pattern, machine};
 use super::{Facets, Import, ImportError, Limits, csg, mesh};
 use std::path::Path;
 
@@ -15,17 +16,33 @@ pub struct Format {
     pub endings: &'static [&'static str],
     /// Reads a model.
     pub read: fn(&Source, Facets, &Limits) -> Result<Import, ImportError>,
-    /// The other files that such a file names, as it names them.
-    pub names: fn(&[u8], &Limits) -> Vec<String>,
+    /// What such a file names beside itself.
+    pub names: fn(&[u8], &Limits) -> Vec<Named>,
+}
+
+/// What a file names beside itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Named {
+    /// Another file, as it names it.
+    File(String),
+    /// A font.
+    Font(Pattern),
 }
 
 /// A file that another one names, in memory.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Attachment {
-    /// As the other one names it.
+    /// As the other one names it; of a font what `of_font` says.
     pub name: String,
     /// What it has in it, or why it was not read.
     pub bytes: Result<Vec<u8>, String>,
+}
+
+impl Attachment {
+    /// The name of a font that a pattern asks for.
+    pub fn of_font(pattern: &Pattern) -> String {
+        format!("font:{}", pattern.written)
+    }
 }
 
 /// Every format that is read. A file whose name ends in none of these ways is taken for one of the first.
@@ -98,7 +115,8 @@ pub struct ModelBytes {
 }
 
 impl ModelBytes {
-    /// Reads a file whose name says what it is, and those that it names: from its own folder and below, nowhere else.
+    /// Reads a file whose name says what it is, and those that it names: from its own folder and below, nowhere else; and the
+    /// machine's fonts that it names.
     ///
     /// # Errors
     /// `Read`, and `Large` when there are more bytes than the limit says; what is wrong with a file that it names is kept for
@@ -107,8 +125,11 @@ impl ModelBytes {
         let (name, bytes) = (path.display().to_string(), read_bytes(path, limits)?);
         let names = (Source::named(&name, &bytes).format()?.names)(&bytes, limits);
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let attached =
-            names.into_iter().map(|name| Attachment { bytes: beside(folder, &name, limits), name }).collect();
+        let attach = |named| match named {
+            Named::File(name) => Attachment { bytes: beside(folder, &name, limits), name },
+            Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: Attachment::of_font(&pattern) },
+        };
+        let attached = names.into_iter().map(attach).collect();
         Ok(Self { name, bytes, attached })
     }
 

@@ -8,6 +8,7 @@
 //! Floor 3: imports `solid`, `math`, `proto`.
 
 pub mod csg;
+pub mod font;
 pub mod format;
 pub mod mesh;
 pub mod problem;

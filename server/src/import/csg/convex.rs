@@ -229,7 +229,7 @@ pub fn sums(parts: &mut Parts<'_>, at: Place, operands: &[Vec<Vec<Element>>]) ->
         parts.affordable(at, sums.iter().map(Vec::len).sum::<usize>() / 64)?;
     }
     if let Some(off) = off {
-        let points = sums.iter().map(Vec::len).sum();
+        let points: usize = sums.iter().map(Vec::len).sum();
         parts.note(at, format!("minkowski: faceted, {points} points, max deviation {off:.1e}"), None);
     }
     Ok(sums)

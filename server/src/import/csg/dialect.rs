@@ -25,6 +25,9 @@ struct Construct {
 }
 
 const CURVES: [(&str, Fate); 4] = [("$fn", Read("3", "4")), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
+/// Of texts an eighth of the pieces counts.
+const TEXT: [(&str, Fate); 4] =
+    [("$fn", Read("8", "80")), ("$fa", Read("10", "60")), ("$fs", Read("1", "20")), ("$fe", Harmless)];
 const FLAT: [(&str, Fate); 4] = [("$fn", Harmless), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
 const BALL: &str = "{ sphere(r = 1); cube(size = [1, 1, 1]); }";
 const SQUARE: &str = "{ square(size = [1, 2]); }";
@@ -32,7 +35,7 @@ const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin
 /// Written for drawings of other files by rotate_extrude, and without one by old versions of OpenSCAD.
 const WITHOUT_FILE: [&str; 3] = ["layer", "origin", "timestamp"];
 
-const KINDS: [Construct; 19] = [
+const KINDS: [Construct; 20] = [
     Construct { name: "group", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "union", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "difference", arguments: &[], inside: BALL, fates: &[] },
@@ -152,15 +155,31 @@ const KINDS: [Construct; 19] = [
             ("paths", Read("[[0, 1, 2]]", "[[0, 1, 3]]")),
         ],
     },
+    Construct {
+        name: "text",
+        arguments: &[("text", "\"aV\"")],
+        inside: ";",
+        fates: &[
+            ("text", Read("\"a\"", "\"b\"")),
+            ("size", Read("9", "11")),
+            ("spacing", Read("1", "2")),
+            ("font", Read("\"Hack\"", "\"Arial\"")),
+            ("halign", Read("\"right\"", "\"center\"")),
+            ("valign", Read("\"top\"", "\"center\"")),
+            ("direction", Read("\"ttb\"", "\"ltr\"")),
+            ("language", Harmless),
+            ("script", Harmless),
+            ("em", Refused),
+        ],
+    },
 ];
 
 /// Kinds of nodes and modules of OpenSCAD that make or change shapes in ways that are not imported.
-const REFUSED: [&str; 28] = [
+const REFUSED: [&str; 27] = [
     "resize",
     "projection",
     "roof",
     "fill",
-    "text",
     "import",
     "surface",
     "import_stl",
@@ -199,7 +218,7 @@ fn text(kind: &Construct, changed: Option<(&str, &str)>) -> String {
     let arguments: Vec<String> = arguments.iter().map(|(n, v)| format!("{n} = {v}")).collect();
     let call = format!("{}({}) {}", kind.name, arguments.join(", "), kind.inside);
     match kind.name {
-        "circle" | "square" | "polygon" | "offset" => format!("linear_extrude(height = 1) {{\n{call}\n}}"),
+        "circle" | "square" | "polygon" | "offset" | "text" => format!("linear_extrude(height = 1) {{\n{call}\n}}"),
         _ => format!("\n{call}"),
     }
 }
@@ -226,7 +245,13 @@ fn every_argument_is_read_without_effect_or_refused() {
     for kind in &KINDS {
         let plain = solid(&text(kind, None)).unwrap_or_else(|e| panic!("{}: {e}", kind.name));
         let curved = matches!(kind.name, "sphere" | "cylinder" | "circle" | "rotate_extrude");
-        let everywhere = if curved { CURVES } else { FLAT };
+        let everywhere = if kind.name == "text" {
+            TEXT
+        } else if curved {
+            CURVES
+        } else {
+            FLAT
+        };
         let old = |f: &&(&str, Fate)| !(kind.name == "rotate_extrude" && WITHOUT_FILE.contains(&f.0));
         let fates =
             kind.fates.iter().chain(&everywhere).chain(FILE.iter().filter(old)).chain(&[("convexity", Harmless)]);
@@ -238,7 +263,8 @@ fn every_argument_is_read_without_effect_or_refused() {
                 Read(one, two) => {
                     let [a, b] = [one, two].map(|v| solid(&text(kind, Some((name, v)))));
                     assert_ne!(a, b, "{name} of {}", kind.name);
-                    let words = text(kind, Some((name, "\"a\"")));
+                    let wrong = if one.starts_with('"') { "[1]" } else { "\"a\"" };
+                    let words = text(kind, Some((name, wrong)));
                     let error = read(&words).err().unwrap_or_else(|| panic!("{words}: was read"));
                     assert!(error.starts_with("m.csg:2:"), "{words}: {error}");
                 }

@@ -18,8 +18,8 @@ use super::polygon::Region;
 use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
 use super::syntax::{Call, CallId, File, Value, ValueKind};
-use super::twist;
 use super::{Facets, Import, Limits, Place, Problem};
+use super::{text, twist};
 use crate::import::{Attachment, Note};
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
 use crate::solid::Op;
@@ -229,6 +229,16 @@ impl<'a> Lowering<'a> {
                     }
                 };
                 Ok(Step::Leaf(id))
+            }
+            "text" => {
+                no_children(call)?;
+                let (inner, overshoot) =
+                    context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
+                let id = text::text(&mut self.shapes, call, inner, overshoot, self.attached)?;
+                Ok(Step::Leaf(match context.plane {
+                    Some(_) => id,
+                    None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
+                }))
             }
             "import" if context.plane.is_some() && self.attached.is_some() => {
                 Err((call.at, Problem::unsupported("import inside of a 2D shape")))
@@ -578,7 +588,7 @@ fn hint(name: &str) -> &'static str {
         | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
         "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
         "resize" | "projection" | "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
-        "text" | "fill" => " (write the outline out in circles, squares and polygons)",
+        "fill" => " (write the outline out in circles, squares and polygons)",
         _ => "",
     }
 }

@@ -34,8 +34,10 @@ mod shapes;
 mod syntax;
 #[cfg(test)]
 mod tests;
+mod text;
 mod twist;
 
+use super::format::Named;
 use super::problem::Problem;
 use super::{Attachment, Facets, Format, Import, ImportError, Limits, Place, Source};
 
@@ -58,15 +60,20 @@ fn import_with(
 /// The row of `format::FORMATS`.
 pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: import_bytes, names: named };
 
-/// The files that the text imports, each once.
-fn named(bytes: &[u8], limits: &Limits) -> Vec<String> {
+/// The files that the text imports and the fonts that it is set in, each once.
+fn named(bytes: &[u8], limits: &Limits) -> Vec<Named> {
     let tree = std::str::from_utf8(bytes).ok().and_then(|text| syntax::parse(text, limits).ok());
     let Some(tree) = tree else { return Vec::new() };
-    let mut names: Vec<String> =
-        tree.calls.iter().filter(|c| c.name == "import").filter_map(imports::file_of).collect();
-    names.sort_unstable();
-    names.dedup();
-    names
+    let mut all: Vec<Named> = Vec::new();
+    for call in &tree.calls {
+        let named = match call.name.as_str() {
+            "import" => imports::file_of(call).map(Named::File),
+            "text" => text::font_of(call).map(Named::Font),
+            _ => None,
+        };
+        all.extend(named.filter(|n| !all.contains(n)));
+    }
+    all
 }
 
 fn import_bytes(source: &Source, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {

@@ -1,0 +1,322 @@
+//! `text`: characters in a row or a column, as OpenSCAD sets them.
+//!
+//! Sizes, alignment and the pieces of curves are those of OpenSCAD 2021.01 (FreetypeRenderer, DrawingCallback): an em is 100/72 of the
+//! size, a curve has an eighth of a circle's pieces. Glyphs are not hinted, which moves OpenSCAD's corners by a thousandth of the size
+//! at most; kerning counts, ligatures are not made.
+
+use super::arguments::Arguments;
+use super::extrude::Curve;
+use super::flat::{Flat, Outline};
+use super::parts::{Part, PartId};
+use super::polygon::overlay;
+use super::shapes::Shapes;
+use super::syntax::{Call, ValueKind};
+use super::{Place, Problem};
+use crate::import::Attachment;
+use crate::import::font::{Font, Pattern};
+use crate::solid::Op;
+use glam::{DAffine3, DVec2};
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// What OpenSCAD writes of a text.
+const PARAMETERS: [&str; 9] =
+    ["text", "size", "font", "direction", "language", "script", "halign", "valign", "spacing"];
+/// An em, in sizes.
+const EM: f64 = 100.0 / 72.0;
+/// Characters of one text.
+const LONGEST: usize = 10_000;
+
+/// The font that a call asks for.
+pub fn font_of(call: &Call) -> Option<Pattern> {
+    let arguments = Arguments::new(call, &PARAMETERS).ok()?;
+    match arguments.get("font").map(|v| &v.kind) {
+        None => Some(Pattern::new("")),
+        Some(ValueKind::Text(name)) => Some(Pattern::new(name)),
+        Some(_) => None,
+    }
+}
+
+/// Which way a text runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Right,
+    Left,
+    Down,
+    Up,
+}
+
+/// A call's arguments.
+struct Setting {
+    text: String,
+    size: f64,
+    spacing: f64,
+    way: Way,
+    /// Words for the sides that stand at the origin.
+    align: [String; 2],
+    pieces: u32,
+}
+
+impl Setting {
+    fn of(shapes: &Shapes<'_>, call: &Call) -> Result<Self> {
+        let arguments = Arguments::new(call, &PARAMETERS)?;
+        let word = |name: &str| match arguments.get(name) {
+            None => Ok(String::new()),
+            Some(v) => match &v.kind {
+                ValueKind::Text(text) => Ok(text.clone()),
+                _ => Err((v.at, Problem::syntax(format!("a string as {name} of text"), v.found()))),
+            },
+        };
+        let finite = |name: &str, default: f64| match arguments.number_or(name, default)? {
+            n if n.is_finite() => Ok(n),
+            n => Err((call.at, Problem::syntax(format!("a finite number as {name} of text"), n.to_string()))),
+        };
+        let size = finite("size", 10.0)?;
+        let way = match word("direction")?.as_str() {
+            "rtl" => Way::Left,
+            "ttb" => Way::Down,
+            "btt" => Way::Up,
+            _ => Way::Right,
+        };
+        word("font")?;
+        Curve::of(&arguments)?;
+        let text = word("text")?;
+        if text.chars().count() > LONGEST {
+            return Err((call.at, Problem::Limit { what: "characters of a text", limit: LONGEST }));
+        }
+        let pieces = (shapes.pieces(&arguments, size.abs())? / 8 + 1).max(2);
+        Ok(Self {
+            text,
+            size,
+            spacing: finite("spacing", 1.0)?,
+            way,
+            align: [word("halign")?, word("valign")?],
+            pieces,
+        })
+    }
+
+    /// Where the first glyph stands, in em, of a text so long and wide whose glyphs reach so far above and below the base line.
+    fn origin(&self, along: DVec2, wide: f64, (above, below): (f64, f64)) -> DVec2 {
+        let level = matches!(self.way, Way::Right | Way::Left);
+        let (width, above, below) = if level { (along.x, above, below) } else { (wide, along.y, 0.0) };
+        let x = match self.align[0].as_str() {
+            "right" => -width,
+            "center" => -0.5 * width,
+            _ => 0.0,
+        };
+        let y = match self.align[1].as_str() {
+            "top" => -above,
+            "center" => 0.5 * (below - above),
+            "bottom" => below,
+            _ => 0.0,
+        };
+        DVec2::new(x, y)
+    }
+}
+
+/// The shapes of a text, each glyph one, in the plane of `inner`.
+///
+/// # Errors
+/// What is wrong with its arguments, and where.
+pub fn text(
+    shapes: &mut Shapes<'_>,
+    call: &Call,
+    inner: DAffine3,
+    overshoot: u32,
+    attached: Option<&[Attachment]>,
+) -> Result<PartId> {
+    let setting = Setting::of(shapes, call)?;
+    let at = call.at;
+    let pattern = font_of(call).unwrap_or_else(|| Pattern::new(""));
+    let name = Attachment::of_font(&pattern);
+    let found = attached.unwrap_or_default().iter().find(|a| a.name == name).and_then(|a| a.bytes.as_ref().ok());
+    let font = found.and_then(|bytes| Font::new(bytes)).or_else(|| Font::carried(&pattern));
+    let Some(font) = font else {
+        return Err((at, Problem::syntax("a font", format!("none for {:?}", pattern.family))));
+    };
+    let (family, style) = font.name();
+    if !pattern.is_met(&family) {
+        let text = format!("text in {:?}: that font is not at hand, set in {family} {style}", pattern.family);
+        shapes.parts.note(at, text, None);
+    }
+    // Language and script change nothing here, whatever they are.
+    let set = Set::new(&setting, &font);
+    if !set.unknown.is_empty() {
+        let text = format!(
+            "{family} {style} has no glyph for {:?}: its sign for that is shown, as OpenSCAD does",
+            set.unknown
+        );
+        shapes.parts.note(at, text, None);
+    }
+    shapes.parts.affordable(at, set.glyphs.iter().flatten().map(Vec::len).max().unwrap_or(0))?;
+    if set.glyphs.is_empty() || setting.size == 0.0 {
+        return Ok(shapes.nothing(call, "without a visible character"));
+    }
+    let corners = set.glyphs.iter().flatten().map(Vec::len).sum();
+    shapes.parts.faceted(at, &format!("text {:?}", setting.text), corners, set.off * setting.size.abs());
+    let mut made = Vec::with_capacity(set.glyphs.len());
+    for paths in set.glyphs {
+        let outline = Outline::Paths(filled(paths));
+        let flat = Flat { outline, inner, overshoot, name: "text".into(), at, pieces: 0 };
+        made.push(shapes.parts.push(Part::Flat(Box::new(flat))));
+    }
+    Ok(shapes.parts.op(Op::Union, at, made))
+}
+
+/// Glyphs where they stand.
+struct Set {
+    /// The paths of each that has any.
+    glyphs: Vec<Vec<Vec<DVec2>>>,
+    /// How far the pieces of curves lie off them at most, in sizes.
+    off: f64,
+    /// Characters without a glyph.
+    unknown: String,
+}
+
+impl Set {
+    fn new(setting: &Setting, font: &Font<'_>) -> Self {
+        let level = matches!(setting.way, Way::Right | Way::Left);
+        let mut characters: Vec<char> = setting.text.chars().collect();
+        if matches!(setting.way, Way::Left | Way::Up) {
+            characters.reverse();
+        }
+        let ids: Vec<u32> = characters.iter().map(|c| font.glyph(*c)).collect();
+        let mut unknown: String = characters.iter().zip(&ids).filter(|(_, id)| **id == 0).map(|(c, _)| *c).collect();
+        unknown.truncate(unknown.char_indices().nth(20).map_or(unknown.len(), |(i, _)| i));
+        let (ascent, descent) = font.extent();
+        let (mut pen, mut off, mut wide) = (DVec2::ZERO, 0.0_f64, 0.0_f64);
+        let (mut above, mut below) = (0.0_f64, 0.0_f64);
+        let mut placed = Vec::with_capacity(ids.len());
+        for (i, &id) in ids.iter().enumerate() {
+            let glyph = font.outline(id, setting.pieces);
+            let advance = font.advance(id);
+            // In a column glyphs hang below their origin, about its middle.
+            let hung = if level { DVec2::ZERO } else { DVec2::new(-0.5 * advance, -ascent) };
+            if glyph.low.is_finite() {
+                (above, below) = (above.max(glyph.high.y), below.max(-glyph.low.y));
+                wide = wide.max(glyph.high.x - glyph.low.x);
+                off = off.max(glyph.off);
+            }
+            placed.push((glyph.paths, pen + hung));
+            pen += setting.spacing
+                * if level {
+                    let kerning = ids.get(i + 1).map_or(0.0, |next| font.kerning(id, *next));
+                    DVec2::new(advance + kerning, 0.0)
+                } else {
+                    DVec2::new(0.0, descent - ascent)
+                };
+        }
+        let origin = setting.origin(pen, wide, (above, below));
+        let put = |(paths, at): (Vec<Vec<DVec2>>, DVec2)| {
+            let point = |p: DVec2| (p + at + origin) * (EM * setting.size);
+            let paths = paths.into_iter().filter(|p| p.len() >= 3);
+            paths.map(|path| path.into_iter().map(point).collect()).collect::<Vec<Vec<DVec2>>>()
+        };
+        let glyphs = placed.into_iter().map(put).filter(|g| !g.is_empty()).collect();
+        Self { glyphs, off: off * EM, unknown }
+    }
+}
+
+/// Paths of a glyph whose contours may cover each other, filled by the winding number as fonts mean it, as paths for the even-odd rule.
+fn filled(paths: Vec<Vec<DVec2>>) -> Vec<Vec<DVec2>> {
+    if paths.len() < 2 {
+        return paths;
+    }
+    let way = |path: &Vec<DVec2>| {
+        let n = path.len();
+        let area: f64 = (0..n).map(|i| (path[i] - path[0]).perp_dot(path[(i + 1) % n] - path[0])).sum();
+        if area < 0.0 { -1 } else { 1 }
+    };
+    let ways: Vec<i32> = paths.iter().map(way).collect();
+    let each: Vec<Vec<Vec<DVec2>>> = paths.iter().map(|p| vec![p.clone()]).collect();
+    let inside = |of: &[bool]| of.iter().zip(&ways).filter(|(here, _)| **here).map(|(_, w)| w).sum::<i32>() != 0;
+    overlay(&each, &inside).unwrap_or(paths)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::import::{Facets, Import, Limits, import_csg};
+    use glam::DVec3;
+
+    fn read(arguments: &str) -> Import {
+        let text = format!("linear_extrude(height = 2) {{ text({arguments}); }}");
+        import_csg("m.csg", &text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}"))
+    }
+
+    fn bounds(import: &Import) -> [f64; 4] {
+        let b = import.solid.aabb();
+        [b.min.x, b.min.y, b.max.x, b.max.y]
+    }
+
+    /// Area by sums over a grid of the plane at half height.
+    fn area(import: &Import) -> f64 {
+        let b = import.solid.aabb();
+        let n = 300;
+        let at = |i: u32, low: f64, high: f64| low + (high - low) * (f64::from(i) + 0.5) / f64::from(n);
+        let inside = (0..n * n).filter(|k| {
+            let p = DVec3::new(at(k % n, b.min.x, b.max.x), at(k / n, b.min.y, b.max.y), 1.0);
+            import.solid.value(p) < 0.0
+        });
+        let size = b.max - b.min;
+        size.x * size.y * inside.count() as f64 / f64::from(n * n)
+    }
+
+    #[test]
+    fn texts_have_the_areas_and_bounds_that_another_reader_of_fonts_says() {
+        // fontTools 4.68: areas of the curves, their bounds, and sums of advances with GPOS' kerning; an em is size · 100/72.
+        for (font, text, size, spacing, area_of, all) in [
+            ("", "AVo fi", 10.0, 1.0, 78.645648, [0.138889, -0.166667, 35.180556, 10.777778]),
+            ("", "Äg&T.", 4.0, 1.3, 14.346048, [0.055556, -1.044444, 17.939444, 4.872222]),
+            ("Hack", "R6 {x}", 7.0, 0.9, 62.34956, [0.678847, -1.243761, 31.618585, 7.771132]),
+            ("", "~-", 20.0, 1.0, 33.89175, [1.388889, 6.166667, 22.722222, 10.166667]),
+        ] {
+            let arguments = format!("{text:?}, size = {size}, spacing = {spacing}, font = {font:?}, $fn = 200");
+            let import = read(&arguments);
+            let off = bounds(&import).iter().zip(all).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 2e-3 * size, "{text}: {:?}", bounds(&import));
+            assert!((area(&import) - area_of).abs() < 0.01 * area_of, "{text}: {}", area(&import));
+        }
+    }
+
+    #[test]
+    fn a_text_stands_where_its_alignment_says() {
+        // Width by advances 36.166667, heights 10.777778 above and 0.166667 below: from the table above.
+        let at = |align: &str| bounds(&read(&format!("\"AVo fi\", font = \"\", $fn = 200, {align}")));
+        let left = at("halign = \"left\", valign = \"baseline\"");
+        for (align, x, y) in [
+            ("halign = \"center\"", -36.166667 / 2.0, 0.0),
+            ("halign = \"right\"", -36.166667, 0.0),
+            ("valign = \"top\"", 0.0, -10.777778),
+            ("valign = \"bottom\"", 0.0, 0.166667),
+            ("valign = \"center\"", 0.0, (0.166667 - 10.777778) / 2.0),
+            ("halign = \"default\", valign = \"default\", language = 7", 0.0, 0.0),
+        ] {
+            let here = at(align);
+            for (k, by) in [x, y, x, y].into_iter().enumerate() {
+                assert!((here[k] - left[k] - by).abs() < 1e-5, "{align}: {here:?} of {left:?}");
+            }
+        }
+        let size = |direction: &str| {
+            let [x, y, u, v] = bounds(&read(&format!("\"iii\", direction = {direction:?}")));
+            [u - x, v - y]
+        };
+        assert!(size("ttb")[1] > 3.0 * size("ltr")[1] && size("ttb")[0] < 0.5 * size("ltr")[0]);
+        assert_eq!(size("ttb"), size("btt"));
+        assert_eq!(size("rtl"), size("ltr"));
+    }
+
+    #[test]
+    fn fonts_and_glyphs_that_are_not_at_hand_are_told() {
+        let told =
+            |arguments: &str| read(arguments).notes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+        assert!(
+            told("\"a\", font = \"Arial:style=Bold\"")
+                .contains("text in \"Arial\": that font is not at hand, set in Ubuntu")
+        );
+        assert!(!told("\"a\", font = \"Hack\"").contains("at hand"));
+        assert!(told("\"a\u{10fff0}\"").contains("has no glyph for "));
+        assert!(told("\"\"").contains("text without a visible character: left out"));
+        assert!(told("\" \"").contains("text without a visible character: left out"));
+        assert!(told("\"o\", $fn = 16").contains("text \"o\": faceted, "));
+    }
+}
