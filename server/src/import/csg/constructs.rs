@@ -340,6 +340,29 @@ fn cases() -> Vec<(String, Inside, f64)> {
 }
 
 #[test]
+fn faceted_hulls_hold_the_polygons_of_all_their_circles() {
+    let raised = |inner: &str| moved(0.0, 0.0, 5.0, inner);
+    let revolved = "rotate_extrude() { difference() { circle(r = 5, $fn = 64); multmatrix([[1,0,0,-9],[0,1,0,-9],[0,0,1,0],\
+                    [0,0,0,1]]) { square([9, 18]); } } }";
+    for round in [
+        "linear_extrude(height = 1) { circle(r = 5, $fn = 64); }".to_owned(),
+        format!(
+            "hull() {{ cylinder(h = 1, r1 = 5, r2 = 5, $fn = 64); {} }}",
+            raised("cylinder(h = 1, r1 = 5, r2 = 5);")
+        ),
+        revolved.to_owned(),
+    ] {
+        let text = format!("hull() {{ {round} {} }}", moved(9.0, 0.0, 0.0, "cube([1, 1, 7]);"));
+        let import = import_csg("m.csg", &text, Facets::Auto, &Limits::default()).expect("a hull");
+        assert!(import.notes.iter().any(|n| n.text.contains("hull: faceted, ")), "{:?}", import.notes);
+        for k in 0..90 {
+            let (s, c) = libm::sincos(f64::from(k) * 4f64.to_radians());
+            assert!(import.solid.value(DVec3::new(4.9 * c, 4.9 * s, 0.01)) < 0.0, "{k}: {text}");
+        }
+    }
+}
+
+#[test]
 fn constructs_hold_what_they_mean_without_seams() {
     let mut r = Random(17);
     for (text, inside, off) in cases() {

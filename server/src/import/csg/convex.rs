@@ -23,6 +23,8 @@ type Result<T> = std::result::Result<T, (Place, Problem)>;
 const SAME: f64 = 1e-9;
 /// Balls up to which their hull is looked for; its cost grows with the third power.
 const MOST_BALLS: usize = 150;
+/// Pieces of a curve that no call stands for, such as one of a hull: OpenSCAD's own of a large circle.
+const PIECES: u32 = 30;
 
 /// What a convex solid is the hull of.
 #[derive(Clone, Copy, Debug)]
@@ -120,7 +122,7 @@ pub fn pieces(parts: &Parts<'_>, root: PartId) -> Option<Vec<Vec<Element>>> {
 
 fn of_leaf(parts: &Parts<'_>, p: PartId) -> Option<Vec<Element>> {
     match &parts.list[p] {
-        Part::Leaf(shape, frame, _) => elements(shape, frame, parts.pieces.get(&p).copied().unwrap_or(1)),
+        Part::Leaf(shape, frame, _) => elements(shape, frame, parts.pieces.get(&p).copied().unwrap_or(PIECES)),
         Part::Empty | Part::Flat(_) | Part::Stray(..) | Part::Op(..) => Some(Vec::new()),
     }
 }

@@ -319,6 +319,9 @@ impl<'a> Lowering<'a> {
                 for leaf in flats(parts, &open.built) {
                     let Part::Flat(flat) = std::mem::replace(&mut parts.list[leaf], Part::Empty) else { continue };
                     parts.list[leaf] = extrusion.part(parts, &open.context.outer, &flat)?;
+                    if flat.pieces > 0 {
+                        parts.pieces.insert(leaf, flat.pieces);
+                    }
                 }
                 Part::Op(Op::Union, at, open.built)
             }
@@ -460,6 +463,7 @@ impl<'a> Lowering<'a> {
             let ball = flat.disc().filter(|d| d.center.x.abs() <= ROUNDING * d.radius && sides.is_empty());
             if let Some(disc) = ball {
                 let center = *outer * DAffine3::from_translation(DVec3::Z * disc.center.y);
+                parts.pieces.insert(leaf, flat.pieces);
                 parts.list[leaf] = parts.leaf(&name, at, place::sphere(&center, disc.radius))?;
                 continue;
             }
