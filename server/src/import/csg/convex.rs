@@ -12,7 +12,7 @@ use super::place;
 use super::polygon::{Region, convex_hull};
 use super::revolve::Lathe;
 use super::{Place, Problem};
-use crate::math::any_perpendicular;
+use crate::math::{Aabb, any_perpendicular};
 use crate::solid::{Op, Shape};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -24,7 +24,7 @@ const SAME: f64 = 1e-9;
 /// Balls up to which their hull is looked for; its cost grows with the third power.
 const MOST_BALLS: usize = 150;
 /// Pieces of a curve that no call stands for, such as one of a hull: OpenSCAD's own of a large circle.
-const PIECES: u32 = 30;
+pub const PIECES: u32 = 30;
 
 /// What a convex solid is the hull of.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +38,36 @@ pub struct Element {
 }
 
 impl Element {
-    fn point(center: DVec3) -> Self {
+    /// A point.
+    pub fn point(center: DVec3) -> Self {
         Self { center, radius: 0.0, axes: None, pieces: 1 }
+    }
+
+    /// Its middle.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Its box.
+    pub fn bounds(&self) -> Aabb {
+        let half = match self.axes {
+            None => DVec3::splat(self.radius),
+            Some(axes) => (DVec3::ONE - axes.z_axis * axes.z_axis).max(DVec3::ZERO).map(f64::sqrt) * self.radius,
+        };
+        Aabb::around(self.center, half)
+    }
+
+    /// What its shadow on z = 0 is the hull of; `None` for an ellipse.
+    pub fn shadow(&self) -> Option<Vec<Disc>> {
+        let disc = |center: DVec3, radius: f64| Disc { center: center.truncate(), radius };
+        let Some(axes) = self.axes else { return Some(vec![disc(self.center, self.radius)]) };
+        let aside = axes.z_axis.truncate();
+        if aside.length() <= SAME {
+            return Some(vec![disc(self.center, self.radius)]);
+        }
+        // A disc that stands upright casts a line.
+        let along = (aside.perp().normalize() * self.radius).extend(0.0);
+        (axes.z_axis.z.abs() <= SAME).then(|| vec![disc(self.center - along, 0.0), disc(self.center + along, 0.0)])
     }
 
     /// Moved.
@@ -62,7 +90,7 @@ impl Element {
     }
 
     /// How far its facets lie inside of it at most.
-    fn deviation(&self) -> f64 {
+    pub fn deviation(&self) -> f64 {
         self.radius * (1.0 - libm::cos(std::f64::consts::PI / f64::from(self.pieces.max(3))))
     }
 
@@ -79,7 +107,7 @@ impl Element {
     }
 
     /// Points whose hull OpenSCAD takes for it.
-    fn facets(&self) -> Vec<DVec3> {
+    pub fn facets(&self) -> Vec<DVec3> {
         if self.radius == 0.0 {
             return vec![self.center];
         }
@@ -106,7 +134,7 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
         Shape::Sphere(s) => Some(vec![Element { center: frame.position, radius: s.radius, axes: None, pieces }]),
         Shape::Cylinder(c) => Some(vec![disc(-c.half_height, c.radius), disc(c.half_height, c.radius)]),
         Shape::Cone(c) => Some(vec![disc(-c.half_height, c.bottom), disc(c.half_height, c.top)]),
-        Shape::Cuboid(c) => corners(&crate::math::Aabb::around(DVec3::ZERO, c.half).corners()),
+        Shape::Cuboid(c) => corners(&Aabb::around(DVec3::ZERO, c.half).corners()),
         Shape::Polyhedron(p) => corners(&p.vertices),
         Shape::TriangleMesh(m) => corners(m.vertices()),
         Shape::HalfSpace(_) | Shape::Torus(_) => None,
@@ -173,7 +201,7 @@ fn clearance(parts: &Parts<'_>, root: PartId, x: DVec3) -> f64 {
 
 /// The hull of elements, from the call `name`.
 pub fn hull(parts: &mut Parts<'_>, name: &str, at: Place, elements: &[Element]) -> Result<Part> {
-    let around = crate::math::Aabb::of_points(elements.iter().map(|e| e.center));
+    let around = Aabb::of_points(elements.iter().map(|e| e.center));
     let reach = elements.iter().map(|e| e.radius).fold(0.0, f64::max);
     let size = around.half().length() + reach;
     let hull = Hull { name, at };

@@ -35,7 +35,7 @@ const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin
 /// Written for drawings of other files by rotate_extrude, and without one by old versions of OpenSCAD.
 const WITHOUT_FILE: [&str; 3] = ["layer", "origin", "timestamp"];
 
-const KINDS: [Construct; 20] = [
+const KINDS: [Construct; 22] = [
     Construct { name: "group", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "union", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "difference", arguments: &[], inside: BALL, fates: &[] },
@@ -172,12 +172,22 @@ const KINDS: [Construct; 20] = [
             ("em", Refused),
         ],
     },
+    Construct {
+        name: "projection",
+        arguments: &[],
+        inside: "{ sphere(r = 1); multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]) { cube(1); } }",
+        fates: &[("cut", Read("true", "false"))],
+    },
+    Construct {
+        name: "resize",
+        arguments: &[("newsize", "[1, 2, 0]")],
+        inside: "{ cube(size = [1, 1, 1]); }",
+        fates: &[("newsize", Read("[2, 3, 4]", "[3, 3, 4]")), ("auto", Read("true", "[0, 0, 0]"))],
+    },
 ];
 
 /// Kinds of nodes and modules of OpenSCAD that make or change shapes in ways that are not imported.
-const REFUSED: [&str; 27] = [
-    "resize",
-    "projection",
+const REFUSED: [&str; 25] = [
     "roof",
     "fill",
     "import",
@@ -218,7 +228,9 @@ fn text(kind: &Construct, changed: Option<(&str, &str)>) -> String {
     let arguments: Vec<String> = arguments.iter().map(|(n, v)| format!("{n} = {v}")).collect();
     let call = format!("{}({}) {}", kind.name, arguments.join(", "), kind.inside);
     match kind.name {
-        "circle" | "square" | "polygon" | "offset" | "text" => format!("linear_extrude(height = 1) {{\n{call}\n}}"),
+        "circle" | "square" | "polygon" | "offset" | "text" | "projection" => {
+            format!("linear_extrude(height = 1) {{\n{call}\n}}")
+        }
         _ => format!("\n{call}"),
     }
 }

@@ -15,8 +15,8 @@ use super::outlines::crossing;
 use super::parts::{Part, PartId, Parts, Signed};
 use super::place::{self, PlacedShape};
 use super::polygon::{Edge, Region};
+use super::slices::{Curve, slices};
 use super::syntax::{Call, ValueKind};
-use super::twist;
 use super::{Place, Problem};
 use crate::math::tolerance::ROUNDING;
 use crate::solid::Op;
@@ -24,27 +24,6 @@ use crate::solid::primitive::MeshError;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
-
-/// Into how many pieces curves are cut.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Curve {
-    /// Pieces of a whole turn; 0 where the other two say it.
-    pub fn_: f64,
-    /// The least angle of a piece, in degrees.
-    pub fa: f64,
-    /// Its least length.
-    pub fs: f64,
-}
-
-impl Curve {
-    /// As a call has it, or OpenSCAD's own.
-    pub fn of(arguments: &Arguments<'_>) -> Result<Self> {
-        let number = |name, default| arguments.number_or(name, default);
-        let fn_ = number("$fn", 0.0)?;
-        let fn_ = if fn_.is_finite() { fn_.max(0.0) } else { 0.0 };
-        Ok(Self { fn_, fa: number("$fa", 12.0)?.max(0.01), fs: number("$fs", 2.0)?.max(0.01) })
-    }
-}
 
 /// A `linear_extrude`: outlines at z = `low`, scaled by `scale` at z = `low + height`.
 #[derive(Clone, Copy, Debug)]
@@ -123,7 +102,7 @@ impl Extrusion {
 
     /// Slices that OpenSCAD cuts it into, of an outline with some corners.
     pub fn slices(&self, corners: &[DVec2]) -> usize {
-        let own = || twist::slices(corners, self.height, self.twist, self.scale, &self.curve);
+        let own = || slices(corners, self.height, self.twist, self.scale, &self.curve);
         self.slices.unwrap_or_else(own).min(f64::from(u32::MAX)) as usize
     }
 

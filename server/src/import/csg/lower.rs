@@ -10,6 +10,7 @@ use super::convex;
 use super::extrude::Extrusion;
 use super::flat::{Flat, Outline};
 use super::imports;
+use super::meshed::Meshed;
 use super::offset::Offset;
 use super::outlines::{self, flat_of, flats};
 use super::parts::{Part, PartId, Parts, emit, is_unbounded};
@@ -19,8 +20,9 @@ use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
 use super::syntax::{Call, CallId, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
-use super::{text, twist};
+use super::{resize, shadow, text, twist};
 use crate::import::{Attachment, Note};
+use crate::math::Aabb;
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
 use crate::solid::Op;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -77,6 +79,10 @@ enum CallKind {
     Revolve(Turn),
     Hull,
     Minkowski,
+    Projection {
+        /// What z = 0 cuts; else the shadow on it.
+        cut: bool,
+    },
     Offset(Offset, u32),
 }
 
@@ -126,7 +132,12 @@ impl<'a> Lowering<'a> {
         if let Some(root) = root {
             self.roots(root);
         }
-        let context = Context { outer: DAffine3::IDENTITY, plane: None, hull: false };
+        self.all(top, root, Context { outer: DAffine3::IDENTITY, plane: None, hull: false })
+    }
+
+    /// The union of some calls, of which `root` alone counts where there is one.
+    fn all(&mut self, top: &[CallId], root: Option<CallId>, context: Context) -> Result<PartId> {
+        let file = self.file;
         let (kind, outside) = (CallKind::Set(Op::Union), context);
         let mut open = vec![Open { call: None, children: top, next: 0, kind, outside, context, built: Vec::new() }];
         while let Some(current) = open.last_mut() {
@@ -197,6 +208,23 @@ impl<'a> Lowering<'a> {
             }),
             "hull" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Hull)),
             "minkowski" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Minkowski)),
+            "projection" => {
+                let cut = Arguments::new(call, &["cut", "convexity"])?.bool_or("cut", false)?;
+                let inside = Context { outer: DAffine3::IDENTITY, plane: None, hull: false };
+                Ok(Step::open(CallKind::Projection { cut }, inside))
+            }
+            "resize" => {
+                let scale = resize::scale(call, context.plane.is_some(), || self.bounds(call, context))?;
+                let linear = DMat3::from_diagonal(scale);
+                let context = match context.plane {
+                    Some(plane) => {
+                        let inner = plane.inner * DAffine3::from_mat3(linear);
+                        Context { plane: Some(Plane { inner, ..plane }), ..context }
+                    }
+                    None => Context { outer: context.outer * DAffine3::from_mat3(linear), ..context },
+                };
+                Ok(Step::open(CallKind::Set(Op::Union), context))
+            }
             "offset" => {
                 let offset = Offset::new(call)?;
                 let pieces = self.shapes.pieces(&Offset::arguments(call)?, offset.by().abs())?;
@@ -280,9 +308,23 @@ impl<'a> Lowering<'a> {
         Ok(Step::open(CallKind::Revolve(turn), Context { plane, hull: false, ..context }))
     }
 
+    /// The box of what is inside of a call, in the call's own coordinates; of 2D shapes flat. `None` for nothing.
+    fn bounds(&self, call: &'a Call, context: Context) -> Result<Option<(Aabb, f64)>> {
+        let parts = Parts::new(self.shapes.limits);
+        let shapes = Shapes { facets: self.shapes.facets, limits: self.shapes.limits, parts };
+        let mut inside = Lowering { file: self.file, attached: self.attached, shapes };
+        let plane = context.plane.map(|_| Plane { inner: DAffine3::IDENTITY, overshoot: 0 });
+        let own = Context { outer: DAffine3::IDENTITY, plane, hull: false };
+        let root = inside.all(&call.children, None, own)?;
+        resize::bounds(&mut inside.shapes.parts, call.at, root, plane.is_some())
+    }
+
     /// What a call has become, all that is inside of it being there.
     fn close(&mut self, open: Open<'_>) -> Result<PartId> {
         let at = open.at();
+        if let (CallKind::Projection { cut }, Some(call)) = (&open.kind, open.call) {
+            return self.projection(call, *cut, open.outside.plane, open.built);
+        }
         if open.context.plane.is_none() {
             let (built, stray) = self.of_one_dimension(open.built, open.call.is_none())?;
             if let Some((at, name)) = stray {
@@ -292,7 +334,9 @@ impl<'a> Lowering<'a> {
                 CallKind::Set(op) => Part::Op(op, at, built),
                 CallKind::Hull => self.hull(at, &built)?,
                 CallKind::Minkowski => self.minkowski(at, &built, open.outside.outer.translation)?,
-                CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) => Part::Empty,
+                CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) | CallKind::Projection { .. } => {
+                    Part::Empty
+                }
             };
             return Ok(self.shapes.parts.push(part));
         }
@@ -309,7 +353,7 @@ impl<'a> Lowering<'a> {
         let parts = &mut self.shapes.parts;
         let part = match (&open.kind, open.call) {
             (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
-            (_, None) => Part::Empty,
+            (_, None) | (CallKind::Projection { .. }, _) => Part::Empty,
             (CallKind::Extrude(extrusion), _)
                 if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f))) =>
             {
@@ -391,16 +435,48 @@ impl<'a> Lowering<'a> {
         Ok((kept, None))
     }
 
+    /// The flat parts of a projection of some solids, in a plane or where none is.
+    fn projection(&mut self, call: &Call, cut: bool, plane: Option<Plane>, built: Vec<PartId>) -> Result<PartId> {
+        let at = call.at;
+        let (built, stray) = self.of_one_dimension(built, false)?;
+        let parts = &mut self.shapes.parts;
+        if let Some((at, name)) = stray {
+            parts.note(at, format!("{name} inside of projection: a 2D shape, left out, as OpenSCAD does"), None);
+        }
+        let Some(plane) = plane else { return Ok(parts.push(Part::Stray(at, call.name.clone()))) };
+        let like = Flat {
+            outline: Outline::Circle(1.0),
+            inner: DAffine3::IDENTITY,
+            overshoot: plane.overshoot,
+            name: call.name.clone(),
+            at,
+            pieces: built.iter().filter_map(|p| parts.most_pieces(*p)).max().unwrap_or(convex::PIECES),
+        };
+        let part =
+            if cut { shadow::section(parts, at, &like, &built)? } else { shadow::shadow(parts, at, &like, &built)? };
+        let id = parts.push(part);
+        for leaf in flats(parts, &[id]) {
+            if let Part::Flat(flat) = &mut parts.list[leaf] {
+                flat.inner = plane.inner * flat.inner;
+            }
+        }
+        Ok(id)
+    }
+
     fn hull(&mut self, at: Place, built: &[PartId]) -> Result<Part> {
         let parts = &mut self.shapes.parts;
         let mut elements = Vec::new();
         for p in built {
-            let Some(more) = convex::extremes(parts, *p) else {
-                let hint = " (hull what is left of it: spheres, cylinders, cubes and polyhedra)";
-                let construct = "hull of what a difference or an intersection has cut".into();
-                return Err((at, Problem::Unsupported { construct, hint }));
-            };
-            elements.extend(more);
+            if let Some(more) = convex::extremes(parts, *p) {
+                elements.extend(more);
+                continue;
+            }
+            // The corners of what is left of it.
+            let mesh = Meshed::of(parts, at, *p)?;
+            if mesh.off > 0.0 {
+                parts.faceted(at, "what a hull holds, cut", mesh.triangles(), mesh.off);
+            }
+            elements.extend(mesh.elements());
         }
         if elements.is_empty() {
             return Ok(Part::Empty);
@@ -416,10 +492,16 @@ impl<'a> Lowering<'a> {
         }
         let mut operands = Vec::with_capacity(built.len());
         for p in built {
-            let Some(pieces) = convex::pieces(parts, *p) else {
-                let hint = " (write the sum out as a union of sums of convex pieces)";
-                let construct = "minkowski of a solid that is no union of convex primitives".into();
-                return Err((at, Problem::Unsupported { construct, hint }));
+            let pieces = match convex::pieces(parts, *p) {
+                Some(pieces) => pieces,
+                None => {
+                    let mesh = Meshed::of(parts, at, *p)?;
+                    let Some(piece) = mesh.convex() else { return self.minkowski_of_meshes(at, built, origin) };
+                    if mesh.off > 0.0 {
+                        parts.faceted(at, "what minkowski sums, cut", mesh.triangles(), mesh.off);
+                    }
+                    if mesh.is_empty() { Vec::new() } else { vec![piece] }
+                }
             };
             if !pieces.is_empty() {
                 operands.push(pieces);
@@ -435,6 +517,23 @@ impl<'a> Lowering<'a> {
             }
         }
         Ok(Part::Op(Op::Union, at, made))
+    }
+
+    /// The same of solids that are not unions of convex ones: of their meshes.
+    fn minkowski_of_meshes(&mut self, at: Place, built: &[PartId], origin: DVec3) -> Result<Part> {
+        let parts = &mut self.shapes.parts;
+        let mut sum: Option<Meshed> = None;
+        for p in built {
+            let mesh = Meshed::of(parts, at, *p)?;
+            sum = match sum {
+                _ if mesh.is_empty() => sum,
+                None => Some(mesh),
+                Some(before) => Some(before.plus(&mesh, at, origin)?),
+            };
+        }
+        let Some(sum) = sum else { return Ok(Part::Empty) };
+        parts.faceted(at, "minkowski", sum.triangles(), sum.off);
+        sum.part(parts, at, "faceted minkowski")
     }
 
     fn revolve(&mut self, call: &Call, turn: Turn, outer: &DAffine3, built: Vec<PartId>) -> Result<PartId> {
@@ -591,7 +690,7 @@ fn hint(name: &str) -> &'static str {
         "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
         | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
         "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
-        "resize" | "projection" | "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
+        "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
         "fill" => " (write the outline out in circles, squares and polygons)",
         _ => "",
     }

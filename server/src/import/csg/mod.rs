@@ -24,18 +24,24 @@ mod hull;
 mod imports;
 mod lexer;
 mod lower;
+mod meshed;
 mod offset;
 mod outlines;
 mod parts;
 mod place;
 mod polygon;
+mod resize;
 mod revolve;
+mod shadow;
 mod shapes;
+mod slices;
 mod syntax;
 #[cfg(test)]
 mod tests;
 mod text;
 mod twist;
+#[cfg(test)]
+mod whole;
 
 use super::format::Named;
 use super::problem::Problem;

@@ -81,6 +81,18 @@ impl<'a> Parts<'a> {
         self.note(at, format!("{what}: faceted, {facets} facets, max deviation {off:.1e}"), None);
     }
 
+    /// The most pieces that a round primitive below a part is cut into.
+    pub fn most_pieces(&self, root: PartId) -> Option<u32> {
+        let (mut most, mut stack) = (None, vec![root]);
+        while let Some(p) = stack.pop() {
+            most = most.max(self.pieces.get(&p).copied());
+            if let Part::Op(_, _, of) = &self.list[p] {
+                stack.extend(of);
+            }
+        }
+        most
+    }
+
     /// An operation.
     pub fn op(&mut self, op: Op, at: Place, operands: Vec<PartId>) -> PartId {
         match operands.as_slice() {

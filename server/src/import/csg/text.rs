@@ -5,11 +5,11 @@
 //! at most; kerning counts, ligatures are not made.
 
 use super::arguments::Arguments;
-use super::extrude::Curve;
 use super::flat::{Flat, Outline};
 use super::parts::{Part, PartId};
 use super::polygon::overlay;
 use super::shapes::Shapes;
+use super::slices::Curve;
 use super::syntax::{Call, ValueKind};
 use super::{Place, Problem};
 use crate::import::Attachment;

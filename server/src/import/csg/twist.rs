@@ -4,7 +4,7 @@
 //! shorter diagonal, between caps (linear_extrude of OpenSCAD 2021.01; how many slices: its Calc). Slices so coarse that their facets
 //! cross are halved until they do not.
 
-use super::extrude::{Curve, Extrusion};
+use super::extrude::Extrusion;
 use super::facets::direction;
 use super::outlines::{crossing, paths};
 use super::parts::{Part, PartId, Parts};
@@ -16,8 +16,6 @@ use glam::{DAffine3, DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
-/// Lengths below which OpenSCAD takes points as one: its finer grid.
-const GRID: f64 = 1.0 / (1u64 << 20) as f64;
 /// Diagonals that differ by less than this, relative to their half sum, are equally long to OpenSCAD.
 const SAME_DIAGONAL: f64 = 1e-5;
 /// How often slices are halved where facets cross.
@@ -70,39 +68,6 @@ pub fn extruded(
         }
     }
     Ok(Part::Empty)
-}
-
-/// OpenSCAD's number of slices of a twist, or of an uneven scale without one, of an outline with some corners.
-pub fn slices(corners: &[DVec2], height: f64, twist: f64, scale: DVec2, curve: &Curve) -> f64 {
-    let largest = |all: &dyn Fn(DVec2) -> f64| corners.iter().map(|p| all(*p)).fold(0.0, f64::max);
-    if twist == 0.0 {
-        let way = largest(&|p| (p - p * scale).length());
-        return if way < GRID {
-            1.0
-        } else if curve.fn_ > 0.0 {
-            curve.fn_.floor().max(1.0)
-        } else {
-            (way.hypot(height) / curve.fs).ceil().max(1.0)
-        };
-    }
-    let (turned, radius) = (twist.abs(), largest(&|p| p.length()));
-    let least = (turned / 120.0).ceil().max(1.0);
-    if radius < GRID {
-        return least;
-    }
-    if curve.fn_ > 0.0 {
-        return (turned / 360.0 * curve.fn_).ceil().max(least);
-    }
-    let angle = turned.to_radians();
-    let length = if scale.x == scale.y && scale.x != 1.0 {
-        // Along a spiral of Archimedes that ends where the scale would be 0.
-        let end = angle * if scale.x > 1.0 { scale.x / (scale.x - 1.0) } else { 1.0 / (1.0 - scale.x) };
-        let arc = |t: f64| 0.5 * (radius / end) * (t * (1.0 + t * t).sqrt() + libm::asinh(t));
-        (arc(end) - arc(end - angle)).hypot(height)
-    } else {
-        (angle * radius).hypot(height)
-    };
-    (turned / curve.fa).ceil().min((length / curve.fs).ceil()).max(least)
 }
 
 /// A mesh in the making.

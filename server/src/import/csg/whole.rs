@@ -1,0 +1,181 @@
+//! Constructs that look at the whole of what is inside, held against the inside itself: hulls and sums of what something has cut,
+//! shadows, sections, sizes.
+
+use crate::import::{Facets, Import, Limits, import_csg};
+use crate::math::random::Random;
+use glam::{DVec2, DVec3};
+
+fn read(text: &str) -> Import {
+    import_csg("m.csg", text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+fn moved(by: DVec3, inner: &str) -> String {
+    let [x, y, z] = by.to_array();
+    format!("multmatrix([[1, 0, 0, {x}], [0, 1, 0, {y}], [0, 0, 1, {z}], [0, 0, 0, 1]]) {{ {inner} }}")
+}
+
+fn is_faceted(import: &Import) -> bool {
+    import.notes.iter().any(|n| n.text.contains("faceted"))
+}
+
+/// Volume by sums over a grid.
+fn volume(import: &Import, n: u32) -> f64 {
+    let b = import.solid.aabb();
+    let size = b.max - b.min;
+    let at = |i: u32| DVec3::new(f64::from(i % n), f64::from(i / n % n), f64::from(i / n / n)) + 0.5;
+    let inside = (0..n * n * n).filter(|i| import.solid.value(b.min + size * at(*i) / f64::from(n)) < 0.0);
+    size.x * size.y * size.z * inside.count() as f64 / f64::from(n * n * n)
+}
+
+/// A difference or an intersection of random boxes, balls and cylinders.
+fn random_cut(r: &mut Random, flat: bool) -> String {
+    let operand = |r: &mut Random, size: f64| {
+        let at = r.vector(0.7);
+        let shape = match (flat, (r.unit() * 3.0) as u32) {
+            (false, 0) => format!("sphere(r = {}, $fn = 40);", size * r.within(0.6, 1.0)),
+            (false, 1) => {
+                format!("cylinder(h = {}, r1 = {}, r2 = {}, center = true, $fn = 40);", 2.0 * size, size, 0.6 * size)
+            }
+            _ => format!("cube([{}, {}, {}], center = true);", 2.0 * size, r.within(1.0, 2.0) * size, 1.5 * size),
+        };
+        moved(at, &shape)
+    };
+    let (a, b, c) = (operand(r, 2.0), operand(r, 1.3), operand(r, 1.0));
+    match (r.unit() * 3.0) as u32 {
+        0 => format!("difference() {{ {a} {b} {c} }}"),
+        1 => format!("intersection() {{ {a} {b} }}"),
+        _ => format!("difference() {{ union() {{ {a} {c} }} {b} }}"),
+    }
+}
+
+#[test]
+fn a_hull_of_what_is_cut_holds_what_is_left_and_reaches_no_farther() {
+    let mut r = Random(41);
+    for round in 0..16 {
+        let cut = random_cut(&mut r, round % 2 == 0);
+        let (inner, hull) = (read(&cut), read(&format!("hull() {{ {cut} }}")));
+        let b = inner.solid.aabb();
+        let off = if round % 2 == 0 { 1e-9 } else { 0.03 };
+        let points: Vec<DVec3> = (0..6000).map(|_| b.center() + r.vector(1.0) * b.half()).collect();
+        let kept: Vec<DVec3> = points.into_iter().filter(|x| inner.solid.value(*x) < 0.0).collect();
+        assert!(kept.iter().all(|x| hull.solid.value(*x) < off), "{cut}");
+        // Along each direction the hull ends where the last of what is left does.
+        for _ in 0..20 {
+            let n = r.vector(1.0).normalize();
+            let reach = kept.iter().map(|x| n.dot(*x)).fold(f64::NEG_INFINITY, f64::max);
+            let beyond = (0..4000).map(|_| b.center() + r.vector(1.0) * b.half()).filter(|x| n.dot(*x) > reach + 0.5);
+            assert!(beyond.into_iter().all(|x| hull.solid.value(x) > -0.05), "{n} of {cut}");
+        }
+        assert!(round % 2 == 1 || !hull.notes.iter().any(|n| n.text.contains("faceted")), "{:?}", hull.notes);
+    }
+    // A cube without a corner: its hull lacks the corner of a tetrahedron.
+    let corner = format!("hull() {{ difference() {{ cube(2); {} }} }}", moved(DVec3::ONE, "cube(2);"));
+    assert!(
+        (read(&corner).solid.primitives.len() == 1) && (volume(&read(&corner), 60) - (8.0 - 1.0 / 6.0)).abs() < 0.02
+    );
+    let nothing = read("cube(1); hull() { difference() { cube(1); cube(3, center = true); } }");
+    assert_eq!(nothing.solid.primitives.len(), 1);
+}
+
+#[test]
+fn sums_of_what_is_not_convex_are_exact_where_it_is_and_meshes_where_not() {
+    let bend = format!("difference() {{ cube([3, 3, 1]); {} }}", moved(DVec3::new(1.0, 1.0, -1.0), "cube(9);"));
+    for (around, at) in [(String::new(), DVec3::ZERO), ("moved".into(), DVec3::new(5.0, -2.0, 1.0))] {
+        let sum = format!("minkowski() {{ {bend} cube(1); }}");
+        let import = read(&if around.is_empty() { sum } else { moved(at, &sum) });
+        let mut r = Random(43);
+        for _ in 0..2000 {
+            let x = DVec3::new(r.within(-0.5, 4.5), r.within(-0.5, 4.5), r.within(-0.5, 2.5));
+            let inside = x.min_element() > 0.0 && x.x < 4.0 && x.y < 4.0 && x.z < 2.0 && (x.x < 2.0 || x.y < 2.0);
+            let f = import.solid.value(x + at);
+            assert!(f.abs() < 1e-9 || (f < 0.0) == inside, "{x}: {f}");
+        }
+        assert!(is_faceted(&import));
+    }
+    let round =
+        format!("minkowski() {{ intersection() {{ cube(2); {} }} sphere(0.5); }}", moved(DVec3::ONE, "cube(2);"));
+    let import = read(&round);
+    let mut r = Random(44);
+    for _ in 0..2000 {
+        let x = DVec3::splat(1.5) + r.vector(1.2);
+        let away = (x - x.clamp(DVec3::ONE, DVec3::splat(2.0))).length();
+        let f = import.solid.value(x);
+        assert!((away - 0.5).abs() < 1e-9 || (f < 0.0) == (away < 0.5), "{x}: {f}");
+    }
+    assert!(!is_faceted(&import), "{:?}", import.notes);
+}
+
+#[test]
+fn sections_and_shadows_are_what_the_solid_says() {
+    let mut r = Random(45);
+    for round in 0..16 {
+        let exact = round % 2 == 0;
+        let tilted = "multmatrix([[0.6, 0, 0.8, 0.3], [0, 1, 0, 0.2], [-0.8, 0, 0.6, 0.1], [0, 0, 0, 1]])";
+        let inner = random_cut(&mut r, false);
+        let inner = if exact { inner } else { format!("union() {{ {tilted} {{ {inner} }} cube(0.5); }}") };
+        let solid = read(&inner).solid;
+        let flat =
+            |cut: bool| read(&format!("linear_extrude(height = 2) {{ projection(cut = {cut}) {{ {inner} }} }}")).solid;
+        let (section, shadow) = (flat(true), flat(false));
+        let b = solid.aabb();
+        for _ in 0..300 {
+            let p = (b.center() + r.vector(1.0) * b.half()).truncate();
+            let f = solid.value(p.extend(0.0));
+            if f.abs() > if exact { 1e-7 } else { 0.05 } {
+                assert_eq!(section.value(p.extend(1.0)) < 0.0, f < 0.0, "{p}, f {f}, section of {inner}");
+            }
+            let along = (0..200).map(|i| p.extend(b.min.z + (b.max.z - b.min.z) * (f64::from(i) + 0.5) / 200.0));
+            let deepest = along.map(|x| solid.value(x)).fold(f64::INFINITY, f64::min);
+            if deepest.abs() > 0.08 {
+                let g = shadow.value(p.extend(1.0));
+                assert_eq!(g < 0.0, deepest < 0.0, "{p}, f {deepest}, {g}: shadow of {inner}");
+            }
+        }
+    }
+    // A face in the plane: what lies above it. A lying cylinder casts a rectangle, an upright one its circle, exactly.
+    let on = |text: &str, p: DVec2| {
+        read(&format!("linear_extrude(height = 2) {{ {text} }}")).solid.value(p.extend(1.0)) < 0.0
+    };
+    assert!(on("projection(cut = true) { cube(2); }", DVec2::ONE));
+    assert!(!on(
+        "projection(cut = true) { cube(3); multmatrix([[1,0,0,5],[0,1,0,0],[0,0,1,-2],[0,0,0,1]]) { cube(2); } }",
+        DVec2::new(6.0, 1.0)
+    ));
+    let lying =
+        "multmatrix([[1,0,0,0],[0,0,-1,0],[0,1,0,9],[0,0,0,1]]) { cylinder(h = 4, r1 = 1, r2 = 1, center = true); }";
+    let import = read(&format!(
+        "linear_extrude(height = 1) {{ projection() {{ {lying} cylinder(h = 1, r1 = 1.5, r2 = 1.5); }} }}"
+    ));
+    assert!(!is_faceted(&import) && import.solid.primitives.len() == 2, "{:?}", import.notes);
+    assert!(
+        import.solid.value(DVec3::new(0.99, 1.99, 0.5)) < 0.0 && import.solid.value(DVec3::new(1.499, 0.0, 0.5)) < 0.0
+    );
+}
+
+#[test]
+fn resized_shapes_have_the_sizes_that_are_asked_for() {
+    let size = |text: &str| {
+        let b = read(text).solid.aabb();
+        b.max - b.min
+    };
+    let near = |a: DVec3, b: [f64; 3]| (a - DVec3::from_array(b)).abs().max_element() < 1e-9;
+    assert!(near(size("resize([4, 0, 6]) { cube([1, 2, 3]); }"), [4.0, 2.0, 6.0]));
+    assert!(near(size("resize([4, 0, 0], auto = true) { cube([1, 2, 3]); }"), [4.0, 8.0, 12.0]));
+    assert!(near(size("resize([4, 0, 0], auto = [false, true, false]) { cube([1, 2, 3]); }"), [4.0, 8.0, 3.0]));
+    assert!(near(size("resize([6, 6, 6]) { sphere(1); }"), [6.0, 6.0, 6.0]));
+    assert!(near(
+        size("linear_extrude(height = 1) { resize([3, 1]) { square([1, 4]); circle(0.1, $fn = 4); } }"),
+        [3.0, 1.0, 1.0]
+    ));
+    assert!(near(size("resize([0, 0, 0]) { cube([1, 2, 3]); }"), [1.0, 2.0, 3.0]));
+    assert!(near(size("resize([2, 2, 2]) { resize([1, 5, 9]) { cube(3); } }"), [2.0, 2.0, 2.0]));
+    let text = format!("resize([1, 5, 5]) {{ difference() {{ cube(2); {} }} }}", moved(DVec3::X, "cube(9);"));
+    let import = read(&text);
+    // What is left of the cube is one wide, and stays so; the cube that was cut away is as large as before.
+    let inside = |x: f64, y: f64, z: f64| import.solid.value(DVec3::new(x, y, z)) < 0.0;
+    assert!(inside(0.99, 4.9, 4.9) && !inside(1.01, 1.0, 1.0) && !inside(0.5, 5.1, 1.0));
+    // About the origin, not about itself.
+    let aside = format!("resize([2, 0, 0]) {{ {} }}", moved(DVec3::X, "cube(1);"));
+    assert!((read(&aside).solid.aabb().min.x - 2.0).abs() < 1e-12);
+    assert_eq!(read("cube(1); resize([1, 1, 1]) { }").solid.primitives.len(), 1);
+}
