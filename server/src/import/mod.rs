@@ -8,6 +8,7 @@
 //! Floor 3: imports `solid`, `math`, `proto`.
 
 pub mod csg;
+pub mod drawing;
 pub mod font;
 pub mod format;
 pub mod mesh;
@@ -15,7 +16,7 @@ pub mod problem;
 pub mod scene;
 
 pub use csg::import_csg;
-pub use format::{Attachment, FORMATS, Format, ModelBytes, Source, read_bytes, read_model};
+pub use format::{Attachment, FORMATS, Format, ModelBytes, Named, Source, read_bytes, read_model};
 pub use problem::Problem;
 pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
 

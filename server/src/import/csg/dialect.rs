@@ -318,8 +318,8 @@ fn every_other_kind_is_refused_with_its_place_and_what_to_do() {
     }
     assert_eq!(
         read("union() {\n  linear_extrude(file = \"part.dxf\", layer = \"0\", height = 3);\n}").unwrap_err(),
-        "m.csg:2:18: expected a supported construct, found linear_extrude of another file, which is not \
-         supported (other files are not read: write the shape out in primitives)"
+        "m.csg:2:3: expected a supported construct, found linear_extrude, which is not supported (a text that is \
+         sent names no files: send the mesh itself, by its format)"
     );
 }
 

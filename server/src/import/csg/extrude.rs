@@ -46,7 +46,11 @@ pub struct Extrusion {
 impl Extrusion {
     /// Its arguments by name. With straight walls, `slices` and `segments` cut flat walls into flat pieces: they change nothing.
     pub fn arguments(call: &Call) -> Result<Arguments<'_>> {
-        Arguments::new(call, &["height", "center", "twist", "slices", "scale", "segments", "v"])
+        const OWN: [&str; 7] = ["height", "center", "twist", "slices", "scale", "segments", "v"];
+        if call.children.is_empty() {
+            return Arguments::new(call, &[&OWN[..], &["file", "layer", "origin", "timestamp"]].concat());
+        }
+        Arguments::new(call, &OWN)
     }
 
     /// Reads the arguments of `linear_extrude`.

@@ -1,22 +1,61 @@
-//! `import` of meshes: files beside the text, which whoever read it has read too.
+//! `import` of meshes and drawings: files beside the text, which whoever read it has read too.
 
 use super::arguments::Arguments;
-use super::parts::PartId;
+use super::flat::{Flat, Outline};
+use super::parts::{Part, PartId};
 use super::shapes::Shapes;
+use super::slices::Curve;
 use super::syntax::{Call, ValueKind};
 use super::{Place, Problem};
-use crate::import::{Attachment, mesh};
-use glam::DAffine3;
+use crate::import::{Attachment, drawing, mesh};
+use glam::{DAffine3, DVec2};
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
 
 /// What OpenSCAD writes beside the file; of a mesh `center` alone changes anything.
 const PARAMETERS: [&str; 9] = ["file", "layer", "convexity", "origin", "scale", "center", "dpi", "id", "timestamp"];
 
-/// The file that a call names, where it does.
+/// The same of extrusions that name a drawing, with what they have of their own.
+const OF_EXTRUSIONS: [&str; 13] = [
+    "file",
+    "layer",
+    "origin",
+    "scale",
+    "timestamp",
+    "height",
+    "center",
+    "twist",
+    "slices",
+    "segments",
+    "v",
+    "angle",
+    "start",
+];
+
+/// The file that a call names, where it does: `import`, or an extrusion without anything inside.
 pub fn file_of(call: &Call) -> Option<String> {
-    let arguments = Arguments::new(call, &PARAMETERS).ok()?;
-    match &arguments.get("file")?.kind {
-        ValueKind::Text(name) => Some(name.clone()),
+    let value = call.arguments.iter().find(|a| a.name.as_deref() == Some("file"))?;
+    match &value.value.kind {
+        ValueKind::Text(name) if call.name == "import" || call.children.is_empty() && !name.is_empty() => {
+            Some(name.clone())
+        }
         _ => None,
+    }
+}
+
+/// The bytes of a file that a call names, and its name.
+fn bytes_of<'b>(call: &Call, attached: Option<&'b [Attachment]>) -> Result<(String, &'b [u8])> {
+    let Some(attached) = attached else {
+        let hint = " (a text that is sent names no files: send the mesh itself, by its format)";
+        return Err((call.at, Problem::Unsupported { construct: call.short(), hint }));
+    };
+    let Some(name) = file_of(call) else {
+        return Err((call.at, Problem::syntax(format!("a file's name as file of {}", call.name), "none")));
+    };
+    match attached.iter().find(|a| a.name == name).map(|a| &a.bytes) {
+        Some(Ok(bytes)) => Ok((name, bytes)),
+        Some(Err(why)) => Err((call.at, Problem::syntax("a readable file", why.clone()))),
+        None => Err((call.at, Problem::syntax("a file that was read", format!("{name:?}")))),
     }
 }
 
@@ -29,35 +68,76 @@ pub fn import(
     call: &Call,
     (outer, hull): (&DAffine3, bool),
     attached: Option<&[Attachment]>,
-) -> Result<PartId, (Place, Problem)> {
+) -> Result<PartId> {
     let refused = |construct: String, hint| (call.at, Problem::Unsupported { construct, hint });
-    let Some(attached) = attached else {
-        return Err(refused(
-            call.short(),
-            " (a text that is sent names no files: send the mesh itself, by its format)",
-        ));
-    };
-    let arguments = Arguments::new(call, &PARAMETERS)?;
-    let centred = arguments.bool_or("center", false)?;
-    let Some(name) = file_of(call) else {
-        return Err((call.at, Problem::syntax("a file's name as file of import", "none")));
-    };
-    if centred {
+    let (name, bytes) = bytes_of(call, attached)?;
+    if Arguments::new(call, &PARAMETERS)?.bool_or("center", false)? {
         return Err(refused(format!("import of {name:?} with center = true"), " (move it instead)"));
     }
-    let found = attached.iter().find(|a| a.name == name).map(|a| &a.bytes);
-    let bytes = match found {
-        Some(Ok(bytes)) => bytes,
-        Some(Err(why)) => return Err((call.at, Problem::syntax("a readable file", why.clone()))),
-        None => return Err((call.at, Problem::syntax("a file that was read", format!("{name:?}")))),
-    };
     let Some(read) = mesh::of_file(&name, bytes, shapes.limits) else {
-        return Err(refused(format!("import of {name:?}"), " (of other files stl, off and obj are read)"));
+        return Err(refused(format!("import of {name:?}"), " (of other files stl, off, obj and dxf are read)"));
     };
     let polygons =
         read.map_err(|(at, problem)| (call.at, Problem::Named { file: name, at, problem: problem.into() }))?;
     let clockwise: Vec<Vec<u32>> = polygons.faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
     shapes.of_faces(call, outer, hull, (polygons.points, clockwise))
+}
+
+/// What an `import` is, before it is read: a drawing, or a solid.
+pub fn is_flat(call: &Call) -> bool {
+    file_of(call).is_some_and(|name| drawing::is_drawing(&name))
+}
+
+/// The flat shape that a call imports, of `import` itself or of an extrusion that names a drawing.
+///
+/// # Errors
+/// What is wrong with the call or with the file, and where.
+pub fn flat(
+    shapes: &mut Shapes<'_>,
+    call: &Call,
+    (inner, overshoot): (DAffine3, u32),
+    attached: Option<&[Attachment]>,
+) -> Result<PartId> {
+    let at = call.at;
+    let (name, bytes) = bytes_of(call, attached)?;
+    let arguments = Arguments::new(call, if call.name == "import" { &PARAMETERS } else { &OF_EXTRUSIONS })?;
+    let layer = match arguments.get("layer").map(|v| (&v.kind, v)) {
+        None => String::new(),
+        Some((ValueKind::Text(layer), _)) => layer.clone(),
+        Some((_, v)) => return Err((v.at, Problem::syntax("a layer's name as layer of import", v.found()))),
+    };
+    let origin = arguments.pair_or("origin", DVec2::ZERO)?;
+    // An extrusion's own scale scales its drawing, too, as it does in OpenSCAD.
+    let scale = arguments.pair_or("scale", DVec2::ONE)?.x;
+    Curve::of(&arguments)?;
+    let pieces = |radius: f64| shapes.pieces(&arguments, radius).unwrap_or(3);
+    let frame = drawing::Frame { layer: &layer, origin, scale, pieces: &pieces };
+    let Some(read) = drawing::of_file(&name, bytes, &frame) else {
+        let hint = " (of other files stl, off, obj and dxf are read)";
+        return Err((at, Problem::Unsupported { construct: format!("{} of {name:?}", call.name), hint }));
+    };
+    let drawing = read
+        .map_err(|(place, problem)| (at, Problem::Named { file: name.clone(), at: place, problem: problem.into() }))?;
+    for (what, count) in &drawing.left_out {
+        shapes.parts.note(at, format!("{count} {what} of {name:?}: left out, as OpenSCAD does"), None);
+    }
+    let mut paths = drawing.paths;
+    if paths.is_empty() {
+        return Ok(shapes.nothing(call, &format!("of {name:?}, without a closed path")));
+    }
+    if arguments.get("center").is_some() && call.name == "import" && arguments.bool_or("center", false)? {
+        let all = || paths.iter().flatten();
+        let low = all().fold(DVec2::INFINITY, |m, p| m.min(*p));
+        let high = all().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
+        paths.iter_mut().flatten().for_each(|p| *p -= (low + high) * 0.5);
+    }
+    let corners = paths.iter().map(Vec::len).sum();
+    shapes.parts.affordable(at, paths.iter().map(Vec::len).max().unwrap_or(0))?;
+    if drawing.off > 0.0 {
+        shapes.parts.faceted(at, &format!("curves of {name:?}"), corners, drawing.off);
+    }
+    let flat = Flat { outline: Outline::Paths(paths), inner, overshoot, name: call.name.clone(), at, pieces: 0 };
+    Ok(shapes.parts.push(Part::Flat(Box::new(flat))))
 }
 
 #[cfg(test)]
@@ -73,7 +153,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir_all(at("text/parts")).expect("folders");
-        for name in ["text/parts/t.off", "t.off", "text/t.dxf"] {
+        for name in ["text/parts/t.off", "t.off", "text/t.dat"] {
             fs::write(at(name), TETRAHEDRON).expect("written");
         }
         fs::write(at("text/broken.off"), TETRAHEDRON.replace("3 0 3 2", "3 0 3 9")).expect("written");
@@ -97,7 +177,10 @@ mod tests {
             (at("t.off").to_str().expect("a name"), outside),
             ("none.stl", "expected a readable file, found \"none.stl\": No such file"),
             ("parts", "which is no plain file"),
-            ("t.dxf", "found import of \"t.dxf\", which is not supported (of other files stl, off and obj are read)"),
+            (
+                "t.dat",
+                "found import of \"t.dat\", which is not supported (of other files stl, off, obj and dxf are read)",
+            ),
             ("broken.off", "m.csg:1:1: broken.off:9:7: expected a point's number below 4, found \"9\""),
         ] {
             let error = read(&of(name)).expect_err(name);
@@ -107,5 +190,52 @@ mod tests {
             import_csg("m.csg", &of("parts/t.off"), Facets::Auto, &Limits::default()).expect_err("sent").to_string();
         assert!(sent.starts_with("m.csg:1:1: expected a supported construct, found import"), "{sent}");
         assert!(sent.ends_with("(a text that is sent names no files: send the mesh itself, by its format)"), "{sent}");
+    }
+
+    #[test]
+    fn a_drawing_beside_the_text_is_a_flat_shape_and_a_missing_one_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let dxf = "0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n8\nrim\n70\n1\n10\n0\n20\n0\n10\n4\n20\n0\n10\n4\n20\n2\n10\n0\n20\n2\n\
+                   0\nCIRCLE\n8\nbore\n10\n1\n20\n1\n40\n0.5\n0\nENDSEC\n0\nEOF\n";
+        fs::write(folder.path().join("plate.dxf"), dxf).expect("written");
+        let read = |text: &str| {
+            let path = folder.path().join("m.csg");
+            fs::write(&path, text).expect("written");
+            read_model(&path, Facets::Auto, &Limits::default()).map_err(|e| e.to_string())
+        };
+        let of = "file = \"plate.dxf\", layer = \"LAYER\", origin = [0, 0], scale = 1, convexity = 1, $fn = 64";
+        let inside = |text: &str, x: f64, y: f64, z: f64| {
+            read(text).unwrap_or_else(|e| panic!("{text}: {e}")).solid.value(DVec3::new(x, y, z)) < 0.0
+        };
+        for plate in [
+            format!("linear_extrude(height = 2) {{ import({}); }}", of.replace("LAYER", "")),
+            "linear_extrude(file = \"plate.dxf\", layer = \"\", origin = [0, 0], timestamp = 1, height = 2, center = false, \
+             convexity = 1, scale = [1, 1], $fn = 64, $fa = 12, $fs = 2);"
+                .to_owned(),
+        ] {
+            assert!(inside(&plate, 3.9, 1.9, 1.9) && inside(&plate, 1.0, 0.4, 1.0));
+            assert!(!inside(&plate, 1.0, 1.0, 1.0) && !inside(&plate, 1.0, 0.6, 1.0) && !inside(&plate, 4.1, 1.0, 1.0));
+        }
+        let rim = format!("linear_extrude(height = 2) {{ import({}); }}", of.replace("LAYER", "rim"));
+        assert!(inside(&rim, 1.0, 1.0, 1.0));
+        let turned = "rotate_extrude(file = \"plate.dxf\", layer = \"rim\", origin = [0, 0], scale = 2, angle = 360);";
+        assert!(inside(turned, 5.0, 5.0, 3.0) && !inside(turned, 1.0, 1.0, 5.0));
+        let stray = format!("cube(1); import({});", of.replace("LAYER", ""));
+        assert_eq!(read(&stray).expect("a cube").solid.primitives.len(), 1);
+        for (text, sentence) in [
+            (
+                "\nlinear_extrude(file = \"x.dxf\", height = 3);",
+                "m.csg:2:1: expected a readable file, found \"x.dxf\": No such",
+            ),
+            ("linear_extrude(height = 3) { import(\"x.dxf\"); }", "m.csg:1:30: expected"),
+            (
+                "rotate_extrude(file = \"360\", angle = 360);",
+                "m.csg:1:1: expected a readable file, found \"360\": No such",
+            ),
+            ("linear_extrude(height = 1) { import(file = \"m.csg\"); }", "which is not supported (of other files"),
+        ] {
+            let error = read(text).expect_err(text);
+            assert!(error.contains(sentence), "{error}\nnot {sentence}");
+        }
     }
 }

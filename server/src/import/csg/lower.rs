@@ -268,8 +268,15 @@ impl<'a> Lowering<'a> {
                     None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
                 }))
             }
-            "import" if context.plane.is_some() && self.attached.is_some() => {
-                Err((call.at, Problem::unsupported("import inside of a 2D shape")))
+            "import" if context.plane.is_some() || imports::is_flat(call) && self.attached.is_some() => {
+                let (inner, overshoot) =
+                    context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
+                let id = imports::flat(&mut self.shapes, call, (inner, overshoot), self.attached)?;
+                no_children(call)?;
+                Ok(Step::Leaf(match context.plane {
+                    Some(_) => id,
+                    None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
+                }))
             }
             "import" => {
                 let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
@@ -282,6 +289,9 @@ impl<'a> Lowering<'a> {
 
     fn extrusion(&mut self, call: &'a Call, context: Context) -> Result<Step> {
         let linear = call.name == "linear_extrude";
+        if imports::file_of(call).is_some() && context.plane.is_none() {
+            return self.extruded_file(call, context);
+        }
         if call.children.is_empty() {
             if linear {
                 Extrusion::arguments(call)?
@@ -306,6 +316,34 @@ impl<'a> Lowering<'a> {
             return Ok(Step::Leaf(self.shapes.nothing(call, "by no angle")));
         };
         Ok(Step::open(CallKind::Revolve(turn), Context { plane, hull: false, ..context }))
+    }
+
+    /// An extrusion of a drawing in another file.
+    fn extruded_file(&mut self, call: &'a Call, context: Context) -> Result<Step> {
+        let plane = Some(Plane { inner: DAffine3::IDENTITY, overshoot: 0 });
+        let (kind, outer) = if call.name == "linear_extrude" {
+            let Some(extrusion) = Extrusion::new(call)? else {
+                return Ok(Step::Leaf(self.shapes.nothing(call, "of no height")));
+            };
+            (CallKind::Extrude(extrusion), extrusion.slanted(&context.outer))
+        } else {
+            let Some(turn) = Turn::new(call)? else {
+                return Ok(Step::Leaf(self.shapes.nothing(call, "by no angle")));
+            };
+            (CallKind::Revolve(turn), context.outer)
+        };
+        let flat = imports::flat(&mut self.shapes, call, (DAffine3::IDENTITY, 0), self.attached)?;
+        let inside = Context { outer, plane, hull: false };
+        let open = Open {
+            call: Some(call),
+            children: &[],
+            next: 0,
+            kind,
+            outside: context,
+            context: inside,
+            built: vec![flat],
+        };
+        self.close(open).map(Step::Leaf)
     }
 
     /// The box of what is inside of a call, in the call's own coordinates; of 2D shapes flat. `None` for nothing.

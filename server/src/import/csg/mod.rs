@@ -43,9 +43,8 @@ mod twist;
 #[cfg(test)]
 mod whole;
 
-use super::format::Named;
 use super::problem::Problem;
-use super::{Attachment, Facets, Format, Import, ImportError, Limits, Place, Source};
+use super::{Attachment, Facets, Format, Import, ImportError, Limits, Named, Place, Source};
 
 /// Reads a model from the text of a flattened file; `file` is what errors call it.
 pub fn import_csg(file: &str, text: &str, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
@@ -73,7 +72,7 @@ fn named(bytes: &[u8], limits: &Limits) -> Vec<Named> {
     let mut all: Vec<Named> = Vec::new();
     for call in &tree.calls {
         let named = match call.name.as_str() {
-            "import" => imports::file_of(call).map(Named::File),
+            "import" | "linear_extrude" | "rotate_extrude" => imports::file_of(call).map(Named::File),
             "text" => text::font_of(call).map(Named::Font),
             _ => None,
         };

@@ -34,7 +34,11 @@ pub struct Turn {
 impl Turn {
     /// Its arguments by name; `origin` and `scale` belong to drawings of other files, and are written without one, too.
     pub fn arguments(call: &Call) -> Result<Arguments<'_>> {
-        Arguments::new(call, &["angle", "start", "origin", "scale", "layer", "timestamp"])
+        const OWN: [&str; 6] = ["angle", "start", "origin", "scale", "layer", "timestamp"];
+        if call.children.is_empty() {
+            return Arguments::new(call, &[&OWN[..], &["file"]].concat());
+        }
+        Arguments::new(call, &OWN)
     }
 
     /// Reads the arguments of `rotate_extrude`; `None` for no turn at all.
