@@ -332,6 +332,55 @@ fn cases() -> Vec<(String, Inside, f64)> {
         Box::new(|p| p.min_element() > 0.0 && p.max_element() < 2.0),
         0.0,
     ));
+    // Circles beside the axis are tori, rims rounded by a ball parts of some.
+    let tube = |p: DVec3, r: f64| DVec2::new(p.x.hypot(p.y) - 3.0, p.z - 1.0).length() < r;
+    let rounded =
+        |p: DVec3| DVec2::new((p.x.hypot(p.y) - 2.0).max(0.0), ((p.z - 1.0).abs() - 1.0).max(0.0)).length() < 0.5;
+    cases.extend([
+        (revolved("", &moved(3., 1., 0., "circle(1);")), Box::new(move |p| tube(p, 1.0)) as Inside, 0.0),
+        (
+            revolved(
+                "angle = 100",
+                &format!(
+                    "difference() {{ {} {} }}",
+                    moved(-3., 1., 0., "circle(1);"),
+                    moved(-3., 1., 0., "circle(0.4);")
+                ),
+            ),
+            Box::new(move |p| tube(p, 1.0) && !tube(p, 0.4) && (180.0..280.0).contains(&angle(p))),
+            0.0,
+        ),
+        (
+            revolved(
+                "",
+                &format!(
+                    "difference() {{ {} {} }}",
+                    moved(1., 0., 0., "circle(2);"),
+                    moved(-5., -5., 0., "square([5, 10]);")
+                ),
+            ),
+            Box::new(|p| DVec2::new(p.x.hypot(p.y) - 1.0, p.z).length() < 2.0),
+            0.0,
+        ),
+        ("minkowski() { cylinder(h = 2, r1 = 2, r2 = 2); sphere(0.5); }".into(), Box::new(rounded), 0.0),
+        (
+            format!("hull() {{ {} }}", revolved("", &moved(3., 1., 0., "circle(1);"))),
+            Box::new(move |p| tube(p, 1.0) || p.x.hypot(p.y) < 3.0 && (p.z - 1.0).abs() < 1.0),
+            0.0,
+        ),
+        (
+            format!("minkowski() {{ {} sphere(0.25); }}", moved(0., 0., 1., "cylinder(h = 1, r1 = 1, r2 = 0);")),
+            Box::new(|p| {
+                // The distance from a cone's meridian: a triangle.
+                let m = DVec2::new(p.x.hypot(p.y), p.z - 1.0);
+                let corner = [DVec2::ZERO, DVec2::X, DVec2::Y].map(|c| c.extend(0.0));
+                let q = m.extend(0.0);
+                let rim = (0..3).map(|i| to_segment(q, corner[i], corner[(i + 1) % 3])).fold(f64::INFINITY, f64::min);
+                rim < 0.25 || m.y > 0.0 && m.x + m.y < 1.0
+            }),
+            0.0,
+        ),
+    ]);
     let balls = [[0., 0., 0., 1.], [3., 0., 0., 0.5], [0., 3., 0., 0.7], [1., 1., 3., 0.2], [1., 1., 0.5, 1.1]];
     let text: String = balls.iter().map(|[x, y, z, r]| ball(*x, *y, *z, *r)).collect();
     let all = balls.iter().map(|[x, y, z, r]| (DVec3::new(*x, *y, *z), *r)).collect();

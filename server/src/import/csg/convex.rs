@@ -33,6 +33,8 @@ pub struct Element {
     radius: f64,
     /// Of a disc: its frame, z square to it.
     axes: Option<DMat3>,
+    /// Of a disc: the radius of the ball that its rim is rounded with, all points within it of the disc.
+    round: f64,
     /// Pieces that OpenSCAD cuts its curve into.
     pieces: u32,
 }
@@ -40,7 +42,7 @@ pub struct Element {
 impl Element {
     /// A point.
     pub fn point(center: DVec3) -> Self {
-        Self { center, radius: 0.0, axes: None, pieces: 1 }
+        Self { center, radius: 0.0, axes: None, round: 0.0, pieces: 1 }
     }
 
     /// Its middle.
@@ -52,7 +54,10 @@ impl Element {
     pub fn bounds(&self) -> Aabb {
         let half = match self.axes {
             None => DVec3::splat(self.radius),
-            Some(axes) => (DVec3::ONE - axes.z_axis * axes.z_axis).max(DVec3::ZERO).map(f64::sqrt) * self.radius,
+            Some(axes) => {
+                let disc = (DVec3::ONE - axes.z_axis * axes.z_axis).max(DVec3::ZERO).map(f64::sqrt);
+                disc * self.radius + DVec3::splat(self.round)
+            }
         };
         Aabb::around(self.center, half)
     }
@@ -63,11 +68,12 @@ impl Element {
         let Some(axes) = self.axes else { return Some(vec![disc(self.center, self.radius)]) };
         let aside = axes.z_axis.truncate();
         if aside.length() <= SAME {
-            return Some(vec![disc(self.center, self.radius)]);
+            return Some(vec![disc(self.center, self.radius + self.round)]);
         }
         // A disc that stands upright casts a line.
         let along = (aside.perp().normalize() * self.radius).extend(0.0);
-        (axes.z_axis.z.abs() <= SAME).then(|| vec![disc(self.center - along, 0.0), disc(self.center + along, 0.0)])
+        let ends = || vec![disc(self.center - along, self.round), disc(self.center + along, self.round)];
+        (axes.z_axis.z.abs() <= SAME).then(ends)
     }
 
     /// Moved.
@@ -78,20 +84,22 @@ impl Element {
     /// The sum of two, where it is one of a kind.
     fn plus(&self, other: &Self) -> Option<Self> {
         let (center, pieces) = (self.center + other.center, self.pieces.max(other.pieces));
-        let radius = self.radius + other.radius;
-        let axes = match (self.axes, other.axes) {
-            (None, None) => None,
-            (Some(a), None) if other.radius == 0.0 => Some(a),
-            (None, Some(b)) if self.radius == 0.0 => Some(b),
-            (Some(a), Some(b)) if a.z_axis.cross(b.z_axis).length() <= SAME => Some(a),
-            (Some(_), _) | (_, Some(_)) => return None,
+        // Discs that lie alike add up, and so do balls; a ball rounds a disc.
+        let (radius, axes, round) = match (self.axes, other.axes) {
+            (None, None) => (self.radius + other.radius, None, 0.0),
+            (Some(a), None) => (self.radius, Some(a), self.round + other.radius),
+            (None, Some(b)) => (other.radius, Some(b), other.round + self.radius),
+            (Some(a), Some(b)) if a.z_axis.cross(b.z_axis).length() <= SAME => {
+                (self.radius + other.radius, Some(a), self.round + other.round)
+            }
+            (Some(_), Some(_)) => return None,
         };
-        Some(Self { center, radius, axes, pieces })
+        Some(Self { center, radius, axes, round, pieces })
     }
 
     /// How far its facets lie inside of it at most.
     pub fn deviation(&self) -> f64 {
-        self.radius * (1.0 - libm::cos(std::f64::consts::PI / f64::from(self.pieces.max(3))))
+        (self.radius + self.round) * (1.0 - libm::cos(std::f64::consts::PI / f64::from(self.pieces.max(3))))
     }
 
     /// True when a part is proven not to touch it where it is extreme: f of the part changes by no more than the way, and no place on
@@ -101,7 +109,7 @@ impl Element {
         if self.radius == 0.0 {
             return clearance(parts, cut, self.center) > 0.0;
         }
-        let step = self.radius * std::f64::consts::TAU / f64::from(ROUND);
+        let step = (self.radius + self.round) * std::f64::consts::TAU / f64::from(ROUND);
         let dense = Self { pieces: ROUND, ..*self };
         dense.facets().into_iter().all(|p| clearance(parts, cut, p) > step)
     }
@@ -113,45 +121,66 @@ impl Element {
         }
         let local: Vec<DVec3> = match self.axes {
             None => faceted_sphere(self.radius, self.pieces, self.pieces.div_ceil(2)).0,
-            Some(axes) => ring(self.radius, self.pieces).into_iter().map(|p| axes * p.extend(0.0)).collect(),
+            Some(axes) if self.round == 0.0 => {
+                ring(self.radius, self.pieces).into_iter().map(|p| axes * p.extend(0.0)).collect()
+            }
+            Some(axes) => {
+                // Along the rim the outer half of the ball's circle.
+                let tube = ring(self.round, self.pieces.next_multiple_of(4)).into_iter().filter(|p| p.x >= 0.0);
+                let tube: Vec<DVec2> = tube.collect();
+                let rim = ring(1.0, self.pieces).into_iter();
+                let at = |x: DVec2| tube.iter().map(move |p| axes * (x * (self.radius + p.x)).extend(p.y)).collect();
+                rim.flat_map(|x| -> Vec<DVec3> { at(x) }).collect()
+            }
         };
         local.into_iter().map(|p| self.center + p).collect()
     }
 }
 
-/// What a primitive is the hull of; `None` for what has no bounds, and for a torus, which is no hull. Of a mesh: what its hull
-/// is the hull of.
+/// What a primitive is the hull of; `None` for what has no bounds. Of a mesh or a torus: what its hull is the hull of.
 pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>> {
     let axes = frame.matrix();
     let disc = |z: f64, radius: f64| Element {
         center: frame.point(DVec3::Z * z),
         radius,
         axes: (radius > 0.0).then_some(axes),
+        round: 0.0,
         pieces,
     };
     let corners = |all: &[DVec3]| Some(all.iter().map(|v| Element::point(frame.point(*v))).collect());
     match shape {
-        Shape::Sphere(s) => Some(vec![Element { center: frame.position, radius: s.radius, axes: None, pieces }]),
+        Shape::Sphere(s) => {
+            Some(vec![Element { center: frame.position, radius: s.radius, axes: None, round: 0.0, pieces }])
+        }
         Shape::Cylinder(c) => Some(vec![disc(-c.half_height, c.radius), disc(c.half_height, c.radius)]),
         Shape::Cone(c) => Some(vec![disc(-c.half_height, c.bottom), disc(c.half_height, c.top)]),
         Shape::Cuboid(c) => corners(&Aabb::around(DVec3::ZERO, c.half).corners()),
         Shape::Polyhedron(p) => corners(&p.vertices),
         Shape::TriangleMesh(m) => corners(m.vertices()),
-        Shape::HalfSpace(_) | Shape::Torus(_) => None,
+        Shape::Torus(t) => {
+            let (center, axes) = (frame.position, Some(axes));
+            Some(vec![Element { center, radius: t.major, axes, round: t.minor, pieces }])
+        }
+        Shape::HalfSpace(_) => None,
     }
 }
 
 /// The pieces of a union of convex solids, as what each is the hull of; `None` where it is no such union.
 pub fn pieces(parts: &Parts<'_>, root: PartId) -> Option<Vec<Vec<Element>>> {
     let (leaves, false) = parts.leaves(root)? else { return None };
-    let convex = |p: &PartId| !matches!(&parts.list[*p], Part::Leaf(shape, ..) if shape.formula().is_some());
+    let hollow = |shape: &Shape| shape.formula().is_some() || matches!(shape, Shape::Torus(_));
+    let convex = |p: &PartId| !matches!(&parts.list[*p], Part::Leaf(shape, ..) if hollow(shape));
     leaves.iter().map(|p| if convex(p) { of_leaf(parts, *p) } else { None }).collect()
 }
 
 fn of_leaf(parts: &Parts<'_>, p: PartId) -> Option<Vec<Element>> {
     match &parts.list[p] {
         Part::Leaf(shape, frame, _) => elements(shape, frame, parts.pieces.get(&p).copied().unwrap_or(PIECES)),
-        Part::Empty | Part::Flat(_) | Part::Stray(..) | Part::Op(..) => Some(Vec::new()),
+        Part::Empty => {
+            let points = parts.points.get(&p);
+            Some(points.into_iter().flatten().map(|p| Element::point(*p)).collect())
+        }
+        Part::Flat(_) | Part::Stray(..) | Part::Op(..) => Some(Vec::new()),
     }
 }
 
@@ -202,7 +231,7 @@ fn clearance(parts: &Parts<'_>, root: PartId, x: DVec3) -> f64 {
 /// The hull of elements, from the call `name`.
 pub fn hull(parts: &mut Parts<'_>, name: &str, at: Place, elements: &[Element]) -> Result<Part> {
     let around = Aabb::of_points(elements.iter().map(|e| e.center));
-    let reach = elements.iter().map(|e| e.radius).fold(0.0, f64::max);
+    let reach = elements.iter().map(|e| e.radius + e.round).fold(0.0, f64::max);
     let size = around.half().length() + reach;
     let hull = Hull { name, at };
     let discs: Vec<&Element> = elements.iter().filter(|e| e.axes.is_some()).collect();
@@ -347,9 +376,15 @@ impl Hull<'_> {
             let part = lathe.region(parts, &Region::of_paths(&[symmetric(&hull.corners)]))?;
             made.push(parts.push(part));
         }
-        for d in hull.discs {
+        let far = profile.iter().fold(0.0, |m: f64, d| m.max(d.center.abs().max_element() + d.radius));
+        for d in hull.discs.into_iter().filter(|d| d.center.x >= -SAME * far) {
             let center = outer * DAffine3::from_translation(DVec3::Z * d.center.y);
-            let leaf = parts.leaf(self.name, self.at, place::sphere(&center, d.radius))?;
+            let placed = if d.center.x > SAME * far {
+                place::torus(&center, d.center.x, d.radius)
+            } else {
+                place::sphere(&center, d.radius)
+            };
+            let leaf = parts.leaf(self.name, self.at, placed)?;
             made.push(parts.push(leaf));
         }
         Ok(Part::Op(Op::Union, self.at, made))
@@ -429,7 +464,9 @@ fn coaxial(elements: &[Element], origin: DVec3, axis: DVec3, size: f64) -> Optio
             return None;
         }
         match e.axes {
-            Some(_) => profile.extend([e.radius, -e.radius].map(|x| Disc { center: DVec2::new(x, z), radius: 0.0 })),
+            Some(_) => {
+                profile.extend([e.radius, -e.radius].map(|x| Disc { center: DVec2::new(x, z), radius: e.round }));
+            }
             None => profile.push(Disc { center: DVec2::new(0.0, z), radius: e.radius }),
         }
     }
@@ -444,7 +481,7 @@ fn prismatic(elements: &[Element], origin: DVec3, axes: DMat3, size: f64) -> Opt
     let heights = elements.iter().map(height);
     let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
     for e in elements {
-        if e.radius > 0.0 && e.axes.is_none() {
+        if e.radius > 0.0 && e.axes.is_none() || e.round > 0.0 {
             return None;
         }
         let z = height(e);

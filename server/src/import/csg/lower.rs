@@ -597,12 +597,19 @@ impl<'a> Lowering<'a> {
             let Some(flat) = flat_of(parts, leaf) else { continue };
             let (name, at) = (flat.name.clone(), flat.at);
             let lathe = Lathe { name: &name, at, outer, sides: sides.clone() };
-            let ball = flat.disc().filter(|d| d.center.x.abs() <= ROUNDING * d.radius && sides.is_empty());
-            if let Some(disc) = ball {
+            if let Some(disc) = flat.disc().filter(|_| sides.is_empty()) {
                 let center = *outer * DAffine3::from_translation(DVec3::Z * disc.center.y);
-                parts.pieces.insert(leaf, flat.pieces);
-                parts.list[leaf] = parts.leaf(&name, at, place::sphere(&center, disc.radius))?;
-                continue;
+                let away = disc.center.x.abs();
+                let placed = if away <= ROUNDING * disc.radius {
+                    place::sphere(&center, disc.radius)
+                } else {
+                    place::torus(&center, away, disc.radius)
+                };
+                if placed.is_ok() {
+                    parts.pieces.insert(leaf, flat.pieces);
+                    parts.list[leaf] = parts.leaf(&name, at, placed)?;
+                    continue;
+                }
             }
             let paths: Vec<Vec<DVec2>> =
                 flat.paths().iter().map(|p| p.iter().map(|p| DVec2::new(p.x * side, p.y)).collect()).collect();

@@ -7,6 +7,7 @@ use super::{Limits, Place, Problem};
 use crate::import::Note;
 use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
+use glam::DVec3;
 use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -48,6 +49,8 @@ pub struct Parts<'a> {
     pub list: Vec<Part>,
     /// Of a round primitive: into how many pieces OpenSCAD cuts it.
     pub pieces: HashMap<PartId, u32>,
+    /// Below a hull: the corners of what has no volume, by the empty part that it is.
+    pub points: HashMap<PartId, Vec<DVec3>>,
     /// Of an extruded island: the part that is its convex hull.
     pub hulls: HashMap<PartId, PartId>,
     faces: usize,
@@ -61,8 +64,8 @@ pub fn is_unbounded(shape: &Shape) -> bool {
 impl<'a> Parts<'a> {
     /// None yet.
     pub fn new(limits: &'a Limits) -> Self {
-        let (pieces, hulls) = (HashMap::new(), HashMap::new());
-        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, hulls, faces: 0 }
+        let (pieces, points, hulls) = (HashMap::new(), HashMap::new(), HashMap::new());
+        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, points, hulls, faces: 0 }
     }
 
     /// Adds a part.

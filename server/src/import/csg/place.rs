@@ -10,7 +10,7 @@
 use super::Problem;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
-    Cone, Cuboid, Cylinder, Fit, HalfSpace, Polyhedron, Repair, Shape, Sphere, TriangleMesh,
+    Cone, Cuboid, Cylinder, Fit, HalfSpace, Polyhedron, Repair, Shape, Sphere, Torus, TriangleMesh,
 };
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
@@ -98,6 +98,13 @@ pub fn snapped(m: DMat3) -> (DMat3, Option<f64>) {
 pub fn sphere(a: &DAffine3, radius: f64) -> Result<PlacedShape, Problem> {
     let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "sphere"))?;
     Ok(PlacedShape::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
+}
+
+/// All points within `minor` of a circle of radius `major` about z, around the origin.
+pub fn torus(a: &DAffine3, major: f64, minor: f64) -> Result<PlacedShape, Problem> {
+    let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "torus"))?;
+    let frame = Pose::new(a.translation, proper(s.orthogonal).0);
+    Ok(PlacedShape::new(Torus { major: major * s.scale, minor: minor * s.scale }, frame).off(s.off, "torus"))
 }
 
 /// A cylinder, cone or frustum around `center`, along z, with radii `bottom` (low z) and `top`.

@@ -182,11 +182,15 @@ impl Shapes<'_> {
         }
         if hull && matches!(mesh, Err(Problem::Mesh(_))) {
             let used: Vec<DVec3> = faces.iter().flatten().map(|i| points[*i as usize]).collect();
-            if let Some(faces) = point_hull(&used) {
-                self.parts.affordable(call.at, faces.len())?;
-                let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
-                mesh = place::polyhedron(outer, &used, &faces);
-            }
+            let Some(faces) = point_hull(&used) else {
+                // What is flat has corners, too.
+                let id = self.parts.push(Part::Empty);
+                self.parts.points.insert(id, used.into_iter().map(|p| outer.transform_point3(p)).collect());
+                return Ok(id);
+            };
+            self.parts.affordable(call.at, faces.len())?;
+            let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
+            mesh = place::polyhedron(outer, &used, &faces);
         }
         let (placed, fit) = match mesh {
             Err(Problem::Mesh(MeshError::Flat)) => return Ok(self.nothing(call, "without volume")),

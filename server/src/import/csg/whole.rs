@@ -73,6 +73,11 @@ fn a_hull_of_what_is_cut_holds_what_is_left_and_reaches_no_farther() {
     assert!(
         (read(&corner).solid.primitives.len() == 1) && (volume(&read(&corner), 60) - (8.0 - 1.0 / 6.0)).abs() < 0.02
     );
+    // Flat polyhedra span a hull with what stands beside them.
+    let sheet = "polyhedron([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], [[0, 1, 2, 3]]);";
+    let between = read(&format!("hull() {{ {sheet} {} }}", moved(DVec3::Z * 3.0, sheet)));
+    assert_eq!(between.solid.aabb().max, DVec3::new(2.0, 2.0, 3.0));
+    assert!(between.solid.value(DVec3::new(0.1, 1.9, 2.9)) < -0.09);
     let nothing = read("cube(1); hull() { difference() { cube(1); cube(3, center = true); } }");
     assert_eq!(nothing.solid.primitives.len(), 1);
 }
