@@ -37,7 +37,7 @@ impl<'s> ConvexBody<'s> {
     /// The core's farthest point along n, which may have any length.
     #[inline]
     pub fn support(&self, n: DVec3) -> DVec3 {
-        self.shape.support(&self.axes, n).map_or(self.origin, |local| self.origin + local)
+        self.shape.support(&self.axes, self.origin, n)
     }
 
     /// Largest n·x over the body.

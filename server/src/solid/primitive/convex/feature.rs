@@ -42,6 +42,7 @@ pub struct Features {
 
 impl Features {
     /// `None` for a shape that is told by corners, and for what is not known.
+    #[inline]
     pub fn new(shape: Convex<'_>) -> Option<Self> {
         let lean = match shape {
             Convex::Round { bottom, top, half } => {
@@ -55,12 +56,14 @@ impl Features {
     }
 
     /// Half the height of a round one, and the radius of its disc above or below.
+    #[inline]
     pub fn disc(&self, above: bool) -> Option<(f64, f64)> {
         let Convex::Round { bottom, top, half } = self.shape else { return None };
         Some((half, if above { top } else { bottom }))
     }
 
     /// What holds the unit outward direction m, nearer than `tol`: circles, and whether a flat face does.
+    #[inline]
     pub fn held(&self, axes: &DMat3, m: DVec3, tol: f64) -> (u8, bool) {
         let l = axes.transpose() * m;
         match self.shape {
@@ -78,6 +81,7 @@ impl Features {
     }
 
     /// Circles by their axes and leans.
+    #[inline]
     pub fn circles(&self, axes: &DMat3, held: u8) -> impl Iterator<Item = (DVec3, f64)> {
         let (axes, lean) = (*axes, self.lean);
         (0..3).filter(move |k| held >> k & 1 == 1).map(move |k| (axes.col(k), lean))
@@ -114,6 +118,7 @@ impl Features {
     }
 
     /// What meets in what is shown along the unit outward direction m.
+    #[inline]
     pub fn holds(&self, axes: &DMat3, m: DVec3, shown: &Shown, mut hold: impl FnMut(Hold)) {
         let l = axes.transpose() * m;
         match self.shape {

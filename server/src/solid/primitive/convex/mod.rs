@@ -105,10 +105,10 @@ impl Convex<'_> {
         if let Convex::Ball(radius) = self { Some(*radius) } else { None }
     }
 
-    /// The farthest point along n, which may have any length, from the frame's centre; `None` where that is the centre itself: of a ball, whose
-    /// core is a point.
+    /// The farthest point along n, which may have any length, where it stands with these axes about `origin`. Of a ball, whose core is
+    /// a point, that is the origin.
     #[inline]
-    pub fn support(&self, axes: &DMat3, n: DVec3) -> Option<DVec3> {
+    pub fn support(&self, axes: &DMat3, origin: DVec3, n: DVec3) -> DVec3 {
         let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
         let round = |bottom: f64, top: f64, half: f64| {
             let len = (m.x * m.x + m.y * m.y).sqrt();
@@ -118,7 +118,7 @@ impl Convex<'_> {
             DVec3::new(k * m.x, k * m.y, z)
         };
         let local = match *self {
-            Convex::Ball(_) | Convex::Other => return None,
+            Convex::Ball(_) | Convex::Other => return origin,
             Convex::Round { bottom, top, half } => round(bottom, top, half),
             Convex::Cuboid(half) => DVec3::new(half.x.copysign(m.x), half.y.copysign(m.y), half.z.copysign(m.z)),
             Convex::Corners(corners) => {
@@ -132,7 +132,7 @@ impl Convex<'_> {
                 best.1
             }
         };
-        Some(*axes * local)
+        origin + *axes * local
     }
 
     /// How deep a point is, seen `from` the frame's centre, by f, the largest of its faces' values: the same as `Primitive::value` but for rounding,
