@@ -8,7 +8,7 @@ use glam::DVec3;
 
 pub(super) const TARGET: Target = Target { name: "csg", run, seeds, words: &WORDS, longest: 2000, thorough_every: 64 };
 
-const WORDS: [&str; 48] = [
+const WORDS: [&str; 56] = [
     "union() {",
     "difference() {",
     "intersection() {",
@@ -36,6 +36,14 @@ const WORDS: [&str; 48] = [
     "square(size = [1, 1], center = false);",
     "polygon(points = [[0, 0], [2, 0], [0, 2]], paths = undef);",
     "color([1, 0, 0, 1]) {",
+    "linear_extrude(height = 3, twist = 90, scale = [1, 2], slices = 4) {",
+    "text(text = \"aB\", size = 3);",
+    "projection(cut = true) {",
+    "projection() {",
+    "resize([1, 0, 2], auto = true) {",
+    "hull() {",
+    "minkowski() {",
+    "rotate_extrude(angle = 90) {",
     "render() {",
     "$fn = 5",
     "$fa = 12",
@@ -68,6 +76,9 @@ fn seeds() -> Vec<Vec<u8>> {
          [0, 2]], paths = [[0, 1, 2]]); circle(r = 0.2, $fn = 4); } }",
         "color([1, 0, 0, 1]) { polyhedron(points = [[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]], faces = \
          [[0,4,2],[0,2,5],[0,3,4],[0,5,3],[1,2,4],[1,5,2],[1,4,3],[1,3,5]], convexity = 1); } // end",
+        "hull() { difference() { cube(2); sphere(1); } linear_extrude(height = 1, twist = 40) { square(1); } }",
+        "minkowski() { difference() { cube(2); cube(1); } cube(0.1); } resize([1, 2, 0]) { sphere(1, $fn = 5); }",
+        "linear_extrude(height = 1) { projection() { difference() { cube(1); sphere(0.4); } } text(text = \"a\"); }",
     ]
     .map(|text| text.as_bytes().to_vec())
     .into()

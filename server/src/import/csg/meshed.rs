@@ -8,7 +8,7 @@ use super::facets::ring;
 use super::parts::{Part, PartId, Parts};
 use super::place;
 use super::{Place, Problem};
-use crate::math::{Aabb, any_perpendicular};
+use crate::math::{Aabb, any_perpendicular, halt};
 use crate::solid::primitive::MeshFault;
 use crate::solid::{Op, Shape};
 use contactd_proto::Pose;
@@ -42,7 +42,7 @@ impl Meshed {
         if maker.around.is_empty() {
             return Ok(Self { solid: Manifold::empty(), off: 0.0 });
         }
-        let solid = maker.part(root)?;
+        let solid = guarded(at, || maker.part(root))??;
         let off = maker.off;
         Self::checked(at, solid, off)
     }
@@ -100,20 +100,26 @@ impl Meshed {
             return Err((at, Problem::Limit { what: "pairs of facets and corners of a sum", limit: MOST_PAIRS }));
         }
         let back = Vec3::new(-origin.x, -origin.y, -origin.z);
-        let sum = self.solid.minkowski_sum(&other.solid).translate(back);
+        let sum = guarded(at, || self.solid.minkowski_sum(&other.solid).translate(back))?;
         Self::checked(at, sum, self.off + other.off)
     }
 
     /// Its shadow on the plane z = 0, as closed paths.
-    pub fn shadow(&self) -> Vec<Vec<DVec2>> {
-        let paths = self.solid.project().to_polygons();
-        paths.into_iter().map(|p| p.into_iter().map(|v| DVec2::new(v.x, v.y)).collect()).collect()
+    ///
+    /// # Errors
+    /// A mesh that the operation does not take.
+    pub fn shadow(&self, at: Place) -> Result<Vec<Vec<DVec2>>> {
+        let paths = guarded(at, || self.solid.project().to_polygons())?;
+        Ok(paths.into_iter().map(|p| p.into_iter().map(|v| DVec2::new(v.x, v.y)).collect()).collect())
     }
 
     /// Where the plane z = 0 cuts it, as closed paths; of a face in that plane what lies above it.
-    pub fn section(&self) -> Vec<Vec<DVec2>> {
-        let paths = self.solid.slice(0.0).to_polygons();
-        paths.into_iter().map(|p| p.into_iter().map(|v| DVec2::new(v.x, v.y)).collect()).collect()
+    ///
+    /// # Errors
+    /// A mesh that the operation does not take.
+    pub fn section(&self, at: Place) -> Result<Vec<Vec<DVec2>>> {
+        let paths = guarded(at, || self.solid.slice(0.0).to_polygons())?;
+        Ok(paths.into_iter().map(|p| p.into_iter().map(|v| DVec2::new(v.x, v.y)).collect()).collect())
     }
 
     /// The solid again, as one primitive.
@@ -134,6 +140,20 @@ impl Meshed {
             placed => parts.leaf(name, at, placed.map(|p| p.0)),
         }
     }
+}
+
+/// What an operation on meshes answers; whatever it may fail by within, a model's text is read or refused. A load that is to end
+/// ends.
+///
+/// # Errors
+/// A sentence where it failed.
+pub fn guarded<T>(at: Place, operation: impl FnOnce() -> T) -> Result<T> {
+    halt::catch(operation).map_err(|ended| {
+        if matches!(ended, halt::Ended::Cancelled) {
+            halt::point();
+        }
+        (at, Problem::syntax("a solid", "one that set operations on meshes do not take"))
+    })
 }
 
 /// A mesh in the making.

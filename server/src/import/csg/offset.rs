@@ -8,6 +8,7 @@
 use super::arguments::Arguments;
 use super::flat::{Flat, Outline};
 use super::hull::Disc;
+use super::meshed::guarded;
 use super::outlines::{crossing, flat, flat_of, hull_parts, paths};
 use super::parts::{Part, PartId, Parts};
 use super::polygon::{Region, turn};
@@ -15,8 +16,15 @@ use super::syntax::Call;
 use super::{Place, Problem};
 use crate::solid::Op;
 use glam::DVec2;
+use manifold_rust::cross_section::CrossSection;
+use manifold_rust::linalg::Vec2;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// Clipper's numbers of joins, and OpenSCAD's limit of a sharp one, in offsets.
+const SQUARE: i32 = 0;
+const MITER: i32 = 2;
+const LONGEST_MITER: f64 = 1e6;
 
 /// How corners are joined where the ring opens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,16 +129,32 @@ impl Offset {
         let moved: Vec<Option<Vec<DVec2>>> = region.rings.iter().map(|r| self.moved(r)).collect();
         if let Some(moved) = moved.into_iter().collect::<Option<Vec<_>>>() {
             let after = Region::of_paths(&moved);
-            if !after.crossed && !after.open && after.rings.len() == region.rings.len() {
+            // What is passed through the other way round, or twice, counts otherwise than by the even-odd rule.
+            let (passed, filled) = (area(&moved), area(&after.rings));
+            let once = (passed - filled).abs() <= 1e-9 * (passed.abs() + filled.abs());
+            if once && !after.crossed && !after.open && after.rings.len() == region.rings.len() {
                 return Ok(self.joined(parts, at, like, &region, Outline::Paths(moved), false));
             }
         }
         if self.join != Join::Round {
-            let hint = " (take offset(r = …), or a smaller delta)";
-            let construct = "offset by a delta at which sides of the shape meet".into();
-            return Err((at, Problem::Unsupported { construct, hint }));
+            let paths = self.clipped(at, &region.rings)?;
+            return Ok(if paths.is_empty() { Part::Empty } else { flat(like, Outline::Paths(paths), DVec2::ZERO) });
         }
         Ok(self.joined(parts, at, like, &region, Outline::Paths(paths.to_vec()), true))
+    }
+
+    /// Rings with their edges moved where some meet others: by Clipper (of manifold-rust), as in OpenSCAD, on a grid of about 1e-12 of
+    /// the size.
+    fn clipped(&self, at: Place, rings: &[Vec<DVec2>]) -> Result<Vec<Vec<DVec2>>> {
+        let size = rings.iter().flatten().fold(self.by.abs(), |m, p| m.max(p.abs().max_element()));
+        // It counts in millionths; a power of two rounds nothing.
+        let scale = (1e6 / size).log2().floor().exp2();
+        let polygon = |ring: &Vec<DVec2>| ring.iter().map(|p| Vec2::new(p.x * scale, p.y * scale)).collect();
+        let section = CrossSection::new(rings.iter().map(polygon).collect());
+        let join = if self.join == Join::Cut { SQUARE } else { MITER };
+        let moved = guarded(at, || section.offset_with_params(self.by * scale, join, LONGEST_MITER, 0).to_polygons())?;
+        let path = |p: Vec<Vec2>| p.into_iter().map(|v| DVec2::new(v.x, v.y) / scale).collect();
+        Ok(moved.into_iter().map(path).collect())
     }
 
     /// The shape with discs at the corners where it opens, and with rectangles over its edges; added or taken away.
@@ -229,4 +253,12 @@ fn around(ring: &[DVec2], i: usize) -> [DVec2; 3] {
 /// The unit normal to the right of the way from a to b: out of a shape on the left.
 fn outwards(a: DVec2, b: DVec2) -> DVec2 {
     -(b - a).normalize().perp()
+}
+
+/// Twice the area within rings, of what runs clockwise negative.
+fn area(rings: &[Vec<DVec2>]) -> f64 {
+    let of = |ring: &Vec<DVec2>| -> f64 {
+        (0..ring.len()).map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0])).sum()
+    };
+    rings.iter().map(of).sum()
 }

@@ -48,7 +48,7 @@ pub fn shadow(parts: &mut Parts<'_>, at: Place, like: &Flat, roots: &[PartId]) -
     }
     let whole = parts.push(Part::Op(Op::Union, at, roots.to_vec()));
     let mesh = Meshed::of(parts, at, whole)?;
-    let paths = mesh.shadow();
+    let paths = mesh.shadow(at)?;
     Ok(of_paths(parts, at, like, paths, mesh.off, "the shadow of projection"))
 }
 
@@ -115,7 +115,7 @@ impl Cut {
                     Some(None) => Part::Empty,
                     None => {
                         let mesh = Meshed::of(parts, self.at, p)?;
-                        let paths = mesh.section();
+                        let paths = mesh.section(self.at)?;
                         of_paths(parts, self.at, &like, paths, mesh.off, "a section of projection")
                     }
                 }

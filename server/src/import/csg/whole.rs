@@ -184,3 +184,27 @@ fn resized_shapes_have_the_sizes_that_are_asked_for() {
     assert!((read(&aside).solid.aabb().min.x - 2.0).abs() < 1e-12);
     assert_eq!(read("cube(1); resize([1, 1, 1]) { }").solid.primitives.len(), 1);
 }
+
+#[test]
+fn offsets_by_a_delta_at_which_sides_meet_are_the_moved_half_planes() {
+    // Two squares and a bridge between them; a fork whose gap closes.
+    let bridge = "polygon([[0, 0], [4, 0], [4, 1.5], [6, 1.5], [6, 0], [10, 0], [10, 4], [6, 4], [6, 2.5], [4, 2.5], [4, 4], [0, 4]]);";
+    let fork = "polygon([[0, 0], [5, 0], [5, 4], [3, 4], [3, 1], [2, 1], [2, 4], [0, 4]]);";
+    let of = |delta: f64, shape: &str| {
+        read(&format!("linear_extrude(height = 2) {{ offset(delta = {delta}) {{ {shape} }} }}"))
+    };
+    let (thin, closed) = (of(-0.75, bridge), of(0.75, fork));
+    let mut r = Random(47);
+    for _ in 0..3000 {
+        let p = DVec2::new(r.within(-2.0, 12.0), r.within(-2.0, 6.0));
+        let within = |x: f64, y: f64, u: f64, v: f64| p.x > x && p.x < u && p.y > y && p.y < v;
+        for (import, inside) in [
+            (&thin, within(0.75, 0.75, 3.25, 3.25) || within(6.75, 0.75, 9.25, 3.25)),
+            (&closed, within(-0.75, -0.75, 5.75, 4.75)),
+        ] {
+            let f = import.solid.value(p.extend(1.0));
+            assert!(f.abs() < 1e-9 || (f < 0.0) == inside, "{p}: {f}");
+        }
+    }
+    assert!(of(-3.0, bridge).solid.is_empty());
+}
