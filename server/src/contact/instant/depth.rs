@@ -117,7 +117,7 @@ pub fn climb(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
 }
 
 fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
-    let (x, depth, support) = ascend((rounds, WIDE * task.scale), task, at, start, work);
+    let (x, depth, support) = ascend((rounds, WIDE * task.scale), false, task, at, start, work);
     (x, normal(task, at, x, &support), depth, support.iter().map(|s| (s.0, s.1)).collect())
 }
 
@@ -130,7 +130,7 @@ pub(in crate::contact) fn climb_within(
     start: DVec3,
     work: &Work,
 ) -> Held {
-    ascend((ROUNDS, reach.unwrap_or(WIDE * task.scale)), task, at, start, work)
+    ascend((ROUNDS, reach.unwrap_or(WIDE * task.scale)), true, task, at, start, work)
 }
 
 /// A point, its depth, what holds it there.
@@ -139,7 +139,37 @@ pub(in crate::contact) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
 /// Half the sides of the first trust box, in scales of the pair.
 const WIDE: f64 = 0.5;
 
-fn ascend((rounds, reach): (usize, f64), task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
+/// Steps from a point towards where it is as deep in the one body as in the other.
+const LEVELLINGS: usize = 2;
+
+/// A point beside x that is as deep in the one body as in the other, along what its deciding faces differ by. Between
+/// like round faces a step along them leaves the thin layer that both bodies have in common by its square over their
+/// radius, on one side or the other: this leads back to the middle of the layer (a second-order correction, as in
+/// sequential quadratic programming).
+fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
+    for _ in 0..LEVELLINGS {
+        let decide = |side: Side| {
+            let (model, y) = if side == Side::A { (task.model_a, x) } else { (task.model_b, at.b_point(x)) };
+            let (value, id) = model.deciding(y);
+            let n = model.solid.faces[id.face() as usize].at(y).normal;
+            let n = if id.sense() == Sense::Positive { n } else { -n };
+            (value, if side == Side::A { n } else { at.a_vector(n) })
+        };
+        let ((in_a, up_a), (in_b, up_b)) = (decide(Side::A), decide(Side::B));
+        let apart = up_a - up_b;
+        let square = apart.length_squared();
+        if square < OPPOSED {
+            break;
+        }
+        x -= apart * ((in_a - in_b) / square);
+    }
+    x
+}
+
+/// |g_A − g_B|² below which two gradients do not oppose each other.
+const OPPOSED: f64 = 1.0;
+
+fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
     let f = |x: DVec3| separation::value(task, at, x);
     let (mut x, mut best) = (start, f(start));
     let mut size = reach;
@@ -187,9 +217,14 @@ fn ascend((rounds, reach): (usize, f64), task: &Task, at: &Instant, start: DVec3
             size *= 0.5;
             continue;
         }
-        let next = x + step.y;
-        let value = f(next);
-        if value < best - 1e-3 * task.rounding {
+        let enough = best - 1e-3 * task.rounding;
+        let mut next = x + step.y;
+        let mut value = f(next);
+        if value >= enough && bends {
+            next = levelled(task, at, next);
+            value = f(next);
+        }
+        if value < enough {
             (x, best) = (next, value);
         } else {
             size *= 0.5;

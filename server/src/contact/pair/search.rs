@@ -451,11 +451,38 @@ impl<'a> PairSearch<'a> {
         if touch.is_none() && deep.t == found.upper {
             let held = climber.deepest(deep.t, deep.x);
             if held.1 >= self.task.delta {
-                deep = back.climbed(deep.t, &held);
+                deep = self.balanced(&back, back.climbed(deep.t, &held), held.1);
             }
         }
         self.outcome.counters.instant_cells += climber.cells();
         Found { touch, deep, ..found.clone() }
+    }
+
+    /// Where a climb to a depth has ended, or where its faces' equations have their solution then, which is about as deep:
+    /// on a flat top rounding keeps a climb from the point where the faces oppose each other.
+    fn balanced(&self, back: &Touch, climbed: Solution, depth: f64) -> Solution {
+        let at = self.task.relative.at(climbed.t);
+        let level_for = |t: f64| -> Option<Solution> {
+            // Secants on the level whose contact comes at the time.
+            let (mut level, mut s) = (depth * (1.0 - NEAR_DEPTH), back.mended(&climbed, depth)?);
+            let mut last = (depth, s.t);
+            for _ in 0..DEPTHS {
+                if (s.t - t).abs() <= f64::EPSILON {
+                    break;
+                }
+                s = back.mended(&s, level)?;
+                let slope = (level - last.0) / (s.t - last.1);
+                last = (level, s.t);
+                level += (t - s.t) * slope;
+                if level.is_nan() || (level - depth).abs() > 0.5 * depth {
+                    break;
+                }
+            }
+            Some(s)
+        };
+        let deep = |s: &Solution| -separation::value(&self.task, &at, s.x) >= depth - INCIDENT * self.task.rounding;
+        let solved = level_for(climbed.t).filter(deep);
+        solved.map_or(climbed.clone(), |s| Solution { t: climbed.t, ..s })
     }
 
     /// The answer that nothing more is known than that nothing is met before `t`, or what a finer search has proven and found.
@@ -502,6 +529,10 @@ impl<'a> PairSearch<'a> {
         self.raised += 1;
         self.resolution = raised(self.resolution, *more, self.task.rounding);
         self.outcome.resolution = self.resolution;
+        // What was twice as deep as the resolution may be less than that now: then the promise is one for once.
+        if self.task.ignored_depth == 0.0 {
+            (self.level, self.task.start_tolerance) = (1.0, self.task.rounding);
+        }
         true
     }
 
@@ -573,10 +604,7 @@ fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> C
     let deep = &found.deep;
     let s = found.touch.as_ref().filter(|s| s.t >= 0.0).unwrap_or(deep);
     // Where the touch was before the start: the point on the way from it to the witness, now.
-    let now = found.touch.as_ref().filter(|s| s.t < 0.0 && deep.t > 0.0).map(|s| {
-        let share = -s.t / (deep.t - s.t);
-        s.x + (deep.x - s.x) * share
-    });
+    let now = found.touch.as_ref().filter(|s| s.t < 0.0 && deep.t > 0.0).map(|s| s.before(deep, 0.0));
     let time = contact.time;
     let at = task.relative.at(time);
     let problem = Problem {
@@ -595,14 +623,16 @@ fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> C
     let start = start
         .filter(|_| s.active.iter().zip(&s.lambda).map(|(c, l)| balance(c) * *l).sum::<DVec3>().length() > BENT)
         .and_then(|touch| at_the_start(task, touch, deep));
-    let start = start.or_else(|| (time == 0.0).then(|| climbed_at_the_start(task, &at, x, 2.0 * resolution)).flatten());
+    let climbed = |x: &DVec3| climbed_at_the_start(task, &at, *x, 2.0 * resolution);
+    let start = start.or_else(|| [Some(x), now].iter().flatten().filter(|_| time == 0.0).find_map(climbed));
     let s = start.as_ref().unwrap_or(s);
     x = start.as_ref().map_or(x, |s| s.x);
     // Where the point is no touch, or one that was climbed to, faces pass as far from it as it is deep.
     let off = task.model_a.value(x).abs().max(task.model_b.value(at.b_point(x)).abs());
     let off = if off <= INCIDENT * task.rounding { 0.0 } else { off };
     // Deep in each other bodies show no faces in one point: those of the solution are told.
-    let features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(off + INCIDENT * task.rounding));
+    let tolerance = BESIDE * off + INCIDENT * task.rounding;
+    let features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(tolerance));
     let mut active = Active::of(&problem, s, (x, &at), &features);
     if active.extent == Extent::Point {
         active.add_incident(&features);
@@ -629,11 +659,18 @@ fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> C
     }
 }
 
+/// A face that is this many times as far from a deep point as the point is deep passes it, too: it may hold it with next to
+/// no weight.
+const BESIDE: f64 = 1.0 + 1e-3;
+
 /// Gradients that miss each other by more than this are not of the point where the bodies hold each other.
 const BENT: f64 = 1e-9;
 
-/// Steps towards the depth that a contact has at the start.
-const DEPTHS: usize = 6;
+/// Steps towards the depth that a contact has at a time.
+const DEPTHS: usize = 24;
+
+/// The first of them, a part of the depth.
+const NEAR_DEPTH: f64 = 1e-3;
 
 /// What a contact that touched before the start is at the start: its equations at the depth that it has reached by then.
 fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Solution> {
@@ -641,13 +678,22 @@ fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Soluti
     // Depths and times before and after it.
     let (mut before, mut after) = ((0.0, touch.t), (witness_level(task.delta, task.rounding), deep.t));
     let mut s = deep.clone();
+    let mut earlier = None;
     for _ in 0..DEPTHS {
         let level = before.0 - before.1 * (after.0 - before.0) / (after.1 - before.1);
         s = problem.solve(&s.active, s.x, s.t, &s.lambda, level, true)?;
         if s.t.abs() <= f64::EPSILON {
             break;
         }
-        *(if s.t < 0.0 { &mut before } else { &mut after }) = (level, s.t);
+        let is_before = s.t < 0.0;
+        // An end that stays is taken for half as far (the Illinois rule): else the steps come from one side alone.
+        let stays = if earlier == Some(is_before) { 0.5 } else { 1.0 };
+        if is_before {
+            (before, after.1) = ((level, s.t), after.1 * stays);
+        } else {
+            (after, before.1) = ((level, s.t), before.1 * stays);
+        }
+        earlier = Some(is_before);
     }
     // The same contact still, at a depth between.
     let at = task.relative.at(0.0);
@@ -690,7 +736,8 @@ impl Active {
             s.active.iter().copied().zip(s.lambda.iter().copied()).collect();
         let is_active = |c: &Constraint, l: f64| match *c {
             Constraint::Literal(side, id) => l <= ACTIVE || features.has(side, id),
-            Constraint::Apex(..) => true,
+            // A cone's tip that the witness met may have been left by the start.
+            Constraint::Apex(side, id, _) => features.is_apex(side, id),
         };
         let known = features.active.iter().all(|ids| !ids.is_empty());
         let balance = |held: &[(Constraint, f64)]| {
@@ -709,7 +756,7 @@ impl Active {
                     *c = Constraint::Literal(side, other.unwrap_or(id));
                     other.is_some()
                 }
-                _ => true,
+                _ => is_active(c, *l),
             });
             if all {
                 held = renamed;
@@ -719,7 +766,7 @@ impl Active {
         }
         let (mut count, mut apex) = ([0; 2], [false; 2]);
         let mut faces = [[NO_FACE; 3]; 2];
-        let mut sums = [DVec3::ZERO; 2];
+        let (mut sums, mut weights) = ([DVec3::ZERO; 2], [0.0; 2]);
         let mut gradients: SmallVec<[DVec3; 6]> = SmallVec::new();
         let mut of_side: [SmallVec<[DVec3; 6]>; 2] = Default::default();
         let mut curvature = DMat3::ZERO;
@@ -728,6 +775,7 @@ impl Active {
             let (Constraint::Literal(side, id) | Constraint::Apex(side, id, _)) = *c;
             let k = side as usize;
             sums[k] += row.gradient * *l;
+            weights[k] += l.abs();
             curvature += row.hessian * *l;
             let active = match c {
                 Constraint::Literal(..) => *l > ACTIVE,
@@ -744,8 +792,7 @@ impl Active {
         for k in 0..2 {
             count[k] = if apex[k] { 3 } else { rank_of(&of_side[k]) };
         }
-        let normal =
-            (sums[0] - sums[1]).try_normalize().unwrap_or_else(|| gradients.first().copied().unwrap_or(DVec3::X));
+        let normal = normal_of(sums, weights).unwrap_or_else(|| gradients.first().copied().unwrap_or(DVec3::X));
         Self { count, faces, normal, average: None, apex, extent: extent(&gradients, curvature, problem.scale) }
     }
 
@@ -781,6 +828,20 @@ impl Active {
         }
         self.average = sum.try_normalize();
     }
+}
+
+/// The normal that both bodies' weighted gradients make, unit, from A. Where they miss each other it is that of the body
+/// whose own cancel less: of one face exact, while two that are next to opposite, as at the tip of a crescent, make of
+/// the rounding of a point what they like.
+fn normal_of(sums: [DVec3; 2], weights: [f64; 2]) -> Option<DVec3> {
+    let sum = if (sums[0] + sums[1]).length() <= BENT * (sums[0] - sums[1]).length() {
+        sums[0] - sums[1]
+    } else if sums[0].length() * weights[1] >= sums[1].length() * weights[0] {
+        sums[0]
+    } else {
+        -sums[1]
+    };
+    sum.try_normalize()
 }
 
 /// Overlap at the start: from a common point to one that tells a direction.

@@ -36,14 +36,15 @@ pub struct PairQuery<'a> {
 
 impl PairQuery<'_> {
     /// True when b carries the cells: small and without cavities is cheap to cover. A round peg that spins about hardly another axis
-    /// than its own in a hole with flat walls does not: seen from it the walls rush by, seen from these it all but stands
-    /// (`fit::spun`).
+    /// than its own in a hole with flat or conical walls does not: seen from it the walls rush by, or the hole's apex goes round;
+    /// seen from the hole it all but stands (`fit::spun`). Of cylinders and balls in their like either is as good, and where
+    /// they come deep is found sooner from the smaller one.
     pub(super) fn is_swapped(&self) -> bool {
         let [a, b] = [&self.a, &self.b];
-        if turns_between_walls(a, b) {
+        if turns_in_a_hole(a, b) {
             return true;
         }
-        if turns_between_walls(b, a) {
+        if turns_in_a_hole(b, a) {
             return false;
         }
         let weight = |m: &Model| m.radius * if m.hollow { HOLLOW } else { 1.0 };
@@ -121,8 +122,8 @@ const OFF_AXIS: f64 = 0.02;
 const ALONG: f64 = 0.1;
 
 /// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the other one, which is
-/// bounded, has subtracted planes along that axis.
-fn turns_between_walls(peg: &Body, hole: &Body) -> bool {
+/// bounded, has subtracted planes along that axis or subtracted cones.
+fn turns_in_a_hole(peg: &Body, hole: &Body) -> bool {
     let spin = peg.placed.motion.spin;
     let candidates = hole.model.hollow && !peg.model.hollow && hole.model.radius.is_finite();
     if !candidates || spin.length_squared() < SPINS * SPINS {
@@ -138,6 +139,6 @@ fn turns_between_walls(peg: &Body, hole: &Body) -> bool {
     let solid = &hole.model.solid;
     solid.faces.iter().zip(&solid.face_owner).any(|(face, owner)| {
         let negative = solid.senses[*owner as usize] == Sense::Negative;
-        negative && face.flat().is_some_and(|(normal, _)| normal.dot(axis).abs() <= ALONG)
+        negative && (face.apex().is_some() || face.flat().is_some_and(|(normal, _)| normal.dot(axis).abs() <= ALONG))
     })
 }

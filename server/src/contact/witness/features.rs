@@ -4,22 +4,20 @@
 //! primitives lie in one plane, or the plane of a subtracted one's face passes by far from its cube, a literal of the
 //! solution may have the right value and yet decide nothing there. A face is *active* at a point if it passes through
 //! it and f depends on it there: the tree's literals are folded by what is known of them at the point
-//! (`Model::literals_at`), and of the open rest those count that the expression depends on, faces of one tangent plane
-//! counting as one. So neither a satisfied alternative of a complement is active nor the side of a body whose end lies
+//! (`Model::literals_at`), and of the open rest those count that the expression depends on (`dependence`), faces of one
+//! tangent plane counting as one. So neither a satisfied alternative of a complement is active nor the side of a body whose end lies
 //! flush in another's; and of faces in one plane none that another one always precedes.
 
+use super::dependence::{self, Literals, ONE_PLANE};
 use super::newton::{Constraint, cholesky_solve};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
-use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
+use crate::solid::local::{self, LiteralId, Truth};
 use crate::solid::surface::Apex;
 use crate::solid::{Face, Sense};
 use glam::DVec3;
 use smallvec::SmallVec;
-
-/// The literals active on a side, in order.
-pub type Literals = SmallVec<[LiteralId; 8]>;
 
 /// Both bodies at a point of contact.
 pub struct Features<'t, 'a> {
@@ -30,12 +28,6 @@ pub struct Features<'t, 'a> {
     /// The active faces of A and of B; empty where a body has no surface there.
     pub active: [Literals; 2],
 }
-
-/// Gradients closer than this are of one tangent plane.
-const ONE_PLANE: f64 = 1e-9;
-
-/// Most tangent planes at a point of which it is worked out on which of them f depends.
-const MOST_PLANES: usize = 8;
 
 /// What is left of the gradients' weighted sum where they hold each other.
 const BALANCED: f64 = 1e-9;
@@ -54,7 +46,9 @@ impl<'t, 'a> Features<'t, 'a> {
             if model.literals_at(y, tolerance, &mut open) != Truth::Open {
                 return Literals::new();
             }
-            active(&open, |id| normal(&model.solid.faces[id.face() as usize], id, y))
+            let face = |id: LiteralId| &model.solid.faces[id.face() as usize];
+            let is_apex = |id| face(id).apex().is_some_and(|apex| passes(&apex, y, tolerance));
+            dependence::active(&open, |id| normal(face(id), id, y), local::literals(&open).any(is_apex))
         });
         Self { task, x, at, tolerance, active }
     }
@@ -98,7 +92,7 @@ impl<'t, 'a> Features<'t, 'a> {
     }
 
     fn is_at(&self, apex: &Apex, y: DVec3) -> bool {
-        (y - apex.point).length() * apex.sin <= self.tolerance
+        passes(apex, y, self.tolerance)
     }
 
     /// The active face of `side` that lies in the tangent plane of another face there.
@@ -245,84 +239,13 @@ fn balance(gradients: &[DVec3]) -> Option<(SmallVec<[f64; 4]>, f64)> {
     lambda.iter().all(|l| *l >= 0.0).then_some((lambda, rest)).filter(|b| b.1.is_finite())
 }
 
+/// True when a cone's apex lies at a point, as near as every face that passes there within `tolerance` comes to it.
+fn passes(apex: &Apex, y: DVec3, tolerance: f64) -> bool {
+    (y - apex.point).length() * apex.sin <= tolerance
+}
+
 /// The gradient of a literal at a point of its own body.
 fn normal(face: &Face, id: LiteralId, y: DVec3) -> DVec3 {
     let n = face.at(y).normal;
     if id.sense() == Sense::Positive { n } else { -n }
-}
-
-/// The literals that an open expression depends on, those of one gradient taken for one.
-fn active(open: &[Token], gradient: impl Fn(LiteralId) -> DVec3) -> Literals {
-    let mut ids: Literals = local::literals(open).collect();
-    ids.sort_unstable();
-    ids.dedup();
-    // Of literals that are all alternatives, or all demanded, none can be left out.
-    if is_flat(open) {
-        return ids;
-    }
-    let mut planes: SmallVec<[DVec3; 8]> = SmallVec::new();
-    let plane_of: SmallVec<[usize; 8]> = ids
-        .iter()
-        .map(|id| {
-            let g = gradient(*id);
-            planes.iter().position(|p| (*p - g).length() <= ONE_PLANE).unwrap_or_else(|| {
-                planes.push(g);
-                planes.len() - 1
-            })
-        })
-        .collect();
-    if planes.len() > MOST_PLANES {
-        return ids;
-    }
-    let plane = |id: LiteralId| plane_of[ids.binary_search(&id).expect("a literal of the expression")];
-    let worlds = || 0..1usize << planes.len();
-    let table: Vec<bool> = worlds().map(|w| holds(open, &|id| w >> plane(id) & 1 == 1)).collect();
-    let depends = |k: usize| worlds().any(|w| w >> k & 1 == 0 && table[w] != table[w | 1 << k]);
-    // Of the faces in one plane those count that decide when they are the first or the last of it.
-    let alone = |own: LiteralId| {
-        let k = plane(own);
-        worlds().any(|w| table[w] != holds(open, &|id| (w >> plane(id) & 1 == 1) != (id == own)) && depends(k))
-    };
-    let of_plane = |k: usize| ids.iter().zip(&plane_of).filter(move |(_, p)| **p == k).map(|(id, _)| *id);
-    let mut kept = Literals::new();
-    for k in (0..planes.len()).filter(|k| depends(*k)) {
-        let before = kept.len();
-        kept.extend(of_plane(k).filter(|id| alone(*id)));
-        if kept.len() == before {
-            kept.extend(of_plane(k));
-        }
-    }
-    kept.sort_unstable();
-    if kept.is_empty() { ids } else { kept }
-}
-
-/// True for a literal, and for an operator over literals alone.
-fn is_flat(tokens: &[Token]) -> bool {
-    match local::first(tokens).0 {
-        Expression::Literal(_) => true,
-        Expression::And(body) | Expression::Or(body) => {
-            local::operands(body).all(|e| matches!(e, Expression::Literal(_)))
-        }
-    }
-}
-
-/// Truth of an expression from its literals'.
-fn holds(tokens: &[Token], of: &dyn Fn(LiteralId) -> bool) -> bool {
-    let (expression, _) = local::first(tokens);
-    let each = |body: &[Token], all: bool| {
-        let mut rest = body;
-        while !rest.is_empty() {
-            let n = local::first(rest).1;
-            if holds(&rest[..n], of) != all {
-                return !all;
-            }
-            rest = &rest[n..];
-        }
-        all
-    };
-    match expression {
-        Expression::Literal(id) => of(id),
-        Expression::And(body) => each(body, true),
-        Expression::Or(body) => each(body, false),
-    }
 }

@@ -2,6 +2,7 @@
 
 pub mod climb;
 pub mod contacts;
+mod dependence;
 pub mod extent;
 pub mod faces;
 pub mod features;

@@ -71,6 +71,13 @@ pub struct Solution {
     pub stationarity: f64,
 }
 
+impl Solution {
+    /// The point at a time between this solution's and a later one's, on the straight way from the one to the other.
+    pub(in crate::contact) fn before(&self, later: &Solution, t: f64) -> DVec3 {
+        self.x + (later.x - self.x) * ((t - self.t) / (later.t - self.t))
+    }
+}
+
 /// Steps in which the slowest motion that is told from rest passes the scale of a pair.
 const SLOWEST: f64 = 1e12;
 

@@ -8,7 +8,7 @@ use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution,
 use super::retreat::{BACK, Climber, ON_SURFACE, held};
 use super::sides::{deciding, has_both_sides};
 use crate::contact::exclusion::literal::Side;
-use crate::contact::instant::depth;
+use crate::contact::instant::{depth, separation};
 use crate::contact::query::task::{Task, witness_level};
 use crate::motion::Instant;
 use crate::octree::Model;
@@ -22,6 +22,9 @@ pub(in crate::contact) const CLIMBED: f64 = 0.5 * SETTLED;
 
 /// |Σ λ g| that is small enough for either body's normal to be told.
 const BALANCED: f64 = 1e-7;
+
+/// The same that is not worth another solution.
+const SHARP: f64 = 1e-9;
 
 /// Size of a small feature against its body.
 const FEATURE: f64 = 1e-3;
@@ -59,9 +62,9 @@ impl Touch<'_, '_> {
         let touch = touch.filter(|s| s.stationarity < SETTLED).or_else(|| {
             if continues { problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0, true) } else { None }
         });
-        let touch = touch.and_then(|s| if self.is_touch(&s, deep.t) { Some(s) } else { self.touch_beside(s, deep.t) });
+        let touch = touch.and_then(|s| if self.is_touch(&s, deep) { Some(s) } else { self.touch_beside(s, deep) });
         match touch {
-            Some(s) if self.is_held(&s) => Some(s),
+            Some(s) if self.is_held(&s) => Some(self.sharpened(s, deep)),
             other if continues => {
                 let climbed = || self.back(deep, &Climber::new(self.task, BACK));
                 self.continued_by_steps(deep).or_else(climbed).or(other.filter(|s| self.is_there(s)))
@@ -70,12 +73,47 @@ impl Touch<'_, '_> {
         }
     }
 
+    /// A touch whose multipliers balance no better than may be for a guess, as they may at features that are small against
+    /// the pair: solved for once more in units of these, where that helps.
+    fn sharpened(&self, s: Solution, deep: &Solution) -> Solution {
+        if s.stationarity <= SHARP {
+            return s;
+        }
+        let better = self.scales().into_iter().filter_map(|p| p.solve(&s.active, s.x, s.t, &s.lambda, 0.0, true));
+        let near = |o: &Solution| (o.x - s.x).length() <= NOT_FAR * self.task.scale;
+        let mut better = better.filter(|o| o.stationarity < 0.5 * s.stationarity && near(o));
+        better.find(|o| self.is_held(o) && self.is_touch(o, deep)).unwrap_or(s)
+    }
+
+    /// The equations in units of the pair, of its smaller body and of a small feature of that. Beside a far larger body,
+    /// and at small round features, those in units of the pair's scale lose all digits.
+    fn scales(&self) -> [Problem<'_>; 3] {
+        let own = self.task.model_a.radius.min(self.task.model_b.radius).min(self.task.scale);
+        [self.task.scale, own, FEATURE * own].map(|scale| {
+            let problem = Problem::of(self.task);
+            Problem { scale, time_scale: problem.time_scale * (scale / self.task.scale), ..problem }
+        })
+    }
+
     /// True when the surfaces meet in a solution, as both whole trees say, no later than the witness.
-    fn is_touch(&self, s: &Solution, latest: f64) -> bool {
+    fn is_touch(&self, s: &Solution, deep: &Solution) -> bool {
         let at = self.task.relative.at(s.t);
         let tol = 16.0 * self.task.rounding;
         let touches = |model: &Model, x: DVec3| model.value_within(x, tol).abs() <= tol;
-        s.t <= latest && touches(self.task.model_a, s.x) && touches(self.task.model_b, at.b_point(s.x))
+        s.t <= deep.t
+            && touches(self.task.model_a, s.x)
+            && touches(self.task.model_b, at.b_point(s.x))
+            && (s.t >= 0.0 || deep.t <= 0.0 || self.lasts_to_the_start(s, deep))
+    }
+
+    /// True when bodies whose surfaces meet before the start, as their motion has it, still have something in common at the
+    /// start, on the way from there to the witness. Between like faces the equations of the one have solutions far from
+    /// the other, between which the bodies are apart.
+    fn lasts_to_the_start(&self, s: &Solution, deep: &Solution) -> bool {
+        let at = self.task.relative.at(0.0);
+        let least = INCIDENT * self.task.rounding;
+        let x = s.before(deep, 0.0);
+        separation::value(self.task, &at, x) <= least || Climber::new(self.task, BACK).deepest(0.0, x).1 >= -least
     }
 
     /// True when a solution's multipliers balance, none pulls, and its faces are there.
@@ -109,7 +147,7 @@ impl Touch<'_, '_> {
         let mut from = deep.clone();
         let mut level = witness_level(self.task.delta, self.task.rounding);
         for _ in 0..CONTINUATIONS {
-            let last = self.mended(&from, 0.0).filter(|s| self.is_held(s) && self.is_touch(s, deep.t));
+            let last = self.mended(&from, 0.0).filter(|s| self.is_held(s) && self.is_touch(s, deep));
             if last.is_some() || level < self.task.rounding {
                 return last;
             }
@@ -131,7 +169,7 @@ impl Touch<'_, '_> {
         let solve = |t: f64, held: &depth::Held| {
             let near = |s: &Solution| (s.x - held.0).length() <= NOT_FAR * self.task.scale;
             let balances = |s: &Solution| s.stationarity < BALANCED;
-            let touches = |s: &Solution| near(s) && balances(s) && self.is_held(s) && self.is_touch(s, deep.t);
+            let touches = |s: &Solution| near(s) && balances(s) && self.is_held(s) && self.is_touch(s, deep);
             self.mended(&self.climbed(t, held), 0.0).filter(touches)
         };
         let (t, held) = match climber.back((deep.t, deep.x, level), solve)? {
@@ -157,7 +195,7 @@ impl Touch<'_, '_> {
 
     /// Where a climb has ended, as a solution of the faces that hold it.
     pub(in crate::contact) fn climbed(&self, t: f64, (x, _, support): &depth::Held) -> Solution {
-        let (mut active, mut lambda): (Actives, Weights) = held(support).unzip();
+        let (mut active, mut lambda): (Actives, Weights) = held(support).filter(|(_, l)| *l > ACTIVE).unzip();
         if !has_both_sides(&active) {
             // What is no thicker than rounding holds itself.
             let at = self.task.relative.at(t);
@@ -169,13 +207,8 @@ impl Touch<'_, '_> {
     }
 
     /// The contact at a depth from one at another, its faces exchanged until both trees have that depth at its point.
-    fn mended(&self, from: &Solution, level: f64) -> Option<Solution> {
-        // Beside a far larger body, and at small round features, equations in units of the pair's scale lose all digits.
-        let own = self.task.model_a.radius.min(self.task.model_b.radius).min(self.task.scale);
-        let near = [self.task.scale, own, FEATURE * own].map(|scale| {
-            let problem = Problem::of(self.task);
-            Problem { scale, time_scale: problem.time_scale * (scale / self.task.scale), ..problem }
-        });
+    pub(in crate::contact) fn mended(&self, from: &Solution, level: f64) -> Option<Solution> {
+        let near = self.scales();
         let tol = 16.0 * self.task.rounding;
         let (mut active, mut lambda) = (from.active.to_vec(), from.lambda.to_vec());
         let (mut x, mut t) = (from.x, from.t);
@@ -240,7 +273,7 @@ impl Touch<'_, '_> {
     }
 
     /// A touch along a line or over a patch, at a point that the faces beside it have left meanwhile: moved to their edge.
-    fn touch_beside(&self, s: Solution, latest: f64) -> Option<Solution> {
+    fn touch_beside(&self, s: Solution, deep: &Solution) -> Option<Solution> {
         let beside = deciding(self.task, s.x, &self.task.relative.at(s.t));
         let full = s.active.len() == MAX_ACTIVE;
         if full || s.active.contains(&beside) || !self.known.holds(self.task, &beside) {
@@ -248,7 +281,7 @@ impl Touch<'_, '_> {
         }
         let active: Vec<_> = s.active.iter().copied().chain([beside]).collect();
         let lambda: Vec<_> = s.lambda.iter().copied().chain([0.0]).collect();
-        Problem::of(self.task).solve(&active, s.x, s.t, &lambda, 0.0, true).filter(|s| self.is_touch(s, latest))
+        Problem::of(self.task).solve(&active, s.x, s.t, &lambda, 0.0, true).filter(|s| self.is_touch(s, deep))
     }
 }
 
