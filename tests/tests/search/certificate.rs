@@ -1,5 +1,6 @@
 //! Certificates of answers hold against a verifier with interval arithmetic of its own: all cases and 200 random scenes
-//! (`CONTACTD_CERTIFICATES=N` for another number, and all altered cases, `CONTACTD_CERTIFICATE_FIRST=I` from another one on), and no altered one does.
+//! (`CONTACTD_CERTIFICATES=N` for another number and all altered cases, `CONTACTD_CERTIFICATE_FIRST=I` from another one on),
+//! and no altered one does.
 
 use contactd::contact::certificate::certify;
 use contactd::contact::{
