@@ -132,15 +132,15 @@ fn bad_input_is_one_line_and_status_2() {
         ("ball.csg", BALL),
         ("good.toml", &scene(4.0)),
         ("unknown.toml", &unknown),
-        ("flat.csg", "union() {\n  projection();\n}\n"),
+        ("flat.csg", "union() {\n  roof();\n}\n"),
         ("flat.toml", &scene(4.0).replace("ball.csg", "flat.csg")),
         ("lost.toml", &scene(4.0).replace("ball.csg", "lost.csg")),
     ]);
     std::fs::write(folder.path().join("bytes.csg"), b"cube(\xff1);").expect("a file");
     let table: [(&[&str], &str); 7] = [
         (&["check", "unknown.toml"], "unknown.toml:6:9: expected the name of a model, found \"bat\""),
-        (&["check", "flat.toml"], "flat.csg:2:3: expected a supported construct, found projection, which"),
-        (&["inspect", "flat.csg"], "flat.csg:2:3: expected a supported construct, found projection, which"),
+        (&["check", "flat.toml"], "flat.csg:2:3: expected a supported construct, found roof, which"),
+        (&["inspect", "flat.csg"], "flat.csg:2:3: expected a supported construct, found roof, which"),
         (&["inspect", "bytes.csg"], "bytes.csg:1:6: expected text in UTF-8, found the byte 0xff"),
         (&["check", "lost.toml"], "lost.toml:3:8: expected a model file, found lost.csg: "),
         (&["check", "none.toml"], "none.toml: expected a readable file, found "),
