@@ -632,7 +632,15 @@ fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> C
     let off = if off <= INCIDENT * task.rounding { 0.0 } else { off };
     // Deep in each other bodies show no faces in one point: those of the solution are told.
     let tolerance = BESIDE * off + INCIDENT * task.rounding;
-    let features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(tolerance));
+    let mut features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(tolerance));
+    if off > 0.0 && task.ignored_depth == 0.0 && !features.is_balanced(NEARLY) {
+        // A face that holds the point with next to no weight may be farther from it than the point is deep: a move of
+        // the point changes the depth by that weight of it.
+        let wider = Features::at(task, x, &at, Some(WIDER * off + INCIDENT * task.rounding));
+        if wider.is_balanced(NEARLY) {
+            features = wider;
+        }
+    }
     let mut active = Active::of(&problem, s, (x, &at), &features);
     if active.extent == Extent::Point {
         active.add_incident(&features);
@@ -662,6 +670,12 @@ fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> C
 /// A face that is this many times as far from a deep point as the point is deep passes it, too: it may hold it with next to
 /// no weight.
 const BESIDE: f64 = 1.0 + 1e-3;
+
+/// How much farther than it is deep faces are looked for beside a point where those that pass it do not hold it.
+const WIDER: f64 = 1.1;
+
+/// What may be left of the gradients of faces that hold a point where it is deep.
+const NEARLY: f64 = 1e-7;
 
 /// Gradients that miss each other by more than this are not of the point where the bodies hold each other.
 const BENT: f64 = 1e-9;
