@@ -283,6 +283,14 @@ impl<'a> Lowering<'a> {
                 no_children(call)?;
                 Ok(Step::Leaf(id))
             }
+            "surface" => {
+                let id = imports::surface(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
+                no_children(call)?;
+                Ok(Step::Leaf(match context.plane {
+                    None => id,
+                    Some(_) => self.shapes.nothing(call, "inside of a 2D shape"),
+                }))
+            }
             other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
     }
@@ -734,7 +742,7 @@ fn hint(name: &str) -> &'static str {
     match name {
         "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
         | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
-        "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
+        "import_stl" | "import_off" | "import_dxf" => OTHER_FILES,
         "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
         "fill" => " (write the outline out in circles, squares and polygons)",
         _ => "",
