@@ -145,8 +145,8 @@ mod tests {
         for name in ["root/part.stl", "other.stl"] {
             std::fs::write(folder.path().join(name), cube("9")).unwrap();
         }
-        let root = Some(folder.path().join("root"));
-        let models = Models::new(&ServerConfig { import_root: root.clone(), ..ServerConfig::default() });
+        let root = folder.path().join("root");
+        let models = Models::new(&ServerConfig { import_root: Some(root.clone()), ..ServerConfig::default() });
         let load = |models: &Models, name: &str| {
             let bytes = format!("import(file = \"{name}\");").into_bytes();
             models.load(&ModelFile { name: "sent".into(), format: String::new(), bytes }, Facets::Auto)
@@ -154,7 +154,7 @@ mod tests {
         let first = load(&models, "part.stl").unwrap_or_else(|e| panic!("{}", e.detail));
         assert_eq!(first.part.model.solid.primitives.len(), 1);
         assert!(Arc::ptr_eq(&first, &load(&models, "part.stl").expect("the same")));
-        std::fs::write(root.unwrap_or_default().join("part.stl"), cube("8")).unwrap();
+        std::fs::write(root.join("part.stl"), cube("8")).unwrap();
         assert!(!Arc::ptr_eq(&first, &load(&models, "part.stl").expect("another file by now")));
         let outside = load(&models, "../other.stl").expect_err("outside").detail;
         assert!(outside.starts_with("sent:1:1: expected a readable file, found \"../other.stl\", which is not in"));

@@ -49,6 +49,12 @@ pub fn file_of(call: &Call) -> Option<String> {
     }
 }
 
+/// True for a call with an empty name, where files can be named at all.
+fn names_none(call: &Call, attached: Option<&[Attachment]>) -> bool {
+    let is_empty = |v: &ValueKind| matches!(v, ValueKind::Text(name) if name.is_empty());
+    attached.is_some() && call.arguments.iter().any(|a| a.name.as_deref() == Some("file") && is_empty(&a.value.kind))
+}
+
 /// The bytes of a file that a call names, and its name.
 fn bytes_of<'b>(call: &Call, attached: Option<&'b [Attachment]>) -> Result<(String, &'b [u8])> {
     let Some(attached) = attached else {
@@ -75,6 +81,9 @@ pub fn import(
     (outer, hull): (&DAffine3, bool),
     attached: Option<&[Attachment]>,
 ) -> Result<PartId> {
+    if names_none(call, attached) {
+        return Ok(shapes.nothing(call, "of no file"));
+    }
     let refused = |construct: String, hint| (call.at, Problem::Unsupported { construct, hint });
     let (name, bytes) = bytes_of(call, attached)?;
     if Arguments::new(call, &PARAMETERS)?.bool_or("center", false)? {
@@ -122,6 +131,9 @@ pub fn surface(
     (outer, hull): (&DAffine3, bool),
     attached: Option<&[Attachment]>,
 ) -> Result<PartId> {
+    if names_none(call, attached) {
+        return Ok(shapes.nothing(call, "of no file"));
+    }
     let (name, bytes) = bytes_of(call, attached)?;
     let arguments = Arguments::new(call, &["file", "center", "convexity", "invert", "timestamp"])?;
     let how = (arguments.bool_or("center", false)?, arguments.bool_or("invert", false)?);
@@ -148,6 +160,9 @@ pub fn flat(
     attached: Option<&[Attachment]>,
 ) -> Result<PartId> {
     let at = call.at;
+    if names_none(call, attached) {
+        return Ok(shapes.nothing(call, "of no file"));
+    }
     let (name, bytes) = bytes_of(call, attached)?;
     let arguments = Arguments::new(call, if call.name == "import" { &PARAMETERS } else { &OF_EXTRUSIONS })?;
     let word = |name: &str| match arguments.get(name).map(|v| (&v.kind, v)) {
@@ -180,7 +195,7 @@ pub fn flat(
         return Ok(shapes.nothing(call, &format!("of {name:?}, without a closed path")));
     }
     let corners = drawn.iter().flatten().map(Vec::len).sum();
-    shapes.parts.affordable(at, drawn.iter().flatten().map(Vec::len).max().unwrap_or(0))?;
+    shapes.parts.meshable(at, corners)?;
     if drawing.off > 0.0 {
         shapes.parts.faceted(at, &format!("curves of {name:?}"), corners, drawing.off);
     }
@@ -289,6 +304,9 @@ mod tests {
         assert!(inside(&rim, 1.0, 1.0, 1.0));
         let turned = "rotate_extrude(file = \"plate.dxf\", layer = \"rim\", origin = [0, 0], scale = 2, angle = 360);";
         assert!(inside(turned, 5.0, 5.0, 3.0) && !inside(turned, 1.0, 1.0, 5.0));
+        let none =
+            read("cube(1); import(file = \"\"); linear_extrude(height = 1) { import(file = \"\"); }").expect("a cube");
+        assert!(none.notes.iter().filter(|n| n.text.starts_with("import of no file: left out")).count() == 2);
         let stray = format!("cube(1); import({});", of.replace("LAYER", ""));
         assert_eq!(read(&stray).expect("a cube").solid.primitives.len(), 1);
         for (text, sentence) in [

@@ -17,6 +17,7 @@ use crate::solid::primitive::{MeshFault, Polyhedron, Shape, TriangleMesh};
 use crate::solid::{Label, Op, SolidBuilder};
 use contactd_proto::Pose;
 use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
 
 /// Something wrong at a place of a file.
 pub type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -78,6 +79,60 @@ impl Polygons {
         out.faces = self.faces.iter().map(|f| f.iter().map(|i| of(*i)).collect()).collect();
         out
     }
+}
+
+/// Faces of which neighbours agree about what is outside, and how many were turned for that: of what hangs together the fewer ones.
+/// `None` where none has to be, and where an edge has not two faces or no way round suits all.
+pub fn oriented(faces: &[Vec<u32>]) -> Option<(Vec<Vec<u32>>, usize)> {
+    // The faces at each edge, and whether they run from its lower corner to its higher.
+    let mut edges: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
+    for (i, face) in faces.iter().enumerate() {
+        for (a, b) in face.iter().zip(face.iter().cycle().skip(1)) {
+            edges.entry([*a.min(b), *a.max(b)]).or_default().push((i, a < b));
+        }
+    }
+    if edges.values().any(|e| e.len() != 2) {
+        return None;
+    }
+    let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut count = 0;
+    for first in 0..faces.len() {
+        if turned[first].is_some() {
+            continue;
+        }
+        turned[first] = Some(false);
+        let (mut shell, mut next) = (vec![first], 0);
+        while let Some(&i) = shell.get(next) {
+            next += 1;
+            let here = turned[i]?;
+            for (a, b) in faces[i].iter().zip(faces[i].iter().cycle().skip(1)) {
+                let pair = &edges[&[*a.min(b), *a.max(b)]];
+                let other = if pair[0].0 == i { pair[1].0 } else { pair[0].0 };
+                let wanted = here ^ (pair[0].1 == pair[1].1);
+                match turned[other] {
+                    None => {
+                        turned[other] = Some(wanted);
+                        shell.push(other);
+                    }
+                    Some(is) if is != wanted => return None,
+                    Some(_) => {}
+                }
+            }
+        }
+        let others = shell.iter().filter(|i| turned[**i] == Some(true)).count();
+        if 2 * others > shell.len() {
+            shell.iter().for_each(|i| turned[*i] = turned[*i].map(|t| !t));
+        }
+        count += others.min(shell.len() - others);
+    }
+    let turn = |(face, turned): (&Vec<u32>, &Option<bool>)| {
+        let mut face = face.clone();
+        if *turned == Some(true) {
+            face.reverse();
+        }
+        face
+    };
+    (count > 0).then(|| (faces.iter().zip(&turned).map(turn).collect(), count))
 }
 
 /// What a file has in it.
@@ -162,8 +217,17 @@ fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Ve
             return Ok((polyhedron.into(), flipped.into_iter().collect()));
         }
     }
-    let (mesh, repair) = TriangleMesh::of_polygons(points, faces)?;
-    Ok((mesh.into(), repair.notes("a mesh")))
+    let made = TriangleMesh::of_polygons(points, faces);
+    if let Err(MeshFault::Mixed(..)) = made
+        && let Some((turned, count)) = oriented(faces)
+    {
+        let polygons = Polygons { points: points.clone(), faces: turned };
+        let (shape, mut repaired) = solid(&polygons, limits)?;
+        let text = format!("a mesh with {count} faces that run the other way round than their neighbours: turned");
+        repaired.insert(0, (text, None));
+        return Ok((shape, repaired));
+    }
+    made.map(|(mesh, repair)| (mesh.into(), repair.notes("a mesh")))
 }
 
 /// Text of a file.

@@ -193,7 +193,8 @@ fn head(bytes: &[u8]) -> Result<(Order, Vec<Element>, &[u8], u32)> {
                     ["list", length, of] => (Some(kind(length)?), kind(of)?),
                     [of] => (None, kind(of)?),
                     _ => {
-                        return line.wrong("property KIND NAME or property list KIND KIND NAME", words.first().copied());
+                        return line
+                            .wrong("property KIND NAME or property list KIND KIND NAME", words.first().copied());
                     }
                 };
                 element.properties.push(Property { name: (*name).to_owned(), kind, length });
