@@ -467,7 +467,7 @@ fn outlines_of_more_corners_than_a_formula_has_are_meshes_with_flat_faces() {
     let star = |n: usize| {
         let corner = |i: usize| {
             let (sin, cos) = libm::sincos(i as f64 / n as f64 * std::f64::consts::TAU);
-            let r = if i % 2 == 0 { 5.0 } else { 4.9 };
+            let r = if i.is_multiple_of(2) { 5.0 } else { 4.9 };
             format!("[{},{}]", r * cos, r * sin)
         };
         format!("polygon([{}]);", (0..n).map(corner).collect::<Vec<_>>().join(","))
