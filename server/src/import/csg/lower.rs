@@ -78,6 +78,8 @@ enum CallKind {
     Extrude(Extrusion),
     Revolve(Turn),
     Hull,
+    /// A flat shape without its holes.
+    Fill,
     Minkowski,
     Projection {
         /// What z = 0 cuts; else the shadow on it.
@@ -207,6 +209,7 @@ impl<'a> Lowering<'a> {
                 None => Step::Leaf(self.shapes.nothing(call, "that flattens what is inside of it")),
             }),
             "hull" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Hull)),
+            "fill" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Fill)),
             "minkowski" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Minkowski)),
             "projection" => {
                 let cut = Arguments::new(call, &["cut", "convexity"])?.bool_or("cut", false)?;
@@ -282,6 +285,14 @@ impl<'a> Lowering<'a> {
                 let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
                 no_children(call)?;
                 Ok(Step::Leaf(id))
+            }
+            "surface" => {
+                let id = imports::surface(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
+                no_children(call)?;
+                Ok(Step::Leaf(match context.plane {
+                    None => id,
+                    Some(_) => self.shapes.nothing(call, "inside of a 2D shape"),
+                }))
             }
             other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
@@ -370,6 +381,7 @@ impl<'a> Lowering<'a> {
             }
             let part = match open.kind {
                 CallKind::Set(op) => Part::Op(op, at, built),
+                CallKind::Fill => Part::Op(Op::Union, at, built),
                 CallKind::Hull => self.hull(at, &built)?,
                 CallKind::Minkowski => self.minkowski(at, &built, open.outside.outer.translation)?,
                 CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) | CallKind::Projection { .. } => {
@@ -393,7 +405,8 @@ impl<'a> Lowering<'a> {
             (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
             (_, None) | (CallKind::Projection { .. }, _) => Part::Empty,
             (CallKind::Extrude(extrusion), _)
-                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f))) =>
+                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f)))
+                    || outlines::is_intricate(parts, &open.built) =>
             {
                 twist::extruded(parts, at, &open.context.outer, extrusion, &open.built)?
             }
@@ -409,6 +422,7 @@ impl<'a> Lowering<'a> {
             }
             (CallKind::Revolve(turn), Some(call)) => return self.revolve(call, *turn, &open.context.outer, open.built),
             (CallKind::Hull, Some(call)) => outlines::hull(parts, at, &like(most, call), &open.built)?,
+            (CallKind::Fill, Some(call)) => outlines::filled(parts, at, &like(most, call), &open.built)?,
             (CallKind::Minkowski, Some(call)) => {
                 let origin = open.outside.plane.map_or(DVec3::ZERO, |p| p.inner.translation);
                 outlines::minkowski(parts, at, &like(most, call), &open.built, origin)?
@@ -448,8 +462,12 @@ impl<'a> Lowering<'a> {
         let Some((at, name)) = stray else { return Ok((built, None)) };
         if !solids {
             if top {
-                let found = format!("the 2D shape {name} outside of linear_extrude");
-                return Err((at, Problem::syntax("a solid", found)));
+                let text = format!(
+                    "{name} outside of linear_extrude: a 2D shape, without volume (OpenSCAD: \"Current top level object is not a \
+                     3D object.\")"
+                );
+                self.note(at, text, None);
+                return Ok((Vec::new(), None));
             }
             if kinds.contains(&Some(true)) {
                 self.note(
@@ -734,9 +752,8 @@ fn hint(name: &str) -> &'static str {
     match name {
         "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
         | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
-        "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
+        "import_stl" | "import_off" | "import_dxf" => OTHER_FILES,
         "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
-        "fill" => " (write the outline out in circles, squares and polygons)",
         _ => "",
     }
 }
