@@ -231,7 +231,8 @@ impl<'a> Contacts<'a> {
         s.active.iter().all(|c| {
             let Constraint::Apex(side, id, 0) = *c else { return true };
             let solid = if side == Side::A { self.task.a } else { self.task.b };
-            let Some(Apex { axis, sin, .. }) = solid.faces[id.face() as usize].apex() else { return false };
+            let Some(apex) = solid.faces[id.face() as usize].apex() else { return false };
+            let Apex { axis, sin, .. } = apex;
             let axis = if side == Side::A { axis } else { at.a_vector(axis) };
             let same = s
                 .active
@@ -239,6 +240,10 @@ impl<'a> Contacts<'a> {
                 .zip(&s.lambda)
                 .filter(|(o, _)| matches!(**o, Constraint::Apex(os, oid, _) if (os, oid) == (side, id)));
             let sum: DVec3 = same.map(|(o, l)| problem.row(o, s.x, at, 0.0).gradient * *l).sum();
+            if apex.rows.is_some() {
+                let own = if side == Side::A { sum } else { at.b_from_a * sum };
+                return apex.holds(own, -sum.dot(axis), 1e-6 * sum.length());
+            }
             -sum.dot(axis) >= sum.length() * (sin - 1e-6)
         })
     }
