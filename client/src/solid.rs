@@ -247,6 +247,12 @@ impl ModelText for str {
     }
 }
 
+impl<T: ModelText + ?Sized> ModelText for &T {
+    fn model_text(&self) -> Result<Cow<'_, str>, BuildError> {
+        (**self).model_text()
+    }
+}
+
 impl ModelText for String {
     fn model_text(&self) -> Result<Cow<'_, str>, BuildError> {
         Ok(self.into())

@@ -21,11 +21,11 @@
 use crate::engine::ReportedPoint as _;
 use crate::formula::{Formula, formula_of};
 use crate::reference::Moving;
-use crate::reference::field::Literal;
+use crate::reference::field::{Image, Literal};
 use contactd::contact::{ContactKind, Extent, Outcome, Status};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Sense, Shape, Solid, surface};
 use contactd_proto::contact_record::NO_FACE;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 /// What a record says that is not so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -138,6 +138,7 @@ impl<'a> Side<'a> {
             | Face::Cylinder(surface::Cylinder { origin: o, radius, .. }) => o.length() + radius,
             Face::Cone(surface::Cone { apex, .. }) => apex.length(),
             Face::Torus(surface::Torus { origin, major, minor, .. }) => origin.length() + major + minor,
+            Face::Elliptic(e) => e.origin.length() + e.size,
         });
         let motion = &moving.motion;
         let own = 2.0 * moving.place.position.length() + 2.0 * reach + numbers.fold(0.0, f64::max);
@@ -179,6 +180,10 @@ impl<'a> Side<'a> {
             Face::Cone(surface::Cone { apex, axis, sin, cos }) if apex.distance(x) <= tau / sin => {
                 l.sign * (axis.cross(d).length() * cos - axis.dot(d) * sin)
             }
+            Face::Elliptic(e) if self.is_apex(i, x, tau) => {
+                let image = Image::of(&e);
+                l.sign * (image.across(image.origin + d).length() - image.fall * image.local(image.origin + d).z)
+            }
             _ => l.gradient(x).dot(d),
         }
     }
@@ -194,6 +199,7 @@ impl<'a> Side<'a> {
     fn is_apex(&self, i: usize, x: DVec3, tau: f64) -> bool {
         match self.literals[i].face {
             Face::Cone(surface::Cone { apex, sin, .. }) => apex.distance(x) <= tau / sin,
+            Face::Elliptic(e) if e.third < 0.0 => e.origin.distance(x) <= tau / -e.third,
             _ => false,
         }
     }
@@ -291,8 +297,19 @@ impl Spot {
         let mut apex = false;
         for i in &active {
             if side.is_apex(*i, x, tau) {
-                let Face::Cone(surface::Cone { axis, sin, cos, .. }) = side.literals[*i].face else { unreachable!() };
                 let sign = side.literals[*i].sign;
+                if let Face::Elliptic(e) = side.literals[*i].face {
+                    let image = Image::of(&e);
+                    let n = image.turn.conjugate() * (normal * sign);
+                    let towards = DVec2::new(n.x / image.scale.x, n.y / image.scale.y).try_normalize();
+                    let around = (0..256).map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 256.0));
+                    let ray = |v: DVec2| image.turn * (v.extend(0.0) * image.scale - DVec3::Z * image.fall) * sign;
+                    generators.extend(around.chain(towards).map(ray));
+                    generators.push(image.turn * DVec3::Z * -sign);
+                    apex = true;
+                    continue;
+                }
+                let Face::Cone(surface::Cone { axis, sin, cos, .. }) = side.literals[*i].face else { unreachable!() };
                 let u = axis.any_orthonormal_vector();
                 let v = axis.cross(u);
                 let towards = (normal * sign - axis * axis.dot(normal * sign)).try_normalize();
@@ -552,6 +569,11 @@ fn features(
                 let rho = axis.cross(point - origin).length();
                 let tube = (rho - major).hypot(axis.dot(point - origin));
                 moves / tube.min(rho).max(f64::MIN_POSITIVE)
+            }
+            // Of the gradient, over its length: twice as much of the normal.
+            Face::Elliptic(e) => {
+                let slope = side.literals[*i].gradient(point).length();
+                2.0 * moves / (slope * Image::of(&e).across(point).length()).max(f64::MIN_POSITIVE)
             }
         });
         each.fold(0.0, f64::max)

@@ -155,6 +155,17 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
         Shape::Torus(t) => {
             point(t.major) * across + point(t.minor) * (n[0].square() + n[1].square() + n[2].square()).sqrt()
         }
+        Shape::Ellipsoid(e) => {
+            let [a, b, c] = std::array::from_fn(|k| (point(e.semi[k]) * n[k]).square());
+            (a + b + c).sqrt()
+        }
+        Shape::EllipticFrustum(c) => {
+            let rim = ((point(c.semi.x) * n[0]).square() + (point(c.semi.y) * n[1]).square()).sqrt();
+            let up = n[2] + point(c.lean.x) * n[0] + point(c.lean.y) * n[1];
+            let top = point(c.half_height) * up + point(c.top) * rim;
+            let bottom = point(-c.half_height) * up + point(c.bottom) * rim;
+            point(top.hi.max(bottom.hi))
+        }
         Shape::HalfSpace(_) => return f64::INFINITY,
     };
     (at + own).hi

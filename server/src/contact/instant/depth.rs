@@ -151,14 +151,14 @@ fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
         let decide = |side: Side| {
             let (model, y) = if side == Side::A { (task.model_a, x) } else { (task.model_b, at.b_point(x)) };
             let (value, id) = model.deciding(y);
-            let n = model.solid.faces[id.face() as usize].at(y).normal;
-            let n = if id.sense() == Sense::Positive { n } else { -n };
-            (value, if side == Side::A { n } else { at.a_vector(n) })
+            let f = model.solid.faces[id.face() as usize].at(y);
+            let n = if id.sense() == Sense::Positive { f.normal } else { -f.normal };
+            (value, if side == Side::A { n } else { at.a_vector(n) }, f.slope)
         };
-        let ((in_a, up_a), (in_b, up_b)) = (decide(Side::A), decide(Side::B));
+        let ((in_a, up_a, steep_a), (in_b, up_b, steep_b)) = (decide(Side::A), decide(Side::B));
         let apart = up_a - up_b;
         let square = apart.length_squared();
-        if square < OPPOSED {
+        if square < OPPOSED * steep_a * steep_b {
             break;
         }
         x -= apart * ((in_a - in_b) / square);
@@ -166,7 +166,7 @@ fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
     x
 }
 
-/// |g_A − g_B|² below which two gradients do not oppose each other.
+/// |g_A − g_B|² below which two gradients do not oppose each other, over their lengths.
 const OPPOSED: f64 = 1.0;
 
 fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
@@ -244,5 +244,8 @@ fn normal(task: &Task, at: &Instant, x: DVec3, support: &[(Side, LiteralId, f64)
     };
     let sum = |side: Side| support.iter().filter(|s| s.0 == side).map(|s| gradient(s.0, s.1) * s.2).sum::<DVec3>();
     let from_a = local::deciding(&task.a.normal_form, &mut |f| task.a.faces[f as usize].value(x)).1;
-    (sum(Side::A) - sum(Side::B)).try_normalize().unwrap_or_else(|| gradient(Side::A, from_a))
+    (sum(Side::A) - sum(Side::B)).try_normalize().unwrap_or_else(|| {
+        let n = task.a.faces[from_a.face() as usize].unit_normal(x);
+        if from_a.sense() == Sense::Positive { n } else { -n }
+    })
 }

@@ -63,7 +63,7 @@ impl<'t, 'a> Features<'t, 'a> {
         self.active[side as usize].contains(&id)
     }
 
-    /// The gradient of a literal at the point, along A's axes.
+    /// The unit vector along a literal's gradient at the point, along A's axes.
     pub fn gradient(&self, side: Side, id: LiteralId) -> DVec3 {
         let (face, y) = self.face(side, id);
         let n = normal(face, id, y);
@@ -75,7 +75,7 @@ impl<'t, 'a> Features<'t, 'a> {
         let (face, y) = self.face(side, id);
         match face.apex().filter(|apex| self.is_at(apex, y)) {
             Some(apex) => -apex.axis,
-            None => face.at(y).normal,
+            None => face.unit_normal(y),
         }
     }
 
@@ -159,7 +159,9 @@ impl<'t, 'a> Features<'t, 'a> {
                         best = Some((along, held.zip(weights).collect(), sum));
                     }
                 }
-                let Some((along, mut held, sum)) = best.filter(|b| b.0 >= apex.sin - NEARLY_BALANCED) else { continue };
+                let own = |v: DVec3| if side == Side::A { v } else { self.at.b_from_a * v };
+                let holds = |b: &(f64, Vec<(Constraint, f64)>, DVec3)| apex.holds(own(-b.2), b.0, NEARLY_BALANCED);
+                let Some((along, mut held, sum)) = best.filter(holds) else { continue };
                 debug_assert!(along <= 1.0 + 1e-9);
                 let directions = apex.directions();
                 held.extend((0..3).map(|k| {
@@ -263,8 +265,8 @@ fn passes(apex: &Apex, y: DVec3, tolerance: f64) -> bool {
     (y - apex.point).length() * apex.sin <= tolerance
 }
 
-/// The gradient of a literal at a point of its own body.
+/// The unit normal of a literal at a point of its own body, along its gradient.
 fn normal(face: &Face, id: LiteralId, y: DVec3) -> DVec3 {
-    let n = face.at(y).normal;
+    let n = face.unit_normal(y);
     if id.sense() == Sense::Positive { n } else { -n }
 }

@@ -309,7 +309,8 @@ impl Problem<'_> {
         s.active.iter().all(|c| {
             let Constraint::Apex(side, id, 0) = *c else { return true };
             let faces = if side == Side::A { &self.a } else { &self.b };
-            let Some(Apex { axis, sin, .. }) = faces.get(id.face()).apex() else { return false };
+            let Some(apex) = faces.get(id.face()).apex() else { return false };
+            let Apex { axis, sin, .. } = apex;
             let axis = if side == Side::A { axis } else { at.a_vector(axis) };
             let same = s
                 .active
@@ -317,6 +318,10 @@ impl Problem<'_> {
                 .zip(&s.lambda)
                 .filter(|(o, _)| matches!(**o, Constraint::Apex(os, oid, _) if (os, oid) == (side, id)));
             let sum: DVec3 = same.map(|(o, l)| self.row(o, s.x, at, 0.0).gradient * *l).sum();
+            if apex.rows.is_some() {
+                let own = if side == Side::A { sum } else { at.b_from_a * sum };
+                return apex.holds(own, -sum.dot(axis), 1e-6 * sum.length());
+            }
             -sum.dot(axis) >= sum.length() * (sin - 1e-6)
         })
     }

@@ -378,7 +378,7 @@ fn what_is_left_out_is_reported() {
         ("hull() { cylinder(1, 1, 1); cube(3); }", "1:1: hull: faceted, "),
         (
             "multmatrix([[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]) { sphere(1); }",
-            "1:57: non-uniform scale on a sphere: faceted, ",
+            "1:57: non-uniform scale on a sphere: an ellipsoid, exact",
         ),
         ("cube(1); hull() { linear_extrude(height = 1) { hull() { } } }", "1:48: a hull without area: left out"),
         (

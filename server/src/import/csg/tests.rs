@@ -167,6 +167,8 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::HalfSpace(_) => "half-space",
         Shape::Torus(_) => "torus",
         Shape::TriangleMesh(_) => "mesh",
+        Shape::Ellipsoid(_) => "ellipsoid",
+        Shape::EllipticFrustum(_) => "elliptic frustum",
     }
 }
 

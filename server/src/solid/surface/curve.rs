@@ -1,6 +1,6 @@
 //! Straight and circular curves of two faces: those that they have in common, and those along which they touch.
 
-use super::{Axis, Cone, Cylinder, Face, Plane, Sphere, Symmetry, Torus};
+use super::{Axis, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Symmetry, Torus};
 use crate::math::any_perpendicular;
 use glam::{DVec2, DVec3};
 
@@ -108,9 +108,44 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
         | (Face::Cone(_), Face::Cylinder(_)) => common(q, p, size, least, found),
         // Two cones, and a cone and a sphere, share no line or circle that is looked for.
         (Face::Cone(_), Face::Cone(_) | Face::Sphere(_)) | (Face::Sphere(_), Face::Cone(_)) => {}
+        (Face::Elliptic(image), Face::Plane(plane)) => {
+            rulings(&image, &plane, PARALLEL).into_iter().flatten().for_each(found);
+        }
+        (Face::Plane(_), Face::Elliptic(_)) => common(q, p, size, least, found),
+        // Other curves of elliptic faces are no lines, and circles by chance alone.
+        (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => {}
         (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
         (_, Face::Torus(_)) => common(q, p, size, least, found),
     }
+}
+
+/// The lines that the image of a cylinder has in common with a plane along its axis: |n₁·y|² + |n₂·y|² = 1 with y from the axis, in the
+/// two directions across it, is a circle in the coordinates n₁·y, n₂·y, and the plane a line there.
+fn rulings(image: &Elliptic, plane: &Plane, parallel: f64) -> [Option<Curve>; 2] {
+    let axis = image.axis();
+    if !image.is_cylinder() || plane.normal.dot(axis).abs() > parallel {
+        return [None; 2];
+    }
+    let parts = image.parts();
+    // m·v = h with v = B y, |v| = r.
+    let back = |v: DVec3| {
+        parts
+            .rows
+            .map(|row| if row == DVec3::ZERO { row } else { row / row.length_squared() })
+            .into_iter()
+            .zip(v.to_array())
+            .map(|(row, v)| row * v)
+            .sum::<DVec3>()
+    };
+    let m = DVec3::from_array([DVec3::X, DVec3::Y, DVec3::Z].map(|e| plane.normal.dot(back(e))));
+    let h = (plane.offset - plane.normal.dot(image.origin)) / m.length();
+    let m = m.normalize();
+    let half = (parts.radius - h) * (parts.radius + h);
+    if half <= 0.0 {
+        return [None; 2];
+    }
+    let beside = DVec3::new(-m.y, m.x, 0.0) * half.sqrt();
+    [beside, -beside].map(|w| Some(Curve::Line { origin: image.origin + back(m * h + w), along: axis }))
 }
 
 /// True where a face is symmetric about the axis of a torus, by sines up to the first and offsets up to the second.
@@ -121,6 +156,7 @@ fn is_about(torus: &Torus, face: &Face, [sine, offset]: [f64; 2]) -> bool {
         Symmetry::Normal(normal) => parallel(normal),
         Symmetry::Center(center) => passes(center),
         Symmetry::Axis(Axis { origin, direction }) => parallel(direction) && passes(origin),
+        Symmetry::None => false,
     }
 }
 
@@ -138,7 +174,7 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         // Of the line through a cone's apex a half belongs to its other nappe; a tube may go beyond the axis.
         let is_on = match other {
             Face::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
-            Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Torus(_) => true,
+            Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Torus(_) | Face::Elliptic(_) => true,
         };
         if is_on && p.x > 0.0 {
             circle(x, axis, p.x * p.x);
@@ -166,6 +202,8 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         }
         Face::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
         Face::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
+        // About no axis.
+        Face::Elliptic(_) => return,
     };
     let way = center - tube;
     let d = way.length();
@@ -260,6 +298,15 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let circle = Curve::Circle { center: center - axis * (radius * sin), axis, radius: radius * cos };
             (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
         }
+        (Face::Elliptic(image), Face::Plane(_)) => {
+            if !p.is_convex {
+                return None;
+            }
+            let (origin, along, lean) = image.ruling(-out_of_q(image.origin))?;
+            parallel(lean).then_some(Curve::Line { origin, along })
+        }
+        // Touching others, they do so at points, or along no line or circle that is looked for.
+        (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => None,
         // A plane touches what is round, and a hollow what is in it, the other way round.
         (Face::Plane(_), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_) | Face::Torus(_))
         | (Face::Cylinder(_) | Face::Cone(_), Face::Sphere(_) | Face::Torus(_))
