@@ -19,7 +19,7 @@ pub struct ServerConfig {
     pub records: usize,
     /// Bytes of a model's text.
     pub text: usize,
-    /// Megabytes of the texts of a session's models together.
+    /// Megabytes of a session's models together: their texts, and 200 bytes a face.
     pub models_mb: u64,
     /// Nodes of a model's tree.
     pub nodes: usize,

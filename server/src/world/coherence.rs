@@ -73,6 +73,8 @@ pub struct PredictedMotion {
 #[derive(Clone, Copy, Debug)]
 struct Answer {
     motions: [Motion; 2],
+    /// When the step began in which it was searched, in steps.
+    begin: f64,
     /// Of the first contact alone more is asked than of others.
     query_options: QueryOptions,
     /// Work that it might take. Another limit has the same answer where none of both cuts it.
@@ -262,6 +264,11 @@ impl PairCache {
         true
     }
 
+    /// When the step began in which the last answer was searched, in steps.
+    pub fn answered_at(&self) -> Option<f64> {
+        self.answer.as_ref().filter(|_| self.answered).map(|answer| answer.begin)
+    }
+
     /// What has answered last, and the predicted motion it was.
     pub fn via(&self) -> (Via, Option<&PredictedMotion>) {
         (self.via, self.prediction.as_deref())
@@ -279,7 +286,7 @@ impl PairCache {
         self.answered = outcome.status() != Status::Undecided && !open && !(cheap && moves());
         if self.answered {
             let (motions, query_options) = (q.motions(), q.query.query_options);
-            put(&mut self.answer, Answer { motions, query_options, limit, outcome: *outcome });
+            put(&mut self.answer, Answer { motions, begin: q.clock, query_options, limit, outcome: *outcome });
             self.reported = None;
         }
     }

@@ -300,6 +300,19 @@ impl<'a> PairSearch<'a> {
         true
     }
 
+    /// The depth that is searched for now: what is free until `earliest` is so of this depth.
+    pub fn depth(&self) -> f64 {
+        match &self.state {
+            State::Reported(reported, _) => reported.depth,
+            State::Searching(..) => self.task.delta,
+        }
+    }
+
+    /// True when an overlap at the start is searched past.
+    pub fn is_past(&self) -> bool {
+        self.task.ignored_depth > 0.0
+    }
+
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
         match &self.state {
