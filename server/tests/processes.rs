@@ -378,7 +378,7 @@ fn bad_input_is_refused_each_with_its_sentence() {
     assert!(matches!(answer, Answer::Refused { code, .. } if code == ErrorCode::Version.number()), "{answer:?}");
 
     refused(session.load_model("broken.csg", "cube(size = [1, 1, 1);"), ErrorCode::Model, &["broken.csg:1:"]);
-    refused(session.load_model("text.csg", "text(\"x\");"), ErrorCode::Model, &["text.csg:1:1", "text"]);
+    refused(session.load_model("roof.csg", "roof();"), ErrorCode::Model, &["roof.csg:1:1", "roof"]);
     let long = format!("cube(size = 1);{}", " ".repeat(6000));
     refused(session.load_model("long.csg", &long), ErrorCode::LimitText, &["long.csg"]);
     refused(session.add_object(Object::new("ghost", 99)), ErrorCode::UnknownModel, &["ghost", "99"]);
