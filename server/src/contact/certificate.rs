@@ -13,7 +13,7 @@
 use crate::bound::{Bound, Volumes};
 use crate::contact::exclusion::clause::{self, Hint, Proof, Term};
 use crate::contact::exclusion::enumeration;
-use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::instant::depth;
 use crate::contact::instant::work::Work;
 use crate::contact::query::outcome::{Contact, NO_FACE, Outcome, Status};
@@ -457,21 +457,10 @@ struct PlacedTree<'a> {
 impl PlacedTree<'_> {
     fn view(&self) -> View<'_> {
         View {
-            a: Faces { solid: self.task.a, clip_planes: &[] },
-            b: Faces { solid: self.task.b, clip_planes: &[] },
-            at: &self.at,
-            motion: self.motion,
-            center: self.center,
-            half: self.half,
-            radius: self.half.length(),
-            center_b: self.at.b_point(self.center),
-            velocity: self.at.velocity(self.center),
-            delta: self.task.delta,
             wall: self.task.delta * (WALL / DEPTH),
-            rounding: self.task.rounding,
-            fits: self.task.strategies.fits,
             multipliers: true,
             curved: false,
+            ..self.task.view((self.center, self.half), &self.at, self.motion, &[])
         }
     }
 }

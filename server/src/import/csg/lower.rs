@@ -198,6 +198,8 @@ impl<'a> Lowering<'a> {
             let hull = matches!(kind, CallKind::Hull) || context.hull && matches!(kind, CallKind::Set(Op::Union));
             Ok(Step::open(kind, Context { hull, ..context }))
         };
+        // A 2D shape within its plane, or by itself.
+        let placed = || context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
         match call.name.as_str() {
             "group" | "union" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "difference" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Difference))),
@@ -216,18 +218,7 @@ impl<'a> Lowering<'a> {
                 let inside = Context { outer: DAffine3::IDENTITY, plane: None, hull: false };
                 Ok(Step::open(CallKind::Projection { cut }, inside))
             }
-            "resize" => {
-                let scale = resize::scale(call, context.plane.is_some(), || self.bounds(call, context))?;
-                let linear = DMat3::from_diagonal(scale);
-                let context = match context.plane {
-                    Some(plane) => {
-                        let inner = plane.inner * DAffine3::from_mat3(linear);
-                        Context { plane: Some(Plane { inner, ..plane }), ..context }
-                    }
-                    None => Context { outer: context.outer * DAffine3::from_mat3(linear), ..context },
-                };
-                Ok(Step::open(CallKind::Set(Op::Union), context))
-            }
+            "resize" => self.resized(call, context),
             "offset" => {
                 let offset = Offset::new(call)?;
                 let pieces = self.shapes.pieces(&Offset::arguments(call)?, offset.by().abs())?;
@@ -252,34 +243,21 @@ impl<'a> Lowering<'a> {
             }
             "circle" | "square" | "polygon" => {
                 no_children(call)?;
-                let id = match context.plane {
-                    Some(plane) => self.shapes.outline(call, plane.inner, plane.overshoot)?,
-                    None => {
-                        self.shapes.outline(call, DAffine3::IDENTITY, 0)?;
-                        self.shapes.parts.push(Part::Stray(call.at, call.name.clone()))
-                    }
-                };
-                Ok(Step::Leaf(id))
+                let (inner, overshoot) = placed();
+                let id = self.shapes.outline(call, inner, overshoot)?;
+                Ok(self.flat_leaf(call, context, id))
             }
             "text" => {
                 no_children(call)?;
-                let (inner, overshoot) =
-                    context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
+                let (inner, overshoot) = placed();
                 let id = text::text(&mut self.shapes, call, inner, overshoot, self.attached)?;
-                Ok(Step::Leaf(match context.plane {
-                    Some(_) => id,
-                    None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
-                }))
+                Ok(self.flat_leaf(call, context, id))
             }
             "import" if context.plane.is_some() || imports::is_flat(call) && self.attached.is_some() => {
-                let (inner, overshoot) =
-                    context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
+                let (inner, overshoot) = placed();
                 let id = imports::flat(&mut self.shapes, call, (inner, overshoot), self.attached)?;
                 no_children(call)?;
-                Ok(Step::Leaf(match context.plane {
-                    Some(_) => id,
-                    None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
-                }))
+                Ok(self.flat_leaf(call, context, id))
             }
             "import" => {
                 let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
@@ -296,6 +274,25 @@ impl<'a> Lowering<'a> {
             }
             other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
+    }
+
+    /// What a call that resizes its operands opens.
+    fn resized(&mut self, call: &'a Call, context: Context) -> Result<Step> {
+        let scale = resize::scale(call, context.plane.is_some(), || self.bounds(call, context))?;
+        let linear = DAffine3::from_mat3(DMat3::from_diagonal(scale));
+        let context = match context.plane {
+            Some(plane) => Context { plane: Some(Plane { inner: plane.inner * linear, ..plane }), ..context },
+            None => Context { outer: context.outer * linear, ..context },
+        };
+        Ok(Step::open(CallKind::Set(Op::Union), context))
+    }
+
+    /// A 2D shape; outside of what makes it a solid it is none.
+    fn flat_leaf(&mut self, call: &Call, context: Context, id: PartId) -> Step {
+        Step::Leaf(match context.plane {
+            Some(_) => id,
+            None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
+        })
     }
 
     fn extrusion(&mut self, call: &'a Call, context: Context) -> Result<Step> {
