@@ -255,7 +255,7 @@ class Outline:
     def offset(self, by: float, corners: str = "round") -> Outline:
         """What is within a distance, corners "round", "sharp" or "cut"; below 0 what is farther inside."""
     def with_pieces(self, pieces: int) -> Outline: ...
-    def extrude(self, height: float, scale: tuple[float, float] = (1.0, 1.0)) -> Solid:
+    def extrude(self, height: float, scale: tuple[float, float] = ...) -> Solid:
         """The solid over it between -height/2 and height/2, scaled towards its upper end."""
     def twist(self, height: float, angle: float, slices: int) -> Solid:
         """The same, turned about z towards its upper end, radians counter-clockwise."""

@@ -1,10 +1,10 @@
 """Solids told in code: ``box(40, 40, 4) - cylinder(r=3, h=9)``, printed as the OpenSCAD text that the server loads.
 
 >>> from contactd.solid import box, cylinder
->>> print(box(40, 40, 4) - cylinder(r=3, h=9))
+>>> print((box(40, 40, 4) - cylinder(r=3, h=9)).text.expandtabs(4))
 difference() {
-	cube(size = [40, 40, 4], center = true);
-	cylinder(h = 9, r1 = 3, r2 = 3, center = true);
+    cube(size = [40, 40, 4], center = true);
+    cylinder(h = 9, r1 = 3, r2 = 3, center = true);
 }
 <BLANKLINE>
 
