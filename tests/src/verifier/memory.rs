@@ -458,7 +458,7 @@ fn regions(text: &str, (count, threshold): (usize, f64), bodies: &[Truth; 2], re
     let cells = text.find("pair ").ok_or("the cells are missing")?;
     let (told, cells) = text.split_at(cells);
     let mut points: Vec<DVec3> = Vec::new();
-    let (mut regions, mut left) = (0, 0.0);
+    let (mut regions, mut left, mut is_line) = (0, 0.0, false);
     for line in told.lines() {
         let words: Vec<&str> = line.split(' ').collect();
         let mut numbers = Numbers::of(&words)?;
@@ -469,19 +469,26 @@ fn regions(text: &str, (count, threshold): (usize, f64), bodies: &[Truth; 2], re
                     return Err(format!("{line}: no region"));
                 }
                 regions += 1;
+                is_line = words[1] == "line";
                 left = numbers.next()?;
             }
             "point" => {
                 let (x, separation) = (numbers.vector()?, numbers.next()?);
                 let size = bodies[0].reach.min(bodies[1].reach) + x.abs().max_element();
                 let slack = 0.25 * resolution + 1e-10 * size;
-                if separation.abs() > threshold * (1.0 + 1e-6) + slack {
+                let within = |f: f64| {
+                    let ways = [[false, false], [true, true]];
+                    ways.iter().all(|way| is_deep(bodies, x, 0.0, -f - slack, *way))
+                };
+                // At sharp edges f is less than the distance: what is nearest where nothing else is, may be farther apart.
+                let is_nearest = count == 1 && !is_line && left == 1.0 && points.is_empty();
+                if separation.abs() > threshold * (1.0 + 1e-6) + slack && !is_nearest {
                     return Err(format!("{line}: farther apart than {threshold:e}"));
                 }
-                let within = 0.5 * separation.abs() + slack;
-                let ways = [[false, false], [true, true]];
-                if !ways.iter().all(|way| is_deep(bodies, x, 0.0, -within, *way)) {
-                    return Err(format!("{line}: not within {within:e} of both surfaces"));
+                // The very end of a line may lie on the edge that it runs along, as far beyond the threshold as its middle is within it.
+                let most = if is_line { 2.0 * threshold } else { 0.5 * separation.abs() };
+                if !within(most) {
+                    return Err(format!("{line}: not within {most:e} of both surfaces"));
                 }
                 points.push(x);
                 left -= 1.0;
