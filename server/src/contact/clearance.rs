@@ -14,7 +14,7 @@ use crate::contact::instant::within::{Within, within};
 use crate::contact::instant::work::Work;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
-use crate::contact::query::question::{Body, PairQuery};
+use crate::contact::query::question::{PairQuery, PlacedModel};
 use crate::contact::query::task::Task;
 use crate::contact::queue::scratch::Scratch;
 use crate::contact::queue::search::Search;
@@ -230,9 +230,9 @@ fn advance(task: &Task, level: f64, work: &Work) -> (f64, bool) {
 }
 
 /// A body that stays where its motion starts.
-fn standing(body: Body<'_>) -> Body<'_> {
+fn standing(body: PlacedModel<'_>) -> PlacedModel<'_> {
     let motion = Motion::resting(body.placed.motion.start);
-    Body { placed: Placed { motion, ..body.placed }, ..body }
+    PlacedModel { placed: Placed { motion, ..body.placed }, ..body }
 }
 
 /// Whether the bodies of a question are within `distance` (a length) of each other at the start, proven or witnessed, and

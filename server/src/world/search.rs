@@ -341,7 +341,7 @@ pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions
         let body = &bodies[index as usize];
         let discrete = job.plan.detect == Detect::Discrete;
         let motion = if discrete { Motion::resting(body.motion_state.end) } else { body.motion_state.motion };
-        contact::Body { model: &body.part.model, placed: Placed { place: body.place, motion } }
+        contact::PlacedModel { model: &body.part.model, placed: Placed { place: body.place, motion } }
     };
     PairQuery {
         a: side(job.a),
