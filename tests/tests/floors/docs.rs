@@ -242,8 +242,43 @@ fn lost_test(known: &Known, patch: &str) -> Option<String> {
     (!found).then(|| format!("names {line}, which is not there"))
 }
 
+/// Where a deliberate fault does not apply: a hunk whose lines do not stand in their file, one after the other.
+fn lost_place(patch: &str) -> Option<String> {
+    let mut file = String::new();
+    let mut wanted: Option<(String, String)> = None;
+    let is_there = |wanted: &Option<(String, String)>, file: &str| {
+        wanted
+            .as_ref()
+            .filter(|(_, lines)| !file.contains(lines.as_str()))
+            .map(|(at, _)| format!("finds no place: {at}"))
+    };
+    for line in patch.lines() {
+        if let Some(path) = line.strip_prefix("+++ b/") {
+            if let Some(lost) = is_there(&wanted.take(), &file) {
+                return Some(lost);
+            }
+            file = std::fs::read_to_string(root().join(path)).unwrap_or_default();
+        } else if line.starts_with("--- a/") {
+            // The next file's name follows.
+        } else if line.starts_with("@@ ") {
+            if let Some(lost) = is_there(&wanted.replace((line.to_owned(), String::new())), &file) {
+                return Some(lost);
+            }
+        } else if let Some((_, lines)) = &mut wanted
+            && let Some(old) = line.strip_prefix([' ', '-']).or(line.is_empty().then_some(""))
+        {
+            lines.push_str(old);
+            lines.push('\n');
+        }
+    }
+    let Some((_, lines)) = &mut wanted else { return Some("changes nothing".to_owned()) };
+    // Blank lines at a patch's end may be its own.
+    lines.truncate(lines.trim_end_matches('\n').len());
+    is_there(&wanted, &file)
+}
+
 #[test]
-fn every_deliberate_fault_names_a_test_that_is_there() {
+fn every_deliberate_fault_has_its_place_and_names_a_test_that_is_there() {
     let (known, folder) = (Known::read(), root().join("tests/mutants"));
     let mut wrong = Vec::new();
     let mut count = 0;
@@ -251,7 +286,8 @@ fn every_deliberate_fault_names_a_test_that_is_there() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "patch") {
             count += 1;
-            let lost = lost_test(&known, &read(&path));
+            let patch = read(&path);
+            let lost = lost_test(&known, &patch).into_iter().chain(lost_place(&patch));
             wrong.extend(lost.map(|what| format!("{}: {what}", path.file_name().unwrap().display())));
         }
     }
@@ -261,6 +297,11 @@ fn every_deliberate_fault_names_a_test_that_is_there() {
     assert_eq!(of("answers -- cases::every_case_is_answered_to_eight_digits"), None);
     assert!(of("answers -- laws::every_case_is_answered_to_eight_digits").is_some());
     assert!(of("cases -- every_case_is_answered_to_eight_digits").is_some());
+    let patch = |old: &str| format!("--- a/rustfmt.toml\n+++ b/rustfmt.toml\n@@ -1 +1 @@\n-{old}\n+gone\n");
+    let first = read(&root().join("rustfmt.toml"));
+    let first = first.lines().next().expect("a line");
+    assert_eq!(lost_place(&patch(first)), None);
+    assert!(lost_place(&patch("no such line")).is_some() && lost_place("Fault: none").is_some());
 }
 
 #[test]
