@@ -29,17 +29,17 @@ use contactd_tests::scenes::Recipe;
 use glam::{DMat3, DVec2, DVec3, dvec3};
 use std::f64::consts::PI;
 
-fn pairs(default: usize) -> usize {
+pub(super) fn pairs(default: usize) -> usize {
     std::env::var("CONTACTD_PAIRS").ok().map_or(default, |n| n.parse().expect("a number of pairs"))
 }
 
 /// Two bodies, how far they are from touching at a pose of each, and how fast that may change.
-struct Scene {
-    a: Recipe,
-    b: Recipe,
-    motions: [Motion; 2],
-    gap: Box<dyn Fn(&Pose, &Pose) -> f64>,
-    speed: f64,
+pub(super) struct Scene {
+    pub a: Recipe,
+    pub b: Recipe,
+    pub motions: [Motion; 2],
+    pub gap: Box<dyn Fn(&Pose, &Pose) -> f64>,
+    pub speed: f64,
 }
 
 impl Scene {
@@ -65,25 +65,25 @@ impl Scene {
 }
 
 /// A motion from a place next to the origin past it.
-fn past(r: &mut Random, from: f64) -> Motion {
+pub(super) fn past(r: &mut Random, from: f64) -> Motion {
     let start = r.direction() * from;
     let aim = r.vector(0.7);
     let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.5) };
     Motion { start: Pose::new(start, r.rotation()), velocity: (aim - start) * r.within(0.8, 1.6), spin }
 }
 
-fn turning(r: &mut Random) -> Motion {
+pub(super) fn turning(r: &mut Random) -> Motion {
     let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.0) };
     Motion { start: Pose::new(DVec3::ZERO, r.rotation()), velocity: r.vector(0.3), spin }
 }
 
-fn speed(motions: &[Motion; 2], reach: f64) -> f64 {
+pub(super) fn speed(motions: &[Motion; 2], reach: f64) -> f64 {
     let [a, b] = motions;
     (a.velocity - b.velocity).length() + (a.spin.length() + b.spin.length()) * reach
 }
 
 /// Asks about scenes and compares with the closed form, to 1e-12 of the size; the records are judged.
-fn compare(name: &str, count: usize, seed: u64, make: impl Fn(&mut Random) -> Scene) {
+pub(super) fn compare(name: &str, count: usize, seed: u64, make: impl Fn(&mut Random) -> Scene) {
     let mut r = Random::new(seed);
     let (mut contacts, mut clear, mut overlap, mut undecided, mut worst, mut cells) = (0, 0, 0, 0, 0.0f64, 0);
     let (mut flagged, mut lies) = (0, 0);

@@ -282,6 +282,11 @@ fn stops(bodies: &Bodies, c: &Candidate, others: &[Lit], range: (f64, f64)) -> O
             stops.push(c.curve.nearest(apex.point).0);
         }
     }
+    // What is straight of a capsule ends where its segment does.
+    if let Curve::Line { .. } = c.curve {
+        let ends = c.faces.iter().flat_map(|lit| bodies.face(*lit).ends());
+        stops.extend(ends.flatten().map(|end| c.curve.nearest(end).0));
+    }
     stops.sort_by(f64::total_cmp);
     let merge = 1e-9 * bodies.size / c.curve.speed();
     stops.dedup_by(|b, a| *b - *a <= merge);

@@ -176,6 +176,17 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
             let (center, axes) = (frame.position, Some(axes));
             Some(vec![Element { center, radius: t.major, axes, round: t.minor, pieces, off: 0.0 }])
         }
+        Shape::Capsule(c) => {
+            let ball = |z: f64| Element {
+                center: frame.point(DVec3::Z * z),
+                radius: c.radius,
+                axes: None,
+                round: 0.0,
+                pieces,
+                off: 0.0,
+            };
+            Some(vec![ball(-c.half), ball(c.half)])
+        }
         // No element is an ellipse: as many points as OpenSCAD has.
         Shape::Ellipsoid(e) => {
             let points = faceted_sphere(1.0, pieces, pieces.div_ceil(2)).0;
@@ -380,12 +391,19 @@ impl Hull<'_> {
             made.push(parts.push(leaf));
             Ok(())
         };
-        for &i in &hull.balls {
+        // Between balls of one size all within it of the way: both are of that.
+        let is_alike = |(i, j): (usize, usize)| balls[i].1 == balls[j].1;
+        let held = |i: usize| hull.edges.iter().any(|e| (e.0 == i || e.1 == i) && is_alike(*e));
+        for &i in hull.balls.iter().filter(|i| !held(**i)) {
             let (center, radius) = balls[i];
             add(parts, place::sphere(&DAffine3::from_translation(center), radius))?;
         }
         for &(i, j) in &hull.edges {
             let (a, b) = (balls[i], balls[j]);
+            if is_alike((i, j)) {
+                add(parts, Ok(place::capsule(a.0, b.0, a.1)))?;
+                continue;
+            }
             let apart = b.0.distance(a.0);
             let e = (b.0 - a.0) / apart;
             // Where a plane along both touches them: as far along the axis, and as far from it, as the slope says.

@@ -11,8 +11,8 @@
 use super::Problem;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
-    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair, Shape,
-    Sphere, Torus, TriangleMesh,
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair,
+    Shape, Sphere, Torus, TriangleMesh,
 };
 use crate::solid::surface::elliptic::squared;
 use contactd_proto::Pose;
@@ -103,6 +103,12 @@ pub fn sphere(a: &DAffine3, radius: f64) -> Result<PlacedShape, Problem> {
         return Ok(ellipsoid(a, radius));
     };
     Ok(PlacedShape::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
+}
+
+/// All points within a radius of the way between two points.
+pub fn capsule(from: DVec3, to: DVec3, radius: f64) -> PlacedShape {
+    let frame = Pose::new(0.5 * (from + to), DQuat::from_rotation_arc(DVec3::Z, (to - from).normalize()));
+    PlacedShape::new(Capsule { half: 0.5 * from.distance(to), radius }, frame)
 }
 
 /// The image of a ball around the origin: semi-axes are the matrix' singular values, by turns in the planes of two columns until all are

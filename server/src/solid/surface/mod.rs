@@ -8,6 +8,7 @@
 //! | cylinder | ρ − r, ρ the distance from the axis |
 //! | cone | ρ cos α − z sin α, z along the axis from the apex into the cone, α the half angle |
 //! | torus | hypot(ρ − R, z) − r, R the radius of its circle, r that of the tube |
+//! | capsule | \|x − q\| − r, q the point of a segment next to x |
 //! | elliptic: the image of a sphere, cylinder or cone | \|B(x − o)\| − w·(x − o) − r |
 //!
 //! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
@@ -22,6 +23,7 @@
 //! distance from the axis, so `ON_AXIS` is rounding and no more.
 
 mod bend;
+mod capsule;
 mod cone;
 pub mod curve;
 mod cylinder;
@@ -34,6 +36,7 @@ mod tests;
 mod torus;
 
 pub use bend::{Bend, Law};
+pub use capsule::Capsule;
 pub use cone::{Apex, Cone};
 pub use curve::Curve;
 pub use cylinder::Cylinder;
@@ -279,6 +282,12 @@ pub trait Surface: Copy {
         None
     }
 
+    /// Between which points of its axis it is straight, where that ends.
+    #[inline]
+    fn ends(&self) -> [Option<DVec3>; 2] {
+        [None; 2]
+    }
+
     /// True where the face is the same when it is moved along the unit vector `d`, to within `tolerance` (a sine).
     #[inline]
     fn slides_along(&self, _d: DVec3, _tolerance: f64) -> bool {
@@ -375,6 +384,7 @@ faces! {$
     Cone = 3: "Infinite single-napped cone.",
     Torus = 4: "All points within a radius of a circle.",
     Elliptic = 5: "The affine image of a sphere, a cylinder or a cone.",
+    Capsule = 6: "All points within a radius of a segment.",
 }
 
 impl Face {
@@ -515,6 +525,11 @@ impl Face {
     /// See [`Surface::skewer`].
     pub fn skewer(&self, normal: DVec3) -> Option<Axis> {
         each!(self, f => f.skewer(normal))
+    }
+
+    /// See [`Surface::ends`].
+    pub fn ends(&self) -> [Option<DVec3>; 2] {
+        each!(self, f => f.ends())
     }
 
     /// See [`Surface::slides_along`].

@@ -5,7 +5,7 @@ use crate::math::random::Random;
 use glam::DQuat;
 
 /// One face of each kind, somewhere.
-fn faces(r: &mut Random) -> [Face; 10] {
+fn faces(r: &mut Random) -> [Face; 11] {
     let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
     let radius = r.within(0.2, 2.0);
     let (sin, cos) = r.within(0.1, 1.2).sin_cos();
@@ -17,6 +17,7 @@ fn faces(r: &mut Random) -> [Face; 10] {
         Torus { origin: o, axis: n, major: r.within(1.0, 2.0), minor: r.within(0.1, 1.0) }.into(),
         // One without a hole.
         Torus { origin: o, axis: n, major: r.within(0.1, 0.5), minor: r.within(0.5, 1.0) }.into(),
+        Capsule { origin: o, axis: n, half: r.within(0.1, 1.0), radius }.into(),
         ellipsoid(r).into(),
         Elliptic::cylinder(r.vector(1.0), [r.vector(1.0), r.vector(1.0)]).into(),
         // One that leans over its ellipse, and an upright one.
