@@ -6,7 +6,7 @@ use crate::engine::ReportedPoint as _;
 use crate::reference::{self, Effort, Moving, Verdict};
 use crate::scenes::Recipe;
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -113,8 +113,8 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
         return Ok("empty".into());
     }
     let query = PairQuery {
-        a: Body { model: &a, placed: placed_a },
-        b: Body { model: &b, placed: placed_b },
+        a: PlacedModel { model: &a, placed: placed_a },
+        b: PlacedModel { model: &b, placed: placed_b },
         resolution,
         cell_limit: CELLS,
         strategies: Default::default(),

@@ -182,6 +182,17 @@ fn check_level(
     first: (&Solid, &Placed),
     second: (&Solid, &Placed),
 ) -> Result<Checked, String> {
+    check_cells(text, names, first, second, None)
+}
+
+/// The same but for the cells that are left, where that is allowed: their boxes (frame of the reference body) are listed.
+fn check_cells(
+    text: &str,
+    names: (usize, usize),
+    first: (&Solid, &Placed),
+    second: (&Solid, &Placed),
+    mut left: Option<&mut Vec<[(f64, f64); 3]>>,
+) -> Result<Checked, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>())).peekable();
     let (_, head) = lines.next().ok_or("empty certificate")?;
     let [_, a, b, _, reference, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
@@ -300,6 +311,10 @@ fn check_level(
             let absent = cell.a.is_none() || cell.b.is_none();
             match words.as_slice() {
                 ["done"] if absent || (cell.started && cell.t == until) => {}
+                ["left"] => match &mut left {
+                    Some(left) => left.push(cell.region),
+                    None => return wrong("a cell is left"),
+                },
                 ["done"] => return wrong("the cell is not done: time or clauses are left"),
                 ["inside"] => {
                     let inside = cell.a.as_ref().is_some_and(|a| certain(&mut bounder, a, region(0.0, 0.0)));

@@ -363,7 +363,9 @@ pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVe
         Some(if side == Side::A { (o, axis, radius) } else { (at.a_point(o), axis.map(|a| at.a_vector(a)), radius) })
     };
     let side_q = if side_p == Side::A { Side::B } else { Side::A };
-    let ((o_p, axis, radius), (o_q, ..)) = (on_axis(side_p, p)?, on_axis(side_q, q)?);
+    let ((o_p, axis, radius), (o_q, axis_q, _)) = (on_axis(side_p, p)?, on_axis(side_q, q)?);
+    // A ball in a round hole is off the hole's axis, at whatever height x is.
+    let axis = axis.or(axis_q);
     let off = |v: DVec3| axis.map_or(v, |a| v - a * v.dot(a));
     let (apart, way) = (off(o_p - o_q), off(at.velocity(x)) * if side_p == Side::A { 1.0 } else { -1.0 });
     let direction = if apart.length() > 1e-6 * radius { apart } else { way };

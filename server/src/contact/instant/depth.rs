@@ -12,7 +12,7 @@ use super::separation::{self, Cover};
 use super::work::Work;
 use crate::contact::exclusion::clause::{self, Expressions};
 use crate::contact::exclusion::enumeration;
-use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use crate::solid::Sense;
@@ -182,14 +182,7 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
         work.bound();
         // Literals decided against the present depth over the trust box fold away.
         let view = View {
-            a: Faces { solid: task.a, clip_planes: &[] },
-            b: Faces { solid: task.b, clip_planes: &[] },
-            at,
-            motion: task.relative.bounds(0.0, 0.0, 0.0),
-            center: x,
-            half: DVec3::splat(size),
             radius: size * 3f64.sqrt(),
-            center_b: at.b_point(x),
             velocity: DVec3::ZERO,
             delta: -best,
             wall: f64::NEG_INFINITY,
@@ -197,6 +190,7 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
             fits: false,
             multipliers: true,
             curved: false,
+            ..task.view((x, DVec3::splat(size)), at, task.relative.bounds(0.0, 0.0, 0.0), &[])
         };
         let mut pool: Vec<Token> = Vec::new();
         let truth_a = local::prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));

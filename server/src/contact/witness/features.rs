@@ -109,6 +109,19 @@ impl<'t, 'a> Features<'t, 'a> {
         by_faces.or_else(|| self.held_by_an_apex(&each))
     }
 
+    /// All sets of active faces that nearly hold each other, the smallest first.
+    pub fn nearly_held(&self, within: f64) -> Vec<Vec<(Constraint, f64)>> {
+        let each = self.smooth();
+        let mut out = Vec::new();
+        for set in (2..=4usize).flat_map(|count| sets(&each, count)) {
+            let Some((lambda, rest)) = balance(&set.iter().map(|l| l.2).collect::<Vec<_>>()) else { continue };
+            if rest <= within {
+                out.push(set.iter().map(|l| Constraint::Literal(l.0, l.1)).zip(lambda).collect());
+            }
+        }
+        out
+    }
+
     /// True when active faces of both bodies oppose each other, up to what is left of their gradients' weighted sum, or
     /// an apex holds.
     pub fn is_balanced(&self, within: f64) -> bool {
@@ -167,18 +180,13 @@ impl<'t, 'a> Features<'t, 'a> {
 fn held_by_faces(each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<(f64, Vec<(Constraint, f64)>)> {
     let mut best: Option<(f64, Vec<(Constraint, f64)>)> = None;
     for count in 2..=4usize {
-        for of_a in 1..count {
-            for p in choices(&each[0], of_a) {
-                for q in choices(&each[1], count - of_a) {
-                    let all: Vec<_> = p.iter().chain(&q).copied().collect();
-                    let Some((lambda, rest)) = balance(&all.iter().map(|l| l.2).collect::<Vec<_>>()) else {
-                        continue;
-                    };
-                    if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
-                        let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
-                        best = Some((rest, held.zip(lambda).collect()));
-                    }
-                }
+        for all in sets(each, count) {
+            let Some((lambda, rest)) = balance(&all.iter().map(|l| l.2).collect::<Vec<_>>()) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
+                let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
+                best = Some((rest, held.zip(lambda).collect()));
             }
         }
         if best.as_ref().is_some_and(|b| b.0 <= BALANCED) {
@@ -186,6 +194,17 @@ fn held_by_faces(each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<(f64, Vec<
         }
     }
     best
+}
+
+/// All choices of `count` faces, some of either side.
+fn sets(each: &[Vec<(Side, LiteralId, DVec3)>; 2], count: usize) -> Vec<Vec<(Side, LiteralId, DVec3)>> {
+    let mut out = Vec::new();
+    for of_a in 1..count {
+        for p in choices(&each[0], of_a) {
+            out.extend(choices(&each[1], count - of_a).iter().map(|q| p.iter().chain(q).copied().collect()));
+        }
+    }
+    out
 }
 
 /// The unit vector between some unit vectors (one or two) that is nearest to a direction, with their weights in it.

@@ -10,6 +10,7 @@ use super::parts::{Part, PartId, Parts};
 use super::place;
 use super::syntax::Call;
 use super::{Facets, Limits, Place, Problem};
+use crate::import::mesh::oriented;
 use crate::solid::primitive::{MeshError, MeshFault};
 use crate::solid::{Op, Shape};
 use glam::{DAffine3, DVec2, DVec3};
@@ -175,6 +176,15 @@ impl Shapes<'_> {
         }
         self.parts.affordable(call.at, faces.len())?;
         let mut mesh = place::polyhedron(outer, &points, &faces);
+        if !hull
+            && matches!(mesh, Err(Problem::Mesh(MeshError::Mixed(..))))
+            && let Some((turned, count)) = oriented(&faces)
+        {
+            let text =
+                format!("a polyhedron with {count} faces that run the other way round than their neighbours: turned");
+            self.parts.note(call.at, text, None);
+            return self.of_faces(call, outer, hull, (points, turned));
+        }
         if !hull && matches!(mesh, Err(Problem::Mesh(ref e)) if *e != MeshError::Flat) {
             return self.mesh(call, outer, (&points, &faces), mesh.err());
         }
@@ -269,7 +279,7 @@ impl Shapes<'_> {
                         lists.iter().map(|l| l.iter().map(|i| points[*i as usize]).collect()).collect()
                     }
                 };
-                self.parts.affordable(call.at, paths.iter().map(Vec::len).sum::<usize>() + 2)?;
+                self.parts.meshable(call.at, paths.iter().map(Vec::len).sum())?;
                 if paths.iter().all(|p| p.len() < 3) {
                     return Ok(self.nothing(call, "without area"));
                 }

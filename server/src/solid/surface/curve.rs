@@ -25,45 +25,22 @@ pub enum Curve {
     },
 }
 
+/// Directions are parallel, and centres on an axis, nearer than this: an angle, and a part of the body's size.
+const PARALLEL: f64 = 1e-9;
+
+/// The circle of a centre, an axis and the square of its radius, if it has one above `least`.
+fn circle_above(least: f64, center: DVec3, axis: DVec3, squared: f64) -> Option<Curve> {
+    (squared > (least * least).max(0.0)).then(|| Curve::Circle { center, axis, radius: squared.sqrt() })
+}
+
 /// The lines and circles that two faces have in common, for a body of the diameter `size`; circles with a radius above
 /// `least` alone. Both are lengths.
 pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(Curve)) {
-    const PARALLEL: f64 = 1e-9;
-    let mut circle = |center: DVec3, axis: DVec3, squared: f64| {
-        if squared > (least * least).max(0.0) {
-            found(Curve::Circle { center, axis, radius: squared.sqrt() });
-        }
-    };
+    let mut circle =
+        |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
     match (*p, *q) {
-        (Face::Plane(Plane { normal: m, offset: d }), Face::Plane(Plane { normal: n, offset: e })) => {
-            let w = m.cross(n);
-            if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
-                let origin = (n.cross(w) * d + w.cross(m) * e) / w.length_squared();
-                found(Curve::Line { origin, along });
-            }
-        }
-        (Face::Plane(Plane { normal, offset }), Face::Sphere(Sphere { center, radius })) => {
-            let h = normal.dot(center) - offset;
-            circle(center - normal * h, normal, (radius - h) * (radius + h));
-        }
-        (Face::Plane(Plane { normal, offset }), Face::Cylinder(Cylinder { origin, axis, radius })) => {
-            let h = normal.dot(origin) - offset;
-            if normal.cross(axis).length() <= PARALLEL {
-                circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
-            } else if normal.dot(axis).abs() <= PARALLEL {
-                let half = (radius - h) * (radius + h);
-                if half > 0.0 {
-                    let w = normal.cross(axis).normalize() * half.sqrt();
-                    found(Curve::Line { origin: origin - normal * h + w, along: axis });
-                    found(Curve::Line { origin: origin - normal * h - w, along: axis });
-                }
-            }
-        }
-        (Face::Plane(Plane { normal, offset }), Face::Cone(Cone { apex, axis, sin, cos })) => {
-            let z = (offset - normal.dot(apex)) / normal.dot(axis);
-            if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
-                circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
-            }
+        (Face::Plane(plane), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_)) => {
+            on_plane(&plane, q, least, found);
         }
         (Face::Sphere(Sphere { center: o, radius: r }), Face::Sphere(Sphere { center: c, radius: s })) => {
             let d = (c - o).length();
@@ -124,6 +101,47 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
         (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => {}
         (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
         (_, Face::Torus(_)) => common(q, p, size, least, found),
+    }
+}
+
+/// What a plane and a plane, a sphere, a cylinder or a cone have in common.
+fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut impl FnMut(Curve)) {
+    let mut circle =
+        |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
+    match *q {
+        Face::Plane(Plane { normal: n, offset: e }) => {
+            let (m, d) = (normal, offset);
+            let w = m.cross(n);
+            if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
+                let origin = (n.cross(w) * d + w.cross(m) * e) / w.length_squared();
+                found(Curve::Line { origin, along });
+            }
+        }
+        Face::Sphere(Sphere { center, radius }) => {
+            let h = normal.dot(center) - offset;
+            circle(center - normal * h, normal, (radius - h) * (radius + h));
+        }
+        Face::Cylinder(Cylinder { origin, axis, radius }) => {
+            let h = normal.dot(origin) - offset;
+            if normal.cross(axis).length() <= PARALLEL {
+                circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
+            } else if normal.dot(axis).abs() <= PARALLEL {
+                let half = (radius - h) * (radius + h);
+                if half > 0.0 {
+                    let w = normal.cross(axis).normalize() * half.sqrt();
+                    found(Curve::Line { origin: origin - normal * h + w, along: axis });
+                    found(Curve::Line { origin: origin - normal * h - w, along: axis });
+                }
+            }
+        }
+        Face::Cone(Cone { apex, axis, sin, cos }) => {
+            let z = (offset - normal.dot(apex)) / normal.dot(axis);
+            if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
+                circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
+            }
+        }
+        // Of these `common` knows more.
+        Face::Elliptic(_) | Face::Torus(_) => {}
     }
 }
 
