@@ -470,6 +470,13 @@ impl Bounder<'_> {
         if let (Face::Cone(_), Face::Cone(_)) = (p.1, q.1) {
             return self.cones(p, q, x, t);
         }
+        // Of a capsule the cylinder or the ball that it is all over the region; where it is both, only smaller regions tell.
+        let of = |l: &Literal, face: &Face| part_of(face, if l.on_b { b } else { a });
+        let (Some(part_p), Some(part_q)) = (of(p.0, p.1), of(q.0, q.1)) else {
+            let any = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+            return Some(Jet { v: any, g: [any; 4], h: [any; 10] });
+        };
+        let (p, q) = ((p.0, &part_p), (q.0, &part_q));
         let round = |face: &Face| match *face {
             Face::Sphere(surface::Sphere { center, radius }) => Some((center, None, radius)),
             Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
@@ -583,6 +590,21 @@ fn hull(p: &Jet, q: &Jet) -> Jet {
         v: p.v.hull(q.v),
         g: std::array::from_fn(|k| p.g[k].hull(q.g[k])),
         h: std::array::from_fn(|k| p.h[k].hull(q.h[k])),
+    }
+}
+
+/// The face itself, or of a capsule what it is over a whole region: its cylinder, or the ball at one of its ends.
+fn part_of(face: &Face, y: &[Jet; 3]) -> Option<Face> {
+    let Face::Capsule(surface::Capsule { origin, axis, half, radius }) = *face else { return Some(*face) };
+    let along = linear(unit(vector(axis.to_array())), &offsets(y, origin)).v;
+    if along.mag() <= half {
+        Some(surface::Cylinder { origin, axis, radius }.into())
+    } else if along.lo >= half {
+        Some(surface::Sphere { center: origin + axis * half, radius }.into())
+    } else if along.hi <= -half {
+        Some(surface::Sphere { center: origin - axis * half, radius }.into())
+    } else {
+        None
     }
 }
 

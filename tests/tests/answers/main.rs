@@ -11,6 +11,7 @@ mod contact_regions;
 mod elliptics;
 mod families;
 mod hard_cases;
+mod kinds;
 mod laws;
 mod meshes;
 mod overlap;

@@ -178,7 +178,7 @@ fn psi(face: &Face, x: &Vector) -> Big {
 fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2]) -> Option<Big> {
     // |u|² − ρ² of a face that delta shrinks; the fit takes an axis' direction, not its stored length.
     let square = |face: &Face, x: &Vector, shrink: f64| {
-        let (origin, axis, radius, steep) = match *face {
+        let (origin, axis, radius, steep) = match part_of(face, x) {
             Face::Sphere(surface::Sphere { center, radius }) => {
                 (Vector::of(center), None, big(radius) - big(shrink), big(0.0))
             }
@@ -199,6 +199,19 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
         Some(o.dot(&o) - along * (big(1.0) + steep) - &radius * &radius)
     };
     Some(big(mu[0]) * square(p.0, p.1, delta)? - big(mu[1]) * square(q.0, q.1, -delta)?)
+}
+
+/// The face itself, or of a capsule its cylinder or the ball at one of its ends, which it is around a point.
+fn part_of(face: &Face, x: &Vector) -> Face {
+    let Face::Capsule(surface::Capsule { origin, axis, half, radius }) = *face else { return *face };
+    let along = x.minus(&Vector::of(origin)).dot(&Vector::of(axis));
+    if along > big(half) {
+        surface::Sphere { center: origin + axis * half, radius }.into()
+    } else if along < big(-half) {
+        surface::Sphere { center: origin - axis * half, radius }.into()
+    } else {
+        surface::Cylinder { origin, axis, radius }.into()
+    }
 }
 
 /// Random models: primitives and trees, frusta with a far apex, faces far from the model's origin.

@@ -391,19 +391,18 @@ impl Hull<'_> {
             made.push(parts.push(leaf));
             Ok(())
         };
-        // Between balls of one size all within it of the way: both are of that.
-        let is_alike = |(i, j): (usize, usize)| balls[i].1 == balls[j].1;
-        let held = |i: usize| hull.edges.iter().any(|e| (e.0 == i || e.1 == i) && is_alike(*e));
-        for &i in hull.balls.iter().filter(|i| !held(**i)) {
+        // Of two balls of one size: all within it of the way between them.
+        if let [(i, j)] = hull.edges[..]
+            && balls[i].1 == balls[j].1
+        {
+            return parts.leaf(self.name, self.at, Ok(place::capsule(balls[i].0, balls[j].0, balls[i].1))).map(Some);
+        }
+        for &i in &hull.balls {
             let (center, radius) = balls[i];
             add(parts, place::sphere(&DAffine3::from_translation(center), radius))?;
         }
         for &(i, j) in &hull.edges {
             let (a, b) = (balls[i], balls[j]);
-            if is_alike((i, j)) {
-                add(parts, Ok(place::capsule(a.0, b.0, a.1)))?;
-                continue;
-            }
             let apart = b.0.distance(a.0);
             let e = (b.0 - a.0) / apart;
             // Where a plane along both touches them: as far along the axis, and as far from it, as the slope says.

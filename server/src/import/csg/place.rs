@@ -107,8 +107,11 @@ pub fn sphere(a: &DAffine3, radius: f64) -> Result<PlacedShape, Problem> {
 
 /// All points within a radius of the way between two points.
 pub fn capsule(from: DVec3, to: DVec3, radius: f64) -> PlacedShape {
-    let frame = Pose::new(0.5 * (from + to), DQuat::from_rotation_arc(DVec3::Z, (to - from).normalize()));
-    PlacedShape::new(Capsule { half: 0.5 * from.distance(to), radius }, frame)
+    let way = to - from;
+    // Either way along it is the same; on this one the turn from z is a quarter at most, and right to the last digits.
+    let d = if way.z < 0.0 { -way } else { way }.normalize();
+    let turn = DQuat::from_xyzw(-d.y, d.x, 0.0, 1.0 + d.z).normalize();
+    PlacedShape::new(Capsule { half: 0.5 * way.length(), radius }, Pose::new(0.5 * (from + to), turn))
 }
 
 /// The image of a ball around the origin: semi-axes are the matrix' singular values, by turns in the planes of two columns until all are

@@ -1,6 +1,6 @@
 //! Capsule around z.
 
-use super::{Checked, Convex, Cylinder, Geometry, Shape, Sink, Source};
+use super::{Checked, Convex, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface;
@@ -39,7 +39,7 @@ impl Geometry for Capsule {
     }
     #[inline]
     fn convex(&self) -> Convex<'_> {
-        Convex::Other
+        Convex::Capsule { half: self.half, radius: self.radius }
     }
     /// A cylinder's and a ball's, whose halves have their centres 3r/8 off its own.
     fn moments(&self) -> Option<Moments> {
@@ -49,10 +49,8 @@ impl Geometry for Capsule {
         let along = tube * h * h / 3.0 + ball * (h * h + 0.75 * h * r + r * r / 5.0);
         Some(Moments::diagonal(tube + ball, 0.0, DVec3::new(across, across, along)))
     }
-    /// A cylinder around it: of use to those who compute with convex bodies.
     fn grown(&self, margin: f64) -> Option<Shape> {
-        let radius = self.radius + margin;
-        Some(Cylinder { radius, half_height: self.half + radius }.into())
+        Some(Self { half: self.half, radius: self.radius + margin }.into())
     }
     fn kind(&self) -> &'static str {
         "capsule"

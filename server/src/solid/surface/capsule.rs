@@ -4,8 +4,8 @@
 //! the ball of radius r around the point next to where they are taken: each bound of a sphere holds of it from that side.
 
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, around, between_roots,
-    largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Cylinder, Face, FaceAt, Law, NUMBERS, Section, Sphere, Stretches, Surface, Symmetry, around,
+    between_roots, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -75,6 +75,18 @@ impl Surface for Capsule {
         Curvature { each, factor: -each, along: at.normal, ..Curvature::NONE }
     }
 
+    /// The cylinder beside the segment, the ball beyond an end of it.
+    #[inline]
+    fn near(&self, center: DVec3, reach: f64) -> Option<Face> {
+        let Self { origin, axis, half, radius } = *self;
+        let z = (center - origin).dot(axis);
+        if z.abs() + reach <= half {
+            return Some(Cylinder { origin, axis, radius }.into());
+        }
+        let end = self.end(z)?;
+        (z.abs() - reach >= half).then(|| Sphere { center: origin + end, radius }.into())
+    }
+
     /// Below, the larger of the tangent and the segment; above, the largest value of a corner.
     #[inline]
     fn span(&self, center: DVec3, half: DVec3) -> (f64, f64) {
@@ -104,13 +116,36 @@ impl Surface for Capsule {
     }
 
     #[inline]
+    fn radius(&self) -> Option<f64> {
+        Some(self.radius)
+    }
+
+    #[inline]
+    fn straight_at(&self, x: DVec3) -> Option<DVec3> {
+        self.end((x - self.origin).dot(self.axis)).is_none().then_some(self.axis)
+    }
+
+    /// Through the middle, between the points that are farthest along the normal and against it.
+    #[inline]
+    fn skewer(&self, normal: DVec3) -> Option<Axis> {
+        let lean = normal.dot(self.axis);
+        let along = if lean.abs() > 1e-9 { self.half.copysign(lean) } else { 0.0 };
+        Some(Axis { origin: self.origin, direction: (normal * self.radius + self.axis * along).normalize() })
+    }
+
+    #[inline]
     fn ends(&self) -> [Option<DVec3>; 2] {
         [self.half, -self.half].map(|z| Some(self.origin + self.axis * z))
     }
 
+    /// Of the cylinder beside the segment, of the ball beyond an end.
     #[inline]
-    fn section(&self, _: DVec3) -> Option<Section> {
-        None
+    fn section(&self, y: DVec3) -> Option<Section> {
+        let Self { origin, axis, radius, .. } = *self;
+        Some(match self.end((y - origin).dot(axis)) {
+            Some(end) => Section { origin: origin + end, axis: None, radius },
+            None => Section { origin, axis: Some(axis), radius },
+        })
     }
 
     #[inline]

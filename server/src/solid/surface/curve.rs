@@ -3,6 +3,7 @@
 use super::{Axis, Capsule, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Surface as _, Symmetry, Torus};
 use crate::math::any_perpendicular;
 use glam::{DVec2, DVec3};
+use std::f64::consts::FRAC_PI_8;
 
 /// A straight or circular curve, in the frame of the faces that make it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,7 +142,7 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut
             }
         }
         // Of these `common` knows more.
-        Face::Elliptic(_) | Face::Torus(_) => {}
+        Face::Elliptic(_) | Face::Torus(_) | Face::Capsule(_) => {}
     }
 }
 
@@ -188,7 +189,7 @@ fn parts_of(capsule: &Capsule) -> [Face; 3] {
     [Cylinder { origin, axis, radius }.into(), ball(half), ball(-half)]
 }
 
-/// True where all of a circle, or any of a line, lies on a capsule, to within a length.
+/// True where part of a curve lies on a capsule, to within a length.
 fn lies_on(capsule: &Capsule, curve: &Curve, within: f64) -> bool {
     let on = |x: DVec3| capsule.value(x).abs() <= within;
     match *curve {
@@ -196,7 +197,10 @@ fn lies_on(capsule: &Capsule, curve: &Curve, within: f64) -> bool {
         Curve::Circle { center, axis, radius } => {
             let u = any_perpendicular(axis);
             let v = axis.cross(u);
-            [u, -u, v, -v].into_iter().all(|w| on(center + w * radius))
+            (0..16).any(|k| {
+                let (sin, cos) = libm::sincos(f64::from(k) * FRAC_PI_8);
+                on(center + (u * cos + v * sin) * radius)
+            })
         }
     }
 }

@@ -227,6 +227,12 @@ pub trait Surface: Copy {
         }
     }
 
+    /// A simpler face whose psi is the same within `reach` (a length) of `center`, where there is one.
+    #[inline]
+    fn near(&self, _center: DVec3, _reach: f64) -> Option<Face> {
+        None
+    }
+
     /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
     fn span(&self, center: DVec3, half: DVec3) -> (f64, f64);
 
@@ -270,13 +276,19 @@ pub trait Surface: Copy {
         None
     }
 
+    /// The same of the face around the point `x` alone.
+    #[inline]
+    fn straight_at(&self, _x: DVec3) -> Option<DVec3> {
+        self.developable()
+    }
+
     /// The apex of a cone: the point at which every direction around is a normal.
     #[inline]
     fn apex(&self) -> Option<Apex> {
         None
     }
 
-    /// A line through the inside of every closed curve that planes with this unit normal cut, where no symmetry tells one.
+    /// A line through the inside of every closed curve that planes with this unit normal cut, where the axis is none.
     #[inline]
     fn skewer(&self, _normal: DVec3) -> Option<Axis> {
         None
@@ -448,6 +460,12 @@ impl Face {
         each!(self, f => f.turn(x, at, reach))
     }
 
+    /// See [`Surface::near`].
+    #[inline]
+    pub fn near(&self, center: DVec3, reach: f64) -> Option<Self> {
+        each!(self, f => f.near(center, reach))
+    }
+
     /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
     #[inline]
     pub fn span(&self, center: DVec3, half: DVec3) -> (f64, f64) {
@@ -514,6 +532,12 @@ impl Face {
     #[inline]
     pub fn developable(&self) -> Option<DVec3> {
         each!(self, f => f.developable())
+    }
+
+    /// See [`Surface::straight_at`].
+    #[inline]
+    pub fn straight_at(&self, x: DVec3) -> Option<DVec3> {
+        each!(self, f => f.straight_at(x))
     }
 
     /// See [`Surface::apex`].

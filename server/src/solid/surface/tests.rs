@@ -102,7 +102,7 @@ fn a_moved_face_has_its_values_moved_and_its_own_symmetry_changes_none() {
 
 #[test]
 fn capabilities_agree_with_psi() {
-    let mut r = Random(11);
+    let (mut r, mut parts) = (Random(11), 0);
     for _ in 0..300 {
         for face in faces(&mut r) {
             for _ in 0..10 {
@@ -123,7 +123,13 @@ fn capabilities_agree_with_psi() {
                     let inside = rho >= 0.0 && u.length_squared() <= rho * rho;
                     assert!((v + inset).abs() < 1e-9 || inside == (v <= -inset), "{face:?} {x}");
                 }
-                if let Some(axis) = face.developable() {
+                let reach = r.within(0.0, 0.5);
+                if let Some(part) = face.near(x, reach) {
+                    let y = x + r.vector(1.0).normalize() * reach;
+                    assert!((part.value(y) - face.value(y)).abs() < 1e-14, "{face:?} {x} {y}");
+                    parts += 1;
+                }
+                if let Some(axis) = face.straight_at(x) {
                     // Straight along the tangent that the axis lies over.
                     let along = at.normal.cross(axis.cross(at.normal)).normalize();
                     assert!((face.curvature(x, &at).matrix() * along).length() < 1e-9, "{face:?}");
@@ -145,6 +151,7 @@ fn capabilities_agree_with_psi() {
         let [p, s, ..] = faces(&mut r);
         assert_eq!((p.above(&s, DVec3::ZERO, 1.0), p.deviation(&s, 1.0)), (None, None));
     }
+    assert!(parts > 1000, "{parts}");
 }
 
 /// What `Under` promises, at a point `y` off the centre.
