@@ -91,7 +91,8 @@ impl Scene {
                 let h = 1e-6;
                 return Some((t, (self.at(t - h) - self.at(t + h)) / (2.0 * h)));
             }
-            t += gap / self.speed;
+            // A gap of rounding's size may be less than the next number's distance.
+            t = (t + gap / self.speed).max(t.next_up());
             if t > 1.0 {
                 return None;
             }

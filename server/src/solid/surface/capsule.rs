@@ -23,7 +23,17 @@ pub struct Capsule {
     pub radius: f64,
 }
 
+/// How far beyond the segment, in sizes of the face, it still counts as straight: what lies on a plane touches it there, too, and where
+/// its ends are is known to rounding.
+const SEAM: f64 = 1e-9;
+
 impl Capsule {
+    /// True where it is straight, at this height.
+    #[inline]
+    fn is_straight(&self, z: f64) -> bool {
+        z.abs() <= self.half + SEAM * (self.half + self.radius)
+    }
+
     /// The end of the segment beyond which a point at this height lies; `None` beside the segment.
     #[inline]
     fn end(&self, z: f64) -> Option<DVec3> {
@@ -68,7 +78,7 @@ impl Surface for Capsule {
 
     #[inline]
     fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature {
-        if self.end((x - self.origin).dot(self.axis)).is_none() {
+        if self.is_straight((x - self.origin).dot(self.axis)) {
             return around(self.axis, at);
         }
         let each = 1.0 / at.rho;
@@ -122,7 +132,7 @@ impl Surface for Capsule {
 
     #[inline]
     fn straight_at(&self, x: DVec3) -> Option<DVec3> {
-        self.end((x - self.origin).dot(self.axis)).is_none().then_some(self.axis)
+        self.is_straight((x - self.origin).dot(self.axis)).then_some(self.axis)
     }
 
     /// Through the middle, between the points that are farthest along the normal and against it.
