@@ -2,7 +2,7 @@
 
 use contactd::motion::Placed;
 use contactd::solid::primitive::{
-    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, HalfSpace, Polyhedron, Shape, Sphere, Torus,
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, HalfSpace, Polyhedron, Shape, Sphere, Torus,
 };
 use contactd::solid::{Label, NodeId, Op, Solid, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -104,6 +104,16 @@ pub fn elliptic(r: &mut Random, size: f64) -> Shape {
     let lean = [0.0, 0.0, 0.05, 0.8][r.below(4)] * DVec2::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0));
     let semi = if r.below(4) == 0 && lean != DVec2::ZERO { DVec2::splat(a) } else { DVec2::new(a, b) };
     EllipticFrustum { semi, bottom, top, half_height: c, lean }.into()
+}
+
+/// A random capsule of size about `size`.
+pub fn capsule(r: &mut Random, size: f64) -> Capsule {
+    Capsule { half: size * r.within(0.05, 0.9), radius: size * r.within(0.1, 0.5) }
+}
+
+/// The same as `shape`, or a capsule, one in three.
+pub fn shape_or_capsule(r: &mut Random, size: f64) -> Shape {
+    if r.below(3) == 0 { capsule(r, size).into() } else { shape(r, size) }
 }
 
 /// The same as `shape`, or an elliptic one, one in three.

@@ -64,6 +64,13 @@ fn add_roots(face: &Face, at: DVec3, roots: &mut Vec<f64>) {
             [o.dot(o) * c - h * h * s, o.dot(d) * c - h * k * s, d.dot(d) * c - k * k * s]
         }
         Face::Torus(torus) => return add_roots_of_torus(&torus, at, roots),
+        // Of its cylinder and its balls: a root too many only divides an interval.
+        Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
+            for end in [half, -half] {
+                add_roots(&surface::Sphere { center: origin + axis * end, radius }.into(), at, roots);
+            }
+            return add_roots(&surface::Cylinder { origin, axis, radius }.into(), at, roots);
+        }
         Face::Elliptic(e) => {
             // |p + z d|² = (h + z k)², both nappes of a cone.
             let i = Image::of(&e);

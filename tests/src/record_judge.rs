@@ -139,6 +139,7 @@ impl<'a> Side<'a> {
             Face::Cone(surface::Cone { apex, .. }) => apex.length(),
             Face::Torus(surface::Torus { origin, major, minor, .. }) => origin.length() + major + minor,
             Face::Elliptic(e) => e.origin.length() + e.size,
+            Face::Capsule(surface::Capsule { origin, half, radius, .. }) => origin.length() + half + radius,
         });
         let motion = &moving.motion;
         let own = 2.0 * moving.place.position.length() + 2.0 * reach + numbers.fold(0.0, f64::max);
@@ -569,6 +570,10 @@ fn features(
                 let rho = axis.cross(point - origin).length();
                 let tube = (rho - major).hypot(axis.dot(point - origin));
                 moves / tube.min(rho).max(f64::MIN_POSITIVE)
+            }
+            Face::Capsule(surface::Capsule { origin, axis, half, .. }) => {
+                let along = axis.dot(point - origin).clamp(-half, half);
+                moves / point.distance(origin + axis * along).max(f64::MIN_POSITIVE)
             }
             // Of the gradient, over its length: twice as much of the normal.
             Face::Elliptic(e) => {

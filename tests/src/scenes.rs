@@ -7,7 +7,7 @@
 use crate::random_solids::Random;
 use crate::reference::{self, Effort, Moving, Truth};
 use contactd::solid::primitive::{
-    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Torus, TriangleMesh,
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Torus, TriangleMesh,
 };
 use contactd::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
@@ -46,6 +46,10 @@ impl Recipe {
     /// A torus about z.
     pub fn torus(major: f64, minor: f64) -> Self {
         Self::of(Torus { major, minor })
+    }
+    /// All points within a radius of a segment along z.
+    pub fn capsule(half: f64, radius: f64) -> Self {
+        Self::of(Capsule { half, radius })
     }
     /// An ellipsoid with the given semi-axes.
     pub fn ellipsoid(x: f64, y: f64, z: f64) -> Self {
@@ -125,6 +129,7 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
             TriangleMesh::new(&points, m.triangles()).expect("closed as before").0.into()
         }
         Shape::Torus(t) => Torus { major: t.major * k, minor: t.minor * k }.into(),
+        Shape::Capsule(c) => Capsule { half: c.half * k, radius: c.radius * k }.into(),
         Shape::Ellipsoid(e) => Ellipsoid { semi: e.semi * k }.into(),
         Shape::EllipticFrustum(c) => {
             EllipticFrustum { semi: c.semi * k, half_height: c.half_height * k, ..c.clone() }.into()

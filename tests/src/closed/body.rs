@@ -306,7 +306,7 @@ impl Poly {
 }
 
 impl Convex {
-    /// The primitive in its own frame; `None` for a half-space.
+    /// The primitive in its own frame; `None` for what has no closed form here: a half-space, a capsule and what is not convex.
     pub fn of(shape: &Shape) -> Option<Self> {
         let round = |r0: f64, r1: f64, h: f64| Round {
             centers: [DVec3::Z * -h, DVec3::Z * h],
@@ -326,7 +326,7 @@ impl Convex {
                 let corners = contactd::math::Aabb::around(DVec3::ZERO, half).corners();
                 Convex::Poly(Poly::new(corners.to_vec(), planes()))
             }
-            primitive::Convex::Other => return None,
+            primitive::Convex::Capsule { .. } | primitive::Convex::Other => return None,
         })
     }
 

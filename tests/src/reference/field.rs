@@ -34,6 +34,10 @@ impl Literal {
                 Face::Torus(surface::Torus { origin, axis, major, minor }) => {
                     (axis.cross(x - origin).length() - major).hypot(axis.dot(x - origin)) - minor
                 }
+                Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
+                    let along = axis.dot(x - origin).clamp(-half, half);
+                    x.distance(origin + axis * along) - radius
+                }
                 Face::Elliptic(e) => {
                     let e = Image::of(&e);
                     e.across(x).length() - e.fall * e.local(x).z - e.radius
@@ -53,6 +57,14 @@ impl Literal {
                 Face::Torus(surface::Torus { origin, axis, major, .. }) => {
                     let out = across(origin, axis);
                     (x - origin - out * major).normalize_or(out)
+                }
+                Face::Capsule(surface::Capsule { origin, axis, half, .. }) => {
+                    let along = axis.dot(x - origin);
+                    if along.abs() <= half {
+                        across(origin, axis)
+                    } else {
+                        (x - origin - axis * half.copysign(along)).normalize_or(axis)
+                    }
                 }
                 Face::Elliptic(e) => {
                     let e = Image::of(&e);
@@ -254,6 +266,9 @@ fn moved(face: &Face, place: &Pose) -> Face {
         }
         Face::Torus(surface::Torus { origin, axis, major, minor }) => {
             Face::Torus(surface::Torus { origin: point(origin), axis: turned(axis), major, minor })
+        }
+        Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
+            Face::Capsule(surface::Capsule { origin: point(origin), axis: turned(axis), half, radius })
         }
         Face::Elliptic(e) => {
             let q = place.rotation * Image::of(&e).turn;

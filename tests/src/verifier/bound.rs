@@ -304,6 +304,24 @@ impl Bounder<'_> {
                 let off = square_length(&across(&o, axis)).sqrt().plus(point(-major));
                 (off.square() + linear(axis, &o).square()).sqrt().plus(point(-minor))
             }
+            // Beside its segment a cylinder's, beyond an end a ball's; where that is open, between both, derivatives too: the gradient
+            // does not jump.
+            Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
+                let (o, a) = (offsets(y, origin), unit(vector(axis.to_array())));
+                let along = linear(a, &o);
+                let end = |half: f64| {
+                    let from: [Jet; 3] = std::array::from_fn(|i| o[i].plus(-(point(half) * a[i])));
+                    (along.v - point(half), square_length(&from).sqrt())
+                };
+                let ((above, top), (below, bottom)) = (end(half), end(-half));
+                let pieces = [
+                    (above.hi > 0.0).then_some(top),
+                    (below.lo < 0.0).then_some(bottom),
+                    (above.lo <= 0.0 && below.hi >= 0.0).then(|| square_length(&across(&o, a)).sqrt()),
+                ];
+                let all = pieces.into_iter().flatten().reduce(|p, q| hull(&p, &q));
+                all.unwrap_or_else(|| Jet::constant(Interval::new(0.0, f64::INFINITY))).plus(point(-radius))
+            }
             Face::Elliptic(ref e) => {
                 let (rows, fall, radius) = image(e);
                 let o = offsets(y, e.origin);
@@ -400,6 +418,16 @@ impl Bounder<'_> {
                 let wider = point((point(major) - point(major_q)).mag());
                 point(minor_q) - point(minor) - length(minus(place(o), place(u))) - wider - lean * point(major_q)
             }
+            // The segments are no farther from each other than their middles, their halves and their directions.
+            (
+                Face::Capsule(surface::Capsule { origin: o, axis: a, half, radius }),
+                Face::Capsule(surface::Capsule { origin: u, axis: b, half: half_q, radius: radius_q }),
+            ) => {
+                let turned = if a.dot(b) < 0.0 { -b } else { b };
+                let lean = length(minus(unit(place(a)), unit(place(turned))));
+                let longer = point((point(half) - point(half_q)).mag());
+                point(radius_q) - point(radius) - length(minus(place(o), place(u))) - longer - lean * point(half_q)
+            }
             // psi_p − psi_q >= R_q − R_p + w_p·Δ − |B_p Δ| − |x − o_q| (|B_p − B_q| + |w_p − w_q|), rows turned alike.
             (Face::Elliptic(ref one), Face::Elliptic(ref other)) => {
                 let ((p, w, r), (q, v, s)) = (image(one), image(other));
@@ -435,13 +463,20 @@ impl Bounder<'_> {
         }
         if p.0.on_b == q.0.on_b {
             let wall = self.wall(p.1, q.1, if p.0.on_b { b } else { a })?;
-            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone(_) | Face::Elliptic(_)) {
+            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone(_) | Face::Elliptic(_) | Face::Capsule(_)) {
                 return Some(wall);
             }
         }
         if let (Face::Cone(_), Face::Cone(_)) = (p.1, q.1) {
             return self.cones(p, q, x, t);
         }
+        // Of a capsule the cylinder or the ball that it is all over the region; where it is both, only smaller regions tell.
+        let of = |l: &Literal, face: &Face| part_of(face, if l.on_b { b } else { a });
+        let (Some(part_p), Some(part_q)) = (of(p.0, p.1), of(q.0, q.1)) else {
+            let any = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+            return Some(Jet { v: any, g: [any; 4], h: [any; 10] });
+        };
+        let (p, q) = ((p.0, &part_p), (q.0, &part_q));
         let round = |face: &Face| match *face {
             Face::Sphere(surface::Sphere { center, radius }) => Some((center, None, radius)),
             Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
@@ -549,6 +584,30 @@ fn square_length(y: &[Jet; 3]) -> Jet {
     y[0].square() + y[1].square() + y[2].square()
 }
 
+/// What holds both.
+fn hull(p: &Jet, q: &Jet) -> Jet {
+    Jet {
+        v: p.v.hull(q.v),
+        g: std::array::from_fn(|k| p.g[k].hull(q.g[k])),
+        h: std::array::from_fn(|k| p.h[k].hull(q.h[k])),
+    }
+}
+
+/// The face itself, or of a capsule what it is over a whole region: its cylinder, or the ball at one of its ends.
+fn part_of(face: &Face, y: &[Jet; 3]) -> Option<Face> {
+    let Face::Capsule(surface::Capsule { origin, axis, half, radius }) = *face else { return Some(*face) };
+    let along = linear(unit(vector(axis.to_array())), &offsets(y, origin)).v;
+    if along.mag() <= half {
+        Some(surface::Cylinder { origin, axis, radius }.into())
+    } else if along.lo >= half {
+        Some(surface::Sphere { center: origin + axis * half, radius }.into())
+    } else if along.hi <= -half {
+        Some(surface::Sphere { center: origin - axis * half, radius }.into())
+    } else {
+        None
+    }
+}
+
 /// B, w and r of an elliptic face, from its numbers: with p = `turn` and s = |p|², the quaternion (2p, 1 − s)/(1 + s).
 fn image(e: &surface::Elliptic) -> ([Vector; 3], Vector, Interval) {
     let p = vector(e.turn.to_array());
@@ -614,6 +673,20 @@ fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
             let rho =
                 if lean < 0.0 { square_length(&across(&o, a)).sqrt() } else { linear(perpendicular(axis, origin), &o) };
             rho.plus(point(-major)).scaled(point(lean)) + linear(a, &o).scaled(point(up)).plus(point(-minor))
+        }
+        // |x − q| >= n·(x − q) for every |n| <= 1 that leads to no other point of the segment: across it, or past an end.
+        Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
+            let along = (at - origin).dot(axis);
+            if along.abs() <= half {
+                return linear(perpendicular(axis, origin), &offsets(y, origin)).plus(point(-radius));
+            }
+            let a = times(point(half.copysign(along)), unit(vector(axis.to_array())));
+            let n = short(at - origin - axis * half.copysign(along));
+            let (o, past) = (offsets(y, origin), dot(n, a));
+            // Rounding may leave it leading back.
+            let from: [Jet; 3] = std::array::from_fn(|i| o[i].plus(-a[i]));
+            let back = if past.lo < 0.0 { point(2.0) * past } else { ZERO };
+            linear(n, &from).plus(back + point(-radius))
         }
         Face::Elliptic(ref e) => {
             let (rows, fall, radius) = image(e);

@@ -179,6 +179,9 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
         Shape::Torus(t) => {
             point(t.major) * across + point(t.minor) * (n[0].square() + n[1].square() + n[2].square()).sqrt()
         }
+        Shape::Capsule(c) => {
+            point(c.half) * abs(n[2]) + point(c.radius) * (n[0].square() + n[1].square() + n[2].square()).sqrt()
+        }
         Shape::Ellipsoid(e) => {
             let [a, b, c] = std::array::from_fn(|k| (point(e.semi[k]) * n[k]).square());
             (a + b + c).sqrt()

@@ -548,6 +548,7 @@ fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
         }
         // Its psi is the exact distance.
         Shape::Torus(t) => around(&[DVec3::ZERO], &|k| disc(t.major)(k) + grown(t.minor)),
+        Shape::Capsule(c) => around(&[DVec3::Z * c.half, -DVec3::Z * c.half], &|_| grown(c.radius)),
         // |B x| = r + psi, which is r at the end of the shortest semi-axis.
         Shape::Ellipsoid(e) => {
             let k = scale(e.semi.min_element());

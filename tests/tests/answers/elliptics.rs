@@ -8,135 +8,22 @@
 //! `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers elliptics:: -- --nocapture` sets the number of
 //! pairs, and of trees.
 
-use contactd::contact::region::{regions, threshold};
-use contactd::contact::{Extent, QueryOptions, Scratch, Status, earliest_contact};
+use super::kinds::{Scene, alone, at_rest, compare, pairs, past, placed, speed, turning, values_and_volumes};
+use contactd::contact::Extent;
 use contactd::import::{Facets, Limits, import_csg};
-use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Ellipsoid, EllipticFrustum};
 use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::{certify_all, certify_trees};
-use contactd_tests::engine::ReportedPoint as _;
-use contactd_tests::engine::question;
-use contactd_tests::random_solids::{Random, elliptic, shape, shape_or_elliptic, solid_of};
-use contactd_tests::rays::integrals;
-use contactd_tests::record_judge;
-use contactd_tests::reference::Moving;
-use contactd_tests::reference::field::Field;
+use contactd_tests::random_solids::{Random, elliptic, shape, shape_or_elliptic};
 use contactd_tests::scenes::Recipe;
 use glam::{DMat3, DVec2, DVec3, dvec3};
 use std::f64::consts::PI;
 
-fn pairs(default: usize) -> usize {
-    std::env::var("CONTACTD_PAIRS").ok().map_or(default, |n| n.parse().expect("a number of pairs"))
-}
-
-/// Two bodies, how far they are from touching at a pose of each, and how fast that may change.
-struct Scene {
-    a: Recipe,
-    b: Recipe,
-    motions: [Motion; 2],
-    gap: Box<dyn Fn(&Pose, &Pose) -> f64>,
-    speed: f64,
-}
-
-impl Scene {
-    fn at(&self, t: f64) -> f64 {
-        (self.gap)(&self.motions[0].at(t), &self.motions[1].at(t))
-    }
-
-    /// The first time at which the gap is closed; how fast it closes then.
-    fn first(&self) -> Option<(f64, f64)> {
-        let mut t = 0.0;
-        loop {
-            let gap = self.at(t);
-            if gap <= 1e-15 {
-                let h = 1e-6;
-                return Some((t, (self.at(t - h) - self.at(t + h)) / (2.0 * h)));
-            }
-            t += gap / self.speed;
-            if t > 1.0 {
-                return None;
-            }
-        }
-    }
-}
-
-/// A motion from a place next to the origin past it.
-fn past(r: &mut Random, from: f64) -> Motion {
-    let start = r.direction() * from;
-    let aim = r.vector(0.7);
-    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.5) };
-    Motion { start: Pose::new(start, r.rotation()), velocity: (aim - start) * r.within(0.8, 1.6), spin }
-}
-
-fn turning(r: &mut Random) -> Motion {
-    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.0) };
-    Motion { start: Pose::new(DVec3::ZERO, r.rotation()), velocity: r.vector(0.3), spin }
-}
-
-fn speed(motions: &[Motion; 2], reach: f64) -> f64 {
-    let [a, b] = motions;
-    (a.velocity - b.velocity).length() + (a.spin.length() + b.spin.length()) * reach
-}
-
-/// Asks about scenes and compares with the closed form, to 1e-12 of the size; the records are judged.
-fn compare(name: &str, count: usize, seed: u64, make: impl Fn(&mut Random) -> Scene) {
-    let mut r = Random::new(seed);
-    let (mut contacts, mut clear, mut overlap, mut undecided, mut worst, mut cells) = (0, 0, 0, 0, 0.0f64, 0);
-    let (mut flagged, mut lies) = (0, 0);
-    for i in 0..count {
-        let s = make(&mut r);
-        let (a, b) = (Model::new(s.a.build()), Model::new(s.b.build()));
-        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
-        let query = question((&a, placed(s.motions[0])), (&b, placed(s.motions[1])), QueryOptions::DEPTH);
-        let o = earliest_contact(&query, &mut Scratch::default());
-        let size = query.resolution / 1e-9;
-        cells += o.counters.cells;
-        let moving = [(&a, 0), (&b, 1)].map(|(m, k): (&Model, usize)| Moving {
-            solid: &m.solid,
-            place: Pose::IDENTITY,
-            motion: s.motions[k],
-        });
-        lies += usize::from(!record_judge::holds(&format!("{name} {i}"), &moving[0], &moving[1], &o));
-        // psi is up to seven times flatter than the distance.
-        if s.at(0.0) <= 40.0 * query.resolution {
-            assert!(s.at(0.0) > 0.0 || o.status() != Status::Clear, "{name} {i}: {o:?}");
-            overlap += 1;
-            continue;
-        }
-        match (s.first(), o.status()) {
-            (_, Status::Undecided) => undecided += 1,
-            (None, Status::Clear) => clear += 1,
-            (Some((t, speed)), Status::Contact) => {
-                contacts += 1;
-                assert!(
-                    o.time_lower() <= t + 1e-12 * size / speed.max(1e-9),
-                    "{name} {i}: {t} before {}",
-                    o.time_lower()
-                );
-                if o.not_continued() {
-                    flagged += 1;
-                    continue;
-                }
-                let off = (t - o.time()).abs() * speed.abs().max(o.at().normal_speed.abs()) / size;
-                worst = worst.max(off);
-                assert!(off <= 1e-12, "{name} {i}: {off:e}: {t} at {speed}, not {o:?}");
-            }
-            // A graze within the depth at which contacts are decided is none.
-            (Some((t, speed)), Status::Clear) => assert!(speed.abs() < 1e-3, "{name} {i}: missed at {t}, {speed}"),
-            (found, _) => panic!("{name} {i}: {found:?}, not {o:?}"),
-        }
-    }
-    println!(
-        "{name}: {contacts} contacts, {clear} clear, {overlap} overlap, {undecided} undecided, {flagged} not continued; worst {worst:.1e}; \
-         {} cells each",
-        cells / count as u64
-    );
-    assert!(contacts * 5 > count && undecided * 100 <= count && flagged * 100 <= count && lies == 0, "{name}");
-}
+/// Resolutions of a gap at which a pair may count as touching: psi is up to seven times flatter than the distance.
+const FLAT: f64 = 40.0;
 
 /// Semi-axes up to 1 and down to a seventh of that.
 fn semi(r: &mut Random) -> DVec3 {
@@ -183,23 +70,13 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
             let n = b.rotation * DVec3::Z;
             n.dot(a.position - b.position) - reach(&own, a.rotation.inverse() * -n)
         });
-        let s = Scene { a: Recipe::of(shape), b: floor, motions, gap, speed };
-        // From the other side of the floor: turned over.
-        if s.at(0.0) > 0.0 {
-            return s;
-        }
-        let [mut a, b] = s.motions;
-        let n = b.start.rotation * DVec3::Z;
-        let mirrored = |v: DVec3| v - n * (2.0 * n.dot(v));
-        a.start.position = mirrored(a.start.position - b.start.position) + b.start.position;
-        a.velocity = mirrored(a.velocity);
-        Scene { motions: [a, b], ..s }
+        Scene { a: Recipe::of(shape), b: floor, motions, gap, speed }.above_plane()
     };
-    compare("ellipsoid on a plane", count, 1, |r| {
+    compare("ellipsoid on a plane", (count, 1, FLAT), |r| {
         let shape = Ellipsoid { semi: semi(r) }.into();
         on_plane(r, shape)
     });
-    compare("elliptic cylinder, cone or frustum on a plane", count, 2, |r| {
+    compare("elliptic cylinder, cone or frustum on a plane", (count, 2, FLAT), |r| {
         let shape = loop {
             let shape = elliptic(r, 1.0);
             if matches!(shape, Shape::EllipticFrustum(_)) {
@@ -208,7 +85,7 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
         };
         on_plane(r, shape)
     });
-    compare("ellipsoid and a ball", count, 3, |r| {
+    compare("ellipsoid and a ball", (count, 3, FLAT), |r| {
         let (semi, ball) = (semi(r), r.within(0.05, 0.6));
         let motions = [turning(r), past(r, 2.2)];
         let speed = speed(&motions, 3.5);
@@ -216,7 +93,7 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
         Scene { a: Recipe::of(Ellipsoid { semi }), b: Recipe::sphere(ball), motions, gap, speed }
     });
     // Straight along one of its axes, where the nearest point is the end of that axis.
-    compare("ellipsoid and a ball along an axis", count, 4, |r| {
+    compare("ellipsoid and a ball along an axis", (count, 4, FLAT), |r| {
         let (semi, ball, k) = (semi(r), r.within(0.05, 0.6), r.below(3));
         let body = r.rotation();
         let along = body * DVec3::AXES[k];
@@ -227,7 +104,7 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
         let gap = Box::new(move |a: &Pose, b: &Pose| along.dot(b.position - a.position) - semi[k] - ball);
         Scene { a: Recipe::of(Ellipsoid { semi }), b: Recipe::sphere(ball), motions, gap, speed: speed(&motions, 0.0) }
     });
-    compare("ball in an elliptic hollow", count, 5, |r| {
+    compare("ball in an elliptic hollow", (count, 5, FLAT), |r| {
         let semi = semi(r);
         // No larger than the least radius of curvature: the ball touches in one place.
         let ball = r.within(0.2, 0.9) * semi.min_element().powi(2) / semi.max_element();
@@ -246,47 +123,17 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
 #[test]
 fn certificates_of_elliptic_solids_against_every_kind_and_of_trees_with_them_hold() {
     let count = pairs(120);
-    let alone = |shape: Shape| Model::new(Recipe::of(shape).build());
     certify_all("kinds", (count, 0xe1_1195), |r| {
         let other = if r.chance(0.3) { elliptic(r, 0.8) } else { shape(r, 0.8) };
-        let place = |motion| Placed { place: Pose::IDENTITY, motion };
-        [(alone(elliptic(r, 0.8)), place(turning(r))), (alone(other), place(past(r, 2.2)))]
+        [(alone(elliptic(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]
     });
     certify_trees((count, 0xe1_1195), shape_or_elliptic);
 }
 
 #[test]
 fn trees_with_elliptic_solids_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    let mut r = Random::new(31);
-    let (mut inside, mut seen) = (0, 0);
     // A volume by rays takes a second: an eighth of them in the command.
-    for i in 0..pairs(150).div_ceil(50).min(24) {
-        let solid = solid_of(&mut r, 1 + i % 3, shape_or_elliptic);
-        let (model, around) = (Model::new(solid.clone()), solid.aabb());
-        let field = Field::new(&solid, &Pose::IDENTITY);
-        for _ in 0..pairs(150) * 10 {
-            let x = r.point_in(&around);
-            let (f, other) = (solid.value(x), field.value(x));
-            assert!((f - other).abs() < 1e-13, "solid {i} at {x}: {f} {other}");
-            let margin = model.margin();
-            let within = model.value_within(x, margin).clamp(-margin, margin);
-            assert!((within - f.clamp(-margin, margin)).abs() < 1e-13, "solid {i} at {x}: {within} {f}");
-            // 1-Lipschitz.
-            let y = x + r.vector(0.3);
-            assert!((solid.value(y) - f).abs() <= x.distance(y) * (1.0 + 1e-12) + 1e-13);
-            inside += usize::from(f < 0.0);
-            seen += 1;
-        }
-        let (fine, coarse) = (integrals(&solid, &around, 96), integrals(&solid, &around, 61));
-        if fine[0] < 1e-2 {
-            continue;
-        }
-        let m = mass_properties(&model, &MassOptions { tolerance: 0.03, boxes: 300_000 }).expect("bounded");
-        let doubt = 4.0 * (fine[0] - coarse[0]).abs() + 2e-3 * fine[0];
-        assert!((m.volume - fine[0]).abs() <= m.volume_error + doubt, "solid {i}: {m:?} {}", fine[0]);
-        assert!(m.volume_error <= 0.03 * m.volume, "solid {i}: {m:?}");
-    }
-    assert!(inside * 20 > seen, "{inside} of {seen}");
+    values_and_volumes(shape_or_elliptic, (pairs(150).div_ceil(50).min(24), 3, pairs(150) * 10), [96, 61]);
 }
 
 #[test]
@@ -327,14 +174,6 @@ fn moments_of_elliptic_solids_are_those_of_their_formulas_and_of_their_halves() 
 
 #[test]
 fn elliptic_solids_touch_along_lines_and_at_points() {
-    let at_rest = |a: Recipe, b: Recipe, pose: Pose| {
-        let (a, b) = (Model::new(a.build()), Model::new(b.build()));
-        let place = |pose| Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) };
-        let query = question((&a, place(Pose::IDENTITY)), (&b, place(pose)), QueryOptions::DEPTH);
-        let found = regions(&query, 0.0, threshold(query.resolution, 0.0));
-        assert!(found.complete, "{found:?}");
-        found.regions
-    };
     let floor = || Recipe::cuboid(5.0, 5.0, 1.0).at(0.0, 0.0, -1.0);
     let on_side = contactd_proto::motion::quat_of_rotation_vector(DVec3::X * (0.5 * PI));
     let tube =

@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 mod accuracy;
+mod capsules;
 mod cases;
 mod closed_forms;
 mod coincident;
@@ -10,6 +11,7 @@ mod contact_regions;
 mod elliptics;
 mod families;
 mod hard_cases;
+mod kinds;
 mod laws;
 mod meshes;
 mod overlap;

@@ -3,8 +3,8 @@
 //! `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers meshes:: -- --nocapture` sets the number of
 //! pairs.
 
+use super::kinds::{alone, pairs, past, placed, turning, values_and_volumes};
 use contactd::contact::{Outcome, QueryOptions, Scratch, Status, earliest_contact};
-use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
 use contactd::solid::Shape;
@@ -16,34 +16,11 @@ use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question;
 use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, winding};
 use contactd_tests::random_solids::{Random, shape, shape_or_mesh, solid_of};
-use contactd_tests::rays::integrals;
-use contactd_tests::reference::field::Field;
 use contactd_tests::scenes::Recipe;
 use glam::DVec3;
 
-fn pairs(default: usize) -> usize {
-    std::env::var("CONTACTD_PAIRS").ok().map_or(default, |n| n.parse().expect("a number of pairs"))
-}
-
-fn alone(shape: impl Into<Shape>) -> Model {
-    Model::new(Recipe::of(shape).build())
-}
-
-/// A motion from a place next to the origin past it.
-fn past(r: &mut Random, from: f64) -> Motion {
-    let start = r.direction() * from;
-    let aim = r.vector(0.7);
-    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.5) };
-    Motion { start: Pose::new(start, r.rotation()), velocity: (aim - start) * r.within(0.8, 1.6), spin }
-}
-
-fn turning(r: &mut Random) -> Motion {
-    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.0) };
-    Motion { start: Pose::new(DVec3::ZERO, r.rotation()), velocity: r.vector(0.3), spin }
-}
-
 fn ask(a: &Model, b: &Model, motions: [Motion; 2]) -> Outcome {
-    let [ma, mb] = motions.map(|motion| Placed { place: Pose::IDENTITY, motion });
+    let [ma, mb] = motions.map(placed);
     earliest_contact(&question((a, ma), (b, mb), QueryOptions::DEPTH), &mut Scratch::default())
 }
 
@@ -78,34 +55,7 @@ fn a_point_is_inside_where_the_mesh_winds_around_it_and_f_is_no_more_than_its_di
 
 #[test]
 fn trees_with_meshes_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    let mut r = Random::new(31);
-    let mut volumes = 0;
-    let trees = pairs(150).div_ceil(40).min(9);
-    for i in 0..trees {
-        let solid = solid_of(&mut r, 1 + i % 2, shape_or_mesh);
-        let (model, around) = (Model::new(solid.clone()), solid.aabb());
-        let field = Field::new(&solid, &Pose::IDENTITY);
-        for _ in 0..pairs(150) * 4 {
-            let x = r.point_in(&around);
-            let (f, other) = (solid.value(x), field.value(x));
-            assert!((f - other).abs() < 1e-13, "solid {i} at {x}: {f} {other}");
-            let margin = model.margin();
-            let within = model.value_within(x, margin).clamp(-margin, margin);
-            assert!((within - f.clamp(-margin, margin)).abs() < 1e-13, "solid {i} at {x}: {within} {f}");
-            let y = x + r.vector(0.3);
-            assert!((solid.value(y) - f).abs() <= x.distance(y) * (1.0 + 1e-12) + 1e-13);
-        }
-        let (fine, coarse) = (integrals(&solid, &around, 84), integrals(&solid, &around, 55));
-        if fine[0] < 1e-2 {
-            continue;
-        }
-        let m = mass_properties(&model, &MassOptions { tolerance: 0.03, boxes: 300_000 }).expect("bounded");
-        let doubt = 4.0 * (fine[0] - coarse[0]).abs() + 2e-3 * fine[0];
-        assert!((m.volume - fine[0]).abs() <= m.volume_error + doubt, "solid {i}: {m:?} {}", fine[0]);
-        assert!(m.volume_error <= 0.03 * m.volume, "solid {i}: {m:?}");
-        volumes += 1;
-    }
-    assert!(2 * volumes > trees, "{volumes} of {trees}");
+    values_and_volumes(shape_or_mesh, (pairs(150).div_ceil(40).min(9), 2, pairs(150) * 4), [84, 55]);
 }
 
 /// Enclosed volume, by signed tetrahedra.
@@ -131,8 +81,7 @@ fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
     certify_all("kinds", (count, 0x3e_5105), |r| {
         let mesh = |r: &mut Random| Shape::from(meshes::solid(&meshes::random(r, 0.8)));
         let other = if r.chance(0.3) { mesh(r) } else { shape(r, 0.8) };
-        let place = |motion| Placed { place: Pose::IDENTITY, motion };
-        [(alone(mesh(r)), place(turning(r))), (alone(other), place(past(r, 2.2)))]
+        [(alone(mesh(r)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]
     });
     certify_trees((count, 0x3e_5105), shape_or_mesh);
 }

@@ -151,6 +151,20 @@ fn psi(face: &Face, x: &Vector) -> Big {
             let square = &off * &off + &z * &z;
             (if square == Big::ZERO { big(0.0) } else { square.sqrt() }) - big(minor)
         }
+        Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
+            let (o, a) = (x.minus(&Vector::of(origin)), Vector::of(axis));
+            // The axis' stored length stays in the point of the segment, as across a cylinder.
+            let z = o.dot(&a);
+            let (low, high) = (big(-half), big(half));
+            let z = if z < low {
+                low
+            } else if z > high {
+                high
+            } else {
+                z
+            };
+            o.minus(&a.times(&z)).length() - big(radius)
+        }
         Face::Elliptic(e) => {
             let (parts, y) = (e.parts(), x.minus(&Vector::of(e.origin)));
             Vector(parts.rows.map(|row| Vector::of(row).dot(&y))).length()
@@ -164,7 +178,7 @@ fn psi(face: &Face, x: &Vector) -> Big {
 fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2]) -> Option<Big> {
     // |u|² − ρ² of a face that delta shrinks; the fit takes an axis' direction, not its stored length.
     let square = |face: &Face, x: &Vector, shrink: f64| {
-        let (origin, axis, radius, steep) = match *face {
+        let (origin, axis, radius, steep) = match part_of(face, x) {
             Face::Sphere(surface::Sphere { center, radius }) => {
                 (Vector::of(center), None, big(radius) - big(shrink), big(0.0))
             }
@@ -175,7 +189,7 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
                 let tan = big(sin) / big(cos);
                 (Vector::of(apex + axis * (shrink / sin)), Some(axis), big(0.0), &tan * &tan)
             }
-            Face::Plane(_) | Face::Torus(_) | Face::Elliptic(_) => return None,
+            Face::Plane(_) | Face::Torus(_) | Face::Elliptic(_) | Face::Capsule(_) => return None,
         };
         let o = x.minus(&origin);
         let along = axis.map_or(big(0.0), |a| {
@@ -185,6 +199,19 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
         Some(o.dot(&o) - along * (big(1.0) + steep) - &radius * &radius)
     };
     Some(big(mu[0]) * square(p.0, p.1, delta)? - big(mu[1]) * square(q.0, q.1, -delta)?)
+}
+
+/// The face itself, or of a capsule its cylinder or the ball at one of its ends, which it is around a point.
+fn part_of(face: &Face, x: &Vector) -> Face {
+    let Face::Capsule(surface::Capsule { origin, axis, half, radius }) = *face else { return *face };
+    let along = x.minus(&Vector::of(origin)).dot(&Vector::of(axis));
+    if along > big(half) {
+        surface::Sphere { center: origin + axis * half, radius }.into()
+    } else if along < big(-half) {
+        surface::Sphere { center: origin - axis * half, radius }.into()
+    } else {
+        surface::Cylinder { origin, axis, radius }.into()
+    }
 }
 
 /// Random models: primitives and trees, frusta with a far apex, faces far from the model's origin.
@@ -280,6 +307,16 @@ fn nothing_that_is_computed_of_an_elliptic_face_differs_by_more_than_the_budget(
     let shapes: Vec<Shape> = (0..48).map(|_| random_solids::elliptic(&mut r, 1.0)).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
     evaluate(&mut r, &models, wanted, "elliptic faces");
+}
+
+#[test]
+fn nothing_that_is_computed_of_a_capsule_differs_by_more_than_the_budget() {
+    let wanted: u64 =
+        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
+    let mut r = Random::new(10);
+    let shapes: Vec<Shape> = (0..24).map(|_| random_solids::capsule(&mut r, 1.0).into()).collect();
+    let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
+    evaluate(&mut r, &models, wanted, "capsules");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.
@@ -462,6 +499,7 @@ fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
             let (sin, cos) = r.within(0.0, TAU).sin_cos();
             origin + (u * cos + axis.cross(u) * sin) * major
         }
+        Face::Capsule(surface::Capsule { origin, axis, half, .. }) => origin + axis * (half * r.within(-1.0, 1.0)),
         Face::Elliptic(e) => {
             let along = if e.third > 0.0 { 0.0 } else { r.within(if e.third < 0.0 { 0.0 } else { -1.0 }, 2.0) };
             e.origin + e.axis() * along

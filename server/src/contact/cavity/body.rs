@@ -1,7 +1,7 @@
 //! A convex body as the hull of discs of one axis, and how far it reaches when cut by one plane.
 //!
-//! A cylinder or frustum is the hull of its two rims, a ball one disc without an axis (all directions count), a box or a polyhedron
-//! of its corners: discs of radius 0. Along w the disc about c with radius r reaches c·w + r|w⊥|, w⊥ the part of w across the axis.
+//! A cylinder or frustum is the hull of its two rims, a ball one disc without an axis (all directions count), a capsule two of them,
+//! a box or a polyhedron the hull of its corners: discs of radius 0. Along w the disc about c with radius r reaches c·w + r|w⊥|, w⊥ the part of w across the axis.
 //!
 //! Of a body P cut by half-spaces n_k·x <= d_k no point reaches farther along u than
 //!
@@ -37,7 +37,7 @@ fn is_simple(p: &Primitive, corners: &[DVec3]) -> bool {
 #[derive(Clone, Debug)]
 pub(super) struct CavityBody {
     pub discs: Discs,
-    /// Common axis; `None` for a ball.
+    /// Common axis; `None` for a ball and a capsule, whose discs are balls.
     pub axis: Option<DVec3>,
 }
 
@@ -54,7 +54,7 @@ impl CavityBody {
         }
         let mut discs = shape.discs()?;
         discs.iter_mut().for_each(|(c, _)| *c = at.point(*c));
-        Some(Self { discs, axis: shape.ball().is_none().then_some(z) })
+        Some(Self { discs, axis: (shape.margin() == 0.0).then_some(z) })
     }
 }
 

@@ -116,7 +116,9 @@ impl<'a> CavityPair<'a> {
                 continue;
             }
             // Of round walls those alone that are as wide everywhere along an axis.
-            let (Some(radius), Some(Axis { origin, direction: axis })) = (face.radius(), face.axis()) else {
+            let (Some(radius), Some(Axis { origin, direction: axis }), Some(_)) =
+                (face.radius(), face.axis(), face.developable())
+            else {
                 return None;
             };
             round = Some(Round { origin, axis, radius, face: cavity.first_face + i as u32 });

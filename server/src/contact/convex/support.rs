@@ -1,7 +1,8 @@
 //! A convex primitive where it stands: how far it reaches along a direction, and with which point.
 //!
 //! Static dispatch on the shape, nothing allocated: this is the innermost loop of the advance.
-//! A ball is its centre and a margin: then the distance of two balls is that of two points, found at once.
+//! A ball is its centre and a margin, a capsule a segment and a margin: then the distance of two balls is that of two points, found
+//! at once.
 
 use crate::solid::Shape;
 use crate::solid::primitive::{Convex, Slope};
@@ -13,7 +14,7 @@ pub struct ConvexBody<'s> {
     shape: Convex<'s>,
     axes: DMat3,
     origin: DVec3,
-    /// What the primitive is thicker than its core: a ball's radius, else 0.
+    /// What the primitive is thicker than its core, as `Convex::margin` has it.
     pub margin: f64,
 }
 
@@ -21,7 +22,7 @@ impl<'s> ConvexBody<'s> {
     /// A primitive's shape with its own frame; `None` for one without bounds.
     pub fn new(shape: &'s Shape, axes: DMat3, origin: DVec3) -> Option<Self> {
         let shape = shape.convex();
-        shape.is_known().then(|| Self { shape, axes, origin, margin: shape.ball().unwrap_or(0.0) })
+        shape.is_known().then(|| Self { shape, axes, origin, margin: shape.margin() })
     }
 
     /// The same body in a frame that sees its own by `axes` and `origin`.
@@ -43,12 +44,7 @@ impl<'s> ConvexBody<'s> {
     /// Largest n·x over the body.
     #[inline]
     pub fn reach(&self, n: DVec3) -> f64 {
-        let own = if let Some(radius) = self.shape.ball() {
-            radius * n.length()
-        } else {
-            self.shape.extent([self.axes.x_axis.dot(n), self.axes.y_axis.dot(n), self.axes.z_axis.dot(n)])
-        };
-        n.dot(self.origin) + own
+        n.dot(self.origin) + self.shape.reach_along(&self.axes, n)
     }
 
     /// How deep a point is in the body, as `Convex::slope` has it.
@@ -67,14 +63,15 @@ impl<'s> ConvexBody<'s> {
 mod tests {
     use super::*;
     use crate::math::random::Random;
-    use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
+    use crate::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, Sphere};
     use crate::solid::{Label, Primitive};
     use contactd_proto::Pose;
     use contactd_proto::motion::quat_of_rotation_vector;
 
     #[test]
     fn the_value_of_a_body_is_the_largest_of_its_faces() {
-        let shapes: [Shape; 6] = [
+        let shapes: [Shape; 7] = [
+            Capsule { half: 0.6, radius: 0.3 }.into(),
             Sphere { radius: 0.7 }.into(),
             Cuboid { half: DVec3::new(0.5, 0.9, 0.2) }.into(),
             Cylinder { radius: 0.4, half_height: 0.8 }.into(),

@@ -319,7 +319,7 @@ impl<'a> Stand<'a> {
                 let f = face.at(own);
                 (row.value, row.normal, row.sinks) = (f.value, *axes * f.normal, 1.0);
                 row.bend = if f.rho > 0.0 { f.k / f.rho } else { 0.0 };
-                (row.axis, row.all) = match face.developable() {
+                (row.axis, row.all) = match face.straight_at(own) {
                     Some(axis) => (*axes * axis, false),
                     None => (DVec3::ZERO, true),
                 };

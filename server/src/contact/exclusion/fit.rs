@@ -161,7 +161,7 @@ pub fn fit(
     (side_q, q): (Side, LiteralId),
 ) -> impl Iterator<Item = Linear> {
     debug_assert!(side_p != side_q && p.sense() == Sense::Positive && q.sense() == Sense::Negative);
-    let (face_p, face_q) = (*view.faces(side_p).get(p.face()), *view.faces(side_q).get(q.face()));
+    let (face_p, face_q) = (view.face(side_p, p), view.face(side_q, q));
     let of = |even| quadrics(view, (side_p, p, &face_p), (side_q, q, &face_q), even);
     let even = of(true);
     // Radii alike to a hundredth bend alike: one bound will do.
@@ -174,7 +174,7 @@ pub fn fit(
 /// The bound G of a positive and a negative literal of one body, where both are round alike and near each other: two sides of
 /// a thin wall, or of a crescent. With even weights it is next to linear, and moves with its body as a plane does.
 pub fn within(view: &View, side: Side, p: LiteralId, q: LiteralId) -> Option<Linear> {
-    let (face_p, face_q) = (*view.faces(side).get(p.face()), *view.faces(side).get(q.face()));
+    let (face_p, face_q) = (view.face(side, p), view.face(side, q));
     quadrics(view, (side, p, &face_p), (side, q, &face_q), true).filter(|l| l.normal.length() <= 1.0)
 }
 
@@ -264,7 +264,7 @@ const SPINS: f64 = 8.0;
 /// left of G needs Q_p <= 0 or −Q_q <= 0 at a contact. A plane that is fixed in B turns away with the spin; the quadric
 /// does not know of it.
 pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
-    let face = view.b.get(id.face());
+    let face = &view.face(Side::B, id);
     let around_axis = match face.symmetry() {
         Symmetry::Normal(_) | Symmetry::None => return None,
         Symmetry::Center(_) => view.at.omega.length(),
@@ -333,7 +333,7 @@ pub fn touch_spun(view: &View, spun: &Linear, y: DVec3) -> Option<Linear> {
     if spun.other.is_some() || spun.id.sense() != Sense::Positive {
         return None;
     }
-    let f = Around::of(&quadric(view.b.get(spun.id.face()), Sense::Positive, view.delta)?, view, Side::B);
+    let f = Around::of(&quadric(&view.face(Side::B, spun.id), Sense::Positive, view.delta)?, view, Side::B);
     let pull = (y - f.axis.map_or(DVec3::ZERO, |a| a * a.dot(y))) * mu;
     // |∇Q| has grown: its rounding, and that of the axis.
     let lost = view.rounding * (2.0 * pull.length() + 8.0 * mu * view.radius);
@@ -347,7 +347,7 @@ pub fn touch_spun_against(view: &View, spun: &Linear, normal: DVec3) -> Option<L
     if spun.weights.is_none() || spun.other.is_some() || spun.id.sense() != Sense::Positive {
         return None;
     }
-    let f = Around::of(&quadric(view.b.get(spun.id.face()), Sense::Positive, view.delta)?, view, Side::B);
+    let f = Around::of(&quadric(&view.face(Side::B, spun.id), Sense::Positive, view.delta)?, view, Side::B);
     let across = f.axis.map_or(normal, |a| normal - a * a.dot(normal));
     touch_spun(view, spun, -across.try_normalize()? * f.rho - f.u)
 }
@@ -378,7 +378,7 @@ pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
     if side_q == fit.side {
         return None;
     }
-    let (p, q) = (view.faces(fit.side).get(fit.id.face()), view.faces(side_q).get(q.face()));
+    let (p, q) = (&view.face(fit.side, fit.id), &view.face(side_q, q));
     if !view.curved && p.ball().is_none() {
         return None;
     }

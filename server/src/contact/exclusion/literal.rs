@@ -166,6 +166,22 @@ impl View<'_> {
         }
     }
 
+    /// The face of a literal, or a simpler one that is the same all over the cell for the whole span.
+    pub fn face(&self, side: Side, id: LiteralId) -> Face {
+        let face = self.faces(side).get(id.face());
+        self.near(side, face).unwrap_or(*face)
+    }
+
+    /// The simpler one alone.
+    #[inline]
+    fn near(&self, side: Side, face: &Face) -> Option<Face> {
+        let (center, way) = match side {
+            Side::A => (self.center, 0.0),
+            Side::B => (self.center_b, self.motion.speed * self.motion.h),
+        };
+        face.near(center, self.radius + way + self.rounding)
+    }
+
     /// The face at the point `center + y`, its normal along A's axes.
     fn face_at(&self, side: Side, face: &Face, y: DVec3) -> FaceAt {
         match side {
@@ -301,6 +317,8 @@ impl View<'_> {
             l.point = point;
             return l;
         }
+        let near = self.near(side, face);
+        let face = near.as_ref().unwrap_or(face);
         let f = self.face_at(side, face, DVec3::ZERO);
         if f.k == 0.0 {
             return self.plane(side, id, -f.normal, -f.value + delta);

@@ -6,7 +6,7 @@
 //! middle is farther from it than half its length is free of it), and between two of them the bodies touch everywhere or
 //! nowhere: one point decides, confirmed by both whole trees. Runs of pieces that touch are the lines.
 
-use super::local::{Bodies, Lit};
+use super::local::{ANGLE, Bodies, Lit};
 use super::patch::{Corner, key_of};
 use super::surface::{FacePair, Standing, is_convex, standing};
 use crate::contact::exclusion::literal::Side;
@@ -81,6 +81,26 @@ impl Curve {
             }
         };
         (s, (self.point(s) - x).length())
+    }
+
+    /// Where it goes through the plane through a point with the unit normal `axis`; a line that does not, next to the point.
+    fn crossings(&self, end: DVec3, axis: DVec3, out: &mut Vec<f64>) {
+        match *self {
+            Curve::Line { origin, along } => {
+                let closing = along.dot(axis);
+                let s = (end - origin).dot(axis) / closing;
+                out.push(if closing.abs() > ANGLE { s } else { self.nearest(end).0 });
+            }
+            Curve::Circle { center, axis: own, zero, radius } => {
+                // radius (x cos s + y sin s) = z.
+                let (x, y) = (zero.dot(axis), own.cross(zero).dot(axis));
+                let (far, z) = (x.hypot(y) * radius, (end - center).dot(axis));
+                if z.abs() < far {
+                    let (middle, half) = (y.atan2(x), (z / far).acos());
+                    out.extend([middle - half, middle + half].map(|s| s.rem_euclid(TAU)));
+                }
+            }
+        }
     }
 
     /// The part of it that may lie in a box.
@@ -280,6 +300,12 @@ fn stops(bodies: &Bodies, c: &Candidate, others: &[Lit], range: (f64, f64)) -> O
         // A ruling ends at its apex.
         if let (Some(apex), Curve::Line { .. }) = (bodies.face(*lit).apex(), c.curve) {
             stops.push(c.curve.nearest(apex.point).0);
+        }
+    }
+    for lit in &c.faces {
+        let face = bodies.face(*lit);
+        for end in face.ends().into_iter().flatten() {
+            c.curve.crossings(end, face.axis().map_or(DVec3::ZERO, |a| a.direction), &mut stops);
         }
     }
     stops.sort_by(f64::total_cmp);

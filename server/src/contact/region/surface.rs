@@ -226,11 +226,17 @@ pub fn axis_of_curve(bodies: &Bodies, p: Lit, q: Lit) -> Option<(DVec3, DVec3, D
         }
         (Symmetry::Normal(_), Symmetry::None) => return axis_of_curve(bodies, q, p),
         (Symmetry::None, _) | (_, Symmetry::None) => return None,
-        (Symmetry::Axis(Axis { origin, direction }), _) => {
-            if other.slides_along(direction, 1e-6) {
-                return None;
+        (Symmetry::Axis(Axis { origin, direction }), like) => {
+            let skewer = match like {
+                Symmetry::Normal(normal) => bodies.face(p).skewer(normal),
+                Symmetry::Axis(_) | Symmetry::Center(_) | Symmetry::None => None,
+            };
+            match skewer {
+                // The axis is not what the curve goes around.
+                Some(skewer) => (skewer.origin, skewer.direction, p.0),
+                None if other.slides_along(direction, 1e-6) => return None,
+                None => (origin, direction, p.0),
             }
-            (origin, direction, p.0)
         }
         (Symmetry::Center(center), Symmetry::Normal(normal)) => (center, normal, p.0),
         (Symmetry::Center(center), Symmetry::Center(other)) => (center, (other - center).try_normalize()?, p.0),

@@ -176,6 +176,17 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
             let (center, axes) = (frame.position, Some(axes));
             Some(vec![Element { center, radius: t.major, axes, round: t.minor, pieces, off: 0.0 }])
         }
+        Shape::Capsule(c) => {
+            let ball = |z: f64| Element {
+                center: frame.point(DVec3::Z * z),
+                radius: c.radius,
+                axes: None,
+                round: 0.0,
+                pieces,
+                off: 0.0,
+            };
+            Some(vec![ball(-c.half), ball(c.half)])
+        }
         // No element is an ellipse: as many points as OpenSCAD has.
         Shape::Ellipsoid(e) => {
             let points = faceted_sphere(1.0, pieces, pieces.div_ceil(2)).0;
@@ -380,6 +391,12 @@ impl Hull<'_> {
             made.push(parts.push(leaf));
             Ok(())
         };
+        // Of two balls of one size: all within it of the way between them.
+        if let [(i, j)] = hull.edges[..]
+            && balls[i].1 == balls[j].1
+        {
+            return parts.leaf(self.name, self.at, Ok(place::capsule(balls[i].0, balls[j].0, balls[i].1))).map(Some);
+        }
         for &i in &hull.balls {
             let (center, radius) = balls[i];
             add(parts, place::sphere(&DAffine3::from_translation(center), radius))?;

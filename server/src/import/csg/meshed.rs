@@ -225,6 +225,7 @@ impl Maker<'_, '_> {
                 Ok(of_triangles(&points, &triangles))
             }
             Shape::Sphere(_)
+            | Shape::Capsule(_)
             | Shape::Cylinder(_)
             | Shape::Cone(_)
             | Shape::Cuboid(_)

@@ -11,8 +11,8 @@
 use super::Problem;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
-    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair, Shape,
-    Sphere, Torus, TriangleMesh,
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair,
+    Shape, Sphere, Torus, TriangleMesh,
 };
 use crate::solid::surface::elliptic::squared;
 use contactd_proto::Pose;
@@ -103,6 +103,15 @@ pub fn sphere(a: &DAffine3, radius: f64) -> Result<PlacedShape, Problem> {
         return Ok(ellipsoid(a, radius));
     };
     Ok(PlacedShape::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
+}
+
+/// All points within a radius of the way between two points.
+pub fn capsule(from: DVec3, to: DVec3, radius: f64) -> PlacedShape {
+    let way = to - from;
+    // Either way along it is the same; on this one the turn from z is a quarter at most, and right to the last digits.
+    let d = if way.z < 0.0 { -way } else { way }.normalize();
+    let turn = DQuat::from_xyzw(-d.y, d.x, 0.0, 1.0 + d.z).normalize();
+    PlacedShape::new(Capsule { half: 0.5 * way.length(), radius }, Pose::new(0.5 * (from + to), turn))
 }
 
 /// The image of a ball around the origin: semi-axes are the matrix' singular values, by turns in the planes of two columns until all are

@@ -13,6 +13,7 @@ use super::parts::{Part, PartId, Parts};
 use super::polygon::convex_hull;
 use super::{Place, Problem};
 use crate::math::Aabb;
+use crate::solid::primitive::{Capsule, Cylinder, Sphere};
 use crate::solid::{Op, Shape};
 use contactd_proto::Pose;
 use glam::{DVec2, DVec3};
@@ -106,6 +107,24 @@ impl Cut {
                 }
                 Part::Op(op, at, all)
             }
+            // As its parts, of which some may be told by outlines.
+            Part::Leaf(Shape::Capsule(c), frame, label) => {
+                let (Capsule { half, radius }, frame, label) = (c.clone(), *frame, label.clone());
+                let pieces = parts.pieces.get(&p).copied();
+                let mut leaf = |shape: Shape, z: f64| {
+                    let own = parts.push(Part::Leaf(
+                        shape,
+                        Pose::new(frame.point(DVec3::Z * z), frame.rotation),
+                        label.clone(),
+                    ));
+                    parts.pieces.extend(pieces.map(|n| (own, n)));
+                    own
+                };
+                let tube = leaf(Cylinder { radius, half_height: half }.into(), 0.0);
+                let ends = [half, -half].map(|z| leaf(Sphere { radius }.into(), z));
+                let all = parts.push(Part::Op(Op::Union, self.at, vec![tube, ends[0], ends[1]]));
+                return self.part(parts, all, like);
+            }
             Part::Leaf(shape, frame, _) => {
                 let (shape, frame) = (shape.clone(), *frame);
                 let pieces = parts.pieces.get(&p).copied().unwrap_or(super::convex::PIECES);
@@ -147,7 +166,11 @@ impl Cut {
                 if corners.len() > FEW { None } else { Some(self.polygon(&corners)) }
             }
             Shape::HalfSpace(_) => Some(self.half_plane(frame)),
-            Shape::TriangleMesh(_) | Shape::Torus(_) | Shape::Ellipsoid(_) | Shape::EllipticFrustum(_) => None,
+            Shape::TriangleMesh(_)
+            | Shape::Torus(_)
+            | Shape::Ellipsoid(_)
+            | Shape::EllipticFrustum(_)
+            | Shape::Capsule(_) => None,
         }
     }
 

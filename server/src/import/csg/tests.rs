@@ -168,6 +168,7 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::Torus(_) => "torus",
         Shape::TriangleMesh(_) => "mesh",
         Shape::Ellipsoid(_) => "ellipsoid",
+        Shape::Capsule(_) => "capsule",
         Shape::EllipticFrustum(_) => "elliptic frustum",
     }
 }

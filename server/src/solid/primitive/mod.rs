@@ -10,6 +10,7 @@ use crate::solid::{Face, Label, Sense};
 use contactd_proto::Pose;
 use glam::DVec3;
 
+mod capsule;
 mod cone;
 mod convex;
 mod cuboid;
@@ -22,6 +23,7 @@ mod sphere;
 mod torus;
 mod triangle_mesh;
 
+pub use capsule::Capsule;
 pub use cone::Cone;
 pub use convex::{Convex, Discs, Features, Hold, Shown, Slope};
 pub use cuboid::Cuboid;
@@ -180,6 +182,7 @@ shapes!(
     TriangleMesh = 7,
     Ellipsoid = 8,
     EllipticFrustum = 9,
+    Capsule = 10,
 );
 
 /// A primitive placed in a model.

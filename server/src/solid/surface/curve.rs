@@ -1,8 +1,9 @@
 //! Straight and circular curves of two faces: those that they have in common, and those along which they touch.
 
-use super::{Axis, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Symmetry, Torus};
+use super::{Axis, Capsule, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Surface as _, Symmetry, Torus};
 use crate::math::any_perpendicular;
 use glam::{DVec2, DVec3};
+use std::f64::consts::FRAC_PI_8;
 
 /// A straight or circular curve, in the frame of the faces that make it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,6 +90,14 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
             rulings(&image, &plane, PARALLEL).into_iter().flatten().for_each(found);
         }
         (Face::Plane(_), Face::Elliptic(_)) => common(q, p, size, least, found),
+        // Beside its segment it is a cylinder, at its ends a ball: what these have in common with another face, as far as it lies there.
+        (Face::Capsule(capsule), _) => {
+            for own in parts_of(&capsule) {
+                let curves = all_common(&own, q, size, least);
+                curves.into_iter().filter(|curve| lies_on(&capsule, curve, PARALLEL * size)).for_each(&mut *found);
+            }
+        }
+        (_, Face::Capsule(_)) => common(q, p, size, least, found),
         // Other curves of elliptic faces are no lines, and circles by chance alone.
         (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => {}
         (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
@@ -133,7 +142,7 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut
             }
         }
         // Of these `common` knows more.
-        Face::Elliptic(_) | Face::Torus(_) => {}
+        Face::Elliptic(_) | Face::Torus(_) | Face::Capsule(_) => {}
     }
 }
 
@@ -166,6 +175,36 @@ fn rulings(image: &Elliptic, plane: &Plane, parallel: f64) -> [Option<Curve>; 2]
     [beside, -beside].map(|w| Some(Curve::Line { origin: image.origin + back(m * h + w), along: axis }))
 }
 
+/// All that `common` finds.
+fn all_common(p: &Face, q: &Face, size: f64, least: f64) -> Vec<Curve> {
+    let mut all = Vec::new();
+    common(p, q, size, least, &mut |curve| all.push(curve));
+    all
+}
+
+/// The cylinder and the balls that a capsule is of.
+fn parts_of(capsule: &Capsule) -> [Face; 3] {
+    let Capsule { origin, axis, half, radius } = *capsule;
+    let ball = |end: f64| Face::from(Sphere { center: origin + axis * end, radius });
+    [Cylinder { origin, axis, radius }.into(), ball(half), ball(-half)]
+}
+
+/// True where part of a curve lies on a capsule, to within a length.
+fn lies_on(capsule: &Capsule, curve: &Curve, within: f64) -> bool {
+    let on = |x: DVec3| capsule.value(x).abs() <= within;
+    match *curve {
+        Curve::Line { origin, along } => on(origin + along * (capsule.origin - origin).dot(along)),
+        Curve::Circle { center, axis, radius } => {
+            let u = any_perpendicular(axis);
+            let v = axis.cross(u);
+            (0..16).any(|k| {
+                let (sin, cos) = libm::sincos(f64::from(k) * FRAC_PI_8);
+                on(center + (u * cos + v * sin) * radius)
+            })
+        }
+    }
+}
+
 /// True where a face is symmetric about the axis of a torus, by sines up to the first and offsets up to the second.
 fn is_about(torus: &Torus, face: &Face, [sine, offset]: [f64; 2]) -> bool {
     let parallel = |d: DVec3| d.cross(torus.axis).length() <= sine;
@@ -192,7 +231,12 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         // Of the line through a cone's apex a half belongs to its other nappe; a tube may go beyond the axis.
         let is_on = match other {
             Face::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
-            Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Torus(_) | Face::Elliptic(_) => true,
+            Face::Plane(_)
+            | Face::Sphere(_)
+            | Face::Cylinder(_)
+            | Face::Torus(_)
+            | Face::Elliptic(_)
+            | Face::Capsule(_) => true,
         };
         if is_on && p.x > 0.0 {
             circle(x, axis, p.x * p.x);
@@ -220,8 +264,8 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         }
         Face::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
         Face::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
-        // About no axis.
-        Face::Elliptic(_) => return,
+        // About no axis, and of several pieces.
+        Face::Elliptic(_) | Face::Capsule(_) => return,
     };
     let way = center - tube;
     let d = way.length();
@@ -322,6 +366,12 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             }
             let (origin, along, lean) = image.ruling(-out_of_q(image.origin))?;
             parallel(lean).then_some(Curve::Line { origin, along })
+        }
+        (Face::Capsule(Capsule { origin, axis, radius, .. }), _) => {
+            tangent(Outward { face: &Cylinder { origin, axis, radius }.into(), ..p }, q, out_of_q, within)
+        }
+        (_, Face::Capsule(Capsule { origin, axis, radius, .. })) => {
+            tangent(p, Outward { face: &Cylinder { origin, axis, radius }.into(), ..q }, out_of_q, within)
         }
         // Touching others, they do so at points, or along no line or circle that is looked for.
         (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => None,

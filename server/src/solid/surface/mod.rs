@@ -8,6 +8,7 @@
 //! | cylinder | ρ − r, ρ the distance from the axis |
 //! | cone | ρ cos α − z sin α, z along the axis from the apex into the cone, α the half angle |
 //! | torus | hypot(ρ − R, z) − r, R the radius of its circle, r that of the tube |
+//! | capsule | \|x − q\| − r, q the point of a segment next to x |
 //! | elliptic: the image of a sphere, cylinder or cone | \|B(x − o)\| − w·(x − o) − r |
 //!
 //! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
@@ -22,6 +23,7 @@
 //! distance from the axis, so `ON_AXIS` is rounding and no more.
 
 mod bend;
+mod capsule;
 mod cone;
 pub mod curve;
 mod cylinder;
@@ -34,6 +36,7 @@ mod tests;
 mod torus;
 
 pub use bend::{Bend, Law};
+pub use capsule::Capsule;
 pub use cone::{Apex, Cone};
 pub use curve::Curve;
 pub use cylinder::Cylinder;
@@ -224,6 +227,12 @@ pub trait Surface: Copy {
         }
     }
 
+    /// A simpler face whose psi is the same within `reach` (a length) of `center`, where there is one.
+    #[inline]
+    fn near(&self, _center: DVec3, _reach: f64) -> Option<Face> {
+        None
+    }
+
     /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
     fn span(&self, center: DVec3, half: DVec3) -> (f64, f64);
 
@@ -267,16 +276,28 @@ pub trait Surface: Copy {
         None
     }
 
+    /// The same of the face around the point `x` alone.
+    #[inline]
+    fn straight_at(&self, _x: DVec3) -> Option<DVec3> {
+        self.developable()
+    }
+
     /// The apex of a cone: the point at which every direction around is a normal.
     #[inline]
     fn apex(&self) -> Option<Apex> {
         None
     }
 
-    /// A line through the inside of every closed curve that planes with this unit normal cut, where no symmetry tells one.
+    /// A line through the inside of every closed curve that planes with this unit normal cut, where the axis is none.
     #[inline]
     fn skewer(&self, _normal: DVec3) -> Option<Axis> {
         None
+    }
+
+    /// Between which points of its axis it is straight, where that ends.
+    #[inline]
+    fn ends(&self) -> [Option<DVec3>; 2] {
+        [None; 2]
     }
 
     /// True where the face is the same when it is moved along the unit vector `d`, to within `tolerance` (a sine).
@@ -375,6 +396,7 @@ faces! {$
     Cone = 3: "Infinite single-napped cone.",
     Torus = 4: "All points within a radius of a circle.",
     Elliptic = 5: "The affine image of a sphere, a cylinder or a cone.",
+    Capsule = 6: "All points within a radius of a segment.",
 }
 
 impl Face {
@@ -436,6 +458,12 @@ impl Face {
     #[inline]
     pub fn turn(&self, x: DVec3, at: &FaceAt, reach: f64) -> f64 {
         each!(self, f => f.turn(x, at, reach))
+    }
+
+    /// See [`Surface::near`].
+    #[inline]
+    pub fn near(&self, center: DVec3, reach: f64) -> Option<Self> {
+        each!(self, f => f.near(center, reach))
     }
 
     /// Bounds (lower, upper) of psi over the box center ± half, up to rounding.
@@ -506,6 +534,12 @@ impl Face {
         each!(self, f => f.developable())
     }
 
+    /// See [`Surface::straight_at`].
+    #[inline]
+    pub fn straight_at(&self, x: DVec3) -> Option<DVec3> {
+        each!(self, f => f.straight_at(x))
+    }
+
     /// See [`Surface::apex`].
     #[inline]
     pub fn apex(&self) -> Option<Apex> {
@@ -515,6 +549,11 @@ impl Face {
     /// See [`Surface::skewer`].
     pub fn skewer(&self, normal: DVec3) -> Option<Axis> {
         each!(self, f => f.skewer(normal))
+    }
+
+    /// See [`Surface::ends`].
+    pub fn ends(&self) -> [Option<DVec3>; 2] {
+        each!(self, f => f.ends())
     }
 
     /// See [`Surface::slides_along`].

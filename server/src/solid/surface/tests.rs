@@ -5,7 +5,7 @@ use crate::math::random::Random;
 use glam::DQuat;
 
 /// One face of each kind, somewhere.
-fn faces(r: &mut Random) -> [Face; 10] {
+fn faces(r: &mut Random) -> [Face; 11] {
     let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
     let radius = r.within(0.2, 2.0);
     let (sin, cos) = r.within(0.1, 1.2).sin_cos();
@@ -17,6 +17,7 @@ fn faces(r: &mut Random) -> [Face; 10] {
         Torus { origin: o, axis: n, major: r.within(1.0, 2.0), minor: r.within(0.1, 1.0) }.into(),
         // One without a hole.
         Torus { origin: o, axis: n, major: r.within(0.1, 0.5), minor: r.within(0.5, 1.0) }.into(),
+        Capsule { origin: o, axis: n, half: r.within(0.1, 1.0), radius }.into(),
         ellipsoid(r).into(),
         Elliptic::cylinder(r.vector(1.0), [r.vector(1.0), r.vector(1.0)]).into(),
         // One that leans over its ellipse, and an upright one.
@@ -101,7 +102,7 @@ fn a_moved_face_has_its_values_moved_and_its_own_symmetry_changes_none() {
 
 #[test]
 fn capabilities_agree_with_psi() {
-    let mut r = Random(11);
+    let (mut r, mut parts) = (Random(11), 0);
     for _ in 0..300 {
         for face in faces(&mut r) {
             for _ in 0..10 {
@@ -122,7 +123,13 @@ fn capabilities_agree_with_psi() {
                     let inside = rho >= 0.0 && u.length_squared() <= rho * rho;
                     assert!((v + inset).abs() < 1e-9 || inside == (v <= -inset), "{face:?} {x}");
                 }
-                if let Some(axis) = face.developable() {
+                let reach = r.within(0.0, 0.5);
+                if let Some(part) = face.near(x, reach) {
+                    let y = x + r.vector(1.0).normalize() * reach;
+                    assert!((part.value(y) - face.value(y)).abs() < 1e-14, "{face:?} {x} {y}");
+                    parts += 1;
+                }
+                if let Some(axis) = face.straight_at(x) {
                     // Straight along the tangent that the axis lies over.
                     let along = at.normal.cross(axis.cross(at.normal)).normalize();
                     assert!((face.curvature(x, &at).matrix() * along).length() < 1e-9, "{face:?}");
@@ -144,6 +151,7 @@ fn capabilities_agree_with_psi() {
         let [p, s, ..] = faces(&mut r);
         assert_eq!((p.above(&s, DVec3::ZERO, 1.0), p.deviation(&s, 1.0)), (None, None));
     }
+    assert!(parts > 1000, "{parts}");
 }
 
 /// What `Under` promises, at a point `y` off the centre.

@@ -49,7 +49,7 @@ impl Features {
                 let drop = bottom - top;
                 if drop == 0.0 { 0.0 } else { drop / (drop * drop + 4.0 * half * half).sqrt() }
             }
-            Convex::Ball(_) | Convex::Cuboid(_) => 0.0,
+            Convex::Ball(_) | Convex::Cuboid(_) | Convex::Capsule { .. } => 0.0,
             Convex::Corners(_) | Convex::Other => return None,
         };
         Some(Self { shape: shape.of_few()?, lean })
@@ -76,6 +76,7 @@ impl Features {
                 let flat = l.x * l.x + l.y * l.y <= tol * tol && radius > 0.0;
                 (u8::from(!flat && (l.z - self.lean).abs() <= tol) << 2, flat)
             }
+            Convex::Capsule { .. } => (u8::from(l.z.abs() <= tol) << 2, false),
             Convex::Ball(_) | Convex::Corners(_) | Convex::Other => (0, false),
         }
     }
@@ -94,6 +95,11 @@ impl Features {
             Convex::Ball(r) => {
                 shown.ends = [m * r; 2];
                 shown.round = r;
+            }
+            Convex::Capsule { half, radius } => {
+                let end = axes.z_axis * half.copysign(axes.z_axis.dot(m));
+                shown.ends = [end + m * radius, if held == 0 { DVec3::ZERO } else { m * radius - end }];
+                shown.round = radius;
             }
             Convex::Cuboid(half) => {
                 let corner = half.copysign(axes.transpose() * m);
@@ -122,7 +128,7 @@ impl Features {
     pub fn holds(&self, axes: &DMat3, m: DVec3, shown: &Shown, mut hold: impl FnMut(Hold)) {
         let l = axes.transpose() * m;
         match self.shape {
-            Convex::Ball(_) => hold(Hold::Face(0, 1.0)),
+            Convex::Ball(_) | Convex::Capsule { .. } => hold(Hold::Face(0, 1.0)),
             Convex::Cuboid(_) => {
                 for k in (0..3).filter(|k| shown.held >> k & 1 == 0) {
                     hold(Hold::Face(2 * k as u32 + u32::from(l[k] < 0.0), l[k].abs()));

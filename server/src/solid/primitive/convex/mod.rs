@@ -29,6 +29,13 @@ pub enum Convex<'a> {
         /// Half the height.
         half: f64,
     },
+    /// All points within a radius of a segment along z.
+    Capsule {
+        /// Half the length of the segment.
+        half: f64,
+        /// Radius.
+        radius: f64,
+    },
     /// The corners.
     Corners(&'a [DVec3]),
     /// None of these: without bounds, or of a kind that those who compute with forms do not know. They leave it to the search.
@@ -46,7 +53,7 @@ pub struct Slope {
     pub face: u32,
 }
 
-/// Discs about one axis whose hull a shape is: centres and radii, corners with radius 0.
+/// Discs about one axis, or balls, whose hull a shape is: centres and radii, corners with radius 0.
 pub type Discs = SmallVec<[(DVec3, f64); 8]>;
 
 impl Convex<'_> {
@@ -54,7 +61,9 @@ impl Convex<'_> {
     pub fn middle(&self) -> DVec3 {
         match self {
             Convex::Corners(corners) => middle(corners),
-            Convex::Ball(_) | Convex::Cuboid(_) | Convex::Round { .. } | Convex::Other => DVec3::ZERO,
+            Convex::Ball(_) | Convex::Cuboid(_) | Convex::Round { .. } | Convex::Capsule { .. } | Convex::Other => {
+                DVec3::ZERO
+            }
         }
     }
 
@@ -64,12 +73,14 @@ impl Convex<'_> {
             Convex::Ball(radius) => Some(Convex::Ball(radius)),
             Convex::Cuboid(half) => Some(Convex::Cuboid(half)),
             Convex::Round { bottom, top, half } => Some(Convex::Round { bottom, top, half }),
+            Convex::Capsule { half, radius } => Some(Convex::Capsule { half, radius }),
             Convex::Other => Some(Convex::Other),
             Convex::Corners(_) => None,
         }
     }
 
-    /// Largest m·x over the shape, in its own frame; m is a unit vector, or two of them. Of any length but for a ball.
+    /// Largest m·x over the shape, in its own frame; m is a unit vector, or two of them. Of any length but for what
+    /// has a margin.
     #[inline]
     pub fn extent<T: Lanes>(&self, m: [T; 3]) -> T {
         match self {
@@ -82,6 +93,7 @@ impl Convex<'_> {
             Convex::Corners(corners) => {
                 corners.iter().fold(T::all(f64::NEG_INFINITY), |far, v| far.max(m[0] * v.x + m[1] * v.y + m[2] * v.z))
             }
+            Convex::Capsule { half, radius } => m[2].abs() * *half + T::all(*radius),
             Convex::Other => T::all(f64::INFINITY),
         }
     }
@@ -95,6 +107,18 @@ impl Convex<'_> {
         self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)])
     }
 
+    /// The same along n of any length.
+    #[inline]
+    pub fn reach_along(&self, axes: &DMat3, n: DVec3) -> f64 {
+        match self {
+            Convex::Ball(radius) => radius * n.length(),
+            Convex::Capsule { half, radius } => axes.z_axis.dot(n).abs() * half + radius * n.length(),
+            Convex::Cuboid(_) | Convex::Round { .. } | Convex::Corners(_) | Convex::Other => {
+                self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)])
+            }
+        }
+    }
+
     /// False for what those who compute with forms leave to the search.
     pub fn is_known(&self) -> bool {
         !matches!(self, Convex::Other)
@@ -105,8 +129,15 @@ impl Convex<'_> {
         if let Convex::Ball(radius) = self { Some(*radius) } else { None }
     }
 
-    /// The farthest point along n, which may have any length, where it stands with these axes about `origin`. Of a ball, whose core is
-    /// a point, that is the origin.
+    /// What it is thicker than its core: the radius of a ball, whose core is a point, and of a capsule, whose core is a segment; else 0.
+    pub fn margin(&self) -> f64 {
+        match self {
+            Convex::Ball(radius) | Convex::Capsule { radius, .. } => *radius,
+            Convex::Cuboid(_) | Convex::Round { .. } | Convex::Corners(_) | Convex::Other => 0.0,
+        }
+    }
+
+    /// The farthest point of the core along n, which may have any length, where it stands with these axes about `origin`.
     #[inline]
     pub fn support(&self, axes: &DMat3, origin: DVec3, n: DVec3) -> DVec3 {
         let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
@@ -120,6 +151,7 @@ impl Convex<'_> {
         let local = match *self {
             Convex::Ball(_) | Convex::Other => return origin,
             Convex::Round { bottom, top, half } => round(bottom, top, half),
+            Convex::Capsule { half, .. } => DVec3::Z * half.copysign(m.z),
             Convex::Cuboid(half) => DVec3::new(half.x.copysign(m.x), half.y.copysign(m.y), half.z.copysign(m.z)),
             Convex::Corners(corners) => {
                 let mut best = (f64::NEG_INFINITY, corners[0]);
@@ -188,6 +220,12 @@ impl Convex<'_> {
                     reported(bottom, -axes.z_axis, 1 + usize::from(at_top > 0.0))
                 }
             }
+            Convex::Capsule { half, radius } => {
+                let core = axes.z_axis * axes.z_axis.dot(from).clamp(-half, half);
+                let out = from - core;
+                let length = out.length();
+                reported(length - radius, if length > 0.0 { out / length } else { axes.x_axis }, 0)
+            }
             Convex::Corners(_) | Convex::Other => return None,
         })
     }
@@ -208,7 +246,7 @@ impl Convex<'_> {
                     _ => 1,
                 }
             }
-            Convex::Ball(_) | Convex::Round { .. } | Convex::Other => 0,
+            Convex::Ball(_) | Convex::Round { .. } | Convex::Capsule { .. } | Convex::Other => 0,
         }
     }
 
@@ -218,16 +256,21 @@ impl Convex<'_> {
         match self {
             Convex::Cuboid(_) => [x, y, z],
             Convex::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
+            Convex::Capsule { .. } => [(way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO, DVec3::ZERO],
             Convex::Ball(_) | Convex::Corners(_) | Convex::Other => [DVec3::ZERO; 3],
         }
     }
 
-    /// The discs about z whose hull it is, in its own frame; `None` for what is not known. Of a cuboid and of corners these are points.
+    /// The discs about z whose hull it is, in its own frame, or the balls; `None` for what is not known. Of a cuboid and of corners these
+    /// are points.
     pub fn discs(&self) -> Option<Discs> {
         Some(match self {
             Convex::Ball(radius) => SmallVec::from_slice(&[(DVec3::ZERO, *radius)]),
             Convex::Round { bottom, top, half } => {
                 SmallVec::from_slice(&[(DVec3::Z * -half, *bottom), (DVec3::Z * *half, *top)])
+            }
+            Convex::Capsule { half, radius } => {
+                SmallVec::from_slice(&[(DVec3::Z * -*half, *radius), (DVec3::Z * *half, *radius)])
             }
             Convex::Cuboid(half) => {
                 let corner = |k: usize| {
