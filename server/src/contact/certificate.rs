@@ -436,6 +436,10 @@ fn falsify(
     classify: &mut dyn FnMut(LiteralId) -> Truth,
 ) -> Truth {
     let (kind, body) = match local::first(tokens).0 {
+        Expression::Part(id) => {
+            out.push(local::part_token(id));
+            return Truth::Open;
+        }
         Expression::Literal(id) => {
             let truth = classify(id);
             match truth {
@@ -509,6 +513,7 @@ impl<'a> Closing<'a> {
         for item in items(tokens) {
             match local::first(item).0 {
                 Expression::Literal(id) => self.literals.push((side, id)),
+                Expression::Part(_) => {}
                 Expression::And(body) => self.take(side, body),
                 Expression::Or(body) => self.ors.push((side, body)),
             }

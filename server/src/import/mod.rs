@@ -136,7 +136,7 @@ impl Default for Limits {
             depth: 1_000,
             faces: 1_000_000,
             polyhedron_faces: 5_000,
-            mesh_facets: 200_000,
+            mesh_facets: 2_000_000,
             values: 1_000_000,
         }
     }

@@ -290,7 +290,7 @@ impl<'a> Search<'a> {
         let hints: &[Hint] = if self.contacts.task.strategies.hints { &self.contacts.hints } else { &[] };
         let view = self.contacts.task.view((cell.center, cell.half), at, span.motion, &scratch.clip_planes_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
-        let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
+        let b_truth = prune_in_pool(self.contacts.task.b, pool, source, &mut |id| view.truth(Side::B, id));
         let b = match b_truth {
             (Truth::Open, range) => {
                 cell.b = range;
@@ -501,7 +501,7 @@ impl<'a> Search<'a> {
                     let span = local::face_span(&faces[id.face() as usize], child.center, child.half);
                     local::truth_of(id.sense(), span, delta, rounding)
                 };
-                match prune_in_pool(&mut self.items.scratch.pool, cell.a, &mut classify) {
+                match prune_in_pool(self.contacts.task.a, &mut self.items.scratch.pool, cell.a, &mut classify) {
                     (Truth::False, _) => continue,
                     (Truth::True, _) => child.a = (0, 0),
                     (Truth::Open, range) => child.a = range,

@@ -79,7 +79,7 @@ pub fn import(
     };
     let polygons =
         read.map_err(|(at, problem)| (call.at, Problem::Named { file: name, at, problem: problem.into() }))?;
-    let clockwise: Vec<Vec<u32>> = polygons.faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
+    let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
     shapes.of_faces(call, outer, hull, (polygons.points, clockwise))
 }
 

@@ -176,7 +176,7 @@ pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Place
     let points: Vec<DVec3> = points.iter().map(|p| a.transform_point3(*p)).collect();
     let mirrored = a.matrix3.determinant() < 0.0;
     let turned = |f: &Vec<u32>| if mirrored { f.clone() } else { f.iter().rev().copied().collect() };
-    let (shape, repair) = TriangleMesh::of_polygons(&points, &faces.iter().map(turned).collect::<Vec<_>>())?;
+    let (shape, repair) = TriangleMesh::of_polygons(&points, faces.iter().map(turned).collect::<Vec<_>>().iter().map(Vec::as_slice))?;
     Ok((PlacedShape::new(shape, Pose::IDENTITY), repair))
 }
 

@@ -22,23 +22,32 @@ pub type Result<T> = std::result::Result<T, (Place, Problem)>;
 pub struct Polygons {
     /// The points.
     pub points: Vec<DVec3>,
-    /// The faces.
-    pub faces: Vec<Vec<u32>>,
+    /// The faces, one after another.
+    corners: Vec<u32>,
+    /// Where each of them ends.
+    ends: Vec<u32>,
 }
 
 impl Polygons {
     /// Triangles that its faces are cut into.
     pub fn triangles(&self) -> usize {
-        self.faces.iter().map(|f| f.len().saturating_sub(2)).sum()
+        self.faces().map(|f| f.len().saturating_sub(2)).sum()
+    }
+
+    /// The faces.
+    pub fn faces(&self) -> impl Iterator<Item = &[u32]> {
+        let from = std::iter::once(0).chain(self.ends.iter().copied());
+        from.zip(&self.ends).map(|(from, to)| &self.corners[from as usize..*to as usize])
     }
 
     /// Adds a face, within the limit of triangles.
-    fn push(&mut self, face: Vec<u32>, at: Place, count: &mut usize, limits: &Limits) -> Result<()> {
+    fn push(&mut self, face: &[u32], at: Place, count: &mut usize, limits: &Limits) -> Result<()> {
         *count += face.len().saturating_sub(2);
         if *count > limits.mesh_facets {
             return Err((at, Problem::Limit { what: "triangles of a mesh", limit: limits.mesh_facets }));
         }
-        self.faces.push(face);
+        self.corners.extend_from_slice(face);
+        self.ends.push(self.corners.len() as u32);
         Ok(())
     }
 }
@@ -75,9 +84,9 @@ fn import(
 
 /// The solid within a mesh, and what was repaired.
 fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec<(String, Option<f64>)>), MeshFault> {
-    let Polygons { points, faces } = polygons;
-    if faces.len() <= limits.polyhedron_faces {
-        let clockwise: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
+    let points = &polygons.points;
+    if polygons.ends.len() <= limits.polyhedron_faces {
+        let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
         if let Ok((polyhedron, fit)) = Polyhedron::from_faces(points, &clockwise)
             && fit.moved == 0.0
         {
@@ -85,7 +94,7 @@ fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Ve
             return Ok((polyhedron.into(), flipped.into_iter().collect()));
         }
     }
-    let (mesh, repair) = TriangleMesh::of_polygons(points, faces)?;
+    let (mesh, repair) = TriangleMesh::of_polygons(points, polygons.faces())?;
     Ok((mesh.into(), repair.notes("a mesh")))
 }
 

@@ -1,7 +1,8 @@
 //! The planes of a mesh's facets: neighbours in one plane are one face.
 
+use super::mix::Mixed;
 use glam::DVec3;
-use std::collections::HashMap;
+use rayon::prelude::*;
 
 /// The plane of no face: facets too thin to have one.
 pub const NONE: u32 = u32::MAX;
@@ -42,28 +43,35 @@ fn plane_of(n: DVec3, corners: [DVec3; 3]) -> (DVec3, f64) {
     (n, if low == high { low } else { 0.5 * (low + high) })
 }
 
-/// The planes of the faces, and for each triangle its face or `NONE`.
+/// The planes of the faces, and for each triangle its face or `NONE`; `opposite` are the neighbours of each along its sides.
 ///
 /// The largest triangles gather first; a neighbour is of the same face where all its corners lie within `tolerance` (a length) of
 /// that plane and it faces the same way. Faces with the same plane to the bit are one, whether they touch or not.
-pub fn of(vertices: &[DVec3], triangles: &[[u32; 3]], tolerance: f64) -> (Vec<(DVec3, f64)>, Vec<u32>) {
+pub fn of(
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    opposite: &[[u32; 3]],
+    tolerance: f64,
+) -> (Vec<(DVec3, f64)>, Vec<u32>) {
     let corners = |t: &[u32; 3]| t.map(|v| vertices[v as usize]);
-    let areas: Vec<DVec3> = triangles.iter().map(&corners).map(|[p, q, r]| area(p, q, r)).collect();
-    let mut at: HashMap<(u32, u32), u32> = HashMap::with_capacity(3 * triangles.len());
-    for (i, t) in triangles.iter().enumerate() {
-        (0..3).for_each(|k| _ = at.insert((t[k], t[(k + 1) % 3]), i as u32));
-    }
+    let areas: Vec<DVec3> = triangles.par_iter().map(&corners).map(|[p, q, r]| area(p, q, r)).collect();
     let thin = |i: usize| {
         let [p, q, r] = corners(&triangles[i]);
         let longest = p.distance(q).max(q.distance(r)).max(r.distance(p));
         areas[i].length() <= tolerance * longest
     };
-    let mut order: Vec<usize> = (0..triangles.len()).filter(|i| !thin(*i)).collect();
-    order.sort_by(|a, b| areas[*b].length_squared().total_cmp(&areas[*a].length_squared()).then(a.cmp(b)));
+    let mut order: Vec<(f64, u32)> = (0..triangles.len() as u32)
+        .into_par_iter()
+        .filter(|i| !thin(*i as usize))
+        .map(|i| (areas[i as usize].length_squared(), i))
+        .collect();
+    order.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let mut group = vec![NONE; triangles.len()];
     let mut planes: Vec<(DVec3, f64)> = Vec::new();
-    let mut same: HashMap<[u64; 4], u32> = HashMap::new();
-    for seed in order {
+    let mut same: Mixed<[u64; 4], u32> = Mixed::with_capacity_and_hasher(order.len(), Default::default());
+    let mut next = Vec::new();
+    for (_, seed) in order {
+        let seed = seed as usize;
         if group[seed] != NONE {
             continue;
         }
@@ -74,16 +82,17 @@ pub fn of(vertices: &[DVec3], triangles: &[[u32; 3]], tolerance: f64) -> (Vec<(D
             planes.len() as u32 - 1
         });
         group[seed] = id;
-        let mut next = vec![seed];
+        next.push(seed);
         while let Some(i) = next.pop() {
-            let t = triangles[i];
-            for k in 0..3 {
-                let Some(&j) = at.get(&(t[(k + 1) % 3], t[k])) else { continue };
+            for j in opposite[i] {
+                if j == NONE || group[j as usize] != NONE {
+                    continue;
+                }
                 let j = j as usize;
                 let fits = || {
                     areas[j].dot(n) > 0.0 && corners(&triangles[j]).iter().all(|c| (n.dot(*c) - d).abs() <= tolerance)
                 };
-                if group[j] == NONE && !thin(j) && fits() {
+                if !thin(j) && fits() {
                     group[j] = id;
                     next.push(j);
                 }
