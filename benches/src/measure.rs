@@ -10,7 +10,7 @@ use crate::table::Cell;
 use crate::workload::{Case, Class, Truth};
 use contactd::contact::exclusion::rounding;
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
+    DEFAULT_CELL_LIMIT, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, earliest_contact,
 };
 use contactd::motion::{Placed, Relative};
 use contactd_tests::engine::ReportedPoint as _;
@@ -63,8 +63,8 @@ pub fn placed(case: &Case) -> [Placed; 2] {
 pub fn ask(case: &Case, setting: &Setting, scratch: &mut Scratch) -> Outcome {
     let [a, b] = placed(case);
     let query = PairQuery {
-        a: Body { model: &case.a, placed: a },
-        b: Body { model: &case.b, placed: b },
+        a: PlacedModel { model: &case.a, placed: a },
+        b: PlacedModel { model: &case.b, placed: b },
         resolution: setting.resolution * case.size(),
         cell_limit: setting.limit,
         strategies: setting.strategies,

@@ -1,7 +1,7 @@
 //! The engine's side of a race: models built beforehand, one scratch for all queries.
 
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Outcome, PairQuery, QueryOptions, Scratch, Strategies, default_resolution,
+    DEFAULT_CELL_LIMIT, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Strategies, default_resolution,
     earliest_contact,
 };
 use contactd::motion::Placed;
@@ -17,8 +17,8 @@ impl<'a> Question<'a> {
     pub fn new((a, motion_a): (&'a Model, Motion), (b, motion_b): (&'a Model, Motion), strategies: Strategies) -> Self {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         Self(PairQuery {
-            a: Body { model: a, placed: placed(motion_a) },
-            b: Body { model: b, placed: placed(motion_b) },
+            a: PlacedModel { model: a, placed: placed(motion_a) },
+            b: PlacedModel { model: b, placed: placed(motion_b) },
             resolution: default_resolution(a, b),
             cell_limit: DEFAULT_CELL_LIMIT,
             strategies,

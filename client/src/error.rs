@@ -1,5 +1,6 @@
 //! What can go wrong, each with one sentence.
 
+use crate::solid::BuildError;
 use contactd_proto::ErrorCode;
 use contactd_proto::names::AddressError;
 use std::fmt;
@@ -35,6 +36,8 @@ pub enum Error {
         /// Newest version that the server speaks.
         max: u32,
     },
+    /// A solid that was built makes no sense.
+    Build(BuildError),
     /// Calls came in an order that makes no sense.
     Misuse(&'static str),
     /// The system or the shared memory layer failed.
@@ -81,6 +84,7 @@ impl fmt::Display for Error {
                 "the server speaks protocol versions {min} to {max}, this client version {}",
                 contactd_proto::names::PROTOCOL_VERSION
             ),
+            Self::Build(e) => write!(f, "{e}"),
             Self::Misuse(what) => f.write_str(what),
             Self::System(what) => f.write_str(what),
         }
@@ -88,6 +92,12 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+impl From<BuildError> for Error {
+    fn from(e: BuildError) -> Self {
+        Self::Build(e)
+    }
+}
 
 impl From<AddressError> for Error {
     fn from(e: AddressError) -> Self {

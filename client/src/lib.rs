@@ -17,6 +17,7 @@ mod object;
 mod reply;
 pub mod session;
 pub mod shm;
+pub mod solid;
 pub mod transport;
 
 pub use contactd_proto as proto;
@@ -26,4 +27,5 @@ pub use object::{ModelInfo, Object};
 pub use reply::Reply;
 pub use session::{Session, StepOptions};
 pub use shm::SharedMemory;
+pub use solid::Solid;
 pub use transport::Transport;

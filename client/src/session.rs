@@ -9,6 +9,7 @@ mod step;
 pub use options::StepOptions;
 
 use crate::journal::Journal;
+use crate::solid::ModelText;
 use crate::transport::{Opened, Transport};
 use crate::{Error, ModelInfo, Object, SharedMemory};
 use contactd_proto::control::{Answer, Command, Facets, ModelFile, WireRule};
@@ -87,20 +88,27 @@ impl<T: Transport> Session<T> {
         self.opened
     }
 
-    /// Loads a model from OpenSCAD CSG text; `name` stands in error sentences.
+    /// Loads a model from OpenSCAD CSG text or from a solid that was built ([`crate::solid`]); `name` stands in error sentences.
     ///
     /// # Errors
-    /// `Refused` with line and column of what is not supported; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
-    pub fn load_model(&mut self, name: &str, text: &str) -> Result<ModelInfo, Error> {
-        self.load_model_with(name, text, Facets::Auto)
+    /// `Refused` with line and column of what is not supported; `Build` for a solid that makes no sense; `ServerLost`, `ReplyLost`,
+    /// `Timeout`, `System`.
+    pub fn load_model(&mut self, name: &str, model: &(impl ModelText + ?Sized)) -> Result<ModelInfo, Error> {
+        self.load_model_with(name, model, Facets::Auto)
     }
 
     /// The same, saying how curved primitives are taken.
     ///
     /// # Errors
     /// As `load_model`.
-    pub fn load_model_with(&mut self, name: &str, text: &str, facets: Facets) -> Result<ModelInfo, Error> {
-        self.load_model_file(ModelFile { name: name.into(), format: "csg".into(), bytes: text.into() }, facets)
+    pub fn load_model_with(
+        &mut self,
+        name: &str,
+        model: &(impl ModelText + ?Sized),
+        facets: Facets,
+    ) -> Result<ModelInfo, Error> {
+        let bytes = model.model_text()?.into_owned().into_bytes();
+        self.load_model_file(ModelFile { name: name.into(), format: "csg".into(), bytes }, facets)
     }
 
     /// Loads a model from a file's bytes, in any format that the server reads.

@@ -3,7 +3,7 @@
 //! Object ids are the objects' indices in the file. Every pair that the rules allow is told, clear ones too, in the order
 //! (time, a, b); with `first` only those whose bracket meets the earliest contact's.
 
-use crate::contact::{self, Body, Clock, PairQuery, Scratch, Strategies, certificate};
+use crate::contact::{self, Clock, PairQuery, PlacedModel, Scratch, Strategies, certificate};
 use crate::import::{Place, Scene};
 use crate::motion::Placed;
 use crate::octree::Model;
@@ -154,7 +154,7 @@ impl Check {
             let body = self.world.body(id)?;
             let discrete = p.plan.detect == Detect::Discrete;
             let motion = if discrete { Motion::resting(body.motion_state.end) } else { body.motion_state.motion };
-            Some(Body { model: &body.part.model, placed: Placed { place: body.place, motion } })
+            Some(PlacedModel { model: &body.part.model, placed: Placed { place: body.place, motion } })
         };
         let (a, b) = (side(p.a)?, side(p.b)?);
         Some(PairQuery {

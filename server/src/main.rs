@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use contactd::cache::{self, Cache, Prepared};
 use contactd::check::Check;
 use contactd::contact::Status;
-use contactd::import::{self, Facets, Limits, ModelBytes, Scene};
+use contactd::import::{self, Access, Facets, Limits, ModelBytes, Openscad, Scene};
 use contactd::inspect;
 use contactd::ipc::{CacheFolder, ServerConfig};
 use contactd::octree::Model;
@@ -21,6 +21,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Certified earliest contact of solids modelled by constructive solid geometry.
 #[derive(Parser)]
@@ -32,7 +33,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// One step of a scene in this process, without a server: the earliest contact of every pair.
+    /// One step of a scene in this process, without a server: the earliest contact of every pair. Of models: whether they overlap.
     Check(CheckArguments),
     /// The server, until SIGINT or SIGTERM; prints one line when ready.
     Serve {
@@ -45,6 +46,9 @@ enum Command {
         /// Milliseconds within which a step is answered, undecided where it is not known by then; 0: no such limit.
         #[arg(long, value_name = "MS")]
         deadline: Option<u64>,
+        /// A folder of this machine: texts that clients send may import files of it and below. Else they import none.
+        #[arg(long, value_name = "DIR")]
+        import_root: Option<PathBuf>,
         #[command(flatten)]
         cache: CacheArguments,
     },
@@ -67,7 +71,7 @@ enum Command {
     },
     /// What is in a model or scene file, and how it was imported.
     Inspect {
-        /// A model (.csg, .stl, .off, .obj) or a scene (.toml).
+        /// A model (.scad, .csg, .stl, .off, .obj) or a scene (.toml).
         file: PathBuf,
         /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
         #[arg(long, default_value = "auto", value_parser = facets)]
@@ -76,8 +80,36 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         picture: Option<PathBuf>,
         #[command(flatten)]
+        access: AccessArguments,
+        #[command(flatten)]
         cache: CacheArguments,
     },
+}
+
+/// What reading a file may reach beside it.
+#[derive(clap::Args)]
+struct AccessArguments {
+    /// The folder, with all below it, that OpenSCAD texts may import files from; else each text's own, or the scene's import_root.
+    #[arg(long, value_name = "DIR")]
+    import_root: Option<PathBuf>,
+    /// The OpenSCAD that flattens .scad files; else the environment's CONTACTD_OPENSCAD, or openscad.
+    #[arg(long, value_name = "PROGRAM")]
+    openscad: Option<PathBuf>,
+    /// How long that may take for one file.
+    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = seconds)]
+    openscad_timeout: Duration,
+}
+
+impl AccessArguments {
+    /// What they say, the rest as `scene` has it.
+    fn with(&self, scene: Access) -> Result<Access, String> {
+        let root = self.import_root.clone().or(scene.root);
+        if let Some(root) = root.as_ref().filter(|r| !r.is_dir()) {
+            return Err(format!("expected a folder as import root, found {}", root.display()));
+        }
+        let program = self.openscad.as_ref().map_or(scene.openscad.program, |p| p.clone().into_os_string());
+        Ok(Access { root, openscad: Openscad { program, time: self.openscad_timeout } })
+    }
 }
 
 #[derive(clap::Args)]
@@ -97,8 +129,9 @@ impl CacheArguments {
 
 #[derive(clap::Args)]
 struct CheckArguments {
-    /// The scene's .toml file.
-    scene: PathBuf,
+    /// The scene's .toml file; or models, which are taken as they stand.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -118,6 +151,8 @@ struct CheckArguments {
     /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
     #[arg(long, default_value = "auto", value_parser = facets)]
     facets: Facets,
+    #[command(flatten)]
+    access: AccessArguments,
     #[command(flatten)]
     cache: CacheArguments,
 }
@@ -140,8 +175,12 @@ fn main() -> ExitCode {
         Command::Check(arguments) => check_scene(&arguments),
         Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
         Command::Demo { embedded, csv, cache, .. } => run_demo(embedded, csv.as_deref(), cache),
-        Command::Inspect { file, facets, picture, cache } => inspect_file(&file, facets, picture.as_deref(), &cache),
-        Command::Serve { name, config, deadline, cache } => serve(&name, config.as_deref(), deadline, cache),
+        Command::Inspect { file, facets, picture, access, cache } => {
+            inspect_file(&file, facets, picture.as_deref(), &access, &cache)
+        }
+        Command::Serve { name, config, deadline, import_root, cache } => {
+            serve(&name, config.as_deref(), (deadline, import_root), cache)
+        }
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
@@ -156,13 +195,17 @@ fn main() -> ExitCode {
 fn serve(
     name: &str,
     config: Option<&Path>,
-    deadline: Option<u64>,
+    (deadline, import_root): (Option<u64>, Option<PathBuf>),
     cache: CacheArguments,
 ) -> Result<Done, Box<dyn Error>> {
     let mut config = config.map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
     // The command line stands before the file, `off` too.
     config.cache = cache.cache.unwrap_or(config.cache);
     config.deadline_ms = deadline.unwrap_or(config.deadline_ms);
+    if let Some(root) = import_root.as_ref().filter(|r| !r.is_dir()) {
+        return Err(format!("expected a folder as import root, found {}", root.display()).into());
+    }
+    config.import_root = import_root.or(config.import_root);
     let ready = || {
         let pid = std::process::id();
         // A reader that has gone away does not stop a server.
@@ -193,9 +236,35 @@ fn length(word: &str) -> Result<f64, String> {
     positive.ok_or_else(|| "expected a positive finite length".into())
 }
 
+fn seconds(word: &str) -> Result<Duration, String> {
+    let positive = word.parse::<f64>().ok().filter(|x| *x > 0.0);
+    positive
+        .and_then(|x| Duration::try_from_secs_f64(x).ok())
+        .ok_or_else(|| "expected a positive number of seconds".into())
+}
+
+/// Is it a scene? Anything else is a model.
+fn is_scene(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e == "toml")
+}
+
 fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
-    let scene = import::read_scene(&arguments.scene)?;
+    let scene = match arguments.files.as_slice() {
+        [file] if is_scene(file) => import::read_scene(file)?,
+        files => match files.iter().find(|f| is_scene(f)) {
+            Some(scene) => {
+                return Err(format!("expected one scene, or models, found {} among them", scene.display()).into());
+            }
+            None => Scene::of_models(files),
+        },
+    };
+    let scene = Scene { access: arguments.access.with(scene.access.clone())?, ..scene };
     let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
+    if scene.file.is_empty() {
+        for (source, p) in scene.models.iter().zip(&prepared) {
+            p.notes.iter().for_each(|n| warn(&format!("{}:{n}", source.path.display())));
+        }
+    }
     let mut check = Check::new(&scene, &models_of(&prepared), arguments.resolution)?;
     let outcome = check.step(arguments.first)?.clone();
     if let Some(to) = &arguments.certificate {
@@ -244,8 +313,8 @@ fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Resul
     prepared.iter().filter_map(|p| p.trouble.as_deref()).for_each(warn);
     scene.notes.iter().for_each(|n| warn(&format!("{}:{n}", scene.file)));
     for (source, _) in scene.models.iter().zip(&prepared).filter(|(_, p)| p.model.solid.is_empty()) {
-        let (file, at) = (&scene.file, source.at);
-        warn(&format!("{file}:{at}: the model \"{}\" is empty: nothing can touch it", source.name));
+        let at = if scene.file.is_empty() { String::new() } else { format!("{}:{}: ", scene.file, source.at) };
+        warn(&format!("{at}the model \"{}\" is empty: nothing can touch it", source.name));
     }
     Ok(prepared)
 }
@@ -267,10 +336,12 @@ fn inspect_file(
     file: &Path,
     facets: Facets,
     picture: Option<&Path>,
+    access: &AccessArguments,
     cache: &CacheArguments,
 ) -> Result<Done, Box<dyn Error>> {
-    let text = if file.extension().is_some_and(|e| e == "toml") {
+    let text = if is_scene(file) {
         let scene = import::read_scene(file)?;
+        let scene = Scene { access: access.with(scene.access.clone())?, ..scene };
         let models = prepare_scene(&scene, facets, cache)?;
         let mut text = inspect::scene(&scene) + &inspect::effects(&scene);
         for (source, p) in scene.models.iter().zip(&models) {
@@ -282,7 +353,7 @@ fn inspect_file(
         text
     } else {
         let (limits, name) = (Limits::default(), file.display().to_string());
-        let read = ModelBytes::read(file, &limits)?;
+        let read = ModelBytes::read(file, &access.with(Access::default())?, &limits)?;
         let prepared = cache::prepare(cache.open().as_ref(), &read.source(), facets, &limits)?;
         prepared.trouble.as_deref().into_iter().for_each(warn);
         let text = inspect::model(&name, &prepared.model, &prepared.notes);

@@ -261,3 +261,21 @@ fn a_thread_that_cannot_be_started_is_an_error_and_no_panic() {
         assert_eq!(said.trim().lines().count(), 1, "{arguments}: {said}");
     }
 }
+
+/// What a session keeps is limited, whatever it is made of: long texts, and short ones of many faces; and so is what it is told.
+#[test]
+fn a_session_has_a_share_of_memory_and_of_slots() {
+    let config = ServerConfig { models_mb: 1, records: 5, ..ServerConfig::default() };
+    let mut session = contactd::embedded(&config).unwrap();
+    let long = format!("sphere(r = 1);{}", " ".repeat(600_000));
+    session.load_model("long.csg", &long).unwrap();
+    let full = |loaded: Result<_, Error>| matches!(loaded, Err(e) if e.code() == Some(ErrorCode::LimitMemory));
+    assert!(full(session.load_model("again.csg", &long).map(|m| m.id)));
+    // Their text alone would find room.
+    let many = spheres(2_000);
+    assert!(many.len() < 400_000 && full(session.load_model("many.csg", &many).map(|m| m.id)));
+    let ids = crowd(&mut session, BALL, 5, &[]);
+    begin(&mut session, &ids, 1);
+    let reply = session.finish(PATIENCE).unwrap();
+    assert!(reply.truncated() && reply.records().len() == 5, "{} records", reply.records().len());
+}

@@ -94,7 +94,7 @@ fn a_killed_server_is_noticed_and_its_successor_continues_bit_for_bit() {
     for k in 0..90 {
         if k % 30 == 19 {
             // Stopped first, so that the step is in flight when it dies.
-            rustix::process::kill_process(server.pid(), rustix::process::Signal::STOP).unwrap();
+            server.freeze();
             set_options(&mut session, k);
             fill(session.begin_step(ids.len()).unwrap(), &ids, k, 7);
             session.send().unwrap();
@@ -182,7 +182,7 @@ fn a_session_that_reconnects_to_a_server_that_lives_takes_no_second_place() {
     }
     // With a step in flight on a server that is busy: the goodbye is not heard, and its place is found to be free.
     for k in 4..7 {
-        rustix::process::kill_process(server.pid(), rustix::process::Signal::STOP).unwrap();
+        server.freeze();
         set_options(&mut session, k);
         fill(session.begin_step(ids.len()).unwrap(), &ids, k, 1);
         session.send().unwrap();
@@ -217,7 +217,7 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     // One that takes longer than anybody waits: the server finds that nobody listens, whether the session was closed or dropped.
     for closes in [true, false] {
         let mut session = connect();
-        rustix::process::kill_process(server.pid(), rustix::process::Signal::STOP).unwrap();
+        server.freeze();
         session.begin_step(0).unwrap();
         session.send().unwrap();
         if closes {
@@ -378,7 +378,7 @@ fn bad_input_is_refused_each_with_its_sentence() {
     assert!(matches!(answer, Answer::Refused { code, .. } if code == ErrorCode::Version.number()), "{answer:?}");
 
     refused(session.load_model("broken.csg", "cube(size = [1, 1, 1);"), ErrorCode::Model, &["broken.csg:1:"]);
-    refused(session.load_model("text.csg", "text(\"x\");"), ErrorCode::Model, &["text.csg:1:1", "text"]);
+    refused(session.load_model("roof.csg", "roof();"), ErrorCode::Model, &["roof.csg:1:1", "roof"]);
     let long = format!("cube(size = 1);{}", " ".repeat(6000));
     refused(session.load_model("long.csg", &long), ErrorCode::LimitText, &["long.csg"]);
     refused(session.add_object(Object::new("ghost", 99)), ErrorCode::UnknownModel, &["ghost", "99"]);

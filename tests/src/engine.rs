@@ -2,7 +2,7 @@
 
 use crate::scenes::Scene;
 use contactd::contact::{
-    Body, Contact, ContactPoint, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, Verdict,
+    Contact, ContactPoint, Extent, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, Verdict,
     default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
@@ -73,8 +73,8 @@ pub fn ask_with(a: (&Model, Placed), b: (&Model, Placed), resolution: Option<f64
 /// A question about two placed models, at the default resolution, all ideas on.
 pub fn question<'a>(a: (&'a Model, Placed), b: (&'a Model, Placed), query_options: QueryOptions) -> PairQuery<'a> {
     PairQuery {
-        a: Body { model: a.0, placed: a.1 },
-        b: Body { model: b.0, placed: b.1 },
+        a: PlacedModel { model: a.0, placed: a.1 },
+        b: PlacedModel { model: b.0, placed: b.1 },
         resolution: default_resolution(a.0, b.0),
         cell_limit: CELL_LIMIT,
         strategies: Strategies::default(),

@@ -9,6 +9,7 @@ pub mod formula;
 pub mod fuzz;
 pub mod judge;
 pub mod lanes;
+pub mod mesh_files;
 pub mod meshes;
 pub mod openscad;
 pub mod primitive_pairs;

@@ -1,11 +1,13 @@
 //! Random CSG trees of all primitives and operations, and random motions, from a seed: the same seed, the same solid.
 
 use contactd::motion::Placed;
-use contactd::solid::primitive::{Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Shape, Sphere, Torus};
+use contactd::solid::primitive::{
+    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, HalfSpace, Polyhedron, Shape, Sphere, Torus,
+};
 use contactd::solid::{Label, NodeId, Op, Solid, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// A small generator of random numbers (splitmix64): fixed results everywhere.
 #[derive(Clone, Debug)]
@@ -88,6 +90,25 @@ pub fn torus(r: &mut Random, size: f64) -> Torus {
 /// The same as `shape`, or a torus, one in three.
 pub fn shape_or_torus(r: &mut Random, size: f64) -> Shape {
     if r.below(3) == 0 { torus(r, size).into() } else { shape(r, size) }
+}
+
+/// A random ellipsoid, elliptic cylinder, cone or frustum of size about `size`: half of those lean, some but a little or on circles.
+pub fn elliptic(r: &mut Random, size: f64) -> Shape {
+    let mut s = |lo: f64, hi: f64| size * r.within(lo, hi);
+    let (a, b, c) = (s(0.15, 1.0), s(0.15, 1.0), s(0.15, 1.0));
+    if r.below(2) == 0 {
+        let semi = if r.below(4) == 0 { DVec3::new(a, a, b) } else { DVec3::new(a, b, c) };
+        return Ellipsoid { semi }.into();
+    }
+    let (bottom, top) = [(1.0, 1.0), (1.0, 0.0), (1.0, 0.4), (0.7, 1.0), (0.0, 1.0)][r.below(5)];
+    let lean = [0.0, 0.0, 0.05, 0.8][r.below(4)] * DVec2::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0));
+    let semi = if r.below(4) == 0 && lean != DVec2::ZERO { DVec2::splat(a) } else { DVec2::new(a, b) };
+    EllipticFrustum { semi, bottom, top, half_height: c, lean }.into()
+}
+
+/// The same as `shape`, or an elliptic one, one in three.
+pub fn shape_or_elliptic(r: &mut Random, size: f64) -> Shape {
+    if r.below(3) == 0 { elliptic(r, size) } else { shape(r, size) }
 }
 
 /// The same as `shape`, or a mesh, one in three.

@@ -4,6 +4,7 @@
 //! one point tells. Across, the lengths are no smooth function: the rule converges with the power 1.5 or so of the
 //! distance of the rays, and two rules tell how far it has come.
 
+use crate::reference::field::Image;
 use contactd::math::Aabb;
 use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
@@ -63,6 +64,13 @@ fn add_roots(face: &Face, at: DVec3, roots: &mut Vec<f64>) {
             [o.dot(o) * c - h * h * s, o.dot(d) * c - h * k * s, d.dot(d) * c - k * k * s]
         }
         Face::Torus(torus) => return add_roots_of_torus(&torus, at, roots),
+        Face::Elliptic(e) => {
+            // |p + z d|² = (h + z k)², both nappes of a cone.
+            let i = Image::of(&e);
+            let (p, d) = (i.across(at), (i.turn.conjugate() * DVec3::Z) * i.scale);
+            let (h, k) = (i.radius + i.fall * i.local(at).z, i.fall * (i.turn.conjugate() * DVec3::Z).z);
+            [p.dot(p) - h * h, p.dot(d) - h * k, d.dot(d) - k * k]
+        }
     };
     if c2.abs() < 1e-14 {
         if c1 != 0.0 {

@@ -21,11 +21,11 @@
 use crate::engine::ReportedPoint as _;
 use crate::formula::{Formula, formula_of};
 use crate::reference::Moving;
-use crate::reference::field::Literal;
+use crate::reference::field::{Image, Literal};
 use contactd::contact::{ContactKind, Extent, Outcome, Status};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Sense, Shape, Solid, surface};
 use contactd_proto::contact_record::NO_FACE;
-use glam::DVec3;
+use glam::{DMat3, DVec2, DVec3};
 
 /// What a record says that is not so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -105,6 +105,8 @@ struct Side<'a> {
     /// Bounding radius of the model, and the size of all numbers that its points are computed from.
     radius: f64,
     extent: f64,
+    /// The part of `extent` that has nothing to do with where the bodies are.
+    own: f64,
 }
 
 impl<'a> Side<'a> {
@@ -136,20 +138,22 @@ impl<'a> Side<'a> {
             | Face::Cylinder(surface::Cylinder { origin: o, radius, .. }) => o.length() + radius,
             Face::Cone(surface::Cone { apex, .. }) => apex.length(),
             Face::Torus(surface::Torus { origin, major, minor, .. }) => origin.length() + major + minor,
+            Face::Elliptic(e) => e.origin.length() + e.size,
         });
         let motion = &moving.motion;
-        let extent = motion.start.position.length()
-            + motion.velocity.length()
-            + 2.0 * moving.place.position.length()
-            + 2.0 * reach
-            + numbers.fold(0.0, f64::max);
-        Self { moving, literals, ids, root, time, radius, extent }
+        let own = 2.0 * moving.place.position.length() + 2.0 * reach + numbers.fold(0.0, f64::max);
+        let extent = motion.start.position.length() + motion.velocity.length() + own;
+        Self { moving, literals, ids, root, time, radius, extent, own }
     }
 
     /// A world point in the model's frame.
     fn local(&self, world: DVec3) -> DVec3 {
-        let at = self.moving.motion.at(self.time);
-        let object = at.rotation.conjugate() * (world - at.position);
+        self.local_from(world - self.moving.motion.at(self.time).position)
+    }
+
+    /// A point in the model's frame, by its way from the body's position along the world's axes.
+    fn local_from(&self, way: DVec3) -> DVec3 {
+        let object = self.moving.motion.at(self.time).rotation.conjugate() * way;
         self.moving.place.rotation.conjugate() * (object - self.moving.place.position)
     }
 
@@ -176,6 +180,10 @@ impl<'a> Side<'a> {
             Face::Cone(surface::Cone { apex, axis, sin, cos }) if apex.distance(x) <= tau / sin => {
                 l.sign * (axis.cross(d).length() * cos - axis.dot(d) * sin)
             }
+            Face::Elliptic(e) if self.is_apex(i, x, tau) => {
+                let image = Image::of(&e);
+                l.sign * (image.across(image.origin + d).length() - image.fall * image.local(image.origin + d).z)
+            }
             _ => l.gradient(x).dot(d),
         }
     }
@@ -191,6 +199,7 @@ impl<'a> Side<'a> {
     fn is_apex(&self, i: usize, x: DVec3, tau: f64) -> bool {
         match self.literals[i].face {
             Face::Cone(surface::Cone { apex, sin, .. }) => apex.distance(x) <= tau / sin,
+            Face::Elliptic(e) if e.third < 0.0 => e.origin.distance(x) <= tau / -e.third,
             _ => false,
         }
     }
@@ -288,8 +297,19 @@ impl Spot {
         let mut apex = false;
         for i in &active {
             if side.is_apex(*i, x, tau) {
-                let Face::Cone(surface::Cone { axis, sin, cos, .. }) = side.literals[*i].face else { unreachable!() };
                 let sign = side.literals[*i].sign;
+                if let Face::Elliptic(e) = side.literals[*i].face {
+                    let image = Image::of(&e);
+                    let n = image.turn.conjugate() * (normal * sign);
+                    let towards = DVec2::new(n.x / image.scale.x, n.y / image.scale.y).try_normalize();
+                    let around = (0..256).map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 256.0));
+                    let ray = |v: DVec2| image.turn * (v.extend(0.0) * image.scale - DVec3::Z * image.fall) * sign;
+                    generators.extend(around.chain(towards).map(ray));
+                    generators.push(image.turn * DVec3::Z * -sign);
+                    apex = true;
+                    continue;
+                }
+                let Face::Cone(surface::Cone { axis, sin, cos, .. }) = side.literals[*i].face else { unreachable!() };
                 let u = axis.any_orthonormal_vector();
                 let v = axis.cross(u);
                 let towards = (normal * sign - axis * axis.dot(normal * sign)).try_normalize();
@@ -350,6 +370,60 @@ fn directions(gradients: &[DVec3], apex: bool) -> Vec<DVec3> {
     out
 }
 
+/// A reported point as its two bodies see it, and the size of the numbers that go into that.
+struct Seen {
+    points: [DVec3; 2],
+    extent: f64,
+}
+
+impl Seen {
+    /// The point as it stands in the record.
+    fn reported(sides: &[Side; 2], o: &Outcome) -> Self {
+        let points = [sides[0].local(o.at().point), sides[1].local(o.at().point)];
+        Self { points, extent: sides[0].extent + sides[1].extent }
+    }
+
+    /// The point without what a world coordinate far from the origin rounds away, whatever the bodies' sizes: both see
+    /// it from a's position, and it is moved onto all faces that are named, the least way there is, if that is no more
+    /// than rounding. `None` where it is more. Where the faces leave no point open, as at a vertex, it is the one that
+    /// they have in common, and whatever else passes through it was to be named.
+    fn on_named_faces(sides: &[Side; 2], o: &Outcome) -> Option<Self> {
+        let [a, b] = sides.each_ref().map(|s| &s.moving.motion);
+        let apart = (b.start.position - a.start.position) + (b.velocity - a.velocity) * sides[0].time;
+        let start = (o.at().point - a.start.position) - a.velocity * sides[0].time;
+        let far = 4.0 * f64::EPSILON * (a.start.position.length() + a.velocity.length() + o.at().point.length());
+        let mut way = start;
+        let seen = |way: DVec3| [sides[0].local_from(way), sides[1].local_from(way - apart)];
+        for _ in 0..4 {
+            let points = seen(way);
+            // Least squares on the faces' values, hardly damped: (J^T J + mu) step = -J^T values.
+            let (mut square, mut right) = (DMat3::from_diagonal(DVec3::splat(1e-12)), DVec3::ZERO);
+            for (k, side) in sides.iter().enumerate() {
+                let at = side.moving.motion.at(side.time).rotation * side.moving.place.rotation;
+                let mut meets = |n: DVec3, value: f64| {
+                    let n = at * n;
+                    square += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+                    right -= n * value;
+                };
+                let named = [o.at().faces_a, o.at().faces_b][k].into_iter().filter(|f| *f != NO_FACE);
+                for i in named.filter_map(|f| side.ids.iter().position(|id| *id == f)) {
+                    let (x, literal) = (points[k], &side.literals[i]);
+                    match literal.face {
+                        // The tip of a cone is a point.
+                        Face::Cone(surface::Cone { apex, sin, .. }) if apex.distance(x) * sin <= far => {
+                            DVec3::AXES.into_iter().for_each(|e| meets(e, e.dot(x - apex)));
+                        }
+                        _ => meets(literal.gradient(x), literal.value(x)),
+                    }
+                }
+            }
+            way += square.inverse() * right;
+        }
+        let extent = sides[0].own + sides[1].own + apart.length() + (b.velocity - a.velocity).length();
+        (way.is_finite() && way.distance(start) <= far).then(|| Self { points: seen(way), extent })
+    }
+}
+
 /// Gradients closer than this, in radians, are one direction: a seam where faces meet tangentially is no edge.
 const TANGENT: f64 = 1e-6;
 
@@ -400,21 +474,20 @@ const NORMAL: f64 = 1e-6;
 
 fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
     let size = sides[0].radius.max(sides[1].radius);
-    let extent = sides[0].extent + sides[1].extent;
-    let rounding = 64.0 * f64::EPSILON * extent;
+    let rounding = 64.0 * f64::EPSILON * (sides[0].extent + sides[1].extent);
     let normals = [o.at().normal, -o.at().normal];
     if (o.at().normal.length() - 1.0).abs() > 1e-12 || !o.at().normal.is_finite() || !o.at().point.is_finite() {
         out.push((Lie::Normal, format!("point {}, normal {}", o.at().point, o.at().normal)));
         return;
     }
-    let points = [sides[0].local(o.at().point), sides[1].local(o.at().point)];
-    let values = [sides[0].value(points[0]), sides[1].value(points[1])];
+    let reported = Seen::reported(sides, o);
+    let values: [f64; 2] = std::array::from_fn(|k| sides[k].value(reported.points[k]));
     // What starts in touch, or was not continued, is told where it is deep.
     let at_depth = o.not_continued() || o.time() == 0.0;
     let near = (1e-11 * size).max(rounding);
     // What was not continued is told how deep it is.
-    let reported = if o.not_continued() { -0.5 * o.at().separation } else { 0.0 };
-    let off = if at_depth { near + reported.max(2.001 * o.resolution) } else { near };
+    let told = if o.not_continued() { -0.5 * o.at().separation } else { 0.0 };
+    let off = if at_depth { near + told.max(2.001 * o.resolution) } else { near };
     if values.iter().any(|v| v.abs() > off) {
         out.push((Lie::Point, format!("f {:e} {:e} at {}, within {off:e}", values[0], values[1], o.at().point)));
     }
@@ -446,6 +519,8 @@ fn contact(sides: &[Side; 2], o: &Outcome, out: &mut Vec<(Lie, String)>) {
         }
     }
     // Which faces pass through the point is a matter of what counts as through: any sensible measure will do for all.
+    let on_faces = if at_depth { None } else { Seen::on_named_faces(sides, o) };
+    let Seen { points, extent } = on_faces.unwrap_or(reported);
     let least = 4.0 * f64::EPSILON * extent;
     let most = if at_depth { off } else { 1e-9 * size + rounding };
     let mut doubts: Option<Vec<(Lie, String)>> = None;
@@ -494,6 +569,11 @@ fn features(
                 let rho = axis.cross(point - origin).length();
                 let tube = (rho - major).hypot(axis.dot(point - origin));
                 moves / tube.min(rho).max(f64::MIN_POSITIVE)
+            }
+            // Of the gradient, over its length: twice as much of the normal.
+            Face::Elliptic(e) => {
+                let slope = side.literals[*i].gradient(point).length();
+                2.0 * moves / (slope * Image::of(&e).across(point).length()).max(f64::MIN_POSITIVE)
             }
         });
         each.fold(0.0, f64::max)

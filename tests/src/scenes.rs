@@ -6,7 +6,9 @@
 
 use crate::random_solids::Random;
 use crate::reference::{self, Effort, Moving, Truth};
-use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Polyhedron, Sphere, Torus, TriangleMesh};
+use contactd::solid::primitive::{
+    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Torus, TriangleMesh,
+};
 use contactd::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
 use glam::{DQuat, DVec3};
@@ -44,6 +46,10 @@ impl Recipe {
     /// A torus about z.
     pub fn torus(major: f64, minor: f64) -> Self {
         Self::of(Torus { major, minor })
+    }
+    /// An ellipsoid with the given semi-axes.
+    pub fn ellipsoid(x: f64, y: f64, z: f64) -> Self {
+        Self::of(Ellipsoid { semi: DVec3::new(x, y, z) })
     }
     /// Regular polyhedron with 4, 6, 8, 12 or 20 faces.
     pub fn platonic(faces: usize, radius: f64) -> Self {
@@ -119,6 +125,10 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
             TriangleMesh::new(&points, m.triangles()).expect("closed as before").0.into()
         }
         Shape::Torus(t) => Torus { major: t.major * k, minor: t.minor * k }.into(),
+        Shape::Ellipsoid(e) => Ellipsoid { semi: e.semi * k }.into(),
+        Shape::EllipticFrustum(c) => {
+            EllipticFrustum { semi: c.semi * k, half_height: c.half_height * k, ..c.clone() }.into()
+        }
     }
 }
 

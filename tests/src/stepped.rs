@@ -105,6 +105,8 @@ pub struct Play {
     stage: f64,
     /// How often something is changed, put elsewhere, redrawn.
     unrest: f64,
+    /// Bodies come together, and what has met stays as it is or presses on.
+    settles: bool,
     begun: bool,
 }
 
@@ -187,6 +189,7 @@ impl Play {
             grid,
             stage,
             unrest: 0.0,
+            settles: false,
             begun: false,
         };
         play.stops = play.rng.chance(0.4);
@@ -195,6 +198,29 @@ impl Play {
         for k in 0..count {
             let thing = play.thing(k);
             play.enter(thing);
+        }
+        play
+    }
+
+    /// A play of a few bodies that come together, stop where they meet, and then rest on each other or press on: all of their rules ask
+    /// where they touch.
+    pub fn settling(seed: u64) -> Self {
+        let mut play = Self::new(seed);
+        play.settles = true;
+        play.stops = true;
+        play.unrest = if play.rng.chance(0.3) { 0.05 } else { 0.0 };
+        play.actors.truncate(2 + play.rng.below(2));
+        play.options = StepOptions { cell_limit: 50_000, clear: play.rng.chance(0.3), ..StepOptions::default() };
+        for k in 0..play.actors.len() {
+            let pose = play.actors[k].pose;
+            let rotation = if play.rng.chance(0.4) { DQuat::IDENTITY } else { pose.rotation };
+            let from = if k == 0 { DVec3::ZERO } else { play.rng.direction() * play.rng.within(0.8, 2.5) };
+            let pose = Pose::new(from, rotation);
+            let spin = if play.rng.chance(0.3) { play.rng.vector(0.2) } else { DVec3::ZERO };
+            let velocity = (play.rng.vector(0.2) - from) * play.rng.within(0.3, 1.0);
+            let manner = Manner::Goes { velocity, spin, pull: DVec3::ZERO, jitter: 0.0 };
+            let thing = Thing { is_static: k == 0, pose, ..play.actors[k].thing.clone() };
+            play.actors[k] = Actor { thing, manner, pose, home: pose };
         }
         play
     }
@@ -275,6 +301,14 @@ impl Play {
                 ..Rule::new(between.map(String::from))
             });
         }
+        if self.settles {
+            for rule in &mut rules {
+                rule.report = if rule.margin > 0.0 && r.chance(0.5) { Report::Contact } else { Report::Patch };
+                rule.sensor = false;
+                // Regions of a margin that holds the bodies are those of all their faces.
+                rule.margin = rule.margin.min(0.02);
+            }
+        }
         rules
     }
 
@@ -330,6 +364,9 @@ impl Play {
             if self.rng.chance(self.unrest) {
                 self.options = self.step_options();
             }
+        }
+        if self.settles && free < 1.0 && self.rng.chance(0.4) {
+            self.actors.iter_mut().for_each(|actor| actor.manner = Manner::Rests);
         }
         let mut records = Vec::new();
         for k in 0..self.actors.len() {

@@ -50,19 +50,19 @@ enum Kind {
 }
 
 /// A body for both sides: OpenSCAD's text and rapier's shape in the object's frame.
-type F64x2 = (String, peer::Body);
+type Twin = (String, peer::Body);
 
-fn primitive(text: &str, shape: impl Into<Shape>) -> F64x2 {
+fn primitive(text: &str, shape: impl Into<Shape>) -> Twin {
     (text.into(), peer::Body::of(&shape.into(), &Pose::IDENTITY))
 }
 
-fn drilled(text: &str, outline: Outline, hole: f64, half_height: f64) -> F64x2 {
+fn drilled(text: &str, outline: Outline, hole: f64, half_height: f64) -> Twin {
     let part = Drilled { center: DVec3::ZERO, outline, hole, half_height };
     (text.into(), peer::Body::new(contactd_benches::facets::compound(&[part], FACETS)))
 }
 
 impl Kind {
-    fn twins(self) -> Vec<F64x2> {
+    fn twins(self) -> Vec<Twin> {
         match self {
             Kind::Primitives => vec![
                 primitive("sphere(r = 0.3);", Sphere { radius: 0.3 }),
@@ -135,7 +135,7 @@ impl Path {
 }
 
 /// Paths of `n` objects on the grid, drawn again where one would overlap its neighbours at the start.
-fn paths(twins: &[F64x2], n: usize) -> Vec<Path> {
+fn paths(twins: &[Twin], n: usize) -> Vec<Path> {
     let mut r = Random::new(n as u64);
     let side = (n as f64).cbrt().ceil() as usize;
     let stands = |i: usize, path: &Path| {
@@ -180,7 +180,7 @@ struct Rapier {
 }
 
 impl Rapier {
-    fn new(twins: &[F64x2], paths: &[Path]) -> Self {
+    fn new(twins: &[Twin], paths: &[Path]) -> Self {
         let mut colliders = ColliderSet::new();
         let objects = paths.iter().enumerate().map(|(i, path)| {
             let body = &twins[i % twins.len()].1;
@@ -222,7 +222,7 @@ impl Rapier {
 }
 
 /// Our side: a session with all objects in it, and their ids.
-fn session(twins: &[F64x2], paths: &[Path]) -> Result<(Session<Embedded>, Vec<u32>), Error> {
+fn session(twins: &[Twin], paths: &[Path]) -> Result<(Session<Embedded>, Vec<u32>), Error> {
     let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default())?;
     let mut models = Vec::new();
     for (k, (text, _)) in twins.iter().enumerate() {

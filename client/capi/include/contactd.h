@@ -293,6 +293,36 @@
 // Always the prism or polyhedron that `$fn` asks for.
 #define CONTACTD_FACETS_AS_WRITTEN 2
 
+// All points of any of the operands.
+#define CONTACTD_UNION 0
+
+// All points that the operands have in common.
+#define CONTACTD_INTERSECTION 1
+
+// All points of the first operand that no other one has.
+#define CONTACTD_DIFFERENCE 2
+
+// The convex hull of the operands.
+#define CONTACTD_HULL 3
+
+// All sums of a point of each operand; of solids alone.
+#define CONTACTD_MINKOWSKI 4
+
+// Corners that an offset opens are joined by a circle.
+#define CONTACTD_CORNERS_ROUND 0
+
+// By prolonging the sides.
+#define CONTACTD_CORNERS_SHARP 1
+
+// By a straight cut.
+#define CONTACTD_CORNERS_CUT 2
+
+// A solid in the making, and its text once that was asked for.
+typedef struct contactd_solid contactd_solid;
+
+// A flat shape in the making.
+typedef struct contactd_outline contactd_outline;
+
 // The points of all pairs, from step to step.
 typedef struct contactd_manifolds contactd_manifolds;
 
@@ -761,6 +791,111 @@ int32_t contactd_mass_placed(const struct contactd_mass *mass, const struct cont
 
 // The same solid of another density, mass per volume, which is taken as exact. `out` may be `mass`.
 int32_t contactd_mass_with_density(const struct contactd_mass *mass, double density, struct contactd_mass *out);
+
+// A box with these lengths of its edges, centred at the origin of its frame as every solid here.
+int32_t contactd_solid_box(double x, double y, double z, struct contactd_solid **out);
+
+// A ball.
+int32_t contactd_solid_sphere(double radius, struct contactd_solid **out);
+
+// A cylinder along z, from -height/2 to height/2.
+int32_t contactd_solid_cylinder(double radius, double height, struct contactd_solid **out);
+
+// A cone or frustum along z, of radius `bottom` at -height/2 and `top` at height/2; one of them may be 0.
+int32_t contactd_solid_cone(double bottom, double top, double height, struct contactd_solid **out);
+
+// All points within `minor` of the circle of radius `major` about z.
+int32_t contactd_solid_torus(double major, double minor, struct contactd_solid **out);
+
+// All points within `radius` of the segment along z from -length/2 to length/2.
+int32_t contactd_solid_capsule(double radius, double length, struct contactd_solid **out);
+
+// The half-space normal.x <= offset |normal|, to be cut with something. `normal`: 3 numbers.
+int32_t contactd_solid_half_space(const double *normal, double offset, struct contactd_solid **out);
+
+// The solid within faces, convex or not. `points`: 3 numbers each. `corners`: indices of points, those of each face
+// counter-clockwise as seen from outside, one face after the other; `sides`: how many of them each face has.
+int32_t contactd_solid_polyhedron(const double *points,
+                                  size_t point_count,
+                                  const uint32_t *corners,
+                                  const uint32_t *sides,
+                                  size_t face_count,
+                                  struct contactd_solid **out);
+
+// CONTACTD_UNION, _INTERSECTION, _DIFFERENCE, _HULL or _MINKOWSKI of solids, which stay the caller's.
+int32_t contactd_solid_join(uint32_t operation,
+                            const struct contactd_solid *const *operands,
+                            size_t count,
+                            struct contactd_solid **out);
+
+// A solid under an affine map. `matrix`: 12 numbers, the three rows of 3 of its linear part and a translation each.
+int32_t contactd_solid_transformed(const struct contactd_solid *of, const double *matrix, struct contactd_solid **out);
+
+// A solid whose curves are cut into `pieces`, 9 or more, where something made of them has no exact form.
+int32_t contactd_solid_with_pieces(const struct contactd_solid *of, uint32_t pieces, struct contactd_solid **out);
+
+// OpenSCAD's text of a solid, which is what is loaded. Valid until the solid is freed.
+int32_t contactd_solid_text(struct contactd_solid *of, const char **out);
+
+// Frees a solid and sets `*of` to NULL; one that is NULL already is done.
+int32_t contactd_solid_free(struct contactd_solid **of);
+
+// Loads a solid as contactd_load_model loads its text.
+int32_t contactd_load_solid(struct contactd_session *session,
+                            const char *name,
+                            const struct contactd_solid *of,
+                            uint32_t facets,
+                            uint32_t *model);
+
+// A disc.
+int32_t contactd_outline_circle(double radius, struct contactd_outline **out);
+
+// A rectangle with these lengths of its sides, centred.
+int32_t contactd_outline_rectangle(double x, double y, struct contactd_outline **out);
+
+// What is within an odd number of closed paths: one, or an outline with holes. `points`: 2 numbers each, those of one path after
+// those of another; `corners`: how many each path has.
+int32_t contactd_outline_polygon(const double *points,
+                                 const uint32_t *corners,
+                                 size_t path_count,
+                                 struct contactd_outline **out);
+
+// CONTACTD_UNION, _INTERSECTION, _DIFFERENCE or _HULL of outlines, which stay the caller's.
+int32_t contactd_outline_join(uint32_t operation,
+                              const struct contactd_outline *const *operands,
+                              size_t count,
+                              struct contactd_outline **out);
+
+// Everything within `by` of an outline, or, below 0, what is farther than that inside; `corners` is CONTACTD_CORNERS_….
+int32_t contactd_outline_offset(const struct contactd_outline *of, double by, uint32_t corners, struct contactd_outline **out);
+
+// An outline under an affine map. `matrix`: 6 numbers, the two rows of 2 of its linear part and a translation each.
+int32_t contactd_outline_transformed(const struct contactd_outline *of, const double *matrix, struct contactd_outline **out);
+
+// The solid over an outline from z = -height/2 to height/2, scaled by `scale_x`, `scale_y` towards its upper end (1 and 1: straight).
+int32_t contactd_outline_extrude(const struct contactd_outline *of,
+                                 double height,
+                                 double scale_x,
+                                 double scale_y,
+                                 struct contactd_solid **out);
+
+// The same, turned about z towards its upper end by `angle` (radians, counter-clockwise) in `slices` steps.
+int32_t contactd_outline_twist(const struct contactd_outline *of,
+                               double height,
+                               double angle,
+                               uint32_t slices,
+                               struct contactd_solid **out);
+
+// The solid that an outline makes about an axis, over `angle` radians from +x: its x becomes the distance from z, its y becomes z.
+int32_t contactd_outline_revolve(const struct contactd_outline *of,
+                                 double angle,
+                                 struct contactd_solid **out);
+
+// The outline that the plane z = 0 cuts out of a solid (`cut` 1), or the solid's shadow on it (0).
+int32_t contactd_solid_projection(const struct contactd_solid *of, uint32_t cut, struct contactd_outline **out);
+
+// Frees an outline and sets `*of` to NULL; one that is NULL already is done.
+int32_t contactd_outline_free(struct contactd_outline **of);
 
 // A moving object of group "default" at the origin. Name and group are copied when it is added.
 struct contactd_object contactd_object_new(const char *name, uint32_t model);

@@ -103,6 +103,7 @@ impl From<Error> for Failure {
             Error::ReplyLost => (ERROR_REPLY_LOST, NO_INDEX),
             Error::Timeout => (ERROR_TIMEOUT, NO_INDEX),
             Error::Address(_) => (ERROR_ADDRESS, NO_INDEX),
+            Error::Build(_) => (ERROR_ARGUMENT, NO_INDEX),
             Error::Misuse(_) => (ERROR_MISUSE, NO_INDEX),
             Error::System(_) => (ERROR_SYSTEM, NO_INDEX),
         };

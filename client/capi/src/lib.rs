@@ -17,7 +17,9 @@
 //! 4. slots of poses are not used after `contactd_send` or `contactd_finish`, records not after the next
 //!    `contactd_begin_step`, `contactd_reconnect`, `contactd_resend` or `contactd_close`;
 //! 5. manifolds came from `contactd_manifolds_new`, were not freed since (freeing sets the caller's variable to NULL), and are in one
-//!    call at a time.
+//!    call at a time;
+//! 6. solids and outlines came from functions of `contactd_solid_…` and `contactd_outline_…`, were not freed since (freeing sets the
+//!    caller's variable to NULL), and are in one call at a time.
 
 pub mod abi;
 pub mod convention;
@@ -27,6 +29,7 @@ pub mod manifold;
 pub mod model;
 pub mod scene;
 pub mod session;
+pub mod solid;
 pub mod step;
 
 mod models;

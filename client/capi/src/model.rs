@@ -16,7 +16,7 @@ pub const FACETS_EXACT: u32 = 1;
 pub const FACETS_AS_WRITTEN: u32 = 2;
 
 /// By their numbers.
-const FACETS: [Facets; 3] = [Facets::Auto, Facets::Exact, Facets::AsWritten];
+pub(crate) const FACETS: [Facets; 3] = [Facets::Auto, Facets::Exact, Facets::AsWritten];
 
 fn index(i: u32, n: usize, what: &str) -> Result<usize, Failure> {
     if (i as usize) < n {

@@ -18,7 +18,7 @@ use std::sync::OnceLock;
 const TABLES: &str = "tables";
 
 /// Sources of the header, in its order.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "src/error.rs",
     "../../proto/src/pose_record.rs",
     "../../proto/src/contact_record.rs",
@@ -28,6 +28,7 @@ const SOURCES: [&str; 14] = [
     "src/handle.rs",
     "src/session.rs",
     "src/model.rs",
+    "src/solid.rs",
     "src/scene.rs",
     "src/step.rs",
     "src/manifold.rs",

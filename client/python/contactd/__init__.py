@@ -12,7 +12,7 @@
 0.5 True 0.0
 """
 
-from . import convention, manifold
+from . import convention, manifold, solid
 from ._native import PROTOCOL_VERSION, MassProperties, Options, __version__
 from .errors import (
     BadAddress,
@@ -49,6 +49,7 @@ from .records import (
 )
 from .rules import Effect, Rule
 from .session import Face, Model, Region, Reply, Session, connect, embedded
+from .solid import Outline, Solid
 from .view import View
 
 __all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "rules", "session", "view")]

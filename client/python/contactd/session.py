@@ -9,7 +9,7 @@ from typing import Any, Iterable, Iterator, NamedTuple
 import numpy as np
 
 from . import _native
-from ._native import MassProperties
+from ._native import MassProperties, Solid
 from .errors import Error
 from .pose import PoseLike, pose
 from .records import DETAIL, PATCH, REGION, StepStatus, Tag
@@ -152,12 +152,16 @@ class Session(_native.Session):
             if error is None:
                 raise
 
-    def load_model(self, name: str, text: str | bytes, facets: str = "auto", *, format: str | None = None) -> Model:
-        """Loads a model from OpenSCAD CSG text, or from the bytes of a file; ``name`` stands in error sentences.
+    def load_model(
+        self, name: str, text: str | bytes | Solid, facets: str = "auto", *, format: str | None = None
+    ) -> Model:
+        """Loads a model from OpenSCAD CSG text, from a solid that was built (``contactd.solid``), or from the bytes of a file.
 
-        ``format``: what it is, such as "csg"; None: bytes are what ``name`` ends in, text is CSG. ``facets``: how curved primitives are taken, "auto", "exact" or "as-written". Large models take seconds; other threads
+        ``name`` stands in error sentences. ``format``: what it is, such as "csg"; None: bytes are what ``name`` ends in, text is CSG. ``facets``: how curved primitives are taken, "auto", "exact" or "as-written". Large models take seconds; other threads
         run meanwhile, and Ctrl-C is heard when the model is there.
         """
+        if isinstance(text, Solid):
+            text = text.text
         if isinstance(text, str):
             text, format = text.encode(), format or "csg"
         id, faces, warnings = self._load_model(name, format or "", text, facets)

@@ -27,7 +27,8 @@ pub fn of(py: Python<'_>, error: &Error) -> PyErr {
         Error::Timeout => "Timeout",
         Error::Address(_) => "BadAddress",
         Error::Version { .. } => "VersionMismatch",
-        Error::Misuse(_) => "Misuse",
+        // Python's solids are checked where they are built, so this is a call that cannot be.
+        Error::Build(_) | Error::Misuse(_) => "Misuse",
         Error::System(_) => "SystemFailure",
     };
     let index = match error {

@@ -19,6 +19,7 @@ mod reply;
 mod rules;
 mod session;
 mod slots;
+mod solid;
 
 use pyo3::prelude::*;
 
@@ -46,6 +47,8 @@ mod _native {
     use crate::session::Session;
     #[pymodule_export]
     use crate::slots::Slots;
+    #[pymodule_export]
+    use crate::solid::{Outline, Solid, flat, join, join_outlines, polygon, polyhedron, primitive};
 
     /// Version of the package.
     #[pymodule_export]

@@ -6,10 +6,12 @@ use crate::Error;
 use contactd_proto::control::ControlHeader;
 use contactd_proto::names::Address;
 use contactd_proto::{ContactRecord, PoseRecord, StepReply, StepRequest};
+use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::port::client::Client;
 use iceoryx2::port::server::Server;
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::request_response::PortFactory as RequestResponse;
+use std::time::Duration;
 
 /// The variant of iceoryx2's services that is used.
 pub type Variant = ipc::Service;
@@ -66,8 +68,18 @@ pub fn node_of<V: iceoryx2::service::Service>(config: &Config) -> Result<Node<V>
     // Its log would go to the user's terminal, for conditions that are handled here.
     set_log_level(LogLevel::Fatal);
     // Signals belong to the program; iceoryx2 would install handlers of its own.
-    let builder = NodeBuilder::new().config(config).signal_handling_mode(SignalHandlingMode::Disabled);
-    builder.create::<V>().map_err(|e| system("a node cannot be created", e))
+    let create = || {
+        let builder = NodeBuilder::new().config(config).signal_handling_mode(SignalHandlingMode::Disabled);
+        builder.create::<V>()
+    };
+    // On a machine under heavy load iceoryx2 sometimes fails with an internal error; another try has another id.
+    for _ in 0..3 {
+        match create() {
+            Err(NodeCreationFailure::InternalError) => std::thread::sleep(Duration::from_millis(10)),
+            made => return made.map_err(|e| system("a node cannot be created", e)),
+        }
+    }
+    create().map_err(|e| system("a node cannot be created", e))
 }
 
 /// A service name from a text that is known to be one.

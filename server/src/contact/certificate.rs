@@ -13,16 +13,17 @@
 use crate::bound::{Bound, Volumes};
 use crate::contact::exclusion::clause::{self, Hint, Proof, Term};
 use crate::contact::exclusion::enumeration;
-use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::instant::depth;
 use crate::contact::instant::work::Work;
 use crate::contact::query::outcome::{Contact, NO_FACE, Outcome, Status};
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
-use crate::motion::Relative;
+use crate::motion::{Placed, Relative};
 use crate::solid::local::{self, AND, Expression, LiteralId, OR, Token, Truth};
 use crate::solid::{Node, NodeId, Op, Sense, Solid};
+use contactd_proto::Motion;
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -41,6 +42,8 @@ const HASTE: f64 = 0.85;
 const WITNESS: f64 = 0.995;
 /// Room left for a checker: the box of a proof at a distance holds what is so many times as near.
 const ROOM: f64 = 4.0;
+/// Sides of a cell that may be left differ by no more than about this.
+const SLAB: f64 = 4.0;
 /// How much before `time_lower` the proof of an undecided answer may end, in depths over the fastest speed.
 const BACK: [f64; 3] = [0.0, 10.0, 1000.0];
 /// Combinations of a span above which they are not thinned out.
@@ -93,6 +96,8 @@ pub enum Rest {
     Inside,
     /// Two halves follow: axis and coordinate.
     Split(usize, f64),
+    /// Nothing is said of it: bodies touch in it, or near it.
+    Left,
 }
 
 /// Proves what an answer says; `None` when it says nothing about any time (overlap), or the limit of cells is reached.
@@ -128,7 +133,7 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
         return None;
     }
     if outcome.status() != Status::Undecided {
-        return cover(&task, swapped, outcome, made, query.cell_limit);
+        return cover(&task, swapped, outcome, made, (query.cell_limit, 0.0));
     }
     // The limit may have run out where the bodies are as good as at the depth, too near for what a checker needs: then the
     // proof ends a little earlier.
@@ -136,12 +141,17 @@ pub fn certify(query: &PairQuery, outcome: &Outcome) -> Option<Certificate> {
     let backs = BACK.iter().map(|back| made.until - back * depth / speed).filter(|until| *until >= 0.0);
     let tries: Vec<Certificate> = backs.map(|until| Certificate { until, ..made.clone() }).collect();
     let limit = query.cell_limit / BACK.len() as u64;
-    tries.into_iter().find_map(|made| cover(&task, swapped, outcome, made, limit))
+    tries.into_iter().find_map(|made| cover(&task, swapped, outcome, made, (limit, 0.0)))
 }
 
 /// Proves that no point has f_A <= `level` and f_B <= `level` (a length, positive) until `until`; the cells are bounded at `made`,
 /// a little more than that, which leaves a checker room. `None` when the limit of cells is reached.
 pub fn certify_level(query: &PairQuery, level: f64, made: f64, until: f64) -> Option<Certificate> {
+    level_proof(query, (level, made), until, 0.0)
+}
+
+/// The same, of which cells of radius `left` or less may be left.
+fn level_proof(query: &PairQuery, (level, made): (f64, f64), until: f64, left: f64) -> Option<Certificate> {
     let (mut task, swapped) = Task::of(query);
     let (reference, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
     task.relative = Relative::new(reference.placed, other.placed);
@@ -156,7 +166,30 @@ pub fn certify_level(query: &PairQuery, level: f64, made: f64, until: f64) -> Op
         return Some(made);
     }
     let nothing = Outcome::clear(query.resolution);
-    if root.is_finite() { cover(&task, swapped, &nothing, made, query.cell_limit) } else { None }
+    if root.is_finite() { cover(&task, swapped, &nothing, made, (query.cell_limit, left)) } else { None }
+}
+
+/// Proves where two bodies touch at one time of their motions: but for cells that are left, of radius `left` (radii of the smaller
+/// body), no point has f_A <= `level` and f_B <= `level`. The certificate's motions are those of bodies that stand as they do then.
+/// `None` when the limit of cells is reached.
+pub fn certify_regions(query: &PairQuery, time: f64, level: f64, left: f64) -> Option<Certificate> {
+    let mut query = *query;
+    for body in [&mut query.a, &mut query.b] {
+        let motion = Motion::resting(body.placed.motion.at(time));
+        body.placed = Placed { motion, ..body.placed };
+    }
+    let radius = query.a.model.radius.min(query.b.model.radius);
+    level_proof(&query, (level, 1.25 * level), 0.0, left * radius)
+}
+
+/// The point of a contact's witness (world), and its time.
+pub fn witness_of(query: &PairQuery, outcome: &Outcome) -> Option<(f64, DVec3)> {
+    let (mut task, swapped) = Task::of(query);
+    let (reference, other) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+    let still = task.relative;
+    task.relative = Relative::new(reference.placed, other.placed);
+    let (t, x) = witness(&task, (swapped, &still), outcome, outcome.depth)?;
+    Some((t, task.relative.world_point(&task.relative.at(t), x)))
 }
 
 /// A box around all points with f <= `level` below a node, as its operations bound it.
@@ -174,8 +207,14 @@ fn extent(solid: &Solid, node: NodeId, level: f64) -> Aabb {
     }
 }
 
-/// Covers the box with cells.
-fn cover(task: &Task, swapped: bool, outcome: &Outcome, mut made: Certificate, limit: u64) -> Option<Certificate> {
+/// Covers the box with cells, as many as `limit`; those of radius `left` or less may be left.
+fn cover(
+    task: &Task,
+    swapped: bool,
+    outcome: &Outcome,
+    mut made: Certificate,
+    (limit, left): (u64, f64),
+) -> Option<Certificate> {
     let mut scratch = clause::Scratch::recording();
     let hints = hints(task, swapped, outcome);
     // What lies on itself is left for the checker to see: the trees as they stand.
@@ -185,7 +224,7 @@ fn cover(task: &Task, swapped: bool, outcome: &Outcome, mut made: Certificate, l
         if made.cells.len() as u64 >= limit {
             return None;
         }
-        let mut maker = Maker { task, end: made.until, hints: &hints, scratch: &mut scratch };
+        let mut maker = Maker { task, end: made.until, left, hints: &hints, scratch: &mut scratch };
         let (proof, children) = maker.cell(open);
         made.cells.push(proof);
         stack.extend(children.into_iter().flatten().rev());
@@ -262,6 +301,8 @@ struct Open {
 struct Maker<'a> {
     task: &'a Task<'a>,
     end: f64,
+    /// Cells of this radius or less may be left.
+    left: f64,
     hints: &'a [Hint],
     scratch: &'a mut clause::Scratch,
 }
@@ -318,8 +359,15 @@ impl<'a> Maker<'a> {
                 return (proof, [None, None]);
             }
         }
+        if half.length() <= self.left {
+            proof.rest = Rest::Left;
+            return (proof, [None, None]);
+        }
         // Halves along the axis that costs most.
-        let k = clause::axis_to_halve(cost, half);
+        let dearest = clause::axis_to_halve(cost, half);
+        let longest = half.max_position();
+        // Along faces that touch no cell is ever thin enough: what is to be left must not become a slab.
+        let k = if self.left > 0.0 && half[dearest] * SLAB < half[longest] { longest } else { dearest };
         proof.rest = Rest::Split(k, center[k]);
         let child = |low: bool| {
             let mut region = open.region;
@@ -409,21 +457,10 @@ struct PlacedTree<'a> {
 impl PlacedTree<'_> {
     fn view(&self) -> View<'_> {
         View {
-            a: Faces { solid: self.task.a, clip_planes: &[] },
-            b: Faces { solid: self.task.b, clip_planes: &[] },
-            at: &self.at,
-            motion: self.motion,
-            center: self.center,
-            half: self.half,
-            radius: self.half.length(),
-            center_b: self.at.b_point(self.center),
-            velocity: self.at.velocity(self.center),
-            delta: self.task.delta,
             wall: self.task.delta * (WALL / DEPTH),
-            rounding: self.task.rounding,
-            fits: self.task.strategies.fits,
             multipliers: true,
             curved: false,
+            ..self.task.view((self.center, self.half), &self.at, self.motion, &[])
         }
     }
 }
@@ -593,6 +630,7 @@ impl Certificate {
             let _ = match cell.rest {
                 Rest::Done => writeln!(out, "done"),
                 Rest::Inside => writeln!(out, "inside"),
+                Rest::Left => writeln!(out, "left"),
                 Rest::Split(k, at) => writeln!(out, "split {} {at:e}", ["x", "y", "z"][k]),
             };
         }

@@ -6,6 +6,7 @@
 //! so bodies displaced by d_A and d_B do not meet while d_A + d_B < 2g: a common point x would lie within (d_A + d_B)/2 of
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
+use crate::bound::{Bound, Volumes};
 use crate::contact::certificate::{self, Certificate};
 use crate::contact::convex::ConvexPair;
 use crate::contact::instant::depth;
@@ -13,7 +14,7 @@ use crate::contact::instant::within::{Within, within};
 use crate::contact::instant::work::Work;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
-use crate::contact::query::question::{Body, PairQuery};
+use crate::contact::query::question::{PairQuery, PlacedModel};
 use crate::contact::query::task::Task;
 use crate::contact::queue::scratch::Scratch;
 use crate::contact::queue::search::Search;
@@ -22,6 +23,7 @@ use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::math::tolerance::WIDE_MARGIN;
 use crate::motion::Placed;
+use crate::solid::Solid;
 use contactd_proto::Motion;
 use glam::DVec3;
 
@@ -70,6 +72,20 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
     let counters = *search.counters();
     *scratch = search.into_scratch();
     (ending, counters)
+}
+
+/// How many levels far {f <= level} reaches out of a solid's box (`Solid::aabb`) along an axis, at most: one where faces lie along
+/// the axes, more at sharp edges and apexes. Boxes of primitives grow in proportion to the level, and what operations put together of
+/// them no faster.
+pub fn sharpness(solid: &Solid) -> f64 {
+    let mut most: f64 = 1.0;
+    for p in solid.primitives.iter().filter(|p| p.aabb.is_finite()) {
+        let level = p.shape.geometry().smallest_dimension();
+        let [own, grown] = [0.0, level].map(|level| Bound::of_primitive(p, level, Volumes::Boxes).aabb);
+        let over = (grown.max - own.max).max(own.min - grown.min).max_element() / level;
+        most = if over.is_nan() { f64::INFINITY } else { most.max(over) };
+    }
+    most * (1.0 + 1e-9)
 }
 
 /// A lower bound of the distance of two whole convex primitives at the start of the motion, less their touching
@@ -214,9 +230,9 @@ fn advance(task: &Task, level: f64, work: &Work) -> (f64, bool) {
 }
 
 /// A body that stays where its motion starts.
-fn standing(body: Body<'_>) -> Body<'_> {
+fn standing(body: PlacedModel<'_>) -> PlacedModel<'_> {
     let motion = Motion::resting(body.placed.motion.start);
-    Body { placed: Placed { motion, ..body.placed }, ..body }
+    PlacedModel { placed: Placed { motion, ..body.placed }, ..body }
 }
 
 /// Whether the bodies of a question are within `distance` (a length) of each other at the start, proven or witnessed, and

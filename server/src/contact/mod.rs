@@ -25,7 +25,7 @@ pub use query::outcome::{
     Contact, ContactKind, ContactPoint, Counters, DEFAULT_CELL_LIMIT, Extent, Outcome, Overlap, Penetration, Status,
     Verdict,
 };
-pub use query::question::{Body, PairQuery, Strategies, default_resolution};
+pub use query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
 pub use queue::clock::{Clock, Stage};
 pub use queue::scratch::Scratch;
 pub use region::{Region, RegionPoint, Regions};

@@ -58,8 +58,8 @@ fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
 fn ask_with(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion, strategies: Strategies) -> Outcome {
     let place = Pose::IDENTITY;
     let q = PairQuery {
-        a: Body { model: a, placed: Placed { place, motion: ma } },
-        b: Body { model: b, placed: Placed { place, motion: mb } },
+        a: PlacedModel { model: a, placed: Placed { place, motion: ma } },
+        b: PlacedModel { model: b, placed: Placed { place, motion: mb } },
         resolution: default_resolution(a, b),
         cell_limit: 300_000,
         strategies,
@@ -257,8 +257,8 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
     let ask = |a: &Model, motion: Motion, strategies: Strategies, scratch: &mut Scratch| {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let query = PairQuery {
-            a: Body { model: a, placed: placed(rest()) },
-            b: Body { model: &block, placed: placed(motion) },
+            a: PlacedModel { model: a, placed: placed(rest()) },
+            b: PlacedModel { model: &block, placed: placed(motion) },
             resolution: default_resolution(a, &block),
             cell_limit: 300_000,
             strategies,
@@ -319,8 +319,8 @@ fn a_limit_of_cells_cuts_the_same_bits() {
             turn(Pose::new(v(r(0.31), r(0.47), 0.9), tilt(v(0.2, 0.1, r(0.7)))), v(0.1, 0.2, -1.2), v(0.3, 0.0, 0.4));
         let place = Pose::IDENTITY;
         let query = PairQuery {
-            a: Body { model: &fork, placed: Placed { place, motion: falling } },
-            b: Body { model: &plate, placed: Placed { place, motion: rest() } },
+            a: PlacedModel { model: &fork, placed: Placed { place, motion: falling } },
+            b: PlacedModel { model: &plate, placed: Placed { place, motion: rest() } },
             resolution: default_resolution(&fork, &plate),
             cell_limit: LIMIT,
             strategies: Strategies { convex: false, cavities: false, ..Strategies::default() },

@@ -4,6 +4,7 @@
 //! clients carry a format's name and a file's bytes.
 
 use super::font::{Pattern, machine};
+use super::openscad::{self, Access};
 use super::{Facets, Import, ImportError, Limits, csg, mesh};
 use std::path::Path;
 
@@ -43,10 +44,22 @@ impl Attachment {
     pub fn of_font(pattern: &Pattern) -> String {
         format!("font:{}", pattern.written)
     }
+
+    /// The name of what OpenSCAD warned of when it flattened the text: a line each.
+    pub const WARNINGS: &'static str = "openscad:";
 }
 
 /// Every format that is read. A file whose name ends in none of these ways is taken for one of the first.
-pub const FORMATS: &[Format] = &[csg::FORMAT, mesh::stl::FORMAT, mesh::off::FORMAT, mesh::obj::FORMAT];
+pub const FORMATS: &[Format] = &[
+    csg::FORMAT,
+    mesh::stl::FORMAT,
+    mesh::off::FORMAT,
+    mesh::obj::FORMAT,
+    mesh::threemf::FORMAT,
+    mesh::amf::FORMAT,
+    mesh::ply::FORMAT,
+    mesh::gltf::FORMAT,
+];
 
 /// A file that is in memory.
 #[derive(Clone, Copy, Debug)]
@@ -110,42 +123,76 @@ pub fn read_bytes(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError> 
 #[derive(Clone, Debug)]
 pub struct ModelBytes {
     name: String,
+    format: &'static str,
     bytes: Vec<u8>,
     attached: Vec<Attachment>,
 }
 
 impl ModelBytes {
-    /// Reads a file whose name says what it is, and those that it names: from its own folder and below, nowhere else; and the
-    /// machine's fonts that it names.
+    /// Reads a file whose name says what it is, and those that it names: from its own folder and below, or from the root that
+    /// `access` names, nowhere else; and the machine's fonts that it names. OpenSCAD's own texts are flattened first.
     ///
     /// # Errors
-    /// `Read`, and `Large` when there are more bytes than the limit says; what is wrong with a file that it names is kept for
-    /// who asks for that.
-    pub fn read(path: &Path, limits: &Limits) -> Result<Self, ImportError> {
-        let (name, bytes) = (path.display().to_string(), read_bytes(path, limits)?);
-        let names = (Source::named(&name, &bytes).format()?.names)(&bytes, limits);
+    /// `Read`, `Large` when there are more bytes than the limit says, and `Flatten`; what is wrong with a file that it names is
+    /// kept for who asks for that.
+    pub fn read(path: &Path, access: &Access, limits: &Limits) -> Result<Self, ImportError> {
+        let (mut name, mut warnings) = (path.display().to_string(), Vec::new());
+        let (bytes, format) = if openscad::is_source(path) {
+            let flattened = access.openscad.flatten(path, limits)?;
+            name += ", flattened";
+            warnings = flattened.warnings;
+            (flattened.bytes, csg::FORMAT.name)
+        } else {
+            (read_bytes(path, limits)?, "")
+        };
+        let names = (Source { format, ..Source::named(&name, &bytes) }.format()?.names)(&bytes, limits);
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let root = access.root.as_deref();
         let attach = |named| match named {
-            Named::File(name) => Attachment { bytes: beside(folder, &name, limits), name },
+            Named::File(name) => Attachment { bytes: beside(folder, root, &name, limits), name },
             Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: Attachment::of_font(&pattern) },
         };
-        let attached = names.into_iter().map(attach).collect();
-        Ok(Self { name, bytes, attached })
+        let mut attached: Vec<Attachment> = names.into_iter().map(attach).collect();
+        if !warnings.is_empty() {
+            let bytes = Ok(warnings.join("\n").into_bytes());
+            attached.push(Attachment { name: Attachment::WARNINGS.to_owned(), bytes });
+        }
+        Ok(Self { name, format, bytes, attached })
     }
 
     /// What is read of it.
     pub fn source(&self) -> Source<'_> {
-        Source { attached: Some(&self.attached), ..Source::named(&self.name, &self.bytes) }
+        Source { format: self.format, attached: Some(&self.attached), ..Source::named(&self.name, &self.bytes) }
     }
 }
 
-/// The bytes of a file in a folder or below it.
-fn beside(folder: &Path, name: &str, limits: &Limits) -> Result<Vec<u8>, String> {
-    let unreadable = |e: std::io::Error| format!("{name:?}: {e}");
-    let (root, path) = (folder.canonicalize().map_err(unreadable)?, folder.join(name));
-    let path = path.canonicalize().map_err(unreadable)?;
-    if !path.starts_with(&root) {
-        return Err(format!("{name:?}, which is not in the folder of the text that names it"));
+/// The files that a text which was sent names, in a folder and below. Fonts are those that a text that is sent has anyway.
+pub fn files_of(source: &Source, root: &Path, limits: &Limits) -> Vec<Attachment> {
+    let names = source.format().map(|format| (format.names)(source.bytes, limits)).unwrap_or_default();
+    let files = names.into_iter().filter_map(|named| match named {
+        Named::File(name) => Some(Attachment { bytes: beside(root, Some(root), &name, limits), name }),
+        Named::Font(_) => None,
+    });
+    files.collect()
+}
+
+/// The bytes of a file that a text in `folder` names; it is in `root` or below, which is `folder` unless another one is given.
+fn beside(folder: &Path, root: Option<&Path>, name: &str, limits: &Limits) -> Result<Vec<u8>, String> {
+    let of = |path: &Path| path.canonicalize().map_err(|e| format!("{name:?}: {e}"));
+    let top = match root {
+        None => of(folder)?,
+        Some(root) => {
+            root.canonicalize().map_err(|e| format!("{name:?}, whose import root {}: {e}", root.display()))?
+        }
+    };
+    let path = of(&folder.join(name))?;
+    if !path.starts_with(&top) {
+        return Err(match root {
+            None => {
+                format!("{name:?}, which is not in the folder of the text that names it (--import-root gives another)")
+            }
+            Some(root) => format!("{name:?}, which is not in the import root {}", root.display()),
+        });
     }
     if !path.is_file() {
         return Err(format!("{name:?}, which is no plain file"));
@@ -158,7 +205,7 @@ fn beside(folder: &Path, name: &str, limits: &Limits) -> Result<Vec<u8>, String>
 /// # Errors
 /// What is wrong with the file.
 pub fn read_model(path: &Path, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
-    ModelBytes::read(path, limits)?.source().import(facets, limits)
+    ModelBytes::read(path, &Access::default(), limits)?.source().import(facets, limits)
 }
 
 #[cfg(test)]
@@ -174,7 +221,10 @@ mod tests {
             assert_eq!(of(name, format).unwrap(), "csg", "{name} {format}");
         }
         let sentence = of("part.csg", "step").unwrap_err().to_string();
-        assert_eq!(sentence, "part.csg: expected one of the formats csg, stl, off, obj, found \"step\"");
+        assert_eq!(
+            sentence,
+            "part.csg: expected one of the formats csg, stl, off, obj, 3mf, amf, ply, gltf, found \"step\""
+        );
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; meshes: `mesh`) and scene files (`scene`).
+//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; what flattens them: `openscad`; meshes: `mesh`) and scene files (`scene`).
 //!
 //! A file is read completely or refused with one sentence that names the file, the line, the column, what was expected
 //! and what stands there. Real files are rough; whatever is snapped, flipped, merged or taken in another way than
@@ -12,11 +12,16 @@ pub mod drawing;
 pub mod font;
 pub mod format;
 pub mod mesh;
+pub mod openscad;
 pub mod problem;
 pub mod scene;
+mod surface;
+mod xml;
+mod zip;
 
 pub use csg::import_csg;
-pub use format::{Attachment, FORMATS, Format, ModelBytes, Named, Source, read_bytes, read_model};
+pub use format::{Attachment, FORMATS, Format, ModelBytes, Named, Source, files_of, read_bytes, read_model};
+pub use openscad::{Access, Openscad};
 pub use problem::Problem;
 pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
 
@@ -160,6 +165,14 @@ pub enum ImportError {
         file: String,
         /// How many.
         limit: usize,
+    },
+    /// OpenSCAD did not flatten a text.
+    #[error("{file}: expected OpenSCAD to flatten it, found {found}")]
+    Flatten {
+        /// The file.
+        file: String,
+        /// What happened instead.
+        found: String,
     },
     /// A format that is not read.
     #[error("{file}: expected one of the formats {expected}, found {found:?}")]

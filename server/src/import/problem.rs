@@ -27,6 +27,16 @@ pub enum Problem {
     /// A mesh that is not the surface of a solid.
     #[error("expected a closed mesh, found {0}")]
     Surface(#[from] MeshFault),
+    /// One of several meshes that is not the surface of a solid.
+    #[error("expected closed meshes, found body {number} of {count} to be {fault}")]
+    Body {
+        /// Which one, from 1.
+        number: usize,
+        /// How many there are.
+        count: usize,
+        /// What it is.
+        fault: String,
+    },
     /// Something in another file that the text names.
     #[error("{file}:{at}: {problem}")]
     Named {

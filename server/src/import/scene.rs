@@ -9,9 +9,10 @@ mod rules;
 
 use self::rules::RawRule;
 use super::format::{ModelBytes, Source};
+use super::openscad::Access;
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
-use contactd_proto::{Motion, MotionState, Pose, Rule};
+use contactd_proto::{Motion, MotionState, Pose, Report, Rule};
 use glam::DVec3;
 use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
@@ -42,6 +43,8 @@ pub struct Scene {
     pub notes: Vec<Note>,
     /// What errors call the scene's file.
     pub file: String,
+    /// Where its models' texts may import files from, and what flattens them.
+    pub access: Access,
 }
 
 /// A model of a scene.
@@ -170,7 +173,51 @@ impl Scene {
         let notes = checker.without_effect(&raw, &objects);
         let unit = raw.unit.unwrap_or_default();
         let resolution_at = raw.resolution.as_ref().map(|r| checker.place(r));
-        Ok(Self { unit, resolution, resolution_at, dt, models, objects, rules, notes, file: file.to_owned() })
+        let root = raw.import_root.as_ref().map(|root| checker.root(folder, root)).transpose()?;
+        let (file, access) = (file.to_owned(), Access { root, ..Access::default() });
+        Ok(Self { unit, resolution, resolution_at, dt, models, objects, rules, notes, file, access })
+    }
+
+    /// Models as they stand, each an object at rest that is called as its file is, every pair told with its regions. What is
+    /// wrong with one is told of its file: the scene has none.
+    pub fn of_models(files: &[PathBuf]) -> Self {
+        let mut names: Vec<String> = Vec::with_capacity(files.len());
+        for file in files {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let again = (2..).map(|k| format!("{stem} {k}"));
+            let name = std::iter::once(stem.clone()).chain(again).find(|n| !names.contains(n));
+            names.push(name.unwrap_or(stem));
+        }
+        let model = |(file, name): (&PathBuf, &String)| ModelSource {
+            name: name.clone(),
+            path: file.clone(),
+            at: Place::START,
+        };
+        let object = |(model, name): (usize, &String)| SceneObject {
+            name: name.clone(),
+            at: Place::START,
+            model,
+            group: "default".into(),
+            is_static: false,
+            place: Pose::IDENTITY,
+            motion: MotionState::resting(Pose::IDENTITY).motion,
+            record: None,
+            rotates: true,
+            max_speed: None,
+        };
+        let every = Rule { report: Report::Patch, ..Rule::new(["default".into(), "default".into()]) };
+        Self {
+            unit: String::new(),
+            resolution: None,
+            resolution_at: None,
+            dt: None,
+            models: files.iter().zip(&names).map(model).collect(),
+            objects: names.iter().enumerate().map(object).collect(),
+            rules: vec![every],
+            notes: Vec::new(),
+            file: String::new(),
+            access: Access::default(),
+        }
     }
 
     /// Reads every model of the scene, in order.
@@ -188,8 +235,8 @@ impl Scene {
         mut read: impl FnMut(&Source) -> Result<T, ImportError>,
     ) -> Result<Vec<T>, SceneError> {
         let each = self.models.iter().map(|m| {
-            ModelBytes::read(&m.path, limits).and_then(|file| read(&file.source())).map_err(|e| match e {
-                ImportError::Read { file, reason } => SceneError::Value {
+            ModelBytes::read(&m.path, &self.access, limits).and_then(|file| read(&file.source())).map_err(|e| match e {
+                ImportError::Read { file, reason } if !self.file.is_empty() => SceneError::Value {
                     file: self.file.clone(),
                     at: m.at,
                     expected: "a model file".into(),
@@ -208,6 +255,7 @@ struct RawScene {
     unit: Option<String>,
     resolution: Option<Spanned<f64>>,
     dt: Option<Spanned<f64>>,
+    import_root: Option<Spanned<String>>,
     #[serde(default)]
     model: Vec<RawModel>,
     #[serde(default)]
@@ -288,6 +336,15 @@ impl Checker<'_> {
                 let found = format!("a second {what} \"{}\"", name.as_ref());
                 Err(self.wrong(name, &format!("a name that no other {what} has"), &found))
             }
+        }
+    }
+
+    /// A folder that the scene names.
+    fn root(&self, folder: &Path, value: &Spanned<String>) -> Result<PathBuf, SceneError> {
+        let root = folder.join(value.as_ref());
+        match root.is_dir() {
+            true => Ok(root),
+            false => Err(self.wrong(value, "a folder as import_root", &format!("{:?}", value.as_ref()))),
         }
     }
 
@@ -406,7 +463,7 @@ impl Checker<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contactd_proto::{Detect, InitialOverlap, Report};
+    use contactd_proto::{Detect, InitialOverlap};
     use std::f64::consts::TAU;
 
     const MODELS: &str = "[[model]]\nname = \"m\"\nfile = \"m.csg\"\n";
@@ -497,7 +554,7 @@ mod tests {
         let table = [
             (
                 "colour = 1".into(),
-                "1:1: unknown field `colour`, expected one of `unit`, `resolution`, `dt`, `model`, `object`, `rule`",
+                "1:1: unknown field `colour`, expected one of `unit`, `resolution`, `dt`, `import_root`, `model`, `object`, `rule`",
             ),
             ("unit = ".into(), "1:8: "),
             ("resolution = 0".into(), "1:14: expected a positive finite number as resolution, found 0"),
@@ -543,6 +600,7 @@ mod tests {
                 "7:13: expected dt, the duration of the step in seconds, beside max_speed, found none",
             ),
             (o("speed = 1"), "7:1: unknown field `speed`, expected one of `name`, `model`, `group`, `motion`"),
+            ("import_root = \"none\"".into(), "1:15: expected a folder as import_root, found \"none\""),
             (rule("detect = \"on\""), "9:10: expected \"off\" or \"discrete\" or \"continuous\", found \"on\""),
             (rule("report = \"all\""), "9:10: expected \"hit\" or \"time\" or \"contact\" or \"patch\", found \"all\""),
             (rule("initial_overlap = \"\""), "9:19: expected \"report\" or \"ignore_if_separating\", found \"\""),

@@ -19,7 +19,7 @@ pub struct ServerConfig {
     pub records: usize,
     /// Bytes of a model's text.
     pub text: usize,
-    /// Megabytes of the texts of a session's models together.
+    /// Megabytes of a session's models together: their texts, and 200 bytes a face.
     pub models_mb: u64,
     /// Nodes of a model's tree.
     pub nodes: usize,
@@ -39,6 +39,9 @@ pub struct ServerConfig {
     pub cache: CacheFolder,
     /// Megabytes that the files in it may take; those used longest ago go first.
     pub cache_mb: u64,
+    /// A folder of this machine: texts that clients send may import files of it and below, by names relative to it. None: a text
+    /// that is sent names no files.
+    pub import_root: Option<PathBuf>,
 }
 
 /// Where preprocessed models are kept between runs, if anywhere.
@@ -84,6 +87,7 @@ impl Default for ServerConfig {
             deadline_ms: 0,
             cache: CacheFolder::default(),
             cache_mb: crate::cache::DEFAULT_BYTES >> 20,
+            import_root: None,
         }
     }
 }
@@ -124,6 +128,11 @@ impl ServerConfig {
             ("models_mb", config.models_mb as usize, 1 << 20),
             ("cache_mb", config.cache_mb as usize, 1 << 20),
         ];
+        if let Some(root) = config.import_root.as_ref().filter(|root| !root.is_dir()) {
+            let start = places.get("import_root").map_or(0, |v| v.span().start);
+            let at = crate::import::Place::of_offset(text, start);
+            return Err(format!("{file}:{at}: import_root = {root:?}: expected a folder"));
+        }
         let spin = usize::try_from(config.spin_us).unwrap_or(usize::MAX);
         let deadline = usize::try_from(config.deadline_ms).unwrap_or(usize::MAX);
         let each = bounded.map(|(name, value, most)| (name, value, 1, most));

@@ -5,7 +5,7 @@
 
 use super::config::ServerConfig;
 use crate::cache::{self, Cache, Prepared};
-use crate::import::{self, ImportError, Problem, Source};
+use crate::import::{self, Attachment, ImportError, Problem, Source};
 use crate::math::halt;
 use crate::solid::Sense;
 use crate::world::{MeasuredModel, Refusal};
@@ -13,6 +13,7 @@ use contactd_proto::ErrorCode;
 use contactd_proto::control::{FaceName, Facets, ModelFile};
 use std::collections::HashMap;
 use std::io::Write as _;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// A model as sessions use it.
@@ -26,14 +27,16 @@ pub struct Loaded {
     pub warnings: Vec<String>,
 }
 
-/// A file's content and how it is taken.
-type Key = (Facets, &'static str, Arc<[u8]>);
+/// A file's content with that of the files that it names, and how it is taken.
+type Key = (Facets, &'static str, Arc<[u8]>, Vec<Attachment>);
 
 /// The models in use.
 #[derive(Debug)]
 pub struct Models {
     limits: import::Limits,
     cache: Option<Cache>,
+    /// Where texts may import files from.
+    root: Option<PathBuf>,
     loaded: Mutex<HashMap<Key, Weak<Loaded>>>,
 }
 
@@ -42,7 +45,8 @@ impl Models {
     pub fn new(config: &ServerConfig) -> Self {
         let cache = config.cache.folder().map(|folder| Cache::open(folder, config.cache_mb << 20));
         let cache = cache.and_then(|opened| opened.map_err(|e| warn(&e)).ok());
-        Self { limits: config.import_limits(), cache, loaded: Mutex::new(HashMap::new()) }
+        let (limits, root) = (config.import_limits(), config.import_root.clone());
+        Self { limits, cache, root, loaded: Mutex::new(HashMap::new()) }
     }
 
     /// The model of a file, imported if it is not in use already. May take seconds for a large one.
@@ -53,7 +57,9 @@ impl Models {
         let ModelFile { name, format, bytes } = file;
         let source = Source { name, format, bytes, attached: None };
         let format = source.format().map_err(|e| Refusal::new(ErrorCode::Model, e.to_string()))?;
-        let key = (facets, format.name, Arc::<[u8]>::from(bytes.as_slice()));
+        let attached = self.root.as_ref().map(|root| import::files_of(&source, root, &self.limits));
+        let source = Source { attached: attached.as_deref(), ..source };
+        let key = (facets, format.name, Arc::<[u8]>::from(bytes.as_slice()), attached.clone().unwrap_or_default());
         let known = self.loaded.lock().unwrap_or_else(PoisonError::into_inner).get(&key).and_then(Weak::upgrade);
         if let Some(known) = known {
             return Ok(known);
@@ -130,6 +136,40 @@ mod tests {
     use super::*;
 
     const PART: &str = "difference() { cube(size = [4, 4, 1], center = true); sphere(r = 1); }";
+
+    #[test]
+    fn a_text_that_is_sent_imports_files_of_the_root_that_the_server_has_and_no_others() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("root")).unwrap();
+        let cube = |side: &str| format!("solid\n{}endsolid\n", TETRAHEDRON.replace('9', side));
+        for name in ["root/part.stl", "other.stl"] {
+            std::fs::write(folder.path().join(name), cube("9")).unwrap();
+        }
+        let root = folder.path().join("root");
+        let models = Models::new(&ServerConfig { import_root: Some(root.clone()), ..ServerConfig::default() });
+        let load = |models: &Models, name: &str| {
+            let bytes = format!("import(file = \"{name}\");").into_bytes();
+            models.load(&ModelFile { name: "sent".into(), format: String::new(), bytes }, Facets::Auto)
+        };
+        let first = load(&models, "part.stl").unwrap_or_else(|e| panic!("{}", e.detail));
+        assert_eq!(first.part.model.solid.primitives.len(), 1);
+        assert!(Arc::ptr_eq(&first, &load(&models, "part.stl").expect("the same")));
+        std::fs::write(root.join("part.stl"), cube("8")).unwrap();
+        assert!(!Arc::ptr_eq(&first, &load(&models, "part.stl").expect("another file by now")));
+        let outside = load(&models, "../other.stl").expect_err("outside").detail;
+        assert!(outside.starts_with("sent:1:1: expected a readable file, found \"../other.stl\", which is not in"));
+        let closed = load(&Models::new(&ServerConfig::default()), "part.stl").expect_err("no root").detail;
+        assert!(
+            closed.ends_with("(a text that is sent names no files: send the mesh itself, by its format)"),
+            "{closed}"
+        );
+    }
+
+    /// The facets of a tetrahedron.
+    const TETRAHEDRON: &str = "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 9 0\nvertex 9 0 0\nendloop\nendfacet\n\
+         facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 0 9\nendloop\nendfacet\n\
+         facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 9\nvertex 0 9 0\nendloop\nendfacet\n\
+         facet normal 0 0 0\nouter loop\nvertex 9 0 0\nvertex 0 9 0\nvertex 0 0 9\nendloop\nendfacet\n";
 
     #[test]
     fn whoever_loads_a_text_shares_one_model_while_it_is_in_use() {

@@ -19,9 +19,9 @@ pub struct Scene {
     world: World,
     models: HashMap<u32, Arc<Loaded>>,
     last_model: u32,
-    /// Bytes of the texts of its models, and the most that they may have.
-    text: u64,
-    max_text: u64,
+    /// Bytes that its models count as, and the most that they may.
+    taken: u64,
+    most: u64,
     max_records: usize,
     /// Set for good when the engine failed within a step: its world can no longer be trusted.
     broken: bool,
@@ -57,6 +57,10 @@ impl Integration {
     }
 }
 
+/// What a face of a model counts as, in bytes: the face, its name, its part of the tree and its bounds. A short text may have a million
+/// of them.
+const FACE_BYTES: u64 = 200;
+
 /// A model to be imported.
 #[derive(Debug)]
 pub struct Import {
@@ -75,8 +79,8 @@ impl Scene {
             world: World::new(config.objects, config.batch),
             models: HashMap::new(),
             last_model: 0,
-            text: 0,
-            max_text: config.models_mb << 20,
+            taken: 0,
+            most: config.models_mb << 20,
             max_records: config.records,
             broken: false,
         }
@@ -91,14 +95,28 @@ impl Scene {
     pub fn loaded(&mut self, model: u32, text: usize, loaded: Result<Arc<Loaded>, Refusal>) -> Answer {
         match loaded {
             Ok(loaded) => {
+                let more = text as u64 + FACE_BYTES * loaded.faces.len() as u64;
+                if let Err(refusal) = self.fits(more, &format!("model id {model}")) {
+                    return refused(refusal);
+                }
                 let answer = Answer::Loaded { faces: loaded.faces.clone(), warnings: loaded.warnings.clone() };
                 self.last_model = self.last_model.max(model);
-                self.text += text as u64;
+                self.taken += more;
                 self.models.insert(model, loaded);
                 answer
             }
             Err(refusal) => refused(refusal),
         }
+    }
+
+    /// Refuses a model that would take so much more.
+    fn fits(&self, more: u64, name: &str) -> Result<(), Refusal> {
+        let after = self.taken + more;
+        if after <= self.most {
+            return Ok(());
+        }
+        let detail = format!("{name}: {after} bytes of models, the limit is {}", self.most);
+        Err(Refusal::new(ErrorCode::LimitMemory, detail))
     }
 
     fn obey(&mut self, command: Command) -> Result<CommandOutcome, Refusal> {
@@ -111,11 +129,7 @@ impl Scene {
                     let detail = format!("model id {model} was used before");
                     return Err(Refusal::new(ErrorCode::BadCommand, detail));
                 }
-                let after = self.text + file.bytes.len() as u64;
-                if after > self.max_text {
-                    let detail = format!("{}: {after} bytes of models, the limit is {}", file.name, self.max_text);
-                    return Err(Refusal::new(ErrorCode::LimitMemory, detail));
-                }
+                self.fits(file.bytes.len() as u64, &file.name)?;
                 return Ok(CommandOutcome::Import(Import { model, file, facets }));
             }
             Command::AddObject(spec) => {

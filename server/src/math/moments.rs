@@ -1,6 +1,6 @@
 //! Integrals of 1, the coordinates and their products over a body, and sums of many of them.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Number of integrals.
 pub const COUNT: usize = 10;
@@ -67,6 +67,23 @@ impl Moments {
                     1..=3 => volume * by[k - 1],
                     _ => volume * by[PAIRS[k - 4].0] * by[PAIRS[k - 4].1],
                 }
+        }))
+    }
+
+    /// The image of the body under a linear map M: |det M| times V, M ∫ x, M ∫ xxᵀ Mᵀ.
+    pub fn mapped(&self, map: &DMat3) -> Self {
+        let mut second = [[0.0; 3]; 3];
+        for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+            (second[i][j], second[j][i]) = (self.0[4 + k], self.0[4 + k]);
+        }
+        let (first, second) = (*map * self.first(), *map * DMat3::from_cols_array_2d(&second) * map.transpose());
+        let (by, second) = (map.determinant().abs(), second.to_cols_array_2d());
+        Self(std::array::from_fn(|k| {
+            by * match k {
+                0 => self.volume(),
+                1..=3 => first[k - 1],
+                _ => second[PAIRS[k - 4].0][PAIRS[k - 4].1],
+            }
         }))
     }
 

@@ -231,7 +231,7 @@ impl View<'_> {
                         cut_normal(thing.cut.as_deref().unwrap_or(&[]), point)
                     } else {
                         let face = &thing.traced.solid.faces[c.face as usize];
-                        let n = face.at(local.at(c.at)).normal;
+                        let n = face.unit_normal(local.at(c.at));
                         thing.pose.vector(if c.outward { n } else { -n })
                     };
                     best = Some(Hit { object: i as u32, face: c.face, at: c.at, point, normal });

@@ -17,14 +17,14 @@ const FEW_HOLES: usize = 32;
 
 /// A convex primitive less some others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct PiercedPart {
     /// Index of the primitive.
     pub main: u32,
     /// The innermost group of holes.
     holes: Option<u32>,
 }
 
-impl Part {
+impl PiercedPart {
     /// True when something is subtracted from it.
     pub fn is_pierced(&self) -> bool {
         self.holes.is_some()
@@ -45,7 +45,7 @@ struct Group {
 /// The parts of which a solid is the union.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
-    parts: Vec<Part>,
+    parts: Vec<PiercedPart>,
     groups: Vec<Group>,
 }
 
@@ -58,7 +58,7 @@ impl Parts {
     }
 
     /// All parts, in the tree's order.
-    pub fn all(&self) -> &[Part] {
+    pub fn all(&self) -> &[PiercedPart] {
         &self.parts
     }
 
@@ -69,7 +69,7 @@ impl Parts {
 
     /// The hole of a part that a point is deepest in, or else nearest to; the first of equals. Of thousands most are dropped by
     /// their balls.
-    pub fn deepest<'s>(&self, solid: &'s Solid, part: Part, point: DVec3) -> Option<&'s Primitive> {
+    pub fn deepest<'s>(&self, solid: &'s Solid, part: PiercedPart, point: DVec3) -> Option<&'s Primitive> {
         // Value, place in the part's order, index.
         let mut best: Option<(f64, u32, u32)> = None;
         let mut before = 0;
@@ -98,7 +98,7 @@ impl Parts {
     }
 
     /// Groups of holes of a part, the inner ones first.
-    fn groups_of(&self, part: Part) -> impl Iterator<Item = &Group> {
+    fn groups_of(&self, part: PiercedPart) -> impl Iterator<Item = &Group> {
         let group = |g: Option<u32>| g.map(|g| &self.groups[g as usize]);
         std::iter::successors(group(part.holes), move |g| group(g.outer))
     }
@@ -107,7 +107,7 @@ impl Parts {
     fn take(&mut self, solid: &Solid, node: NodeId, outer: Option<u32>) -> Option<()> {
         match &solid.nodes[node as usize] {
             Node::Primitive(p) if self.parts.len() < MOST_PARTS && has_no_formula(solid, *p) => {
-                self.parts.push(Part { main: *p, holes: outer });
+                self.parts.push(PiercedPart { main: *p, holes: outer });
             }
             Node::Op(Op::Union, children) => children.iter().try_for_each(|c| self.take(solid, *c, outer))?,
             Node::Op(Op::Difference, children) => {
@@ -176,7 +176,7 @@ mod tests {
         assert_eq!(parts.all().iter().map(|p| p.main).collect::<Vec<_>>(), [0, 1]);
         assert_eq!((holes(&parts, 0), holes(&parts, 1)), (vec![5], vec![2, 3, 4, 5]));
         assert_eq!(parts.groups.iter().map(|g| g.holes.len()).sum::<usize>(), 4);
-        assert!(parts.are_pierced() && parts.all().iter().all(Part::is_pierced));
+        assert!(parts.are_pierced() && parts.all().iter().all(PiercedPart::is_pierced));
     }
 
     #[test]

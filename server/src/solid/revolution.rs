@@ -27,6 +27,7 @@ impl Revolution {
                 Symmetry::Axis(axis) => return is_symmetric(solid, &axis, extent).then_some(Self::Axis(axis)),
                 Symmetry::Center(c) => center = Some(c),
                 Symmetry::Normal(_) => {}
+                Symmetry::None => return None,
             }
         }
         center.map(Self::Center)
@@ -50,6 +51,7 @@ fn is_symmetric(solid: &Solid, axis: &Axis, extent: f64) -> bool {
         Symmetry::Normal(normal) => axis.is_along(normal),
         Symmetry::Center(center) => axis.passes(center, extent),
         Symmetry::Axis(own) => axis.is_along(own.direction) && axis.passes(own.origin, extent),
+        Symmetry::None => false,
     })
 }
 

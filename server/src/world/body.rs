@@ -5,7 +5,7 @@
 //! leaves the ball of radius |c| around the origin's path, nor goes farther from its start than `travel` tells. The smallest of
 //! these bounds is taken, side by side.
 
-use crate::contact::Hull;
+use crate::contact::{Hull, clearance};
 use crate::math::{Aabb, tolerance};
 use crate::octree::Model;
 use contactd_proto::{Motion, MotionState, Pose};
@@ -23,6 +23,8 @@ pub struct MeasuredModel {
     pub resolution: f64,
     /// Smallest dimension of its primitives; infinite for a solid without any.
     pub smallest: f64,
+    /// How many levels far {f <= level} reaches out of its box.
+    sharpness: f64,
 }
 
 impl MeasuredModel {
@@ -34,7 +36,17 @@ impl MeasuredModel {
         // An unbounded or empty solid has no size of its own: its partner's decides.
         let resolution =
             Some(crate::contact::default_resolution(&model, &model)).filter(|r| r.is_finite()).unwrap_or(0.0);
-        Self { model, aabb, resolution, smallest }
+        let sharpness = clearance::sharpness(&model.solid);
+        Self { model, aabb, resolution, smallest, sharpness }
+    }
+}
+
+impl MeasuredModel {
+    /// How far {f <= level} reaches out of a box around the solid, however it is turned, at most: at sharp edges and apexes that is
+    /// farther than the level.
+    pub fn reach_of_level(&self, level: f64) -> f64 {
+        // The box grows along three axes.
+        if level > 0.0 { 3f64.sqrt() * self.sharpness * level } else { 0.0 }
     }
 }
 

@@ -73,6 +73,8 @@ pub struct PredictedMotion {
 #[derive(Clone, Copy, Debug)]
 struct Answer {
     motions: [Motion; 2],
+    /// When the step began in which it was searched, in steps.
+    begin: f64,
     /// Of the first contact alone more is asked than of others.
     query_options: QueryOptions,
     /// Work that it might take. Another limit has the same answer where none of both cuts it.
@@ -96,8 +98,10 @@ pub struct PairCache {
     /// The predicted motion still holds.
     on_prediction: bool,
     answer: Option<Box<Answer>>,
-    /// The answer is still that of the last question.
+    /// The answer is still that of the last question that was searched.
     answered: bool,
+    /// It is that of the question in hand.
+    is_in_hand: bool,
     /// What was told of that answer, if all of it could be found out.
     reported: Option<Box<Reported>>,
     /// Steps and clearance of the next predicted motion; 0 until there was one.
@@ -155,12 +159,14 @@ impl PairCache {
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> Option<(Outcome, Option<f64>)> {
+        self.is_in_hand = false;
         if let Some(last) = self.answer.as_ref().filter(|_| self.answered)
             && last.motions.iter().zip(&q.motions()).all(|(p, q)| same_bits(p, q))
             && last.query_options == q.query.query_options
             && (last.limit == q.query.cell_limit || last.outcome.counters.fits(q.query.cell_limit.min(last.limit)))
         {
             self.via = Via::Answer;
+            self.is_in_hand = true;
             return Some((last.outcome, None));
         }
         let clear = || Outcome::clear(q.query.resolution);
@@ -204,9 +210,12 @@ impl PairCache {
         self.reported.as_deref()
     }
 
-    /// Remembers what is told of the last answer.
+    /// Remembers what is told beside the answer to the question in hand. What is told where something else has shown the pair apart belongs
+    /// to no answer that is kept.
     pub fn report(&mut self, reported: Reported) {
-        self.reported = self.answered.then(|| Box::new(reported));
+        if self.answered && self.is_in_hand {
+            self.reported = Some(Box::new(reported));
+        }
     }
 
     /// Plans a predicted motion, unless others have failed of late.
@@ -262,6 +271,11 @@ impl PairCache {
         true
     }
 
+    /// When the step began in which the last answer was searched, in steps.
+    pub fn answered_at(&self) -> Option<f64> {
+        self.answer.as_ref().filter(|_| self.answered).map(|answer| answer.begin)
+    }
+
     /// What has answered last, and the predicted motion it was.
     pub fn via(&self) -> (Via, Option<&PredictedMotion>) {
         (self.via, self.prediction.as_deref())
@@ -279,7 +293,8 @@ impl PairCache {
         self.answered = outcome.status() != Status::Undecided && !open && !(cheap && moves());
         if self.answered {
             let (motions, query_options) = (q.motions(), q.query.query_options);
-            put(&mut self.answer, Answer { motions, query_options, limit, outcome: *outcome });
+            self.is_in_hand = true;
+            put(&mut self.answer, Answer { motions, begin: q.clock, query_options, limit, outcome: *outcome });
             self.reported = None;
         }
     }
@@ -346,7 +361,9 @@ impl PredictedMotion {
             // Chords of the angle at the start and of what it grows by, at the farthest point.
             let turning = 2.0 * turned + (motion.spin - spin).length();
             let size = motion.start.position.abs().max_element() + pose.position.abs().max_element() + body.reach();
-            let arm = body.reach() + self.clearance;
+            // Within a margin it is f that counts: of points that may lie farther out than that.
+            let beyond = body.part.reach_of_level(if q.margin > 0.0 { 0.5 * (q.margin + self.clearance) } else { 0.0 });
+            let arm = body.reach() + self.clearance.max(beyond);
             sum += off.length().max(later.length()) + turning.min(2.0) * arm + size * ROUNDING;
         }
         Some(sum)

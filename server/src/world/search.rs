@@ -49,6 +49,8 @@ pub struct PairJob {
     is_blank: bool,
     /// Its answer was found, but for what a queue over all pairs adds.
     is_done: bool,
+    /// The queue has left it, searched no further than to prove it free until after the scene's first contact.
+    pub(super) is_left: bool,
     /// The answer.
     pub found: Finding,
 }
@@ -67,7 +69,8 @@ impl PairJob {
         let (pair, pair_cache): (_, Option<Box<PairCache>>) = pair.unzip();
         // Looked up here, where many jobs are made in a row and the memory can answer several at a time.
         let is_blank = pair_cache.as_deref().is_none_or(PairCache::is_blank);
-        Self { a, b, plan, plan_index, resolution, near, pair, pair_cache, is_blank, is_done: false, found }
+        let (is_done, is_left) = (false, false);
+        Self { a, b, plan, plan_index, resolution, near, pair, pair_cache, is_blank, is_done, is_left, found }
     }
 
     pub(super) fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
@@ -307,7 +310,9 @@ fn run_queue(
         let search = &mut searches[i];
         if time > horizon {
             let verdict = Verdict::Clear { until: time.min(1.0), rest: None };
-            open[i].found.outcome = Outcome { verdict, counters: search.counters(), ..open[i].found.outcome };
+            let (depth, past, counters) = (search.depth(), search.is_past(), search.counters());
+            open[i].found.outcome = Outcome { verdict, depth, past, counters, ..open[i].found.outcome };
+            open[i].is_left = true;
             continue;
         }
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
@@ -336,7 +341,7 @@ pub(super) fn query<'a>(bodies: &'a [Body], job: &PairJob, options: &StepOptions
         let body = &bodies[index as usize];
         let discrete = job.plan.detect == Detect::Discrete;
         let motion = if discrete { Motion::resting(body.motion_state.end) } else { body.motion_state.motion };
-        contact::Body { model: &body.part.model, placed: Placed { place: body.place, motion } }
+        contact::PlacedModel { model: &body.part.model, placed: Placed { place: body.place, motion } }
     };
     PairQuery {
         a: side(job.a),

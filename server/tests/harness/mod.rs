@@ -50,6 +50,22 @@ impl ServerProcess {
         rustix::process::Pid::from_child(&self.child)
     }
 
+    /// SIGSTOP, and waits until every thread of the server has stopped: the signal alone leaves it time for an answer.
+    pub fn freeze(&self) {
+        rustix::process::kill_process(self.pid(), rustix::process::Signal::STOP).unwrap();
+        let tasks = format!("/proc/{}/task", self.child.id());
+        // The state stands behind the name, which ends with the last parenthesis.
+        let stopped = |task: std::io::Result<std::fs::DirEntry>| {
+            let stat = task.and_then(|t| std::fs::read_to_string(t.path().join("stat"))).unwrap_or_default();
+            stat.rsplit_once(") ").is_none_or(|(_, rest)| rest.starts_with('T'))
+        };
+        let until = Instant::now() + PATIENCE;
+        while !std::fs::read_dir(&tasks).unwrap().all(stopped) {
+            assert!(Instant::now() < until, "the server does not stop");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
     /// SIGKILL: nothing is cleaned up.
     pub fn kill(&mut self) {
         self.child.kill().expect("a running server");

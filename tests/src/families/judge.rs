@@ -9,7 +9,7 @@ use super::draw::Draw;
 use super::{Course, Field, Scene};
 use crate::engine::ReportedPoint as _;
 use contactd::contact::{Outcome, Status};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, dvec3};
 
 /// How hard the judge looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -240,8 +240,43 @@ impl Pair {
         places.truncate(kept);
         // Between like round faces the deepest place is far away and hardly downhill.
         let firsts = [10.0, 1e3, 1e5, 1e7].map(|k| (k * delta).min(0.3 * self.size));
+        let slides = [1e-1, 1e-2, 1e-3].map(|k| k * self.size);
         let mut is_deep = |x: DVec3, first: f64| -self.deepen(0.0, x, None, first, 600, draw).0 >= 0.9 * delta;
-        places.into_iter().any(|(_, x)| firsts.iter().any(|first| is_deep(x, *first)))
+        if places.iter().any(|(_, x)| firsts.iter().any(|first| is_deep(*x, *first))) {
+            return true;
+        }
+        let mut is_deep = |x: DVec3, first: f64| -self.slide(&m, x, first, 400, draw) >= 0.9 * delta;
+        places.iter().take(24).any(|(_, x)| slides.iter().any(|first| is_deep(*x, *first)))
+    }
+
+    /// A point beside x that is as deep in the one body as in the other, along what their gradients differ by.
+    fn levelled(&self, m: &Moment, mut x: DVec3) -> DVec3 {
+        let h = 1e-7 * self.size;
+        for _ in 0..2 {
+            let y = m.in_b(x);
+            let apart = self.a.gradient(x, h) - m.a.transpose() * (m.b * self.b.gradient(y, h));
+            if apart.length_squared() < 1.0 {
+                break;
+            }
+            x -= apart * ((self.a.value(x) - self.b.value(y)) / apart.length_squared());
+        }
+        x
+    }
+
+    /// The depth (f, below 0 inside) that is reached from x by lot in the middle of the layer that both bodies have in
+    /// common: between like round faces that is thinner by far than it is wide, and each step is led back to it.
+    fn slide(&self, m: &Moment, x: DVec3, mut step: f64, most: usize, draw: &mut Draw) -> f64 {
+        let mut x = self.levelled(m, x);
+        let mut best = self.common(m, x);
+        for _ in 0..most {
+            let y = self.levelled(m, x + dvec3(draw.normal(), draw.normal(), draw.normal()) * step);
+            let v = self.common(m, y);
+            step *= if v < best { 1.5 } else { 0.85 };
+            if v < best {
+                (x, best) = (y, v);
+            }
+        }
+        best
     }
 
     /// The deepest common point found at `time_upper`, near the contact first (x in a's frame), then anywhere; the search

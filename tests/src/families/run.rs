@@ -28,7 +28,7 @@ pub struct Answer {
 
 impl Answer {
     /// What the judge of records finds in it.
-    fn lies(&self) -> Vec<(Lie, String)> {
+    pub fn lies(&self) -> Vec<(Lie, String)> {
         let moving = |id: u32| {
             let body = self.check.world.body(id).expect("a body of the pair");
             (body.part.model.clone(), body.place, body.motion_state.motion)

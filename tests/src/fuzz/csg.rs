@@ -108,7 +108,7 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
 }
 
 /// What a solid that was loaded must be able to answer.
-fn ask_all(solid: &Solid, thorough: bool) -> Result<(), String> {
+pub(super) fn ask_all(solid: &Solid, thorough: bool) -> Result<(), String> {
     for x in [DVec3::ZERO, DVec3::new(0.1, 0.2, 0.3), DVec3::new(-1e3, 7.0, 1e-9)] {
         if solid.value(x).is_nan() {
             return Err(format!("f is NaN at {x}"));
@@ -132,7 +132,7 @@ fn ask_all(solid: &Solid, thorough: bool) -> Result<(), String> {
 }
 
 /// A sentence without its numbers and quotations: its kind.
-fn family(sentence: &str) -> String {
+pub(super) fn family(sentence: &str) -> String {
     let head = sentence.split(", found").next().unwrap_or(sentence);
     let head: String = head.chars().filter(|c| c.is_ascii_alphabetic() || *c == ' ').collect();
     head.split_whitespace().take(12).collect::<Vec<_>>().join(" ")

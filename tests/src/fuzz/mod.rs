@@ -11,6 +11,7 @@ mod cache;
 mod control;
 mod csg;
 mod drive;
+mod files;
 mod reader;
 mod scenes;
 mod steps;
@@ -40,7 +41,8 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 5] = [csg::TARGET, control::TARGET, steps::TARGET, scenes::TARGET, cache::TARGET];
+pub const TARGETS: [Target; 7] =
+    [csg::TARGET, control::TARGET, steps::TARGET, scenes::TARGET, cache::TARGET, files::MESHES, files::DRAWINGS];
 
 /// What must hold of any outcome, whatever was asked.
 fn sound(o: &Outcome) -> Result<(), String> {

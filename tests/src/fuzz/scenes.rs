@@ -6,7 +6,7 @@ use crate::engine::ReportedPoint as _;
 use crate::reference::{self, Effort, Moving, Verdict};
 use crate::scenes::Recipe;
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -33,7 +33,7 @@ fn leaf(r: &mut Reader, size: f64) -> Recipe {
     // Sizes from a small set: faces, axes and apexes of different leaves fall together.
     let mut s = || size * r.one_of(&[0.5, 1.0, 0.25, 0.75]);
     let (x, y, z) = (s(), s(), s());
-    let shape = match r.below(8) {
+    let shape = match r.below(9) {
         0 => Recipe::sphere(x),
         1 => Recipe::cylinder(x, y),
         2 => Recipe::cone(x, 0.0, y),
@@ -41,6 +41,7 @@ fn leaf(r: &mut Reader, size: f64) -> Recipe {
         4 => Recipe::cone(0.0, x, y),
         5 => Recipe::cuboid(x, y, z),
         6 => Recipe::torus(x, 0.5 * y),
+        7 => Recipe::ellipsoid(x, y, z),
         _ => Recipe::platonic(r.one_of(&[4, 6, 8, 12, 20]), x),
     };
     match r.below(4) {
@@ -112,8 +113,8 @@ fn run(bytes: &[u8], thorough: bool) -> Result<String, String> {
         return Ok("empty".into());
     }
     let query = PairQuery {
-        a: Body { model: &a, placed: placed_a },
-        b: Body { model: &b, placed: placed_b },
+        a: PlacedModel { model: &a, placed: placed_a },
+        b: PlacedModel { model: &b, placed: placed_b },
         resolution,
         cell_limit: CELLS,
         strategies: Default::default(),

@@ -7,7 +7,7 @@
 use crate::formula::{Formula, formula_of};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Solid, surface};
 use contactd_proto::Pose;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// One face with its sign: +psi of a positive primitive, −psi of a subtracted one.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,10 @@ impl Literal {
                 Face::Torus(surface::Torus { origin, axis, major, minor }) => {
                     (axis.cross(x - origin).length() - major).hypot(axis.dot(x - origin)) - minor
                 }
+                Face::Elliptic(e) => {
+                    let e = Image::of(&e);
+                    e.across(x).length() - e.fall * e.local(x).z - e.radius
+                }
             }
     }
 
@@ -50,6 +54,10 @@ impl Literal {
                     let out = across(origin, axis);
                     (x - origin - out * major).normalize_or(out)
                 }
+                Face::Elliptic(e) => {
+                    let e = Image::of(&e);
+                    e.turn * (e.across(x).normalize_or(DVec3::X) * e.scale - DVec3::Z * e.fall)
+                }
             }
     }
 
@@ -57,8 +65,54 @@ impl Literal {
     pub fn apex(&self) -> Option<(DVec3, DVec3, f64)> {
         match self.face {
             Face::Cone(surface::Cone { apex, axis, sin, .. }) if self.sign > 0.0 => Some((apex, axis, sin)),
+            Face::Elliptic(e) if self.sign > 0.0 && e.third < 0.0 => {
+                Some((e.origin, Image::of(&e).turn * DVec3::Z, -e.third))
+            }
             _ => None,
         }
+    }
+}
+
+/// An elliptic face by its numbers: psi = |(s_k y_k)| − fall y_z − radius with y = turnᵀ(x − origin).
+#[derive(Clone, Copy, Debug)]
+pub struct Image {
+    /// Centre, a point of the axis, or the apex.
+    pub origin: DVec3,
+    /// Principal axes.
+    pub turn: DQuat,
+    /// s.
+    pub scale: DVec3,
+    /// sin α of a cone.
+    pub fall: f64,
+    /// r.
+    pub radius: f64,
+}
+
+impl Image {
+    /// 2⁻⁴⁷ less than 1: what stands for it.
+    pub const WHOLE: f64 = 1.0 - 1.0 / (1u64 << 47) as f64;
+
+    /// A tangent of a quarter of an angle about an axis is a quaternion's vector over one more than its scalar.
+    pub fn of(e: &surface::Elliptic) -> Self {
+        let square = e.turn.length_squared();
+        let v = e.turn * (2.0 / (1.0 + square));
+        let turn = DQuat::from_xyzw(v.x, v.y, v.z, (1.0 - square) / (1.0 + square)).normalize();
+        let (scale, fall, radius) = if e.third < 0.0 {
+            (DVec3::new(e.size, e.second, 0.0), -e.third, 0.0)
+        } else {
+            (DVec3::new(Self::WHOLE, e.second, e.third), 0.0, e.size)
+        };
+        Self { origin: e.origin, turn, scale, fall, radius }
+    }
+
+    /// A point along its axes.
+    pub fn local(&self, x: DVec3) -> DVec3 {
+        self.turn.conjugate() * (x - self.origin)
+    }
+
+    /// (s_k y_k).
+    pub fn across(&self, x: DVec3) -> DVec3 {
+        self.local(x) * self.scale
     }
 }
 
@@ -200,6 +254,11 @@ fn moved(face: &Face, place: &Pose) -> Face {
         }
         Face::Torus(surface::Torus { origin, axis, major, minor }) => {
             Face::Torus(surface::Torus { origin: point(origin), axis: turned(axis), major, minor })
+        }
+        Face::Elliptic(e) => {
+            let q = place.rotation * Image::of(&e).turn;
+            let q = if q.w < 0.0 { -q } else { q };
+            Face::Elliptic(surface::Elliptic { origin: point(e.origin), turn: q.xyz() / (1.0 + q.w), ..e })
         }
     }
 }

@@ -5,7 +5,7 @@
 //! middle, Hessian over the box) and by its gradient over the box; where that does not suffice the box or the span is
 //! halved, up to a budget. A budget that runs out is a refusal.
 
-use super::interval::{Interval, Jet, Vector, ZERO, dot, minus, place, point, times, unit, vector};
+use super::interval::{Interval, Jet, Vector, ZERO, cross, dot, minus, place, plus, point, times, unit, vector};
 use super::motion::{Motions, in_a};
 use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
@@ -304,6 +304,11 @@ impl Bounder<'_> {
                 let off = square_length(&across(&o, axis)).sqrt().plus(point(-major));
                 (off.square() + linear(axis, &o).square()).sqrt().plus(point(-minor))
             }
+            Face::Elliptic(ref e) => {
+                let (rows, fall, radius) = image(e);
+                let o = offsets(y, e.origin);
+                square_length(&rows.map(|row| linear(row, &o))).sqrt() - linear(fall, &o).plus(radius)
+            }
         }
     }
 
@@ -395,6 +400,15 @@ impl Bounder<'_> {
                 let wider = point((point(major) - point(major_q)).mag());
                 point(minor_q) - point(minor) - length(minus(place(o), place(u))) - wider - lean * point(major_q)
             }
+            // psi_p − psi_q >= R_q − R_p + w_p·Δ − |B_p Δ| − |x − o_q| (|B_p − B_q| + |w_p − w_q|), rows turned alike.
+            (Face::Elliptic(ref one), Face::Elliptic(ref other)) => {
+                let ((p, w, r), (q, v, s)) = (image(one), image(other));
+                let like = |a: Vector, b: Vector| if dot(a, b).hi < 0.0 { times(point(-1.0), b) } else { b };
+                let off = |k: usize| length(minus(p[k], like(p[k], q[k])));
+                let lean = off(0) + off(1) + off(2) + length(minus(w, v));
+                let delta = minus(place(one.origin), place(other.origin));
+                s - r + dot(w, delta) - length(p.map(|row| dot(row, delta))) - lean * far(other.origin)
+            }
             _ => return None,
         };
         let any = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
@@ -421,7 +435,7 @@ impl Bounder<'_> {
         }
         if p.0.on_b == q.0.on_b {
             let wall = self.wall(p.1, q.1, if p.0.on_b { b } else { a })?;
-            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone(_)) {
+            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone(_) | Face::Elliptic(_)) {
                 return Some(wall);
             }
         }
@@ -535,6 +549,29 @@ fn square_length(y: &[Jet; 3]) -> Jet {
     y[0].square() + y[1].square() + y[2].square()
 }
 
+/// B, w and r of an elliptic face, from its numbers: with p = `turn` and s = |p|², the quaternion (2p, 1 − s)/(1 + s).
+fn image(e: &surface::Elliptic) -> ([Vector; 3], Vector, Interval) {
+    let p = vector(e.turn.to_array());
+    let s = p[0].square() + p[1].square() + p[2].square();
+    let per = (point(1.0) + s).recip();
+    let (v, w) = (times(point(2.0) * per, p), (point(1.0) - s) * per);
+    let two = point(2.0);
+    // Column k: e + 2 w v × e + 2 v × (v × e).
+    let column = |k: usize| {
+        let unit: Vector = std::array::from_fn(|i| point(if i == k { 1.0 } else { 0.0 }));
+        let once = cross(v, unit);
+        plus(unit, plus(times(two * w, once), times(two, cross(v, once))))
+    };
+    let zero = [ZERO; 3];
+    if e.third < 0.0 {
+        let rows = [times(point(e.size), column(0)), times(point(e.second), column(1)), zero];
+        return (rows, times(point(-e.third), column(2)), ZERO);
+    }
+    let whole = 1.0 - 1.0 / (1u64 << 47) as f64;
+    let third = if e.third == 0.0 { zero } else { times(point(e.third), column(2)) };
+    ([times(point(whole), column(0)), times(point(e.second), column(1)), third], zero, point(e.size))
+}
+
 /// A unit vector made a little shorter than 1 for certain.
 fn short(v: DVec3) -> Vector {
     times(point(1.0 - 1e-15), vector(v.normalize_or_zero().to_array()))
@@ -577,6 +614,15 @@ fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
             let rho =
                 if lean < 0.0 { square_length(&across(&o, a)).sqrt() } else { linear(perpendicular(axis, origin), &o) };
             rho.plus(point(-major)).scaled(point(lean)) + linear(a, &o).scaled(point(up)).plus(point(-minor))
+        }
+        Face::Elliptic(ref e) => {
+            let (rows, fall, radius) = image(e);
+            let o = at - e.origin;
+            let middle = |row: Vector| DVec3::from_array(row.map(|x| 0.5 * (x.lo + x.hi))).dot(o);
+            let n = short(DVec3::from_array(rows.map(middle)));
+            let y = offsets(y, e.origin);
+            let v = rows.map(|row| linear(row, &y));
+            linear(n, &v) - linear(fall, &y).plus(radius)
         }
     }
 }

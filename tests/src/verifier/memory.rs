@@ -7,7 +7,7 @@
 
 use super::interval::{Interval, Vector, apply, dot, minus, plus, point, product, times, transpose, vector};
 use super::motion::{Motions, rotation, turned};
-use super::{Bounder, Checked, Region, certain, check_level, expression, extent, extent_in, number};
+use super::{Bounder, Checked, Region, certain, check_cells, check_level, expression, extent, extent_in, number};
 use contactd::motion::Placed;
 use contactd::solid::{Node, NodeId, Op, Shape, Solid};
 use contactd_proto::{Motion, Pose};
@@ -26,7 +26,31 @@ pub enum Proven {
     Answer(Checked),
     /// The same question: in each other at the start.
     Overlap,
+    /// Of a step that asks for its first contact: free of contact until later than that.
+    Horizon {
+        /// When the first pair has met.
+        first: f64,
+        /// Until then this one has not.
+        until: f64,
+    },
+    /// The same question: farther apart than a threshold.
+    Apart {
+        /// The threshold.
+        threshold: f64,
+        /// Until then.
+        until: f64,
+    },
+    /// The same question: touching where it is told, and nowhere else.
+    Regions {
+        /// How near is touching.
+        threshold: f64,
+        /// When.
+        time: f64,
+    },
 }
+
+/// Two bodies that a certificate names beside its own, as they move in the step, and their pair's resolution.
+pub type Others<'a> = dyn Fn(u32, u32) -> Option<([Truth<'a>; 2], f64)> + 'a;
 
 /// A body as it truly is in the step.
 #[derive(Clone, Copy, Debug)]
@@ -155,6 +179,17 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
         Shape::Torus(t) => {
             point(t.major) * across + point(t.minor) * (n[0].square() + n[1].square() + n[2].square()).sqrt()
         }
+        Shape::Ellipsoid(e) => {
+            let [a, b, c] = std::array::from_fn(|k| (point(e.semi[k]) * n[k]).square());
+            (a + b + c).sqrt()
+        }
+        Shape::EllipticFrustum(c) => {
+            let rim = ((point(c.semi.x) * n[0]).square() + (point(c.semi.y) * n[1]).square()).sqrt();
+            let up = n[2] + point(c.lean.x) * n[0] + point(c.lean.y) * n[1];
+            let top = point(c.half_height) * up + point(c.top) * rim;
+            let bottom = point(-c.half_height) * up + point(c.bottom) * rim;
+            point(top.hi.max(bottom.hi))
+        }
         Shape::HalfSpace(_) => return f64::INFINITY,
     };
     (at + own).hi
@@ -281,12 +316,32 @@ fn strays(body: &Truth, expected: &Motion) -> f64 {
     (off.length().max(later.length()) + turning * body.reach) * (1.0 + 1e-14) + 4.0 * f64::EPSILON * size
 }
 
+/// True when a point of the world lies for certain at a depth in both bodies at a time; of a negative depth: no farther from them, as
+/// f measures it. `inside_out`: of what is not in the bodies.
+fn is_deep(bodies: &[Truth; 2], x: DVec3, t: f64, depth: f64, inside_out: [bool; 2]) -> bool {
+    let [a, b] = bodies;
+    let place = a.placed.place.inverse();
+    let x = place.point(a.placed.motion.at(t).inverse().point(x));
+    let motions = Motions::new(&a.placed, &b.placed);
+    let mut bounder = Bounder { a: a.solid, b: b.solid, motions, depth, evaluations: 0, exhausted: false };
+    let region = Region([(x.x, x.x), (x.y, x.y), (x.z, x.z), (t, t)]);
+    let own = expression(a.solid, a.solid.root, inside_out[0], false);
+    let other = expression(b.solid, b.solid.root, inside_out[1], true);
+    certain(&mut bounder, &own, region) && certain(&mut bounder, &other, region)
+}
+
 /// Checks the certificate of one pair: its text, the two bodies as they truly move in the step (the one with the smaller id
 /// first) and the resolution of the pair. Apart means: by more than the resolution.
 ///
 /// # Errors
 /// The first thing that is not certain.
-pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -> Result<Proven, String> {
+pub fn check(
+    text: &str,
+    ids: (u32, u32),
+    bodies: [Truth; 2],
+    resolution: f64,
+    others: &Others,
+) -> Result<Proven, String> {
     let (head, rest) = text.split_once('\n').ok_or("no line")?;
     let words: Vec<&str> = head.split(' ').collect();
     let ["pair", a, b, kind, words @ ..] = words.as_slice() else { return Err("not the head of a pair".into()) };
@@ -340,24 +395,142 @@ pub fn check(text: &str, ids: (u32, u32), bodies: [Truth; 2], resolution: f64) -
             if let Some(x) = rest.strip_prefix("overlap ") {
                 let words: Vec<&str> = x.trim_end().split(' ').collect();
                 let x = Numbers::of(&words)?.vector()?;
-                let place = a.placed.place.inverse();
-                let x = place.point(a.placed.motion.start.inverse().point(x));
-                let motions = Motions::new(&a.placed, &b.placed);
-                let mut bounder =
-                    Bounder { a: a.solid, b: b.solid, motions, depth: resolution, evaluations: 0, exhausted: false };
-                let region = Region([(x.x, x.x), (x.y, x.y), (x.z, x.z), (0.0, 0.0)]);
-                let own = expression(a.solid, a.solid.root, false, false);
-                let other = expression(b.solid, b.solid.root, false, true);
-                if certain(&mut bounder, &own, region) && certain(&mut bounder, &other, region) {
+                if is_deep(&bodies, x, 0.0, resolution, [false; 2]) {
                     return Ok(Proven::Overlap);
                 }
                 return Err("the point is not inside both bodies".into());
             }
             super::check(rest, (0, 1), (a.solid, &a.placed), (b.solid, &b.placed)).map(Proven::Answer)
         }
+        "horizon" => {
+            let mut numbers = Numbers::of(words)?;
+            let (first, until) = (numbers.next()?, numbers.next()?);
+            let (c, d) = (numbers.next()? as u32, numbers.next()? as u32);
+            let x = numbers.vector()?;
+            let (pair, theirs) = others(c, d).ok_or("the pair that meets first is none")?;
+            if !(0.0..=1.0).contains(&first) || !is_deep(&pair, x, first, super::WITNESS * theirs, [false; 2]) {
+                return Err(format!("{c} and {d} are not seen to have met at {first}"));
+            }
+            let [a, b] = &bodies;
+            let checked = super::check(rest, (0, 1), (a.solid, &a.placed), (b.solid, &b.placed))?;
+            if checked.until < until || until <= first && until < 1.0 {
+                return Err(format!("free until {}, told {until}, the first contact comes by {first}", checked.until));
+            }
+            Ok(Proven::Horizon { first, until })
+        }
+        "apart" => {
+            let mut numbers = Numbers::of(words)?;
+            let (since, threshold, until) = (numbers.next()?, numbers.next()?, numbers.next()?);
+            if since < 0.0 || [numbers.motion()?, numbers.motion()?] != motions {
+                return Err("another question".into());
+            }
+            let [a, b] = &bodies;
+            let checked = check_level(rest, (0, 1), (a.solid, &a.placed), (b.solid, &b.placed))?;
+            if checked.until < until || -2.0 * checked.depth < APART * threshold {
+                let (until, distance) = (checked.until, -2.0 * checked.depth);
+                return Err(format!("{distance:e} apart until {until}, the threshold is {threshold:e}"));
+            }
+            Ok(Proven::Apart { threshold, until })
+        }
+        "regions" => {
+            let mut numbers = Numbers::of(words)?;
+            let (since, time, threshold) = (numbers.next()?, numbers.next()?, numbers.next()?);
+            let count = numbers.next()? as usize;
+            if since < 0.0 || [numbers.motion()?, numbers.motion()?] != motions {
+                return Err("another question".into());
+            }
+            let still = bodies.map(|b| b.moving(Motion::resting(b.placed.motion.at(time))));
+            regions(rest, (count, threshold), &still, resolution)?;
+            Ok(Proven::Regions { threshold, time })
+        }
         _ => Err(format!("{kind:?} is no kind of memory")),
     }
 }
+
+/// Of a threshold as much must be proven as apart: the rest is the checker's room.
+const APART: f64 = 0.75;
+/// Of half a threshold as much must be proven as told. f is less than the distance where edges are sharp.
+const TOLD: f64 = 0.25;
+
+/// Where bodies that stand touch: each point of the regions told lies half way between surfaces that are as far apart as it says, and
+/// every place in which they may touch hangs together with one of the points.
+fn regions(text: &str, (count, threshold): (usize, f64), bodies: &[Truth; 2], resolution: f64) -> Result<(), String> {
+    let cells = text.find("pair ").ok_or("the cells are missing")?;
+    let (told, cells) = text.split_at(cells);
+    let mut points: Vec<DVec3> = Vec::new();
+    let (mut regions, mut left, mut is_line) = (0, 0.0, false);
+    for line in told.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        let mut numbers = Numbers::of(&words)?;
+        match words[0] {
+            "region" => {
+                let normal = numbers.vector()?;
+                if (normal.length() - 1.0).abs() > 1e-9 || left != 0.0 {
+                    return Err(format!("{line}: no region"));
+                }
+                regions += 1;
+                is_line = words[1] == "line";
+                left = numbers.next()?;
+            }
+            "point" => {
+                let (x, separation) = (numbers.vector()?, numbers.next()?);
+                let size = bodies[0].reach.min(bodies[1].reach) + x.abs().max_element();
+                let slack = 0.25 * resolution + 1e-10 * size;
+                let within = |f: f64| {
+                    let ways = [[false, false], [true, true]];
+                    ways.iter().all(|way| is_deep(bodies, x, 0.0, -f - slack, *way))
+                };
+                // At sharp edges f is less than the distance: what is nearest where nothing else is, may be farther apart.
+                let is_nearest = count == 1 && !is_line && left == 1.0 && points.is_empty();
+                if separation.abs() > threshold * (1.0 + 1e-6) + slack && !is_nearest {
+                    return Err(format!("{line}: farther apart than {threshold:e}"));
+                }
+                // The very end of a line may lie on the edge that it runs along, as far beyond the threshold as its middle is within it.
+                let most = if is_line { 2.0 * threshold } else { 0.5 * separation.abs() };
+                if !within(most) {
+                    return Err(format!("{line}: not within {most:e} of both surfaces"));
+                }
+                points.push(x);
+                left -= 1.0;
+            }
+            _ => return Err(format!("{line}: neither region nor point")),
+        }
+    }
+    if regions != count || left != 0.0 {
+        return Err("regions or points are left over or missing".into());
+    }
+    let [a, b] = bodies;
+    let mut boxes = Vec::new();
+    let checked = check_cells(cells, (0, 1), (a.solid, &a.placed), (b.solid, &b.placed), Some(&mut boxes))?;
+    if -2.0 * checked.depth < TOLD * threshold * (1.0 - 1e-9) {
+        return Err(format!("proven for {:e} alone, the threshold is {threshold:e}", -2.0 * checked.depth));
+    }
+    let reference = &bodies[usize::from(cells.starts_with("pair 0 1 reference 1"))];
+    let into = |x: &DVec3| {
+        reference.placed.place.inverse().point(reference.placed.motion.start.inverse().point(*x)).to_array()
+    };
+    let points: Vec<[f64; 3]> = points.iter().map(into).collect();
+    let near = 1e-9 * (a.reach.min(b.reach) + threshold);
+    let holds =
+        |cell: &[(f64, f64); 3], x: &[f64; 3]| (0..3).all(|k| cell[k].0 - near <= x[k] && x[k] <= cell[k].1 + near);
+    let meets =
+        |p: &[(f64, f64); 3], q: &[(f64, f64); 3]| (0..3).all(|k| p[k].0 - near <= q[k].1 && q[k].0 <= p[k].1 + near);
+    // From the cells with a point to all that hang together with them.
+    let (mut told, mut rest): (Vec<_>, Vec<_>) =
+        boxes.into_iter().partition(|cell| points.iter().any(|x| holds(cell, x)));
+    while let Some(cell) = told.pop() {
+        let (near, far) = rest.into_iter().partition(|other| meets(&cell, other));
+        rest = far;
+        told.extend::<Vec<_>>(near);
+    }
+    match rest.first() {
+        Some(cell) => Err(format!("{UNTOLD}: {} cells, of which one is {cell:?}", rest.len())),
+        None => Ok(()),
+    }
+}
+
+/// How the error begins of bodies that may touch where nothing is told.
+pub const UNTOLD: &str = "they may touch where nothing is told";
 
 /// A predicted motion: the bodies were proven to keep a distance over motions, and stray from these by less.
 fn prediction(words: &[&str], rest: &str, bodies: &[Truth; 2], resolution: f64) -> Result<Proven, String> {

@@ -182,6 +182,17 @@ fn check_level(
     first: (&Solid, &Placed),
     second: (&Solid, &Placed),
 ) -> Result<Checked, String> {
+    check_cells(text, names, first, second, None)
+}
+
+/// The same but for the cells that are left, where that is allowed: their boxes (frame of the reference body) are listed.
+fn check_cells(
+    text: &str,
+    names: (usize, usize),
+    first: (&Solid, &Placed),
+    second: (&Solid, &Placed),
+    mut left: Option<&mut Vec<[(f64, f64); 3]>>,
+) -> Result<Checked, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>())).peekable();
     let (_, head) = lines.next().ok_or("empty certificate")?;
     let [_, a, b, _, reference, _, depth, _, until, _, cells, _, corners @ ..] = head.as_slice() else {
@@ -300,6 +311,10 @@ fn check_level(
             let absent = cell.a.is_none() || cell.b.is_none();
             match words.as_slice() {
                 ["done"] if absent || (cell.started && cell.t == until) => {}
+                ["left"] => match &mut left {
+                    Some(left) => left.push(cell.region),
+                    None => return wrong("a cell is left"),
+                },
                 ["done"] => return wrong("the cell is not done: time or clauses are left"),
                 ["inside"] => {
                     let inside = cell.a.as_ref().is_some_and(|a| certain(&mut bounder, a, region(0.0, 0.0)));
@@ -533,6 +548,30 @@ fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
         }
         // Its psi is the exact distance.
         Shape::Torus(t) => around(&[DVec3::ZERO], &|k| disc(t.major)(k) + grown(t.minor)),
+        // |B x| = r + psi, which is r at the end of the shortest semi-axis.
+        Shape::Ellipsoid(e) => {
+            let k = scale(e.semi.min_element());
+            around(&[DVec3::ZERO], &|i| (m.row(i) * e.semi).length() * k * (1.0 + 1e-12))
+        }
+        // About the middle of its axis as a cone. With n and m the rows of what is a circle on its ends, psi of the side is there no
+        // higher than −(mean of both sizes)/√(|n|² + |m|² + slope²).
+        Shape::EllipticFrustum(c) => {
+            let mean = 0.5 * (c.bottom + c.top);
+            let steep = (1.0 + c.lean.x * c.lean.x) / (c.semi.x * c.semi.x)
+                + (1.0 + c.lean.y * c.lean.y) / (c.semi.y * c.semi.y)
+                + ((c.bottom - c.top) / (2.0 * c.half_height)).powi(2);
+            let k = scale(c.half_height.min(mean / steep.sqrt()));
+            let end = |z: f64, size: f64| {
+                let middle = (c.lean * z).extend(z) * k;
+                let rim = |i: usize| {
+                    let row = m.row(i);
+                    k * size * (row.x * c.semi.x).hypot(row.y * c.semi.y) * (1.0 + 1e-12)
+                };
+                around(&[middle], &rim)
+            };
+            let (top, bottom) = (end(c.half_height, c.top), end(-c.half_height, c.bottom));
+            std::array::from_fn(|k| top[k].hull(bottom[k]))
+        }
         Shape::HalfSpace(_) => [EVERYWHERE; 3],
     }
 }

@@ -3,7 +3,7 @@
 use contactd::cache::prepare_scene;
 use contactd::check::Check;
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
 use contactd::import::{self, Limits};
 use contactd::motion::Placed;
@@ -240,8 +240,8 @@ fn a_pair_stops_at_its_limit_with_what_is_proven_by_then() {
     let with = |limit: u64| {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let query = PairQuery {
-            a: Body { model: &models[0], placed: placed(Motion::resting(Pose::IDENTITY)) },
-            b: Body { model: &models[1], placed: placed(motion) },
+            a: PlacedModel { model: &models[0], placed: placed(Motion::resting(Pose::IDENTITY)) },
+            b: PlacedModel { model: &models[1], placed: placed(motion) },
             resolution: default_resolution(&models[0], &models[1]),
             cell_limit: limit,
             strategies: Strategies::default(),

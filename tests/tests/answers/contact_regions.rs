@@ -5,7 +5,7 @@ use contactd::contact::clearance::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::within::Within;
 use contactd::contact::{
-    Body, DEFAULT_CELL_LIMIT, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies,
+    DEFAULT_CELL_LIMIT, Extent, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies,
     default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
@@ -38,8 +38,11 @@ impl Rest {
     fn moving(&self, velocity: DVec3) -> PairQuery<'_> {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         PairQuery {
-            a: Body { model: &self.a, placed: placed(Motion::resting(self.pose_a)) },
-            b: Body { model: &self.b, placed: placed(Motion { start: self.pose_b, velocity, spin: DVec3::ZERO }) },
+            a: PlacedModel { model: &self.a, placed: placed(Motion::resting(self.pose_a)) },
+            b: PlacedModel {
+                model: &self.b,
+                placed: placed(Motion { start: self.pose_b, velocity, spin: DVec3::ZERO }),
+            },
             resolution: default_resolution(&self.a, &self.b),
             cell_limit: 100_000,
             strategies: Strategies::default(),

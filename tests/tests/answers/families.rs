@@ -3,9 +3,9 @@
 //! In the command 40 scenes of each; `CONTACTD_FAMILY_SCENES` says how many in the long form, `CONTACTD_FAMILY_SEED` which
 //! (1 by default). `cargo run --release -p contactd-benches --bin families` tells what they cost.
 
-use contactd::contact::{Contact, Outcome, Overlap, Status, Verdict};
+use contactd::contact::{Contact, ContactKind, ContactPoint, Outcome, Overlap, Status, Verdict};
 use contactd::world::{StepOutcome, record};
-use contactd_proto::contact_record::COARSER_RESOLUTION;
+use contactd_proto::contact_record::{COARSER_RESOLUTION, NO_FACE};
 use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::families::{Course, Effort, Fault, NAMES, Node, Scene, Shape, ask, examine, judge, scene};
 use glam::{DQuat, DVec3, dvec3};
@@ -151,7 +151,7 @@ fn what_a_finer_search_has_found_stays_where_a_coarser_one_finds_nothing() {
 /// answers, says so, and no point contradicts it.
 #[test]
 fn long_searches_are_answered_at_a_coarser_resolution_that_is_reported() {
-    let (family, index) = (7, 8270);
+    let (family, index) = (7, 17903);
     let scene = scene(1, family, index);
     let answer = ask(&scene, 0).expect("a scene");
     let o = &answer.pair.outcome;
@@ -274,6 +274,110 @@ fn contacts_at_the_start_are_told_at_a_common_point() {
         assert_eq!((o.status(), o.time()), (Status::Contact, 0.0), "{index}");
         let verdict = examine(&scene, 0, Effort::Quick);
         assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[family], verdict.faults);
+    }
+}
+
+/// Between like faces the multipliers of a touch may hardly miss their balance far from where they have it: at the mouth
+/// of a socket the edge holds the ball with next to no weight, and a touch on the walls alone is told of other normals.
+/// A cone's tip is no touch where it is pressed from within; and what a climb follows at a depth another face of the same
+/// body may be ahead of where the surfaces meet.
+#[test]
+fn touches_are_balanced_and_of_the_faces_ahead() {
+    for (family, index) in [(6, 4242), (7, 19373), (2, 14256)] {
+        let verdict = examine(&scene(1, family, index), 0, Effort::Quick);
+        assert_eq!(verdict.status, Some(Status::Contact));
+        assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[family], verdict.faults);
+    }
+}
+
+/// A body that starts one resolution deep and sinks to just two of them. Rounding leaves open whether that is twice the
+/// depth; at a raised resolution the start is not in touch any more, so that what reaches it once is a contact.
+#[test]
+fn a_resolution_raised_at_twice_its_depth_is_searched_at_once_its_depth_again() {
+    let cube = |x: f64, y: f64, z: f64| Node::Leaf(Shape::Box { size: dvec3(x, y, z) });
+    let ground = cube(4.0, 4.0, 1.0).at(dvec3(0.0, 0.0, -0.5)).or(cube(1.0, 1.0, 1.0).at(dvec3(1.25, 1.25, 0.5)));
+    let cross = cube(1.0, 0.5, 0.5).or(cube(0.5, 1.0, 0.5));
+    let still = Course { start: DVec3::ZERO, rotation: DQuat::IDENTITY, end: DVec3::ZERO, spin: DVec3::ZERO };
+    // What two flat faces have in common is twice as thick as it is deep.
+    let sinks = |from: f64, to: f64, resolution: f64| {
+        let [start, end] = [from, to].map(|depth| dvec3(0.0, 0.0, 0.25 - 2.0 * depth));
+        let moving = Course { start, rotation: DQuat::IDENTITY, end, spin: DVec3::ZERO };
+        let (a, b) = (ground.clone(), cross.clone());
+        Scene { a, b, courses: [still, moving], resolution: Some(resolution) }
+    };
+    let delta = 1.2 * ask(&sinks(0.0, 0.0, 1e-15), 0).expect("an answer").pair.outcome.resolution;
+    let mut raised = 0;
+    for part in [-4, -2, 0, 2, 4, 6] {
+        let scene = sinks(delta, 2.0 * delta * (1.0 + 0.01 * f64::from(part)), delta);
+        let answer = ask(&scene, 0).expect("an answer");
+        let o = &answer.pair.outcome;
+        assert_eq!(judge(&scene, o, Effort::Quick, || answer.witness()), [], "{part}: {o:?}");
+        if o.resolution > 1.5 * delta {
+            raised += 1;
+            assert_eq!(o.status(), Status::Contact, "{part}: {o:?}");
+        }
+    }
+    assert!(raised >= 2, "{raised}");
+}
+
+/// World coordinates a million sizes away round a point by more than faces are apart there: the judge of records sees
+/// it from the bodies. It finds nothing wrong with what is told of such points, and still notices what is.
+#[test]
+fn points_far_from_the_origin_are_seen_from_the_bodies() {
+    for index in [11687, 13187] {
+        let mut answer = ask(&scene(1, 9, index), 0).expect("an answer");
+        assert_eq!(answer.lies(), [], "{index}");
+        let told = *answer.pair.outcome.contact().expect("a contact");
+        let point = told.point.expect("a point");
+        let mut notices = |wrong: ContactPoint| {
+            answer.pair.outcome.verdict = Verdict::Contact(Contact { point: Some(wrong), ..told });
+            assert!(!answer.lies().is_empty(), "{index}: {wrong:?}");
+        };
+        let [a, b] = [point.faces_a, point.faces_b];
+        let fewer = |f: [u32; 3]| if f[1] == NO_FACE { [NO_FACE; 3] } else { [f[1], NO_FACE, NO_FACE] };
+        notices(ContactPoint { faces_a: [a[0] ^ 1, a[1], a[2]], ..point });
+        notices(ContactPoint { faces_a: fewer(a), ..point });
+        notices(ContactPoint { faces_b: fewer(b), ..point });
+        notices(ContactPoint {
+            normal: (point.normal + point.normal.any_orthonormal_vector() * 1e-5).normalize(),
+            ..point
+        });
+        notices(ContactPoint { point: point.point + point.normal * 1e-6, ..point });
+    }
+    // A corner on an edge, exactly: whoever tells of one face of the two is noticed, the judge's own moves left aside.
+    let a = Node::Leaf(Shape::Box { size: DVec3::splat(2.0) });
+    let corners =
+        [(0.0, 0.0, -1.0), (-0.5, -0.5, 0.5), (0.75, -0.25, 0.5), (-0.25, 0.5, 0.5)].map(|(x, y, z)| dvec3(x, y, z));
+    let b = Node::Leaf(Shape::Hull {
+        points: corners.to_vec(),
+        faces: vec![vec![0, 1, 2], vec![0, 2, 3], vec![0, 3, 1], vec![1, 3, 2]],
+    });
+    let far = dvec3(1e6, -2e6, 5e5);
+    let still = Course { start: far, rotation: DQuat::IDENTITY, end: far, spin: DVec3::ZERO };
+    let [start, end] = [3.0, 1.0].map(|z| far + dvec3(1.0, 0.0, z));
+    let falls = Course { start, rotation: DQuat::IDENTITY, end, spin: DVec3::ZERO };
+    let mut answer = ask(&Scene { a, b, courses: [still, falls], resolution: None }, 0).expect("an answer");
+    let told = *answer.pair.outcome.contact().expect("a contact");
+    let point = told.point.expect("a point");
+    assert_eq!((point.kind, answer.lies()), (ContactKind::VertexEdge, vec![]), "{point:?}");
+    for face in point.faces_a.into_iter().filter(|f| *f != NO_FACE) {
+        let wrong = ContactPoint { faces_a: [face, NO_FACE, NO_FACE], kind: ContactKind::VertexFace, ..point };
+        answer.pair.outcome.verdict = Verdict::Contact(Contact { point: Some(wrong), ..told });
+        assert!(!answer.lies().is_empty(), "{wrong:?}");
+    }
+}
+
+/// A peg that leans by 1e-8 starts .911 delta deep in the wall at its lower end, as 40 digits say, and ends 1.499 delta
+/// deep: that is no miss at this delta. It is one at a smaller delta, of which it ends twice as deep, and at a larger one, in
+/// touch with which it does not start.
+#[test]
+fn the_judge_finds_how_deep_a_leaning_peg_starts() {
+    let scene = scene(1, 9, 6879);
+    // The resolution of its answer, to which rounding raises its own.
+    let delta = 1.766_873e-9;
+    for (factor, is_miss) in [(0.7, true), (1.0, false), (1.1, true)] {
+        let found = judge(&scene, &Outcome::clear(factor * delta), Effort::Thorough, || None);
+        assert_eq!(found.iter().any(|f| f.kind == "miss"), is_miss, "{factor}: {found:?}");
     }
 }
 

@@ -4,7 +4,7 @@
 //! `cell_ceilings.toml` holds twice the cells each cost when it was recorded: `CONTACTD_RECORD=1` prints new lines for it.
 
 use contactd::contact::{
-    Body, ContactPoint, Extent, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact,
+    ContactPoint, Extent, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -545,8 +545,8 @@ fn a_blade_that_turns_with_the_ball_it_meets_is_not_passed_over() {
         let models = [Recipe::sphere(0.1), arm].map(|r| Model::new(r.build()));
         let bodies = [ball, blade].map(|motion| Placed { place: Pose::IDENTITY, motion });
         let query = PairQuery {
-            a: Body { model: &models[0], placed: bodies[0] },
-            b: Body { model: &models[1], placed: bodies[1] },
+            a: PlacedModel { model: &models[0], placed: bodies[0] },
+            b: PlacedModel { model: &models[1], placed: bodies[1] },
             resolution: 1e-9,
             cell_limit: contactd_tests::engine::CELL_LIMIT,
             strategies: Strategies { region: false, walk: false, ..Strategies::default() },

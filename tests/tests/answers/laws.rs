@@ -5,7 +5,7 @@
 //! `CONTACTD_LAW_SCENES=2000 cargo test --release -p contactd-tests --test answers laws:: -- --nocapture`
 
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -519,8 +519,8 @@ fn memory_that_was_used_before_changes_no_bit() {
         let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let query = PairQuery {
-            a: Body { model: &a, placed: placed(scene.motion_a) },
-            b: Body { model: &b, placed: placed(scene.motion_b) },
+            a: PlacedModel { model: &a, placed: placed(scene.motion_a) },
+            b: PlacedModel { model: &b, placed: placed(scene.motion_b) },
             resolution: scene.resolution.unwrap_or_else(|| default_resolution(&a, &b)),
             cell_limit: engine::CELL_LIMIT,
             strategies: Default::default(),

@@ -7,6 +7,7 @@ mod cases;
 mod closed_forms;
 mod coincident;
 mod contact_regions;
+mod elliptics;
 mod families;
 mod hard_cases;
 mod laws;

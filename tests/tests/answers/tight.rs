@@ -7,7 +7,7 @@
 //! `time_upper`, none in a clear pair. The long form: `CONTACTD_TIGHT_SCENES=20000`, `CONTACTD_TIGHT_SEED=7`.
 
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -331,8 +331,8 @@ fn ask(scene: &Scene, models: [&Model; 2]) -> Outcome {
 fn ask_with(scene: &Scene, models: [&Model; 2], strategies: Strategies) -> Outcome {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
     let query = PairQuery {
-        a: Body { model: models[0], placed: placed(scene.motion_a) },
-        b: Body { model: models[1], placed: placed(scene.motion_b) },
+        a: PlacedModel { model: models[0], placed: placed(scene.motion_a) },
+        b: PlacedModel { model: models[1], placed: placed(scene.motion_b) },
         resolution: scene.resolution.unwrap_or_else(|| default_resolution(models[0], models[1])),
         cell_limit: contactd::contact::DEFAULT_CELL_LIMIT,
         strategies,

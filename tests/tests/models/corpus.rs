@@ -48,3 +48,13 @@ fn any_batch_is_taken_whole_or_changes_nothing() {
 fn any_scene_has_an_answer_in_order_that_the_reference_does_not_refute() {
     replay("scenes", 500);
 }
+
+#[test]
+fn any_file_of_a_mesh_is_a_solid_or_one_sentence() {
+    replay("meshes", 3000);
+}
+
+#[test]
+fn any_drawing_or_surface_is_a_shape_or_one_sentence() {
+    replay("drawings", 2000);
+}

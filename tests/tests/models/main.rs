@@ -1,9 +1,11 @@
-//! Models: imports, the corpus of inputs, the cache on disk, mass properties.
+//! Models: imports, files of every format, the corpus of inputs, the cache on disk, mass properties.
 //! One program for all of them links once; `--test models NAME::` runs those of one file.
 #![allow(missing_docs)]
 
+mod builder;
 mod cache;
 mod corpus;
+mod files;
 mod import_models;
 mod mass;
 mod models;

@@ -4,7 +4,7 @@
 
 use contactd::contact::certificate::certify;
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -31,8 +31,8 @@ struct Certified {
 fn certified(a: (Solid, Placed), b: (Solid, Placed), resolution: Option<f64>, cell_limit: u64) -> Certified {
     let (model_a, model_b) = (Model::new(a.0.clone()), Model::new(b.0.clone()));
     let query = PairQuery {
-        a: Body { model: &model_a, placed: a.1 },
-        b: Body { model: &model_b, placed: b.1 },
+        a: PlacedModel { model: &model_a, placed: a.1 },
+        b: PlacedModel { model: &model_b, placed: b.1 },
         resolution: resolution.unwrap_or_else(|| default_resolution(&model_a, &model_b)),
         cell_limit,
         strategies: Default::default(),

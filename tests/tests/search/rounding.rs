@@ -151,6 +151,12 @@ fn psi(face: &Face, x: &Vector) -> Big {
             let square = &off * &off + &z * &z;
             (if square == Big::ZERO { big(0.0) } else { square.sqrt() }) - big(minor)
         }
+        Face::Elliptic(e) => {
+            let (parts, y) = (e.parts(), x.minus(&Vector::of(e.origin)));
+            Vector(parts.rows.map(|row| Vector::of(row).dot(&y))).length()
+                - Vector::of(parts.fall).dot(&y)
+                - big(parts.radius)
+        }
     }
 }
 
@@ -169,7 +175,7 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
                 let tan = big(sin) / big(cos);
                 (Vector::of(apex + axis * (shrink / sin)), Some(axis), big(0.0), &tan * &tan)
             }
-            Face::Plane(_) | Face::Torus(_) => return None,
+            Face::Plane(_) | Face::Torus(_) | Face::Elliptic(_) => return None,
         };
         let o = x.minus(&origin);
         let along = axis.map_or(big(0.0), |a| {
@@ -264,6 +270,16 @@ fn nothing_that_is_computed_of_a_torus_differs_by_more_than_the_budget() {
     let shapes: Vec<Shape> = (0..24).map(|_| random_solids::torus(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
     evaluate(&mut r, &models, wanted, "tori");
+}
+
+#[test]
+fn nothing_that_is_computed_of_an_elliptic_face_differs_by_more_than_the_budget() {
+    let wanted: u64 =
+        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
+    let mut r = Random::new(9);
+    let shapes: Vec<Shape> = (0..48).map(|_| random_solids::elliptic(&mut r, 1.0)).collect();
+    let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
+    evaluate(&mut r, &models, wanted, "elliptic faces");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.
@@ -445,6 +461,10 @@ fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
             let u = axis.any_orthonormal_vector();
             let (sin, cos) = r.within(0.0, TAU).sin_cos();
             origin + (u * cos + axis.cross(u) * sin) * major
+        }
+        Face::Elliptic(e) => {
+            let along = if e.third > 0.0 { 0.0 } else { r.within(if e.third < 0.0 { 0.0 } else { -1.0 }, 2.0) };
+            e.origin + e.axis() * along
         }
         Face::Plane(_) => return None,
     };

@@ -3,18 +3,18 @@
 //! The steps are drawn by `stepped`, which knows nothing of what is remembered. 100,000 of them:
 //! `CONTACTD_MEMORY_STEPS=100000 cargo test --release -p contactd-tests --test steps memory:: -- --nocapture`
 
-use contactd::contact::{Counters, Outcome, Status};
+use contactd::contact::{Counters, Outcome, RegionPoint, Status};
 use contactd::motion::Placed;
 use contactd::octree::Model;
-use contactd::world::memory::Remembered;
-use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, StepOptions, StepOutcome, World, record};
+use contactd::world::memory::{Beside, Remembered};
+use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, PairPlan, StepOptions, StepOutcome, World, record};
 use contactd_proto::contact_record::{ContactRecord, DETAIL_SLOT, DetailSlot};
 use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
 use contactd_tests::stepped::{Act, Change, Play, Thing, block, motion_states, plate};
 use contactd_tests::verifier::UNSHOWN;
-use contactd_tests::verifier::memory::{Proven, Truth, check};
+use contactd_tests::verifier::memory::{Proven, Truth, UNTOLD, check};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -130,10 +130,11 @@ struct Work {
     known: usize,
     /// Steps that only a session without memory had to leave open.
     open: usize,
-    /// Certificates that hold, by kind: clearance, directions, predicted motion, answer, overlap.
-    proven: [usize; 5],
-    /// Answers of memory without a certificate, and pairs whose certificate does not hold.
-    unproven: usize,
+    /// Certificates that hold, by kind: clearance, directions, predicted motion, answer, overlap; free until after the first contact; and
+    /// what is told beside an answer: apart, regions.
+    proven: [usize; 8],
+    /// What has no certificate: answers of memory, what is beyond a threshold, regions.
+    unproven: [usize; 3],
     /// Certificates that the checker's budget did not suffice for.
     unshown: usize,
     refused: Option<String>,
@@ -153,6 +154,16 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
         .iter()
         .map(|b| Truth::new(&b.part.model.solid, Placed { place: b.place, motion: b.motion_state.motion }))
         .collect();
+    let pair = |a: u32, b: u32| {
+        let detect = cold.plan_of(a, b)?.detect;
+        let places = [ids.iter().position(|id| *id == a)?, ids.iter().position(|id| *id == b)?];
+        let bodies = places.map(|k| match detect {
+            Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].motion_state.end)),
+            _ => truths[k],
+        });
+        let resolution = places.map(|k| cold.bodies()[k].part.resolution);
+        Some((bodies, resolution[0].max(resolution[1])))
+    };
     for (i, a) in ids.iter().enumerate() {
         for (j, b) in ids.iter().enumerate().skip(i + 1) {
             let Some(plan) = cold.plan_of(*a, *b) else { continue };
@@ -161,16 +172,11 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
                 continue;
             }
             let Some(text) = warm.certificate_of(*a, *b, CELLS) else {
-                work.unproven += 1;
+                work.unproven[0] += 1;
                 continue;
             };
-            let bodies = [i, j].map(|k| match plan.detect {
-                Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].motion_state.end)),
-                _ => truths[k],
-            });
-            let own = |id: u32| cold.body(id).expect("a body").part.resolution;
-            let resolution = own(*a).max(own(*b));
-            let kind = match check(&text, (*a, *b), bodies, resolution) {
+            let (bodies, resolution) = pair(*a, *b).expect("bodies");
+            let kind = match check(&text, (*a, *b), bodies, resolution, &pair) {
                 Ok(Proven::Clearance) => 0,
                 Ok(Proven::Directions) => 1,
                 Ok(Proven::PredictedMotion) => 2,
@@ -189,6 +195,20 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
                     3
                 }
                 Ok(Proven::Overlap) => 4,
+                Ok(Proven::Horizon { first, until }) => {
+                    let Remembered::Horizon { outcome, .. } = remembered else {
+                        return Err(format!("{a}, {b}: {remembered:?} is reported as left"));
+                    };
+                    let stops = warm.outcome().pairs.iter().filter(|p| !p.plan.sensor && p.outcome.meets());
+                    let told = stops.map(|p| p.outcome.time_upper()).fold(f64::INFINITY, f64::min);
+                    if until != outcome.time_lower() || first > told {
+                        return Err(format!(
+                            "{a}, {b}: left at {until} of {outcome:?}, the first contact is told by {told}"
+                        ));
+                    }
+                    5
+                }
+                Ok(proven) => return Err(format!("{a}, {b}: {proven:?} is no answer")),
                 // Neither shown nor refuted: counted, and bounded by the test.
                 Err(e) if e.contains(UNSHOWN) => {
                     work.unshown += 1;
@@ -203,6 +223,72 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
                 }
             };
             work.proven[kind] += 1;
+            if let Remembered::Answer { .. } = remembered {
+                beside(warm, (*a, *b), plan, (bodies, resolution), work)
+                    .map_err(|e| format!("{a}, {b}: {e}\n{plan:?}"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Radii, in radii of the smaller body, of the cells in which bodies that touch are left.
+const LEFT: [f64; 3] = [0.25, 0.06, 0.015];
+
+/// The same of what is told beside an answer that is repeated: that its bodies don't touch, or where.
+fn beside(
+    warm: &World,
+    (a, b): (u32, u32),
+    plan: &PairPlan,
+    (bodies, resolution): ([Truth; 2], f64),
+    work: &mut Work,
+) -> Result<(), String> {
+    let nobody = |_, _| None;
+    let told = warm.outcome().pairs.iter().find(|p| (p.a, p.b) == (a, b));
+    for (i, left) in LEFT.into_iter().enumerate() {
+        let Some(Beside { apart, regions }) = warm.certificates_beside(a, b, (4 * CELLS, left)) else { return Ok(()) };
+        let near = |threshold: f64| threshold >= plan.margin && threshold >= 2.0 * resolution;
+        match apart.filter(|_| i == 0) {
+            None => {}
+            Some(None) => work.unproven[1] += 1,
+            Some(Some(text)) => {
+                let Proven::Apart { threshold, until } = check(&text, (a, b), bodies, resolution, &nobody)? else {
+                    return Err("not proven apart".into());
+                };
+                let until = if plan.margin > 0.0 { until } else { 1.0 };
+                let told = told.map(|p| &p.outcome);
+                let same = |o: &Outcome| !o.touching && (o.status() != Status::Clear || o.margin_time == until);
+                if !near(threshold) || !told.is_none_or(same) {
+                    return Err(format!("proven {threshold:e} apart until {until}, told {told:?}"));
+                }
+                work.proven[6] += 1;
+            }
+        }
+        let text = match regions {
+            None => return Ok(()),
+            Some(None) => {
+                work.unproven[2] += 1;
+                return Ok(());
+            }
+            Some(Some(text)) => text,
+        };
+        match check(&text, (a, b), bodies, resolution, &nobody) {
+            Ok(Proven::Regions { threshold, .. }) => {
+                let told = told.map_or(&[][..], |p| warm.outcome().regions_of(p));
+                let line = |p: &RegionPoint| {
+                    let [x, y, z] = p.point.to_array();
+                    format!("point {x:e} {y:e} {z:e} {:e}\n", p.separation)
+                };
+                let all = told.iter().flat_map(|region| &region.points).all(|p| text.contains(&line(p)));
+                if !near(threshold) || !all {
+                    return Err(format!("proven for {threshold:e}, told {told:?}\n{text}"));
+                }
+                work.proven[7] += 1;
+                return Ok(());
+            }
+            Err(e) if e.starts_with(UNTOLD) && i + 1 < LEFT.len() => {}
+            Err(e) => return Err(format!("{e}\n{}", &text[..text.len().min(2_000)])),
+            Ok(proven) => return Err(format!("{proven:?} is nothing of regions")),
         }
     }
     Ok(())
@@ -210,7 +296,10 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
 
 /// A play in a world that remembers, and each of its steps in a world made for it.
 fn run(seed: u64, steps: usize) -> Work {
-    let mut play = Play::new(seed);
+    run_play(seed, Play::new(seed), steps)
+}
+
+fn run_play(seed: u64, mut play: Play, steps: usize) -> Work {
     let parts: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
     // Octrees are refined by searches: the fresh worlds have models of their own.
     let own: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
@@ -242,10 +331,10 @@ fn run(seed: u64, steps: usize) -> Work {
             let open = expected.undecided || expected.pairs.iter().any(is_open);
             let (mine, other) = (lines(answer, true), lines(expected, true));
             let wide = StepOptions { cell_limit: 0, batch_limit: 0, max_records: 0, max_patch_slots: 0, ..options };
+            let mut whole = fresh.world();
+            let found = whole.step(&records, &wide).expect("a step");
+            let all = lines(found, true);
             let is_known = open && {
-                let mut whole = fresh.world();
-                let found = whole.step(&records, &wide).expect("a step");
-                let all = lines(found, true);
                 // What the whole step's limit leaves for a pair depends on what others took, of which some may be known: such a
                 // pair stays undecided from a time on before which it is free.
                 let meets = |p: &PairOutcome| {
@@ -264,10 +353,14 @@ fn run(seed: u64, steps: usize) -> Work {
                 let differs = |a: &[String], b: &[String]| {
                     a.iter().filter(|x| !b.contains(x)).map(|x| x[..x.len().min(600)].to_string()).collect::<Vec<_>>()
                 };
+                let known = |p: &PairOutcome| format!("{:?} {:?}: {:?}", (p.a, p.b), p.plan, warm.remembered(p.a, p.b));
+                let differing_pairs = mine.iter().zip(&answer.pairs).filter(|(line, _)| !other.contains(line));
+                let known: Vec<String> = differing_pairs.map(|(_, p)| known(p)).take(3).collect();
                 work.difference = Some(format!(
-                    "seed {seed}, step {k}, {options:?}\nremembers: {:#?}\nfresh: {:#?}\n{}",
+                    "seed {seed}, step {k}, {options:?}\nremembers: {:#?}\nfresh: {:#?}\nwithout limits: {:#?}\n{known:#?}\n{}",
                     differs(&mine, &other),
                     differs(&other, &mine),
+                    differs(&all, &mine),
                     differing(&reported(&warm), &reported(&cold))
                 ));
                 break;
@@ -295,10 +388,22 @@ fn run(seed: u64, steps: usize) -> Work {
 }
 
 const STEPS: usize = 25;
+const SETTLING: usize = 12;
+
+/// How many certificates are missing, in words.
+fn unproven(all: &[Work]) -> String {
+    let [answers, apart, regions]: [usize; 3] = std::array::from_fn(|k| all.iter().map(|w| w.unproven[k]).sum());
+    format!("{answers} answers, {apart} beyond a threshold and {regions} with regions")
+}
+
+/// Steps of the random plays.
+fn steps() -> usize {
+    std::env::var("CONTACTD_MEMORY_STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(2_000)
+}
 
 #[test]
 fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
-    let steps = std::env::var("CONTACTD_MEMORY_STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(2_000usize);
+    let steps = steps();
     let first: u64 = std::env::var("CONTACTD_MEMORY_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(40_000_001);
     let plays = steps.div_ceil(STEPS) as u64;
     let all: Vec<Work> = (0..plays).into_par_iter().map(|i| run(first + i, STEPS)).collect();
@@ -318,12 +423,12 @@ fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
     for d in differences.iter().take(5) {
         println!("{d}");
     }
-    let proven: [usize; 5] = std::array::from_fn(|k| all.iter().map(|w| w.proven[k]).sum());
-    let (unproven, unshown) = (sum(|w| w.unproven), sum(|w| w.unshown));
+    let proven: [usize; 8] = std::array::from_fn(|k| all.iter().map(|w| w.proven[k]).sum());
+    let (unproven, unshown) = (unproven(&all), sum(|w| w.unshown));
     println!(
-        "certificates that hold: {} clearances, {} by directions, {} predictions, {} answers, {} overlaps; {unproven} without one, {unshown} that \
-         the checker's budget left open",
-        proven[0], proven[1], proven[2], proven[3], proven[4]
+        "certificates that hold: {} clearances, {} by directions, {} predictions, {} answers, {} overlaps, {} left behind the first \
+         contact, {} beyond a threshold, {} with regions; {unproven} without one, {unshown} that the checker's budget left open",
+        proven[0], proven[1], proven[2], proven[3], proven[4], proven[5], proven[6], proven[7]
     );
     let refused: Vec<&String> = all.iter().filter_map(|w| w.refused.as_ref()).collect();
     for r in refused.iter().take(5) {
@@ -337,13 +442,37 @@ fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
     assert!(sum(|w| w.known) * 4 > sum(|w| w.clear), "hardly anything is remembered");
 }
 
+/// Bodies that come to rest on each other, or press on: where they touch is remembered with their answer.
+#[test]
+fn regions_that_are_kept_are_those_of_bodies_that_rest() {
+    let steps = steps().div_ceil(8);
+    let plays = steps.div_ceil(SETTLING) as u64;
+    let all: Vec<Work> =
+        (0..plays).into_par_iter().map(|i| run_play(i, Play::settling(50_000_000 + i), SETTLING)).collect();
+    let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
+    let (regions, apart, unproven) = (sum(|w| w.proven[7]), sum(|w| w.proven[6]), unproven(&all));
+    println!(
+        "{} steps: {} with a contact, {} clear; {regions} certificates of regions hold, {apart} beyond a threshold, {unproven} without one",
+        sum(|w| w.steps),
+        sum(|w| w.contacts),
+        sum(|w| w.clear)
+    );
+    for w in all.iter().filter_map(|w| w.difference.as_ref().or(w.refused.as_ref())).take(5) {
+        println!("{w}");
+    }
+    assert!(all.iter().all(|w| w.difference.is_none() && w.refused.is_none()), "see above");
+    assert!(regions * 8 > steps, "{regions} certificates of regions in {steps} steps");
+}
+
 /// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,
 /// discrete pairs, pairs later than the first contact, unbounded bodies, multipliers that all but vanish on their way, overlaps whose
 /// depth was worked out within a limit.
 #[test]
 fn plays_that_were_told_wrong_once_are_told_right() {
-    let seeds =
-        [40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_000_682, 40_001_917, 40_001_935, 40_002_375, 40_002_817];
+    let seeds = [
+        40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_000_682, 40_001_917, 40_001_935, 40_002_002, 40_002_375,
+        40_003_306, 40_002_817,
+    ];
     for seed in seeds {
         let work = run(seed, STEPS);
         assert_eq!((work.difference, work.refused, work.steps), (None, None, STEPS), "seed {seed}");

@@ -9,7 +9,7 @@
 //! 20,000 stops here; `CONTACTD_STOPS=1000000 cargo test -p contactd-tests --test steps stopping::` makes a million.
 
 use contactd::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
 use contactd::math::any_perpendicular;
 use contactd::motion::Placed;
@@ -48,8 +48,8 @@ impl Table {
     fn ask(&mut self, motion: Motion) -> Outcome {
         let at = |motion| Placed { place: Pose::IDENTITY, motion };
         let query = PairQuery {
-            a: Body { model: &self.fixed, placed: at(Motion::resting(self.place)) },
-            b: Body { model: &self.moving, placed: at(motion) },
+            a: PlacedModel { model: &self.fixed, placed: at(Motion::resting(self.place)) },
+            b: PlacedModel { model: &self.moving, placed: at(motion) },
             resolution: self.delta,
             cell_limit: CELLS,
             strategies: Strategies::default(),

@@ -4,6 +4,7 @@
 mod convention;
 mod manifold;
 mod misuse;
+mod solid;
 mod stub;
 #[path = "../support/mod.rs"]
 mod support;

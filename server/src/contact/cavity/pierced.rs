@@ -9,7 +9,7 @@ use crate::contact::witness::newton::{self, Constraint};
 use crate::math::any_perpendicular;
 use crate::motion::Relative;
 use crate::solid::local::LiteralId;
-use crate::solid::parts::Part;
+use crate::solid::parts::PiercedPart;
 use crate::solid::surface::Axis;
 use crate::solid::{Primitive, Sense};
 use glam::DVec3;
@@ -92,7 +92,7 @@ impl<'a> CavityPair<'a> {
     pub(super) fn new(
         task: &Task,
         primitive: &'a Primitive,
-        part: Part,
+        part: PiercedPart,
         side: Side,
         relative: &'a Relative,
     ) -> Option<Self> {

@@ -6,7 +6,7 @@ use super::proof::ProofEnd;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::{
-    Body, Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
 use crate::math::random::Random;
 use crate::motion::{Placed, Relative};
@@ -27,8 +27,8 @@ fn across(n: &mut Random, size: f64) -> DVec3 {
 fn ask(a: (&Model, Motion), b: (&Model, Motion), strategies: Strategies) -> Outcome {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
     let query = PairQuery {
-        a: Body { model: a.0, placed: placed(a.1) },
-        b: Body { model: b.0, placed: placed(b.1) },
+        a: PlacedModel { model: a.0, placed: placed(a.1) },
+        b: PlacedModel { model: b.0, placed: placed(b.1) },
         resolution: default_resolution(a.0, b.0),
         cell_limit: 100_000,
         strategies,
@@ -298,8 +298,8 @@ fn a_proof_does_not_jump_over_an_arc() {
         let start = Pose { position: start.position - DVec3::X * (if met { 0.0 } else { rise + 0.02 }), ..start };
         let motion = Motion::turning(start, start.position, DVec3::Y * turn);
         let query = PairQuery {
-            a: Body { model: &pipe, placed: Placed { place: Pose::IDENTITY, motion: rest() } },
-            b: Body { model: &ball, placed: Placed { place: Pose::IDENTITY, motion } },
+            a: PlacedModel { model: &pipe, placed: Placed { place: Pose::IDENTITY, motion: rest() } },
+            b: PlacedModel { model: &ball, placed: Placed { place: Pose::IDENTITY, motion } },
             resolution: default_resolution(&pipe, &ball),
             cell_limit: 1000,
             strategies: Strategies::default(),

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::contact::query::options::QueryOptions;
-use crate::contact::query::question::{Body, Strategies, default_resolution};
+use crate::contact::query::question::{PlacedModel, Strategies, default_resolution};
 use crate::math::random::Random;
 use crate::motion::Placed;
 use crate::octree::Model;
@@ -46,8 +46,8 @@ fn every_clause_is_closed_by_a_recorded_proof() {
         };
         let (of_a, of_b) = (motion(&mut r), motion(&mut r));
         let query = PairQuery {
-            a: Body { model: &a, placed: Placed { place: Pose::IDENTITY, motion: of_a } },
-            b: Body { model: &b, placed: Placed { place: Pose::IDENTITY, motion: of_b } },
+            a: PlacedModel { model: &a, placed: Placed { place: Pose::IDENTITY, motion: of_a } },
+            b: PlacedModel { model: &b, placed: Placed { place: Pose::IDENTITY, motion: of_b } },
             resolution: default_resolution(&a, &b),
             cell_limit: 1000,
             strategies: Strategies::default(),
@@ -69,7 +69,7 @@ fn every_clause_is_closed_by_a_recorded_proof() {
                 b: task.b.literal_form(),
                 reach: 1.0,
             };
-            let mut maker = Maker { task: &task, end: 1.0, hints: &[], scratch: &mut scratch };
+            let mut maker = Maker { task: &task, end: 1.0, left: 0.0, hints: &[], scratch: &mut scratch };
             let (_, close, ..) = maker.span(&cell, 1.0 - cell.t, region.center(), region.half());
             match close {
                 Some(close) if !close.is_empty() => {

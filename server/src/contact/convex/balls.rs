@@ -156,7 +156,7 @@ fn no_shorter(v: DVec3) -> f64 {
 
 /// The radius and the face of a body that is a ball about its object's origin and does not turn.
 #[inline(always)] // Its answer passes through memory otherwise: a quarter of the time that two balls take.
-fn centered(body: &question::Body) -> Option<(f64, u32)> {
+fn centered(body: &question::PlacedModel) -> Option<(f64, u32)> {
     let placed = &body.placed;
     // Zeros of either sign: one comparison for six numbers.
     let bits = |v: DVec3| v.x.to_bits() | v.y.to_bits() | v.z.to_bits();

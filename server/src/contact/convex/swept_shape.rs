@@ -98,7 +98,9 @@ pub struct SeparatingAxisTest {
 impl Hull {
     /// Of a model placed in its object; `None` for one without bounds.
     pub fn new(model: &Model, place: &Pose) -> Option<Self> {
-        let whole = model.solid.whole().filter(|p| p.is_convex());
+        // Of a bounded one that has no form a box stands for it.
+        let has_form = |p: &&Primitive| p.is_convex() && (p.shape.convex().is_known() || !p.aabb.is_finite());
+        let whole = model.solid.whole().filter(has_form);
         let (around, level, form, frame, ball) = if let Some(p) = whole {
             body_of(p)?;
             (None, f64::INFINITY, p.shape.convex().of_few(), p.frame, p.ball)

@@ -33,7 +33,7 @@ impl Bodies {
     }
 
     fn query(&self) -> PairQuery<'_> {
-        let [a, b] = [0, 1].map(|k| question::Body { model: &self.models[k], placed: self.placed[k] });
+        let [a, b] = [0, 1].map(|k| question::PlacedModel { model: &self.models[k], placed: self.placed[k] });
         PairQuery {
             a,
             b,

@@ -87,7 +87,8 @@ impl<'a> Turning<'a> {
 
     /// φ along a unit direction.
     fn gap(&self, m: &Posed, n: DVec3) -> Gap {
-        let [a, b] = [0, 1].map(|k| self.parts[k].primitive.shape.convex());
+        let shape = |k: usize| self.parts[k].primitive.shape.convex();
+        let (a, b) = (shape(0), shape(1));
         Gap { t: m.t, n, phi: n.dot(m.way) - a.reach(&m.axes[0], n) - b.reach(&m.axes[1], -n) }
     }
 

@@ -53,16 +53,21 @@ impl Turns {
 
     /// The bodies at a time.
     pub fn at(&self, t: f64) -> Posed {
-        let axes = [0, 1].map(|k| {
-            let [along, across, ahead] = &self.axes[k];
-            if self.rates[k] == 0.0 {
-                return *along;
-            }
-            let (s, c) = libm::sincos(self.rates[k] * t);
-            *along + *across * c + *ahead * s
-        });
-        let offsets =
-            [0, 1].map(|k| if self.offsets[k] == DVec3::ZERO { DVec3::ZERO } else { axes[k] * self.offsets[k] });
+        // Each body by itself: `map` over an array of two is a call for each step of it.
+        let axes = [self.axes_at(0, t), self.axes_at(1, t)];
+        let offset = |k: usize| if self.offsets[k] == DVec3::ZERO { DVec3::ZERO } else { axes[k] * self.offsets[k] };
+        let offsets = [offset(0), offset(1)];
         Posed { t, axes, offsets, way: self.pivots - self.velocity * t + (offsets[1] - offsets[0]) }
+    }
+
+    /// World from primitive at a time.
+    #[inline]
+    fn axes_at(&self, k: usize, t: f64) -> DMat3 {
+        let [along, across, ahead] = &self.axes[k];
+        if self.rates[k] == 0.0 {
+            return *along;
+        }
+        let (s, c) = libm::sincos(self.rates[k] * t);
+        *along + *across * c + *ahead * s
     }
 }

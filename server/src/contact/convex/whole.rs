@@ -14,7 +14,7 @@ pub(super) const APART: f64 = 4.0;
 
 /// Two whole primitives at the start and as they move along; world axes.
 pub(super) struct PrimitivePair<'a> {
-    pub(super) bodies: [&'a question::Body<'a>; 2],
+    pub(super) bodies: [&'a question::PlacedModel<'a>; 2],
     pub(super) primitives: [&'a Primitive; 2],
     /// From an object's origin to its primitive's centre.
     pub(super) offsets: [DVec3; 2],
@@ -33,7 +33,7 @@ pub(super) struct PrimitivePair<'a> {
 impl<'a> PrimitivePair<'a> {
     /// The pair of two bodies, the first of which carries; `None` if the resolution needs raising.
     pub(super) fn new(
-        bodies: [&'a question::Body<'a>; 2],
+        bodies: [&'a question::PlacedModel<'a>; 2],
         primitives: [&'a Primitive; 2],
         resolution: f64,
     ) -> Option<Self> {
@@ -49,14 +49,14 @@ impl<'a> PrimitivePair<'a> {
         let rounding = rounding::of_motion(a.model, b.model, places, apart, &motion);
         let scale = a.model.radius.max(b.model.radius);
         // Sums of components: no less than lengths, and no roots.
-        let center = |body: &question::Body| body.model.bounds.root().ball.center.abs().element_sum();
+        let center = |body: &question::PlacedModel| body.model.bounds.root().ball.center.abs().element_sum();
         let centers = [center(a), center(b)];
         let extent = centers[0] + centers[1] + 2.0 * scale + places[0] + apart;
         let least = (tolerance::LEAST_RESOLUTION * extent).max(tolerance::LEAST_ROUNDINGS * rounding);
         if resolution.is_nan() || resolution < least {
             return None;
         }
-        let offset = |body: &question::Body, primitive: &Primitive| {
+        let offset = |body: &question::PlacedModel, primitive: &Primitive| {
             let (place, frame) = (&body.placed.place, primitive.frame.position);
             if place.position == DVec3::ZERO && frame == DVec3::ZERO {
                 DVec3::ZERO
@@ -71,7 +71,7 @@ impl<'a> PrimitivePair<'a> {
 
     /// How they turn, spins about their own axes left out.
     pub(super) fn spins(&self) -> [DVec3; 2] {
-        let spin = |body: &question::Body| {
+        let spin = |body: &question::PlacedModel| {
             let spin = body.placed.motion.spin;
             if spin == DVec3::ZERO { spin } else { question::without_own_spin(body).motion.spin }
         };

@@ -266,7 +266,7 @@ const SPINS: f64 = 8.0;
 pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
     let face = view.b.get(id.face());
     let around_axis = match face.symmetry() {
-        Symmetry::Normal(_) => return None,
+        Symmetry::Normal(_) | Symmetry::None => return None,
         Symmetry::Center(_) => view.at.omega.length(),
         Symmetry::Axis(axis) => view.at.omega.dot(view.at.a_vector(axis.direction)).abs(),
     };
@@ -363,7 +363,9 @@ pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVe
         Some(if side == Side::A { (o, axis, radius) } else { (at.a_point(o), axis.map(|a| at.a_vector(a)), radius) })
     };
     let side_q = if side_p == Side::A { Side::B } else { Side::A };
-    let ((o_p, axis, radius), (o_q, ..)) = (on_axis(side_p, p)?, on_axis(side_q, q)?);
+    let ((o_p, axis, radius), (o_q, axis_q, _)) = (on_axis(side_p, p)?, on_axis(side_q, q)?);
+    // A ball in a round hole is off the hole's axis, at whatever height x is.
+    let axis = axis.or(axis_q);
     let off = |v: DVec3| axis.map_or(v, |a| v - a * v.dot(a));
     let (apart, way) = (off(o_p - o_q), off(at.velocity(x)) * if side_p == Side::A { 1.0 } else { -1.0 });
     let direction = if apart.length() > 1e-6 * radius { apart } else { way };
@@ -404,8 +406,8 @@ fn cones(
     (side_q, q, face_q): (Side, LiteralId, &Face),
 ) -> Option<Linear> {
     let (on_a, on_b) = if side_p == Side::A { (face_p, face_q) } else { (face_q, face_p) };
-    let Apex { point: o_a, axis: a, sin, cos } = on_a.apex()?;
-    let Apex { point: apex, axis, sin: sin_b, cos: cos_b } = on_b.apex()?;
+    let Apex { point: o_a, axis: a, sin, cos, rows: None } = on_a.apex()? else { return None };
+    let Apex { point: apex, axis, sin: sin_b, cos: cos_b, rows: None } = on_b.apex()? else { return None };
     let o_b = view.center - view.at.a_vector(view.center_b - apex);
     let axis_b = view.at.a_vector(axis);
     let angle = (sin * cos_b - cos * sin_b).abs() * std::f64::consts::FRAC_PI_2; // |α' − α| <= π/2·|sin(α' − α)|

@@ -3,7 +3,7 @@
 //! The cell is a box fixed in A. For x in it, a literal is at least a + n·(x − c) − R:
 //! * +psi: where psi is convex a tangent plane bounds it everywhere: R = 0; where it is not (`Surface::under`), it bends away from
 //!   its tangent as a subtracted cone does, and R is that of the next line;
-//! * −psi: concave; R is the supremum of k·(ρ(x) − ρ − u·(x−c)): k·D²/(2ρ) over |x−c| <= D across the face's axis (exact
+//! * −psi (ρ and D those of B(x − o) and B y where a face is the affine image of another): concave; R is the supremum of k·(ρ(x) − ρ − u·(x−c)): k·D²/(2ρ) over |x−c| <= D across the face's axis (exact
 //!   where D <= 2ρ, an upper bound beyond), or k·T²/(2(ρ−S)) where the cell reaches S along the radial direction u and
 //!   T along the curving tangents (sqrt((ρ+s)² + τ²) − (ρ+s) falls with s). Where D > 2ρ the radial direction means
 //!   nothing over the cell: it is left out and R = k·D.
@@ -16,7 +16,7 @@
 use super::rounding;
 use crate::motion::{Bounds, Instant};
 use crate::solid::local::{LiteralId, Truth, truth_of};
-use crate::solid::surface::{FaceAt, Under};
+use crate::solid::surface::{FaceAt, Stretch, Under};
 use crate::solid::{Face, Sense, Solid};
 use glam::DVec3;
 
@@ -99,13 +99,15 @@ impl Linear {
     }
 }
 
-/// What bends as k·ρ(x) does, ρ the distance from an axis or, without one, from a point; A's axes.
+/// What bends as k·ρ(x) does, ρ the distance from an axis or, without one, from a point, or |B(x − o)|; A's axes.
 struct Round {
     k: f64,
     /// ρ at the cell's centre.
     rho: f64,
     axis: Option<DVec3>,
-    /// The face's normal there, or any that leans against the axis on the same side.
+    /// B, of the affine image of a face.
+    stretch: Option<Stretch>,
+    /// The face's gradient there, or any that leans against the axis on the same side.
     normal: DVec3,
 }
 
@@ -183,9 +185,12 @@ impl View<'_> {
 
     /// Extents of the cell at a curved face: (across the axis or all around, along the normal, along the curving
     /// tangents), each the largest distance from the centre. `normal` is the face's there, both along A's axes.
-    fn extents(&self, axis: Option<DVec3>, normal: DVec3) -> (f64, f64, f64) {
-        let along = |n: DVec3| n.abs().dot(self.half);
-        match axis {
+    fn extents(&self, round: &Round) -> (f64, f64, f64) {
+        let (along, normal) = (|n: DVec3| n.abs().dot(self.half), round.normal);
+        if let Some(b) = &round.stretch {
+            return self.stretched(b, normal);
+        }
+        match round.axis {
             Some(axis) => {
                 let t = axis.cross(normal).normalize_or_zero();
                 let u = t.cross(axis);
@@ -199,19 +204,32 @@ impl View<'_> {
         }
     }
 
+    /// The same of B y instead of y: |B y|, its part along B(x − o) at the centre, and what is across that. B's rows and their
+    /// products have some roundings more than a unit vector's.
+    #[cold]
+    fn stretched(&self, b: &Stretch, normal: DVec3) -> (f64, f64, f64) {
+        const MORE: f64 = 1.0 + 1e-12;
+        let reach = |v: DVec3| v.abs().dot(self.half) * MORE;
+        let all = DVec3::from_array(b.rows.map(reach)).length().min(self.radius);
+        let along = b.along(normal);
+        let [s, t] = b.beside(along).map(|t| reach(b.back(t)));
+        (all, reach(b.back(along)), s.hypot(t).min(all))
+    }
+
     /// How far a function that bends as k·ρ(x) does rises above its tangent over the cell.
     fn remainder(&self, side: Side, round: &Round) -> Remainder {
         // Extents and distance from the axis are each known to the rounding; R must not come out too small.
-        let (d, radial, tangential) = self.extents(round.axis, round.normal);
+        let (d, radial, tangential) = self.extents(round);
         let (d, tangential) = (d + self.rounding, tangential + self.rounding);
         let rho = (round.rho - self.rounding).max(0.0);
         let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
         let closest = rho - radial - way;
         // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
         let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
-        let across = match round.axis {
-            Some(axis) => DVec3::ONE - axis * axis,
-            None => DVec3::ONE,
+        let across = match (&round.stretch, round.axis) {
+            (Some(b), _) => b.rows.iter().map(|row| *row * *row).sum(),
+            (None, Some(axis)) => DVec3::ONE - axis * axis,
+            (None, None) => DVec3::ONE,
         };
         let k = round.k;
         let cost = if slab {
@@ -306,7 +324,7 @@ impl View<'_> {
         let center = if side == Side::A { self.center } else { self.center_b };
         let under = face.under(point, center)?;
         let [axis, normal] = [under.axis, under.out].map(|v| self.turned(side, v));
-        let rest = self.remainder(side, &Round { k: under.k, rho: under.rho, axis: Some(axis), normal });
+        let rest = self.remainder(side, &Round { k: under.k, rho: under.rho, axis: Some(axis), stretch: None, normal });
         let normal = self.turned(side, if rest.far { under.far } else { under.normal });
         let l = self.plane(side, id, normal, under.value - rest.most + self.delta);
         let l = Linear { point, cost: rest.cost, ..l };
@@ -359,7 +377,8 @@ impl View<'_> {
     #[inline]
     fn round(&self, side: Side, face: &Face, f: &FaceAt) -> Round {
         let axis = face.developable().map(|axis| self.turned(side, axis));
-        Round { k: f.k, rho: f.rho, axis, normal: f.normal }
+        let turned = |b: Stretch| Stretch { rows: b.rows.map(|row| self.turned(side, row)), ..b };
+        Round { k: f.k, rho: f.rho, axis, stretch: face.stretch().map(turned), normal: f.normal }
     }
 
     /// How much each half extent weighs in how far a face bends away from its tangent: k·(tangent component)²·e²/(2ρ).
@@ -367,12 +386,16 @@ impl View<'_> {
         if round.k == 0.0 {
             return DVec3::ZERO;
         }
-        let across = match round.axis {
-            Some(axis) => {
+        let across = match (&round.stretch, round.axis) {
+            (Some(b), _) => {
+                let [s, t] = b.beside(b.along(round.normal)).map(|t| b.back(t));
+                s * s + t * t
+            }
+            (None, Some(axis)) => {
                 let t = axis.cross(round.normal);
                 t * t
             }
-            None => DVec3::ONE - round.normal * round.normal,
+            (None, None) => DVec3::ONE - round.normal * round.normal,
         };
         across * self.half * self.half * (round.k / (2.0 * round.rho.max(self.radius)))
     }

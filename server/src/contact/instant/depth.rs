@@ -12,7 +12,7 @@ use super::separation::{self, Cover};
 use super::work::Work;
 use crate::contact::exclusion::clause::{self, Expressions};
 use crate::contact::exclusion::enumeration;
-use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use crate::solid::Sense;
@@ -151,14 +151,14 @@ fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
         let decide = |side: Side| {
             let (model, y) = if side == Side::A { (task.model_a, x) } else { (task.model_b, at.b_point(x)) };
             let (value, id) = model.deciding(y);
-            let n = model.solid.faces[id.face() as usize].at(y).normal;
-            let n = if id.sense() == Sense::Positive { n } else { -n };
-            (value, if side == Side::A { n } else { at.a_vector(n) })
+            let f = model.solid.faces[id.face() as usize].at(y);
+            let n = if id.sense() == Sense::Positive { f.normal } else { -f.normal };
+            (value, if side == Side::A { n } else { at.a_vector(n) }, f.slope)
         };
-        let ((in_a, up_a), (in_b, up_b)) = (decide(Side::A), decide(Side::B));
+        let ((in_a, up_a, steep_a), (in_b, up_b, steep_b)) = (decide(Side::A), decide(Side::B));
         let apart = up_a - up_b;
         let square = apart.length_squared();
-        if square < OPPOSED {
+        if square < OPPOSED * steep_a * steep_b {
             break;
         }
         x -= apart * ((in_a - in_b) / square);
@@ -166,7 +166,7 @@ fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
     x
 }
 
-/// |g_A − g_B|² below which two gradients do not oppose each other.
+/// |g_A − g_B|² below which two gradients do not oppose each other, over their lengths.
 const OPPOSED: f64 = 1.0;
 
 fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
@@ -182,14 +182,7 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
         work.bound();
         // Literals decided against the present depth over the trust box fold away.
         let view = View {
-            a: Faces { solid: task.a, clip_planes: &[] },
-            b: Faces { solid: task.b, clip_planes: &[] },
-            at,
-            motion: task.relative.bounds(0.0, 0.0, 0.0),
-            center: x,
-            half: DVec3::splat(size),
             radius: size * 3f64.sqrt(),
-            center_b: at.b_point(x),
             velocity: DVec3::ZERO,
             delta: -best,
             wall: f64::NEG_INFINITY,
@@ -197,6 +190,7 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
             fits: false,
             multipliers: true,
             curved: false,
+            ..task.view((x, DVec3::splat(size)), at, task.relative.bounds(0.0, 0.0, 0.0), &[])
         };
         let mut pool: Vec<Token> = Vec::new();
         let truth_a = task.a.prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));
@@ -244,5 +238,8 @@ fn normal(task: &Task, at: &Instant, x: DVec3, support: &[(Side, LiteralId, f64)
     };
     let sum = |side: Side| support.iter().filter(|s| s.0 == side).map(|s| gradient(s.0, s.1) * s.2).sum::<DVec3>();
     let from_a = task.a.deciding(x).1;
-    (sum(Side::A) - sum(Side::B)).try_normalize().unwrap_or_else(|| gradient(Side::A, from_a))
+    (sum(Side::A) - sum(Side::B)).try_normalize().unwrap_or_else(|| {
+        let n = task.a.faces[from_a.face() as usize].unit_normal(x);
+        if from_a.sense() == Sense::Positive { n } else { -n }
+    })
 }

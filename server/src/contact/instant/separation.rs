@@ -13,7 +13,7 @@
 use super::work::Work;
 use crate::contact::exclusion::clause;
 use crate::contact::exclusion::enumeration;
-use crate::contact::exclusion::literal::{Faces, Side, View};
+use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::motion::Instant;
@@ -109,21 +109,13 @@ impl<'t, 'a> Cover<'t, 'a> {
 
     fn view(&self, place: &Place, delta: f64) -> View<'t> {
         View {
-            a: Faces { solid: self.task.a, clip_planes: &[] },
-            b: Faces { solid: self.task.b, clip_planes: &[] },
-            at: self.at,
-            motion: self.task.relative.bounds(self.at.t, 0.0, 0.0),
-            center: place.center,
-            half: place.half,
-            radius: place.half.length(),
-            center_b: self.at.b_point(place.center),
             velocity: DVec3::ZERO,
             delta,
             wall: delta,
-            rounding: self.task.rounding,
             fits: -delta < self.fits_below,
             multipliers: true,
             curved: false,
+            ..self.task.view((place.center, place.half), self.at, self.task.relative.bounds(self.at.t, 0.0, 0.0), &[])
         }
     }
 

@@ -1,5 +1,6 @@
 //! One pair over one step: the kernels in front of the queue, then the queue; and the answer's fields.
 
+mod report;
 pub mod search;
 pub mod unbounded;
 

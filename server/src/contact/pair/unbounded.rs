@@ -5,7 +5,7 @@
 //! tells nothing is undecided, at once.
 
 use crate::contact::query::outcome::{ContactPoint, Outcome, Overlap, Penetration, Verdict};
-use crate::contact::query::question::{Body, PairQuery};
+use crate::contact::query::question::{PairQuery, PlacedModel};
 use crate::math::tolerance;
 use crate::solid::{Node, Solid};
 use contactd_proto::Pose;
@@ -65,7 +65,7 @@ struct Side<'a> {
 }
 
 impl<'a> Side<'a> {
-    fn new(body: &Body<'a>) -> Self {
+    fn new(body: &PlacedModel<'a>) -> Self {
         let (start, place) = (body.placed.motion.start, body.placed.place);
         let world_from_model = Pose::new(start.point(place.position), start.rotation * place.rotation);
         Self { solid: &body.model.solid, world_from_model }

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 /// One body of a pair.
 #[derive(Clone, Copy, Debug)]
-pub struct Body<'a> {
+pub struct PlacedModel<'a> {
     /// Its model.
     pub model: &'a Model,
     /// Where it stands and how it moves.
@@ -20,9 +20,9 @@ pub struct Body<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct PairQuery<'a> {
     /// The first body; normals point from it.
-    pub a: Body<'a>,
+    pub a: PlacedModel<'a>,
     /// The second one.
-    pub b: Body<'a>,
+    pub b: PlacedModel<'a>,
     /// Depth delta at which a contact is decided; see `default_resolution`. Raised to `LEAST_RESOLUTION` of the pair's
     /// extent over the step; the outcome tells what was used.
     pub resolution: f64,
@@ -99,7 +99,7 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 }
 
 /// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
-pub(in crate::contact) fn without_own_spin(body: &Body) -> Placed {
+pub(in crate::contact) fn without_own_spin(body: &PlacedModel) -> Placed {
     let mut placed = body.placed;
     let spin = placed.motion.spin;
     if spin != DVec3::ZERO {
@@ -123,13 +123,13 @@ const ALONG: f64 = 0.1;
 
 /// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the other one, which is
 /// bounded, has subtracted planes along that axis or subtracted cones.
-fn turns_in_a_hole(peg: &Body, hole: &Body) -> bool {
+fn turns_in_a_hole(peg: &PlacedModel, hole: &PlacedModel) -> bool {
     let spin = peg.placed.motion.spin;
     let candidates = hole.model.hollow && !peg.model.hollow && hole.model.radius.is_finite();
     if !candidates || spin.length_squared() < SPINS * SPINS {
         return false;
     }
-    let world_from_model = |body: &Body| body.placed.motion.start.rotation * body.placed.place.rotation;
+    let world_from_model = |body: &PlacedModel| body.placed.motion.start.rotation * body.placed.place.rotation;
     let along = world_from_model(peg).conjugate() * spin;
     let Some(axis) = peg.model.axis_of_revolution(along) else { return false };
     if axis.is_along(along) || axis.direction.cross(along).length() > OFF_AXIS * along.length() {

@@ -5,7 +5,7 @@ use super::scratch::Scratch;
 use super::slices::Slices;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
-use crate::contact::query::question::{Body, PairQuery, Strategies, default_resolution};
+use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::motion::Placed;
@@ -42,8 +42,8 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
             spin: v(0.3, 0.0, 0.4),
         };
         let query = PairQuery {
-            a: Body { model: &fork, placed: Placed { place, motion: falling } },
-            b: Body { model: &plate, placed: Placed { place, motion: Motion::resting(Pose::IDENTITY) } },
+            a: PlacedModel { model: &fork, placed: Placed { place, motion: falling } },
+            b: PlacedModel { model: &plate, placed: Placed { place, motion: Motion::resting(Pose::IDENTITY) } },
             resolution: default_resolution(&fork, &plate),
             cell_limit: 1000,
             strategies: Strategies::default(),

@@ -114,7 +114,7 @@ fn edge(bodies: &Bodies, p: Lit, q: Lit, found: &mut impl FnMut(Curve)) {
 fn tangent(bodies: &Bodies, p: Lit, q: Lit) -> Option<Curve> {
     let [out_p, out_q] = [p, q].map(|l| Outward { face: bodies.face(l), is_convex: is_convex(l) });
     let within = Nearness { near: bodies.tau, lie: bodies.lie, size: bodies.size };
-    let found = curve::tangent(out_p, out_q, |x| bodies.look(q, x).normal, &within);
+    let found = curve::tangent(out_p, out_q, |x| bodies.look_out(q, x).normal, &within);
     found.map(|curve| Curve::of(bodies, q.0, curve))
 }
 

@@ -46,6 +46,8 @@ pub struct At {
     pub value: f64,
     pub normal: DVec3,
     pub hessian: DMat3,
+    /// Length of the gradient.
+    pub slope: f64,
 }
 
 /// A literal of one of the bodies.
@@ -112,7 +114,17 @@ impl<'t, 'a> Bodies<'t, 'a> {
         let face = self.face(lit);
         let f = face.at(x);
         let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
-        At { value: f.value * sign, normal: f.normal * sign, hessian: newton::hessian(face, x) * sign }
+        At { value: f.value * sign, normal: f.normal * sign, hessian: newton::hessian(face, x) * sign, slope: f.slope }
+    }
+
+    /// The same as a distance, next to the surface: all over the length of the gradient, which is then a unit vector.
+    pub fn look_out(&self, lit: Lit, x: DVec3) -> At {
+        let at = self.look(lit, x);
+        if at.slope == 1.0 {
+            return at;
+        }
+        let by = 1.0 / at.slope;
+        At { value: at.value * by, normal: at.normal * by, hessian: at.hessian * by, slope: 1.0 }
     }
 
     /// A literal's value at a point.
@@ -141,7 +153,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     /// The point of a literal's surface next to `x`.
     pub fn foot(&self, lit: Lit, mut x: DVec3) -> DVec3 {
         for _ in 0..3 {
-            let at = self.look(lit, x);
+            let at = self.look_out(lit, x);
             x -= at.normal * at.value;
         }
         x
@@ -181,7 +193,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     pub fn rise(&self, lit: Lit, x: DVec3) -> (DVec3, bool) {
         match self.face(lit).apex().filter(|apex| (x - apex.point).length() <= self.eps) {
             Some(apex) => (if lit.1.sense() == Sense::Positive { -apex.axis } else { apex.axis }, true),
-            None => (self.look(lit, x).normal, false),
+            None => (self.look_out(lit, x).normal, false),
         }
     }
 

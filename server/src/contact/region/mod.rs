@@ -408,7 +408,7 @@ fn points_of(corners: &[Corner]) -> Vec<RegionPoint> {
 }
 
 fn patch_region(bodies: &Bodies, pair: &FacePair, corners: &[Corner]) -> Region {
-    let normals = corners.iter().map(|c| bodies.look(pair.alpha, c.x).normal);
+    let normals = corners.iter().map(|c| bodies.look_out(pair.alpha, c.x).normal);
     let mean = normals.clone().sum::<DVec3>();
     let normal = if mean.length() > 1e-3 { mean.normalize() } else { normals.clone().next().unwrap_or(DVec3::Z) };
     Region {

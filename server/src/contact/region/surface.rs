@@ -50,7 +50,7 @@ impl FacePair {
 
     /// Feet of a point on both faces, and the normal from A to B.
     pub fn feet(&self, bodies: &Bodies, x: DVec3) -> (DVec3, DVec3, DVec3) {
-        (bodies.foot(self.alpha, x), bodies.foot(self.beta, x), bodies.look(self.alpha, x).normal)
+        (bodies.foot(self.alpha, x), bodies.foot(self.beta, x), bodies.look_out(self.alpha, x).normal)
     }
 
     /// Separation of the faces at a point.
@@ -61,7 +61,7 @@ impl FacePair {
 
     /// Half way between the faces: value and gradient.
     pub fn middle(&self, bodies: &Bodies, x: DVec3) -> (f64, DVec3) {
-        let (a, b) = (bodies.look(self.alpha, x), bodies.look(self.beta, x));
+        let (a, b) = (bodies.look_out(self.alpha, x), bodies.look_out(self.beta, x));
         (0.5 * (a.value - b.value), (a.normal - b.normal) * 0.5)
     }
 }
@@ -175,11 +175,11 @@ pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
     if truth_a != Truth::Open || truth_b != Truth::Open || (x_b - x_a).dot(n) > bodies.tau * (1.0 + 1e-9) {
         return Standing::Outside;
     }
-    let surface = bodies.look(pair.alpha, x_a);
+    let surface = bodies.look_out(pair.alpha, x_a);
     let mut parts = Vec::new();
     for (side, y) in [(Side::A, x_a), (Side::B, x_b)] {
         for id in bodies.through(side, y) {
-            let at = bodies.look((side, id), y);
+            let at = bodies.look_out((side, id), y);
             let across = at.normal - n * at.normal.dot(n);
             // Leaning faces of a pair count as parallel.
             let flat = ANGLE.max(2.0 * LEAN * bodies.lie / bodies.size);
@@ -215,11 +215,17 @@ pub fn same_surface(bodies: &Bodies, p: Lit, q: Lit) -> bool {
     p.1.sense() == q.1.sense() && face_p.difference(face_q, size).is_some_and(near)
 }
 
-/// The axis about which the curve of two faces is symmetric, if it has one: a point, a direction, and a perpendicular
-/// that moves with the body.
+/// The axis about which the curve of two faces is symmetric, if it has one, or a line through the middle of an ellipse: a point, a
+/// direction, and a perpendicular that moves with the body.
 pub fn axis_of_curve(bodies: &Bodies, p: Lit, q: Lit) -> Option<(DVec3, DVec3, DVec3)> {
     let other = bodies.face(q);
     let (origin, axis, side) = match (bodies.face(p).symmetry(), other.symmetry()) {
+        (Symmetry::None, Symmetry::Normal(normal)) => {
+            let Axis { origin, direction } = bodies.face(p).skewer(normal)?;
+            (origin, direction, p.0)
+        }
+        (Symmetry::Normal(_), Symmetry::None) => return axis_of_curve(bodies, q, p),
+        (Symmetry::None, _) | (_, Symmetry::None) => return None,
         (Symmetry::Axis(Axis { origin, direction }), _) => {
             if other.slides_along(direction, 1e-6) {
                 return None;

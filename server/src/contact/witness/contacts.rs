@@ -14,9 +14,7 @@ use crate::contact::exclusion::clause::Hint;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::outcome::Counters;
 use crate::contact::query::task::{Task, witness_level};
-use crate::motion::Instant;
 use crate::solid::Sense;
-use crate::solid::surface::Apex;
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -114,7 +112,7 @@ impl<'a> Contacts<'a> {
                 let at = self.task.relative.at(s.t);
                 let holds = |(c, l): (&Constraint, &f64)| matches!(c, Constraint::Apex(..)) || *l >= -1e-9;
                 if s.active.iter().zip(&s.lambda).all(holds) && self.task.is_deep(s.x, &at, self.task.rounding) {
-                    self.holds_at_apexes(&s, &at) && self.accept(Known::All, s)
+                    Problem::of(&self.task).holds_at_apexes(&s, &at) && self.accept(Known::All, s)
                 } else {
                     mend && self.mend(active, s.x, s.t, s.lambda)
                 }
@@ -130,7 +128,7 @@ impl<'a> Contacts<'a> {
                 Some(s) if (0.0..=1.0).contains(&s.t) && s.t < self.goal() && s.stationarity < SETTLED => {
                     let at = self.task.relative.at(s.t);
                     if self.task.is_deep(s.x, &at, self.task.rounding) {
-                        self.holds_at_apexes(&s, &at) && self.accept(Known::All, s)
+                        Problem::of(&self.task).holds_at_apexes(&s, &at) && self.accept(Known::All, s)
                     } else {
                         mend && self.mend(active, x, t, lambda)
                     }
@@ -199,7 +197,7 @@ impl<'a> Contacts<'a> {
             let at = self.task.relative.at(s.t);
             // Whatever rounding did: a witness of depth delta.
             if self.task.is_deep(s.x, &at, self.task.rounding) {
-                return self.holds_at_apexes(&s, &at) && self.accept(known, s);
+                return Problem::of(&self.task).holds_at_apexes(&s, &at) && self.accept(known, s);
             }
             // Something else decides there: it enters, the smallest multiplier leaves. A primitive that the walk has not
             // handed over is not asked.
@@ -222,25 +220,6 @@ impl<'a> Contacts<'a> {
             }
         }
         false
-    }
-
-    /// True when the multiplied normals of every apex in a solution lie in its normal cone: within the right angle less
-    /// the half angle of the direction away from the cone.
-    fn holds_at_apexes(&self, s: &Solution, at: &Instant) -> bool {
-        let problem = Problem::of(&self.task);
-        s.active.iter().all(|c| {
-            let Constraint::Apex(side, id, 0) = *c else { return true };
-            let solid = if side == Side::A { self.task.a } else { self.task.b };
-            let Some(Apex { axis, sin, .. }) = solid.faces[id.face() as usize].apex() else { return false };
-            let axis = if side == Side::A { axis } else { at.a_vector(axis) };
-            let same = s
-                .active
-                .iter()
-                .zip(&s.lambda)
-                .filter(|(o, _)| matches!(**o, Constraint::Apex(os, oid, _) if (os, oid) == (side, id)));
-            let sum: DVec3 = same.map(|(o, l)| problem.row(o, s.x, at, 0.0).gradient * *l).sum();
-            -sum.dot(axis) >= sum.length() * (sin - 1e-6)
-        })
     }
 
     /// True for the contact that is known already.

@@ -21,8 +21,8 @@ pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &m
             return;
         }
         let f = face.at(x);
-        if f.value.abs() <= tol && f.normal.dot(n) > -0.99 {
-            near.push((id, f.normal));
+        if f.value.abs() <= tol && f.unit().dot(n) > -0.99 {
+            near.push((id, f.unit()));
         }
     }
     // The least set of them whose normals hold n between them: one, two, then three.

@@ -63,7 +63,7 @@ impl<'t, 'a> Features<'t, 'a> {
         self.active[side as usize].contains(&id)
     }
 
-    /// The gradient of a literal at the point, along A's axes.
+    /// The unit vector along a literal's gradient at the point, along A's axes.
     pub fn gradient(&self, side: Side, id: LiteralId) -> DVec3 {
         let (face, y) = self.face(side, id);
         let n = normal(face, id, y);
@@ -75,7 +75,7 @@ impl<'t, 'a> Features<'t, 'a> {
         let (face, y) = self.face(side, id);
         match face.apex().filter(|apex| self.is_at(apex, y)) {
             Some(apex) => -apex.axis,
-            None => face.at(y).normal,
+            None => face.unit_normal(y),
         }
     }
 
@@ -107,6 +107,19 @@ impl<'t, 'a> Features<'t, 'a> {
         let each = self.smooth();
         let by_faces = held_by_faces(&each).filter(|held| held.0 <= NEARLY_BALANCED).map(|held| held.1);
         by_faces.or_else(|| self.held_by_an_apex(&each))
+    }
+
+    /// All sets of active faces that nearly hold each other, the smallest first.
+    pub fn nearly_held(&self, within: f64) -> Vec<Vec<(Constraint, f64)>> {
+        let each = self.smooth();
+        let mut out = Vec::new();
+        for set in (2..=4usize).flat_map(|count| sets(&each, count)) {
+            let Some((lambda, rest)) = balance(&set.iter().map(|l| l.2).collect::<Vec<_>>()) else { continue };
+            if rest <= within {
+                out.push(set.iter().map(|l| Constraint::Literal(l.0, l.1)).zip(lambda).collect());
+            }
+        }
+        out
     }
 
     /// True when active faces of both bodies oppose each other, up to what is left of their gradients' weighted sum, or
@@ -146,7 +159,9 @@ impl<'t, 'a> Features<'t, 'a> {
                         best = Some((along, held.zip(weights).collect(), sum));
                     }
                 }
-                let Some((along, mut held, sum)) = best.filter(|b| b.0 >= apex.sin - NEARLY_BALANCED) else { continue };
+                let own = |v: DVec3| if side == Side::A { v } else { self.at.b_from_a * v };
+                let holds = |b: &(f64, Vec<(Constraint, f64)>, DVec3)| apex.holds(own(-b.2), b.0, NEARLY_BALANCED);
+                let Some((along, mut held, sum)) = best.filter(holds) else { continue };
                 debug_assert!(along <= 1.0 + 1e-9);
                 let directions = apex.directions();
                 held.extend((0..3).map(|k| {
@@ -165,18 +180,13 @@ impl<'t, 'a> Features<'t, 'a> {
 fn held_by_faces(each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<(f64, Vec<(Constraint, f64)>)> {
     let mut best: Option<(f64, Vec<(Constraint, f64)>)> = None;
     for count in 2..=4usize {
-        for of_a in 1..count {
-            for p in choices(&each[0], of_a) {
-                for q in choices(&each[1], count - of_a) {
-                    let all: Vec<_> = p.iter().chain(&q).copied().collect();
-                    let Some((lambda, rest)) = balance(&all.iter().map(|l| l.2).collect::<Vec<_>>()) else {
-                        continue;
-                    };
-                    if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
-                        let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
-                        best = Some((rest, held.zip(lambda).collect()));
-                    }
-                }
+        for all in sets(each, count) {
+            let Some((lambda, rest)) = balance(&all.iter().map(|l| l.2).collect::<Vec<_>>()) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|b| rest < 0.5 * b.0) {
+                let held = all.iter().map(|l| Constraint::Literal(l.0, l.1));
+                best = Some((rest, held.zip(lambda).collect()));
             }
         }
         if best.as_ref().is_some_and(|b| b.0 <= BALANCED) {
@@ -184,6 +194,17 @@ fn held_by_faces(each: &[Vec<(Side, LiteralId, DVec3)>; 2]) -> Option<(f64, Vec<
         }
     }
     best
+}
+
+/// All choices of `count` faces, some of either side.
+fn sets(each: &[Vec<(Side, LiteralId, DVec3)>; 2], count: usize) -> Vec<Vec<(Side, LiteralId, DVec3)>> {
+    let mut out = Vec::new();
+    for of_a in 1..count {
+        for p in choices(&each[0], of_a) {
+            out.extend(choices(&each[1], count - of_a).iter().map(|q| p.iter().chain(q).copied().collect()));
+        }
+    }
+    out
 }
 
 /// The unit vector between some unit vectors (one or two) that is nearest to a direction, with their weights in it.
@@ -244,8 +265,8 @@ fn passes(apex: &Apex, y: DVec3, tolerance: f64) -> bool {
     (y - apex.point).length() * apex.sin <= tolerance
 }
 
-/// The gradient of a literal at a point of its own body.
+/// The unit normal of a literal at a point of its own body, along its gradient.
 fn normal(face: &Face, id: LiteralId, y: DVec3) -> DVec3 {
-    let n = face.at(y).normal;
+    let n = face.unit_normal(y);
     if id.sense() == Sense::Positive { n } else { -n }
 }

@@ -18,7 +18,7 @@ use crate::contact::exclusion::literal::{Faces, Side};
 use crate::contact::query::task::Task;
 use crate::motion::{Instant, Relative};
 use crate::solid::local::LiteralId;
-use crate::solid::surface::Curvature;
+use crate::solid::surface::{Apex, Curvature};
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -301,6 +301,29 @@ impl Problem<'_> {
         let at = self.relative.at(t);
         let sum = active.iter().zip(&lambda).map(|(c, l)| self.row(c, x, &at, level).gradient * *l).sum::<DVec3>();
         Some(Solution { x, t, active: Actives::from_slice(active), lambda, stationarity: sum.abs().max_element() })
+    }
+
+    /// True when the multiplied normals of every apex in a solution lie in its normal cone: within the right angle less
+    /// the half angle of the direction away from the cone.
+    pub(in crate::contact) fn holds_at_apexes(&self, s: &Solution, at: &Instant) -> bool {
+        s.active.iter().all(|c| {
+            let Constraint::Apex(side, id, 0) = *c else { return true };
+            let faces = if side == Side::A { &self.a } else { &self.b };
+            let Some(apex) = faces.get(id.face()).apex() else { return false };
+            let Apex { axis, sin, .. } = apex;
+            let axis = if side == Side::A { axis } else { at.a_vector(axis) };
+            let same = s
+                .active
+                .iter()
+                .zip(&s.lambda)
+                .filter(|(o, _)| matches!(**o, Constraint::Apex(os, oid, _) if (os, oid) == (side, id)));
+            let sum: DVec3 = same.map(|(o, l)| self.row(o, s.x, at, 0.0).gradient * *l).sum();
+            if apex.rows.is_some() {
+                let own = if side == Side::A { sum } else { at.b_from_a * sum };
+                return apex.holds(own, -sum.dot(axis), 1e-6 * sum.length());
+            }
+            -sum.dot(axis) >= sum.length() * (sin - 1e-6)
+        })
     }
 
     /// Plain Newton steps on the same square system, from a good guess: `Err(true)` where the system is singular, which

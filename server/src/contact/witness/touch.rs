@@ -8,7 +8,7 @@ use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution,
 use super::retreat::{BACK, Climber, ON_SURFACE, held};
 use super::sides::{deciding, has_both_sides};
 use crate::contact::exclusion::literal::Side;
-use crate::contact::instant::{depth, separation};
+use crate::contact::instant::depth;
 use crate::contact::query::task::{Task, witness_level};
 use crate::motion::Instant;
 use crate::octree::Model;
@@ -35,6 +35,12 @@ const MENDS: usize = 8;
 /// How far from either surface the end of a climb may lie that is told as a touch, relative to the bodies. Where none
 /// lies so near the witness alone is told (`Outcome::not_continued`).
 const TOUCHES: f64 = 1e-11;
+
+/// How far from a witness the faces may pass that its touch is looked for with, in depths.
+const CROWD: f64 = 1.5;
+
+/// What the gradients of such faces may leave of each other.
+const NEARLY_HELD: f64 = 1e-3;
 
 /// A continuation that leads farther from its witness than this, in scales of the pair, is another contact's.
 const NOT_FAR: f64 = 1e-2;
@@ -63,11 +69,16 @@ impl Touch<'_, '_> {
             if continues { problem.solve(&deep.active, deep.x, deep.t, &deep.lambda, 0.0, true) } else { None }
         });
         let touch = touch.and_then(|s| if self.is_touch(&s, deep) { Some(s) } else { self.touch_beside(s, deep) });
+        let climbed = || self.back(deep, &Climber::new(self.task, BACK));
         match touch {
-            Some(s) if self.is_held(&s) => Some(self.sharpened(s, deep)),
+            Some(s) if self.is_held(&s) => {
+                let s = self.sharpened(s, deep);
+                // Between like faces multipliers may hardly miss their balance far from where they have it.
+                let misses = continues && s.stationarity > BALANCED;
+                Some(if misses { climbed().unwrap_or(s) } else { s })
+            }
             other if continues => {
-                let climbed = || self.back(deep, &Climber::new(self.task, BACK));
-                self.continued_by_steps(deep).or_else(climbed).or(other.filter(|s| self.is_there(s)))
+                self.continued_by_steps(deep).or_else(climbed).or(other.filter(|s| !pulls(s) && self.is_there(s)))
             }
             other => other,
         }
@@ -100,25 +111,13 @@ impl Touch<'_, '_> {
         let at = self.task.relative.at(s.t);
         let tol = 16.0 * self.task.rounding;
         let touches = |model: &Model, x: DVec3| model.value_within(x, tol).abs() <= tol;
-        s.t <= deep.t
-            && touches(self.task.model_a, s.x)
-            && touches(self.task.model_b, at.b_point(s.x))
-            && (s.t >= 0.0 || deep.t <= 0.0 || self.lasts_to_the_start(s, deep))
+        s.t <= deep.t && touches(self.task.model_a, s.x) && touches(self.task.model_b, at.b_point(s.x))
     }
 
-    /// True when bodies whose surfaces meet before the start, as their motion has it, still have something in common at the
-    /// start, on the way from there to the witness. Between like faces the equations of the one have solutions far from
-    /// the other, between which the bodies are apart.
-    fn lasts_to_the_start(&self, s: &Solution, deep: &Solution) -> bool {
-        let at = self.task.relative.at(0.0);
-        let least = INCIDENT * self.task.rounding;
-        let x = s.before(deep, 0.0);
-        separation::value(self.task, &at, x) <= least || Climber::new(self.task, BACK).deepest(0.0, x).1 >= -least
-    }
-
-    /// True when a solution's multipliers balance, none pulls, and its faces are there.
+    /// True when a solution's multipliers balance, none pulls, no apex is pressed from within, and its faces are there.
     fn is_held(&self, s: &Solution) -> bool {
-        holds(s) && self.is_there(s)
+        let tips = || Problem::of(self.task).holds_at_apexes(s, &self.task.relative.at(s.t));
+        holds(s) && tips() && self.is_there(s)
     }
 
     /// True when f depends on each face that pushes, or on another one in its plane. In a thin wall a face that decides
@@ -172,10 +171,19 @@ impl Touch<'_, '_> {
             let touches = |s: &Solution| near(s) && balances(s) && self.is_held(s) && self.is_touch(s, deep);
             self.mended(&self.climbed(t, held), 0.0).filter(touches)
         };
-        let (t, held) = match climber.back((deep.t, deep.x, level), solve)? {
-            Ok(solved) => return Some(solved),
-            Err(end) => end,
+        let end = match climber.back((deep.t, deep.x, level), solve) {
+            Some(Ok(solved)) => return Some(solved),
+            Some(Err(end)) => Some(end),
+            None => None,
         };
+        let (from, x) = end.as_ref().map_or((deep.t, deep.x), |(t, held)| (*t, held.0));
+        let near = |s: &Solution| (s.x - x).length() <= NOT_FAR * self.task.scale && s.stationarity < BALANCED;
+        let touches = |s: &Solution| near(s) && self.is_held(s) && self.is_touch(s, deep);
+        let beside = if from > 0.0 { self.of_faces_beside(from, x).find(touches) } else { None };
+        if beside.is_some() {
+            return beside;
+        }
+        let (t, held) = end?;
         // A climb may end on one of the surfaces.
         let at = self.task.relative.at(t);
         let values = [self.task.model_a.value(held.0), self.task.model_b.value(at.b_point(held.0))];
@@ -183,6 +191,18 @@ impl Touch<'_, '_> {
         let most = TOUCHES * self.task.scale + self.task.rounding;
         let is_deep_at_start = t == 0.0 && held.1 > ON_SURFACE * self.task.rounding;
         ((is_deep_at_start || off <= most) && self.is_balanced(held.0, &at, off)).then(|| self.climbed(t, &held))
+    }
+
+    /// Touches that the faces beside a point may have, which pass it no farther than a witness is deep, by what holds both
+    /// bodies there. A climb follows the faces that hold it at a depth: another face of the same body may be ahead of these
+    /// where the surfaces meet.
+    fn of_faces_beside(&self, t: f64, x: DVec3) -> impl Iterator<Item = Solution> {
+        let at = self.task.relative.at(t);
+        let features = Features::at(self.task, x, &at, Some(CROWD * self.task.delta));
+        features.nearly_held(NEARLY_HELD).into_iter().take(MENDS).filter_map(move |held| {
+            let (active, lambda) = held.into_iter().unzip();
+            self.mended(&Solution { x, t, active, lambda, stationarity: CLIMBED }, 0.0)
+        })
     }
 
     /// True when faces of both bodies oppose each other at the end of a climb that lies `off` their surfaces. Where none
@@ -283,6 +303,11 @@ impl Touch<'_, '_> {
         let lambda: Vec<_> = s.lambda.iter().copied().chain([0.0]).collect();
         Problem::of(self.task).solve(&active, s.x, s.t, &lambda, 0.0, true).filter(|s| self.is_touch(s, deep))
     }
+}
+
+/// True when a solution's multipliers balance but one pulls by more than such a balance leaves open.
+fn pulls(s: &Solution) -> bool {
+    s.stationarity < SETTLED && !holds(s)
 }
 
 /// True when a solution's multipliers balance and none pulls.

@@ -322,6 +322,20 @@ fn cases() -> Vec<(String, Inside, f64)> {
             1e-3,
         ),
     ];
+    // A frame with a frame in its hole, and what lies beside: holes are gone, and what was in them is covered.
+    let frame = |a: f64, b: f64| {
+        let at = |x: f64| moved(-x, -x, 0.0, &format!("square({});", 2.0 * x));
+        format!("difference() {{ {} {} }}", at(a), at(b))
+    };
+    let shapes = format!("{} {} {}", frame(3.0, 2.0), frame(1.0, 0.5), moved(5.0, 0.0, 0.0, "square(1);"));
+    cases.push((
+        linear("height = 1", &format!("fill() {{ {shapes} }}")),
+        Box::new(|p| {
+            let beside = (5.0..6.0).contains(&p.x) && (0.0..1.0).contains(&p.y);
+            (0.0..1.0).contains(&p.z) && (p.x.abs().max(p.y.abs()) < 3.0 || beside)
+        }),
+        0.0,
+    ));
     // What is taken away takes no corner, and points are enough of a polyhedron.
     let open_mesh = "polyhedron([[0,0,0],[2,0,0],[0,2,0],[2,2,0],[0,0,1]], [[0,1,2],[3,4,1]]);";
     cases.push((
@@ -445,5 +459,42 @@ fn constructs_hold_what_they_mean_without_seams() {
             }
         }
         assert!(full > 40 && near < 60, "{full} inside, {near} near: {text}");
+    }
+}
+
+#[test]
+fn outlines_of_more_corners_than_a_formula_has_are_meshes_with_flat_faces() {
+    let star = |n: usize| {
+        let corner = |i: usize| {
+            let (sin, cos) = libm::sincos(i as f64 / n as f64 * std::f64::consts::TAU);
+            let r = if i.is_multiple_of(2) { 5.0 } else { 4.9 };
+            format!("[{},{}]", r * cos, r * sin)
+        };
+        format!("polygon([{}]);", (0..n).map(corner).collect::<Vec<_>>().join(","))
+    };
+    let holed = format!("difference() {{ {} {} }}", star(120), moved(4.0, 0.0, 0.0, "square([2, 1]);"));
+    // How far the outline and the notch are moved, outwards positive.
+    for (call, by) in [("union()", 0.0), ("offset(delta = -0.25)", -0.25), ("offset(r = 0.25, $fn = 40)", 0.25)] {
+        let text = linear("height = 2", &format!("{call} {{ {holed} }}"));
+        let read = |polyhedron_faces| {
+            let limits = Limits { polyhedron_faces, ..Limits::default() };
+            import_csg("m.csg", &text, Facets::Auto, &limits).unwrap_or_else(|e| panic!("{text}: {e}"))
+        };
+        let (few, exact) = (read(60), read(5000));
+        assert!(few.notes.iter().any(|n| n.text.contains("corners: taken as a mesh")), "{:?}", few.notes);
+        assert_eq!(few.solid.primitives.len(), 1);
+        let mut r = Random(5);
+        let mut inside = 0;
+        for _ in 0..300 {
+            let p = DVec3::new(r.within(-5.5, 5.5), r.within(-5.5, 5.5), r.within(-0.2, 2.2));
+            let (a, b) = (few.solid.value(p), exact.solid.value(p));
+            assert!(a.abs().min(b.abs()) < 2e-3 || (a < 0.0) == (b < 0.0), "{call} at {p}: {a} {b}");
+            let round = p.x.hypot(p.y);
+            if (0.0..2.0).contains(&p.z) && round < 4.8 + by && p.x < 3.9 + by.min(0.0) {
+                assert!(a < 0.0, "{call} at {p}: {a}");
+                inside += 1;
+            }
+        }
+        assert!(inside > 60, "{inside}");
     }
 }

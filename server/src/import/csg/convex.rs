@@ -37,12 +37,19 @@ pub struct Element {
     round: f64,
     /// Pieces that OpenSCAD cuts its curve into.
     pieces: u32,
+    /// Of a point that stands for a curve with others: how far off it they are at most.
+    off: f64,
 }
 
 impl Element {
     /// A point.
     pub fn point(center: DVec3) -> Self {
-        Self { center, radius: 0.0, axes: None, round: 0.0, pieces: 1 }
+        Self { center, radius: 0.0, axes: None, round: 0.0, pieces: 1, off: 0.0 }
+    }
+
+    /// A point of those that stand for a curved solid, `off` from it at most.
+    pub fn facet(center: DVec3, off: f64) -> Self {
+        Self { off, ..Self::point(center) }
     }
 
     /// Its middle.
@@ -64,6 +71,9 @@ impl Element {
 
     /// What its shadow on z = 0 is the hull of; `None` for an ellipse.
     pub fn shadow(&self) -> Option<Vec<Disc>> {
+        if self.off > 0.0 {
+            return None;
+        }
         let disc = |center: DVec3, radius: f64| Disc { center: center.truncate(), radius };
         let Some(axes) = self.axes else { return Some(vec![disc(self.center, self.radius)]) };
         let aside = axes.z_axis.truncate();
@@ -94,12 +104,12 @@ impl Element {
             }
             (Some(_), Some(_)) => return None,
         };
-        Some(Self { center, radius, axes, round, pieces })
+        Some(Self { center, radius, axes, round, pieces, off: self.off + other.off })
     }
 
     /// How far its facets lie inside of it at most.
     pub fn deviation(&self) -> f64 {
-        (self.radius + self.round) * (1.0 - libm::cos(std::f64::consts::PI / f64::from(self.pieces.max(3))))
+        self.off + (self.radius + self.round) * sagitta(self.pieces)
     }
 
     /// True when a part is proven not to touch it where it is extreme: f of the part changes by no more than the way, and no place on
@@ -137,6 +147,10 @@ impl Element {
     }
 }
 
+fn sagitta(pieces: u32) -> f64 {
+    1.0 - libm::cos(std::f64::consts::PI / f64::from(pieces.max(3)))
+}
+
 /// What a primitive is the hull of; `None` for what has no bounds. Of a mesh or a torus: what its hull is the hull of.
 pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>> {
     let axes = frame.matrix();
@@ -146,11 +160,12 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
         axes: (radius > 0.0).then_some(axes),
         round: 0.0,
         pieces,
+        off: 0.0,
     };
     let corners = |all: &[DVec3]| Some(all.iter().map(|v| Element::point(frame.point(*v))).collect());
     match shape {
         Shape::Sphere(s) => {
-            Some(vec![Element { center: frame.position, radius: s.radius, axes: None, round: 0.0, pieces }])
+            Some(vec![Element { center: frame.position, radius: s.radius, axes: None, round: 0.0, pieces, off: 0.0 }])
         }
         Shape::Cylinder(c) => Some(vec![disc(-c.half_height, c.radius), disc(c.half_height, c.radius)]),
         Shape::Cone(c) => Some(vec![disc(-c.half_height, c.bottom), disc(c.half_height, c.top)]),
@@ -159,7 +174,22 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
         Shape::TriangleMesh(m) => corners(m.vertices()),
         Shape::Torus(t) => {
             let (center, axes) = (frame.position, Some(axes));
-            Some(vec![Element { center, radius: t.major, axes, round: t.minor, pieces }])
+            Some(vec![Element { center, radius: t.major, axes, round: t.minor, pieces, off: 0.0 }])
+        }
+        // No element is an ellipse: as many points as OpenSCAD has.
+        Shape::Ellipsoid(e) => {
+            let points = faceted_sphere(1.0, pieces, pieces.div_ceil(2)).0;
+            let off = e.semi.max_element() * sagitta(pieces);
+            Some(points.into_iter().map(|p| Element::facet(frame.point(p * e.semi), off)).collect())
+        }
+        Shape::EllipticFrustum(c) => {
+            let off = c.semi.max_element() * sagitta(pieces);
+            let rim = |(z, size): (f64, f64)| {
+                let middle = (c.lean * z).extend(z);
+                let points = if size > 0.0 { ring(size, pieces) } else { vec![DVec2::ZERO] };
+                points.into_iter().map(move |p| Element::facet(frame.point(middle + (p * c.semi).extend(0.0)), off))
+            };
+            Some([(-c.half_height, c.bottom), (c.half_height, c.top)].into_iter().flat_map(rim).collect())
         }
         Shape::HalfSpace(_) => None,
     }
@@ -174,6 +204,9 @@ pub fn pieces(parts: &Parts<'_>, root: PartId) -> Option<Vec<Vec<Element>>> {
 }
 
 fn of_leaf(parts: &Parts<'_>, p: PartId) -> Option<Vec<Element>> {
+    if let Some((points, off)) = parts.bent.get(&p) {
+        return Some(points.iter().map(|x| Element::facet(*x, *off)).collect());
+    }
     match &parts.list[p] {
         Part::Leaf(shape, frame, _) => elements(shape, frame, parts.pieces.get(&p).copied().unwrap_or(PIECES)),
         Part::Empty => {
@@ -235,7 +268,9 @@ pub fn hull(parts: &mut Parts<'_>, name: &str, at: Place, elements: &[Element]) 
     let size = around.half().length() + reach;
     let hull = Hull { name, at };
     let discs: Vec<&Element> = elements.iter().filter(|e| e.axes.is_some()).collect();
-    let exact = if let Some(axes) = discs.first().and_then(|d| d.axes) {
+    let exact = if elements.iter().any(|e| e.off > 0.0) {
+        None
+    } else if let Some(axes) = discs.first().and_then(|d| d.axes) {
         let parallel = discs.iter().all(|d| d.axes.is_some_and(|a| a.z_axis.cross(axes.z_axis).length() <= SAME));
         if !parallel {
             None
@@ -272,6 +307,8 @@ pub fn sums(parts: &mut Parts<'_>, at: Place, operands: &[Vec<Vec<Element>>]) ->
             for piece in pieces {
                 let pairs = || sum.iter().flat_map(|a| piece.iter().map(move |b| (a, b)));
                 let exact: Option<Vec<Element>> = pairs().map(|(a, b)| a.plus(b)).collect();
+                let most = exact.iter().flatten().map(|e| e.off).fold(0.0, f64::max);
+                off = if most > 0.0 { Some(off.unwrap_or(0.0).max(most)) } else { off };
                 let of_points = || {
                     let points = |e: &[Element]| e.iter().flat_map(Element::facets).collect::<Vec<DVec3>>();
                     let (a, b) = (points(sum), points(piece));

@@ -35,7 +35,7 @@ const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin
 /// Written for drawings of other files by rotate_extrude, and without one by old versions of OpenSCAD.
 const WITHOUT_FILE: [&str; 3] = ["layer", "origin", "timestamp"];
 
-const KINDS: [Construct; 22] = [
+const KINDS: [Construct; 23] = [
     Construct { name: "group", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "union", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "difference", arguments: &[], inside: BALL, fates: &[] },
@@ -178,6 +178,7 @@ const KINDS: [Construct; 22] = [
         inside: "{ sphere(r = 1); multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]) { cube(1); } }",
         fates: &[("cut", Read("true", "false"))],
     },
+    Construct { name: "fill", arguments: &[], inside: "{ difference() { square(3); circle(r = 1); } }", fates: &[] },
     Construct {
         name: "resize",
         arguments: &[("newsize", "[1, 2, 0]")],
@@ -187,9 +188,8 @@ const KINDS: [Construct; 22] = [
 ];
 
 /// Kinds of nodes and modules of OpenSCAD that make or change shapes in ways that are not imported.
-const REFUSED: [&str; 25] = [
+const REFUSED: [&str; 24] = [
     "roof",
-    "fill",
     "import",
     "surface",
     "import_stl",
@@ -228,7 +228,7 @@ fn text(kind: &Construct, changed: Option<(&str, &str)>) -> String {
     let arguments: Vec<String> = arguments.iter().map(|(n, v)| format!("{n} = {v}")).collect();
     let call = format!("{}({}) {}", kind.name, arguments.join(", "), kind.inside);
     match kind.name {
-        "circle" | "square" | "polygon" | "offset" | "text" | "projection" => {
+        "circle" | "square" | "polygon" | "offset" | "text" | "projection" | "fill" => {
             format!("linear_extrude(height = 1) {{\n{call}\n}}")
         }
         _ => format!("\n{call}"),
@@ -357,6 +357,11 @@ fn what_is_left_out_is_reported() {
             "1:39: a polygon without area: left out, as OpenSCAD does",
         ),
         ("cube(1); linear_extrude(height = 1) { cube(2); }", "1:39: cube inside of a 2D shape: left out"),
+        ("group() { square(1); }", "1:11: square outside of linear_extrude: a 2D shape, without volume (OpenSCAD: "),
+        (
+            "polyhedron([[0,0,0],[0,1,0],[1,1,0],[1,0,0],[0.5,0.5,0.5]], [[0,1,2],[0,2,3],[0,1,4],[1,2,4],[2,3,4],[3,0,4]]);",
+            "1:1: a polyhedron with 2 faces that run the other way round than their neighbours: turned",
+        ),
         ("cube(1); group() { cube(2); square(1); }", "1:29: square among solids: a 2D shape, left out"),
         (
             "cube(1); group() { hull() { circle(1); } cube(2); }",
@@ -373,7 +378,7 @@ fn what_is_left_out_is_reported() {
         ("hull() { cylinder(1, 1, 1); cube(3); }", "1:1: hull: faceted, "),
         (
             "multmatrix([[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]) { sphere(1); }",
-            "1:57: non-uniform scale on a sphere: faceted, ",
+            "1:57: non-uniform scale on a sphere: an ellipsoid, exact",
         ),
         ("cube(1); hull() { linear_extrude(height = 1) { hull() { } } }", "1:48: a hull without area: left out"),
         (

@@ -104,8 +104,16 @@ impl Extrusion {
         self.twist != 0.0 || self.scale.x != self.scale.y && !flats.all(straight)
     }
 
+    /// True where walls may bend.
+    pub fn may_bend(&self) -> bool {
+        self.twist != 0.0 || self.scale.x != self.scale.y
+    }
+
     /// Slices that OpenSCAD cuts it into, of an outline with some corners.
     pub fn slices(&self, corners: &[DVec2]) -> usize {
+        if !self.may_bend() {
+            return 1;
+        }
         let own = || slices(corners, self.height, self.twist, self.scale, &self.curve);
         self.slices.unwrap_or_else(own).min(f64::from(u32::MAX)) as usize
     }

@@ -7,13 +7,17 @@ use super::shapes::Shapes;
 use super::slices::Curve;
 use super::syntax::{Call, ValueKind};
 use super::{Place, Problem};
-use crate::import::{Attachment, drawing, mesh};
+use crate::import::{Attachment, drawing, mesh, surface};
+use crate::solid::Op;
 use glam::{DAffine3, DVec2};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
 /// What OpenSCAD writes beside the file; of a mesh `center` alone changes anything.
 const PARAMETERS: [&str; 9] = ["file", "layer", "convexity", "origin", "scale", "center", "dpi", "id", "timestamp"];
+
+/// The formats that are read of other files, for sentences.
+const READ: &str = " (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dxf and svg are read)";
 
 /// The same of extrusions that name a drawing, with what they have of their own.
 const OF_EXTRUSIONS: [&str; 13] = [
@@ -32,15 +36,23 @@ const OF_EXTRUSIONS: [&str; 13] = [
     "start",
 ];
 
-/// The file that a call names, where it does: `import`, or an extrusion without anything inside.
+/// The file that a call names, where it does: `import`, `surface`, or an extrusion without anything inside.
 pub fn file_of(call: &Call) -> Option<String> {
     let value = call.arguments.iter().find(|a| a.name.as_deref() == Some("file"))?;
     match &value.value.kind {
-        ValueKind::Text(name) if call.name == "import" || call.children.is_empty() && !name.is_empty() => {
+        ValueKind::Text(name)
+            if ["import", "surface"].contains(&call.name.as_str()) || call.children.is_empty() && !name.is_empty() =>
+        {
             Some(name.clone())
         }
         _ => None,
     }
+}
+
+/// True for a call with an empty name, where files can be named at all.
+fn names_none(call: &Call, attached: Option<&[Attachment]>) -> bool {
+    let is_empty = |v: &ValueKind| matches!(v, ValueKind::Text(name) if name.is_empty());
+    attached.is_some() && call.arguments.iter().any(|a| a.name.as_deref() == Some("file") && is_empty(&a.value.kind))
 }
 
 /// The bytes of a file that a call names, and its name.
@@ -69,18 +81,67 @@ pub fn import(
     (outer, hull): (&DAffine3, bool),
     attached: Option<&[Attachment]>,
 ) -> Result<PartId> {
+    if names_none(call, attached) {
+        return Ok(shapes.nothing(call, "of no file"));
+    }
     let refused = |construct: String, hint| (call.at, Problem::Unsupported { construct, hint });
     let (name, bytes) = bytes_of(call, attached)?;
     if Arguments::new(call, &PARAMETERS)?.bool_or("center", false)? {
         return Err(refused(format!("import of {name:?} with center = true"), " (move it instead)"));
     }
     let Some(read) = mesh::of_file(&name, bytes, shapes.limits) else {
-        return Err(refused(format!("import of {name:?}"), " (of other files stl, off, obj and dxf are read)"));
+        return Err(refused(format!("import of {name:?}"), READ));
     };
-    let polygons =
-        read.map_err(|(at, problem)| (call.at, Problem::Named { file: name, at, problem: problem.into() }))?;
+    let bodies = read.map_err(|e| named(call, &name, e))?;
+    for what in &bodies.left_out {
+        shapes.parts.note(call.at, format!("{what} of {name:?}: left out"), None);
+    }
+    let mut made = Vec::with_capacity(bodies.all.len());
+    for body in bodies.all {
+        made.push(of_polygons(shapes, call, (outer, hull), body)?);
+    }
+    Ok(match made.as_slice() {
+        [one] => *one,
+        _ => shapes.parts.op(Op::Union, call.at, made),
+    })
+}
+
+/// Something in a file that a call names.
+fn named(call: &Call, name: &str, (at, problem): (Place, Problem)) -> (Place, Problem) {
+    (call.at, Problem::Named { file: name.to_owned(), at, problem: problem.into() })
+}
+
+fn of_polygons(
+    shapes: &mut Shapes<'_>,
+    call: &Call,
+    (outer, hull): (&DAffine3, bool),
+    polygons: mesh::Polygons,
+) -> Result<PartId> {
     let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
     shapes.of_faces(call, outer, hull, (polygons.points, clockwise))
+}
+
+/// The solid under the heights that a `surface` names.
+///
+/// # Errors
+/// What is wrong with the call or with the file, and where.
+pub fn surface(
+    shapes: &mut Shapes<'_>,
+    call: &Call,
+    (outer, hull): (&DAffine3, bool),
+    attached: Option<&[Attachment]>,
+) -> Result<PartId> {
+    if names_none(call, attached) {
+        return Ok(shapes.nothing(call, "of no file"));
+    }
+    let (name, bytes) = bytes_of(call, attached)?;
+    let arguments = Arguments::new(call, &["file", "center", "convexity", "invert", "timestamp"])?;
+    let how = (arguments.bool_or("center", false)?, arguments.bool_or("invert", false)?);
+    let polygons = surface::read(bytes, how, shapes.limits).map_err(|e| named(call, &name, e))?;
+    if polygons.is_empty() {
+        return Ok(shapes.nothing(call, &format!("of {name:?}, which has no two rows of two heights")));
+    }
+    of_polygons(shapes, call, (outer, hull), polygons)
 }
 
 /// What an `import` is, before it is read: a drawing, or a solid.
@@ -99,50 +160,59 @@ pub fn flat(
     attached: Option<&[Attachment]>,
 ) -> Result<PartId> {
     let at = call.at;
+    if names_none(call, attached) {
+        return Ok(shapes.nothing(call, "of no file"));
+    }
     let (name, bytes) = bytes_of(call, attached)?;
     let arguments = Arguments::new(call, if call.name == "import" { &PARAMETERS } else { &OF_EXTRUSIONS })?;
-    let layer = match arguments.get("layer").map(|v| (&v.kind, v)) {
-        None => String::new(),
-        Some((ValueKind::Text(layer), _)) => layer.clone(),
-        Some((_, v)) => return Err((v.at, Problem::syntax("a layer's name as layer of import", v.found()))),
+    let word = |name: &str| match arguments.get(name).map(|v| (&v.kind, v)) {
+        None => Ok(String::new()),
+        Some((ValueKind::Text(word), _)) => Ok(word.clone()),
+        Some((_, v)) => Err((v.at, Problem::syntax(format!("a string as {name} of import"), v.found()))),
     };
+    let of_import = call.name == "import";
+    let (layer, id) = (word("layer")?, if of_import { word("id")? } else { String::new() });
     let origin = arguments.pair_or("origin", DVec2::ZERO)?;
     // An extrusion's own scale scales its drawing, too, as it does in OpenSCAD.
     let scale = arguments.pair_or("scale", DVec2::ONE)?.x;
+    let center = of_import && arguments.bool_or("center", false)?;
+    // OpenSCAD's own where none is given, or one that makes no sense.
+    let dpi = if of_import { arguments.number_or("dpi", 72.0)? } else { 72.0 };
+    let dpi = if (0.001..1e9).contains(&dpi) { dpi } else { 72.0 };
     Curve::of(&arguments)?;
     let pieces = |radius: f64| shapes.pieces(&arguments, radius).unwrap_or(3);
-    let frame = drawing::Frame { layer: &layer, origin, scale, pieces: &pieces };
+    let frame = drawing::Frame { layer: &layer, id: &id, dpi, center, origin, scale, pieces: &pieces };
     let Some(read) = drawing::of_file(&name, bytes, &frame) else {
-        let hint = " (of other files stl, off, obj and dxf are read)";
-        return Err((at, Problem::Unsupported { construct: format!("{} of {name:?}", call.name), hint }));
+        return Err((at, Problem::Unsupported { construct: format!("{} of {name:?}", call.name), hint: READ }));
     };
-    let drawing = read
-        .map_err(|(place, problem)| (at, Problem::Named { file: name.clone(), at: place, problem: problem.into() }))?;
+    let drawing = read.map_err(|e| named(call, &name, e))?;
     for (what, count) in &drawing.left_out {
         shapes.parts.note(at, format!("{count} {what} of {name:?}: left out, as OpenSCAD does"), None);
     }
-    let mut paths = drawing.paths;
-    if paths.is_empty() {
+    let mut drawn: Vec<Vec<Vec<DVec2>>> = drawing.shapes;
+    drawn.retain(|paths| !paths.is_empty());
+    if drawn.is_empty() {
         return Ok(shapes.nothing(call, &format!("of {name:?}, without a closed path")));
     }
-    if arguments.get("center").is_some() && call.name == "import" && arguments.bool_or("center", false)? {
-        let all = || paths.iter().flatten();
-        let low = all().fold(DVec2::INFINITY, |m, p| m.min(*p));
-        let high = all().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
-        paths.iter_mut().flatten().for_each(|p| *p -= (low + high) * 0.5);
-    }
-    let corners = paths.iter().map(Vec::len).sum();
-    shapes.parts.affordable(at, paths.iter().map(Vec::len).max().unwrap_or(0))?;
+    let corners = drawn.iter().flatten().map(Vec::len).sum();
+    shapes.parts.meshable(at, corners)?;
     if drawing.off > 0.0 {
         shapes.parts.faceted(at, &format!("curves of {name:?}"), corners, drawing.off);
     }
-    let flat = Flat { outline: Outline::Paths(paths), inner, overshoot, name: call.name.clone(), at, pieces: 0 };
-    Ok(shapes.parts.push(Part::Flat(Box::new(flat))))
+    let mut made = Vec::with_capacity(drawn.len());
+    for paths in drawn {
+        let flat = Flat { outline: Outline::Paths(paths), inner, overshoot, name: call.name.clone(), at, pieces: 0 };
+        made.push(shapes.parts.push(Part::Flat(Box::new(flat))));
+    }
+    Ok(match made.as_slice() {
+        [one] => *one,
+        _ => shapes.parts.op(Op::Union, at, made),
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::import::{Facets, Limits, import_csg, read_model};
+    use crate::import::{Access, Facets, Limits, ModelBytes, import_csg, read_model};
     use glam::DVec3;
     use std::fs;
 
@@ -153,7 +223,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir_all(at("text/parts")).expect("folders");
-        for name in ["text/parts/t.off", "t.off", "text/t.dat"] {
+        for name in ["text/parts/t.off", "t.off", "text/t.dat", "beyond.off"] {
             fs::write(at(name), TETRAHEDRON).expect("written");
         }
         fs::write(at("text/broken.off"), TETRAHEDRON.replace("3 0 3 2", "3 0 3 9")).expect("written");
@@ -179,13 +249,27 @@ mod tests {
             ("parts", "which is no plain file"),
             (
                 "t.dat",
-                "found import of \"t.dat\", which is not supported (of other files stl, off, obj and dxf are read)",
+                "found import of \"t.dat\", which is not supported (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dxf and svg are read)",
             ),
             ("broken.off", "m.csg:1:1: broken.off:9:7: expected a point's number below 4, found \"9\""),
         ] {
             let error = read(&of(name)).expect_err(name);
             assert!(error.contains(sentence), "{error}\nnot {sentence}");
         }
+        // From a root that is given, and from no other place.
+        let root = Access { root: Some(folder.path().join("text/parts")), ..Access::default() };
+        let wide = Access { root: Some(folder.path().to_path_buf()), ..Access::default() };
+        let of_root = |name: &str, access: &Access| {
+            fs::write(at("text/m.csg"), of(name)).expect("written");
+            let read = ModelBytes::read(&at("text/m.csg"), access, &Limits::default()).expect("a text");
+            read.source().import(Facets::Auto, &Limits::default()).map_err(|e| e.to_string())
+        };
+        assert!(of_root("../t.off", &wide).is_ok() && of_root("link.off", &wide).is_ok());
+        assert!(of_root("parts/t.off", &root).is_ok());
+        let error = of_root("../t.off", &root).expect_err("outside");
+        assert!(error.contains("m.csg:1:1: expected a readable file, found \"../t.off\", which is not in the import"));
+        let none = Access { root: Some(at("none")), ..Access::default() };
+        assert!(of_root("parts/t.off", &none).expect_err("no root").contains("whose import root "));
         let sent =
             import_csg("m.csg", &of("parts/t.off"), Facets::Auto, &Limits::default()).expect_err("sent").to_string();
         assert!(sent.starts_with("m.csg:1:1: expected a supported construct, found import"), "{sent}");
@@ -220,6 +304,9 @@ mod tests {
         assert!(inside(&rim, 1.0, 1.0, 1.0));
         let turned = "rotate_extrude(file = \"plate.dxf\", layer = \"rim\", origin = [0, 0], scale = 2, angle = 360);";
         assert!(inside(turned, 5.0, 5.0, 3.0) && !inside(turned, 1.0, 1.0, 5.0));
+        let none =
+            read("cube(1); import(file = \"\"); linear_extrude(height = 1) { import(file = \"\"); }").expect("a cube");
+        assert!(none.notes.iter().filter(|n| n.text.starts_with("import of no file: left out")).count() == 2);
         let stray = format!("cube(1); import({});", of.replace("LAYER", ""));
         assert_eq!(read(&stray).expect("a cube").solid.primitives.len(), 1);
         for (text, sentence) in [

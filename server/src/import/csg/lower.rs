@@ -78,6 +78,8 @@ enum CallKind {
     Extrude(Extrusion),
     Revolve(Turn),
     Hull,
+    /// A flat shape without its holes.
+    Fill,
     Minkowski,
     Projection {
         /// What z = 0 cuts; else the shadow on it.
@@ -196,6 +198,8 @@ impl<'a> Lowering<'a> {
             let hull = matches!(kind, CallKind::Hull) || context.hull && matches!(kind, CallKind::Set(Op::Union));
             Ok(Step::open(kind, Context { hull, ..context }))
         };
+        // A 2D shape within its plane, or by itself.
+        let placed = || context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
         match call.name.as_str() {
             "group" | "union" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "difference" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Difference))),
@@ -207,24 +211,14 @@ impl<'a> Lowering<'a> {
                 None => Step::Leaf(self.shapes.nothing(call, "that flattens what is inside of it")),
             }),
             "hull" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Hull)),
+            "fill" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Fill)),
             "minkowski" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Minkowski)),
             "projection" => {
                 let cut = Arguments::new(call, &["cut", "convexity"])?.bool_or("cut", false)?;
                 let inside = Context { outer: DAffine3::IDENTITY, plane: None, hull: false };
                 Ok(Step::open(CallKind::Projection { cut }, inside))
             }
-            "resize" => {
-                let scale = resize::scale(call, context.plane.is_some(), || self.bounds(call, context))?;
-                let linear = DMat3::from_diagonal(scale);
-                let context = match context.plane {
-                    Some(plane) => {
-                        let inner = plane.inner * DAffine3::from_mat3(linear);
-                        Context { plane: Some(Plane { inner, ..plane }), ..context }
-                    }
-                    None => Context { outer: context.outer * DAffine3::from_mat3(linear), ..context },
-                };
-                Ok(Step::open(CallKind::Set(Op::Union), context))
-            }
+            "resize" => self.resized(call, context),
             "offset" => {
                 let offset = Offset::new(call)?;
                 let pieces = self.shapes.pieces(&Offset::arguments(call)?, offset.by().abs())?;
@@ -249,42 +243,56 @@ impl<'a> Lowering<'a> {
             }
             "circle" | "square" | "polygon" => {
                 no_children(call)?;
-                let id = match context.plane {
-                    Some(plane) => self.shapes.outline(call, plane.inner, plane.overshoot)?,
-                    None => {
-                        self.shapes.outline(call, DAffine3::IDENTITY, 0)?;
-                        self.shapes.parts.push(Part::Stray(call.at, call.name.clone()))
-                    }
-                };
-                Ok(Step::Leaf(id))
+                let (inner, overshoot) = placed();
+                let id = self.shapes.outline(call, inner, overshoot)?;
+                Ok(self.flat_leaf(call, context, id))
             }
             "text" => {
                 no_children(call)?;
-                let (inner, overshoot) =
-                    context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
+                let (inner, overshoot) = placed();
                 let id = text::text(&mut self.shapes, call, inner, overshoot, self.attached)?;
-                Ok(Step::Leaf(match context.plane {
-                    Some(_) => id,
-                    None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
-                }))
+                Ok(self.flat_leaf(call, context, id))
             }
             "import" if context.plane.is_some() || imports::is_flat(call) && self.attached.is_some() => {
-                let (inner, overshoot) =
-                    context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
+                let (inner, overshoot) = placed();
                 let id = imports::flat(&mut self.shapes, call, (inner, overshoot), self.attached)?;
                 no_children(call)?;
-                Ok(Step::Leaf(match context.plane {
-                    Some(_) => id,
-                    None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
-                }))
+                Ok(self.flat_leaf(call, context, id))
             }
             "import" => {
                 let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
                 no_children(call)?;
                 Ok(Step::Leaf(id))
             }
+            "surface" => {
+                let id = imports::surface(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
+                no_children(call)?;
+                Ok(Step::Leaf(match context.plane {
+                    None => id,
+                    Some(_) => self.shapes.nothing(call, "inside of a 2D shape"),
+                }))
+            }
             other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
+    }
+
+    /// What a call that resizes its operands opens.
+    fn resized(&mut self, call: &'a Call, context: Context) -> Result<Step> {
+        let scale = resize::scale(call, context.plane.is_some(), || self.bounds(call, context))?;
+        let linear = DAffine3::from_mat3(DMat3::from_diagonal(scale));
+        let context = match context.plane {
+            Some(plane) => Context { plane: Some(Plane { inner: plane.inner * linear, ..plane }), ..context },
+            None => Context { outer: context.outer * linear, ..context },
+        };
+        Ok(Step::open(CallKind::Set(Op::Union), context))
+    }
+
+    /// A 2D shape; outside of what makes it a solid it is none.
+    fn flat_leaf(&mut self, call: &Call, context: Context, id: PartId) -> Step {
+        Step::Leaf(match context.plane {
+            Some(_) => id,
+            None => self.shapes.parts.push(Part::Stray(call.at, call.name.clone())),
+        })
     }
 
     fn extrusion(&mut self, call: &'a Call, context: Context) -> Result<Step> {
@@ -370,6 +378,7 @@ impl<'a> Lowering<'a> {
             }
             let part = match open.kind {
                 CallKind::Set(op) => Part::Op(op, at, built),
+                CallKind::Fill => Part::Op(Op::Union, at, built),
                 CallKind::Hull => self.hull(at, &built)?,
                 CallKind::Minkowski => self.minkowski(at, &built, open.outside.outer.translation)?,
                 CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) | CallKind::Projection { .. } => {
@@ -393,7 +402,8 @@ impl<'a> Lowering<'a> {
             (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
             (_, None) | (CallKind::Projection { .. }, _) => Part::Empty,
             (CallKind::Extrude(extrusion), _)
-                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f))) =>
+                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f)))
+                    || outlines::is_intricate(parts, &open.built) =>
             {
                 twist::extruded(parts, at, &open.context.outer, extrusion, &open.built)?
             }
@@ -409,6 +419,7 @@ impl<'a> Lowering<'a> {
             }
             (CallKind::Revolve(turn), Some(call)) => return self.revolve(call, *turn, &open.context.outer, open.built),
             (CallKind::Hull, Some(call)) => outlines::hull(parts, at, &like(most, call), &open.built)?,
+            (CallKind::Fill, Some(call)) => outlines::filled(parts, at, &like(most, call), &open.built)?,
             (CallKind::Minkowski, Some(call)) => {
                 let origin = open.outside.plane.map_or(DVec3::ZERO, |p| p.inner.translation);
                 outlines::minkowski(parts, at, &like(most, call), &open.built, origin)?
@@ -448,8 +459,12 @@ impl<'a> Lowering<'a> {
         let Some((at, name)) = stray else { return Ok((built, None)) };
         if !solids {
             if top {
-                let found = format!("the 2D shape {name} outside of linear_extrude");
-                return Err((at, Problem::syntax("a solid", found)));
+                let text = format!(
+                    "{name} outside of linear_extrude: a 2D shape, without volume (OpenSCAD: \"Current top level object is not a \
+                     3D object.\")"
+                );
+                self.note(at, text, None);
+                return Ok((Vec::new(), None));
             }
             if kinds.contains(&Some(true)) {
                 self.note(
@@ -734,9 +749,8 @@ fn hint(name: &str) -> &'static str {
     match name {
         "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
         | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
-        "import_stl" | "import_off" | "import_dxf" | "surface" => OTHER_FILES,
+        "import_stl" | "import_off" | "import_dxf" => OTHER_FILES,
         "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
-        "fill" => " (write the outline out in circles, squares and polygons)",
         _ => "",
     }
 }

@@ -187,6 +187,10 @@ impl Maker<'_, '_> {
         match &self.parts.list[p] {
             Part::Empty | Part::Flat(_) | Part::Stray(..) => Ok(Manifold::empty()),
             Part::Leaf(shape, frame, _) => {
+                if let Some((corners, off)) = self.parts.bent.get(&p) {
+                    self.off = self.off.max(*off);
+                    return Ok(hull(corners));
+                }
                 let pieces = self.parts.pieces.get(&p).copied();
                 self.leaf(shape, frame, pieces.unwrap_or(super::convex::PIECES))
             }
@@ -220,12 +224,18 @@ impl Maker<'_, '_> {
                 let points: Vec<DVec3> = points.into_iter().map(|p| frame.point(p)).collect();
                 Ok(of_triangles(&points, &triangles))
             }
-            Shape::Sphere(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Cuboid(_) | Shape::Polyhedron(_) => {
+            Shape::Sphere(_)
+            | Shape::Cylinder(_)
+            | Shape::Cone(_)
+            | Shape::Cuboid(_)
+            | Shape::Polyhedron(_)
+            | Shape::Ellipsoid(_)
+            | Shape::EllipticFrustum(_) => {
                 let all = elements(shape, frame, pieces).unwrap_or_default();
                 self.off = all.iter().map(Element::deviation).fold(self.off, f64::max);
                 let points: Vec<DVec3> = all.iter().flat_map(Element::facets).collect();
                 self.parts.meshable(self.at, 2 * points.len())?;
-                Ok(Manifold::hull(&points.iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect::<Vec<_>>()))
+                Ok(hull(&points))
             }
         }
     }
@@ -247,6 +257,10 @@ impl Maker<'_, '_> {
         };
         Manifold::hull(&(0..8).map(corner).collect::<Vec<_>>())
     }
+}
+
+fn hull(points: &[DVec3]) -> Manifold {
+    Manifold::hull(&points.iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect::<Vec<_>>())
 }
 
 fn sagitta(pieces: u32) -> f64 {

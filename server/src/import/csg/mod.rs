@@ -44,7 +44,7 @@ mod twist;
 mod whole;
 
 use super::problem::Problem;
-use super::{Attachment, Facets, Format, Import, ImportError, Limits, Named, Place, Source};
+use super::{Attachment, Facets, Format, Import, ImportError, Limits, Named, Note, Place, Source};
 
 /// Reads a model from the text of a flattened file; `file` is what errors call it.
 pub fn import_csg(file: &str, text: &str, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
@@ -72,7 +72,7 @@ fn named(bytes: &[u8], limits: &Limits) -> Vec<Named> {
     let mut all: Vec<Named> = Vec::new();
     for call in &tree.calls {
         let named = match call.name.as_str() {
-            "import" | "linear_extrude" | "rotate_extrude" => imports::file_of(call).map(Named::File),
+            "import" | "surface" | "linear_extrude" | "rotate_extrude" => imports::file_of(call).map(Named::File),
             "text" => text::font_of(call).map(Named::Font),
             _ => None,
         };
@@ -89,5 +89,10 @@ fn import_bytes(source: &Source, facets: Facets, limits: &Limits) -> Result<Impo
         let found = format!("the byte 0x{:02x}", bytes[e.valid_up_to()]);
         ImportError::Content { file: file.to_owned(), at, problem: Problem::syntax("text in UTF-8", found) }
     })?;
-    import_with(file, text, (facets, source.attached), limits)
+    let mut import = import_with(file, text, (facets, source.attached), limits)?;
+    let warnings = source.attached.unwrap_or_default().iter().filter(|a| a.name == Attachment::WARNINGS);
+    let warnings = warnings.filter_map(|a| std::str::from_utf8(a.bytes.as_ref().ok()?).ok()).flat_map(str::lines);
+    let note = |line: &str| Note { at: Place::START, text: format!("openscad: {line}"), amount: None };
+    import.notes.splice(..0, warnings.map(note));
+    Ok(import)
 }

@@ -9,20 +9,19 @@ use super::arguments::Arguments;
 use super::flat::{Flat, Outline};
 use super::hull::Disc;
 use super::meshed::guarded;
-use super::outlines::{crossing, flat, flat_of, hull_parts, paths};
+use super::outlines::{Grid, crossing, flat, flat_of, hull_parts, paths};
 use super::parts::{Part, PartId, Parts};
 use super::polygon::{Region, turn};
 use super::syntax::Call;
 use super::{Place, Problem};
 use crate::solid::Op;
 use glam::DVec2;
-use manifold_rust::cross_section::CrossSection;
-use manifold_rust::linalg::Vec2;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
 /// Clipper's numbers of joins, and OpenSCAD's limit of a sharp one, in offsets.
 const SQUARE: i32 = 0;
+const ROUND: i32 = 1;
 const MITER: i32 = 2;
 const LONGEST_MITER: f64 = 1e6;
 
@@ -112,7 +111,15 @@ impl Offset {
             return Err((at, crossing()));
         }
         let corners: usize = region.rings.iter().map(Vec::len).sum();
-        parts.affordable(at, corners)?;
+        if parts.affordable(at, corners).is_err() {
+            // As OpenSCAD has it: a disc or a strip at each of so many would be as many primitives.
+            let paths = self.clipped(at, &region.rings, like.pieces)?;
+            if self.join == Join::Round {
+                let off = self.by.abs() * (1.0 - libm::cos(std::f64::consts::PI / f64::from(like.pieces.max(3))));
+                parts.faceted(at, "offset", paths.iter().map(Vec::len).sum(), off);
+            }
+            return Ok(if paths.is_empty() { Part::Empty } else { flat(like, Outline::Paths(paths), DVec2::ZERO) });
+        }
         if self.join == Join::Round && self.by > 0.0 && region.is_convex() {
             let disc = |c: &DVec2| Disc { center: *c, radius: self.by };
             let discs: Vec<Disc> = region.islands[0].hull.iter().map(disc).collect();
@@ -137,7 +144,7 @@ impl Offset {
             }
         }
         if self.join != Join::Round {
-            let paths = self.clipped(at, &region.rings)?;
+            let paths = self.clipped(at, &region.rings, like.pieces)?;
             return Ok(if paths.is_empty() { Part::Empty } else { flat(like, Outline::Paths(paths), DVec2::ZERO) });
         }
         Ok(self.joined(parts, at, like, &region, Outline::Paths(paths.to_vec()), true))
@@ -145,16 +152,16 @@ impl Offset {
 
     /// Rings with their edges moved where some meet others: by Clipper (of manifold-rust), as in OpenSCAD, on a grid of about 1e-12 of
     /// the size.
-    fn clipped(&self, at: Place, rings: &[Vec<DVec2>]) -> Result<Vec<Vec<DVec2>>> {
-        let size = rings.iter().flatten().fold(self.by.abs(), |m, p| m.max(p.abs().max_element()));
-        // It counts in millionths; a power of two rounds nothing.
-        let scale = (1e6 / size).log2().floor().exp2();
-        let polygon = |ring: &Vec<DVec2>| ring.iter().map(|p| Vec2::new(p.x * scale, p.y * scale)).collect();
-        let section = CrossSection::new(rings.iter().map(polygon).collect());
-        let join = if self.join == Join::Cut { SQUARE } else { MITER };
-        let moved = guarded(at, || section.offset_with_params(self.by * scale, join, LONGEST_MITER, 0).to_polygons())?;
-        let path = |p: Vec<Vec2>| p.into_iter().map(|v| DVec2::new(v.x, v.y) / scale).collect();
-        Ok(moved.into_iter().map(path).collect())
+    fn clipped(&self, at: Place, rings: &[Vec<DVec2>], pieces: u32) -> Result<Vec<Vec<DVec2>>> {
+        let grid = Grid::of(rings.iter().flatten().copied().chain([DVec2::splat(self.by)]));
+        let section = grid.section(rings);
+        let join = match self.join {
+            Join::Cut => SQUARE,
+            Join::Sharp => MITER,
+            Join::Round => ROUND,
+        };
+        let pieces = pieces.max(3) as i32;
+        guarded(at, || grid.paths(&section.offset_with_params(grid.length(self.by), join, LONGEST_MITER, pieces)))
     }
 
     /// The shape with discs at the corners where it opens, and with rectangles over its edges; added or taken away.

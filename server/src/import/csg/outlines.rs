@@ -2,11 +2,15 @@
 
 use super::flat::{Flat, Outline};
 use super::hull::{Disc, disc_hull};
+use super::meshed::guarded;
 use super::parts::{Part, PartId, Parts};
-use super::polygon::{Region, overlay};
+use super::polygon::{Region, overlay, turn};
 use super::{Place, Problem};
 use crate::solid::Op;
 use glam::{DAffine3, DVec2, DVec3};
+use manifold_rust::cross_section::CrossSection;
+use manifold_rust::linalg::Vec2;
+use manifold_rust::types::OpType;
 use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -65,7 +69,8 @@ pub fn paths(parts: &mut Parts<'_>, at: Place, roots: &[PartId], who: &str) -> R
     let leaves = flats(parts, roots);
     note_facets(parts, at, &leaves, who);
     let of_each: Vec<Vec<Vec<DVec2>>> = leaves.iter().filter_map(|l| flat_of(parts, *l)).map(Flat::paths).collect();
-    parts.affordable(at, of_each.iter().flatten().map(Vec::len).sum())?;
+    let corners = of_each.iter().flatten().map(Vec::len).sum();
+    parts.meshable(at, corners)?;
     if let ([one], [root]) = (of_each.as_slice(), roots)
         && leaves[0] == *root
     {
@@ -83,6 +88,9 @@ pub fn paths(parts: &mut Parts<'_>, at: Place, roots: &[PartId], who: &str) -> R
             }
             Part::Empty | Part::Leaf(..) | Part::Flat(_) | Part::Stray(..) | Part::Op(..) => order.push(p),
         }
+    }
+    if parts.affordable(at, corners).is_err() {
+        return clipped(parts, at, roots, &order, (&of_each, &place));
     }
     let list = &parts.list;
     let inside = |of: &[bool]| {
@@ -102,6 +110,120 @@ pub fn paths(parts: &mut Parts<'_>, at: Place, roots: &[PartId], who: &str) -> R
         roots.iter().any(|r| truth[r])
     };
     overlay(&of_each, &inside).ok_or_else(|| (at, crossing()))
+}
+
+/// The same of more corners than can be held against each other one by one: by Clipper (of manifold-rust), as in OpenSCAD, on a grid
+/// of about 1e-12 of the size.
+fn clipped(
+    parts: &Parts<'_>,
+    at: Place,
+    roots: &[PartId],
+    order: &[PartId],
+    (of_each, place): (&[Vec<Vec<DVec2>>], &HashMap<PartId, usize>),
+) -> Result<Vec<Vec<DVec2>>> {
+    let grid = Grid::of(of_each.iter().flatten().flatten().copied());
+    let mut made: HashMap<PartId, CrossSection> = HashMap::with_capacity(order.len());
+    for p in order {
+        let section = match &parts.list[*p] {
+            Part::Flat(_) => {
+                let region = Region::of_paths(&of_each[place[p]]);
+                if region.open {
+                    return Err((at, crossing()));
+                }
+                grid.section(&region.rings)
+            }
+            Part::Op(op, _, of) => {
+                let all: Vec<CrossSection> = of.iter().filter_map(|c| made.remove(c)).collect();
+                let how = match op {
+                    Op::Union => OpType::Add,
+                    Op::Intersection => OpType::Intersect,
+                    Op::Difference => OpType::Subtract,
+                };
+                guarded(at, || CrossSection::batch_boolean(&all, how))?
+            }
+            Part::Empty | Part::Leaf(..) | Part::Stray(..) => CrossSection::default(),
+        };
+        made.insert(*p, section);
+    }
+    let all: Vec<CrossSection> = roots.iter().filter_map(|r| made.remove(r)).collect();
+    Ok(grid.paths(&guarded(at, || CrossSection::batch_boolean(&all, OpType::Add))?))
+}
+
+/// A scale at which Clipper, which counts in millionths, moves corners by no more than about 1e-12 of the size.
+pub struct Grid(f64);
+
+impl Grid {
+    /// That of some points.
+    pub fn of(points: impl Iterator<Item = DVec2>) -> Self {
+        let size = points.fold(f64::MIN_POSITIVE, |m, p| m.max(p.abs().max_element()));
+        // A power of two rounds nothing.
+        Self((1e6 / size).log2().floor().exp2())
+    }
+
+    /// A length on it.
+    pub fn length(&self, length: f64) -> f64 {
+        length * self.0
+    }
+
+    /// Rings that run with the inside on their left.
+    pub fn section(&self, rings: &[Vec<DVec2>]) -> CrossSection {
+        let polygon = |ring: &Vec<DVec2>| ring.iter().map(|p| Vec2::new(p.x * self.0, p.y * self.0)).collect();
+        CrossSection::new(rings.iter().map(polygon).collect())
+    }
+
+    /// The rings of a section.
+    pub fn paths(&self, section: &CrossSection) -> Vec<Vec<DVec2>> {
+        let path = |p: Vec<Vec2>| p.into_iter().map(|v| DVec2::new(v.x, v.y) / self.0).collect();
+        section.to_polygons().into_iter().map(path).collect()
+    }
+}
+
+/// True for flat shapes of which one has more corners than a formula is made of.
+pub fn is_intricate(parts: &Parts<'_>, roots: &[PartId]) -> bool {
+    let corners = |f: &Flat| match &f.outline {
+        Outline::Circle(_) | Outline::Square { .. } => 0,
+        Outline::Paths(paths) => paths.iter().map(Vec::len).sum::<usize>() + 2,
+    };
+    let most = flats(parts, roots).into_iter().filter_map(|l| flat_of(parts, l)).map(corners).max();
+    most.is_some_and(|most| parts.affordable(Place::START, most).is_err())
+}
+
+/// Some parts without the holes in them.
+pub fn filled(parts: &mut Parts<'_>, at: Place, like: &Flat, roots: &[PartId]) -> Result<Part> {
+    let leaves = flats(parts, roots);
+    let is_path = |l: &PartId| flat_of(parts, *l).is_some_and(|f| matches!(f.outline, Outline::Paths(_)));
+    if leaves.len() == 1 && !leaves.iter().any(is_path) {
+        return Ok(Part::Op(Op::Union, at, roots.to_vec()));
+    }
+    let region = Region::of_paths(&paths(parts, at, roots, "fill")?);
+    if region.open {
+        return Err((at, crossing()));
+    }
+    let area = |ring: &[DVec2]| -> f64 {
+        (0..ring.len()).map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0])).sum()
+    };
+    let mut outer: Vec<Vec<DVec2>> = region.rings.into_iter().filter(|r| area(r) > 0.0).collect();
+    outer.sort_by(|a, b| area(b).total_cmp(&area(a)));
+    let mut kept: Vec<Vec<DVec2>> = Vec::with_capacity(outer.len());
+    for ring in outer {
+        // Rings touch at corners at most: the middle of a side tells whether all of one lies in a hole.
+        let middle = (ring[0] + ring[1]) * 0.5;
+        if !kept.iter().any(|k| surrounds(k, middle)) {
+            kept.push(ring);
+        }
+    }
+    let made = kept.into_iter().map(|ring| parts.push(flat(like, Outline::Paths(vec![ring]), DVec2::ZERO))).collect();
+    Ok(Part::Op(Op::Union, at, made))
+}
+
+/// Does a point lie within a ring?
+fn surrounds(ring: &[DVec2], p: DVec2) -> bool {
+    let sides = (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]));
+    let crossed = sides.filter(|(a, b)| {
+        let (low, high) = if a.y < b.y { (*a, *b) } else { (*b, *a) };
+        low.y <= p.y && p.y < high.y && turn(low, high, p) > 0.0
+    });
+    crossed.count() % 2 == 1
 }
 
 /// What to say of paths that make no closed rings.

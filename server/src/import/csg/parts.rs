@@ -49,6 +49,8 @@ pub struct Parts<'a> {
     pub list: Vec<Part>,
     /// Of a round primitive: into how many pieces OpenSCAD cuts it.
     pub pieces: HashMap<PartId, u32>,
+    /// Of an elliptic primitive: the corners of OpenSCAD's polyhedron of it, and how far off they are at most.
+    pub bent: HashMap<PartId, (Vec<DVec3>, f64)>,
     /// Below a hull: the corners of what has no volume, by the empty part that it is.
     pub points: HashMap<PartId, Vec<DVec3>>,
     /// Of an extruded island: the part that is its convex hull.
@@ -64,8 +66,8 @@ pub fn is_unbounded(shape: &Shape) -> bool {
 impl<'a> Parts<'a> {
     /// None yet.
     pub fn new(limits: &'a Limits) -> Self {
-        let (pieces, points, hulls) = (HashMap::new(), HashMap::new(), HashMap::new());
-        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, points, hulls, faces: 0 }
+        let (pieces, bent, points, hulls) = (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
+        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, bent, points, hulls, faces: 0 }
     }
 
     /// Adds a part.

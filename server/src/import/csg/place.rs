@@ -2,7 +2,8 @@
 //!
 //! Similarities (rotation, mirror, uniform scale) keep every kind. A transform that scales along a primitive's own axes
 //! keeps a box a box, and a cylinder a cylinder when it scales its cross-section evenly. Any other regular transform
-//! keeps polyhedra (a sheared box becomes one) and half-spaces, and is refused by name on curved primitives.
+//! keeps polyhedra (a sheared box becomes one) and half-spaces, makes an ellipsoid of a sphere and a frustum over an ellipse of a
+//! cylinder or cone, and is refused by name on a torus.
 //!
 //! Files print six digits: a linear part within `SIMILARITY` of scale × orthogonal is replaced by that product
 //! (`snapped`), with the orthogonal polar factor from Newton's iteration Q ← (Q + Q⁻ᵀ)/2 (Higham 1986).
@@ -10,10 +11,12 @@
 use super::Problem;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
-    Cone, Cuboid, Cylinder, Fit, HalfSpace, Polyhedron, Repair, Shape, Sphere, Torus, TriangleMesh,
+    Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair, Shape,
+    Sphere, Torus, TriangleMesh,
 };
+use crate::solid::surface::elliptic::squared;
 use contactd_proto::Pose;
-use glam::{DAffine3, DMat3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 /// A shape, its frame in the model, and what had to be snapped for it.
 pub struct PlacedShape {
@@ -96,8 +99,61 @@ pub fn snapped(m: DMat3) -> (DMat3, Option<f64>) {
 
 /// A ball of radius `radius` around the origin.
 pub fn sphere(a: &DAffine3, radius: f64) -> Result<PlacedShape, Problem> {
-    let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "sphere"))?;
+    let Some(s) = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY) else {
+        return Ok(ellipsoid(a, radius));
+    };
     Ok(PlacedShape::new(Sphere { radius: radius * s.scale }, Pose::at(a.translation)).off(s.off, "sphere"))
+}
+
+/// The image of a ball around the origin: semi-axes are the matrix' singular values, by turns in the planes of two columns until all are
+/// square to each other (M. Hestenes, Inversion of matrices by biorthogonalization, 1958).
+fn ellipsoid(a: &DAffine3, radius: f64) -> PlacedShape {
+    let mut c = [a.matrix3.x_axis, a.matrix3.y_axis, a.matrix3.z_axis];
+    for _ in 0..12 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            [c[p], c[q]] = squared([c[p], c[q]]);
+        }
+    }
+    let semi = DVec3::from_array(c.map(DVec3::length)) * radius;
+    let [x, y, z] = c.map(DVec3::normalize);
+    let rotation = proper(DMat3::from_cols(x, y, if x.cross(y).dot(z) < 0.0 { -z } else { z })).0;
+    let mut placed = PlacedShape::new(Ellipsoid { semi }, Pose::new(a.translation, rotation));
+    placed.notes.push((format!("{} on a sphere: an ellipsoid, exact", bending(a.matrix3)), None));
+    placed
+}
+
+/// The image of a cylinder, cone or frustum: upright where the ends' planes stay square to the axis.
+fn elliptic_frustum(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64) -> PlacedShape {
+    let m = a.matrix3;
+    // The ends' normal, towards the top.
+    let normal = m.x_axis.cross(m.y_axis).normalize();
+    let normal = if normal.dot(m.z_axis) < 0.0 { -normal } else { normal };
+    let [u, v] = squared([m.x_axis, m.y_axis]);
+    let x = (u - normal * u.dot(normal)).normalize();
+    let y = normal.cross(x);
+    let up = m.z_axis.dot(normal);
+    let aside = DVec2::new(m.z_axis.dot(x), m.z_axis.dot(y));
+    let upright = aside.length() <= ROUNDING * up;
+    let larger = bottom.max(top);
+    let alike = (bottom - top).abs() <= SAME_RADIUS * larger;
+    let shape = EllipticFrustum {
+        semi: DVec2::new(u.length(), v.length()) * larger,
+        bottom: if alike { 1.0 } else { bottom / larger },
+        top: if alike { 1.0 } else { top / larger },
+        half_height: 0.5 * height * up,
+        lean: if upright { DVec2::ZERO } else { aside / up },
+    };
+    let kind = if alike { "cylinder" } else { "cone" };
+    let text = format!(
+        "{} on a {kind}: {} {}, exact",
+        bending(m),
+        if shape.kind().starts_with('e') || shape.kind().starts_with('o') { "an" } else { "a" },
+        shape.kind()
+    );
+    let frame = Pose::new(a.transform_point3(center), proper(DMat3::from_cols(x, y, normal)).0);
+    let mut placed = PlacedShape::new(shape, frame);
+    placed.notes.push((text, None));
+    placed
 }
 
 /// All points within `minor` of a circle of radius `major` about z, around the origin.
@@ -112,7 +168,7 @@ pub fn cylinder(a: &DAffine3, center: DVec3, bottom: f64, top: f64, height: f64)
     let kind = if bottom == top { "cylinder" } else { "cone" };
     let uneven = |l: &DVec3| (l.x - l.y).abs() / l.x;
     let Some((lengths, rotation, off)) = along_axes(a.matrix3).filter(|(l, ..)| uneven(l) <= SIMILARITY) else {
-        return Err(refusal(a.matrix3, kind));
+        return Ok(elliptic_frustum(a, center, bottom, top, height));
     };
     let off = off.max(uneven(&lengths));
     // Even in x and y within rounding: their mean; the half sum is exact when they are equal.
@@ -195,8 +251,12 @@ pub fn half_space_at(a: &DAffine3, n: DVec3, point: DVec3) -> PlacedShape {
 
 /// Why a curved primitive cannot follow `m`.
 fn refusal(m: DMat3, kind: &str) -> Problem {
-    let how = if columns_are_perpendicular(m) { "non-uniform scale" } else { "shear" };
-    Problem::unsupported(format!("{how} on a {kind}"))
+    Problem::unsupported(format!("{} on a {kind}", bending(m)))
+}
+
+/// What `m` does beside turning and scaling.
+fn bending(m: DMat3) -> &'static str {
+    if columns_are_perpendicular(m) { "non-uniform scale" } else { "shear" }
 }
 
 fn columns_are_perpendicular(m: DMat3) -> bool {

@@ -147,7 +147,7 @@ impl Cut {
                 if corners.len() > FEW { None } else { Some(self.polygon(&corners)) }
             }
             Shape::HalfSpace(_) => Some(self.half_plane(frame)),
-            Shape::TriangleMesh(_) | Shape::Torus(_) => None,
+            Shape::TriangleMesh(_) | Shape::Torus(_) | Shape::Ellipsoid(_) | Shape::EllipticFrustum(_) => None,
         }
     }
 

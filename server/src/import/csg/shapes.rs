@@ -10,8 +10,9 @@ use super::parts::{Part, PartId, Parts};
 use super::place;
 use super::syntax::Call;
 use super::{Facets, Limits, Place, Problem};
-use crate::solid::Op;
+use crate::import::mesh::oriented;
 use crate::solid::primitive::{MeshError, MeshFault};
+use crate::solid::{Op, Shape};
 use glam::{DAffine3, DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -41,7 +42,7 @@ impl Shapes<'_> {
         Ok(self.parts.push(leaf))
     }
 
-    /// A round primitive, or OpenSCAD's polyhedron for one that a transform makes something else of.
+    /// A round primitive; of one that a transform makes elliptic OpenSCAD's polyhedron is kept for what has no other form.
     fn round(
         &mut self,
         call: &Call,
@@ -50,20 +51,18 @@ impl Shapes<'_> {
         (pieces, radius): (u32, f64),
         mesh: &dyn Fn(u32) -> (Vec<DVec3>, Vec<Vec<u32>>),
     ) -> Result<PartId> {
-        let Err(Problem::Unsupported { construct, .. }) = placed else {
-            let id = self.leaf(call, placed)?;
-            self.parts.pieces.insert(id, pieces);
-            return Ok(id);
-        };
-        let (points, faces) = mesh(pieces);
-        self.parts.affordable(call.at, faces.len())?;
-        let m = outer.matrix3;
-        let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-        let off = radius * size * (1.0 - libm::cos(std::f64::consts::PI / f64::from(pieces)));
-        self.parts.faceted(call.at, &construct, faces.len(), off);
-        let name = format!("faceted {}", call.name);
-        let leaf = self.parts.leaf(&name, call.at, place::polyhedron(outer, &points, &faces).map(|p| p.0))?;
-        Ok(self.parts.push(leaf))
+        let is_elliptic =
+            placed.as_ref().is_ok_and(|p| matches!(p.shape, Shape::Ellipsoid(_) | Shape::EllipticFrustum(_)));
+        let id = self.leaf(call, placed)?;
+        self.parts.pieces.insert(id, pieces);
+        if is_elliptic {
+            let m = outer.matrix3;
+            let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+            let off = radius * size * (1.0 - libm::cos(std::f64::consts::PI / f64::from(pieces)));
+            let corners = mesh(pieces).0.into_iter().map(|p| outer.transform_point3(p)).collect();
+            self.parts.bent.insert(id, (corners, off));
+        }
+        Ok(id)
     }
 
     /// `sphere`.
@@ -177,6 +176,15 @@ impl Shapes<'_> {
         }
         self.parts.affordable(call.at, faces.len())?;
         let mut mesh = place::polyhedron(outer, &points, &faces);
+        if !hull
+            && matches!(mesh, Err(Problem::Mesh(MeshError::Mixed(..))))
+            && let Some((turned, count)) = oriented(&faces)
+        {
+            let text =
+                format!("a polyhedron with {count} faces that run the other way round than their neighbours: turned");
+            self.parts.note(call.at, text, None);
+            return self.of_faces(call, outer, hull, (points, turned));
+        }
         if !hull && matches!(mesh, Err(Problem::Mesh(ref e)) if *e != MeshError::Flat) {
             return self.mesh(call, outer, (&points, &faces), mesh.err());
         }
@@ -271,7 +279,7 @@ impl Shapes<'_> {
                         lists.iter().map(|l| l.iter().map(|i| points[*i as usize]).collect()).collect()
                     }
                 };
-                self.parts.affordable(call.at, paths.iter().map(Vec::len).sum::<usize>() + 2)?;
+                self.parts.meshable(call.at, paths.iter().map(Vec::len).sum())?;
                 if paths.iter().all(|p| p.len() < 3) {
                     return Ok(self.nothing(call, "without area"));
                 }

@@ -167,6 +167,8 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::HalfSpace(_) => "half-space",
         Shape::Torus(_) => "torus",
         Shape::TriangleMesh(_) => "mesh",
+        Shape::Ellipsoid(_) => "ellipsoid",
+        Shape::EllipticFrustum(_) => "elliptic frustum",
     }
 }
 
@@ -337,7 +339,6 @@ fn every_refusal_is_a_sentence_with_its_place() {
         ("}".into(), "1:1: expected a call such as union() or cube(…), found \"}\""),
         ("%".into(), "1:2: expected a call such as union() or cube(…), found the end of the file"),
         ("union() {\n\nsphere(1);".into(), "3:11: expected \"}\" closing line 1, found the end of the file"),
-        ("circle(r = 1);".into(), "1:1: expected a solid, found the 2D shape circle outside of linear_extrude"),
         (
             "linear_extrude(height = inf) { circle(1); }".into(),
             "1:25: expected a finite number as height of linear_extrude, found inf",
@@ -356,11 +357,6 @@ fn every_refusal_is_a_sentence_with_its_place() {
         (
             "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,1,0,1]]) { }".into(),
             "1:43: expected the row [0, 0, 0, 1], found a list of 4",
-        ),
-        (
-            format!("polyhedron(points = {cube_points}, faces = {});", cube_faces.replace("[3,7,6,2]", "[2,6,7,3]")),
-            "1:1: expected a closed polyhedron, found mixed orientation: two faces run along the edge from point 2 \
-             to point 6 in the same direction",
         ),
         (
             format!("polyhedron(points = {cube_points}, faces = {});", cube_faces.replace("[3,7,6,2],", "")),

@@ -57,6 +57,11 @@ pub fn extruded(
             placed => {
                 let m = outer.matrix3;
                 let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+                if !extrusion.may_bend() {
+                    let text = format!("linear_extrude of {} corners: taken as a mesh", corners.len());
+                    parts.note(at, text, None);
+                    return parts.leaf("linear_extrude", at, placed.map(|p| p.0));
+                }
                 let what = if slices == wanted {
                     "linear_extrude with bent walls".to_owned()
                 } else {

@@ -54,7 +54,14 @@ pub fn read(bytes: &[u8], frame: &Frame<'_>) -> Result<Drawing> {
         entity = Entity { kind: value.to_owned(), ..Entity::default() };
     }
     let Reader { lines, off, left, .. } = reader;
-    Ok(Drawing { paths: joined(&lines), off, left_out: left.into_iter().collect() })
+    let mut shapes = vec![joined(&lines)];
+    if frame.center {
+        let corners = || shapes.iter().flatten().flatten();
+        let low = corners().fold(DVec2::INFINITY, |m, p| m.min(*p));
+        let high = corners().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
+        shapes.iter_mut().flatten().flatten().for_each(|p| *p -= (low + high) * 0.5);
+    }
+    Ok(Drawing { shapes, off, left_out: left.into_iter().collect() })
 }
 
 /// Where in a file an entity stands.
@@ -268,7 +275,7 @@ mod tests {
     use super::*;
 
     fn read_text(text: &str, layer: &str) -> Drawing {
-        let frame = Frame { layer, origin: DVec2::ZERO, scale: 1.0, pieces: &|_| 64 };
+        let frame = Frame { layer, id: "", dpi: 72.0, center: false, origin: DVec2::ZERO, scale: 1.0, pieces: &|_| 64 };
         read(text.as_bytes(), &frame).expect("a drawing")
     }
 
@@ -295,32 +302,33 @@ mod tests {
         list.push(line([10.0, 9.0], [9.0, 10.0], "b"));
         let text = entities(&list.iter().map(String::as_str).collect::<Vec<_>>());
         let drawing = read_text(&text, "");
-        assert_eq!(drawing.paths.len(), 2);
+        assert_eq!(drawing.shapes[0].len(), 2);
         // The second path is open and closed by a line.
-        assert!((area(&drawing.paths) - 12.5).abs() < 0.02, "{:?}", drawing.paths);
-        assert!((area(&read_text(&text, "a").paths) - 12.0).abs() < 0.02);
-        assert!(read_text(&text, "none").paths.is_empty());
+        assert!((area(&drawing.shapes[0]) - 12.5).abs() < 0.02, "{:?}", drawing.shapes);
+        assert!((area(&read_text(&text, "a").shapes[0]) - 12.0).abs() < 0.02);
+        assert!(read_text(&text, "none").shapes[0].is_empty());
     }
 
     #[test]
     fn curves_blocks_and_what_is_left_out() {
         let circle = "0\nCIRCLE\n8\n0\n10\n1\n20\n2\n40\n3\n";
         let drawing = read_text(&entities(&[circle]), "");
-        assert!((area(&drawing.paths) - std::f64::consts::PI * 9.0).abs() < 0.1 && drawing.off > 1e-3);
+        assert!((area(&drawing.shapes[0]) - std::f64::consts::PI * 9.0).abs() < 0.1 && drawing.off > 1e-3);
         let half = "0\nARC\n8\n0\n10\n0\n20\n0\n40\n2\n50\n270\n51\n90\n";
-        assert!((area(&read_text(&entities(&[half]), "").paths) - 2.0 * std::f64::consts::PI).abs() < 0.05);
+        assert!((area(&read_text(&entities(&[half]), "").shapes[0]) - 2.0 * std::f64::consts::PI).abs() < 0.05);
         let ellipse = "0\nELLIPSE\n8\n0\n10\n0\n20\n0\n11\n0\n21\n4\n40\n0.5\n41\n0\n42\n6.283185307179586\n";
-        assert!((area(&read_text(&entities(&[ellipse]), "").paths) - 8.0 * std::f64::consts::PI).abs() < 0.1);
+        assert!((area(&read_text(&entities(&[ellipse]), "").shapes[0]) - 8.0 * std::f64::consts::PI).abs() < 0.1);
         let poly = "0\nLWPOLYLINE\n8\n0\n70\n1\n10\n0\n20\n0\n10\n2\n20\n0\n42\n1\n10\n2\n20\n2\n";
         let drawing = read_text(&entities(&[poly, "0\nSPLINE\n8\n0\n"]), "");
-        assert!((area(&drawing.paths) - 2.0).abs() < 0.01);
+        assert!((area(&drawing.shapes[0]) - 2.0).abs() < 0.01);
         assert_eq!(drawing.left_out, [("SPLINE".to_owned(), 1), ("bulges of LWPOLYLINE".to_owned(), 1)]);
         let block = "0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nB\n0\nLWPOLYLINE\n70\n1\n10\n0\n20\n0\n10\n1\n20\n0\n10\n0\n20\n1\n0\nENDBLK\n0\nENDSEC\n";
         let insert = "0\nINSERT\n2\nB\n10\n5\n20\n5\n41\n2\n42\n3\n50\n90\n";
         let drawing = read_text(&format!("{block}{}", entities(&[insert])), "");
-        assert!((area(&drawing.paths) - 3.0).abs() < 0.02);
-        assert!(drawing.paths[0].iter().any(|p| p.distance(DVec2::new(2.0, 5.0)) < 2e-3), "{:?}", drawing.paths);
-        let frame = Frame { layer: "", origin: DVec2::ZERO, scale: 1.0, pieces: &|_| 8 };
+        assert!((area(&drawing.shapes[0]) - 3.0).abs() < 0.02);
+        assert!(drawing.shapes[0][0].iter().any(|p| p.distance(DVec2::new(2.0, 5.0)) < 2e-3), "{:?}", drawing.shapes);
+        let frame =
+            Frame { layer: "", id: "", dpi: 72.0, center: false, origin: DVec2::ZERO, scale: 1.0, pieces: &|_| 8 };
         let (at, problem) = read(b"0\nSECTION\nnonsense\n1\n", &frame).map(|_| ()).expect_err("no group code");
         assert_eq!((at.line, problem.to_string()), (3, "expected a group code, found \"nonsense\"".to_owned()));
     }

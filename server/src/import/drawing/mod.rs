@@ -1,6 +1,7 @@
 //! Drawings: closed paths in a plane, which an OpenSCAD text imports.
 
 pub mod dxf;
+pub mod svg;
 
 use super::Place;
 use super::problem::Problem;
@@ -10,6 +11,12 @@ use glam::DVec2;
 pub struct Frame<'f> {
     /// The layer that counts; empty for all.
     pub layer: &'f str,
+    /// The id of the element that counts, where a format has any; empty for all.
+    pub id: &'f str,
+    /// Points of an inch, where a format counts in these.
+    pub dpi: f64,
+    /// The middle of what is drawn is the origin.
+    pub center: bool,
     /// What becomes the origin.
     pub origin: DVec2,
     /// By how much it is scaled, after that.
@@ -18,11 +25,11 @@ pub struct Frame<'f> {
     pub pieces: &'f dyn Fn(f64) -> u32,
 }
 
-/// What a drawing encloses, by the even-odd rule.
+/// What a drawing encloses: the union of its shapes.
 #[derive(Debug, Default)]
 pub struct Drawing {
-    /// Closed paths.
-    pub paths: Vec<Vec<DVec2>>,
+    /// The closed paths of each shape, filled by the even-odd rule.
+    pub shapes: Vec<Vec<Vec<DVec2>>>,
     /// How far pieces of curves lie off them at most.
     pub off: f64,
     /// What was left out, by its name, and how often.
@@ -42,6 +49,7 @@ fn ending(name: &str) -> Option<String> {
 pub fn of_file(name: &str, bytes: &[u8], frame: &Frame<'_>) -> Option<Result<Drawing, (Place, Problem)>> {
     match ending(name)?.as_str() {
         "dxf" => Some(dxf::read(bytes, frame)),
+        "svg" => Some(svg::read(bytes, frame)),
         _ => None,
     }
 }

@@ -1,18 +1,23 @@
-//! Files that are one mesh: `stl`, `off`, `obj`.
+//! Files that are meshes: `stl`, `off`, `obj`, `ply`, which are one each; `threemf`, `amf`, `gltf`, which may be some.
 //!
-//! A mesh that is exactly convex becomes a polyhedron, any other one a mesh. None of these files says what its unit is or which way
-//! is up: numbers are taken as they stand, and a note says so.
+//! A mesh that is exactly convex becomes a polyhedron, any other one a mesh; several bodies are their union. Numbers are taken as they
+//! stand; a note says what the file says of its unit and of which way is up.
 
+pub mod amf;
+pub mod gltf;
 pub mod obj;
 pub mod off;
+pub mod ply;
 pub mod stl;
+pub mod threemf;
 
 use super::problem::Problem;
 use super::{Import, ImportError, Limits, Note, Place};
 use crate::solid::primitive::{MeshFault, Polyhedron, Shape, TriangleMesh};
-use crate::solid::{Label, SolidBuilder};
+use crate::solid::{Label, Op, SolidBuilder};
 use contactd_proto::Pose;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
 
 /// Something wrong at a place of a file.
 pub type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -42,43 +47,184 @@ impl Polygons {
 
     /// Adds a face, within the limit of triangles.
     fn push(&mut self, face: &[u32], at: Place, count: &mut usize, limits: &Limits) -> Result<()> {
+        self.add(face, || at, count, limits)
+    }
+
+    /// Adds a face that stands where `at` tells, within the limit of triangles.
+    fn add(&mut self, face: &[u32], at: impl FnOnce() -> Place, count: &mut usize, limits: &Limits) -> Result<()> {
         *count += face.len().saturating_sub(2);
         if *count > limits.mesh_facets {
-            return Err((at, Problem::Limit { what: "triangles of a mesh", limit: limits.mesh_facets }));
+            return Err((at(), Problem::Limit { what: "triangles of a mesh", limit: limits.mesh_facets }));
         }
+        self.append(face);
+        Ok(())
+    }
+
+    /// Adds a face.
+    pub fn append(&mut self, face: &[u32]) {
         self.corners.extend_from_slice(face);
         self.ends.push(self.corners.len() as u32);
-        Ok(())
+    }
+
+    /// True where it has no face.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The same where a transform puts it; one that mirrors turns its faces.
+    fn placed(mut self, place: &DAffine3) -> Self {
+        if *place == DAffine3::IDENTITY {
+            return self;
+        }
+        self.points.iter_mut().for_each(|p| *p = place.transform_point3(*p));
+        if place.matrix3.determinant() < 0.0 {
+            let mut from = 0;
+            for to in self.ends.iter().map(|end| *end as usize) {
+                self.corners[from..to].reverse();
+                from = to;
+            }
+        }
+        self
+    }
+
+    /// The same without points that no face has.
+    fn used(self) -> Self {
+        let mut place = vec![u32::MAX; self.points.len()];
+        let mut out = Self::default();
+        let mut of = |i: u32| {
+            let new = &mut place[i as usize];
+            if *new == u32::MAX {
+                *new = out.points.len() as u32;
+                out.points.push(self.points[i as usize]);
+            }
+            *new
+        };
+        let corners = self.corners.iter().map(|i| of(*i)).collect();
+        Self { corners, ends: self.ends, ..out }
     }
 }
 
-/// The mesh of a file whose name ends as one of these formats' do; `None` for another one.
-pub fn of_file(name: &str, bytes: &[u8], limits: &Limits) -> Option<Result<Polygons>> {
+/// Faces of which neighbours agree about what is outside, and how many were turned for that: of what hangs together the fewer ones.
+/// `None` where none has to be, and where an edge has not two faces or no way round suits all.
+pub fn oriented(faces: &[Vec<u32>]) -> Option<(Vec<Vec<u32>>, usize)> {
+    // The faces at each edge, and whether they run from its lower corner to its higher.
+    let mut edges: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
+    for (i, face) in faces.iter().enumerate() {
+        for (a, b) in face.iter().zip(face.iter().cycle().skip(1)) {
+            edges.entry([*a.min(b), *a.max(b)]).or_default().push((i, a < b));
+        }
+    }
+    if edges.values().any(|e| e.len() != 2) {
+        return None;
+    }
+    let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut count = 0;
+    for first in 0..faces.len() {
+        if turned[first].is_some() {
+            continue;
+        }
+        turned[first] = Some(false);
+        let (mut shell, mut next) = (vec![first], 0);
+        while let Some(&i) = shell.get(next) {
+            next += 1;
+            let here = turned[i]?;
+            for (a, b) in faces[i].iter().zip(faces[i].iter().cycle().skip(1)) {
+                let pair = &edges[&[*a.min(b), *a.max(b)]];
+                let other = if pair[0].0 == i { pair[1].0 } else { pair[0].0 };
+                let wanted = here ^ (pair[0].1 == pair[1].1);
+                match turned[other] {
+                    None => {
+                        turned[other] = Some(wanted);
+                        shell.push(other);
+                    }
+                    Some(is) if is != wanted => return None,
+                    Some(_) => {}
+                }
+            }
+        }
+        let others = shell.iter().filter(|i| turned[**i] == Some(true)).count();
+        if 2 * others > shell.len() {
+            shell.iter().for_each(|i| turned[*i] = turned[*i].map(|t| !t));
+        }
+        count += others.min(shell.len() - others);
+    }
+    let turn = |(face, turned): (&Vec<u32>, &Option<bool>)| {
+        let mut face = face.clone();
+        if *turned == Some(true) {
+            face.reverse();
+        }
+        face
+    };
+    (count > 0).then(|| (faces.iter().zip(&turned).map(turn).collect(), count))
+}
+
+/// What a file has in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bodies {
+    /// Bodies, each closed by itself; the solid is their union.
+    pub all: Vec<Polygons>,
+    /// What is said of lengths and axes.
+    pub frame: String,
+    /// What was left out.
+    pub left_out: Vec<String>,
+}
+
+impl Bodies {
+    /// None yet.
+    fn new(frame: String) -> Self {
+        Self { all: Vec::new(), frame, left_out: Vec::new() }
+    }
+
+    /// One, of a format that says nothing of lengths and axes.
+    fn of(polygons: Polygons, format: &str) -> Self {
+        let frame = format!("lengths and axes as they stand: {format} says neither its unit nor which way is up");
+        Self { all: vec![polygons], ..Self::new(frame) }
+    }
+
+    fn leave(&mut self, what: &str) {
+        if !self.left_out.iter().any(|w| w == what) {
+            self.left_out.push(what.to_owned());
+        }
+    }
+}
+
+/// The meshes of a file whose name ends as one of these formats' do; `None` for another one.
+pub fn of_file(name: &str, bytes: &[u8], limits: &Limits) -> Option<Result<Bodies>> {
     let ending = std::path::Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
     match ending.as_str() {
-        "stl" => Some(stl::read(bytes, limits)),
-        "off" => Some(off::read(bytes, limits)),
-        "obj" => Some(obj::read(bytes, limits)),
+        "stl" => Some(stl::read(bytes, limits).map(|mesh| Bodies::of(mesh, "STL"))),
+        "off" => Some(off::read(bytes, limits).map(|mesh| Bodies::of(mesh, "OFF"))),
+        "obj" => Some(obj::read(bytes, limits).map(|mesh| Bodies::of(mesh, "OBJ"))),
+        "ply" => Some(ply::read(bytes, limits)),
+        "3mf" => Some(threemf::read(bytes, limits)),
+        "amf" => Some(amf::read(bytes, limits)),
+        "glb" | "gltf" => Some(gltf::read(bytes, limits)),
         _ => None,
     }
 }
 
-/// A model that is one mesh, of a file in the format `format`.
-fn import(
-    file: &str,
-    format: &str,
-    read: Result<Polygons>,
-    limits: &Limits,
-) -> std::result::Result<Import, ImportError> {
+/// A model that is the meshes of a file.
+fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Result<Import, ImportError> {
     let of = |(at, problem)| ImportError::Content { file: file.to_owned(), at, problem };
-    let polygons = read.map_err(of)?;
+    let Bodies { all, frame, left_out } = read.map_err(of)?;
     let at = Place::START;
-    let text = format!("lengths and axes as they stand: {format} says neither its unit nor which way is up");
-    let mut notes = vec![Note { at, text, amount: None }];
-    let (shape, repaired) = solid(&polygons, limits).map_err(|fault| of((at, fault.into())))?;
-    notes.extend(repaired.into_iter().map(|(text, amount)| Note { at, text, amount }));
+    let mut notes = vec![Note { at, text: frame, amount: None }];
+    notes.extend(left_out.into_iter().map(|what| Note { at, text: format!("{what}: left out"), amount: None }));
     let mut b = SolidBuilder::new();
-    let root = b.primitive(shape, Pose::IDENTITY, Label { name: "mesh".into(), line: 1, column: 1, mirrored: false });
+    let mut made = Vec::with_capacity(all.len());
+    for (i, polygons) in all.iter().enumerate() {
+        let (shape, repaired) = solid(polygons, limits).map_err(|fault| match all.len() {
+            1 => of((at, fault.into())),
+            count => of((at, Problem::Body { number: i + 1, count, fault: fault.to_string() })),
+        })?;
+        notes.extend(repaired.into_iter().map(|(text, amount)| Note { at, text, amount }));
+        let label = Label { name: "mesh".into(), line: 1, column: 1, mirrored: false };
+        made.push(b.primitive(shape, Pose::IDENTITY, label));
+    }
+    let root = match made.as_slice() {
+        [one] => *one,
+        _ => b.operation(Op::Union, &made),
+    };
     Ok(Import { solid: b.finish(root), notes })
 }
 
@@ -94,8 +240,18 @@ fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Ve
             return Ok((polyhedron.into(), flipped.into_iter().collect()));
         }
     }
-    let (mesh, repair) = TriangleMesh::of_polygons(points, polygons.faces())?;
-    Ok((mesh.into(), repair.notes("a mesh")))
+    let made = TriangleMesh::of_polygons(points, polygons.faces());
+    if let Err(MeshFault::Mixed(..)) = made
+        && let Some((turned, count)) = oriented(&polygons.faces().map(<[u32]>::to_vec).collect::<Vec<_>>())
+    {
+        let mut polygons = Polygons { points: points.clone(), ..Polygons::default() };
+        turned.iter().for_each(|face| polygons.append(face));
+        let (shape, mut repaired) = solid(&polygons, limits)?;
+        let text = format!("a mesh with {count} faces that run the other way round than their neighbours: turned");
+        repaired.insert(0, (text, None));
+        return Ok((shape, repaired));
+    }
+    made.map(|(mesh, repair)| (mesh.into(), repair.notes("a mesh")))
 }
 
 /// Text of a file.
@@ -107,8 +263,16 @@ fn text(bytes: &[u8]) -> Result<&str> {
     })
 }
 
+/// The lines of some bytes that hold anything but a remark.
+///
+/// # Errors
+/// What is no text.
+pub(super) fn lines(bytes: &[u8]) -> Result<impl Iterator<Item = Line<'_>>> {
+    Ok(Line::all(text(bytes)?))
+}
+
 /// A line of a text, its words and where they stand.
-struct Line<'t> {
+pub(super) struct Line<'t> {
     number: u32,
     text: &'t str,
 }
@@ -123,7 +287,7 @@ impl<'t> Line<'t> {
         lines.filter(|l| !l.text.trim().is_empty())
     }
 
-    fn words(&self) -> impl Iterator<Item = &'t str> + use<'t> {
+    pub(super) fn words(&self) -> impl Iterator<Item = &'t str> + use<'t> {
         self.text.split_whitespace()
     }
 
@@ -143,7 +307,7 @@ impl<'t> Line<'t> {
     }
 
     /// A finite number.
-    fn number(&self, word: Option<&str>) -> Result<f64> {
+    pub(super) fn number(&self, word: Option<&str>) -> Result<f64> {
         match word.and_then(|w| w.parse::<f64>().ok()).filter(|n| n.is_finite()) {
             Some(n) => Ok(n),
             None => self.wrong("a finite number", word),

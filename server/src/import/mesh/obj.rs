@@ -2,14 +2,14 @@
 //!
 //! Normals, texture coordinates, groups, materials and smoothing change no shape and are not read.
 
-use super::{Line, Polygons, Result};
+use super::{Bodies, Line, Polygons, Result};
 use crate::import::{Facets, Format, Import, ImportError, Limits, Source};
 
 /// The row of `format::FORMATS`.
 pub const FORMAT: Format = Format { name: "obj", endings: &["obj"], read: import, names: |_, _| Vec::new() };
 
 fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
-    super::import(source.name, "OBJ", read(source.bytes, limits), limits)
+    super::import(source.name, read(source.bytes, limits).map(|mesh| Bodies::of(mesh, "OBJ")), limits)
 }
 
 /// What changes no shape.

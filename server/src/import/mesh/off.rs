@@ -1,6 +1,6 @@
 //! OFF: counts, points, faces by their points' numbers from 0; colours are not read.
 
-use super::{Line, Polygons, Result};
+use super::{Bodies, Line, Polygons, Result};
 use crate::import::problem::Problem;
 use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
 
@@ -8,7 +8,7 @@ use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
 pub const FORMAT: Format = Format { name: "off", endings: &["off"], read: import, names: |_, _| Vec::new() };
 
 fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
-    super::import(source.name, "OFF", read(source.bytes, limits), limits)
+    super::import(source.name, read(source.bytes, limits).map(|mesh| Bodies::of(mesh, "OFF")), limits)
 }
 
 /// Reads a mesh.

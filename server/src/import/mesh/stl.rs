@@ -1,6 +1,6 @@
 //! STL, both kinds: triangles with their corners; normals are not read, the order of corners tells the outside.
 
-use super::{Line, Polygons, Result};
+use super::{Bodies, Line, Polygons, Result};
 use crate::import::problem::Problem;
 use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
 use glam::DVec3;
@@ -9,7 +9,7 @@ use glam::DVec3;
 pub const FORMAT: Format = Format { name: "stl", endings: &["stl"], read: import, names: |_, _| Vec::new() };
 
 fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
-    super::import(source.name, "STL", read(source.bytes, limits), limits)
+    super::import(source.name, read(source.bytes, limits).map(|mesh| Bodies::of(mesh, "STL")), limits)
 }
 
 /// Bytes before the triangles of a binary file: a remark, then their count.

@@ -11,6 +11,7 @@
 //! | plane | 0 | 0 | |
 //! | sphere, cylinder | 1/r | 2/(r + √(r² − T²)) | q >= 0, T < r |
 //! | cone | 2 cos α/(q⁺ + √(q⁺² + T²)) | cos α/q⁻ | q⁻ > 0 |
+//! | elliptic | as the face it is an image of, in the coordinates B(x − o), of a cone with cos α = 1 | | |
 //! | torus | min(0, n_ρ)/q⁻ | 2/(r + √(r² − T²)) | q⁻ > 0, T < r, the box no deeper than the middle of the tube |
 //!
 //! with T the largest τ and q⁻, q⁺ the range of q over the box. Sphere: x is inside where (r + v + n·(x − c))² + τ² <= r²,
@@ -44,6 +45,8 @@ pub struct Slab {
     law: Law,
     /// E n.
     gradient: DVec3,
+    /// Length of psi's gradient: the planes lie closer in psi than in space by it.
+    slope: f64,
     value: f64,
     /// Rounding, which either plane is moved outwards by.
     pub pad: f64,
@@ -69,6 +72,7 @@ impl Slab {
         let mut slab = Self {
             law,
             gradient: at.normal * half,
+            slope: at.slope,
             value: at.value,
             pad: rounding(face, center, half),
             tangents: tangents.map(|t| t * half),
@@ -150,9 +154,11 @@ impl Slab {
         (a * a + b * b) * self.curve.map_or(1.0, |c| c.range[1])
     }
 
-    /// What the vector areas of the cube of half extents `half` are multiplied by for their part along n, per volume.
+    /// What the vector areas of the cube of half extents `half` are multiplied by for their part along n, per volume and per what psi
+    /// is along n.
     pub fn toward(&self, half: DVec3) -> DVec3 {
-        self.gradient / (half * half)
+        let along = self.gradient / (half * half);
+        if self.slope == 1.0 { along } else { along / (self.slope * self.slope) }
     }
 
     /// The half-space of a planar face itself.
@@ -185,19 +191,25 @@ impl Slab {
 mod tests {
     use super::*;
     use crate::math::random::Random;
-    use crate::solid::surface::{Cone, Cylinder, Plane, Sphere, Torus};
+    use crate::solid::surface::{Cone, Cylinder, Elliptic, Plane, Sphere, Torus};
 
     #[test]
     fn the_surface_lies_between_the_planes() {
         let mut r = Random(11);
         let (mut tight, mut seen, mut tighter) = (0, 0, 0);
-        for i in 0..6000 {
+        for i in 0..9600 {
             let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
-            let face = match i % 5 {
+            let face = match i % 8 {
                 0 => Plane { normal: n, offset: r.within(-1.0, 1.0) }.into(),
                 1 => Sphere { center: o, radius: r.within(0.2, 2.0) }.into(),
                 2 => Cylinder { origin: o, axis: n, radius: r.within(0.2, 2.0) }.into(),
                 3 => Torus { origin: o, axis: n, major: r.within(0.3, 2.0), minor: r.within(0.1, 1.0) }.into(),
+                4 => {
+                    let semi = DVec3::new(r.within(0.3, 2.0), r.within(0.3, 2.0), r.within(0.3, 2.0));
+                    Elliptic::ellipsoid(o, glam::DMat3::from_rotation_x(n.x), semi).into()
+                }
+                5 => Elliptic::cylinder(o, [r.vector(1.0) + DVec3::X, r.vector(1.0) + DVec3::Y]).into(),
+                6 => Elliptic::cone(o, [r.vector(1.0) + DVec3::X, r.vector(1.0) + DVec3::Y], DVec3::Z).into(),
                 _ => {
                     let (sin, cos) = r.within(0.1, 1.4).sin_cos();
                     Face::from(Cone { apex: o, axis: n, sin, cos })

@@ -16,6 +16,8 @@ mod cone;
 mod convex;
 mod cuboid;
 mod cylinder;
+mod ellipsoid;
+mod elliptic_frustum;
 mod half_space;
 mod polyhedron;
 mod sphere;
@@ -26,6 +28,8 @@ pub use cone::Cone;
 pub use convex::{Convex, Discs, Features, Hold, Shown, Slope};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
+pub use ellipsoid::Ellipsoid;
+pub use elliptic_frustum::EllipticFrustum;
 pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use sphere::Sphere;
@@ -171,7 +175,18 @@ macro_rules! shapes {
     };
 }
 
-shapes!(Sphere = 0, Cylinder = 1, Cone = 2, Cuboid = 3, Polyhedron = 4, HalfSpace = 5, Torus = 6, TriangleMesh = 7);
+shapes!(
+    Sphere = 0,
+    Cylinder = 1,
+    Cone = 2,
+    Cuboid = 3,
+    Polyhedron = 4,
+    HalfSpace = 5,
+    Torus = 6,
+    TriangleMesh = 7,
+    Ellipsoid = 8,
+    EllipticFrustum = 9,
+);
 
 /// A primitive placed in a model.
 #[derive(Clone, Debug)]

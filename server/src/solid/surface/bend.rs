@@ -7,9 +7,10 @@ use glam::DVec3;
 pub struct Bend {
     /// How the curvature ranges over a box.
     pub law: Law,
-    /// Distance from the centre or axis, a length, and the unit direction away from it; zero for a plane.
+    /// Distance from the centre or axis, a length, and the direction away from it, a unit vector unless the face is elliptic; zero
+    /// for a plane.
     pub radial: (f64, DVec3),
-    /// Unit vectors along which the face curves, zero where there are fewer.
+    /// Vectors along which the face curves, units unless it is elliptic, zero where there are fewer.
     pub tangents: [DVec3; 2],
     /// How far inwards along the normal the face is what it is from here: a tube to its middle. Infinite where `radial` says it.
     pub core: f64,

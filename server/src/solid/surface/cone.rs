@@ -23,7 +23,7 @@ pub struct Cone {
     pub cos: f64,
 }
 
-/// A circular cone by its apex: all of the face is that cone.
+/// A cone by its apex: all of the face is that cone, psi = |B(x − apex)| − sin α axis·(x − apex), B = cos α (I − axis axisᵀ) of a circular one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Apex {
     /// The apex itself; the face's own frame.
@@ -34,9 +34,20 @@ pub struct Apex {
     pub sin: f64,
     /// cos α of the half angle.
     pub cos: f64,
+    /// B's rows, of one that is not circular.
+    pub rows: Option<[DVec3; 2]>,
 }
 
 impl Apex {
+    /// True for a vector that is a normal there, to within `slack` (a sine): one that leads down no ray of the cone. `down` is its
+    /// part against the axis; it has the length 1, or of one that is not circular any.
+    #[inline]
+    pub fn holds(&self, n: DVec3, down: f64, slack: f64) -> bool {
+        let Some(rows) = self.rows else { return down >= self.sin - slack };
+        let across = rows.map(|row| row.dot(n) / row.length_squared());
+        down + slack >= self.sin * across[0].hypot(across[1])
+    }
+
     /// Three directions square to each other: the axis and two perpendiculars.
     #[inline]
     pub fn directions(&self) -> [DVec3; 3] {
@@ -71,7 +82,7 @@ impl Surface for Cone {
         let o = x - self.apex;
         let (rho, u) = radial(o, self.axis);
         let value = rho * self.cos - o.dot(self.axis) * self.sin;
-        FaceAt { value, normal: u * self.cos - self.axis * self.sin, k: self.cos, rho }
+        FaceAt { value, normal: u * self.cos - self.axis * self.sin, slope: 1.0, k: self.cos, rho }
     }
 
     #[inline]
@@ -111,7 +122,7 @@ impl Surface for Cone {
 
     #[inline]
     fn apex(&self) -> Option<Apex> {
-        Some(Apex { point: self.apex, axis: self.axis, sin: self.sin, cos: self.cos })
+        Some(Apex { point: self.apex, axis: self.axis, sin: self.sin, cos: self.cos, rows: None })
     }
 
     #[inline]
@@ -179,7 +190,7 @@ impl Surface for Cone {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.apex, self.axis);
-        [o.x, o.y, o.z, a.x, a.y, a.z, self.sin, self.cos]
+        [o.x, o.y, o.z, a.x, a.y, a.z, self.sin, self.cos, 0.0]
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

@@ -1,6 +1,6 @@
 //! Straight and circular curves of two faces: those that they have in common, and those along which they touch.
 
-use super::{Axis, Cone, Cylinder, Face, Plane, Sphere, Symmetry, Torus};
+use super::{Axis, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Symmetry, Torus};
 use crate::math::any_perpendicular;
 use glam::{DVec2, DVec3};
 
@@ -25,45 +25,22 @@ pub enum Curve {
     },
 }
 
+/// Directions are parallel, and centres on an axis, nearer than this: an angle, and a part of the body's size.
+const PARALLEL: f64 = 1e-9;
+
+/// The circle of a centre, an axis and the square of its radius, if it has one above `least`.
+fn circle_above(least: f64, center: DVec3, axis: DVec3, squared: f64) -> Option<Curve> {
+    (squared > (least * least).max(0.0)).then(|| Curve::Circle { center, axis, radius: squared.sqrt() })
+}
+
 /// The lines and circles that two faces have in common, for a body of the diameter `size`; circles with a radius above
 /// `least` alone. Both are lengths.
 pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(Curve)) {
-    const PARALLEL: f64 = 1e-9;
-    let mut circle = |center: DVec3, axis: DVec3, squared: f64| {
-        if squared > (least * least).max(0.0) {
-            found(Curve::Circle { center, axis, radius: squared.sqrt() });
-        }
-    };
+    let mut circle =
+        |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
     match (*p, *q) {
-        (Face::Plane(Plane { normal: m, offset: d }), Face::Plane(Plane { normal: n, offset: e })) => {
-            let w = m.cross(n);
-            if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
-                let origin = (n.cross(w) * d + w.cross(m) * e) / w.length_squared();
-                found(Curve::Line { origin, along });
-            }
-        }
-        (Face::Plane(Plane { normal, offset }), Face::Sphere(Sphere { center, radius })) => {
-            let h = normal.dot(center) - offset;
-            circle(center - normal * h, normal, (radius - h) * (radius + h));
-        }
-        (Face::Plane(Plane { normal, offset }), Face::Cylinder(Cylinder { origin, axis, radius })) => {
-            let h = normal.dot(origin) - offset;
-            if normal.cross(axis).length() <= PARALLEL {
-                circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
-            } else if normal.dot(axis).abs() <= PARALLEL {
-                let half = (radius - h) * (radius + h);
-                if half > 0.0 {
-                    let w = normal.cross(axis).normalize() * half.sqrt();
-                    found(Curve::Line { origin: origin - normal * h + w, along: axis });
-                    found(Curve::Line { origin: origin - normal * h - w, along: axis });
-                }
-            }
-        }
-        (Face::Plane(Plane { normal, offset }), Face::Cone(Cone { apex, axis, sin, cos })) => {
-            let z = (offset - normal.dot(apex)) / normal.dot(axis);
-            if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
-                circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
-            }
+        (Face::Plane(plane), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_)) => {
+            on_plane(&plane, q, least, found);
         }
         (Face::Sphere(Sphere { center: o, radius: r }), Face::Sphere(Sphere { center: c, radius: s })) => {
             let d = (c - o).length();
@@ -108,9 +85,85 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
         | (Face::Cone(_), Face::Cylinder(_)) => common(q, p, size, least, found),
         // Two cones, and a cone and a sphere, share no line or circle that is looked for.
         (Face::Cone(_), Face::Cone(_) | Face::Sphere(_)) | (Face::Sphere(_), Face::Cone(_)) => {}
+        (Face::Elliptic(image), Face::Plane(plane)) => {
+            rulings(&image, &plane, PARALLEL).into_iter().flatten().for_each(found);
+        }
+        (Face::Plane(_), Face::Elliptic(_)) => common(q, p, size, least, found),
+        // Other curves of elliptic faces are no lines, and circles by chance alone.
+        (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => {}
         (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
         (_, Face::Torus(_)) => common(q, p, size, least, found),
     }
+}
+
+/// What a plane and a plane, a sphere, a cylinder or a cone have in common.
+fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut impl FnMut(Curve)) {
+    let mut circle =
+        |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
+    match *q {
+        Face::Plane(Plane { normal: n, offset: e }) => {
+            let (m, d) = (normal, offset);
+            let w = m.cross(n);
+            if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
+                let origin = (n.cross(w) * d + w.cross(m) * e) / w.length_squared();
+                found(Curve::Line { origin, along });
+            }
+        }
+        Face::Sphere(Sphere { center, radius }) => {
+            let h = normal.dot(center) - offset;
+            circle(center - normal * h, normal, (radius - h) * (radius + h));
+        }
+        Face::Cylinder(Cylinder { origin, axis, radius }) => {
+            let h = normal.dot(origin) - offset;
+            if normal.cross(axis).length() <= PARALLEL {
+                circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
+            } else if normal.dot(axis).abs() <= PARALLEL {
+                let half = (radius - h) * (radius + h);
+                if half > 0.0 {
+                    let w = normal.cross(axis).normalize() * half.sqrt();
+                    found(Curve::Line { origin: origin - normal * h + w, along: axis });
+                    found(Curve::Line { origin: origin - normal * h - w, along: axis });
+                }
+            }
+        }
+        Face::Cone(Cone { apex, axis, sin, cos }) => {
+            let z = (offset - normal.dot(apex)) / normal.dot(axis);
+            if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
+                circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
+            }
+        }
+        // Of these `common` knows more.
+        Face::Elliptic(_) | Face::Torus(_) => {}
+    }
+}
+
+/// The lines that the image of a cylinder has in common with a plane along its axis: |n₁·y|² + |n₂·y|² = 1 with y from the axis, in the
+/// two directions across it, is a circle in the coordinates n₁·y, n₂·y, and the plane a line there.
+fn rulings(image: &Elliptic, plane: &Plane, parallel: f64) -> [Option<Curve>; 2] {
+    let axis = image.axis();
+    if !image.is_cylinder() || plane.normal.dot(axis).abs() > parallel {
+        return [None; 2];
+    }
+    let parts = image.parts();
+    // m·v = h with v = B y, |v| = r.
+    let back = |v: DVec3| {
+        parts
+            .rows
+            .map(|row| if row == DVec3::ZERO { row } else { row / row.length_squared() })
+            .into_iter()
+            .zip(v.to_array())
+            .map(|(row, v)| row * v)
+            .sum::<DVec3>()
+    };
+    let m = DVec3::from_array([DVec3::X, DVec3::Y, DVec3::Z].map(|e| plane.normal.dot(back(e))));
+    let h = (plane.offset - plane.normal.dot(image.origin)) / m.length();
+    let m = m.normalize();
+    let half = (parts.radius - h) * (parts.radius + h);
+    if half <= 0.0 {
+        return [None; 2];
+    }
+    let beside = DVec3::new(-m.y, m.x, 0.0) * half.sqrt();
+    [beside, -beside].map(|w| Some(Curve::Line { origin: image.origin + back(m * h + w), along: axis }))
 }
 
 /// True where a face is symmetric about the axis of a torus, by sines up to the first and offsets up to the second.
@@ -121,6 +174,7 @@ fn is_about(torus: &Torus, face: &Face, [sine, offset]: [f64; 2]) -> bool {
         Symmetry::Normal(normal) => parallel(normal),
         Symmetry::Center(center) => passes(center),
         Symmetry::Axis(Axis { origin, direction }) => parallel(direction) && passes(origin),
+        Symmetry::None => false,
     }
 }
 
@@ -138,7 +192,7 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         // Of the line through a cone's apex a half belongs to its other nappe; a tube may go beyond the axis.
         let is_on = match other {
             Face::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
-            Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Torus(_) => true,
+            Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Torus(_) | Face::Elliptic(_) => true,
         };
         if is_on && p.x > 0.0 {
             circle(x, axis, p.x * p.x);
@@ -166,6 +220,8 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         }
         Face::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
         Face::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
+        // About no axis.
+        Face::Elliptic(_) => return,
     };
     let way = center - tube;
     let d = way.length();
@@ -260,6 +316,15 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let circle = Curve::Circle { center: center - axis * (radius * sin), axis, radius: radius * cos };
             (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
         }
+        (Face::Elliptic(image), Face::Plane(_)) => {
+            if !p.is_convex {
+                return None;
+            }
+            let (origin, along, lean) = image.ruling(-out_of_q(image.origin))?;
+            parallel(lean).then_some(Curve::Line { origin, along })
+        }
+        // Touching others, they do so at points, or along no line or circle that is looked for.
+        (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => None,
         // A plane touches what is round, and a hollow what is in it, the other way round.
         (Face::Plane(_), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_) | Face::Torus(_))
         | (Face::Cylinder(_) | Face::Cone(_), Face::Sphere(_) | Face::Torus(_))

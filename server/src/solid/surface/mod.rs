@@ -8,6 +8,7 @@
 //! | cylinder | ρ − r, ρ the distance from the axis |
 //! | cone | ρ cos α − z sin α, z along the axis from the apex into the cone, α the half angle |
 //! | torus | hypot(ρ − R, z) − r, R the radius of its circle, r that of the tube |
+//! | elliptic: the image of a sphere, cylinder or cone | \|B(x − o)\| − w·(x − o) − r |
 //!
 //! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
 //! functions. Nobody outside of this folder asks of what kind a face is, only what it can tell: whether it is flat, about what
@@ -24,6 +25,7 @@ mod bend;
 mod cone;
 pub mod curve;
 mod cylinder;
+pub mod elliptic;
 mod plane;
 mod sphere;
 mod symmetry;
@@ -35,6 +37,7 @@ pub use bend::{Bend, Law};
 pub use cone::{Apex, Cone};
 pub use curve::Curve;
 pub use cylinder::Cylinder;
+pub use elliptic::{Elliptic, Stretch};
 pub use plane::Plane;
 pub use sphere::Sphere;
 pub use symmetry::{Axis, Symmetry};
@@ -50,12 +53,23 @@ use smallvec::SmallVec;
 pub struct FaceAt {
     /// psi(x): signed distance-like value, length.
     pub value: f64,
-    /// Gradient of psi, a unit vector.
+    /// Gradient of psi: a unit vector, but of elliptic faces, where psi may grow slower than the distance. What bounds psi goes
+    /// by this; what looks for a direction goes by `unit`.
     pub normal: DVec3,
-    /// Curvature factor k: 0 plane, 1 sphere, cylinder and torus, cos α cone. psi rises above its tangent by k D²/(2ρ) at most.
+    /// Its length: 1 at most, and just that of all but elliptic faces.
+    pub slope: f64,
+    /// Curvature factor k: 0 plane, cos α cone, 1 any other. psi rises above its tangent by k D²/(2ρ) at most.
     pub k: f64,
-    /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0).
+    /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0); of an elliptic face |B(x − o)|.
     pub rho: f64,
+}
+
+impl FaceAt {
+    /// The unit normal: the gradient made as long as 1.
+    #[inline]
+    pub fn unit(&self) -> DVec3 {
+        if self.slope == 1.0 { self.normal } else { self.normal / self.slope }
+    }
 }
 
 /// The Hessian of psi of a face at a point, `each`·I + `factor`·`along`⊗`along` + `other`·`beside`⊗`beside`, in the face's own
@@ -181,6 +195,13 @@ pub trait Surface: Copy {
         true
     }
 
+    /// B of psi = |B(x − o)| − … where the face is the affine image of another: psi bends as |B(x − o)| does. `None` where B only
+    /// leaves out an axis.
+    #[inline]
+    fn stretch(&self) -> Option<Stretch> {
+        None
+    }
+
     /// The Hessian of psi at `x`, where `at` was taken, off the axis and the centre.
     fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature;
 
@@ -246,9 +267,15 @@ pub trait Surface: Copy {
         None
     }
 
-    /// The apex of a circular cone: the point at which every direction around is a normal.
+    /// The apex of a cone: the point at which every direction around is a normal.
     #[inline]
     fn apex(&self) -> Option<Apex> {
+        None
+    }
+
+    /// A line through the inside of every closed curve that planes with this unit normal cut, where no symmetry tells one.
+    #[inline]
+    fn skewer(&self, _normal: DVec3) -> Option<Axis> {
         None
     }
 
@@ -286,7 +313,7 @@ pub trait Surface: Copy {
         self.deviation(other, size)
     }
 
-    /// A number that differs by at most a few times what two faces of this kind differ over the ball of radius `r` around `c`.
+    /// A number that differs by at most a few times what the psi of two faces of this kind differ over the ball of radius `r` around `c`.
     fn key(&self, c: DVec3, r: f64) -> f64;
 
     /// All that tells it from others of its kind, the rest 0.
@@ -297,7 +324,7 @@ pub trait Surface: Copy {
 }
 
 /// Most numbers that tell a face.
-pub const NUMBERS: usize = 8;
+pub const NUMBERS: usize = 9;
 
 /// Any direction that no design has: what faces are sorted along.
 const SKEW: DVec3 = DVec3::new(0.481_726_53, 0.663_114_9, 0.572_917_13);
@@ -347,6 +374,7 @@ faces! {$
     Cylinder = 2: "Infinite cylinder.",
     Cone = 3: "Infinite single-napped cone.",
     Torus = 4: "All points within a radius of a circle.",
+    Elliptic = 5: "The affine image of a sphere, a cylinder or a cone.",
 }
 
 impl Face {
@@ -384,6 +412,18 @@ impl Face {
             return Curvature::NONE;
         }
         each!(self, f => f.curvature(x, at))
+    }
+
+    /// See [`Surface::stretch`].
+    #[inline]
+    pub fn stretch(&self) -> Option<Stretch> {
+        each!(self, f => f.stretch())
+    }
+
+    /// The unit normal at `x`.
+    #[inline]
+    pub fn unit_normal(&self, x: DVec3) -> DVec3 {
+        self.at(x).unit()
     }
 
     /// See [`Surface::under`].
@@ -432,7 +472,7 @@ impl Face {
     pub fn axis(&self) -> Option<Axis> {
         match self.symmetry() {
             Symmetry::Axis(axis) => Some(axis),
-            Symmetry::Center(_) | Symmetry::Normal(_) => None,
+            Symmetry::Center(_) | Symmetry::Normal(_) | Symmetry::None => None,
         }
     }
 
@@ -470,6 +510,11 @@ impl Face {
     #[inline]
     pub fn apex(&self) -> Option<Apex> {
         each!(self, f => f.apex())
+    }
+
+    /// See [`Surface::skewer`].
+    pub fn skewer(&self, normal: DVec3) -> Option<Axis> {
+        each!(self, f => f.skewer(normal))
     }
 
     /// See [`Surface::slides_along`].

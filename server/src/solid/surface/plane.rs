@@ -31,7 +31,7 @@ impl Surface for Plane {
 
     #[inline]
     fn at(&self, x: DVec3) -> FaceAt {
-        FaceAt { value: self.normal.dot(x) - self.offset, normal: self.normal, k: 0.0, rho: f64::INFINITY }
+        FaceAt { value: self.normal.dot(x) - self.offset, normal: self.normal, slope: 1.0, k: 0.0, rho: f64::INFINITY }
     }
 
     #[inline]
@@ -117,7 +117,7 @@ impl Surface for Plane {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let n = self.normal;
-        [n.x, n.y, n.z, self.offset, 0.0, 0.0, 0.0, 0.0]
+        [n.x, n.y, n.z, self.offset, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
     #[inline]

@@ -37,7 +37,7 @@ impl Surface for Sphere {
         let o = x - self.center;
         let rho = o.length();
         let normal = if rho > 0.0 { o / rho } else { DVec3::X };
-        FaceAt { value: rho - self.radius, normal, k: 1.0, rho }
+        FaceAt { value: rho - self.radius, normal, slope: 1.0, k: 1.0, rho }
     }
 
     #[inline]
@@ -116,7 +116,7 @@ impl Surface for Sphere {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let o = self.center;
-        [o.x, o.y, o.z, self.radius, 0.0, 0.0, 0.0, 0.0]
+        [o.x, o.y, o.z, self.radius, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
     fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {

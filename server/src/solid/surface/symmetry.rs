@@ -35,4 +35,6 @@ pub enum Symmetry {
     Center(DVec3),
     /// About every axis along a unit normal, model frame.
     Normal(DVec3),
+    /// About none that is told.
+    None,
 }

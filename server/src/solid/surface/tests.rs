@@ -5,7 +5,7 @@ use crate::math::random::Random;
 use glam::DQuat;
 
 /// One face of each kind, somewhere.
-fn faces(r: &mut Random) -> [Face; 6] {
+fn faces(r: &mut Random) -> [Face; 10] {
     let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
     let radius = r.within(0.2, 2.0);
     let (sin, cos) = r.within(0.1, 1.2).sin_cos();
@@ -17,7 +17,18 @@ fn faces(r: &mut Random) -> [Face; 6] {
         Torus { origin: o, axis: n, major: r.within(1.0, 2.0), minor: r.within(0.1, 1.0) }.into(),
         // One without a hole.
         Torus { origin: o, axis: n, major: r.within(0.1, 0.5), minor: r.within(0.5, 1.0) }.into(),
+        ellipsoid(r).into(),
+        Elliptic::cylinder(r.vector(1.0), [r.vector(1.0), r.vector(1.0)]).into(),
+        // One that leans over its ellipse, and an upright one.
+        Elliptic::cone(r.vector(1.0), [r.vector(1.0) + DVec3::X, r.vector(1.0) + DVec3::Y], DVec3::Z).into(),
+        Elliptic::cone(o, [DVec3::X * r.within(0.5, 2.0), DVec3::Y * r.within(0.5, 2.0)], DVec3::Z * radius).into(),
     ]
+}
+
+fn ellipsoid(r: &mut Random) -> Elliptic {
+    let q = DQuat::from_xyzw(r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0));
+    let semi = DVec3::new(r.within(0.3, 2.0), r.within(0.3, 2.0), r.within(0.3, 2.0));
+    Elliptic::ellipsoid(r.vector(1.0), glam::DMat3::from_quat(q.normalize()), semi)
 }
 
 #[test]
@@ -27,7 +38,8 @@ fn a_face_at_a_point_is_its_value_with_its_derivatives() {
         for face in faces(&mut r) {
             let x = r.vector(2.0);
             let at = face.at(x);
-            assert!((at.value - face.value(x)).abs() < 1e-14 && (at.normal.length() - 1.0).abs() < 1e-14);
+            assert!((at.value - face.value(x)).abs() < 1e-14 && (at.normal.length() - at.slope).abs() < 1e-14);
+            assert!(at.slope < 1.0 + 1e-14 && (at.unit().length() - 1.0).abs() < 1e-14, "{face:?}");
             // Near an axis or a centre the third derivative is large.
             if at.rho < 0.2 || face.axis().is_some_and(|axis| (x - axis.origin).cross(axis.direction).length() < 0.2) {
                 continue;
@@ -73,8 +85,10 @@ fn a_moved_face_has_its_values_moved_and_its_own_symmetry_changes_none() {
                 Symmetry::Axis(Axis { origin, direction }) => (origin, direction),
                 Symmetry::Center(center) => (center, r.vector(1.0).normalize()),
                 Symmetry::Normal(normal) => (r.vector(1.0), normal),
+                Symmetry::None => (DVec3::ZERO, DVec3::ZERO),
             };
-            let spin = DQuat::from_axis_angle(axis, r.within(-3.0, 3.0));
+            let spin =
+                if axis == DVec3::ZERO { DQuat::IDENTITY } else { DQuat::from_axis_angle(axis, r.within(-3.0, 3.0)) };
             for _ in 0..10 {
                 let x = r.vector(2.0);
                 assert!((placed.value(frame.point(x)) - face.value(x)).abs() < 1e-13);
@@ -120,7 +134,7 @@ fn capabilities_agree_with_psi() {
                 let is_whole = |foot: DVec3| face.is_convex() || face.value(foot) > -1e-9;
                 if !face.is_flat() && is_whole(face.foot(x, at.normal, 1.0)) {
                     let foot = face.foot(x, at.normal, 1.0);
-                    assert!(face.value(foot).abs() < 1e-13, "{face:?}");
+                    assert!(face.value(foot).abs() < 1e-12, "{face:?}");
                     assert!((face.at(foot).normal - at.normal).length() < 1e-12, "{face:?}");
                 }
             }
@@ -177,4 +191,28 @@ fn what_bounds_psi_from_below_and_from_above_does_so_near_and_far() {
         }
     }
     assert!(bent > 700 && close > 1000, "{bent} {close}");
+}
+
+#[test]
+fn an_elliptic_face_is_the_image_of_a_round_one() {
+    let mut r = Random(17);
+    for _ in 0..2000 {
+        let m = [r.vector(1.0), r.vector(1.0), r.vector(1.0)];
+        let (o, x) = (r.vector(1.0), r.vector(2.0));
+        let y = x - o;
+        let [n, k, h] = m;
+        // What the rows make a circle of, and a cone of.
+        let circle = n.dot(y).hypot(k.dot(y));
+        let tube = Elliptic::cylinder(o, [n, k]);
+        assert!((circle - 1.0).abs() < 1e-9 || (circle < 1.0) == (tube.value(x) < 0.0), "{tube:?}");
+        let cone = Elliptic::cone(o, [n, k], h);
+        let level = circle - h.dot(y);
+        assert!(level.abs() < 1e-9 || (level < 0.0) == (cone.value(x) < 0.0), "{cone:?}");
+        // On an ellipsoid's surface, and next to it: a lower bound of the distance, no smaller than the ratio of its semi-axes.
+        let ball = ellipsoid(&mut r);
+        let on = ball.foot(x, ball.at(x).normal, 1.0);
+        let (out, far) = (ball.at(on).unit(), r.within(0.0, 1.0));
+        let psi = ball.value(on + out * far);
+        assert!(psi <= far + 1e-13 && psi >= far * ball.third - 1e-13, "{ball:?}");
+    }
 }

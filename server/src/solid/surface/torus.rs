@@ -94,7 +94,7 @@ impl Surface for Torus {
     fn at(&self, x: DVec3) -> FaceAt {
         let at = self.meridian(x);
         let (lean, up) = at.normal(self.major);
-        FaceAt { value: at.s - self.minor, normal: at.out * lean + self.axis * up, k: 1.0, rho: at.s }
+        FaceAt { value: at.s - self.minor, normal: at.out * lean + self.axis * up, slope: 1.0, k: 1.0, rho: at.s }
     }
 
     fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature {
@@ -203,7 +203,7 @@ impl Surface for Torus {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
-        [o.x, o.y, o.z, a.x, a.y, a.z, self.major, self.minor]
+        [o.x, o.y, o.z, a.x, a.y, a.z, self.major, self.minor, 0.0]
     }
 
     /// With t from the ray's point next to the centre and w = |x|² + R² − r²: w² = 4 R² ρ², of degree four.

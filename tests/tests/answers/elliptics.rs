@@ -1,0 +1,433 @@
+//! Elliptic solids against closed forms, and against every other kind: first contacts, membership, regions, mass, import.
+//!
+//! How far an ellipsoid or an elliptic frustum reaches along a direction has a formula, and so have first contacts with planes; the
+//! distance of a point from an ellipsoid is the root of one function of one number (D. Eberly, Distance from a Point to an Ellipse, an
+//! Ellipsoid, or a Hyperellipsoid), and so are those with balls, from outside and from within. What follows them by a Lipschitz
+//! constant shares nothing with the search. Pairs with the other kinds have no closed form: their certificates are checked by the
+//! independent verifier.
+//! `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers elliptics:: -- --nocapture` sets the number of
+//! pairs, and of trees.
+
+use contactd::contact::region::{regions, threshold};
+use contactd::contact::{Extent, QueryOptions, Scratch, Status, earliest_contact};
+use contactd::import::{Facets, Limits, import_csg};
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd::octree::mass::mass_properties;
+use contactd::solid::Shape;
+use contactd::solid::primitive::{Ellipsoid, EllipticFrustum};
+use contactd_proto::{MassOptions, Motion, Pose};
+use contactd_tests::certified::{certify_all, certify_trees};
+use contactd_tests::engine::ReportedPoint as _;
+use contactd_tests::engine::question;
+use contactd_tests::random_solids::{Random, elliptic, shape, shape_or_elliptic, solid_of};
+use contactd_tests::rays::integrals;
+use contactd_tests::record_judge;
+use contactd_tests::reference::Moving;
+use contactd_tests::reference::field::Field;
+use contactd_tests::scenes::Recipe;
+use glam::{DMat3, DVec2, DVec3, dvec3};
+use std::f64::consts::PI;
+
+fn pairs(default: usize) -> usize {
+    std::env::var("CONTACTD_PAIRS").ok().map_or(default, |n| n.parse().expect("a number of pairs"))
+}
+
+/// Two bodies, how far they are from touching at a pose of each, and how fast that may change.
+struct Scene {
+    a: Recipe,
+    b: Recipe,
+    motions: [Motion; 2],
+    gap: Box<dyn Fn(&Pose, &Pose) -> f64>,
+    speed: f64,
+}
+
+impl Scene {
+    fn at(&self, t: f64) -> f64 {
+        (self.gap)(&self.motions[0].at(t), &self.motions[1].at(t))
+    }
+
+    /// The first time at which the gap is closed; how fast it closes then.
+    fn first(&self) -> Option<(f64, f64)> {
+        let mut t = 0.0;
+        loop {
+            let gap = self.at(t);
+            if gap <= 1e-15 {
+                let h = 1e-6;
+                return Some((t, (self.at(t - h) - self.at(t + h)) / (2.0 * h)));
+            }
+            t += gap / self.speed;
+            if t > 1.0 {
+                return None;
+            }
+        }
+    }
+}
+
+/// A motion from a place next to the origin past it.
+fn past(r: &mut Random, from: f64) -> Motion {
+    let start = r.direction() * from;
+    let aim = r.vector(0.7);
+    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.5) };
+    Motion { start: Pose::new(start, r.rotation()), velocity: (aim - start) * r.within(0.8, 1.6), spin }
+}
+
+fn turning(r: &mut Random) -> Motion {
+    let spin = if r.chance(0.3) { DVec3::ZERO } else { r.vector(1.0) };
+    Motion { start: Pose::new(DVec3::ZERO, r.rotation()), velocity: r.vector(0.3), spin }
+}
+
+fn speed(motions: &[Motion; 2], reach: f64) -> f64 {
+    let [a, b] = motions;
+    (a.velocity - b.velocity).length() + (a.spin.length() + b.spin.length()) * reach
+}
+
+/// Asks about scenes and compares with the closed form, to 1e-12 of the size; the records are judged.
+fn compare(name: &str, count: usize, seed: u64, make: impl Fn(&mut Random) -> Scene) {
+    let mut r = Random::new(seed);
+    let (mut contacts, mut clear, mut overlap, mut undecided, mut worst, mut cells) = (0, 0, 0, 0, 0.0f64, 0);
+    let (mut flagged, mut lies) = (0, 0);
+    for i in 0..count {
+        let s = make(&mut r);
+        let (a, b) = (Model::new(s.a.build()), Model::new(s.b.build()));
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let query = question((&a, placed(s.motions[0])), (&b, placed(s.motions[1])), QueryOptions::DEPTH);
+        let o = earliest_contact(&query, &mut Scratch::default());
+        let size = query.resolution / 1e-9;
+        cells += o.counters.cells;
+        let moving = [(&a, 0), (&b, 1)].map(|(m, k): (&Model, usize)| Moving {
+            solid: &m.solid,
+            place: Pose::IDENTITY,
+            motion: s.motions[k],
+        });
+        lies += usize::from(!record_judge::holds(&format!("{name} {i}"), &moving[0], &moving[1], &o));
+        // psi is up to seven times flatter than the distance.
+        if s.at(0.0) <= 40.0 * query.resolution {
+            assert!(s.at(0.0) > 0.0 || o.status() != Status::Clear, "{name} {i}: {o:?}");
+            overlap += 1;
+            continue;
+        }
+        match (s.first(), o.status()) {
+            (_, Status::Undecided) => undecided += 1,
+            (None, Status::Clear) => clear += 1,
+            (Some((t, speed)), Status::Contact) => {
+                contacts += 1;
+                assert!(
+                    o.time_lower() <= t + 1e-12 * size / speed.max(1e-9),
+                    "{name} {i}: {t} before {}",
+                    o.time_lower()
+                );
+                if o.not_continued() {
+                    flagged += 1;
+                    continue;
+                }
+                let off = (t - o.time()).abs() * speed.abs().max(o.at().normal_speed.abs()) / size;
+                worst = worst.max(off);
+                assert!(off <= 1e-12, "{name} {i}: {off:e}: {t} at {speed}, not {o:?}");
+            }
+            // A graze within the depth at which contacts are decided is none.
+            (Some((t, speed)), Status::Clear) => assert!(speed.abs() < 1e-3, "{name} {i}: missed at {t}, {speed}"),
+            (found, _) => panic!("{name} {i}: {found:?}, not {o:?}"),
+        }
+    }
+    println!(
+        "{name}: {contacts} contacts, {clear} clear, {overlap} overlap, {undecided} undecided, {flagged} not continued; worst {worst:.1e}; \
+         {} cells each",
+        cells / count as u64
+    );
+    assert!(contacts * 5 > count && undecided * 100 <= count && flagged * 100 <= count && lies == 0, "{name}");
+}
+
+/// Semi-axes up to 1 and down to a seventh of that.
+fn semi(r: &mut Random) -> DVec3 {
+    DVec3::new(r.within(0.15, 1.0), r.within(0.15, 1.0), r.within(0.15, 1.0))
+}
+
+/// How far an ellipsoid or elliptic frustum reaches along a unit vector of its frame.
+fn reach(shape: &Shape, n: DVec3) -> f64 {
+    match shape {
+        Shape::Ellipsoid(e) => (e.semi * n).length(),
+        Shape::EllipticFrustum(c) => {
+            let (rim, up) = ((c.semi.x * n.x).hypot(c.semi.y * n.y), n.z + c.lean.dot(n.truncate()));
+            (c.top * rim + c.half_height * up).max(c.bottom * rim - c.half_height * up)
+        }
+        _ => panic!("an elliptic shape"),
+    }
+}
+
+/// Signed distance of a point from an ellipsoid: the nearest point is a²y/(t + a²) for the largest root t of Σ (a y/(t + a²))² = 1.
+fn off_ellipsoid(semi: DVec3, y: DVec3) -> f64 {
+    let (square, least) = (semi * semi, semi.min_element());
+    let f = |t: f64| (semi * y / (t + square)).length() - 1.0;
+    let (mut low, mut high) = (-least * least, (semi * y).length());
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if f(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    // y less the nearest point is t y/(t + a²).
+    (y * high / (high + square)).length().copysign(high)
+}
+
+#[test]
+fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
+    let count = pairs(120);
+    let on_plane = |r: &mut Random, shape: Shape| {
+        let floor = Recipe::cuboid(8.0, 8.0, 1.0).at(0.0, 0.0, -1.0);
+        let motions = [past(r, 2.5), Motion::resting(Pose::new(r.vector(0.2), r.rotation()))];
+        let speed = speed(&motions, 2.2);
+        let own = shape.clone();
+        let gap = Box::new(move |a: &Pose, b: &Pose| {
+            let n = b.rotation * DVec3::Z;
+            n.dot(a.position - b.position) - reach(&own, a.rotation.inverse() * -n)
+        });
+        let s = Scene { a: Recipe::of(shape), b: floor, motions, gap, speed };
+        // From the other side of the floor: turned over.
+        if s.at(0.0) > 0.0 {
+            return s;
+        }
+        let [mut a, b] = s.motions;
+        let n = b.start.rotation * DVec3::Z;
+        let mirrored = |v: DVec3| v - n * (2.0 * n.dot(v));
+        a.start.position = mirrored(a.start.position - b.start.position) + b.start.position;
+        a.velocity = mirrored(a.velocity);
+        Scene { motions: [a, b], ..s }
+    };
+    compare("ellipsoid on a plane", count, 1, |r| {
+        let shape = Ellipsoid { semi: semi(r) }.into();
+        on_plane(r, shape)
+    });
+    compare("elliptic cylinder, cone or frustum on a plane", count, 2, |r| {
+        let shape = loop {
+            let shape = elliptic(r, 1.0);
+            if matches!(shape, Shape::EllipticFrustum(_)) {
+                break shape;
+            }
+        };
+        on_plane(r, shape)
+    });
+    compare("ellipsoid and a ball", count, 3, |r| {
+        let (semi, ball) = (semi(r), r.within(0.05, 0.6));
+        let motions = [turning(r), past(r, 2.2)];
+        let speed = speed(&motions, 3.5);
+        let gap = Box::new(move |a: &Pose, b: &Pose| off_ellipsoid(semi, a.inverse().point(b.position)) - ball);
+        Scene { a: Recipe::of(Ellipsoid { semi }), b: Recipe::sphere(ball), motions, gap, speed }
+    });
+    // Straight along one of its axes, where the nearest point is the end of that axis.
+    compare("ellipsoid and a ball along an axis", count, 4, |r| {
+        let (semi, ball, k) = (semi(r), r.within(0.05, 0.6), r.below(3));
+        let body = r.rotation();
+        let along = body * DVec3::AXES[k];
+        let a = Motion { start: Pose::new(r.vector(0.5), body), velocity: r.vector(0.3), spin: DVec3::ZERO };
+        let start = Pose::new(a.start.position + along * r.within(2.0, 3.0), r.rotation());
+        let b = Motion { start, velocity: a.velocity - along * r.within(1.0, 4.0), spin: r.vector(2.0) };
+        let motions = [a, b];
+        let gap = Box::new(move |a: &Pose, b: &Pose| along.dot(b.position - a.position) - semi[k] - ball);
+        Scene { a: Recipe::of(Ellipsoid { semi }), b: Recipe::sphere(ball), motions, gap, speed: speed(&motions, 0.0) }
+    });
+    compare("ball in an elliptic hollow", count, 5, |r| {
+        let semi = semi(r);
+        // No larger than the least radius of curvature: the ball touches in one place.
+        let ball = r.within(0.2, 0.9) * semi.min_element().powi(2) / semi.max_element();
+        let block = Recipe::cuboid(3.0, 3.0, 3.0).minus(Recipe::of(Ellipsoid { semi }));
+        let a = turning(r);
+        let at = a.start.point((semi - ball) * r.direction() * r.within(0.0, 0.7));
+        let b =
+            Motion { start: Pose::new(at, r.rotation()), velocity: a.velocity + r.vector(1.0), spin: r.vector(1.0) };
+        let motions = [a, b];
+        let speed = speed(&motions, 3.5);
+        let gap = Box::new(move |a: &Pose, b: &Pose| -off_ellipsoid(semi, a.inverse().point(b.position)) - ball);
+        Scene { a: block, b: Recipe::sphere(ball), motions, gap, speed }
+    });
+}
+
+#[test]
+fn certificates_of_elliptic_solids_against_every_kind_and_of_trees_with_them_hold() {
+    let count = pairs(120);
+    let alone = |shape: Shape| Model::new(Recipe::of(shape).build());
+    certify_all("kinds", (count, 0xe1_1195), |r| {
+        let other = if r.chance(0.3) { elliptic(r, 0.8) } else { shape(r, 0.8) };
+        let place = |motion| Placed { place: Pose::IDENTITY, motion };
+        [(alone(elliptic(r, 0.8)), place(turning(r))), (alone(other), place(past(r, 2.2)))]
+    });
+    certify_trees((count, 0xe1_1195), shape_or_elliptic);
+}
+
+#[test]
+fn trees_with_elliptic_solids_have_the_values_and_the_volumes_of_an_independent_evaluation() {
+    let mut r = Random::new(31);
+    let (mut inside, mut seen) = (0, 0);
+    // A volume by rays takes a second: an eighth of them in the command.
+    for i in 0..pairs(150).div_ceil(50).min(24) {
+        let solid = solid_of(&mut r, 1 + i % 3, shape_or_elliptic);
+        let (model, around) = (Model::new(solid.clone()), solid.aabb());
+        let field = Field::new(&solid, &Pose::IDENTITY);
+        for _ in 0..pairs(150) * 10 {
+            let x = r.point_in(&around);
+            let (f, other) = (solid.value(x), field.value(x));
+            assert!((f - other).abs() < 1e-13, "solid {i} at {x}: {f} {other}");
+            let margin = model.margin();
+            let within = model.value_within(x, margin).clamp(-margin, margin);
+            assert!((within - f.clamp(-margin, margin)).abs() < 1e-13, "solid {i} at {x}: {within} {f}");
+            // 1-Lipschitz.
+            let y = x + r.vector(0.3);
+            assert!((solid.value(y) - f).abs() <= x.distance(y) * (1.0 + 1e-12) + 1e-13);
+            inside += usize::from(f < 0.0);
+            seen += 1;
+        }
+        let (fine, coarse) = (integrals(&solid, &around, 96), integrals(&solid, &around, 61));
+        if fine[0] < 1e-2 {
+            continue;
+        }
+        let m = mass_properties(&model, &MassOptions { tolerance: 0.03, boxes: 300_000 }).expect("bounded");
+        let doubt = 4.0 * (fine[0] - coarse[0]).abs() + 2e-3 * fine[0];
+        assert!((m.volume - fine[0]).abs() <= m.volume_error + doubt, "solid {i}: {m:?} {}", fine[0]);
+        assert!(m.volume_error <= 0.03 * m.volume, "solid {i}: {m:?}");
+    }
+    assert!(inside * 20 > seen, "{inside} of {seen}");
+}
+
+#[test]
+fn moments_of_elliptic_solids_are_those_of_their_formulas_and_of_their_halves() {
+    let whole = |recipe: &Recipe, tolerance: f64| {
+        mass_properties(&Model::new(recipe.build()), &MassOptions { tolerance, boxes: 300_000 }).expect("bounded")
+    };
+    let e = Recipe::ellipsoid(1.0, 2.0, 3.0);
+    let (m, exact) = (whole(&e, 1e-6), 8.0 * PI);
+    assert!(m.boxes == 0 && (m.volume - exact).abs() <= m.volume_error);
+    // m/5 (b² + c²).
+    for (k, i) in [(0, 13.0), (1, 10.0), (2, 5.0)] {
+        assert!((m.inertia[k] - exact * i / 5.0).abs() <= 1e-11, "{m:?}");
+    }
+    let half = e.clone().minus(Recipe::cuboid(4.0, 4.0, 4.0).at(0.0, 0.0, 4.0));
+    let leaning = EllipticFrustum {
+        semi: DVec2::new(1.0, 0.5),
+        bottom: 1.0,
+        top: 0.5,
+        half_height: 1.0,
+        lean: DVec2::new(0.3, 0.2),
+    };
+    // ⅓ π a b h (1 + ½ + ¼).
+    let frustum = PI * 0.5 * 2.0 / 3.0 * 1.75;
+    let (of_frustum, leaning) = (whole(&Recipe::of(leaning.clone()), 1e-6), Recipe::of(leaning));
+    assert!(of_frustum.boxes == 0 && (of_frustum.volume - frustum).abs() <= of_frustum.volume_error, "{of_frustum:?}");
+    // From its apex down its parts are alike: at z = 0 it is ¾ as wide as below.
+    let lower = leaning.minus(Recipe::cuboid(4.0, 4.0, 4.0).at(0.0, 0.0, 4.0));
+    let lower_volume = PI * 0.5 / 3.0 * (1.0 + 0.75 + 0.5625);
+    for tolerance in [0.1, 1e-2, 1e-3] {
+        for (recipe, exact) in [(&half, 0.5 * exact), (&lower, lower_volume)] {
+            let m = whole(recipe, tolerance);
+            assert!(m.boxes > 0 && (m.volume - exact).abs() <= m.volume_error, "{m:?} {exact}");
+            assert!(m.volume_error <= tolerance * exact, "{m:?}");
+        }
+    }
+}
+
+#[test]
+fn elliptic_solids_touch_along_lines_and_at_points() {
+    let at_rest = |a: Recipe, b: Recipe, pose: Pose| {
+        let (a, b) = (Model::new(a.build()), Model::new(b.build()));
+        let place = |pose| Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) };
+        let query = question((&a, place(Pose::IDENTITY)), (&b, place(pose)), QueryOptions::DEPTH);
+        let found = regions(&query, 0.0, threshold(query.resolution, 0.0));
+        assert!(found.complete, "{found:?}");
+        found.regions
+    };
+    let floor = || Recipe::cuboid(5.0, 5.0, 1.0).at(0.0, 0.0, -1.0);
+    let on_side = contactd_proto::motion::quat_of_rotation_vector(DVec3::X * (0.5 * PI));
+    let tube =
+        EllipticFrustum { semi: DVec2::new(2.0, 0.5), bottom: 1.0, top: 1.0, half_height: 1.5, lean: DVec2::ZERO };
+    // Its z axis lies along −y, its y axis upwards.
+    let found = at_rest(floor(), Recipe::of(tube.clone()), Pose::new(dvec3(0.0, 0.0, 0.5), on_side));
+    assert!(found.len() == 1 && found[0].extent == Extent::Line && found[0].points.len() == 2, "{found:?}");
+    for p in &found[0].points {
+        assert!(p.point.x.abs() < 1e-9 && (p.point.y.abs() - 1.5).abs() < 1e-9 && p.point.z.abs() < 1e-9, "{found:?}");
+    }
+    assert!((found[0].normal - DVec3::Z).length() < 1e-9, "{found:?}");
+    // Upright, on its elliptic end.
+    let found = at_rest(floor(), Recipe::of(tube), Pose::at(dvec3(0.0, 0.0, 1.5)));
+    assert!(found.len() == 1 && found[0].extent == Extent::Patch && found[0].points.len() == 8, "{found:?}");
+    assert!(found[0].points.iter().all(|p| (p.point.x.hypot(4.0 * p.point.y) - 2.0).abs() < 1e-9), "{found:?}");
+    let found = at_rest(floor(), Recipe::ellipsoid(1.0, 0.6, 0.3), Pose::at(dvec3(0.2, 0.1, 0.3)));
+    assert!(found.len() == 1 && found[0].extent == Extent::Point, "{found:?}");
+    let p = &found[0].points[0];
+    assert!(
+        (p.point - dvec3(0.2, 0.1, 0.0)).length() < 1e-9 && (found[0].normal - DVec3::Z).length() < 1e-9,
+        "{found:?}"
+    );
+    // In a hole of its own shape.
+    let hole = floor().minus(Recipe::of(Ellipsoid { semi: dvec3(2.0, 1.0, 0.7) }));
+    let found = at_rest(hole, Recipe::ellipsoid(2.0, 1.0, 0.7), Pose::IDENTITY);
+    assert!(found.len() == 1 && found[0].extent == Extent::Patch && found[0].points.len() == 8, "{found:?}");
+    assert!(found[0].points.iter().all(|p| (p.point.x.hypot(2.0 * p.point.y) - 2.0).abs() < 1e-9), "{found:?}");
+    // A leaning cone on its apex.
+    let cone = EllipticFrustum {
+        semi: DVec2::new(0.5, 0.8),
+        bottom: 0.0,
+        top: 1.0,
+        half_height: 1.0,
+        lean: DVec2::new(0.1, 0.2),
+    };
+    let found = at_rest(floor(), Recipe::of(cone), Pose::at(dvec3(0.1, 0.2, 1.0)));
+    assert!(found.len() == 1 && found[0].extent == Extent::Point, "{found:?}");
+    assert!(found[0].points[0].point.length() < 1e-9 && (found[0].normal - DVec3::Z).length() < 1e-9, "{found:?}");
+}
+
+#[test]
+fn round_calls_under_any_matrix_are_their_exact_images() {
+    let (mut r, mut seen) = (Random::new(5), 0);
+    for i in 0..pairs(120) {
+        let m = match r.below(3) {
+            0 => DMat3::from_diagonal(semi(&mut r)),
+            1 => {
+                DMat3::from_quat(r.rotation())
+                    * DMat3::from_diagonal(semi(&mut r) * 3.0)
+                    * DMat3::from_quat(r.rotation())
+            }
+            _ => DMat3::from_cols(r.vector(1.0), r.vector(1.0), r.vector(1.0)),
+        };
+        let at = r.vector(1.0);
+        let worst = m.inverse().to_cols_array().iter().fold(0.0f64, |s, x| s.max(x.abs()));
+        if worst.is_nan() || worst >= 50.0 {
+            continue;
+        }
+        let row = |k: usize| format!("[{:?}, {:?}, {:?}, {:?}]", m.row(k).x, m.row(k).y, m.row(k).z, at[k]);
+        let (call, inside): (&str, Box<dyn Fn(DVec3) -> f64>) = match r.below(3) {
+            0 => ("sphere(r = 1.5);", Box::new(|u: DVec3| u.length() - 1.5)),
+            1 => (
+                "cylinder(r1 = 1, r2 = 1, h = 2, center = true);",
+                Box::new(|u: DVec3| (u.truncate().length() - 1.0).max(u.z.abs() - 1.0)),
+            ),
+            _ => (
+                "cylinder(r1 = 1, r2 = 0.25, h = 2);",
+                Box::new(|u: DVec3| (u.truncate().length() - (1.0 - 0.375 * u.z)).max(u.z - 2.0).max(-u.z)),
+            ),
+        };
+        let text = format!("multmatrix([{}, {}, {}, [0, 0, 0, 1]]) {{ {call} }}", row(0), row(1), row(2));
+        let import =
+            import_csg("a.csg", &text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}"));
+        assert!(import.notes.iter().all(|n| !n.text.contains("faceted")), "{text}: {:?}", import.notes);
+        let (solid, back) = (&import.solid, m.inverse());
+        let (around, mut within) = (solid.aabb(), 0);
+        for _ in 0..400 {
+            let x = r.point_in(&around);
+            let (f, exact) = (solid.value(x), inside(back * (x - at)));
+            assert!(
+                exact.abs() < 1e-11 * worst.max(1.0) || (f < 0.0) == (exact < 0.0),
+                "{i}: {text} at {x}: {f}, {exact}"
+            );
+            within += usize::from(f < 0.0);
+        }
+        seen += within;
+        let volume = match call.as_bytes()[0] {
+            b's' => 4.5 * PI,
+            _ if call.contains("0.25") => 2.0 * PI / 3.0 * (1.0 + 0.25 + 0.0625),
+            _ => 2.0 * PI,
+        } * m.determinant().abs();
+        let mass = mass_properties(&Model::new(solid.clone()), &MassOptions::default()).expect("bounded");
+        assert!((mass.volume - volume).abs() <= 1e-9 * volume, "{text}: {} not {volume}", mass.volume);
+    }
+    assert!(seen > 20 * pairs(120), "{seen} points inside");
+}
