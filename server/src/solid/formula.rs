@@ -234,7 +234,7 @@ fn value_in(
 }
 
 /// Parts up to which what is left of an expression is written out.
-const FEW_PARTS: usize = 8;
+const FEW_PARTS: usize = 32;
 
 /// Writes out the parts of what stands behind `start` by `open`, where they are few.
 pub(super) fn open_few(

@@ -26,6 +26,7 @@ use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
 use crate::motion::{Bounds, Instant};
+use crate::solid::Solid;
 use crate::solid::local::{self, LiteralId, Truth};
 use glam::DVec3;
 use std::ops::ControlFlow;
@@ -255,6 +256,11 @@ impl<'a> Search<'a> {
                 }
             }
         }
+        if self.has_parts(&cell, &bounded) {
+            // What they hold is not looked at yet: it is in smaller cells, whatever the bound is short of.
+            self.split(cell, DVec3::ZERO);
+            return None;
+        }
         // Bodies that stand still to each other meet at the start or never.
         if !bounded.is_one_sided(&cell) && span.motion.speed > 0.0 {
             self.propose(&cell, &bounded.found, &at);
@@ -324,6 +330,15 @@ impl<'a> Search<'a> {
             found.y
         };
         Some(Bounded { b, found, now })
+    }
+
+    /// True where parts of large meshes are left in a cell, too many to be written out.
+    fn has_parts(&self, cell: &Cell, bounded: &Bounded) -> bool {
+        let Contacts { task, .. } = &self.contacts;
+        let has = |solid: &Solid, range: Range| {
+            solid.has_parts && self.items.scratch.pool[range.0 as usize..range.1 as usize].iter().any(|t| local::is_part(*t))
+        };
+        has(task.a, cell.a) || has(task.b, bounded.b)
     }
 
     /// True where a cell's bounds keep it free for good, or for as long as makes it worth to be put back as it is.

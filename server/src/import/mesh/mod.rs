@@ -211,11 +211,12 @@ fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Res
     let mut notes = vec![Note { at, text: frame, amount: None }];
     notes.extend(left_out.into_iter().map(|what| Note { at, text: format!("{what}: left out"), amount: None }));
     let mut b = SolidBuilder::new();
-    let mut made = Vec::with_capacity(all.len());
-    for (i, polygons) in all.iter().enumerate() {
-        let (shape, repaired) = solid(polygons, limits).map_err(|fault| match all.len() {
+    let count = all.len();
+    let mut made = Vec::with_capacity(count);
+    for (i, polygons) in all.into_iter().enumerate() {
+        let (shape, repaired) = solid(polygons, limits).map_err(|fault| match count {
             1 => of((at, fault.into())),
-            count => of((at, Problem::Body { number: i + 1, count, fault: fault.to_string() })),
+            _ => of((at, Problem::Body { number: i + 1, count, fault: fault.to_string() })),
         })?;
         notes.extend(repaired.into_iter().map(|(text, amount)| Note { at, text, amount }));
         let label = Label { name: "mesh".into(), line: 1, column: 1, mirrored: false };
@@ -229,7 +230,7 @@ fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Res
 }
 
 /// The solid within a mesh, and what was repaired.
-fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec<(String, Option<f64>)>), MeshFault> {
+fn solid(polygons: Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec<(String, Option<f64>)>), MeshFault> {
     let points = &polygons.points;
     if polygons.ends.len() <= limits.polyhedron_faces {
         let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
@@ -240,18 +241,23 @@ fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Ve
             return Ok((polyhedron.into(), flipped.into_iter().collect()));
         }
     }
-    let made = TriangleMesh::of_polygons(points, polygons.faces());
-    if let Err(MeshFault::Mixed(..)) = made
-        && let Some((turned, count)) = oriented(&polygons.faces().map(<[u32]>::to_vec).collect::<Vec<_>>())
-    {
-        let mut polygons = Polygons { points: points.clone(), ..Polygons::default() };
-        turned.iter().for_each(|face| polygons.append(face));
-        let (shape, mut repaired) = solid(&polygons, limits)?;
-        let text = format!("a mesh with {count} faces that run the other way round than their neighbours: turned");
-        repaired.insert(0, (text, None));
-        return Ok((shape, repaired));
-    }
-    made.map(|(mesh, repair)| (mesh.into(), repair.notes("a mesh")))
+    let closed = match TriangleMesh::closed(points, polygons.faces()) {
+        Err(fault @ MeshFault::Mixed(..)) => {
+            let faces: Vec<Vec<u32>> = polygons.faces().map(<[u32]>::to_vec).collect();
+            let Some((turned, count)) = oriented(&faces) else { return Err(fault) };
+            let mut polygons = Polygons { points: polygons.points, ..Polygons::default() };
+            turned.iter().for_each(|face| polygons.append(face));
+            let (shape, mut repaired) = solid(polygons, limits)?;
+            let text = format!("a mesh with {count} faces that run the other way round than their neighbours: turned");
+            repaired.insert(0, (text, None));
+            return Ok((shape, repaired));
+        }
+        closed => closed?,
+    };
+    // Of many triangles they take as much as all the rest.
+    drop(polygons);
+    let (mesh, repair) = TriangleMesh::of_closed(closed)?;
+    Ok((mesh.into(), repair.notes("a mesh")))
 }
 
 /// Text of a file.

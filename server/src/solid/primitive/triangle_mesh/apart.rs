@@ -9,6 +9,8 @@ use robust::{Coord3D, orient3d};
 const NEAR: f64 = 1e3;
 /// Facets that are thinner than this, in tolerances, too.
 const THIN: f64 = 1e5;
+/// Facets that share a corner are this many times farther than near from each other's sides to be apart by that.
+const FAR: f64 = 64.0;
 
 /// How two facets lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,35 +73,68 @@ fn beside(p: DVec3, q: DVec3, t: [DVec3; 3]) -> f64 {
     (0..3).fold(ends, |least, k| least.min(between_segments([p, q], [t[k], t[(k + 1) % 3]])))
 }
 
-/// How the facets of two numbers lie to each other.
-pub fn pair(surface: &Surface, i: u32, j: u32) -> Pair {
-    let near = NEAR * surface.tolerance;
-    let ids = [surface.triangles[i as usize], surface.triangles[j as usize]];
-    let at = ids.map(|t| t.map(|v| surface.vertices[v as usize]));
-    let own = |k: usize, v: u32| !ids[1 - k].contains(&v);
-    let mut normals = [DVec3::ZERO; 2];
-    for k in 0..2 {
-        let [a, b, c] = at[k];
-        let n = (b - a).cross(c - a);
-        normals[k] = n;
+/// A facet as it is held against others.
+pub struct Facet {
+    ids: [u32; 3],
+    at: [DVec3; 3],
+    /// Twice its area times its normal, and how long that is.
+    area: DVec3,
+    length: f64,
+    thin: bool,
+}
+
+impl Facet {
+    /// The one of a number.
+    pub fn of(surface: &Surface, i: u32) -> Self {
+        let ids = surface.triangles[i as usize];
+        let at = ids.map(|v| surface.vertices[v as usize]);
+        let [a, b, c] = at;
+        let area = (b - a).cross(c - a);
         let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-        if n.length_squared() <= (THIN * surface.tolerance).powi(2) * longest {
+        let thin = area.length_squared() <= (THIN * surface.tolerance).powi(2) * longest;
+        Self { ids, at, area, length: area.length(), thin }
+    }
+
+    /// True where some points all lie farther than `far` beyond one of its sides, of these the ones that count.
+    fn is_beside(&self, sides: [bool; 3], points: impl Iterator<Item = DVec3> + Clone, far: f64) -> bool {
+        (0..3).filter(|m| sides[*m]).any(|m| {
+            let (a, b) = (self.at[m], self.at[(m + 1) % 3]);
+            let outward = (b - a).cross(self.area);
+            let least = far * (b - a).length() * self.length;
+            points.clone().all(|x| outward.dot(x - a) > least)
+        })
+    }
+}
+
+/// How two facets lie to each other.
+pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> Pair {
+    let near = NEAR * tolerance;
+    let (ids, at) = (facets.map(|f| f.ids), facets.map(|f| f.at));
+    let own = [0, 1].map(|k| ids[k].map(|v| !ids[1 - k].contains(&v)));
+    let owned = |k: usize| (0..3).filter(move |m| own[k][*m]).map(move |m| at[k][m]);
+    for k in 0..2 {
+        if facets[k].thin {
             return Pair::Doubtful;
         }
         // All that the other one has for itself on one side of this one's plane, and not near it.
-        let least = near * n.length();
+        let (n, least) = (facets[k].area, near * facets[k].length);
         let (mut above, mut below, mut count) = (true, true, 0);
-        for m in 0..3 {
-            if own(1 - k, ids[1 - k][m]) {
-                let height = n.dot(at[1 - k][m] - a);
-                (above, below, count) = (above && height > least, below && height < -least, count + 1);
-            }
+        for x in owned(1 - k) {
+            let height = n.dot(x - at[k][0]);
+            (above, below, count) = (above && height > least, below && height < -least, count + 1);
         }
         if count > 0 && (above || below) {
             return Pair::Apart;
         }
     }
-    let shared = (0..3).filter(|m| !own(0, ids[0][*m])).count();
+    let shared = own[0].iter().filter(|own| !**own).count();
+    // Beyond a side, of one that they meet in a corner of a side at that corner: by far, since what is beyond it at the ends of long
+    // sides is near it at the ends of short ones.
+    let far = if shared == 0 { near } else { FAR * near };
+    let sides = |k: usize| std::array::from_fn(|m| shared == 0 || !own[k][m] || !own[k][(m + 1) % 3]);
+    if shared < 2 && (0..2).any(|k| facets[k].is_beside(sides(k), owned(1 - k), far)) {
+        return Pair::Apart;
+    }
     match shared {
         0 => {
             let mut least = f64::INFINITY;
@@ -117,7 +152,7 @@ pub fn pair(surface: &Surface, i: u32, j: u32) -> Pair {
         1 => {
             let mut least = f64::INFINITY;
             for k in 0..2 {
-                let m = (0..3).find(|m| !own(k, ids[k][*m])).unwrap_or(0);
+                let m = (0..3).find(|m| !own[k][*m]).unwrap_or(0);
                 let (p, q) = (at[k][(m + 1) % 3], at[k][(m + 2) % 3]);
                 if pierces(p, q, at[1 - k]) {
                     return Pair::Crossing;
@@ -128,7 +163,7 @@ pub fn pair(surface: &Surface, i: u32, j: u32) -> Pair {
         }
         2 => {
             // In one plane, or nearly: on both sides of their edge.
-            if normals[0].dot(normals[1]) > 0.0 && ids_run_against(ids) { Pair::Apart } else { Pair::Doubtful }
+            if facets[0].area.dot(facets[1].area) > 0.0 && ids_run_against(ids) { Pair::Apart } else { Pair::Doubtful }
         }
         _ => Pair::Crossing,
     }

@@ -13,7 +13,7 @@
 //! part that fails the check later, far from all such places, is taken for full: a contact may be told too early there, never too
 //! late.
 
-use super::apart::{Pair, pair};
+use super::apart::{Facet, Pair, pair};
 use super::cells::{self, checked};
 use super::local::{Expr, Local};
 use super::piece::Piece;
@@ -45,7 +45,7 @@ const OVERLAP: f64 = 1.0 / 128.0;
 /// Places that are tried for a division, for one that keeps clear of corners.
 const PLACES: usize = 9;
 /// Facets up to which corners are looked at for that: of more the odds are that one is near anyway.
-const LOOKED_AT: usize = 4096;
+const LOOKED_AT: usize = 256;
 /// Facets from which on two halves are divided side by side.
 const SHARED: usize = 4096;
 /// Times that a facet is in a part, on average, at most.
@@ -198,18 +198,17 @@ impl Builder<'_> {
     /// Whether a cell can be a part; where that is not sure its formula is tried, and the last time it must do.
     fn is_part(&self, list: &[u32], cell: &Aabb, last: bool) -> Result<bool, MeshFault> {
         let mut doubt = last;
-        for (k, i) in list.iter().enumerate() {
-            for j in &list[..k] {
-                if !self.boxes[*i as usize].meets(&self.boxes[*j as usize]) {
+        let facets: SmallVec<[Facet; FEW_FACETS]> = list.iter().map(|i| Facet::of(self.surface, *i)).collect();
+        let boxes: SmallVec<[Aabb; FEW_FACETS]> = list.iter().map(|i| self.boxes[*i as usize]).collect();
+        for i in 0..facets.len() {
+            for j in 0..i {
+                if !boxes[i].meets(&boxes[j]) {
                     continue;
                 }
-                match pair(self.surface, *i, *j) {
+                match pair(self.surface.tolerance, [&facets[i], &facets[j]]) {
                     Pair::Apart => {}
                     Pair::Doubtful => doubt = true,
-                    Pair::Crossing => {
-                        let (p, q) = (&self.boxes[*i as usize], &self.boxes[*j as usize]);
-                        return Err(MeshFault::Crossing(p.intersection(q).center()));
-                    }
+                    Pair::Crossing => return Err(MeshFault::Crossing(boxes[i].intersection(&boxes[j]).center())),
                 }
             }
         }

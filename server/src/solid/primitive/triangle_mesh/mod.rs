@@ -61,6 +61,12 @@ pub enum MeshFault {
     Intricate(DVec3),
 }
 
+/// A closed surface of which a mesh is to be made, and what was repaired in it.
+pub struct Closed {
+    shell: shell::Shell,
+    repair: Repair,
+}
+
 /// All points within a closed mesh of triangles.
 #[derive(Clone, Debug)]
 pub struct TriangleMesh {
@@ -109,8 +115,17 @@ impl TriangleMesh {
         points: &[DVec3],
         faces: impl IntoIterator<Item = &'f [u32]>,
     ) -> Result<(Self, Repair), MeshFault> {
+        Self::of_closed(Self::closed(points, faces)?)
+    }
+
+    /// The first half of `of_polygons`, which looks at all of them: beyond it they are not needed.
+    ///
+    /// # Errors
+    /// Where they are not closed.
+    pub fn closed<'f>(points: &[DVec3], faces: impl IntoIterator<Item = &'f [u32]>) -> Result<Closed, MeshFault> {
         let mut bent = 0.0_f64;
-        let mut triangles = Vec::new();
+        let faces = faces.into_iter();
+        let mut triangles = Vec::with_capacity(faces.size_hint().0);
         for face in faces {
             if let [a, b, c] = *face {
                 triangles.push([a, b, c]);
@@ -121,9 +136,18 @@ impl TriangleMesh {
             bent = bent.max(off);
             triangles.extend(cut.into_iter().map(|t| t.map(|i| face[i])));
         }
-        let (mesh, repair) = Self::new(points, &triangles)?;
-        let bent = if bent > ROUNDING * mesh.surface.around.half().length() { bent } else { 0.0 };
-        Ok((mesh, Repair { bent, ..repair }))
+        let (shell, repair) = shell::Shell::of(points, &triangles)?;
+        let size = Aabb::of_points(shell.vertices.iter().copied()).half().length();
+        let bent = if bent > ROUNDING * size { bent } else { 0.0 };
+        Ok(Closed { shell, repair: Repair { bent, ..repair } })
+    }
+
+    /// Its second half.
+    ///
+    /// # Errors
+    /// What is wrong with the mesh, and where.
+    pub fn of_closed(closed: Closed) -> Result<(Self, Repair), MeshFault> {
+        Ok((Self::of_shell(closed.shell, FEW_TRIANGLES)?, closed.repair))
     }
 
     fn of_shell(shell: shell::Shell, few: usize) -> Result<Self, MeshFault> {
