@@ -232,8 +232,11 @@ impl<'a> Pieces<'a> {
             Truth::True => self.turns(from, None, true),
             Truth::False => self.turns(from, None, false),
             Truth::Open
-                if left.len() <= FEW_TOKENS && !left.iter().any(|t| local::is_part(*t)) || to - from <= self.shortest =>
-             self.crossings(&left, from, to),
+                if left.len() <= FEW_TOKENS && !left.iter().any(|t| local::is_part(*t))
+                    || to - from <= self.shortest =>
+            {
+                self.crossings(&left, from, to)
+            }
             Truth::Open => {
                 let middle = 0.5 * (from + to);
                 self.piece(from, middle, Some(&left));
@@ -291,7 +294,9 @@ impl<'a> Pieces<'a> {
         // Of a large mesh what passes next to the point.
         let close = self.shortest.max(THIN * x.abs().max_element());
         let mut near = |id: LiteralId| match self.primitive.shape.formula() {
-            Some(formula) if formula.is_divided() => local::truth_of(id.sense(), (psi(id.face()), psi(id.face())), 0.0, close),
+            Some(formula) if formula.is_divided() => {
+                local::truth_of(id.sense(), (psi(id.face()), psi(id.face())), 0.0, close)
+            }
             _ => Truth::Open,
         };
         self.primitive.pruned(Sense::Positive, &mut tokens, &mut near);
@@ -415,7 +420,8 @@ mod tests {
             [0.0, 1.0].iter().flat_map(|z| outline.iter().map(move |(x, y)| DVec3::new(*x, *y, *z))).collect();
         let mut faces: Vec<Vec<u32>> = vec![(0..6).rev().collect(), (6..12).collect()];
         faces.extend((0..6).map(|i| vec![i, (i + 1) % 6, 6 + (i + 1) % 6, 6 + i]));
-        let (mesh, _) = crate::solid::primitive::TriangleMesh::of_polygons(&points, faces.iter().map(Vec::as_slice)).expect("a closed mesh");
+        let (mesh, _) = crate::solid::primitive::TriangleMesh::of_polygons(&points, faces.iter().map(Vec::as_slice))
+            .expect("a closed mesh");
         let tilt = glam::DQuat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize();
         let pose = |at: DVec3| Pose::new(tilt * at, tilt);
         let mut b = SolidBuilder::new();

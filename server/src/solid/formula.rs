@@ -139,6 +139,11 @@ impl Formula {
     }
 }
 
+/// The value of some tokens at a point, from the faces' values there.
+pub fn value_of(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> f64 {
+    value(local::first(tokens).0, psi, (f64::NEG_INFINITY, f64::INFINITY))
+}
+
 /// Bounds of the value of some tokens over a region, from the faces'.
 pub fn span_of(tokens: &[Token], psi: &mut impl FnMut(u32) -> Span) -> Span {
     span(local::first(tokens).0, psi, (f64::NEG_INFINITY, f64::INFINITY))
@@ -155,7 +160,9 @@ fn write_division(
     let (all, any) = if sense == Sense::Positive { (local::AND, local::OR) } else { (local::OR, local::AND) };
     let around = division.around();
     local::fold(all, 0..7, out, |i, out| {
-        if i < 6 { literal(first_face + around[i], sense, out, truth) } else {
+        if i < 6 {
+            literal(first_face + around[i], sense, out, truth)
+        } else {
             write_place(division, division.whole(), (first_face, sense), (all, any), out, truth)
         }
     })
@@ -189,7 +196,9 @@ fn write_place(
             let halves = division.halves(n);
             local::fold(any, halves.into_iter(), out, |(face, place), out| {
                 local::fold(all, 0..2, out, |i, out| {
-                    if i == 0 { literal(first_face + face, sense, out, truth) } else {
+                    if i == 0 {
+                        literal(first_face + face, sense, out, truth)
+                    } else {
                         write_place(division, place, (first_face, sense), (all, any), out, truth)
                     }
                 })
@@ -199,12 +208,7 @@ fn write_place(
 }
 
 /// The value in a place, exact within the window; beyond it a bound on the same side. The nearer half comes first.
-fn value_in(
-    division: &dyn Division,
-    place: Place,
-    psi: &mut impl FnMut(u32) -> f64,
-    (low, high): (f64, f64),
-) -> f64 {
+fn value_in(division: &dyn Division, place: Place, psi: &mut impl FnMut(u32) -> f64, (low, high): (f64, f64)) -> f64 {
     match place {
         Place::Known(inside) => known(inside),
         Place::Part(part) => match division.part(part) {
@@ -236,14 +240,23 @@ fn value_in(
 /// Parts up to which what is left of an expression is written out.
 const FEW_PARTS: usize = 32;
 
+/// How many parts an expression has.
+pub(super) fn parts(tokens: &[Token]) -> usize {
+    tokens.iter().filter(|t| local::is_part(**t)).count()
+}
+
+/// True for so many parts as are written out.
+pub(super) fn are_few(parts: usize) -> bool {
+    (1..=FEW_PARTS).contains(&parts)
+}
+
 /// Writes out the parts of what stands behind `start` by `open`, where they are few.
 pub(super) fn open_few(
     start: usize,
     out: &mut Vec<Token>,
     open: &mut impl FnMut(LiteralId, &mut Vec<Token>) -> Truth,
 ) -> Truth {
-    let parts = out[start..].iter().filter(|t| local::is_part(**t)).count();
-    if parts == 0 || parts > FEW_PARTS {
+    if !are_few(parts(&out[start..])) {
         return Truth::Open;
     }
     let left = out.split_off(start);

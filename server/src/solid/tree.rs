@@ -83,13 +83,28 @@ const MOST_SIMPLIFIED: usize = 100_000;
 impl Solid {
     /// `local::prune` of an expression of this solid. Where few parts of large meshes are left they are written out, for `classify`
     /// to look at: so a small region has none.
-    pub fn prune(&self, tokens: &[Token], out: &mut Vec<Token>, classify: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+    pub fn prune(
+        &self,
+        tokens: &[Token],
+        out: &mut Vec<Token>,
+        classify: &mut impl FnMut(LiteralId) -> Truth,
+    ) -> Truth {
         let start = out.len();
         let truth = local::prune(tokens, out, classify);
         if !self.has_parts || truth != Truth::Open {
             return truth;
         }
         formula::open_few(start, out, &mut |part, out| self.open(part, out, classify))
+    }
+
+    /// True where parts are left of an expression, few enough to be written out.
+    pub(crate) fn has_few_parts(&self, tokens: &[Token]) -> bool {
+        self.has_parts && formula::are_few(formula::parts(tokens))
+    }
+
+    /// Appends an expression with all its parts written out.
+    pub(crate) fn written_out(&self, tokens: &[Token], out: &mut Vec<Token>) -> Truth {
+        formula::open_parts(tokens, out, &mut |part, out| self.open(part, out, &mut |_| Truth::Open))
     }
 
     /// Appends what a part says.
@@ -167,8 +182,19 @@ impl Solid {
         let has_parts = primitives.iter().any(|p| p.shape.formula().is_some_and(formula::Formula::is_divided));
         let (normal_form, alike) = (Vec::new(), Alike::default());
         let (simplified, vanishes) = (false, false);
-        let mut solid =
-            Self { primitives, nodes, root, faces, face_owner, senses, normal_form, alike, simplified, vanishes, has_parts };
+        let mut solid = Self {
+            primitives,
+            nodes,
+            root,
+            faces,
+            face_owner,
+            senses,
+            normal_form,
+            alike,
+            simplified,
+            vanishes,
+            has_parts,
+        };
         let mut whole = Vec::new();
         write_tree(&solid, &mut whole);
         let sense = |f: u32| solid.senses[solid.face_owner[f as usize] as usize];

@@ -336,7 +336,8 @@ impl<'a> Search<'a> {
     fn has_parts(&self, cell: &Cell, bounded: &Bounded) -> bool {
         let Contacts { task, .. } = &self.contacts;
         let has = |solid: &Solid, range: Range| {
-            solid.has_parts && self.items.scratch.pool[range.0 as usize..range.1 as usize].iter().any(|t| local::is_part(*t))
+            solid.has_parts
+                && self.items.scratch.pool[range.0 as usize..range.1 as usize].iter().any(|t| local::is_part(*t))
         };
         has(task.a, cell.a) || has(task.b, bounded.b)
     }

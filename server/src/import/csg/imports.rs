@@ -117,6 +117,9 @@ fn of_polygons(
     (outer, hull): (&DAffine3, bool),
     polygons: mesh::Polygons,
 ) -> Result<PartId> {
+    if !hull && polygons.count() > shapes.limits.polyhedron_faces {
+        return shapes.of_polygons(call, outer, polygons);
+    }
     let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
     shapes.of_faces(call, outer, hull, (polygons.points, clockwise))
 }

@@ -66,13 +66,18 @@ impl Polygons {
         self.ends.push(self.corners.len() as u32);
     }
 
+    /// How many faces it has.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
     /// True where it has no face.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
     /// The same where a transform puts it; one that mirrors turns its faces.
-    fn placed(mut self, place: &DAffine3) -> Self {
+    pub fn placed(mut self, place: &DAffine3) -> Self {
         if *place == DAffine3::IDENTITY {
             return self;
         }

@@ -124,7 +124,20 @@ impl<'a> Evaluator<'a> {
         let (slabs, closer, cells, expressions) = Default::default();
         let (half, cube) = (DVec3::ZERO, Cell::cube());
         let places = vec![NO_SLAB; faces.len()];
-        Self { solid, faces, slabs, places, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS, work: 0 }
+        Self {
+            solid,
+            faces,
+            slabs,
+            places,
+            closer,
+            half,
+            cube,
+            cells,
+            expressions,
+            cuts: 0,
+            most_cuts: MOST_CUTS,
+            work: 0,
+        }
     }
 
     /// The same without a limit of cuts: for a solid that shall be one box.

@@ -40,6 +40,10 @@ pub use triangle_mesh::{MeshFault, Repair, TriangleMesh, WELD};
 pub trait Geometry {
     /// The faces psi <= 0 whose intersection it is, or those that its formula names, in a fixed order.
     fn faces(&self) -> Vec<Face>;
+    /// How many faces it counts as where they are limited.
+    fn face_count(&self) -> usize {
+        self.faces().len()
+    }
     /// The same faces where they are too many to be listed: planes.
     fn many_faces(&self) -> Option<Arc<dyn Planes>> {
         None

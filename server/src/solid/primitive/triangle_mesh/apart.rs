@@ -39,6 +39,27 @@ fn pierces(p: DVec3, q: DVec3, t: [DVec3; 3]) -> bool {
     around.iter().all(|s| *s >= 0.0) || around.iter().all(|s| *s <= 0.0)
 }
 
+/// True where a point is on the inner side of a facet's plane; `None` where it is on it.
+pub fn is_below(p: DVec3, t: [DVec3; 3]) -> Option<bool> {
+    let height = side(t, p);
+    (height != 0.0).then_some(height < 0.0)
+}
+
+/// True where a segment runs through a facet; `None` where it only touches it or its rim, or ends as near to it as roundings.
+pub fn runs_through(p: DVec3, q: DVec3, t: [DVec3; 3], tolerance: f64) -> Option<bool> {
+    let ends = [side(t, p), side(t, q)];
+    if ends.iter().all(|s| *s > 0.0) || ends.iter().all(|s| *s < 0.0) {
+        return Some(false);
+    }
+    let around = [side([p, q, t[0]], t[1]), side([p, q, t[1]], t[2]), side([p, q, t[2]], t[0])];
+    if around.iter().any(|s| *s > 0.0) && around.iter().any(|s| *s < 0.0) {
+        return Some(false);
+    }
+    let least = NEAR * tolerance * (t[1] - t[0]).cross(t[2] - t[0]).length();
+    let is_clear = around.iter().all(|s| *s != 0.0) && ends.iter().all(|s| s.abs() > least);
+    is_clear.then_some(true)
+}
+
 fn from_segment(x: DVec3, p: DVec3, q: DVec3) -> f64 {
     let along = q - p;
     let t = ((x - p).dot(along) / along.length_squared()).clamp(0.0, 1.0);

@@ -24,7 +24,7 @@ const TOKENS: usize = 6;
 /// Divisions in a row that leave as many planes in a cell: they all meet in one corner then.
 const STALLED: u32 = 9;
 /// Tokens of the formula of such a corner.
-pub const MOST_TOKENS: usize = 20_000;
+const MOST_TOKENS: usize = 20_000;
 /// Tokens of the whole for each facet.
 const TOKENS_PER_FACET: usize = 400;
 /// Half the overlap of two cells, as a fraction of the one that they were.

@@ -13,15 +13,15 @@
 //! part that fails the check later, far from all such places, is taken for full: a contact may be told too early there, never too
 //! late.
 
-use super::apart::{Facet, Pair, pair};
+use super::MeshFault;
+use super::apart::{self, Facet, Pair, pair};
 use super::cells::{self, checked};
+use super::edges::NONE;
 use super::local::{Expr, Local};
 use super::piece::Piece;
 use super::planes::area;
 use super::side::crosses;
 use super::surface::Surface;
-use super::MeshFault;
-use super::edges::NONE;
 use crate::math::{Aabb, halt};
 use crate::solid::faces::Planes;
 use crate::solid::formula::{Division, Part, Place};
@@ -40,6 +40,8 @@ const FEW_FACETS: usize = 32;
 const STALLED: u32 = 9;
 /// Facets of such a corner.
 const MOST_FACETS: usize = 5_000;
+/// Tokens of the formula of a part.
+const MOST_TOKENS: usize = 400_000;
 /// Half the overlap of two cells, as a fraction of the one that they were.
 const OVERLAP: f64 = 1.0 / 128.0;
 /// Places that are tried for a division, for one that keeps clear of corners.
@@ -84,6 +86,26 @@ struct Leaf {
     parent: u32,
 }
 
+/// What is grown side by side: trees under divisions.
+enum Grown {
+    /// With its top.
+    Tree(Tree, u32),
+    Divided(Node, [Option<Box<Grown>>; 2]),
+}
+
+impl Grown {
+    /// How many nodes, leaves and facets it has.
+    fn sizes(&self) -> [usize; 3] {
+        match self {
+            Grown::Tree(tree, _) => [tree.nodes.len(), tree.leaves.len(), tree.facets.len()],
+            Grown::Divided(_, halves) => {
+                let each = halves.iter().flatten().map(|half| half.sizes());
+                each.fold([1, 0, 0], |all, one| std::array::from_fn(|k| all[k] + one[k]))
+            }
+        }
+    }
+}
+
 /// A part of the tree with numbers of its own.
 #[derive(Default)]
 struct Tree {
@@ -93,6 +115,29 @@ struct Tree {
 }
 
 impl Tree {
+    /// All that was grown as one tree, and its top.
+    fn of(grown: Grown) -> (Self, u32) {
+        let [nodes, leaves, facets] = grown.sizes();
+        let (nodes, leaves) = (Vec::with_capacity(nodes), Vec::with_capacity(leaves));
+        let mut tree = Self { nodes, leaves, facets: Vec::with_capacity(facets) };
+        let top = tree.take(grown, NONE);
+        (tree, top)
+    }
+
+    fn take(&mut self, grown: Grown, parent: u32) -> u32 {
+        match grown {
+            Grown::Tree(tree, top) => self.append(tree, top, parent),
+            Grown::Divided(node, halves) => {
+                let n = self.nodes.len();
+                self.nodes.push(Node { parent, ..node });
+                for (k, half) in halves.into_iter().enumerate() {
+                    self.nodes[n].halves[k] = half.map_or(UNDECIDED, |half| self.take(*half, upper(n as u32, k)));
+                }
+                n as u32
+            }
+        }
+    }
+
     /// Appends another one whose top is `top`, below the half `parent`; its place.
     fn append(&mut self, other: Tree, top: u32, parent: u32) -> u32 {
         let (nodes, leaves, facets) = (self.nodes.len() as u32, self.leaves.len() as u32, self.facets.len() as u32);
@@ -117,38 +162,50 @@ impl Tree {
     }
 }
 
-/// Makes the tree.
+/// Makes the tree: of all facets, or of some that lie side by side in memory then.
 struct Builder<'s> {
     surface: &'s Surface,
     boxes: Vec<Aabb>,
+    /// Their numbers and corners, of some.
+    some: Option<(Vec<u32>, Vec<[DVec3; 3]>)>,
 }
 
 /// A place whose side is not decided yet.
-const UNDECIDED: u32 = OUT;
+const UNDECIDED: u32 = OUT | 1;
+/// Facets that are tried for the side of a place that none reaches.
+const TRIED: usize = 4;
 
 impl Builder<'_> {
-    /// The tree of a cell that some facets reach, and its top; `last`: the facets of the one before, and for how long it has been so.
-    fn grown(&self, list: Vec<u32>, cell: Aabb, last: (usize, u32)) -> Result<(Tree, u32), MeshFault> {
-        let mut tree = Tree::default();
+    /// The number of a facet in the mesh.
+    fn number(&self, i: u32) -> u32 {
+        self.some.as_ref().map_or(i, |some| some.0[i as usize])
+    }
+
+    fn corners(&self, i: u32) -> [DVec3; 3] {
+        self.some.as_ref().map_or_else(|| self.surface.corners(i), |some| some.1[i as usize])
+    }
+
+    /// The tree of a cell that some facets reach; `last`: the facets of the one before, and for how long it has been so.
+    fn grown(&self, list: Vec<u32>, cell: Aabb, last: (usize, u32)) -> Result<Grown, MeshFault> {
         if list.len() < SHARED {
-            let top = self.grow(list, cell, last, NONE, &mut tree)?;
-            return Ok((tree, top));
+            let all = 0..list.len() as u32;
+            let boxes = list.iter().map(|i| self.boxes[*i as usize]).collect();
+            let corners = list.iter().map(|i| self.surface.corners(*i)).collect();
+            let near = Builder { surface: self.surface, boxes, some: Some((list, corners)) };
+            let mut tree = Tree::default();
+            let top = near.grow(all.collect(), cell, last, NONE, &mut tree)?;
+            return Ok(Grown::Tree(tree, top));
         }
         halt::point();
         let last = stalled(last, list.len());
         let (node, cells, [low, high]) = self.divided(&list, &cell)?;
         drop(list);
-        tree.nodes.push(Node { parent: NONE, ..node });
         let half = |list: Vec<u32>, cell| (!list.is_empty()).then(|| self.grown(list, cell, last)).transpose();
         let (low, high) = rayon::join(|| half(low, cells[0]), || half(high, cells[1]));
-        for (k, half) in [low?, high?].into_iter().enumerate() {
-            let place = half.map_or(UNDECIDED, |(other, top)| tree.append(other, top, upper(0, k)));
-            tree.nodes[0].halves[k] = place;
-        }
-        Ok((tree, 0))
+        Ok(Grown::Divided(node, [low?, high?].map(|half| half.map(Box::new))))
     }
 
-    /// The same into a tree, below the half `parent`.
+    /// The same of few facets into a tree, below the half `parent`; its place.
     fn grow(
         &self,
         list: Vec<u32>,
@@ -164,18 +221,20 @@ impl Builder<'_> {
             }
             let from = tree.facets.len() as u32;
             if self.is_part(&list, &cell, last.1 > STALLED)? {
-                tree.facets.extend(list);
+                tree.facets.extend(list.iter().map(|i| self.number(*i)));
                 tree.leaves.push(Leaf { from, to: tree.facets.len() as u32, parent });
                 return Ok(PART | (tree.leaves.len() as u32 - 1));
             }
         }
         let (node, cells, halves) = self.divided(&list, &cell)?;
+        let empty = halves.iter().position(Vec::is_empty);
+        let known = empty.and_then(|k| self.side(cells[k].center(), &list, &cell));
         drop(list);
         let n = tree.nodes.len();
         tree.nodes.push(Node { parent, ..node });
         for (k, half) in halves.into_iter().enumerate() {
             let place = if half.is_empty() {
-                UNDECIDED
+                known.map_or(UNDECIDED, |inside| if inside { IN } else { OUT })
             } else {
                 self.grow(half, cells[k], last, upper(n as u32, k), tree)?
             };
@@ -184,12 +243,28 @@ impl Builder<'_> {
         Ok(n as u32)
     }
 
+    /// Whether a point of a cell is inside, told by a facet of the cell and what of the cell's others lies between them; `None` where
+    /// that is not clear.
+    fn side(&self, p: DVec3, list: &[u32], cell: &Aabb) -> Option<bool> {
+        let middle = |i: &u32| self.corners(*i).iter().sum::<DVec3>() / 3.0;
+        let inner = list.iter().filter(|i| cell.contains(middle(i)));
+        inner.take(TRIED).find_map(|f| {
+            let q = middle(f);
+            let mut inside = apart::is_below(p, self.corners(*f))?;
+            for g in list.iter().filter(|g| *g != f) {
+                inside ^= apart::runs_through(p, q, self.corners(*g), self.surface.tolerance)?;
+            }
+            Some(inside)
+        })
+    }
+
     fn middle(&self, list: &[u32]) -> DVec3 {
         list.first().map_or(DVec3::ZERO, |i| self.boxes[*i as usize].center())
     }
 
     fn has_few_planes(&self, list: &[u32]) -> bool {
-        let mut planes: SmallVec<[u32; FEW_FACETS]> = list.iter().map(|i| self.surface.face_of[*i as usize]).collect();
+        let mut planes: SmallVec<[u32; FEW_FACETS]> =
+            list.iter().map(|i| self.surface.face_of[self.number(*i) as usize]).collect();
         planes.sort_unstable();
         planes.dedup();
         planes.len() <= FEW_PLANES
@@ -198,7 +273,8 @@ impl Builder<'_> {
     /// Whether a cell can be a part; where that is not sure its formula is tried, and the last time it must do.
     fn is_part(&self, list: &[u32], cell: &Aabb, last: bool) -> Result<bool, MeshFault> {
         let mut doubt = last;
-        let facets: SmallVec<[Facet; FEW_FACETS]> = list.iter().map(|i| Facet::of(self.surface, *i)).collect();
+        let facets: SmallVec<[Facet; FEW_FACETS]> =
+            list.iter().map(|i| Facet::of(self.surface, self.number(*i))).collect();
         let boxes: SmallVec<[Aabb; FEW_FACETS]> = list.iter().map(|i| self.boxes[*i as usize]).collect();
         for i in 0..facets.len() {
             for j in 0..i {
@@ -215,7 +291,7 @@ impl Builder<'_> {
         if !doubt {
             return Ok(true);
         }
-        match written(self.surface, list.iter().copied(), cell) {
+        match written(self.surface, list.iter().map(|i| self.number(*i)), cell) {
             Ok(_) => Ok(true),
             Err(fault) if last => Err(fault),
             Err(_) => Ok(false),
@@ -239,7 +315,7 @@ impl Builder<'_> {
         let s = self.place(list, cell, axis, w);
         let (mut below, mut above) = (*cell, *cell);
         (below.max[axis], above.min[axis]) = (s + w, s - w);
-        let (mut low, mut high) = (Vec::with_capacity(list.len() / 2), Vec::with_capacity(list.len() / 2));
+        let (mut low, mut high) = (Vec::with_capacity(list.len()), Vec::with_capacity(list.len()));
         for i in list {
             let b = &self.boxes[*i as usize];
             let (under, over) = (b.min[axis] <= below.max[axis], b.max[axis] >= above.min[axis]);
@@ -258,7 +334,7 @@ impl Builder<'_> {
 
     /// True unless a facet and a cell are told apart by an axis (T. Akenine-Möller 2001); its box meets the cell.
     fn reaches(&self, i: u32, cell: &Aabb) -> bool {
-        let corners = self.surface.corners(i);
+        let corners = self.corners(i);
         if corners.iter().any(|c| cell.contains(*c)) {
             return true;
         }
@@ -281,8 +357,7 @@ impl Builder<'_> {
     fn place(&self, list: &[u32], cell: &Aabb, k: usize, w: f64) -> f64 {
         let (from, size) = (cell.min[k], cell.max[k] - cell.min[k]);
         let step = list.len().div_ceil(1024);
-        let mut middles: Vec<f64> =
-            list.iter().step_by(step).map(|i| self.boxes[*i as usize].center()[k]).collect();
+        let mut middles: Vec<f64> = list.iter().step_by(step).map(|i| self.boxes[*i as usize].center()[k]).collect();
         let half = middles.len() / 2;
         let median = *middles.select_nth_unstable_by(half, f64::total_cmp).1;
         let middle = median.clamp(from + 0.25 * size, from + 0.75 * size);
@@ -294,7 +369,7 @@ impl Builder<'_> {
             if list.len() > LOOKED_AT {
                 return s;
             }
-            let clear = list.iter().flat_map(|i| self.surface.corners(*i)).fold(f64::INFINITY, |least: f64, c| {
+            let clear = list.iter().flat_map(|i| self.corners(*i)).fold(f64::INFINITY, |least: f64, c| {
                 let v = c[k] - s;
                 least.min((v - w).abs()).min((v + w).abs())
             });
@@ -319,11 +394,7 @@ fn stalled(last: (usize, u32), count: usize) -> (usize, u32) {
 }
 
 /// The formula of a cell that some facets reach; `None` where none of them does after all.
-fn written(
-    surface: &Surface,
-    list: impl Iterator<Item = u32> + Clone,
-    cell: &Aabb,
-) -> Result<Option<Expr>, MeshFault> {
+fn written(surface: &Surface, list: impl Iterator<Item = u32> + Clone, cell: &Aabb) -> Result<Option<Expr>, MeshFault> {
     let mut pieces = surface.pieces(list);
     for k in 0..3 {
         let axis = DVec3::AXES[k];
@@ -333,7 +404,7 @@ fn written(
     }
     let Some(first) = pieces.first() else { return Ok(None) };
     let middle = first.middle();
-    let local = Local { planes: &surface.planes, tolerance: surface.tolerance, most: cells::MOST_TOKENS };
+    let local = Local { planes: &surface.planes, tolerance: surface.tolerance, most: MOST_TOKENS };
     let e = local.formula(pieces.clone(), true).map_err(|_| MeshFault::Intricate(middle))?;
     checked(&surface.planes, surface.tolerance, &pieces, e, cell).map(Some)
 }
@@ -369,15 +440,13 @@ impl Divided {
         let domain = cells::domain(&surface.around);
         let count = surface.triangles.len() as u32;
         let boxes = (0..count).into_par_iter().map(|i| Aabb::of_points(surface.corners(i))).collect();
-        let builder = Builder { surface: &surface, boxes };
-        let (mut tree, top) = builder.grown((0..count).collect(), domain, (usize::MAX, 0))?;
+        let builder = Builder { surface: &surface, boxes, some: None };
+        let grown = builder.grown((0..count).collect(), domain, (usize::MAX, 0))?;
         drop(builder);
+        let (tree, top) = Tree::of(grown);
         if tree.facets.len() > MOST_TIMES * count as usize + 10_000 {
             return Err(MeshFault::Intricate(domain.center()));
         }
-        tree.nodes.shrink_to_fit();
-        tree.leaves.shrink_to_fit();
-        tree.facets.shrink_to_fit();
         let made = Made((0..tree.leaves.len()).map(|_| OnceLock::new()).collect());
         let Tree { nodes, leaves, facets } = tree;
         let mut this = Self { surface, domain, top, nodes, leaves, facets, made };
@@ -388,7 +457,7 @@ impl Divided {
 
     /// Decides the cells that no facet reaches.
     fn decide(&mut self) {
-        let empty = |n: &Node, k: usize| n.halves[k] & KIND == UNDECIDED;
+        let empty = |n: &Node, k: usize| n.halves[k] == UNDECIDED;
         let all: Vec<(u32, usize)> = (0..self.nodes.len())
             .flat_map(|n| (0..2).map(move |k| (n as u32, k)))
             .filter(|(n, k)| empty(&self.nodes[*n as usize], *k))
@@ -407,7 +476,11 @@ impl Divided {
         let outward = |i: u32| {
             let [a, b, c] = surface.corners(i);
             let (middle, n) = ((a + b + c) / 3.0, area(a, b, c).normalize_or_zero());
-            if self.is_inside(middle - n * step) && !self.is_inside(middle + n * step) { Ok(()) } else { Err(MeshFault::Crossing(middle)) }
+            if self.is_inside(middle - n * step) && !self.is_inside(middle + n * step) {
+                Ok(())
+            } else {
+                Err(MeshFault::Crossing(middle))
+            }
         };
         // The largest facet of each part.
         let mut leader: Vec<u32> = (0..opposite.len() as u32).collect();
@@ -538,7 +611,11 @@ impl Divided {
         for k in 0..2 {
             let (l, h) = look.along(axis, k == 1, offsets[k]);
             let mut inner = *cell;
-            if k == 0 { inner.max[axis] = node.s + node.w } else { inner.min[axis] = node.s - node.w }
+            if k == 0 {
+                inner.max[axis] = node.s + node.w
+            } else {
+                inner.min[axis] = node.s - node.w
+            }
             let (l, h) = if l > 0.0 {
                 (l, f64::INFINITY)
             } else {

@@ -19,7 +19,8 @@ impl Hasher for Mix {
         }
     }
     fn write_u64(&mut self, word: u64) {
-        let wide = u128::from(self.0 ^ word ^ 0x2d35_8dcc_aa6c_78a5) * u128::from(0x8bb8_4b93_962e_acc9_u64 ^ self.0.rotate_left(32));
+        let wide = u128::from(self.0 ^ word ^ 0x2d35_8dcc_aa6c_78a5)
+            * u128::from(0x8bb8_4b93_962e_acc9_u64 ^ self.0.rotate_left(32));
         self.0 = (wide as u64) ^ ((wide >> 64) as u64);
     }
     fn write_u32(&mut self, word: u32) {

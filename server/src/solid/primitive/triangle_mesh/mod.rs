@@ -6,8 +6,8 @@
 
 use super::{Checked, Convex, Geometry, Shape, Sink, Source, read_vector, write_vector};
 use crate::math::{Aabb, Ball, Moments, tolerance::ROUNDING};
-use crate::solid::surface::{Plane, Surface as _};
 use crate::solid::faces::Planes;
+use crate::solid::surface::{Plane, Surface as _};
 use crate::solid::{Face, formula::Formula};
 use contactd_proto::Pose;
 use glam::DVec3;
@@ -29,8 +29,8 @@ mod surface;
 mod tests;
 
 use cells::Cells;
-use local::Expr;
 use division::Divided;
+use local::Expr;
 pub use shell::{Repair, WELD};
 use std::sync::Arc;
 use surface::Surface;
@@ -97,11 +97,7 @@ impl TriangleMesh {
     ///
     /// # Errors
     /// What is wrong with the mesh, and where.
-    pub fn divided_from(
-        few: usize,
-        points: &[DVec3],
-        triangles: &[[u32; 3]],
-    ) -> Result<(Self, Repair), MeshFault> {
+    pub fn divided_from(few: usize, points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(Self, Repair), MeshFault> {
         let (shell, repair) = shell::Shell::of(points, triangles)?;
         Ok((Self::of_shell(shell, few)?, repair))
     }
@@ -163,7 +159,12 @@ impl TriangleMesh {
         if count > few {
             let division = Arc::new(Divided::new(Arc::new(surface), &opposite)?);
             let formula = Formula::Divided(division.clone());
-            return Ok(Self { surface: division.surface().clone(), cuts: Vec::new(), formula, division: Some(division) });
+            return Ok(Self {
+                surface: division.surface().clone(),
+                cuts: Vec::new(),
+                formula,
+                division: Some(division),
+            });
         }
         let pieces = surface.pieces(0..count as u32);
         let faces = surface.planes.len();
@@ -221,6 +222,10 @@ impl Geometry for TriangleMesh {
     fn faces(&self) -> Vec<Face> {
         let count = self.division.as_ref().map_or(self.bounding_faces() + self.cuts.len(), |d| d.count());
         (0..count).map(|face| self.plane(face).into()).collect()
+    }
+    fn face_count(&self) -> usize {
+        // The planes of a division take what a number takes.
+        self.bounding_faces() + self.cuts.len()
     }
     fn many_faces(&self) -> Option<Arc<dyn Planes>> {
         self.division.clone().map(|d| d as Arc<dyn Planes>)

@@ -62,7 +62,11 @@ pub fn of(
     let own = |i: usize| {
         let [p, q, r] = corners(i);
         let longest = p.distance(q).max(q.distance(r)).max(r.distance(p));
-        if areas[i].length() <= tolerance * longest { (DVec3::NAN, 0.0) } else { plane_of(areas[i].normalize(), [p, q, r]) }
+        if areas[i].length() <= tolerance * longest {
+            (DVec3::NAN, 0.0)
+        } else {
+            plane_of(areas[i].normalize(), [p, q, r])
+        }
     };
     let own: Vec<(DVec3, f64)> = (0..count).into_par_iter().map(own).collect();
     let thin = |i: usize| own[i].0.is_nan();
