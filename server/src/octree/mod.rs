@@ -195,10 +195,11 @@ impl Model {
     pub fn deciding(&self, x: DVec3) -> (f64, LiteralId) {
         let mut psi = |face: u32| self.solid.faces[face as usize].value(x);
         let (mut near, tolerance) = (Vec::new(), 0.25 * self.margin());
-        if self.keeps(tolerance) && self.literals_at(x, tolerance, &mut near) == Truth::Open {
-            if let Some(found) = solid::local::decided(&near, &mut psi) {
-                return found;
-            }
+        if self.keeps(tolerance)
+            && self.literals_at(x, tolerance, &mut near) == Truth::Open
+            && let Some(found) = solid::local::decided(&near, &mut psi)
+        {
+            return found;
         }
         self.solid.deciding(x)
     }

@@ -39,6 +39,8 @@ pub enum Part {
     Known(bool),
     /// A formula of faces of the primitive.
     Open(Box<[Token]>),
+    /// Without a formula that passed its check: solid whatever the sense, so that nothing meets too late there.
+    Unclear,
 }
 
 /// A formula that divides space: all of `around` and what it is within them, which is (x beyond no plane p and L) or (x beyond no
@@ -114,6 +116,7 @@ impl Formula {
         match division.part(part.face() - first_face) {
             Part::Known(inside) if *inside == (part.sense() == Sense::Positive) => Truth::True,
             Part::Known(_) => Truth::False,
+            Part::Unclear => Truth::True,
             Part::Open(tokens) => write(local::first(tokens).0, first_face, part.sense(), out, truth),
         }
     }
@@ -213,6 +216,7 @@ fn value_in(division: &dyn Division, place: Place, psi: &mut impl FnMut(u32) -> 
         Place::Known(inside) => known(inside),
         Place::Part(part) => match division.part(part) {
             Part::Known(inside) => known(*inside),
+            Part::Unclear => known(true),
             Part::Open(tokens) => value(local::first(tokens).0, psi, (low, high)),
         },
         Place::Divided(n) => {

@@ -183,7 +183,7 @@ fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_a
         let other = if r.chance(0.3) { Shape::from(meshes::divided(&meshes::random(r, 0.8))) } else { shape(r, 0.8) };
         [(own, place(turning(r))), (alone(other), place(past(r, 2.2)))]
     });
-    certify_trees((count / 2, 0xd1_51de), |r, size| {
+    certify_trees((count + 10, 0x3e_5105), |r, size| {
         if r.chance(0.5) { meshes::divided(&meshes::random(r, size)).into() } else { shape(r, size) }
     });
 }

@@ -10,7 +10,7 @@
 //! At load every pair of facets that share a cell is looked at (`apart`): where one runs through the other the mesh is refused.
 //! Where they are only near each other, or thin, the formula of the cell is made at once and checked as in `cells`: it is 0 on
 //! the facets and rises outwards through them. Where it is not, the cell is divided further, and the mesh is refused in the end. A
-//! part that fails the check later, far from all such places, is taken for full: a contact may be told too early there, never too
+//! part that fails the check later, far from all such places, counts as solid: a contact may be told too early there, never too
 //! late.
 
 use super::MeshFault;
@@ -598,6 +598,7 @@ impl Divided {
             let part = self.part(self.first_part() + (place & !KIND));
             return match part {
                 _ if most > SMALL * size => OPEN,
+                Part::Unclear => OPEN,
                 Part::Known(inside) => self.span_in(if *inside { IN } else { OUT }, cell, look),
                 Part::Open(tokens) => crate::solid::formula::span_of(tokens, &mut |f| {
                     let (n, d) = self.surface.planes[f as usize];
@@ -704,7 +705,7 @@ impl Division for Divided {
                 Ok(Some(Expr::Open(tokens))) => Part::Open(tokens.into()),
                 Ok(Some(Expr::Known(inside))) => Part::Known(inside),
                 Ok(None) => Part::Known(self.is_inside(cell.center())),
-                Err(_) => Part::Known(true),
+                Err(_) => Part::Unclear,
             }
         })
     }

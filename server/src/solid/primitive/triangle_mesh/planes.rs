@@ -57,7 +57,7 @@ pub fn of(
 ) -> (Vec<(DVec3, f64)>, Vec<u32>) {
     let count = triangles.len();
     let corners = |i: usize| triangles[i].map(|v| vertices[v as usize]);
-    let areas: Vec<DVec3> = (0..count).into_par_iter().map(|i| corners(i)).map(|[p, q, r]| area(p, q, r)).collect();
+    let areas: Vec<DVec3> = (0..count).into_par_iter().map(&corners).map(|[p, q, r]| area(p, q, r)).collect();
     // The plane of each by itself; of one that is too thin to have one there is no normal.
     let own = |i: usize| {
         let [p, q, r] = corners(i);
