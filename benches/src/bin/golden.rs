@@ -11,7 +11,7 @@
 use clap::Parser;
 use contactd::check::Check;
 use contactd::contact::{
-    Contact, ContactPoint, Outcome, Overlap, Penetration, QueryOptions, Region, Scratch, Status, Verdict,
+    Contact, ContactPoint, Counters, Outcome, Overlap, Penetration, QueryOptions, Region, Scratch, Status, Verdict,
     earliest_contact,
 };
 use contactd::import::{Facets, Limits, read_scene};
@@ -44,6 +44,9 @@ struct Arguments {
     /// This family alone.
     #[arg(long, value_name = "NAME")]
     family: Option<String>,
+    /// Writes the answers about random pairs to a file, a line each, and nothing else: of two builds `diff` tells which have moved.
+    #[arg(long, value_name = "FILE")]
+    answers: Option<PathBuf>,
     /// One run in this process, on the threads that RAYON_NUM_THREADS says, for the process that compares.
     #[arg(long, hide = true)]
     alone: bool,
@@ -175,12 +178,17 @@ fn together(parts: Vec<([u8; 32], [u64; 4])>) -> Golden {
     Golden { answers: statuses.iter().sum(), statuses, hash: all.finalize().to_hex()[..32].to_string() }
 }
 
-/// One answer about two models, everything asked of it.
-fn pair(scene: &Scene) -> ([u8; 32], [u64; 4]) {
+/// Everything that can be asked about two models.
+fn outcome(scene: &Scene) -> Outcome {
     let models = [&scene.a, &scene.b].map(|recipe| Model::new(recipe.build()));
     let query = engine::question_of(scene, [&models[0], &models[1]], QueryOptions::DEPTH);
+    earliest_contact(&query, &mut Scratch::default())
+}
+
+/// One answer about two models.
+fn pair(scene: &Scene) -> ([u8; 32], [u64; 4]) {
     let mut reported = Told::default();
-    reported.outcome(&earliest_contact(&query, &mut Scratch::default()));
+    reported.outcome(&outcome(scene));
     reported.end()
 }
 
@@ -317,6 +325,21 @@ fn demo() -> Result<Golden, Box<dyn Error>> {
     Ok(together(vec![reported.end()]))
 }
 
+/// Writes the answers about the random pairs of the classes asked for, work left out, a line each.
+fn write_answers(arguments: &Arguments, file: &Path) -> Result<(), Box<dyn Error>> {
+    let count = PAIRS[usize::from(arguments.options.quick)];
+    let wanted = |name: &str| arguments.family.as_deref().is_none_or(|only| only == name);
+    let mut text = String::new();
+    for (name, class) in CLASSES.into_iter().filter(|(name, _)| wanted(name)) {
+        let line = |seed: u64| {
+            let outcome = Outcome { counters: Counters::default(), ..outcome(&class(&mut Random::new(seed))) };
+            format!("{name} {seed}: {outcome:?}\n")
+        };
+        text.extend((0..count).into_par_iter().map(line).collect::<Vec<_>>());
+    }
+    std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()).into())
+}
+
 /// The run of this process, a line for each family.
 fn alone(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let pick = |[full, quick]: [u64; 2]| if arguments.options.quick { quick } else { full };
@@ -404,7 +427,11 @@ fn compare(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let done = if arguments.alone { alone(&arguments).map(|()| true) } else { compare(&arguments) };
+    let done = match &arguments.answers {
+        Some(file) => write_answers(&arguments, file).map(|()| true),
+        None if arguments.alone => alone(&arguments).map(|()| true),
+        None => compare(&arguments),
+    };
     match done {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),

@@ -492,7 +492,7 @@ pub fn status(epoch: u64, config: &ServerConfig, sessions: usize, steps: u64) ->
 fn answer(call: impl CommandCall, answer: &Answer) {
     // An answer that is too long ends the call without one.
     if let Ok(bytes) = encode(answer) {
-        call.answer(&bytes);
+        call.send(&bytes);
     }
 }
 

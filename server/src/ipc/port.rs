@@ -69,7 +69,7 @@ pub trait CommandCall: Send + 'static {
     fn bytes(&self) -> &[u8];
 
     /// Sends the answer's bytes and ends the call.
-    fn answer(self, bytes: &[u8]);
+    fn send(self, bytes: &[u8]);
 }
 
 /// The way to wake the client of a session.

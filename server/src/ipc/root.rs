@@ -9,7 +9,7 @@ use rustix::fs::{FlockOperation, flock};
 use std::fs::{self, DirBuilder, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, OpenOptionsExt as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Where POSIX shared memory shows as files.
@@ -29,6 +29,11 @@ pub enum RootError {
         /// Its process, if it has said.
         who: String,
     },
+    /// Something else lies where a server has its folder.
+    #[error(
+        "{0} is no folder, and a server needs one there: remove it, or set XDG_RUNTIME_DIR to a folder of your own"
+    )]
+    NoFolder(PathBuf),
     /// The system failed.
     #[error("{what}: {reason}")]
     System {
@@ -51,11 +56,12 @@ impl Root {
     /// Takes the place of `address`.
     ///
     /// # Errors
-    /// Another server holds it; a folder is open to other users; the system fails.
+    /// Another server holds it; a folder is open to other users, or is none; the system fails.
     pub fn take(address: &Address) -> Result<Self, RootError> {
         for folder in [address.base(), &address.folder()] {
             match DirBuilder::new().mode(0o700).create(folder) {
                 Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(system(folder, e)),
+                Err(_) if !folder.is_dir() => return Err(RootError::NoFolder(folder.to_owned())),
                 _ => {}
             }
         }
@@ -172,6 +178,16 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::set_permissions(dir.path(), fs::Permissions::from_mode(0o700)).unwrap();
         dir
+    }
+
+    #[test]
+    fn a_file_where_the_folder_belongs_is_named() {
+        let dir = base();
+        let file = dir.path().join("file");
+        fs::write(&file, "kept").unwrap();
+        let refused = Root::take(&Address::under(&file, "one").unwrap()).unwrap_err().to_string();
+        assert!(refused.starts_with(&format!("{} is no folder", file.display())), "{refused}");
+        assert_eq!(fs::read_to_string(file).unwrap(), "kept");
     }
 
     #[test]

@@ -87,7 +87,7 @@ impl CommandCall for CommandInPlace {
         self.payload()
     }
 
-    fn answer(self, bytes: &[u8]) {
+    fn send(self, bytes: &[u8]) {
         let Ok(loan) = self.loan_slice_uninit(bytes.len()) else { return };
         let mut response = loan.write_from_slice(bytes);
         *response.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };

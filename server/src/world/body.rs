@@ -123,6 +123,13 @@ pub struct Body {
 }
 
 impl Body {
+    /// How far from the body's box, and from where its path length tells, those points may come at which f of the body is up to
+    /// half of `reach`: they lie outside of the box by `MeasuredModel::reach_of_level`, and where the body turns they go farther
+    /// than its own points do, by twice of that at most (the largest chord). A length.
+    pub(super) fn room(&self, reach: f64) -> f64 {
+        3.0 * self.part.reach_of_level(0.5 * reach)
+    }
+
     /// A body of group `group`.
     pub fn new(spec: ObjectSpec, group: u32) -> Self {
         let aabb = spec.part.aabb;

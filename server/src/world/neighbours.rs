@@ -14,7 +14,7 @@ use super::body::Body;
 use super::broad::BroadPhase;
 use super::coherence::PairCache;
 use super::plan::PairPlan;
-use crate::contact::SeparatingAxisTest;
+use crate::contact::{Hull, SeparatingAxisTest};
 use crate::math::Aabb;
 use contactd_proto::{Detect, Pose};
 use glam::DVec3;
@@ -48,6 +48,9 @@ pub struct PairHint {
     /// They met when they were last asked about.
     pub met: bool,
     plan_index: u32,
+    /// How much of a distance between their boxes, or along an axis, path lengths may not use up: where it is told of clear
+    /// pairs that they are near, f tells, and {f <= level} reaches out of boxes.
+    room: f64,
 }
 
 /// What else belongs to a pair.
@@ -99,6 +102,16 @@ pub struct Neighbours {
 /// The sum, rounded up.
 fn up(x: f64, y: f64) -> f64 {
     if y == 0.0 { x } else { (x + y).next_up() }
+}
+
+/// Room that a pair needs beside the distance of its boxes, which may stand `plan.reach()` apart without a look. Two convex
+/// primitives are near by their distance, others by f.
+fn room(bodies: [&Body; 2], plan: &PairPlan, touch: f64) -> f64 {
+    let is_whole = |body: &Body| body.hull.as_ref().is_some_and(Hull::is_whole);
+    if !plan.reports_nearness() || bodies.iter().all(|body| is_whole(body)) {
+        return 0.0;
+    }
+    bodies.iter().map(|body| body.room(touch)).sum::<f64>() - plan.reach()
 }
 
 /// Sorts pairs of numbers below `count`: by the first one through counting, and each of these few by the second.
@@ -231,12 +244,14 @@ impl Neighbours {
             }
             let Some((plan_index, plan, resolution)) = plan(a, b) else { continue };
             self.pairs.push(Near { a, b, limit: f64::NEG_INFINITY });
+            let touch = plan.reach().max(2.0 * resolution);
             self.sights.push(PairHint {
                 along: DVec3::ZERO,
-                touch: plan.reach().max(2.0 * resolution),
+                touch,
                 discrete: plan.detect == Detect::Discrete,
                 met: false,
                 plan_index,
+                room: room([a, b].map(|i| &bodies[i as usize]), &plan, touch),
             });
             self.entries.push(Entry { resolution, pair_cache: None });
         }
@@ -337,6 +352,7 @@ impl Neighbours {
     /// Notes that a pair is `clearance` farther apart than its touching distance at the start of this step.
     #[inline]
     pub fn note(&mut self, pair: usize, clearance: f64) {
+        let clearance = clearance - self.sights[pair].room;
         let near = &mut self.pairs[pair];
         let sum = self.path_lengths[near.a as usize].start + self.path_lengths[near.b as usize].start;
         // More than the roundings of both sums, of this product and of the sum that it is compared with.

@@ -45,8 +45,9 @@ impl Roster {
         2.0 * self.resolution.unwrap_or(body.part.resolution)
     }
 
-    /// The same, and its share of the largest margin of its group: how far its neighbours reach.
+    /// The same, and how far what is told of clear pairs of its group reaches: how far its neighbours do.
     pub fn reach(&self, body: &Body) -> f64 {
-        self.touch(body) + 0.5 * self.plans.margin_of(body.group)
+        let touch = self.touch(body);
+        touch + self.plans.nearness_of(body.group).map_or(0.0, |reach| body.room(reach.max(touch)))
     }
 }

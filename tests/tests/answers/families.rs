@@ -280,14 +280,26 @@ fn contacts_at_the_start_are_told_at_a_common_point() {
 /// Between like faces the multipliers of a touch may hardly miss their balance far from where they have it: at the mouth
 /// of a socket the edge holds the ball with next to no weight, and a touch on the walls alone is told of other normals.
 /// A cone's tip is no touch where it is pressed from within; and what a climb follows at a depth another face of the same
-/// body may be ahead of where the surfaces meet.
+/// body may be ahead of where the surfaces meet. Where a slender tip is told, the faces of the other body are told that pass
+/// as near as it does.
 #[test]
 fn touches_are_balanced_and_of_the_faces_ahead() {
-    for (family, index) in [(6, 4242), (7, 19373), (2, 14256)] {
+    for (family, index) in [(6, 4242), (7, 19373), (2, 14256), (7, 17903), (9, 19685)] {
         let verdict = examine(&scene(1, family, index), 0, Effort::Quick);
         assert_eq!(verdict.status, Some(Status::Contact));
         assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[family], verdict.faults);
     }
+}
+
+/// A wall that is hardly thicker than the resolution is pierced along a rim: nowhere in it is anything deeper, so that the way
+/// back to the touch leads along the wall, down to where the rim came first.
+#[test]
+fn what_has_pierced_a_thin_wall_is_followed_back_to_where_it_came_through_first() {
+    let scene = scene(1, 11, 12027);
+    let answer = ask(&scene, 0).expect("an answer");
+    let o = &answer.pair.outcome;
+    assert_eq!(judge(&scene, o, Effort::Quick, || answer.witness()), []);
+    assert!(!o.not_continued() && o.time() - o.time_lower() < 1e-8, "{o:?}");
 }
 
 /// A body that starts one resolution deep and sinks to just two of them. Rounding leaves open whether that is twice the

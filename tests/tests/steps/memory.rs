@@ -588,3 +588,69 @@ fn a_small_margin_is_entered_by_boxes_as_by_others() {
         }
     }
 }
+
+/// Bodies with sharp edges and tips that hover where a margin begins: {f <= level} reaches out of their boxes there, so that neither
+/// boxes nor directions nor ways that were gone may show apart what a new session tells as within.
+#[test]
+fn what_hovers_at_a_margin_by_its_sharp_edges_is_told_as_by_a_new_session() {
+    let options = StepOptions { clear: true, cell_limit: 20_000, ..StepOptions::default() };
+    // A needle with a hole; f of its tip is as low as the margin a long way out of it.
+    let needle = |r: &mut Random, half_angle: f64| {
+        let height = r.within(0.2, 0.6);
+        Recipe::cone(2.0 * height * half_angle.tan(), 0.0, height).minus(Recipe::sphere(0.2 * height * half_angle))
+    };
+    let found: Vec<[usize; 3]> = (0..hovering())
+        .into_par_iter()
+        .map(|seed| {
+            let mut r = Random::new(920_000 + seed);
+            let half_angle = r.within(0.02, 0.2);
+            let margin = r.within(0.005, 0.06);
+            let far = 0.5 * margin / half_angle.sin();
+            let other = match r.below(3) {
+                0 => needle(&mut r, half_angle),
+                1 => Recipe::platonic(4, r.within(0.1, 0.4)).minus(Recipe::sphere(0.05)),
+                _ => Recipe::cuboid(0.3, 0.1, 0.2).minus(Recipe::cylinder(0.05, 1.0)),
+            };
+            let parts = [part(&needle(&mut r, half_angle)), part(&other)];
+            let turned = r.rotation();
+            let reach = parts.each_ref().map(|part| part.model.radius);
+            let away = turned * DVec3::Z * (reach[0] + r.within(0.3, 1.5) * far + r.within(0.0, 1.0) * reach[1]);
+            let mut poses = [Pose::new(DVec3::ZERO, turned), Pose::new(away + r.vector(0.3 * reach[1]), r.rotation())];
+            let mut warm = two([&parts[0], &parts[1]], poses, margin);
+            let mut seen = [0; 3];
+            for step in 0..8 {
+                let pace = 10f64.powf(r.within(-3.0, -0.3));
+                let ends = poses.map(|pose| {
+                    let to = pose.position + r.vector(0.1 * margin * pace);
+                    contactd_proto::Motion::turning(pose, to, r.vector(pace)).at(1.0)
+                });
+                let records = [PoseRecord::end(1, &ends[0]), PoseRecord::end(2, &ends[1])];
+                let mut cold = two([&parts[0], &parts[1]], poses, margin);
+                cold.restore(&[1, 2].map(|id| (id, MotionState::resting(poses[id as usize - 1]))))
+                    .expect("motion states");
+                cold.step(&records, &options).expect("a step");
+                warm.step(&records, &options).expect("a step");
+                let [mine, other] = [&warm, &cold].map(reported);
+                assert!(same(&mine, &other), "seed {seed}, step {step}: {}", differing(&mine, &other));
+                let outcome = cold.outcome().pairs[0].outcome;
+                seen[0] += usize::from(outcome.status() == Status::Clear && outcome.margin_time < 1.0);
+                seen[1] += usize::from(outcome.margin_time == 1.0);
+                seen[2] += usize::from(warm.outcome().searched == warm.outcome().known);
+                poses = [1, 2].map(|id| warm.body(id).expect("a body").motion_state.end);
+            }
+            seen
+        })
+        .collect();
+    let [within, outside, known] = [0, 1, 2].map(|k| found.iter().map(|seen| seen[k]).sum::<usize>());
+    println!("{within} steps within the margin, {outside} out of it, {known} without a search");
+    let steps = 8 * hovering() as usize;
+    assert!(
+        within * 10 > steps && outside * 10 > steps && known * 10 > steps,
+        "{within}, {outside}, {known} of {steps}"
+    );
+}
+
+/// Pairs that hover: as many steps as of the random plays, in plays of 8.
+fn hovering() -> u64 {
+    steps() as u64 / 8
+}

@@ -129,6 +129,11 @@ impl Hull {
         self.around.as_ref().or_else(|| model.solid.whole().map(|p| &p.shape))
     }
 
+    /// True when it is the body itself, of which distances are told.
+    pub fn is_whole(&self) -> bool {
+        self.level == f64::INFINITY
+    }
+
     /// True when it holds all points at which f of the body is up to half of `touch`.
     pub fn holds(&self, touch: f64) -> bool {
         0.5 * touch <= self.level

@@ -41,16 +41,37 @@ impl<'t, 'a> Features<'t, 'a> {
         let Some(tolerance) = tolerance else {
             return Self { task, x, at, tolerance: 0.0, active: Default::default() };
         };
-        let active = [(Side::A, x), (Side::B, at.b_point(x))].map(|(side, y)| {
-            let (model, mut open) = (if side == Side::A { task.model_a } else { task.model_b }, Vec::new());
-            if model.literals_at(y, tolerance, &mut open) != Truth::Open {
-                return Literals::new();
+        let mut spot = Self { task, x, at, tolerance, active: Default::default() };
+        spot.active = [Side::A, Side::B].map(|side| spot.active_within(side, tolerance));
+        // Where the apex of a slender cone is told the faces of the other body are told that pass as near as it does.
+        for (side, other) in [(Side::A, Side::B), (Side::B, Side::A)] {
+            let off = spot.off_apexes(side);
+            if off > tolerance && !spot.active[other as usize].is_empty() {
+                spot.active[other as usize] = spot.active_within(other, off);
             }
-            let face = |id: LiteralId| &model.solid.faces[id.face() as usize];
-            let is_apex = |id| face(id).apex().is_some_and(|apex| passes(&apex, y, tolerance));
-            dependence::active(&open, |id| normal(face(id), id, y), local::literals(&open).any(is_apex))
+        }
+        spot
+    }
+
+    /// The active faces of one side among those within `tolerance` of the point.
+    fn active_within(&self, side: Side, tolerance: f64) -> Literals {
+        let (task, y) = (self.task, if side == Side::A { self.x } else { self.at.b_point(self.x) });
+        let (model, mut open) = (if side == Side::A { task.model_a } else { task.model_b }, Vec::new());
+        if model.literals_at(y, tolerance, &mut open) != Truth::Open {
+            return Literals::new();
+        }
+        let face = |id: LiteralId| &model.solid.faces[id.face() as usize];
+        let is_apex = |id| face(id).apex().is_some_and(|apex| passes(&apex, y, tolerance));
+        dependence::active(&open, |id| normal(face(id), id, y), local::literals(&open).any(is_apex))
+    }
+
+    /// How far the farthest apex lies that counts as passing through the point; 0 without one.
+    fn off_apexes(&self, side: Side) -> f64 {
+        let apexes = self.active[side as usize].iter().filter_map(|id| {
+            let (face, y) = self.face(side, *id);
+            face.apex().filter(|apex| self.is_at(apex, y)).map(|apex| (y - apex.point).length())
         });
-        Self { task, x, at, tolerance, active }
+        apexes.fold(0.0, f64::max)
     }
 
     fn face(&self, side: Side, id: LiteralId) -> (&'a Face, DVec3) {

@@ -6,6 +6,7 @@
 //! a crescent between two like faces, whose equations are singular. Where no depth is left the surfaces touch, or the
 //! step starts.
 
+use super::features::Features;
 use super::newton::{Constraint, HELD, MAX_ACTIVE};
 use crate::contact::exclusion::fit;
 use crate::contact::exclusion::literal::Side;
@@ -28,6 +29,18 @@ const BESIDE: f64 = 64.0;
 
 /// How much further each look back goes.
 const FURTHER: f64 = 4.0;
+
+/// The first step along a wall, a part of the pair's scale; corrections of a step where the wall is curved; how much deeper a step
+/// of its length must lead, and how near to the middle of the wall it must end, in parts of the wall's depth.
+const AHEAD: f64 = 0.1;
+const BENDS: usize = 3;
+const DEEPER: f64 = 1e-3;
+const MIDDLE: f64 = 0.9;
+
+/// The faces of a wall pass a point in its middle by no more than this many times its depth, and their normals miss each other by no
+/// more than this.
+const THICK: f64 = 1.0 + 1e-3;
+const OPPOSITE: f64 = 1e-6;
 
 /// Halvings of the time at which a held point leaves.
 const HALVINGS: usize = 12;
@@ -156,17 +169,22 @@ impl<'t, 'a> Climber<'t, 'a> {
         solve: impl Fn(f64, &depth::Held) -> Option<T>,
     ) -> Option<Result<T, (f64, depth::Held)>> {
         let least = ON_SURFACE * self.task.rounding;
-        let mut last: Option<(f64, DVec3)> = None;
+        let mut last = None;
         for _ in 0..RETREATS {
             let found = self.deepest_beside(t, x, depth);
+            let found = self.wall_of(t, &found).map_or_else(|| found.clone(), |wall| self.along(t, wall, &found));
             if let Some(solved) = solve(t, &found) {
                 return Some(Ok(solved));
             }
             if t == 0.0 || found.1 <= least {
                 return (found.1 >= -least).then_some(Err((t, found)));
             }
-            let drift = last.map_or(DVec3::ZERO, |(later, there)| (there - found.0) / (later - t));
-            last = Some((t, found.0));
+            // How it moves in the frames of both.
+            let in_b = self.task.relative.at(t).b_point(found.0);
+            let drift = last.map_or([DVec3::ZERO; 2], |(later, there): (f64, [DVec3; 2])| {
+                [there[0] - found.0, there[1] - in_b].map(|way| way / (later - t))
+            });
+            last = Some((t, [found.0, in_b]));
             let (since, there) = self.common_since((t, found.0), found.1, drift);
             if since >= t || self.is_spent() {
                 return None;
@@ -176,15 +194,68 @@ impl<'t, 'a> Climber<'t, 'a> {
         None
     }
 
+    /// The side that has a wall about a point: two faces that oppose each other, each no farther than the point is deep.
+    fn wall_of(&self, t: f64, (x, depth, _): &depth::Held) -> Option<Side> {
+        let at = self.task.relative.at(t);
+        let features = Features::at(self.task, *x, &at, (*depth > 0.0).then_some(depth * THICK));
+        [Side::A, Side::B].into_iter().find(|side| {
+            let normals: Vec<DVec3> =
+                features.active[*side as usize].iter().map(|id| features.gradient(*side, *id)).collect();
+            normals.iter().enumerate().any(|(k, n)| normals[..k].iter().any(|m| (*m + *n).length() <= OPPOSITE))
+        })
+    }
+
+    /// From a point of a wall of one body to one that is deeper in the other, along the middle of the wall: down the other's
+    /// gradient or between the last two faces of it, by steps that are doubled where they lead on and halved where they do
+    /// not. Beside the rim of what is pierced the way back would be as short as the wall is thin.
+    fn along(&self, t: f64, wall: Side, (x, depth, support): &depth::Held) -> depth::Held {
+        let at = self.task.relative.at(t);
+        let deciding = |side: Side, x: DVec3| {
+            let (model, y) = if side == Side::A { (self.task.model_a, x) } else { (self.task.model_b, at.b_point(x)) };
+            let (value, id) = model.deciding(y);
+            let n = model.solid.faces[id.face() as usize].unit_normal(y);
+            let n = if id.sense() == Sense::Positive { n } else { -n };
+            (value, if side == Side::A { n } else { at.a_vector(n) })
+        };
+        let other = if wall == Side::A { Side::B } else { Side::A };
+        let (mut x, mut way) = (*x, AHEAD * self.task.scale);
+        let (mut value, mut down) = deciding(other, x);
+        let mut beside = down;
+        while way > *depth && !self.is_spent() {
+            self.work.look(self.task.a.faces.len() + self.task.b.faces.len());
+            let across = deciding(wall, x).1;
+            let [p, q] = [down, beside].map(|n| n - across * n.dot(across));
+            // The shortest vector between both leads down along their edge.
+            let part = (p.dot(p - q) / (p - q).length_squared()).clamp(0.0, 1.0);
+            let Some(along) = (if part > 0.0 { p.lerp(q, part) } else { p }).try_normalize() else { break };
+            let mut next = x - along * way;
+            // A wall may be curved.
+            for _ in 0..BENDS {
+                let (v, n) = deciding(wall, next);
+                next -= n * (v + depth);
+            }
+            let (v, n) = deciding(other, next);
+            if v < value - DEEPER * way && deciding(wall, next).0 <= -MIDDLE * depth {
+                (x, value, down, way) = (next, v, n, (2.0 * way).min(self.task.scale));
+            } else {
+                // Another face is ahead there.
+                (beside, way) = (n, 0.5 * way);
+            }
+        }
+        (x, -separation::value(self.task, &at, x), support.clone())
+    }
+
     /// Since when a common point of some depth is common to both, as far as a look back goes, and where it was then:
-    /// held in either body, or drifting as the deepest point did, which along a wall or between like faces goes far.
-    fn common_since(&self, (t, x): (f64, DVec3), depth: f64, drift: DVec3) -> (f64, DVec3) {
+    /// held in either body, or drifting there as the deepest point did, which along a wall or between like faces goes far.
+    fn common_since(&self, (t, x): (f64, DVec3), depth: f64, drift: [DVec3; 2]) -> (f64, DVec3) {
         let relative = &self.task.relative;
         let in_b = relative.at(t).b_point(x);
         let speed = relative.bounds(0.0, t, x.length()).speed;
         let first = (0.5 * depth / speed.max(f64::MIN_POSITIVE)).max(f64::EPSILON * t);
-        let ways: [&dyn Fn(f64, &Instant) -> DVec3; 3] =
-            [&|_, _| x, &|_, at| at.a_point(in_b), &|s, _| x + drift * (s - t)];
+        let ways: [&dyn Fn(f64, &Instant) -> DVec3; 4] =
+            [&|_, _| x, &|_, at| at.a_point(in_b), &|s, _| x + drift[0] * (s - t), &|s, at| {
+                at.a_point(in_b + drift[1] * (s - t))
+            }];
         let mut earliest = (t, x);
         for way_of in ways {
             // Where it is at a time, if that is in both.

@@ -55,7 +55,7 @@ impl CommandCall for Order {
         &self.bytes
     }
 
-    fn answer(self, bytes: &[u8]) {
+    fn send(self, bytes: &[u8]) {
         let _ = self.to.send(bytes.to_vec());
     }
 }
