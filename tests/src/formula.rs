@@ -18,7 +18,7 @@ pub fn formula_of(p: &Primitive) -> Formula {
     let Some(formula) = p.shape.formula() else {
         return Formula::And((0..p.faces.len() as u32).map(|f| Formula::One(f, false)).collect());
     };
-    read(formula.tokens()).0
+    read(&formula.tokens()).0
 }
 
 /// The first expression of some tokens, and how many it takes.

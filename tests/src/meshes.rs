@@ -16,6 +16,14 @@ pub fn solid((points, triangles): &Mesh) -> TriangleMesh {
     TriangleMesh::new(points, triangles).expect("a closed mesh").0
 }
 
+/// The same with a formula that is divided, as that of a large mesh is: written out where somebody looks.
+///
+/// # Panics
+/// Where it is none.
+pub fn divided((points, triangles): &Mesh) -> TriangleMesh {
+    TriangleMesh::divided_from(0, points, triangles).expect("a closed mesh").0
+}
+
 /// A torus about z in `n` times `m` quadrangles, its corners on the exact one.
 pub fn torus((major, minor): (f64, f64), n: u32, m: u32) -> Mesh {
     let at = |i: u32| {

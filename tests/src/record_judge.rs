@@ -194,7 +194,7 @@ impl<'a> Side<'a> {
     fn is_copy(&self, i: usize, k: usize) -> bool {
         let (a, b) = (&self.literals[i], &self.literals[k]);
         let faces = |l: &Literal| &self.moving.solid.primitives[l.owner as usize].faces;
-        a.sign == b.sign && a.face == b.face && faces(a) == faces(b)
+        a.sign == b.sign && a.face == b.face && faces(a).iter().eq(faces(b).iter())
     }
 
     fn is_apex(&self, i: usize, x: DVec3, tau: f64) -> bool {

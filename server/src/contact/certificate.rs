@@ -319,7 +319,8 @@ impl<'a> Maker<'a> {
             }
             let (mut used, view) = (Vec::new(), self.at(open.t, self.end - open.t, center, half));
             let view = view.view();
-            let truth = falsify(tokens, &mut kept[out], &mut used, &mut |id| view.truth(side, id));
+            let solid = if side == Side::A { self.task.a } else { self.task.b };
+            let truth = falsify_opened(solid, tokens, &mut kept[out], &mut used, &mut |id| view.truth(side, id));
             // B's points of tangency are those at the beginning.
             let center = if side == Side::A { center } else { view.center_b };
             let point = |id: LiteralId| self.task.touched((side, id), center);
@@ -393,7 +394,7 @@ impl<'a> Maker<'a> {
         let view = placed.view();
         let started = open.t > 0.0 || open.started;
         let (mut b, mut used) = (Vec::new(), Vec::new());
-        let truth = falsify(&open.b, &mut b, &mut used, &mut |id| view.truth(Side::B, id));
+        let truth = falsify_opened(self.task.b, &open.b, &mut b, &mut used, &mut |id| view.truth(Side::B, id));
         let singles: Vec<Vec<Term>> = used
             .iter()
             .map(|id| {
@@ -417,13 +418,15 @@ impl<'a> Maker<'a> {
             record.clear();
         }
         let found = enumeration::advance(&view, &pair, self.hints, self.task.rounding, 0.0, self.scratch);
+        // What parts hold that are not written out is in smaller cells, whatever the bound is short of.
+        let cost = if pool.iter().any(|t| local::is_part(*t)) { DVec3::ZERO } else { found.cost };
         if found.dt < 0.0 {
-            return (h, None, 0.0, found.cost);
+            return (h, None, 0.0, cost);
         }
         let gain = found.cost.element_sum().min(radius);
         let enough = found.dt >= h || found.dt * placed.motion.speed >= 0.25 * gain || found.dt >= 0.25 * end;
         if !enough {
-            return (h, None, 0.0, found.cost);
+            return (h, None, 0.0, cost);
         }
         let dt = if found.dt >= h { h } else { found.dt * HASTE };
         let proofs: &[Proof] = self.scratch.record.as_deref().unwrap_or_default();
@@ -435,7 +438,7 @@ impl<'a> Maker<'a> {
             };
             close.push(proof.until(dt).iter().map(touched).collect());
         }
-        (h, Some(thinned(close, &open.a, &open.b)), dt, found.cost)
+        (h, Some(thinned(close, &open.a, &open.b)), dt, cost)
     }
 
     fn at(&self, t: f64, h: f64, center: DVec3, half: DVec3) -> PlacedTree<'a> {
@@ -473,6 +476,10 @@ fn falsify(
     classify: &mut dyn FnMut(LiteralId) -> Truth,
 ) -> Truth {
     let (kind, body) = match local::first(tokens).0 {
+        Expression::Part(id) => {
+            out.push(local::part_token(id));
+            return Truth::Open;
+        }
         Expression::Literal(id) => {
             let truth = classify(id);
             match truth {
@@ -497,6 +504,25 @@ fn falsify(
         }
         truth
     })
+}
+
+/// The same, with the parts of large meshes written out where few are left.
+fn falsify_opened(
+    solid: &Solid,
+    tokens: &[Token],
+    out: &mut Vec<Token>,
+    used: &mut Vec<LiteralId>,
+    classify: &mut dyn FnMut(LiteralId) -> Truth,
+) -> Truth {
+    let truth = falsify(tokens, out, used, classify);
+    if truth != Truth::Open || !solid.has_few_parts(out) {
+        return truth;
+    }
+    let mut written = Vec::new();
+    match solid.written_out(&std::mem::take(out), &mut written) {
+        Truth::Open => falsify(&written, out, used, classify),
+        known => known,
+    }
 }
 
 /// The operands in the body of an operator, heads included.
@@ -546,6 +572,7 @@ impl<'a> Closing<'a> {
         for item in items(tokens) {
             match local::first(item).0 {
                 Expression::Literal(id) => self.literals.push((side, id)),
+                Expression::Part(_) => {}
                 Expression::And(body) => self.take(side, body),
                 Expression::Or(body) => self.ors.push((side, body)),
             }

@@ -139,9 +139,9 @@ impl Default for Limits {
             nodes: 1_000_000,
             // The deepest of several hundred real files has 23 levels. Trees are walked by recursion on higher floors.
             depth: 1_000,
-            faces: 1_000_000,
+            faces: 2_000_000,
             polyhedron_faces: 5_000,
-            mesh_facets: 200_000,
+            mesh_facets: 1_000_000,
             values: 1_000_000,
         }
     }

@@ -49,7 +49,7 @@ pub fn read(bytes: &[u8], (center, invert): (bool, bool), limits: &Limits) -> Re
         mesh.points.push(at(row as f64 - 0.5, column as f64 - 0.5, mean));
         for i in 0..4 {
             let [a, b] = [ring[i], ring[(i + 1) % 4]];
-            mesh.faces.push(vec![corner(a.0, a.1), corner(b.0, b.1), middle]);
+            mesh.append(&[corner(a.0, a.1), corner(b.0, b.1), middle]);
         }
     }
     // Once around, counter-clockwise as seen from above.
@@ -63,9 +63,9 @@ pub fn read(bytes: &[u8], (center, invert): (bool, bool), limits: &Limits) -> Re
     for (i, (row, column)) in rim.iter().enumerate() {
         let j = (i + 1) % count;
         let next = rim[j];
-        mesh.faces.push(vec![first + i as u32, first + j as u32, corner(next.0, next.1), corner(*row, *column)]);
+        mesh.append(&[first + i as u32, first + j as u32, corner(next.0, next.1), corner(*row, *column)]);
     }
-    mesh.faces.push((first..first + count as u32).rev().collect());
+    mesh.append(&(first..first + count as u32).rev().collect::<Vec<u32>>());
     Ok(mesh)
 }
 
@@ -152,7 +152,7 @@ mod tests {
         at: &dyn Fn(usize, usize) -> f64,
     ) {
         let mesh = read(bytes, (center, invert), &Limits::default()).expect("a surface");
-        let (shape, _) = TriangleMesh::of_polygons(&mesh.points, &mesh.faces).expect("closed");
+        let (shape, _) = TriangleMesh::of_polygons(&mesh.points, mesh.faces()).expect("closed");
         let mut builder = SolidBuilder::new();
         let label = Label { name: "surface".into(), line: 1, column: 1, mirrored: false };
         let root = builder.primitive(shape, contactd_proto::Pose::IDENTITY, label);
@@ -209,7 +209,7 @@ mod tests {
     fn what_is_no_surface_is_refused_and_one_without_a_square_is_empty() {
         let of = |bytes: &[u8]| read(bytes, (false, false), &Limits { mesh_facets: 100, ..Limits::default() });
         for flat in ["", "# none", "1 2 3", "1\n2\n3"] {
-            assert!(of(flat.as_bytes()).expect("empty").faces.is_empty(), "{flat}");
+            assert!(of(flat.as_bytes()).expect("empty").is_empty(), "{flat}");
         }
         let (at, problem) = of(b"1 2\n3 x4\n").expect_err("no number");
         assert_eq!(format!("{at}: {problem}"), "2:3: expected a finite number, found \"x4\"");

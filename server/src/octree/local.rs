@@ -254,7 +254,7 @@ fn merge_refs(op: Op, a: NodeKind, b: NodeKind, kind: NodeKind, refs: &mut Vec<u
 /// at the head of `terms`; the box lies in the voxel of the local tree, and `delta` (a length) within its margin.
 pub fn write_literals(solid: &Solid, terms: &[Term], region: &Aabb, delta: f64, out: &mut Vec<Token>) -> Truth {
     let (c, e) = (region.center(), region.half());
-    write(solid, terms, Sense::Positive, out, &mut |id| {
+    opened(solid, terms, out, &mut |id| {
         // Those bounds lie outward of their rounding.
         truth_of(id.sense(), face_span(&solid.faces[id.face() as usize], c, e), delta, 0.0)
     })
@@ -264,7 +264,19 @@ pub fn write_literals(solid: &Solid, terms: &[Term], region: &Aabb, delta: f64, 
 /// being open, for the local tree at the head of `terms`; the point lies in the voxel of the local tree, and the tolerance
 /// within its margin.
 pub fn write_literals_at(solid: &Solid, terms: &[Term], x: DVec3, tolerance: f64, out: &mut Vec<Token>) -> Truth {
-    write(solid, terms, Sense::Positive, out, &mut |id| truth_at(solid, id, x, tolerance))
+    opened(solid, terms, out, &mut |id| truth_at(solid, id, x, tolerance))
+}
+
+/// The expression of a local tree, few parts of large meshes written out (`Solid::prune`).
+fn opened(solid: &Solid, terms: &[Term], out: &mut Vec<Token>, truth: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+    if !solid.has_parts {
+        return write(solid, terms, Sense::Positive, out, truth);
+    }
+    let mut left = Vec::new();
+    match write(solid, terms, Sense::Positive, &mut left, truth) {
+        Truth::Open => solid.prune(&left, out, truth),
+        known => known,
+    }
 }
 
 /// Truth of a literal at depth 0 at a point, its value there known to `tolerance`.

@@ -94,7 +94,7 @@ impl Model {
 
     /// A model of its parts; the rest follows from them.
     fn of_parts(solid: Solid, bounds: SBounds, octree: Eco, radius: f64) -> Self {
-        let face_reach = solid.faces.iter().map(Face::reach).fold(0.0, f64::max);
+        let face_reach = solid.faces.reach();
         let aabb = bounds.root().aabb;
         let extents = if aabb.is_empty() {
             [0.0; 2]
@@ -106,11 +106,11 @@ impl Model {
             _ => None,
         };
         let hollow = solid.senses.contains(&Sense::Negative);
-        let radius_of = |(face, owner): (&Face, &u32)| {
-            let subtracted = solid.senses[*owner as usize] == Sense::Negative;
+        let radius_of = |(i, face): (usize, &Face)| {
+            let subtracted = solid.senses[solid.face_owner[i] as usize] == Sense::Negative;
             face.radius().filter(|_| subtracted).unwrap_or(f64::INFINITY)
         };
-        let narrowest = solid.faces.iter().zip(&solid.face_owner).map(radius_of).fold(f64::INFINITY, f64::min);
+        let narrowest = solid.faces.kept().map(radius_of).fold(f64::INFINITY, f64::min);
         let parts = Parts::of(&solid);
         let revolution = Revolution::of(&solid, radius);
         let wide = OnceLock::new();
@@ -175,7 +175,7 @@ impl Model {
     pub fn literals_at(&self, x: DVec3, tolerance: f64, out: &mut Vec<Token>) -> Truth {
         if !self.keeps(tolerance) {
             let mut truth = |id: LiteralId| local::truth_at(&self.solid, id, x, tolerance);
-            return solid::local::prune(&self.solid.normal_form, out, &mut truth);
+            return self.solid.prune(&self.solid.normal_form, out, &mut truth);
         }
         match self.voxel(x) {
             Some(node) if node.kind() == NodeKind::Full => Truth::True,
@@ -195,10 +195,13 @@ impl Model {
     pub fn deciding(&self, x: DVec3) -> (f64, LiteralId) {
         let mut psi = |face: u32| self.solid.faces[face as usize].value(x);
         let (mut near, tolerance) = (Vec::new(), 0.25 * self.margin());
-        if self.keeps(tolerance) && self.literals_at(x, tolerance, &mut near) == Truth::Open {
-            return solid::local::deciding(&near, &mut psi);
+        if self.keeps(tolerance)
+            && self.literals_at(x, tolerance, &mut near) == Truth::Open
+            && let Some(found) = solid::local::decided(&near, &mut psi)
+        {
+            return found;
         }
-        solid::local::deciding(&self.solid.normal_form, &mut psi)
+        self.solid.deciding(x)
     }
 
     /// True when the octree is asked for f up to `level` (a length of either sign). Half the margin is left to rounding.

@@ -20,12 +20,23 @@ use glam::DVec3;
 /// (lower, upper) bound of psi of the primitive over the box center ± half.
 pub fn primitive_span(p: &Primitive, center: DVec3, half: DVec3) -> (f64, f64) {
     if let Some(formula) = p.shape.formula() {
-        return formula.span(&mut |f| face_span(&p.faces[f as usize], center, half));
+        // Of a large mesh the division is asked, in its own frame.
+        let own = if formula.is_divided() { own_box(p, center, half) } else { (center, half, 0.0) };
+        return formula.span(own, &mut |f| face_span(&p.faces[f as usize], center, half));
     }
-    p.faces.iter().fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |(lo, hi), f| {
+    p.faces.listed().iter().fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |(lo, hi), f| {
         let (l, h) = face_span(f, center, half);
         (lo.max(l), hi.max(h))
     })
+}
+
+/// A box in the frame of a primitive around the box center ± half, and what the rounding of faces may be there, a length.
+fn own_box(p: &Primitive, center: DVec3, half: DVec3) -> (DVec3, DVec3, f64) {
+    let turn = p.frame.matrix().transpose();
+    let own = turn * (center - p.frame.position);
+    let reach = center.abs().max_element() + half.max_element() + p.frame.position.abs().max_element();
+    let abs = |v: DVec3| DVec3::new(turn.row(0).abs().dot(v), turn.row(1).abs().dot(v), turn.row(2).abs().dot(v));
+    (own, abs(half), (reach + p.faces.reach()) * (4.0 * OUTWARD))
 }
 
 /// (lower, upper) bound of a face's psi over the box center ± half.

@@ -225,13 +225,18 @@ impl<'a> Pieces<'a> {
             }
         };
         let truth = match around {
-            Some(tokens) => local::prune(tokens, &mut left, &mut known),
-            None => primitive.expression(Sense::Positive, &mut left, &mut known),
+            Some(tokens) => primitive.prune(tokens, &mut left, &mut known),
+            None => primitive.pruned(Sense::Positive, &mut left, &mut known),
         };
         match truth {
             Truth::True => self.turns(from, None, true),
             Truth::False => self.turns(from, None, false),
-            Truth::Open if left.len() <= FEW_TOKENS || to - from <= self.shortest => self.crossings(&left, from, to),
+            Truth::Open
+                if left.len() <= FEW_TOKENS && !left.iter().any(|t| local::is_part(*t))
+                    || to - from <= self.shortest =>
+            {
+                self.crossings(&left, from, to)
+            }
             Truth::Open => {
                 let middle = 0.5 * (from + to);
                 self.piece(from, middle, Some(&left));
@@ -285,9 +290,18 @@ impl<'a> Pieces<'a> {
     fn nearest(&self, at: f64) -> u32 {
         let x = self.ray.at(at);
         let mut tokens = Vec::new();
-        self.primitive.expression(Sense::Positive, &mut tokens, &mut |_| Truth::Open);
         let psi = |f: u32| self.primitive.faces[(f - self.primitive.first_face) as usize].value(x);
-        local::deciding(&tokens, &mut |f| psi(f)).1.face()
+        // Of a large mesh what passes next to the point.
+        let close = self.shortest.max(THIN * x.abs().max_element());
+        let mut near = |id: LiteralId| match self.primitive.shape.formula() {
+            Some(formula) if formula.is_divided() => {
+                local::truth_of(id.sense(), (psi(id.face()), psi(id.face())), 0.0, close)
+            }
+            _ => Truth::Open,
+        };
+        self.primitive.pruned(Sense::Positive, &mut tokens, &mut near);
+        let decided = if tokens.is_empty() { None } else { local::decided(&tokens, &mut |f| psi(f)) };
+        decided.map_or(self.primitive.first_face, |d| d.1.face())
     }
 }
 
@@ -406,7 +420,8 @@ mod tests {
             [0.0, 1.0].iter().flat_map(|z| outline.iter().map(move |(x, y)| DVec3::new(*x, *y, *z))).collect();
         let mut faces: Vec<Vec<u32>> = vec![(0..6).rev().collect(), (6..12).collect()];
         faces.extend((0..6).map(|i| vec![i, (i + 1) % 6, 6 + (i + 1) % 6, 6 + i]));
-        let (mesh, _) = crate::solid::primitive::TriangleMesh::of_polygons(&points, &faces).expect("a closed mesh");
+        let (mesh, _) = crate::solid::primitive::TriangleMesh::of_polygons(&points, faces.iter().map(Vec::as_slice))
+            .expect("a closed mesh");
         let tilt = glam::DQuat::from_xyzw(0.1, 0.5, -0.3, 0.8).normalize();
         let pose = |at: DVec3| Pose::new(tilt * at, tilt);
         let mut b = SolidBuilder::new();

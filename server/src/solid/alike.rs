@@ -14,7 +14,7 @@
 
 use super::local::{self, Expression, LiteralId, Token, Truth};
 use super::surface::NUMBERS;
-use super::{Face, Sense};
+use super::{Face, Faces, Sense};
 use crate::math::Aabb;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -96,14 +96,18 @@ pub struct Alike {
 }
 
 impl Alike {
-    /// Compares the faces of a solid within its box; `senses` are those of the faces.
-    pub fn of(faces: &[Face], senses: impl Fn(u32) -> Sense, aabb: &Aabb) -> Self {
+    /// Compares the faces of a solid within its box; `senses` are those of the faces. The planes of large meshes are not compared:
+    /// what they share with other faces has no volume either way.
+    pub fn of(faces: &Faces, senses: impl Fn(u32) -> Sense, aabb: &Aabb) -> Self {
         let ball = Ball::round(aabb);
-        let mut first: Vec<u32> = (0..faces.len() as u32).collect();
-        let mut seen: HashMap<(u32, [u64; NUMBERS]), u32> = HashMap::with_capacity(faces.len());
-        let mut distinct = Vec::with_capacity(faces.len());
+        let kept = faces.kept().count();
+        // Faces that stand for others are kept: beyond the last of those each stands for itself.
+        let numbers = faces.kept().last().map_or(0, |(i, _)| i + 1) as u32;
+        let mut first: Vec<u32> = (0..numbers).collect();
+        let mut seen: HashMap<(u32, [u64; NUMBERS]), u32> = HashMap::with_capacity(kept);
+        let mut distinct = Vec::with_capacity(kept);
         let mut any = false;
-        for (i, face) in faces.iter().enumerate() {
+        for (i, face) in faces.kept() {
             match seen.entry(bits(face)) {
                 std::collections::hash_map::Entry::Occupied(e) => (first[i], any) = (*e.get(), true),
                 std::collections::hash_map::Entry::Vacant(e) => {
@@ -118,7 +122,7 @@ impl Alike {
             let mut keys: Vec<_> = distinct.iter().map(|f| (key(&faces[*f as usize], &ball), *f)).collect();
             keys.sort_unstable_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)).then(a.1.cmp(&b.1)));
             let size = ball.center.length() + ball.radius;
-            let mut stands_for: Vec<u32> = (0..faces.len() as u32).collect();
+            let mut stands_for: Vec<u32> = (0..numbers).collect();
             for i in 0..keys.len() {
                 let ((kind, at), f) = keys[i];
                 let one = &faces[f as usize];
@@ -171,7 +175,7 @@ impl Alike {
 
     /// Lower bound of psi_p − psi_q over the solid, p positive and q subtracted, both curved alike, where it may be above
     /// −2·`delta`, or where they are near each other anyway.
-    pub fn wall(&self, faces: &[Face], p: u32, q: u32, delta: f64) -> Option<f64> {
+    pub fn wall(&self, faces: &Faces, p: u32, q: u32, delta: f64) -> Option<f64> {
         if let Ok(i) = self.near.binary_search_by(|n| (n.0, n.1).cmp(&(p, q))) {
             return Some(self.near[i].2);
         }
@@ -218,9 +222,9 @@ impl Alike {
 }
 
 /// The pairs of like curved faces with a wall of at most `reach` between them.
-fn near_pairs(faces: &[Face], senses: &impl Fn(u32) -> Sense, ball: &Ball, reach: f64) -> Vec<(u32, u32, f64)> {
-    let curved = |f: &u32| !faces[*f as usize].is_flat();
-    let all = |sense: Sense| (0..faces.len() as u32).filter(curved).filter(|f| senses(*f) == sense).collect::<Vec<_>>();
+fn near_pairs(faces: &Faces, senses: &impl Fn(u32) -> Sense, ball: &Ball, reach: f64) -> Vec<(u32, u32, f64)> {
+    let curved = || faces.kept().filter(|(_, face)| !face.is_flat()).map(|(i, _)| i as u32);
+    let all = |sense: Sense| curved().filter(|f| senses(*f) == sense).collect::<Vec<_>>();
     let (positive, negative) = (all(Sense::Positive), all(Sense::Negative));
     if positive.is_empty() || negative.is_empty() {
         return Vec::new();
@@ -249,6 +253,8 @@ fn near_pairs(faces: &[Face], senses: &impl Fn(u32) -> Sense, ball: &Ball, reach
 enum Tree {
     Known(bool),
     One(LiteralId),
+    /// A part of a large mesh.
+    Part(LiteralId),
     /// True for a conjunction.
     Many(bool, Vec<Tree>),
 }
@@ -260,6 +266,7 @@ impl Tree {
             Expression::Literal(id) => Tree::One(id),
             Expression::And(body) => Tree::Many(true, all(body)),
             Expression::Or(body) => Tree::Many(false, all(body)),
+            Expression::Part(id) => Tree::Part(id),
         }
     }
 
@@ -269,6 +276,7 @@ impl Tree {
             Expression::Literal(id) => Tree::One(id),
             Expression::And(body) => Tree::Many(true, all(body)),
             Expression::Or(body) => Tree::Many(false, all(body)),
+            Expression::Part(id) => Tree::Part(id),
         }
     }
 
@@ -283,6 +291,7 @@ impl Tree {
         match self {
             Tree::Known(_) => unreachable!("constants are folded away"),
             Tree::One(id) => out.push(local::literal_token(*id)),
+            Tree::Part(id) => out.push(local::part_token(*id)),
             Tree::Many(and, all) => {
                 let kind = if *and { local::AND } else { local::OR };
                 let truth = local::fold(kind, all.iter(), out, |e, out| {
@@ -349,7 +358,7 @@ impl Simplifier<'_> {
     fn simplify(&mut self, e: Tree) -> Tree {
         self.left = self.left.saturating_sub(1);
         match e {
-            Tree::Known(_) => e,
+            Tree::Known(_) | Tree::Part(_) => e,
             Tree::One(id) => self.known(id).map_or(e, Tree::Known),
             Tree::Many(and, all) => self.operator(and, all),
         }
@@ -395,6 +404,7 @@ impl Simplifier<'_> {
                         break;
                     }
                     Tree::Many(kind, _) if kind != and => next.push(e),
+                    Tree::Part(_) => next.push(e),
                     e => {
                         news = true;
                         next.push(e);
@@ -493,7 +503,7 @@ impl Simplifier<'_> {
 
     fn named(&self, e: &Tree) -> Tree {
         match e {
-            Tree::Known(_) => e.clone(),
+            Tree::Known(_) | Tree::Part(_) => e.clone(),
             Tree::One(id) => Tree::One(LiteralId::new(self.alike.one(id.face()), id.sense())),
             Tree::Many(and, all) => {
                 let mut all: Vec<Tree> = all.iter().map(|e| self.named(e)).collect();

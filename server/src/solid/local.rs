@@ -3,12 +3,12 @@
 //! A solid is inside at depth delta where a monotone and/or-tree of literals holds: a positive primitive is the *and* of
 //! its face literals (psi <= −delta), a subtracted one the *or* of its negated face literals (−psi <= −delta), union is or,
 //! intersection is and, complements are pushed to the leaves by De Morgan's laws. In prefix order, one `u32` a token:
-//! a literal (face id, negated?) or an operator with the number of tokens below it. Where a literal's truth is known over
+//! a literal (face id, negated?), an operator with the number of tokens below it, or a part of a large mesh that is written
+//! out when somebody looks at a small region (`Solid::prune`). Where a literal's truth is known over
 //! the whole region it folds away (`prune`); what stays is what the region's contacts depend on.
 //!
 //! Invariant: no operator stands directly below one of its own kind, and none has fewer than two operands.
 
-use crate::math::Aabb;
 use crate::solid::surface::Under;
 use crate::solid::{Face, Sense};
 use glam::DVec3;
@@ -18,6 +18,7 @@ pub type Token = u32;
 
 pub(crate) const AND: u32 = 1 << 30;
 pub(crate) const OR: u32 = 2 << 30;
+pub(crate) const PART: u32 = 3 << 30;
 pub(crate) const KIND: u32 = 3 << 30;
 const NEGATED: u32 = 1 << 29;
 
@@ -61,6 +62,8 @@ pub enum Expression<'a> {
     And(&'a [Token]),
     /// One operand must hold.
     Or(&'a [Token]),
+    /// A part of a large mesh, which is not written out: its id among the faces of its model, and its sense.
+    Part(LiteralId),
 }
 
 /// The first expression of `tokens` and the number of tokens it takes.
@@ -70,6 +73,7 @@ pub fn first(tokens: &[Token]) -> (Expression<'_>, usize) {
     match head & KIND {
         AND => (Expression::And(&tokens[1..1 + len]), 1 + len),
         OR => (Expression::Or(&tokens[1..1 + len]), 1 + len),
+        PART => (Expression::Part(LiteralId(head & !KIND)), 1),
         _ => (Expression::Literal(LiteralId(head)), 1),
     }
 }
@@ -86,9 +90,15 @@ pub fn operands(mut body: &[Token]) -> impl Iterator<Item = Expression<'_>> {
     })
 }
 
-/// All literals of an expression, in order.
+/// All literals of an expression, in order; what its parts hold is not among them.
 pub fn literals(tokens: &[Token]) -> impl Iterator<Item = LiteralId> + '_ {
     tokens.iter().filter(|t| **t & KIND == 0).map(|t| LiteralId(*t))
+}
+
+/// The literals of an expression and the parts that it has beside them, in order.
+pub fn named(tokens: &[Token]) -> impl Iterator<Item = LiteralId> + '_ {
+    let named = |t: &&Token| matches!(**t & KIND, 0 | PART);
+    tokens.iter().filter(named).map(|t| LiteralId(*t & !KIND))
 }
 
 /// Writes an operator over operands that `each` appends one by one, folding constants, single operands and operands of
@@ -152,6 +162,10 @@ pub fn prune(tokens: &[Token], out: &mut Vec<Token>, classify: &mut impl FnMut(L
         }
         Expression::And(body) => prune_operator(AND, body, out, classify),
         Expression::Or(body) => prune_operator(OR, body, out, classify),
+        Expression::Part(id) => {
+            out.push(part_token(id));
+            Truth::Open
+        }
     }
 }
 
@@ -173,7 +187,8 @@ fn prune_operator(
     fold(kind, items, out, |item, out| prune(item, out, classify))
 }
 
-/// f of an expression at a point given the faces' values there: and = max, or = min, negated = −psi.
+/// f of an expression at a point given the faces' values there: and = max, or = min, negated = −psi. Of what stands beside them
+/// if there are parts.
 pub fn value(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> f64 {
     match first(tokens).0 {
         Expression::Literal(id) => {
@@ -182,6 +197,7 @@ pub fn value(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> f64 {
         }
         Expression::And(body) => value_of(body, f64::NEG_INFINITY, f64::max, psi),
         Expression::Or(body) => value_of(body, f64::INFINITY, f64::min, psi),
+        Expression::Part(_) => f64::NAN,
     }
 }
 
@@ -194,27 +210,34 @@ fn value_of(mut body: &[Token], mut v: f64, join: fn(f64, f64) -> f64, psi: &mut
     v
 }
 
-/// f of an expression with the literal that decides it (the first of equals).
-pub fn deciding(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> (f64, LiteralId) {
+/// f of an expression with the literal that decides it (the first of equals); `None` where there are parts alone.
+pub fn decided(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> Option<(f64, LiteralId)> {
     let (e, _) = first(tokens);
     let (mut body, larger) = match e {
         Expression::Literal(id) => {
             let v = psi(id.face());
-            return (if id.sense() == Sense::Positive { v } else { -v }, id);
+            return Some((if id.sense() == Sense::Positive { v } else { -v }, id));
         }
         Expression::And(body) => (body, true),
         Expression::Or(body) => (body, false),
+        Expression::Part(_) => return None,
     };
     let mut found: Option<(f64, LiteralId)> = None;
     while !body.is_empty() {
         let n = first(body).1;
-        let one = deciding(&body[..n], psi);
-        if found.is_none_or(|f| if larger { one.0 > f.0 } else { one.0 < f.0 }) {
+        if let Some(one) = decided(&body[..n], psi)
+            && found.is_none_or(|f| if larger { one.0 > f.0 } else { one.0 < f.0 })
+        {
             found = Some(one);
         }
         body = &body[n..];
     }
-    found.expect("an operator has operands")
+    found
+}
+
+/// The same of an expression without parts.
+pub fn deciding(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> (f64, LiteralId) {
+    decided(tokens, psi).expect("an operator has operands")
 }
 
 /// Appends the conjunction of some open expressions.
@@ -229,6 +252,16 @@ pub fn write_and<'a>(parts: impl IntoIterator<Item = &'a [Token]>, out: &mut Vec
 /// The token of a single literal.
 pub fn literal_token(id: LiteralId) -> Token {
     id.0
+}
+
+/// The token of a part.
+pub(crate) fn part_token(id: LiteralId) -> Token {
+    PART | id.0
+}
+
+/// True for the token of a part.
+pub(crate) fn is_part(token: Token) -> bool {
+    token & KIND == PART
 }
 
 /// Bounds of psi over a region: (lower, upper).
@@ -261,22 +294,10 @@ pub fn truth_of(sense: Sense, (lo, hi): Span, delta: f64, rounding: f64) -> Trut
     }
 }
 
-/// Prunes an expression over the box `region` of the solid's own frame at depth `delta`, psi over the box being known to
-/// `rounding`.
-pub fn prune_to_box(
-    tokens: &[Token],
-    faces: &[Face],
-    region: &Aabb,
-    (delta, rounding): (f64, f64),
-    out: &mut Vec<Token>,
-) -> Truth {
-    let (c, e) = (region.center(), region.half());
-    prune(tokens, out, &mut |id| truth_of(id.sense(), face_span(&faces[id.face() as usize], c, e), delta, rounding))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Aabb;
     use crate::solid::{Label, Op, Solid, SolidBuilder, primitive::*, write_tree};
     use contactd_proto::Pose;
 
@@ -303,7 +324,7 @@ mod tests {
             assert_eq!(value(&tokens, &mut |face| s.faces[face as usize].value(c)), f);
             let region = Aabb::around(c, DVec3::splat(0.07));
             let mut out = vec![];
-            let truth = prune_to_box(&tokens, &s.faces, &region, (1e-9, 1e-15), &mut out);
+            let truth = s.prune_to_box(&tokens, &region, (1e-9, 1e-15), &mut out);
             for x in region.corners().into_iter().chain([c]) {
                 let f = s.value(x);
                 match truth {

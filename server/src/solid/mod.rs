@@ -12,6 +12,7 @@
 
 pub mod alike;
 pub mod classify;
+pub mod faces;
 pub mod formula;
 pub mod local;
 pub mod parts;
@@ -21,6 +22,7 @@ pub mod sense;
 pub mod surface;
 pub mod tree;
 
+pub use faces::Faces;
 pub use parts::Parts;
 pub use primitive::{Primitive, Shape};
 pub use sense::Sense;

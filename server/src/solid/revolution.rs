@@ -17,8 +17,12 @@ pub enum Revolution {
 impl Revolution {
     /// About what a solid of the size `extent` may be symmetric; `None` when no axis can be one.
     pub fn of(solid: &Solid, extent: f64) -> Option<Self> {
+        // The many planes of a large mesh have no axis in common.
+        if solid.has_parts {
+            return None;
+        }
         let mut center = None;
-        for face in &solid.faces {
+        for face in solid.faces.listed() {
             match face.symmetry() {
                 Symmetry::Axis(axis) => return is_symmetric(solid, &axis, extent).then_some(Self::Axis(axis)),
                 Symmetry::Center(c) => center = Some(c),
@@ -43,7 +47,7 @@ impl Revolution {
 
 /// True when every face of a solid of the size `extent` is symmetric about an axis.
 fn is_symmetric(solid: &Solid, axis: &Axis, extent: f64) -> bool {
-    solid.faces.iter().all(|f| match f.symmetry() {
+    solid.faces.listed().iter().all(|f| match f.symmetry() {
         Symmetry::Normal(normal) => axis.is_along(normal),
         Symmetry::Center(center) => axis.passes(center, extent),
         Symmetry::Axis(own) => axis.is_along(own.direction) && axis.passes(own.origin, extent),

@@ -2,10 +2,13 @@
 
 use crate::math::Aabb;
 use crate::solid::alike::Alike;
-use crate::solid::local::{self, Token, Truth};
+use crate::solid::faces::{Faces, Owners};
+use crate::solid::formula;
+use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::sense::Sense;
-use crate::solid::{Face, Primitive, Shape};
+use crate::solid::{Primitive, Shape};
 use contactd_proto::Pose;
+use glam::DVec3;
 
 /// Index of a node in `Solid::nodes`; children come before their parents.
 pub type NodeId = u32;
@@ -56,13 +59,13 @@ pub struct Solid {
     /// Root node.
     pub root: NodeId,
     /// All faces, by id: those of primitive 0 first, in order.
-    pub faces: Vec<Face>,
+    pub faces: Faces,
     /// The primitive that owns each face.
-    pub face_owner: Vec<u32>,
+    pub face_owner: Owners,
     /// Sense of each primitive in this solid (every primitive stands at one leaf).
     pub senses: Vec<Sense>,
     /// The tree as and/or of literals (`local`), simplified where faces lie on each other (`alike`); empty when the solid is
-    /// empty.
+    /// empty. Large meshes stand in it as divisions with parts (`prune`).
     pub normal_form: Vec<Token>,
     /// Faces that lie on or near each other.
     pub alike: Alike,
@@ -70,9 +73,82 @@ pub struct Solid {
     pub simplified: bool,
     /// True where nothing with a volume is left of a tree that is not empty.
     vanishes: bool,
+    /// True where the normal form has parts.
+    pub(crate) has_parts: bool,
 }
 
+/// Tokens up to which an expression with parts is simplified: all of it is looked at.
+const MOST_SIMPLIFIED: usize = 100_000;
+
 impl Solid {
+    /// `local::prune` of an expression of this solid. Where few parts of large meshes are left they are written out, for `classify`
+    /// to look at: so a small region has none.
+    pub fn prune(
+        &self,
+        tokens: &[Token],
+        out: &mut Vec<Token>,
+        classify: &mut impl FnMut(LiteralId) -> Truth,
+    ) -> Truth {
+        let start = out.len();
+        let truth = local::prune(tokens, out, classify);
+        if !self.has_parts || truth != Truth::Open {
+            return truth;
+        }
+        formula::open_few(start, out, &mut |part, out| self.open(part, out, classify))
+    }
+
+    /// True where parts are left of an expression, few enough to be written out.
+    pub(crate) fn has_few_parts(&self, tokens: &[Token]) -> bool {
+        self.has_parts && formula::are_few(formula::parts(tokens))
+    }
+
+    /// Appends an expression with all its parts written out.
+    pub(crate) fn written_out(&self, tokens: &[Token], out: &mut Vec<Token>) -> Truth {
+        formula::open_parts(tokens, out, &mut |part, out| self.open(part, out, &mut |_| Truth::Open))
+    }
+
+    /// Appends what a part says.
+    fn open(&self, part: LiteralId, out: &mut Vec<Token>, classify: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+        self.primitives[self.face_owner[part.face() as usize] as usize].open(part, out, classify)
+    }
+
+    /// Prunes an expression over the box `region` of the solid's own frame at depth `delta`, psi over the box being known to
+    /// `rounding`.
+    pub fn prune_to_box(
+        &self,
+        tokens: &[Token],
+        region: &Aabb,
+        (delta, rounding): (f64, f64),
+        out: &mut Vec<Token>,
+    ) -> Truth {
+        let (c, e) = (region.center(), region.half());
+        let faces = &self.faces;
+        let truth = |id: LiteralId| {
+            local::truth_of(id.sense(), local::face_span(&faces[id.face() as usize], c, e), delta, rounding)
+        };
+        self.prune(tokens, out, &mut { truth })
+    }
+
+    /// f at `x` (model frame) and the literal that decides it, the first of equals.
+    pub fn deciding(&self, x: DVec3) -> (f64, LiteralId) {
+        let mut psi = |face: u32| self.faces[face as usize].value(x);
+        if !self.has_parts {
+            return local::deciding(&self.normal_form, &mut psi);
+        }
+        // Literals below f hold there and those above do not, so what is left decides; how many parts are does not matter.
+        let (f, mut coarse, mut left) = (self.value(x), Vec::new(), Vec::new());
+        let mut at_f = |id: LiteralId| {
+            let v = self.faces[id.face() as usize].value(x);
+            local::truth_of(id.sense(), (v, v), -f, 4.0 * f64::EPSILON * (f.abs() + x.length()))
+        };
+        local::prune(&self.normal_form, &mut coarse, &mut at_f);
+        if !coarse.is_empty() {
+            formula::open_parts(&coarse, &mut left, &mut |part, out| self.open(part, out, &mut at_f));
+        }
+        let decided = if left.is_empty() { None } else { local::decided(&left, &mut psi) };
+        decided.or_else(|| local::decided(&self.normal_form, &mut psi)).unwrap_or((f, LiteralId(0)))
+    }
+
     /// The one primitive of a solid that is nothing else.
     pub fn whole(&self) -> Option<&Primitive> {
         match self.nodes[self.root as usize] {
@@ -98,18 +174,32 @@ impl Solid {
                 }
             }
         }
-        let faces = primitives.iter().flat_map(|p| p.faces.iter().copied()).collect();
-        let owners = primitives.iter().enumerate();
-        let face_owner = owners.flat_map(|(i, p)| std::iter::repeat_n(i as u32, p.faces.len())).collect();
+        let (mut faces, mut face_owner) = (Faces::default(), Owners::default());
+        for (i, p) in primitives.iter().enumerate() {
+            faces.extend(&p.faces);
+            face_owner.extend(i as u32, &p.faces);
+        }
+        let has_parts = primitives.iter().any(|p| p.shape.formula().is_some_and(formula::Formula::is_divided));
         let (normal_form, alike) = (Vec::new(), Alike::default());
         let (simplified, vanishes) = (false, false);
-        let mut solid =
-            Self { primitives, nodes, root, faces, face_owner, senses, normal_form, alike, simplified, vanishes };
+        let mut solid = Self {
+            primitives,
+            nodes,
+            root,
+            faces,
+            face_owner,
+            senses,
+            normal_form,
+            alike,
+            simplified,
+            vanishes,
+            has_parts,
+        };
         let mut whole = Vec::new();
         write_tree(&solid, &mut whole);
         let sense = |f: u32| solid.senses[solid.face_owner[f as usize] as usize];
         solid.alike = Alike::of(&solid.faces, sense, &solid.aabb());
-        if solid.alike.any_same() && !whole.is_empty() {
+        if solid.alike.any_same() && !whole.is_empty() && (!solid.has_parts || whole.len() <= MOST_SIMPLIFIED) {
             let mut left = Vec::new();
             solid.vanishes = solid.alike.simplified(&whole, &mut left) == Truth::False;
             solid.simplified = left.len() < whole.len();

@@ -14,7 +14,7 @@ use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::{certify_all, certify_trees};
 use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question;
-use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, winding};
+use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, torus, winding};
 use contactd_tests::random_solids::{Random, shape, shape_or_mesh, solid_of};
 use contactd_tests::scenes::Recipe;
 use glam::DVec3;
@@ -84,6 +84,57 @@ fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
         [(alone(mesh(r)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]
     });
     certify_trees((count, 0x3e_5105), shape_or_mesh);
+}
+
+/// A mesh of some hundred triangles: more than a part holds.
+fn fine(r: &mut Random) -> Mesh {
+    let (n, m) = (8 + r.below(6) as u32, 6 + r.below(6) as u32);
+    match r.below(3) {
+        0 => torus((r.within(0.4, 0.5), r.within(0.15, 0.3)), n, m),
+        1 => bumps(r, (n, m), (0.55, 0.7)),
+        _ => {
+            let radii: Vec<f64> = (0..4 * n).map(|_| r.within(0.5, 0.7)).collect();
+            prism(&radii, 0.4)
+        }
+    }
+}
+
+#[test]
+fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_and_its_certificates_hold() {
+    let mut r = Random::new(0xd1);
+    let (mut contacts, mut worst) = (0, 0.0_f64);
+    let count = pairs(40);
+    for i in 0..count {
+        let mesh = if r.chance(0.3) { meshes::random(&mut r, 0.8) } else { fine(&mut r) };
+        let [whole, divided] = [alone(meshes::solid(&mesh)), alone(meshes::divided(&mesh))];
+        for _ in 0..100 {
+            let x = mesh.0[r.below(mesh.0.len())] + r.vector(1.0) * 10f64.powf(r.within(-8.0, 0.0));
+            let (f, g) = (whole.solid.value(x), divided.solid.value(x));
+            let off = distance(&mesh, x);
+            assert!(g.abs() <= off + 1e-12 && (off <= 1e-10 || (f < 0.0) == (g < 0.0)), "{i} at {x}: {f} {g} {off}");
+        }
+        let other = if r.chance(0.3) { alone(meshes::divided(&fine(&mut r))) } else { alone(shape(&mut r, 0.8)) };
+        let motions = [turning(&mut r), past(&mut r, 2.5)];
+        let (o, p) = (ask(&whole, &other, motions), ask(&divided, &other, motions));
+        assert_eq!(o.status(), p.status(), "{i}: {o:?}, {p:?}");
+        if o.status() == Status::Contact && !o.not_continued() && !p.not_continued() {
+            contacts += 1;
+            let off = (o.time() - p.time()).abs() * o.at().normal_speed.abs().min(p.at().normal_speed.abs());
+            worst = worst.max(off);
+            assert!(off <= 1e-12, "{i}: {off:e}: {o:?}, {p:?}");
+        }
+    }
+    println!("{contacts} contacts of {count}, the same to {worst:.1e}");
+    assert!(contacts * 3 > count, "{contacts}");
+    certify_all("divided", (count, 0xd1_51de), |r| {
+        let place = |motion| Placed { place: Pose::IDENTITY, motion };
+        let own = alone(meshes::divided(&fine(r)));
+        let other = if r.chance(0.3) { Shape::from(meshes::divided(&meshes::random(r, 0.8))) } else { shape(r, 0.8) };
+        [(own, place(turning(r))), (alone(other), place(past(r, 2.2)))]
+    });
+    certify_trees((count + 10, 0x3e_5105), |r, size| {
+        if r.chance(0.5) { meshes::divided(&meshes::random(r, size)).into() } else { shape(r, size) }
+    });
 }
 
 #[test]

@@ -272,7 +272,7 @@ fn what_is_wrong_with_a_file_is_told_with_its_place() {
         ("a.ply", ply.replacen("double x", "double u", 1), "a.ply:1:1: expected properties x, y and z of vertex"),
         ("a.ply", ply.replacen("3 0", "3 77", 1), "expected a point's number below 10, found 77 in face "),
         ("a.ply", ply.replacen("3 0", "9e9 0", 1), "expected a list's length from 3 that the file has room for"),
-        ("a.ply", ply.replacen("vertex 10", "vertex 900000000", 1), "expected at most 600000 elements of a mesh"),
+        ("a.ply", ply.replacen("vertex 10", "vertex 900000000", 1), "expected at most 3000000 elements of a mesh"),
         ("a.amf", amf.replace("amf", "fma"), "a.amf:2:1: expected an element amf, found \"fma\""),
         ("a.amf", amf.replacen("<v1>0", "<v1>77", 1), ": expected a vertex's number below 10 as v1, found \"77\""),
         ("a.amf", amf.replacen("<x>", "<x>n", 1), ": expected a finite number as x of coordinates, found \"n"),

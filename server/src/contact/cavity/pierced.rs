@@ -99,7 +99,7 @@ impl<'a> CavityPair<'a> {
         let model = if side == Side::A { task.model_a } else { task.model_b };
         let body = CavityBody::of(primitive)?;
         let planes = |p: &Primitive| -> SmallVec<[Plane; 6]> {
-            let faces = p.faces.iter().enumerate();
+            let faces = p.faces.listed().iter().enumerate();
             faces
                 .filter_map(|(i, face)| {
                     let (normal, offset) = face.flat()?;
@@ -111,7 +111,7 @@ impl<'a> CavityPair<'a> {
         let center = relative.at(0.5).b_point(primitive.ball.center);
         let cavity = model.parts.as_ref()?.deepest(&model.solid, part, center)?;
         let (mut round, mut directions) = (None, [DVec3::ZERO; 8]);
-        for (i, face) in cavity.faces.iter().enumerate() {
+        for (i, face) in cavity.faces.listed().iter().enumerate() {
             if face.is_flat() {
                 continue;
             }

@@ -171,7 +171,7 @@ impl<'a> Start<'a> {
     #[cold]
     fn slope_of_faces(&self, k: usize, x: DVec3) -> Slope {
         let (own, p) = (self.own(k, x), self.pair.primitives[k]);
-        let values = p.faces.iter().map(|face| face.value(own));
+        let values = p.faces.listed().iter().map(|face| face.value(own));
         let first = (0, f64::NEG_INFINITY);
         let (face, f) = values.enumerate().fold(first, |best, (i, f)| if f > best.1 { (i, f) } else { best });
         Slope { f, normal: self.axes[k] * p.faces[face].at(own).normal, face: face as u32 }
@@ -242,7 +242,7 @@ impl<'a> Start<'a> {
         let mut outward: SmallVec<[DVec3; 8]> = SmallVec::new();
         for k in 0..2 {
             let own = self.own(k, p);
-            let faces = self.pair.primitives[k].faces.iter().filter(|f| f.value(own) > -near);
+            let faces = self.pair.primitives[k].faces.listed().iter().filter(|f| f.value(own) > -near);
             outward.extend(faces.map(|f| self.axes[k] * f.at(own).normal));
         }
         Some(-gjk::least_of(&outward)?.try_normalize()?)

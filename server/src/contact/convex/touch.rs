@@ -149,7 +149,7 @@ impl<'a> Stand<'a> {
     fn is_deep(&self, x: DVec3, level: f64) -> bool {
         (0..2).all(|k| {
             let own = self.own(k, x);
-            self.parts[k].primitive.faces.iter().all(|f| f.value(own) <= -level)
+            self.parts[k].primitive.faces.listed().iter().all(|f| f.value(own) <= -level)
         })
     }
 
@@ -158,7 +158,7 @@ impl<'a> Stand<'a> {
         let mut passing = [0; 2];
         for k in 0..2 {
             let own = self.own(k, x);
-            for face in &self.parts[k].primitive.faces {
+            for face in self.parts[k].primitive.faces.listed() {
                 let value = face.value(own);
                 if value.is_nan() || value > tol {
                     return None;

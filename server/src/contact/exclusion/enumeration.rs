@@ -76,6 +76,8 @@ impl Run<'_, '_> {
             let (e, n) = local::first(&self.pair.pool[at..]);
             match e {
                 Expression::Literal(id) => self.add(side, id, at as u32, list),
+                // What it says is not known yet: without it the bound is weaker.
+                Expression::Part(_) => {}
                 Expression::And(_) => self.take(side, (at as u32 + 1, (at + n) as u32), list),
                 Expression::Or(_) => {
                     self.scratch.ors.push(List { side, start: at as u32 + 1, end: (at + n) as u32, within: list })
@@ -255,6 +257,7 @@ impl Run<'_, '_> {
                     self.scratch.checked += 1;
                     if height > low.z { Ok(height) } else { Err(l.cost * idle_cost(l)) }
                 }
+                Expression::Part(_) => Err(DVec3::ZERO),
                 Expression::And(_) => self.alone_above(side, (at + 1, next), low),
                 Expression::Or(_) => self.all_above(side, (at + 1, next), low),
             };

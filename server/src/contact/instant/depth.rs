@@ -16,7 +16,7 @@ use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use crate::solid::Sense;
-use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::local::{LiteralId, Token, Truth};
 use glam::DVec3;
 
 /// Trust boxes tried before the climb ends.
@@ -193,9 +193,9 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
             ..task.view((x, DVec3::splat(size)), at, task.relative.bounds(0.0, 0.0, 0.0), &[])
         };
         let mut pool: Vec<Token> = Vec::new();
-        let truth_a = local::prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));
+        let truth_a = task.a.prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));
         let middle = pool.len() as u32;
-        let truth_b = local::prune(&task.b.normal_form, &mut pool, &mut |id| view.truth(Side::B, id));
+        let truth_b = task.b.prune(&task.b.normal_form, &mut pool, &mut |id| view.truth(Side::B, id));
         let end = pool.len() as u32;
         if truth_a == Truth::False || truth_b == Truth::False || end == 0 {
             size *= 0.5;
@@ -237,7 +237,7 @@ fn normal(task: &Task, at: &Instant, x: DVec3, support: &[(Side, LiteralId, f64)
         if id.sense() == Sense::Positive { n } else { -n }
     };
     let sum = |side: Side| support.iter().filter(|s| s.0 == side).map(|s| gradient(s.0, s.1) * s.2).sum::<DVec3>();
-    let from_a = local::deciding(&task.a.normal_form, &mut |f| task.a.faces[f as usize].value(x)).1;
+    let from_a = task.a.deciding(x).1;
     (sum(Side::A) - sum(Side::B)).try_normalize().unwrap_or_else(|| {
         let n = task.a.faces[from_a.face() as usize].unit_normal(x);
         if from_a.sense() == Sense::Positive { n } else { -n }

@@ -129,7 +129,8 @@ impl<'t, 'a> Cover<'t, 'a> {
                 if tokens.is_empty() {
                     return Truth::True;
                 }
-                local::prune(tokens, out, &mut |id| {
+                let solid = if side == Side::A { self.task.a } else { self.task.b };
+                solid.prune(tokens, out, &mut |id| {
                     if far.truth(side, id) == Truth::False {
                         Truth::False
                     } else if near.truth(side, id) == Truth::True {

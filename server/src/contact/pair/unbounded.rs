@@ -7,7 +7,7 @@
 use crate::contact::query::outcome::{ContactPoint, Outcome, Overlap, Penetration, Verdict};
 use crate::contact::query::question::{PairQuery, PlacedModel};
 use crate::math::tolerance;
-use crate::solid::{Face, Node, Solid};
+use crate::solid::{Node, Solid};
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -73,14 +73,14 @@ impl<'a> Side<'a> {
 
     /// Normals of its planes, world axes, out of what is solid there.
     fn normals(&self) -> impl Iterator<Item = DVec3> + '_ {
-        let flat = self.solid.faces.iter().filter_map(Face::flat);
+        let flat = self.solid.faces.kept().filter_map(|(_, face)| face.flat());
         let planes = flat.map(|(normal, _)| self.world_from_model.rotation * normal);
         planes.flat_map(|n| [n, -n])
     }
 
     /// The outward normal and the offset of a solid that is one half-space, world axes.
     fn half_space(&self) -> Option<(DVec3, f64)> {
-        let (Node::Primitive(_), [face]) = (&self.solid.nodes[self.solid.root as usize], self.solid.faces.as_slice())
+        let (Node::Primitive(_), [face]) = (&self.solid.nodes[self.solid.root as usize], self.solid.faces.listed())
         else {
             return None;
         };
@@ -91,8 +91,7 @@ impl<'a> Side<'a> {
 
     /// A length by which far is measured.
     fn size(&self) -> f64 {
-        let reach = self.solid.faces.iter().map(Face::reach);
-        self.world_from_model.position.length() + reach.fold(0.0, f64::max)
+        self.world_from_model.position.length() + self.solid.faces.reach()
     }
 
     fn value(&self, x: DVec3) -> f64 {

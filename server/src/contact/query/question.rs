@@ -137,8 +137,8 @@ fn turns_in_a_hole(peg: &PlacedModel, hole: &PlacedModel) -> bool {
     }
     let axis = world_from_model(hole).conjugate() * (world_from_model(peg) * axis.direction);
     let solid = &hole.model.solid;
-    solid.faces.iter().zip(&solid.face_owner).any(|(face, owner)| {
-        let negative = solid.senses[*owner as usize] == Sense::Negative;
+    solid.faces.kept().any(|(i, face)| {
+        let negative = solid.senses[solid.face_owner[i] as usize] == Sense::Negative;
         negative && (face.apex().is_some() || face.flat().is_some_and(|(normal, _)| normal.dot(axis).abs() <= ALONG))
     })
 }

@@ -5,7 +5,8 @@ use super::scratch::Scratch;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::known::Handed;
-use crate::solid::local::{self, LiteralId, Token, Truth};
+use crate::solid::Solid;
+use crate::solid::local::{LiteralId, Token, Truth};
 
 /// The items of a queue.
 pub(super) struct Items {
@@ -50,12 +51,13 @@ impl Items {
         let motion = task.relative.bounds(cell.t, cell.until - cell.t, x_max);
         let view = task.view((cell.center, cell.half), &at, motion, &self.scratch.clip_planes_b);
         let tokens = &self.scratch.pool[cell.b.0 as usize..cell.b.1 as usize];
-        tokens.is_empty() || local::prune(tokens, &mut Vec::new(), &mut |id| view.truth(Side::B, id)) != Truth::False
+        tokens.is_empty() || task.b.prune(tokens, &mut Vec::new(), &mut |id| view.truth(Side::B, id)) != Truth::False
     }
 }
 
 /// Prunes an expression of the pool, the result behind everything else in it.
 pub(super) fn prune_in_pool(
+    solid: &Solid,
     pool: &mut Vec<Token>,
     source: Range,
     classify: &mut impl FnMut(LiteralId) -> Truth,
@@ -66,7 +68,7 @@ pub(super) fn prune_in_pool(
     // The source stays put while the result grows behind it: copy it out of the way of the borrow.
     let tokens: smallvec::SmallVec<[Token; 64]> = pool[source.0 as usize..source.1 as usize].into();
     let start = pool.len() as u32;
-    let truth = local::prune(&tokens, pool, classify);
+    let truth = solid.prune(&tokens, pool, classify);
     let end = pool.len() as u32;
     if truth == Truth::Open && end - start == source.1 - source.0 {
         // Nothing folded: keep the old one.

@@ -73,7 +73,7 @@ impl Proposals<'_, '_> {
                 if tokens.is_empty() {
                     return None;
                 }
-                let (_, id) = local::deciding(tokens, &mut |f| faces.get(f).value(y));
+                let (_, id) = local::decided(tokens, &mut |f| faces.get(f).value(y))?;
                 if faces.is_guard(id.face()) {
                     return None;
                 }

@@ -80,7 +80,7 @@ fn split(of: &Grown, tokens: &[Token], region: &Aabb, out: &mut Vec<Root>) {
                 split(of, &joined, &region, out);
             });
         }
-        Expression::Literal(_) => out.push(Root { region, tokens: tokens.to_vec() }),
+        Expression::Literal(_) | Expression::Part(_) => out.push(Root { region, tokens: tokens.to_vec() }),
     }
 }
 
@@ -97,12 +97,12 @@ fn each<'t>(mut body: &'t [Token], mut f: impl FnMut(&'t [Token])) {
 /// stand beside it or hold throughout the region.
 fn bound(of: &Grown, tokens: &[Token]) -> Aabb {
     match local::first(tokens).0 {
-        Expression::Literal(id) if id.sense() == Sense::Positive => {
+        Expression::Literal(id) | Expression::Part(id) if id.sense() == Sense::Positive => {
             let Some(p) = of.solid.face_owner.get(id.face() as usize) else { return Aabb::ALL };
             let p = &of.solid.primitives[*p as usize];
             if of.level > 0.0 { Bound::of_primitive(p, of.level, Volumes::Both).aabb } else { p.aabb }
         }
-        Expression::Literal(_) => Aabb::ALL,
+        Expression::Literal(_) | Expression::Part(_) => Aabb::ALL,
         Expression::And(body) => {
             let mut b = Aabb::ALL;
             each(body, |o| b = b.intersection(&bound(of, o)));

@@ -26,6 +26,7 @@ use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
 use crate::motion::{Bounds, Instant};
+use crate::solid::Solid;
 use crate::solid::local::{self, LiteralId, Truth};
 use glam::DVec3;
 use std::ops::ControlFlow;
@@ -255,6 +256,11 @@ impl<'a> Search<'a> {
                 }
             }
         }
+        if self.has_parts(&cell, &bounded) {
+            // What they hold is not looked at yet: it is in smaller cells, whatever the bound is short of.
+            self.split(cell, DVec3::ZERO);
+            return None;
+        }
         // Bodies that stand still to each other meet at the start or never.
         if !bounded.is_one_sided(&cell) && span.motion.speed > 0.0 {
             self.propose(&cell, &bounded.found, &at);
@@ -290,7 +296,7 @@ impl<'a> Search<'a> {
         let hints: &[Hint] = if self.contacts.task.strategies.hints { &self.contacts.hints } else { &[] };
         let view = self.contacts.task.view((cell.center, cell.half), at, span.motion, &scratch.clip_planes_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
-        let b_truth = prune_in_pool(pool, source, &mut |id| view.truth(Side::B, id));
+        let b_truth = prune_in_pool(self.contacts.task.b, pool, source, &mut |id| view.truth(Side::B, id));
         let b = match b_truth {
             (Truth::Open, range) => {
                 cell.b = range;
@@ -324,6 +330,16 @@ impl<'a> Search<'a> {
             found.y
         };
         Some(Bounded { b, found, now })
+    }
+
+    /// True where parts of large meshes are left in a cell, too many to be written out.
+    fn has_parts(&self, cell: &Cell, bounded: &Bounded) -> bool {
+        let Contacts { task, .. } = &self.contacts;
+        let has = |solid: &Solid, range: Range| {
+            solid.has_parts
+                && self.items.scratch.pool[range.0 as usize..range.1 as usize].iter().any(|t| local::is_part(*t))
+        };
+        has(task.a, cell.a) || has(task.b, bounded.b)
     }
 
     /// True where a cell's bounds keep it free for good, or for as long as makes it worth to be put back as it is.
@@ -501,7 +517,7 @@ impl<'a> Search<'a> {
                     let span = local::face_span(&faces[id.face() as usize], child.center, child.half);
                     local::truth_of(id.sense(), span, delta, rounding)
                 };
-                match prune_in_pool(&mut self.items.scratch.pool, cell.a, &mut classify) {
+                match prune_in_pool(self.contacts.task.a, &mut self.items.scratch.pool, cell.a, &mut classify) {
                     (Truth::False, _) => continue,
                     (Truth::True, _) => child.a = (0, 0),
                     (Truth::Open, range) => child.a = range,

@@ -175,8 +175,8 @@ impl<'a> Slices<'_, 'a> {
         }
         let depth = (self.task.delta, self.task.rounding);
         let (mut of_a, mut of_b) = (Vec::new(), Vec::new());
-        let truth_a = local::prune_to_box(a, &self.task.a.faces, in_a, depth, &mut of_a);
-        let truth_b = local::prune_to_box(b, &self.task.b.faces, in_b, depth, &mut of_b);
+        let truth_a = self.task.a.prune_to_box(a, in_a, depth, &mut of_a);
+        let truth_b = self.task.b.prune_to_box(b, in_b, depth, &mut of_b);
         if truth_a == Truth::False || truth_b == Truth::False {
             return;
         }
@@ -229,7 +229,7 @@ impl<'a> Slices<'_, 'a> {
     /// Counts each pair of primitives once and remembers what was handed over.
     fn note(&mut self, a: &[Token], b: &[Token]) {
         let owners = |tokens: &[Token], solid: &Solid| {
-            let mut list: Vec<u32> = local::literals(tokens).map(|id| solid.face_owner[id.face() as usize]).collect();
+            let mut list: Vec<u32> = local::named(tokens).map(|id| solid.face_owner[id.face() as usize]).collect();
             list.sort_unstable();
             list.dedup();
             list

@@ -9,8 +9,9 @@ use crate::contact::query::task::Task;
 use crate::contact::witness::newton;
 use crate::motion::Instant;
 use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
-use crate::solid::{Face, Sense};
+use crate::solid::{Face, Sense, Solid};
 use glam::{DMat3, DVec3};
+use std::cell::OnceCell;
 
 /// Gradients within this angle are parallel.
 pub const ANGLE: f64 = 1e-7;
@@ -34,7 +35,7 @@ pub struct Bodies<'t, 'a> {
     /// Diameter of the smaller body.
     pub size: f64,
     /// B's faces in A's frame.
-    faces_b: Vec<Face>,
+    faces_b: Carried,
     /// Every look at a face counts.
     pub work: &'t Work,
 }
@@ -52,11 +53,41 @@ pub struct At {
 /// A literal of one of the bodies.
 pub type Lit = (Side, LiteralId);
 
+/// B's faces in A's frame: those of large meshes some at a time, when one of them is looked at.
+struct Carried {
+    listed: Vec<Face>,
+    made: Vec<OnceCell<Box<[Face]>>>,
+}
+
+impl Carried {
+    /// Faces that are carried at a time.
+    const TOGETHER: usize = 64;
+
+    fn of<'f>(at: &Instant, faces: impl Iterator<Item = &'f Face>) -> Vec<Face> {
+        faces.map(|f| f.moved(|x| at.a_point(x), |v| at.a_vector(v))).collect()
+    }
+
+    fn new(solid: &Solid, at: &Instant) -> Self {
+        let listed = Self::of(at, solid.faces.listed().iter());
+        let made = vec![OnceCell::new(); (solid.faces.len() - listed.len()).div_ceil(Self::TOGETHER)];
+        Self { listed, made }
+    }
+
+    fn face(&self, solid: &Solid, at: &Instant, id: usize) -> &Face {
+        let Some(i) = id.checked_sub(self.listed.len()) else { return &self.listed[id] };
+        let chunk = self.made[i / Self::TOGETHER].get_or_init(|| {
+            let from = self.listed.len() + i / Self::TOGETHER * Self::TOGETHER;
+            let all = from..(from + Self::TOGETHER).min(solid.faces.len());
+            Self::of(at, all.map(|f| &solid.faces[f])).into()
+        });
+        &chunk[i % Self::TOGETHER]
+    }
+}
+
 impl<'t, 'a> Bodies<'t, 'a> {
     /// Separations up to `tau` count, and up to `REACH`.
     pub fn new(task: &'t Task<'a>, at: &'t Instant, tau: f64, work: &'t Work) -> Self {
         let size = 2.0 * task.model_a.radius.min(task.model_b.radius);
-        let carried = |f: &Face| f.moved(|x| at.a_point(x), |v| at.a_vector(v));
         Self {
             task,
             at,
@@ -64,7 +95,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
             lie: tau.min(LIE * size),
             eps: 256.0 * task.rounding,
             size,
-            faces_b: task.b.faces.iter().map(carried).collect(),
+            faces_b: Carried::new(task.b, at),
             work,
         }
     }
@@ -73,7 +104,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     pub fn face(&self, (side, id): Lit) -> &Face {
         match side {
             Side::A => &self.task.a.faces[id.face() as usize],
-            Side::B => &self.faces_b[id.face() as usize],
+            Side::B => self.faces_b.face(self.task.b, self.at, id.face() as usize),
         }
     }
 
@@ -142,7 +173,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
         let solid = if side == Side::A { self.task.a } else { self.task.b };
         self.work.look(solid.faces.len());
         let mut out = Vec::new();
-        let truth = local::prune(&solid.normal_form, &mut out, &mut |id| {
+        let truth = solid.prune(&solid.normal_form, &mut out, &mut |id| {
             let v = self.face((side, id)).value(x);
             local::truth_of(id.sense(), (v, v), 0.0, self.eps)
         });
@@ -221,6 +252,7 @@ fn clauses(tokens: &[Token]) -> Vec<Vec<LiteralId>> {
     fn of(e: Expression<'_>) -> Vec<Vec<LiteralId>> {
         match e {
             Expression::Literal(id) => vec![vec![id]],
+            Expression::Part(_) => vec![vec![]],
             Expression::Or(body) => local::operands(body).flat_map(of).take(MOST).collect(),
             Expression::And(body) => local::operands(body).map(of).fold(vec![vec![]], |all, one| {
                 all.iter()
@@ -238,6 +270,7 @@ pub fn holds(tokens: &[Token], truth: &mut impl FnMut(LiteralId) -> bool) -> boo
     fn of(e: Expression<'_>, truth: &mut impl FnMut(LiteralId) -> bool) -> bool {
         match e {
             Expression::Literal(id) => truth(id),
+            Expression::Part(_) => true,
             Expression::And(body) => local::operands(body).all(|e| of(e, truth)),
             Expression::Or(body) => local::operands(body).any(|e| of(e, truth)),
         }

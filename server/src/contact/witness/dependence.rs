@@ -186,7 +186,7 @@ fn between(line: DVec3, normals: &[DVec3]) -> SmallVec<[DVec3; 8]> {
 /// True for a literal, and for an operator over literals alone.
 fn is_flat(tokens: &[Token]) -> bool {
     match local::first(tokens).0 {
-        Expression::Literal(_) => true,
+        Expression::Literal(_) | Expression::Part(_) => true,
         Expression::And(body) | Expression::Or(body) => {
             local::operands(body).all(|e| matches!(e, Expression::Literal(_)))
         }
@@ -213,6 +213,7 @@ fn value(tokens: &[Token], of: &dyn Fn(LiteralId) -> f64) -> f64 {
     };
     match expression {
         Expression::Literal(id) => of(id),
+        Expression::Part(_) => f64::NAN,
         Expression::And(body) => each(body, true),
         Expression::Or(body) => each(body, false),
     }

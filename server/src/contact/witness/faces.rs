@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 /// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
 pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
     let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
-    for (i, face) in p.faces.iter().enumerate() {
+    for (i, face) in p.faces.listed().iter().enumerate() {
         let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
         if let Some(apex) = face.apex()
             && (x - apex.point).length() <= tol

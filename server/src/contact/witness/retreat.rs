@@ -79,6 +79,12 @@ impl Fit<'_> {
 /// The pairs of faces that may fit into each other.
 fn alike<'a>(task: &Task<'a>) -> Vec<Fit<'a>> {
     let round = |solid: &'a Solid, sense: Sense| -> Vec<&'a Face> {
+        if solid.has_parts {
+            // Of a large mesh all faces are flat: what is curved is no part of it.
+            let own = |i: usize| solid.senses[solid.face_owner[i] as usize] == sense;
+            let curved = solid.faces.kept().filter(|(i, face)| own(*i) && !face.is_flat());
+            return curved.map(|(_, face)| face).take(FITS).collect();
+        }
         let mut ids: Vec<LiteralId> = local::literals(&solid.normal_form).filter(|id| id.sense() == sense).collect();
         ids.sort_unstable();
         ids.dedup();

@@ -117,7 +117,10 @@ fn of_polygons(
     (outer, hull): (&DAffine3, bool),
     polygons: mesh::Polygons,
 ) -> Result<PartId> {
-    let clockwise: Vec<Vec<u32>> = polygons.faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
+    if !hull && polygons.count() > shapes.limits.polyhedron_faces {
+        return shapes.of_polygons(call, outer, polygons);
+    }
+    let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
     shapes.of_faces(call, outer, hull, (polygons.points, clockwise))
 }
 
@@ -138,7 +141,7 @@ pub fn surface(
     let arguments = Arguments::new(call, &["file", "center", "convexity", "invert", "timestamp"])?;
     let how = (arguments.bool_or("center", false)?, arguments.bool_or("invert", false)?);
     let polygons = surface::read(bytes, how, shapes.limits).map_err(|e| named(call, &name, e))?;
-    if polygons.faces.is_empty() {
+    if polygons.is_empty() {
         return Ok(shapes.nothing(call, &format!("of {name:?}, which has no two rows of two heights")));
     }
     of_polygons(shapes, call, (outer, hull), polygons)

@@ -126,7 +126,7 @@ impl<'a> Parts<'a> {
     pub fn leaf(&mut self, name: &str, at: Place, placed: std::result::Result<PlacedShape, Problem>) -> Result<Part> {
         let PlacedShape { shape, frame, mirrored, notes } = placed.map_err(|p| (at, p))?;
         let geometry = shape.geometry();
-        self.faces += geometry.faces().len();
+        self.faces += geometry.face_count();
         if self.faces > self.limits.faces {
             return Err((at, Problem::Limit { what: "faces", limit: self.limits.faces }));
         }

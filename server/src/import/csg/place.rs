@@ -9,6 +9,7 @@
 //! (`snapped`), with the orthogonal polar factor from Newton's iteration Q ← (Q + Q⁻ᵀ)/2 (Higham 1986).
 
 use super::Problem;
+use crate::import::mesh::Polygons;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
     Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair,
@@ -241,7 +242,18 @@ pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Place
     let points: Vec<DVec3> = points.iter().map(|p| a.transform_point3(*p)).collect();
     let mirrored = a.matrix3.determinant() < 0.0;
     let turned = |f: &Vec<u32>| if mirrored { f.clone() } else { f.iter().rev().copied().collect() };
-    let (shape, repair) = TriangleMesh::of_polygons(&points, &faces.iter().map(turned).collect::<Vec<_>>())?;
+    let (shape, repair) =
+        TriangleMesh::of_polygons(&points, faces.iter().map(turned).collect::<Vec<_>>().iter().map(Vec::as_slice))?;
+    Ok((PlacedShape::new(shape, Pose::IDENTITY), repair))
+}
+
+/// The solid within polygons that run counter-clockwise as seen from outside, their corners where the transform puts them.
+pub fn polygons(a: &DAffine3, polygons: Polygons) -> Result<(PlacedShape, Repair), Problem> {
+    let polygons = polygons.placed(a);
+    let closed = TriangleMesh::closed(&polygons.points, polygons.faces())?;
+    // Of many triangles they take as much as all the rest.
+    drop(polygons);
+    let (shape, repair) = TriangleMesh::of_closed(closed)?;
     Ok((PlacedShape::new(shape, Pose::IDENTITY), repair))
 }
 

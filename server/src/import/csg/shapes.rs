@@ -7,11 +7,11 @@ use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
 use super::hull::point_hull;
 use super::parts::{Part, PartId, Parts};
-use super::place;
+use super::place::{self, PlacedShape};
 use super::syntax::Call;
 use super::{Facets, Limits, Place, Problem};
-use crate::import::mesh::oriented;
-use crate::solid::primitive::{MeshError, MeshFault};
+use crate::import::mesh::{Polygons, oriented};
+use crate::solid::primitive::{MeshError, MeshFault, Repair};
 use crate::solid::{Op, Shape};
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -233,7 +233,22 @@ impl Shapes<'_> {
             let problem = Problem::Limit { what: "triangles of a mesh", limit: self.limits.mesh_facets };
             return Err((call.at, problem));
         }
-        let (placed, repair) = match place::mesh(outer, points, faces) {
+        self.meshed(call, place::mesh(outer, points, faces), before)
+    }
+
+    /// A mesh of many faces, which run counter-clockwise as seen from outside.
+    pub fn of_polygons(&mut self, call: &Call, outer: &DAffine3, polygons: Polygons) -> Result<PartId> {
+        self.parts.meshable(call.at, polygons.triangles())?;
+        self.meshed(call, place::polygons(outer, polygons), None)
+    }
+
+    fn meshed(
+        &mut self,
+        call: &Call,
+        made: std::result::Result<(PlacedShape, Repair), Problem>,
+        before: Option<Problem>,
+    ) -> Result<PartId> {
+        let (placed, repair) = match made {
             Err(Problem::Surface(MeshFault::Flat)) => return Ok(self.nothing(call, "without volume")),
             Err(Problem::Surface(MeshFault::Open(..) | MeshFault::Mixed(..))) if before.is_some() => {
                 return Err((call.at, before.unwrap_or_else(|| Problem::syntax("a mesh", "none"))));

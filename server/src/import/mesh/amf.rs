@@ -130,7 +130,7 @@ impl File<'_, '_, '_> {
                 points.push(DVec3::new(number("x")?, number("y")?, number("z")?));
             }
             for volume in xml::inside(mesh, "volume") {
-                let mut polygons = Polygons { points: points.clone(), faces: Vec::new() };
+                let mut polygons = Polygons { points: points.clone(), ..Polygons::default() };
                 for triangle in xml::inside(volume, "triangle") {
                     let mut face = Vec::with_capacity(3);
                     for name in ["v1", "v2", "v3"] {
@@ -143,9 +143,9 @@ impl File<'_, '_, '_> {
                             }
                         }
                     }
-                    polygons.add(face, || xml::place(triangle), &mut self.triangles, self.limits)?;
+                    polygons.add(&face, || xml::place(triangle), &mut self.triangles, self.limits)?;
                 }
-                if !polygons.faces.is_empty() {
+                if !polygons.is_empty() {
                     all.push(polygons.used().placed(outer));
                 }
             }

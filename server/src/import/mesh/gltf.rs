@@ -311,11 +311,11 @@ impl Reader<'_> {
                 _ => corners.get(1..).unwrap_or_default().windows(2).map(|w| [w[0], w[1], corners[0]]).collect(),
             };
             for t in triangles {
-                let face = t.map(|i| i + first).to_vec();
-                body.add(face, || Place::START, &mut self.triangles, self.limits)?;
+                let face = t.map(|i| i + first);
+                body.add(&face, || Place::START, &mut self.triangles, self.limits)?;
             }
         }
-        if !body.faces.is_empty() {
+        if !body.is_empty() {
             self.bodies.all.push(body.placed(place));
         }
         Ok(())

@@ -27,39 +27,67 @@ pub type Result<T> = std::result::Result<T, (Place, Problem)>;
 pub struct Polygons {
     /// The points.
     pub points: Vec<DVec3>,
-    /// The faces.
-    pub faces: Vec<Vec<u32>>,
+    /// The faces, one after another.
+    corners: Vec<u32>,
+    /// Where each of them ends.
+    ends: Vec<u32>,
 }
 
 impl Polygons {
     /// Triangles that its faces are cut into.
     pub fn triangles(&self) -> usize {
-        self.faces.iter().map(|f| f.len().saturating_sub(2)).sum()
+        self.faces().map(|f| f.len().saturating_sub(2)).sum()
+    }
+
+    /// The faces.
+    pub fn faces(&self) -> impl Iterator<Item = &[u32]> {
+        let from = std::iter::once(0).chain(self.ends.iter().copied());
+        from.zip(&self.ends).map(|(from, to)| &self.corners[from as usize..*to as usize])
     }
 
     /// Adds a face, within the limit of triangles.
-    fn push(&mut self, face: Vec<u32>, at: Place, count: &mut usize, limits: &Limits) -> Result<()> {
+    fn push(&mut self, face: &[u32], at: Place, count: &mut usize, limits: &Limits) -> Result<()> {
         self.add(face, || at, count, limits)
     }
 
     /// Adds a face that stands where `at` tells, within the limit of triangles.
-    fn add(&mut self, face: Vec<u32>, at: impl FnOnce() -> Place, count: &mut usize, limits: &Limits) -> Result<()> {
+    fn add(&mut self, face: &[u32], at: impl FnOnce() -> Place, count: &mut usize, limits: &Limits) -> Result<()> {
         *count += face.len().saturating_sub(2);
         if *count > limits.mesh_facets {
             return Err((at(), Problem::Limit { what: "triangles of a mesh", limit: limits.mesh_facets }));
         }
-        self.faces.push(face);
+        self.append(face);
         Ok(())
     }
 
+    /// Adds a face.
+    pub fn append(&mut self, face: &[u32]) {
+        self.corners.extend_from_slice(face);
+        self.ends.push(self.corners.len() as u32);
+    }
+
+    /// How many faces it has.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// True where it has no face.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
     /// The same where a transform puts it; one that mirrors turns its faces.
-    fn placed(mut self, place: &DAffine3) -> Self {
+    pub fn placed(mut self, place: &DAffine3) -> Self {
         if *place == DAffine3::IDENTITY {
             return self;
         }
         self.points.iter_mut().for_each(|p| *p = place.transform_point3(*p));
         if place.matrix3.determinant() < 0.0 {
-            self.faces.iter_mut().for_each(|f| f.reverse());
+            let mut from = 0;
+            for to in self.ends.iter().map(|end| *end as usize) {
+                self.corners[from..to].reverse();
+                from = to;
+            }
         }
         self
     }
@@ -76,8 +104,8 @@ impl Polygons {
             }
             *new
         };
-        out.faces = self.faces.iter().map(|f| f.iter().map(|i| of(*i)).collect()).collect();
-        out
+        let corners = self.corners.iter().map(|i| of(*i)).collect();
+        Self { corners, ends: self.ends, ..out }
     }
 }
 
@@ -188,11 +216,12 @@ fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Res
     let mut notes = vec![Note { at, text: frame, amount: None }];
     notes.extend(left_out.into_iter().map(|what| Note { at, text: format!("{what}: left out"), amount: None }));
     let mut b = SolidBuilder::new();
-    let mut made = Vec::with_capacity(all.len());
-    for (i, polygons) in all.iter().enumerate() {
-        let (shape, repaired) = solid(polygons, limits).map_err(|fault| match all.len() {
+    let count = all.len();
+    let mut made = Vec::with_capacity(count);
+    for (i, polygons) in all.into_iter().enumerate() {
+        let (shape, repaired) = solid(polygons, limits).map_err(|fault| match count {
             1 => of((at, fault.into())),
-            count => of((at, Problem::Body { number: i + 1, count, fault: fault.to_string() })),
+            _ => of((at, Problem::Body { number: i + 1, count, fault: fault.to_string() })),
         })?;
         notes.extend(repaired.into_iter().map(|(text, amount)| Note { at, text, amount }));
         let label = Label { name: "mesh".into(), line: 1, column: 1, mirrored: false };
@@ -206,10 +235,10 @@ fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Res
 }
 
 /// The solid within a mesh, and what was repaired.
-fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec<(String, Option<f64>)>), MeshFault> {
-    let Polygons { points, faces } = polygons;
-    if faces.len() <= limits.polyhedron_faces {
-        let clockwise: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
+fn solid(polygons: Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec<(String, Option<f64>)>), MeshFault> {
+    let points = &polygons.points;
+    if polygons.ends.len() <= limits.polyhedron_faces {
+        let clockwise: Vec<Vec<u32>> = polygons.faces().map(|f| f.iter().rev().copied().collect()).collect();
         if let Ok((polyhedron, fit)) = Polyhedron::from_faces(points, &clockwise)
             && fit.moved == 0.0
         {
@@ -217,17 +246,23 @@ fn solid(polygons: &Polygons, limits: &Limits) -> std::result::Result<(Shape, Ve
             return Ok((polyhedron.into(), flipped.into_iter().collect()));
         }
     }
-    let made = TriangleMesh::of_polygons(points, faces);
-    if let Err(MeshFault::Mixed(..)) = made
-        && let Some((turned, count)) = oriented(faces)
-    {
-        let polygons = Polygons { points: points.clone(), faces: turned };
-        let (shape, mut repaired) = solid(&polygons, limits)?;
-        let text = format!("a mesh with {count} faces that run the other way round than their neighbours: turned");
-        repaired.insert(0, (text, None));
-        return Ok((shape, repaired));
-    }
-    made.map(|(mesh, repair)| (mesh.into(), repair.notes("a mesh")))
+    let closed = match TriangleMesh::closed(points, polygons.faces()) {
+        Err(fault @ MeshFault::Mixed(..)) => {
+            let faces: Vec<Vec<u32>> = polygons.faces().map(<[u32]>::to_vec).collect();
+            let Some((turned, count)) = oriented(&faces) else { return Err(fault) };
+            let mut polygons = Polygons { points: polygons.points, ..Polygons::default() };
+            turned.iter().for_each(|face| polygons.append(face));
+            let (shape, mut repaired) = solid(polygons, limits)?;
+            let text = format!("a mesh with {count} faces that run the other way round than their neighbours: turned");
+            repaired.insert(0, (text, None));
+            return Ok((shape, repaired));
+        }
+        closed => closed?,
+    };
+    // Of many triangles they take as much as all the rest.
+    drop(polygons);
+    let (mesh, repair) = TriangleMesh::of_closed(closed)?;
+    Ok((mesh.into(), repair.notes("a mesh")))
 }
 
 /// Text of a file.

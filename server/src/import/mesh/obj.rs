@@ -34,7 +34,7 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
                 if face.len() < 3 {
                     return line.wrong("three corners or more", None);
                 }
-                mesh.push(face, line.at(word), &mut triangles, limits)?;
+                mesh.push(&face, line.at(word), &mut triangles, limits)?;
             }
             other if HARMLESS.contains(&other) => {}
             _ => return line.wrong("v, f, or what changes no shape (vn, vt, g, o, s, usemtl, mtllib)", word),

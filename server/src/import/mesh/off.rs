@@ -61,7 +61,7 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
                 None => return line.wrong(format!("a point's number below {points}"), word),
             }
         }
-        mesh.push(face, line.at(word), &mut triangles, limits)?;
+        mesh.push(&face, line.at(word), &mut triangles, limits)?;
     }
     match lines.next() {
         Some(line) => line.wrong("the end of the file", line.words().next()),

@@ -137,7 +137,7 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Bodies> {
                 }
                 if is_face {
                     let at = values.place();
-                    mesh.add(face, || at, &mut triangles, limits)?;
+                    mesh.add(&face, || at, &mut triangles, limits)?;
                 }
             }
             if element.name == "vertex" {

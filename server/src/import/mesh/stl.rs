@@ -61,7 +61,7 @@ fn binary(bytes: &[u8], count: usize, limits: &Limits) -> Result<Polygons> {
             }
             mesh.points.push(point);
         }
-        mesh.push(vec![first, first + 1, first + 2], Place::START, &mut triangles, limits)?;
+        mesh.push(&[first, first + 1, first + 2], Place::START, &mut triangles, limits)?;
     }
     Ok(mesh)
 }
@@ -86,7 +86,7 @@ fn ascii(text: &str, limits: &Limits) -> Result<Polygons> {
             }
             ("endfacet", Some(corners)) if corners.len() == 3 => {
                 let corners = std::mem::take(corners);
-                mesh.push(corners, line.at(word), &mut triangles, limits)?;
+                mesh.push(&corners, line.at(word), &mut triangles, limits)?;
                 facet = None;
             }
             (_, Some(corners)) if corners.len() < 3 => return line.wrong("a vertex", word),

@@ -175,9 +175,9 @@ impl Package<'_, '_, '_> {
                     }
                 }
             }
-            polygons.add(face, || xml::place(triangle), &mut self.triangles, self.limits)?;
+            polygons.add(&face, || xml::place(triangle), &mut self.triangles, self.limits)?;
         }
-        Ok((!polygons.faces.is_empty()).then(|| polygons.placed(&outer)))
+        Ok((!polygons.is_empty()).then(|| polygons.placed(&outer)))
     }
 }
 

@@ -99,7 +99,7 @@ fn holds(p: &Primitive, b: &Aabb) -> bool {
     }
     b.is_empty()
         || b.is_finite()
-            && p.faces.iter().all(|f| {
+            && p.faces.listed().iter().all(|f| {
                 if f.is_convex() {
                     b.corners().iter().all(|x| f.value(*x) < -rounding(f, *x, DVec3::ZERO))
                 } else {
@@ -110,7 +110,7 @@ fn holds(p: &Primitive, b: &Aabb) -> bool {
 
 fn of_primitive(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> Option<(Moments, f64)> {
     let Some(own) = p.shape.geometry().moments() else {
-        let is_polyhedron = p.aabb.is_finite() && p.faces.iter().all(Face::is_flat);
+        let is_polyhedron = p.aabb.is_finite() && p.faces.listed().iter().all(Face::is_flat);
         return if is_polyhedron { of_polyhedron(solid, node, p, origin) } else { None };
     };
     let doubt = FORMULA_ROUNDING * own.volume() + p.shape.geometry().moments_doubt();
@@ -142,6 +142,6 @@ fn of_polyhedron(solid: &Solid, node: NodeId, p: &Primitive, origin: DVec3) -> O
     let region = p.aabb.grown(LOOSE * p.aabb.half().length());
     let mut tokens = vec![];
     write_node(solid, node, Sense::Positive, &|_| true, &mut tokens);
-    let voxel = Evaluator::unlimited(&solid.faces).voxel(region, &tokens);
+    let voxel = Evaluator::unlimited(solid).voxel(region, &tokens);
     Some((voxel.moments.moved(region.center() - origin), voxel.error))
 }

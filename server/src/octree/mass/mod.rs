@@ -159,10 +159,10 @@ impl Found {
     }
 
     fn subdivide(&mut self, model: &Model, options: &MassOptions) {
-        let faces = &model.solid.faces;
+        let solid = &model.solid;
         let mut queue = BinaryHeap::new();
         let (mut volume, mut error) = (Sum::default(), Sum::default());
-        let mut fresh = vec![Evaluator::new(faces).voxel(self.around, &model.solid.normal_form)];
+        let mut fresh = vec![Evaluator::new(solid).voxel(self.around, &solid.normal_form)];
         let mut batch: Vec<Voxel> = vec![];
         // Places in `open` of boxes that were halved, to be used again.
         let mut free: Vec<usize> = vec![];
@@ -207,7 +207,7 @@ impl Found {
             if batch.is_empty() {
                 break;
             }
-            fresh = batch.par_iter().map_init(|| Evaluator::new(faces), halves).flatten_iter().collect();
+            fresh = batch.par_iter().map_init(|| Evaluator::new(solid), halves).flatten_iter().collect();
         }
     }
 

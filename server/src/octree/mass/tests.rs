@@ -45,10 +45,14 @@ fn one_face_in_a_box_is_off_by_its_bound_at_most() {
         let half = r.vector(size).abs() + DVec3::splat(0.1 * size);
         // Around a point of the face, or nearly.
         let at = r.vector(1.0).normalize() * r.within(0.3, 1.5);
-        let (region, faces) = (Aabb::around(at - face.at(at).normal * face.value(at), half), [face]);
+        let region = Aabb::around(at - face.at(at).normal * face.value(at), half);
         let sense = if i % 2 == 0 { Sense::Positive } else { Sense::Negative };
         let tokens = [literal_token(LiteralId::new(0, sense))];
-        let mut evaluator = Evaluator::new(&faces);
+        let mut cube = SolidBuilder::new();
+        let node = cube.primitive(Cuboid { half: DVec3::ONE }, Pose::IDENTITY, Label::default());
+        let mut solid = cube.finish(node);
+        solid.faces = vec![face].into();
+        let mut evaluator = Evaluator::new(&solid);
         let whole = evaluator.voxel(region, &tokens);
         let (sum, rest) = fine(&mut evaluator, region, &tokens, 3, region.center());
         let off = (whole.moments.volume() - sum.volume()).abs();

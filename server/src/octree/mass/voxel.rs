@@ -24,8 +24,8 @@ use super::slab::{Curve, Slab};
 use crate::math::moments::Moments;
 use crate::math::{Aabb, halt};
 use crate::octree::span::face_span;
-use crate::solid::local::{LiteralId, Token, Truth, literals, prune, truth_of};
-use crate::solid::{Face, Sense};
+use crate::solid::local::{LiteralId, Token, Truth, is_part, literals, prune, truth_of};
+use crate::solid::{Faces, Sense, Solid};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -100,7 +100,8 @@ enum VoxelBody {
 
 /// Evaluates boxes of one solid; keeps its memory.
 pub struct Evaluator<'a> {
-    faces: &'a [Face],
+    solid: &'a Solid,
+    faces: &'a Faces,
     /// The slabs of the box at hand with their faces, and those of the cell at hand.
     slabs: Vec<(u32, Slab)>,
     /// Where the slab of a face is in `slabs`, for each face of the solid.
@@ -117,17 +118,31 @@ pub struct Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// For a solid of these faces.
-    pub fn new(faces: &'a [Face]) -> Self {
+    /// For a solid.
+    pub fn new(solid: &'a Solid) -> Self {
+        let faces = &solid.faces;
         let (slabs, closer, cells, expressions) = Default::default();
         let (half, cube) = (DVec3::ZERO, Cell::cube());
         let places = vec![NO_SLAB; faces.len()];
-        Self { faces, slabs, places, closer, half, cube, cells, expressions, cuts: 0, most_cuts: MOST_CUTS, work: 0 }
+        Self {
+            solid,
+            faces,
+            slabs,
+            places,
+            closer,
+            half,
+            cube,
+            cells,
+            expressions,
+            cuts: 0,
+            most_cuts: MOST_CUTS,
+            work: 0,
+        }
     }
 
     /// The same without a limit of cuts: for a solid that shall be one box.
-    pub fn unlimited(faces: &'a [Face]) -> Self {
-        Self { most_cuts: usize::MAX, ..Self::new(faces) }
+    pub fn unlimited(solid: &'a Solid) -> Self {
+        Self { most_cuts: usize::MAX, ..Self::new(solid) }
     }
 
     /// A box where `tokens` are left of the solid, or of a box around it.
@@ -138,7 +153,7 @@ impl<'a> Evaluator<'a> {
         self.work = tokens.len() as u64 / SPANS;
         let mut kept = self.expressions.pop().unwrap_or_default();
         kept.clear();
-        let truth = prune(tokens, &mut kept, &mut |id| {
+        let truth = self.solid.prune(tokens, &mut kept, &mut |id| {
             truth_of(id.sense(), face_span(&faces[id.face() as usize], center, half), 0.0, 0.0)
         });
         let (tokens, moments) = Default::default();
@@ -174,7 +189,8 @@ impl<'a> Evaluator<'a> {
         self.work += count * (1 + count / LOOKUPS);
         let mut part = VoxelPart::default();
         let unit = half.x * half.y * half.z;
-        if self.measure(kept, &cube, VoxelBody::Solid, &mut part) {
+        // Parts that are not written out are too many faces, too.
+        if kept.iter().all(|t| !is_part(*t)) && self.measure(kept, &cube, VoxelBody::Solid, &mut part) {
             // Planes are known to their rounding, a sheet of the box; and so is each of the cells.
             let sheets: f64 = self.slabs.iter().map(|(_, slab)| slab.sheet(CUBE)).sum();
             let rounding = sheets + CUBE * CELL_ROUNDING * self.cuts as f64;

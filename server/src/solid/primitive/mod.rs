@@ -4,11 +4,13 @@
 //! outside of this folder asks of what kind a primitive is: [`Convex`] tells what a convex one is to those who compute with it.
 
 use crate::math::{Aabb, Ball, Moments};
-use crate::solid::formula::Formula;
+use crate::solid::faces::{Faces, Planes};
+use crate::solid::formula::{self, Formula};
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::{Face, Label, Sense};
 use contactd_proto::Pose;
 use glam::DVec3;
+use std::sync::Arc;
 
 mod capsule;
 mod cone;
@@ -40,6 +42,14 @@ pub use triangle_mesh::{MeshFault, Repair, TriangleMesh, WELD};
 pub trait Geometry {
     /// The faces psi <= 0 whose intersection it is, or those that its formula names, in a fixed order.
     fn faces(&self) -> Vec<Face>;
+    /// How many faces it counts as where they are limited.
+    fn face_count(&self) -> usize {
+        self.faces().len()
+    }
+    /// The same faces where they are too many to be listed: planes.
+    fn many_faces(&self) -> Option<Arc<dyn Planes>> {
+        None
+    }
     /// What it is of its faces, where it is not their intersection.
     fn formula(&self) -> Option<&Formula> {
         None
@@ -195,7 +205,7 @@ pub struct Primitive {
     /// Where it came from.
     pub label: Label,
     /// Faces in the model's frame; face `i` has the id `first_face + i` within the model.
-    pub faces: Vec<Face>,
+    pub faces: Faces,
     /// Id of its first face within the model.
     pub first_face: u32,
     /// Tight box in the model's frame.
@@ -208,7 +218,10 @@ impl Primitive {
     /// Places `shape` in a model; `first_face` is the number of faces of the primitives before it.
     pub fn new(shape: Shape, frame: Pose, label: Label, first_face: u32) -> Self {
         let g = shape.geometry();
-        let faces = g.faces().iter().map(|f| f.placed(&frame)).collect();
+        let faces = match g.many_faces() {
+            Some(planes) => Faces::made(planes, frame),
+            None => g.faces().iter().map(|f| f.placed(&frame)).collect::<Vec<Face>>().into(),
+        };
         let aabb = g.aabb(&frame);
         let mut ball = g.ball();
         ball.center = frame.point(ball.center);
@@ -233,12 +246,12 @@ impl Primitive {
     pub fn value(&self, x: DVec3) -> f64 {
         match self.shape.formula() {
             Some(formula) => formula.value(&mut |f| self.faces[f as usize].value(x)),
-            None => self.faces.iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(x))),
+            None => self.faces.listed().iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(x))),
         }
     }
 
     /// Appends it as and/or of its literals (`local`), complemented where `sense` is negative, with what `truth` says of each: the
-    /// third of a solid's contracts.
+    /// third of a solid's contracts. Of a large mesh it has parts (`Solid::prune`).
     pub fn expression(&self, sense: Sense, out: &mut Vec<Token>, truth: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
         if let Some(formula) = self.shape.formula() {
             return formula.write((self.first_face, sense), out, truth);
@@ -252,5 +265,33 @@ impl Primitive {
             }
             known
         })
+    }
+
+    /// Appends what a part of its expression says, as `expression` does.
+    pub(super) fn open(
+        &self,
+        part: LiteralId,
+        out: &mut Vec<Token>,
+        truth: &mut impl FnMut(LiteralId) -> Truth,
+    ) -> Truth {
+        self.shape.formula().map_or(Truth::Open, |formula| formula.open(part, self.first_face, out, truth))
+    }
+
+    /// Its expression with few parts written out, as `Solid::prune` does.
+    pub fn pruned(&self, sense: Sense, out: &mut Vec<Token>, truth: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+        let start = out.len();
+        match self.expression(sense, out, truth) {
+            Truth::Open => formula::open_few(start, out, &mut |part, out| self.open(part, out, truth)),
+            known => known,
+        }
+    }
+
+    /// What is left of such an expression, few parts written out.
+    pub fn prune(&self, tokens: &[Token], out: &mut Vec<Token>, truth: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+        let start = out.len();
+        match local::prune(tokens, out, truth) {
+            Truth::Open => formula::open_few(start, out, &mut |part, out| self.open(part, out, truth)),
+            known => known,
+        }
     }
 }

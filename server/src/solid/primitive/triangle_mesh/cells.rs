@@ -90,7 +90,7 @@ impl Cells {
                     if self.tokens > self.most {
                         return Err(MeshFault::Intricate(pieces[0].middle()));
                     }
-                    return self.checked(&pieces, e, &domain);
+                    return checked(&self.planes, self.tolerance, &pieces, e, &domain);
                 }
                 Err(_) if stalled > STALLED => return Err(MeshFault::Intricate(pieces[0].middle())),
                 Err(_) => {}
@@ -172,36 +172,40 @@ impl Cells {
         }
         best.1
     }
+}
 
-    /// A cell's formula where it is 0 on all pieces and rises outwards through them.
-    fn checked(&self, pieces: &[Piece], e: Expr, domain: &Aabb) -> Result<Expr, MeshFault> {
-        let step = 1e2 * self.tolerance;
-        for piece in pieces {
-            let middle = piece.middle();
-            let (n, _) = self.planes[piece.plane as usize];
-            let off = |x: DVec3| e.value(&self.planes, x);
-            let each = piece.corners.iter().map(|c| 0.5 * (c.at + middle));
-            if each.chain([middle]).any(|x| off(x).abs() > 8.0 * self.tolerance) {
-                return Err(MeshFault::Crossing(middle));
-            }
-            let inner = (middle - domain.min).min(domain.max - middle).min_element() > 2.0 * step;
-            if inner && self.is_roomy(piece) && !(off(middle - n * step) < 0.0 && off(middle + n * step) > 0.0) {
-                return Err(MeshFault::Crossing(middle));
-            }
-        }
-        Ok(e)
-    }
-
-    /// True where the middle of a piece is farther from its sides than other facets can be seen there.
-    fn is_roomy(&self, piece: &Piece) -> bool {
-        let (n, _) = self.planes[piece.plane as usize];
+/// A cell's formula where it is 0 on all pieces and rises outwards through them.
+pub fn checked(
+    planes: &[(DVec3, f64)],
+    tolerance: f64,
+    pieces: &[Piece],
+    e: Expr,
+    domain: &Aabb,
+) -> Result<Expr, MeshFault> {
+    let step = 1e2 * tolerance;
+    let off = |x: DVec3| e.value(planes, x);
+    for piece in pieces {
         let middle = piece.middle();
-        let count = piece.corners.len();
-        (0..count).all(|i| {
-            let (a, b) = (piece.corners[i].at, piece.corners[(i + 1) % count].at);
-            let side = b - a;
-            let inward = n.cross(side).normalize_or_zero();
-            inward.dot(middle - a) > 1e5 * self.tolerance
-        })
+        let (n, _) = planes[piece.plane as usize];
+        let each = piece.corners.iter().map(|c| 0.5 * (c.at + middle));
+        if each.chain([middle]).any(|x| off(x).abs() > 8.0 * tolerance) {
+            return Err(MeshFault::Crossing(middle));
+        }
+        let inner = (middle - domain.min).min(domain.max - middle).min_element() > 2.0 * step;
+        if inner && is_roomy(n, piece, tolerance) && !(off(middle - n * step) < 0.0 && off(middle + n * step) > 0.0) {
+            return Err(MeshFault::Crossing(middle));
+        }
     }
+    Ok(e)
+}
+
+/// True where the middle of a piece with the normal n is farther from its sides than other facets can be seen there.
+fn is_roomy(n: DVec3, piece: &Piece, tolerance: f64) -> bool {
+    let middle = piece.middle();
+    let count = piece.corners.len();
+    (0..count).all(|i| {
+        let (a, b) = (piece.corners[i].at, piece.corners[(i + 1) % count].at);
+        let inward = n.cross(b - a).normalize_or_zero();
+        inward.dot(middle - a) > 1e5 * tolerance
+    })
 }

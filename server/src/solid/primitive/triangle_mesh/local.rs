@@ -15,6 +15,7 @@
 
 use super::piece::{CUT, Piece};
 use crate::solid::Sense;
+use crate::solid::formula::value_of;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -58,7 +59,7 @@ impl Expr {
         match self {
             Expr::Known(true) => f64::NEG_INFINITY,
             Expr::Known(false) => f64::INFINITY,
-            Expr::Open(tokens) => local::value(tokens, &mut |f| {
+            Expr::Open(tokens) => value_of(tokens, &mut |f| {
                 let (n, d) = planes[f as usize];
                 n.dot(x) - d
             }),

@@ -1,30 +1,42 @@
 //! Solid within a closed mesh of triangles, convex or not.
 //!
 //! Its faces are the planes of its facets, neighbours in one plane being one face, then planes that bound nothing (`cells`). What it
-//! is of them a formula tells (`local`), not their intersection.
+//! is of them a formula tells (`local`), not their intersection: written out for few facets (`cells`), a tree whose parts are
+//! written out when they are looked at for many (`division`).
 
 use super::{Checked, Convex, Geometry, Shape, Sink, Source, read_vector, write_vector};
 use crate::math::{Aabb, Ball, Moments, tolerance::ROUNDING};
-use crate::solid::surface::Plane;
+use crate::solid::faces::Planes;
+use crate::solid::surface::{Plane, Surface as _};
 use crate::solid::{Face, formula::Formula};
 use contactd_proto::Pose;
 use glam::DVec3;
 
+mod apart;
 mod cells;
+mod division;
+mod edges;
 mod local;
+mod mix;
 mod moments;
 mod piece;
 mod planes;
 mod polygons;
 mod shell;
+mod side;
+mod surface;
 #[cfg(test)]
 mod tests;
 
 use cells::Cells;
+use division::Divided;
 use local::Expr;
-use piece::{CUT, Corner, Piece};
 pub use shell::{Repair, WELD};
-use std::collections::HashMap;
+use std::sync::Arc;
+use surface::Surface;
+
+/// Triangles up to which the formula of a mesh is written out when it is made.
+const FEW_TRIANGLES: usize = 1000;
 
 /// Where points lie on a plane: this, relative to the size of a mesh and its coordinates.
 const ON_PLANE: f64 = 1e-13;
@@ -49,17 +61,27 @@ pub enum MeshFault {
     Intricate(DVec3),
 }
 
+/// A closed surface of which a mesh is to be made, and what was repaired in it.
+pub struct Closed {
+    shell: shell::Shell,
+    repair: Repair,
+}
+
 /// All points within a closed mesh of triangles.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct TriangleMesh {
-    vertices: Vec<DVec3>,
-    /// Counter-clockwise from outside.
-    triangles: Vec<[u32; 3]>,
-    /// Planes of faces, then planes that bound nothing.
-    planes: Vec<(DVec3, f64)>,
-    /// How many of them are faces.
-    faces: usize,
+    surface: Arc<Surface>,
+    /// Planes that bound nothing, behind those of the surface's faces; of a divided one they are the division's.
+    cuts: Vec<(DVec3, f64)>,
     formula: Formula,
+    division: Option<Arc<Divided>>,
+}
+
+/// All else follows from the triangles.
+impl PartialEq for TriangleMesh {
+    fn eq(&self, other: &Self) -> bool {
+        (self.vertices(), self.triangles()) == (other.vertices(), other.triangles())
+    }
 }
 
 impl TriangleMesh {
@@ -68,8 +90,16 @@ impl TriangleMesh {
     /// # Errors
     /// What is wrong with the mesh, and where.
     pub fn new(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(Self, Repair), MeshFault> {
+        Self::divided_from(FEW_TRIANGLES, points, triangles)
+    }
+
+    /// The same with a formula that is divided beyond `few` triangles: for comparison, all that is inside is the same.
+    ///
+    /// # Errors
+    /// What is wrong with the mesh, and where.
+    pub fn divided_from(few: usize, points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(Self, Repair), MeshFault> {
         let (shell, repair) = shell::Shell::of(points, triangles)?;
-        Ok((Self::of_shell(shell)?, repair))
+        Ok((Self::of_shell(shell, few)?, repair))
     }
 
     /// The same of polygons, each a list of indices of points that runs counter-clockwise as seen from outside. Those that are not
@@ -77,59 +107,108 @@ impl TriangleMesh {
     ///
     /// # Errors
     /// What is wrong with the mesh, and where.
-    pub fn of_polygons(points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Self, Repair), MeshFault> {
+    pub fn of_polygons<'f>(
+        points: &[DVec3],
+        faces: impl IntoIterator<Item = &'f [u32]>,
+    ) -> Result<(Self, Repair), MeshFault> {
+        Self::of_closed(Self::closed(points, faces)?)
+    }
+
+    /// The first half of `of_polygons`, which looks at all of them: beyond it they are not needed.
+    ///
+    /// # Errors
+    /// Where they are not closed.
+    pub fn closed<'f>(points: &[DVec3], faces: impl IntoIterator<Item = &'f [u32]>) -> Result<Closed, MeshFault> {
         let mut bent = 0.0_f64;
-        let mut triangles = Vec::with_capacity(2 * faces.len());
+        let faces = faces.into_iter();
+        let mut triangles = Vec::with_capacity(faces.size_hint().0);
         for face in faces {
+            if let [a, b, c] = *face {
+                triangles.push([a, b, c]);
+                continue;
+            }
             let corners: Vec<DVec3> = face.iter().map(|i| points[*i as usize]).collect();
             let (cut, off) = polygons::triangles(&corners);
             bent = bent.max(off);
             triangles.extend(cut.into_iter().map(|t| t.map(|i| face[i])));
         }
-        let (mesh, repair) = Self::new(points, &triangles)?;
-        let size = Aabb::of_points(mesh.vertices.iter().copied()).half().length();
+        let (shell, repair) = shell::Shell::of(points, &triangles)?;
+        let size = Aabb::of_points(shell.vertices.iter().copied()).half().length();
         let bent = if bent > ROUNDING * size { bent } else { 0.0 };
-        Ok((mesh, Repair { bent, ..repair }))
+        Ok(Closed { shell, repair: Repair { bent, ..repair } })
     }
 
-    fn of_shell(shell: shell::Shell) -> Result<Self, MeshFault> {
-        let shell::Shell { vertices, triangles } = shell;
+    /// Its second half.
+    ///
+    /// # Errors
+    /// What is wrong with the mesh, and where.
+    pub fn of_closed(closed: Closed) -> Result<(Self, Repair), MeshFault> {
+        Ok((Self::of_shell(closed.shell, FEW_TRIANGLES)?, closed.repair))
+    }
+
+    fn of_shell(shell: shell::Shell, few: usize) -> Result<Self, MeshFault> {
+        let shell::Shell { vertices, triangles, edges } = shell;
         let around = Aabb::of_points(vertices.iter().copied());
         let tolerance = tolerance(&around);
-        let (planes, face_of) = planes::of(&vertices, &triangles, tolerance);
-        let (faces, pieces) = (planes.len(), pieces(&vertices, &triangles, &face_of));
-        let (expr, planes) = Cells::formula(planes, pieces, around, tolerance)?;
+        let opposite = edges.opposite(&triangles);
+        drop(edges);
+        let (mut planes, face_of) = planes::of(&vertices, &triangles, &opposite, tolerance);
+        planes.shrink_to_fit();
+        let mut surface = Surface { vertices, triangles, planes, face_of, around, tolerance };
+        let count = surface.triangles.len();
+        if count > few {
+            let division = Arc::new(Divided::new(Arc::new(surface), &opposite)?);
+            let formula = Formula::Divided(division.clone());
+            return Ok(Self {
+                surface: division.surface().clone(),
+                cuts: Vec::new(),
+                formula,
+                division: Some(division),
+            });
+        }
+        let pieces = surface.pieces(0..count as u32);
+        let faces = surface.planes.len();
+        let (expr, mut planes) = Cells::formula(std::mem::take(&mut surface.planes), pieces, around, tolerance)?;
         let Expr::Open(tokens) = expr else { return Err(MeshFault::Flat) };
-        Ok(Self { vertices, triangles, planes, faces, formula: Formula::new(tokens) })
+        let cuts = planes.split_off(faces);
+        surface.planes = planes;
+        Ok(Self { surface: Arc::new(surface), cuts, formula: Formula::new(tokens), division: None })
     }
 
     /// Its corners.
     pub fn vertices(&self) -> &[DVec3] {
-        &self.vertices
+        &self.surface.vertices
     }
 
     /// Its triangles as indices of its corners, counter-clockwise from outside.
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+        &self.surface.triangles
     }
 
     /// Number of faces that bound it; its further faces bound nothing.
     pub fn bounding_faces(&self) -> usize {
-        self.faces
+        self.surface.planes.len()
     }
 
     /// Its moments, and how far the volume may be off. A plane may lie a few tolerances off its corners.
     fn measured(&self) -> (Moments, f64) {
-        let around = Aabb::of_points(self.vertices.iter().copied());
-        moments::of(&self.vertices, &self.triangles, around.center(), 8.0 * tolerance(&around))
+        let s = &*self.surface;
+        moments::of(&s.vertices, &s.triangles, s.around.center(), 8.0 * s.tolerance)
+    }
+
+    /// Plane of a face.
+    fn plane(&self, face: usize) -> Plane {
+        if let Some(division) = &self.division {
+            return division.plane(face);
+        }
+        let faces = self.bounding_faces();
+        let (normal, offset) = if face < faces { self.surface.planes[face] } else { self.cuts[face - faces] };
+        Plane { normal, offset }
     }
 
     /// Value of its formula at a point, its frame.
     fn value(&self, x: DVec3) -> f64 {
-        self.formula.value(&mut |f| {
-            let (n, d) = self.planes[f as usize];
-            n.dot(x) - d
-        })
+        self.formula.value(&mut |f| self.plane(f as usize).value(x))
     }
 }
 
@@ -139,66 +218,46 @@ fn tolerance(around: &Aabb) -> f64 {
     ON_PLANE * around.half().length() + 16.0 * f64::EPSILON * reach
 }
 
-/// The facets as pieces, with their edges by number. The three edges of a facet that is too thin to have a plane are one: its
-/// neighbours meet along them.
-fn pieces(vertices: &[DVec3], triangles: &[[u32; 3]], face_of: &[u32]) -> Vec<Piece> {
-    let mut ids: HashMap<(u32, u32), u32> = HashMap::with_capacity(3 * triangles.len() / 2);
-    let mut id = |a: u32, b: u32| {
-        let next = ids.len() as u32;
-        *ids.entry((a.min(b), a.max(b))).or_insert(next)
-    };
-    let edges: Vec<[u32; 3]> = triangles.iter().map(|t| [id(t[0], t[1]), id(t[1], t[2]), id(t[2], t[0])]).collect();
-    let mut same: Vec<u32> = (0..ids.len() as u32).collect();
-    fn find(same: &[u32], mut e: u32) -> u32 {
-        while same[e as usize] != e {
-            e = same[e as usize];
-        }
-        e
-    }
-    for (e, _) in edges.iter().zip(face_of).filter(|(_, f)| **f == planes::NONE) {
-        let all = e.map(|e| find(&same, e));
-        let least = all.into_iter().min().unwrap_or(CUT);
-        all.iter().for_each(|e| same[*e as usize] = least);
-    }
-    let kept = (0..triangles.len()).filter(|i| face_of[*i] != planes::NONE);
-    kept.map(|i| {
-        let corner = |k: usize| Corner { at: vertices[triangles[i][k] as usize], edge: find(&same, edges[i][k]) };
-        Piece { plane: face_of[i], corners: [corner(0), corner(1), corner(2)].into_iter().collect() }
-    })
-    .collect()
-}
-
 impl Geometry for TriangleMesh {
     fn faces(&self) -> Vec<Face> {
-        self.planes.iter().map(|&(normal, offset)| Plane { normal, offset }.into()).collect()
+        let count = self.division.as_ref().map_or(self.bounding_faces() + self.cuts.len(), |d| d.count());
+        (0..count).map(|face| self.plane(face).into()).collect()
+    }
+    fn face_count(&self) -> usize {
+        // The planes of a division take what a number takes.
+        self.bounding_faces() + self.cuts.len()
+    }
+    fn many_faces(&self) -> Option<Arc<dyn Planes>> {
+        self.division.clone().map(|d| d as Arc<dyn Planes>)
     }
     fn formula(&self) -> Option<&Formula> {
         Some(&self.formula)
     }
     fn domain(&self) -> Option<Aabb> {
-        Some(cells::domain(&Aabb::of_points(self.vertices.iter().copied())))
+        Some(cells::domain(&self.surface.around))
     }
     fn face_name(&self, index: usize) -> String {
-        if index < self.faces { format!("face {index}") } else { format!("cut {}", index - self.faces) }
+        let faces = self.bounding_faces();
+        if index < faces { format!("face {index}") } else { format!("cut {}", index - faces) }
     }
     fn aabb(&self, frame: &Pose) -> Aabb {
-        Aabb::of_points(self.vertices.iter().map(|v| frame.point(*v)))
+        Aabb::of_points(self.vertices().iter().map(|v| frame.point(*v)))
     }
     fn ball(&self) -> Ball {
-        Ball::of_points(&self.vertices)
+        Ball::of_points(self.vertices())
     }
     fn smallest_dimension(&self) -> f64 {
-        2.0 * Aabb::of_points(self.vertices.iter().copied()).half().min_element()
+        2.0 * self.surface.around.half().min_element()
     }
     fn interior_point(&self) -> DVec3 {
         // Inwards from the middle of the largest facet, halving until it is inside.
-        let corners = self.triangles.iter().map(|t| t.map(|v| self.vertices[v as usize]));
+        let corners = self.triangles().iter().map(|t| t.map(|v| self.vertices()[v as usize]));
         let largest = corners.max_by(|[a, b, c], [p, q, r]| {
             planes::area(*a, *b, *c).length_squared().total_cmp(&planes::area(*p, *q, *r).length_squared())
         });
         let [p, q, r] = largest.unwrap_or_default();
         let (middle, inward) = ((p + q + r) / 3.0, -planes::area(p, q, r).normalize_or_zero());
-        let size = Aabb::of_points(self.vertices.iter().copied()).half().length();
+        let size = self.surface.around.half().length();
         let tries = (1..40).map(|k| middle + inward * (size * 0.5f64.powi(k)));
         tries.into_iter().find(|x| self.value(*x) < 0.0).unwrap_or(middle)
     }
@@ -219,13 +278,13 @@ impl Geometry for TriangleMesh {
         "mesh"
     }
     fn dimensions(&self) -> String {
-        format!("{} triangles, {} faces", self.triangles.len(), self.faces)
+        format!("{} triangles, {} faces", self.triangles().len(), self.bounding_faces())
     }
     fn write(&self, out: &mut dyn Sink) {
-        out.word(self.vertices.len());
-        out.word(self.triangles.len());
-        self.vertices.iter().for_each(|v| write_vector(out, *v));
-        self.triangles.iter().flatten().for_each(|i| out.word(*i as usize));
+        out.word(self.vertices().len());
+        out.word(self.triangles().len());
+        self.vertices().iter().for_each(|v| write_vector(out, *v));
+        self.triangles().iter().flatten().for_each(|i| out.word(*i as usize));
     }
     fn read(from: &mut dyn Source) -> Checked<Self> {
         let (corners, count) = (from.word()? as usize, from.word()? as usize);

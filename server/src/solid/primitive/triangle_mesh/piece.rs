@@ -73,6 +73,16 @@ impl Piece {
     }
 }
 
+impl Piece {
+    /// `below`, of a piece that is not wholly below as it is.
+    pub fn within(self, (n, d): (DVec3, f64), tolerance: f64) -> Option<Piece> {
+        if self.corners.iter().all(|c| n.dot(c.at) - d < -tolerance) {
+            return Some(self);
+        }
+        self.below((n, d), tolerance)
+    }
+}
+
 /// Where a segment crosses a plane, from its ends' heights above it: the same whichever end comes first.
 fn between(a: (DVec3, f64), b: (DVec3, f64)) -> DVec3 {
     let later = a.0.to_array().partial_cmp(&b.0.to_array()) == Some(std::cmp::Ordering::Greater);

@@ -1,7 +1,10 @@
 //! The planes of a mesh's facets: neighbours in one plane are one face.
 
+use super::mix::Mixed;
 use glam::DVec3;
-use std::collections::HashMap;
+use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::hash::BuildHasher;
 
 /// The plane of no face: facets too thin to have one.
 pub const NONE: u32 = u32::MAX;
@@ -42,55 +45,117 @@ fn plane_of(n: DVec3, corners: [DVec3; 3]) -> (DVec3, f64) {
     (n, if low == high { low } else { 0.5 * (low + high) })
 }
 
-/// The planes of the faces, and for each triangle its face or `NONE`.
+/// The planes of the faces, and for each triangle its face or `NONE`; `opposite` are the neighbours of each along its sides.
 ///
 /// The largest triangles gather first; a neighbour is of the same face where all its corners lie within `tolerance` (a length) of
 /// that plane and it faces the same way. Faces with the same plane to the bit are one, whether they touch or not.
-pub fn of(vertices: &[DVec3], triangles: &[[u32; 3]], tolerance: f64) -> (Vec<(DVec3, f64)>, Vec<u32>) {
-    let corners = |t: &[u32; 3]| t.map(|v| vertices[v as usize]);
-    let areas: Vec<DVec3> = triangles.iter().map(&corners).map(|[p, q, r]| area(p, q, r)).collect();
-    let mut at: HashMap<(u32, u32), u32> = HashMap::with_capacity(3 * triangles.len());
-    for (i, t) in triangles.iter().enumerate() {
-        (0..3).for_each(|k| _ = at.insert((t[k], t[(k + 1) % 3]), i as u32));
-    }
-    let thin = |i: usize| {
-        let [p, q, r] = corners(&triangles[i]);
+pub fn of(
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    opposite: &[[u32; 3]],
+    tolerance: f64,
+) -> (Vec<(DVec3, f64)>, Vec<u32>) {
+    let count = triangles.len();
+    let corners = |i: usize| triangles[i].map(|v| vertices[v as usize]);
+    let areas: Vec<DVec3> = (0..count).into_par_iter().map(&corners).map(|[p, q, r]| area(p, q, r)).collect();
+    // The plane of each by itself; of one that is too thin to have one there is no normal.
+    let own = |i: usize| {
+        let [p, q, r] = corners(i);
         let longest = p.distance(q).max(q.distance(r)).max(r.distance(p));
-        areas[i].length() <= tolerance * longest
+        if areas[i].length() <= tolerance * longest {
+            (DVec3::NAN, 0.0)
+        } else {
+            plane_of(areas[i].normalize(), [p, q, r])
+        }
     };
-    let mut order: Vec<usize> = (0..triangles.len()).filter(|i| !thin(*i)).collect();
-    order.sort_by(|a, b| areas[*b].length_squared().total_cmp(&areas[*a].length_squared()).then(a.cmp(b)));
-    let mut group = vec![NONE; triangles.len()];
-    let mut planes: Vec<(DVec3, f64)> = Vec::new();
-    let mut same: HashMap<[u64; 4], u32> = HashMap::new();
-    for seed in order {
-        if group[seed] != NONE {
+    let own: Vec<(DVec3, f64)> = (0..count).into_par_iter().map(own).collect();
+    let thin = |i: usize| own[i].0.is_nan();
+    let fits = |(n, d): (DVec3, f64), j: usize| {
+        areas[j].dot(n) > 0.0 && corners(j).iter().all(|c| (n.dot(*c) - d).abs() <= tolerance) && !thin(j)
+    };
+    let gathers = |i: &u32| {
+        let i = *i as usize;
+        !thin(i) && opposite[i].iter().any(|j| *j != NONE && fits(own[i], *j as usize))
+    };
+    let size = |i: u32| areas[i as usize].length_squared();
+    let before = |a: u32, b: u32| size(b).total_cmp(&size(a)).then(a.cmp(&b));
+    // Those that gather no neighbour are faces of their own unless one that comes before them takes them.
+    let mut seeds: Vec<u32> = (0..count as u32).into_par_iter().filter(gathers).collect();
+    seeds.par_sort_unstable_by(|a, b| before(*a, *b));
+    let mut group = vec![NONE; count];
+    let mut faces = Alike::new(&own);
+    let mut next = Vec::new();
+    for seed in seeds {
+        if group[seed as usize] != NONE {
             continue;
         }
-        let (n, d) = plane_of(areas[seed].normalize(), corners(&triangles[seed]));
-        let bits = [n.x, n.y, n.z, d].map(|v| (v + 0.0).to_bits());
-        let id = *same.entry(bits).or_insert_with(|| {
-            planes.push((n, d));
-            planes.len() as u32 - 1
-        });
-        group[seed] = id;
-        let mut next = vec![seed];
+        let id = faces.of(seed, before);
+        group[seed as usize] = id;
+        next.push(seed as usize);
         while let Some(i) = next.pop() {
-            let t = triangles[i];
-            for k in 0..3 {
-                let Some(&j) = at.get(&(t[(k + 1) % 3], t[k])) else { continue };
-                let j = j as usize;
-                let fits = || {
-                    areas[j].dot(n) > 0.0 && corners(&triangles[j]).iter().all(|c| (n.dot(*c) - d).abs() <= tolerance)
-                };
-                if group[j] == NONE && !thin(j) && fits() {
-                    group[j] = id;
-                    next.push(j);
+            for j in opposite[i] {
+                if j != NONE
+                    && group[j as usize] == NONE
+                    && fits(own[seed as usize], j as usize)
+                    && before(seed, j).is_lt()
+                {
+                    group[j as usize] = id;
+                    next.push(j as usize);
                 }
             }
         }
     }
+    for i in 0..count as u32 {
+        if group[i as usize] == NONE && !thin(i as usize) {
+            group[i as usize] = faces.of(i, before);
+        }
+    }
+    let planes = faces.first.iter().map(|seed| own[*seed as usize]).collect();
     in_file_order(planes, group)
+}
+
+/// Faces by their planes' bits.
+struct Alike<'p> {
+    planes: &'p [(DVec3, f64)],
+    /// Of each face the triangle whose plane it has.
+    first: Vec<u32>,
+    /// Faces, each at its hash or the first free place behind it.
+    table: Vec<u32>,
+}
+
+impl<'p> Alike<'p> {
+    /// None yet of so many planes.
+    fn new(planes: &'p [(DVec3, f64)]) -> Self {
+        Self { planes, first: Vec::new(), table: vec![NONE; (2 * planes.len()).next_power_of_two()] }
+    }
+
+    /// The face of a triangle's plane: it has the bits of the first that is named in the order `before`.
+    fn of(&mut self, triangle: u32, before: impl Fn(u32, u32) -> Ordering) -> u32 {
+        // Adding 0 turns -0 into 0.
+        let bits = |i: u32| {
+            let (n, d) = self.planes[i as usize];
+            [n.x, n.y, n.z, d].map(|v| (v + 0.0).to_bits())
+        };
+        let own = bits(triangle);
+        let mut at = Mixed::<(), ()>::default().hasher().hash_one(own) as usize & (self.table.len() - 1);
+        loop {
+            match self.table[at] {
+                NONE => {
+                    self.table[at] = self.first.len() as u32;
+                    self.first.push(triangle);
+                    return self.table[at];
+                }
+                face if bits(self.first[face as usize]) == own => {
+                    let first = &mut self.first[face as usize];
+                    if before(triangle, *first).is_lt() {
+                        *first = triangle;
+                    }
+                    return face;
+                }
+                _ => at = (at + 1) & (self.table.len() - 1),
+            }
+        }
+    }
 }
 
 /// Faces in the order of their first triangles.

@@ -5,9 +5,13 @@
 //! is turned. `Repair` says what was done.
 
 use super::MeshFault;
+use super::edges::Edges;
+use super::mix::Mixed;
 use crate::math::Aabb;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::HashMap;
+use std::hash::BuildHasher;
 
 /// Points nearer to each other than this, relative to the diagonal of the mesh's box, are one where edges would stay open: single
 /// precision, which most files are in, has seven digits.
@@ -57,6 +61,8 @@ pub struct Shell {
     pub vertices: Vec<DVec3>,
     /// Counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Its edges.
+    pub edges: Edges,
 }
 
 impl Shell {
@@ -72,11 +78,11 @@ impl Shell {
         }
         let mut repair = Repair::default();
         let mut shell = Self::welded(points, triangles, &equal(points), &mut repair);
-        if let Err(fault) = shell.closed() {
+        if let Err(fault) = shell.edges.are_closed(&shell.vertices, &shell.triangles) {
             let mut rough = Repair::default();
             let near = near(&shell.vertices, WELD * size, &mut rough);
             shell = Self::welded(&shell.vertices, &shell.triangles, &near, &mut rough);
-            shell.closed().map_err(|_| fault)?;
+            shell.edges.are_closed(&shell.vertices, &shell.triangles).map_err(|_| fault)?;
             repair = Repair { dropped: repair.dropped + rough.dropped, ..rough };
         }
         let volume = shell.volume();
@@ -92,7 +98,7 @@ impl Shell {
 
     /// With the points that stand for others in place of these.
     fn welded(points: &[DVec3], triangles: &[[u32; 3]], stands_for: &[u32], repair: &mut Repair) -> Self {
-        let mut index: HashMap<u32, u32> = HashMap::new();
+        let mut index = vec![u32::MAX; points.len()];
         let (mut vertices, mut kept) = (Vec::new(), Vec::with_capacity(triangles.len()));
         for t in triangles {
             let [a, b, c] = t.map(|v| stands_for[v as usize]);
@@ -101,31 +107,18 @@ impl Shell {
                 continue;
             }
             kept.push([a, b, c].map(|v| {
-                *index.entry(v).or_insert_with(|| {
+                let place = &mut index[v as usize];
+                if *place == u32::MAX {
+                    *place = vertices.len() as u32;
                     vertices.push(points[v as usize]);
-                    vertices.len() as u32 - 1
-                })
+                }
+                *place
             }));
         }
-        Self { vertices, triangles: kept }
-    }
-
-    /// Every edge is run along as often in one direction as in the other.
-    fn closed(&self) -> Result<(), MeshFault> {
-        // Times there less times back, times altogether; by the triangle that comes first.
-        let mut runs: HashMap<(u32, u32), (i32, u32, u32)> = HashMap::with_capacity(3 * self.triangles.len() / 2);
-        for (i, t) in self.triangles.iter().enumerate() {
-            for k in 0..3 {
-                let (a, b) = (t[k], t[(k + 1) % 3]);
-                let run = runs.entry((a.min(b), a.max(b))).or_insert((0, 0, i as u32));
-                run.0 += if a < b { 1 } else { -1 };
-                run.1 += 1;
-            }
-        }
-        let wrong = runs.iter().filter(|(_, run)| run.0 != 0).min_by_key(|(edge, run)| (run.2, **edge));
-        let Some((&(a, b), &(_, times, _))) = wrong else { return Ok(()) };
-        let [a, b] = [a, b].map(|v| self.vertices[v as usize]);
-        Err(if times == 1 { MeshFault::Open(a, b) } else { MeshFault::Mixed(a, b) })
+        vertices.shrink_to_fit();
+        kept.shrink_to_fit();
+        let edges = Edges::of(&kept);
+        Self { vertices, triangles: kept, edges }
     }
 
     /// Enclosed volume, negative inside out.
@@ -136,12 +129,40 @@ impl Shell {
     }
 }
 
+/// Points from which on those of equal hashes are looked through side by side.
+const MANY: usize = 100_000;
+/// In so many shares.
+const SHARES: usize = 64;
+
 /// Of each point the first that is equal to it.
 fn equal(points: &[DVec3]) -> Vec<u32> {
-    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(points.len());
     // Adding 0 turns -0 into 0.
     let key = |p: &DVec3| (*p + DVec3::ZERO).to_array().map(f64::to_bits);
-    points.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
+    if points.len() < MANY {
+        let mut first: Mixed<[u64; 3], u32> = Mixed::with_capacity_and_hasher(points.len(), Default::default());
+        return points.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect();
+    }
+    let share = |p: &DVec3| (Mixed::<(), ()>::default().hasher().hash_one(key(p)) >> 58) as usize % SHARES;
+    let shares: Vec<u8> = points.par_iter().map(|p| share(p) as u8).collect();
+    let mut ends = [0usize; SHARES + 1];
+    shares.iter().for_each(|s| ends[*s as usize + 1] += 1);
+    (0..SHARES).for_each(|s| ends[s + 1] += ends[s]);
+    let (mut order, mut at) = (vec![0u32; points.len()], ends);
+    for (i, s) in shares.iter().enumerate() {
+        order[at[*s as usize]] = i as u32;
+        at[*s as usize] += 1;
+    }
+    let firsts = |s: usize| {
+        let own = &order[ends[s]..ends[s + 1]];
+        let mut first: Mixed<[u64; 3], u32> = Mixed::with_capacity_and_hasher(own.len() / 4, Default::default());
+        own.iter().map(|i| *first.entry(key(&points[*i as usize])).or_insert(*i)).collect::<Vec<u32>>()
+    };
+    let found: Vec<Vec<u32>> = (0..SHARES).into_par_iter().map(firsts).collect();
+    let mut out = vec![0u32; points.len()];
+    for (i, first) in order.iter().zip(found.iter().flatten()) {
+        out[*i as usize] = *first;
+    }
+    out
 }
 
 /// Of each point the first within `reach` of it that stands for itself.

@@ -9,12 +9,12 @@ type Mesh = (Vec<DVec3>, Vec<[u32; 3]>);
 /// How often a mesh winds around a point: its solid angle there over 4π (A. van Oosterom, J. Strackee 1983).
 fn winding(m: &TriangleMesh, x: DVec3) -> f64 {
     let angle = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|v| m.vertices[v as usize] - x);
+        let [a, b, c] = t.map(|v| m.vertices()[v as usize] - x);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
         let under = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
         2.0 * a.dot(b.cross(c)).atan2(under)
     };
-    m.triangles.iter().map(angle).sum::<f64>() / (4.0 * PI)
+    m.triangles().iter().map(angle).sum::<f64>() / (4.0 * PI)
 }
 
 /// Distance of a point from a triangle, by its regions.
@@ -32,7 +32,7 @@ fn distance(x: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
 }
 
 fn off(m: &TriangleMesh, x: DVec3) -> f64 {
-    let each = m.triangles.iter().map(|t| distance(x, t.map(|v| m.vertices[v as usize])));
+    let each = m.triangles().iter().map(|t| distance(x, t.map(|v| m.vertices()[v as usize])));
     each.fold(f64::INFINITY, f64::min)
 }
 
@@ -136,8 +136,8 @@ fn judge(name: &str, (points, triangles): &Mesh, r: &mut Random, count: usize) {
     println!(
         "{name}: {} triangles, {} faces, {} cuts, {tokens} tokens in {took:?}; {inside} of {count} inside; |f| >= {least:.1e} of the distance",
         triangles.len(),
-        m.faces,
-        m.planes.len() - m.faces,
+        m.bounding_faces(),
+        m.faces().len() - m.bounding_faces(),
     );
     assert!(inside > 0 && least > 1e-4, "{name}: {least}");
 }
