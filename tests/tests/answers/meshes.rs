@@ -5,6 +5,7 @@
 
 use super::kinds::{alone, pairs, past, placed, turning, values_and_volumes};
 use contactd::contact::{Outcome, QueryOptions, Scratch, Status, earliest_contact};
+use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
 use contactd::solid::Shape;
