@@ -350,7 +350,7 @@ fn every_refusal_is_a_sentence_with_its_place() {
         ),
         (
             "linear_extrude(height = 1, twist = 36000000) { circle(1); }".into(),
-            "1:1: expected at most 200000 triangles of a mesh, found more",
+            "1:1: expected at most 1000000 triangles of a mesh, found more",
         ),
         (under("[1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:13: expected a row of 4 numbers, found a list of 3"),
         (under("[1, 0, 0, nan], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:23: expected a finite number, found nan"),
