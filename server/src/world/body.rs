@@ -124,10 +124,11 @@ pub struct Body {
 
 impl Body {
     /// How far from the body's box, and from where its path length tells, those points may come at which f of the body is up to
-    /// half of `reach`: they lie outside of the box by `MeasuredModel::reach_of_level`, and where the body turns they go farther
-    /// than its own points do, by twice of that at most (the largest chord). A length.
-    pub(super) fn room(&self, reach: f64) -> f64 {
-        3.0 * self.part.reach_of_level(0.5 * reach)
+    /// half of `reach` while it goes no farther than `way` (lengths): they lie out of the box by e, see
+    /// `MeasuredModel::reach_of_level`, and where the body turns they go farther than its own points do. What no point of a ball of
+    /// radius R leaves by more than d leaves no point e out of it by more than d (1 + 2e/R), and no chord is longer than 2.
+    pub(super) fn room(&self, reach: f64, way: f64) -> f64 {
+        self.part.reach_of_level(0.5 * reach) * (1.0 + 2.0 * (way / self.reach).min(1.0))
     }
 
     /// A body of group `group`.

@@ -111,7 +111,7 @@ fn room(bodies: [&Body; 2], plan: &PairPlan, touch: f64) -> f64 {
     if !plan.reports_nearness() || bodies.iter().all(|body| is_whole(body)) {
         return 0.0;
     }
-    bodies.iter().map(|body| body.room(touch)).sum::<f64>() - plan.reach()
+    bodies.iter().map(|body| body.room(touch, f64::INFINITY)).sum::<f64>() - plan.reach()
 }
 
 /// Sorts pairs of numbers below `count`: by the first one through counting, and each of these few by the second.
@@ -183,7 +183,7 @@ impl Neighbours {
         &mut self,
         bodies: &[Body],
         moving: &[u32],
-        touch: impl Fn(&Body) -> f64,
+        reach: impl Fn(&Body, f64) -> f64,
         plan: impl Fn(u32, u32) -> Option<(u32, PairPlan, f64)>,
     ) {
         if !self.stale && moving.iter().all(|i| self.stays(*i as usize, &bodies[*i as usize])) {
@@ -207,7 +207,11 @@ impl Neighbours {
                 if body.is_static { 0.0 } else { (STEPS * way).min(MOST * body.reach()).max(LEAST * body.reach()) };
             // What turns without bounds has no way that could be told.
             let clearance = if way.is_finite() { way + more } else { 0.0 };
-            self.boxes.push(if way.is_finite() { body.still().grown(clearance + touch(body)) } else { Aabb::ALL });
+            self.boxes.push(if way.is_finite() {
+                body.still().grown(clearance + reach(body, clearance))
+            } else {
+                Aabb::ALL
+            });
             self.fences.push(path_length.start + SAFE * clearance);
             self.homes.push((body.motion_state.motion.start, clearance));
         }

@@ -17,7 +17,7 @@ pub(super) fn find(roster: &Roster, state: &mut StepState, options: &StepOptions
     if let Some(notes) = notes {
         notes.begin(*options);
     }
-    neighbours.update(&roster.bodies, moving, |body| roster.reach(body), |i, j| roster.pair(i, j));
+    neighbours.update(&roster.bodies, moving, |body, way| roster.reach(body, way), |i, j| roster.pair(i, j));
     boxes.begin(*serial, roster.bodies.len());
     jobs.clear();
     let mut sieve = Sieve { roster, neighbours, boxes, swept_shapes, notes: notes.as_deref_mut(), glanced: 0 };

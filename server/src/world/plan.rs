@@ -63,8 +63,8 @@ pub struct Plans {
     by_name: HashMap<String, u32>,
     /// For groups (g, h) that some rule is between: the rules that can name their pairs, in order.
     table: HashMap<(u32, u32), Vec<u32>>,
-    /// Of each group, how far the rules reach by which it is told of clear pairs that they are near; `None` where there is none.
-    reaches: Vec<Option<f64>>,
+    /// Largest margin of each group.
+    margins: Vec<f64>,
 }
 
 impl Plans {
@@ -101,9 +101,9 @@ impl Plans {
         &self.rules
     }
 
-    /// How far the rules that name a group reach, of those that tell of clear pairs that they are near; `None` where none does.
-    pub fn nearness_of(&self, group: u32) -> Option<f64> {
-        self.reaches.get(group as usize).copied().flatten()
+    /// How far the margins of the rules that name a group reach; 0 for most.
+    pub fn margin_of(&self, group: u32) -> f64 {
+        self.margins.get(group as usize).copied().unwrap_or(0.0)
     }
 
     /// The plan of an index.
@@ -135,17 +135,14 @@ impl Plans {
 
     fn compile(&mut self) {
         self.table.clear();
-        self.reaches.clear();
-        self.reaches.resize(self.groups.len(), None);
+        self.margins.clear();
+        self.margins.resize(self.groups.len(), 0.0);
         for (r, rule) in self.rules.iter().enumerate() {
             let [p, q] = rule.between.each_ref().map(|name| self.by_name.get(name).copied());
             let (Some(p), Some(q)) = (p, q) else { continue };
-            let plan = PairPlan(rule.effects());
-            if rule.detect != Detect::Off && plan.reports_nearness() {
-                for group in [p, q] {
-                    let reach = &mut self.reaches[group as usize];
-                    *reach = Some(reach.unwrap_or(0.0).max(plan.reach()));
-                }
+            for group in [p, q] {
+                let margin = &mut self.margins[group as usize];
+                *margin = margin.max(if rule.detect == Detect::Off { 0.0 } else { PairPlan(rule.effects()).reach() });
             }
             for key in [(p, q), (q, p)].into_iter().take(if p == q { 1 } else { 2 }) {
                 self.table.entry(key).or_default().push(r as u32);
@@ -181,7 +178,7 @@ mod tests {
         assert_eq!(detect([robot, cell], ["gripper", "plate"]), None);
         assert_eq!(detect([tool, tool], ["a", "b"]), None);
         assert_eq!(detect([tool, robot], ["a", "b"]), None);
-        assert_eq!((plans.count(), plans.nearness_of(robot)), (3, None));
+        assert_eq!((plans.count(), plans.margin_of(robot)), (3, 0.0));
     }
 
     #[test]
@@ -191,11 +188,8 @@ mod tests {
         let wide = |detect| Rule { margin: 2.0, detect, ..rule("robot", "cell") };
         plans.set(vec![wide(Detect::Continuous), rule("robot", "tool")]);
         let reach = wide(Detect::Continuous).margin * (1.0 + 2.0 * clearance::MARGIN_SLACK);
-        assert_eq!([robot, cell, tool].map(|g| plans.nearness_of(g)), [Some(reach), Some(reach), None]);
-        let patches = Rule { report: Report::Patch, ..rule("tool", "tool") };
-        plans.set(vec![wide(Detect::Continuous), patches]);
-        assert_eq!(plans.nearness_of(tool), Some(0.0));
+        assert_eq!([robot, cell, tool].map(|g| plans.margin_of(g)), [reach, reach, 0.0]);
         plans.set(vec![wide(Detect::Off), rule("robot", "tool")]);
-        assert_eq!([robot, cell, tool].map(|g| plans.nearness_of(g)), [None; 3]);
+        assert_eq!([robot, cell, tool].map(|g| plans.margin_of(g)), [0.0; 3]);
     }
 }

@@ -45,9 +45,8 @@ impl Roster {
         2.0 * self.resolution.unwrap_or(body.part.resolution)
     }
 
-    /// The same, and how far what is told of clear pairs of its group reaches: how far its neighbours do.
-    pub fn reach(&self, body: &Body) -> f64 {
-        let touch = self.touch(body);
-        touch + self.plans.nearness_of(body.group).map_or(0.0, |reach| body.room(reach.max(touch)))
+    /// The same, and how far the largest margin of its group reaches while it goes as far as `way`: how far its neighbours do.
+    pub fn reach(&self, body: &Body, way: f64) -> f64 {
+        self.touch(body) + body.room(self.plans.margin_of(body.group), way)
     }
 }
