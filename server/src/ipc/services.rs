@@ -95,6 +95,21 @@ impl CommandCall for CommandInPlace {
     }
 }
 
+/// How often what the system refuses is tried again, and after how long.
+const AGAIN: usize = 3;
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// A machine that is short of something for a moment keeps nobody from being served: what fails is tried again.
+fn patiently<T>(make: impl Fn() -> Result<T, Error>) -> Result<T, Error> {
+    for _ in 0..AGAIN {
+        if let Ok(made) = make() {
+            return Ok(made);
+        }
+        std::thread::sleep(PAUSE);
+    }
+    make()
+}
+
 /// The server's ports. Dropped in this order.
 pub struct Services {
     steps: StepServer,
@@ -112,6 +127,15 @@ impl Services {
     /// # Errors
     /// `System`.
     pub fn create(
+        address: &Address,
+        epoch: u64,
+        config: &ServerConfig,
+        status: StatusRecord,
+    ) -> Result<(Self, Notifier<Shared>), Error> {
+        patiently(|| Self::create_once(address, epoch, config, status))
+    }
+
+    fn create_once(
         address: &Address,
         epoch: u64,
         config: &ServerConfig,
@@ -226,17 +250,19 @@ impl Port for Services {
 
     /// Its service is created here.
     fn wake_of(&self, session: u64) -> Result<ClientWake, Error> {
-        let service = self
-            .node
-            .service_builder(&link::service_name(&names::wake_service_of(session))?)
-            .event()
-            .max_notifiers(1)
-            .max_listeners(1)
-            .max_nodes(2)
-            .create()
-            .map_err(|e| system("a session's wake service", e))?;
-        let notifier = service.notifier_builder().create().map_err(|e| system("a session's wake port", e))?;
-        Ok(ClientWake { notifier, service })
+        patiently(|| {
+            let service = self
+                .node
+                .service_builder(&link::service_name(&names::wake_service_of(session))?)
+                .event()
+                .max_notifiers(1)
+                .max_listeners(1)
+                .max_nodes(2)
+                .create()
+                .map_err(|e| system("a session's wake service", e))?;
+            let notifier = service.notifier_builder().create().map_err(|e| system("a session's wake port", e))?;
+            Ok(ClientWake { notifier, service })
+        })
     }
 
     fn show(&mut self, status: StatusRecord) {
