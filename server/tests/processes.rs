@@ -40,7 +40,7 @@ fn client(server: &ServerProcess, steps: u64, seed: u64) -> Child {
 #[test]
 fn a_client_process() {
     let Ok(arguments) = std::env::var("CONTACTD_TEST_CLIENT") else {
-        let dir = tempfile::tempdir().unwrap();
+        let dir = harness::runtime_folder();
         let error = Session::connect_to(Address::under(dir.path(), "nobody").unwrap()).unwrap_err();
         assert_eq!(error, Error::NoServer("nobody".into()));
         assert!(error.to_string().contains("contactd serve --name nobody"), "{error}");
@@ -438,7 +438,7 @@ fn batches_and_replies_grow_far_beyond_their_first_size() {
 
 #[test]
 fn two_servers_share_a_cache_and_a_third_begins_with_it() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = harness::runtime_folder();
     let kept = || -> Vec<(String, u64)> {
         let files = std::fs::read_dir(folder.path()).unwrap().flatten();
         let mut files: Vec<_> =

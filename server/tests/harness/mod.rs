@@ -25,7 +25,7 @@ pub struct ServerProcess {
 impl ServerProcess {
     /// Starts one and waits until it is ready.
     pub fn start(name: &str, config: &str) -> Self {
-        let runtime = tempfile::tempdir().expect("a temporary folder");
+        let runtime = runtime_folder();
         let address = Address::under(&runtime.path().join("contactd"), name).expect("an address");
         let child = spawn(runtime.path(), name, config);
         Self { address, runtime, config: config.into(), child }
@@ -131,4 +131,9 @@ fn spawn(runtime: &Path, name: &str, config: &str) -> Child {
     BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("its output");
     assert!(line.contains("ready"), "the server says: {line:?}");
     child
+}
+
+/// A folder for servers: in memory, as a user's runtime folder is, where that can be had.
+pub fn runtime_folder() -> TempDir {
+    tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).expect("a temporary folder")
 }
