@@ -3,6 +3,7 @@
 //! The distance from a convex set is convex, and that from one of its points is nowhere less. So psi lies above its tangents and below
 //! the ball of radius r around the point next to where they are taken: each bound of a sphere holds of it from that side.
 
+use super::tube::Tube;
 use super::{
     Axis, Bend, Curvature, Cylinder, Face, FaceAt, Law, NUMBERS, Section, Sphere, Stretches, Surface, Symmetry, around,
     between_roots, largest_corner, radial, tangent,
@@ -38,6 +39,12 @@ impl Capsule {
     #[inline]
     fn end(&self, z: f64) -> Option<DVec3> {
         (z.abs() > self.half).then(|| self.axis * self.half.copysign(z))
+    }
+
+    /// The tube that it is.
+    #[inline]
+    fn tube(&self) -> Tube {
+        Tube { origin: self.origin, axis: self.axis, extent: self.half, radius: self.radius }
     }
 }
 
@@ -164,21 +171,14 @@ impl Surface for Capsule {
         self.origin + self.axis * z + normal * self.radius
     }
 
-    /// r_q − r_p − |Δ| − |h_p − h_q| − |a_p − a_q| h_q: so far apart are the segments, a_q turned so that it points the way of a_p.
     #[inline]
     fn above(&self, q: &Self, _: DVec3, _: f64) -> (f64, f64) {
-        let b = if self.axis.dot(q.axis) < 0.0 { -q.axis } else { q.axis };
-        let apart = (self.origin - q.origin).length() + (self.half - q.half).abs();
-        let lean = (self.axis - b).length() * q.half;
-        let size = self.origin.length() + q.origin.length() + self.half + q.half + self.radius + q.radius;
-        (q.radius - self.radius - apart - lean, size)
+        self.tube().above(&q.tube())
     }
 
     #[inline]
     fn deviation(&self, other: &Self, _: f64) -> f64 {
-        let lean = self.axis.cross(other.axis).length() * self.half.max(other.half);
-        let apart = (self.origin - other.origin).length() + (self.half - other.half).abs();
-        lean + apart + (self.radius - other.radius).abs()
+        self.tube().deviation(&other.tube())
     }
 
     #[inline]

@@ -34,6 +34,7 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 mod torus;
+mod tube;
 
 pub use bend::{Bend, Law};
 pub use capsule::Capsule;

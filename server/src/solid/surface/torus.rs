@@ -8,6 +8,7 @@
 //!
 //! With r > R the tube meets itself: psi <= 0 is then all that either side of it holds, without an inner surface.
 
+use super::tube::Tube;
 use super::{
     Axis, Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Under, largest_corner,
     radial,
@@ -65,6 +66,12 @@ impl Torus {
     fn dip(&self, at: &Meridian, reach: f64) -> f64 {
         let (lean, _) = at.normal(self.major);
         if lean >= 0.0 { 0.0 } else { Under::dip(-lean, at.rho, reach) }
+    }
+
+    /// The tube that it is.
+    #[inline]
+    fn tube(&self) -> Tube {
+        Tube { origin: self.origin, axis: self.axis, extent: self.major, radius: self.minor }
     }
 }
 
@@ -178,21 +185,14 @@ impl Surface for Torus {
         self.bead(&self.meridian(point)).center + normal * self.minor
     }
 
-    /// r_q − r_p − |Δ| − |R_p − R_q| − |a_p − a_q| R_q: so far apart are the circles, a_q turned so that it points the way of a_p.
     #[inline]
     fn above(&self, q: &Self, _: DVec3, _: f64) -> (f64, f64) {
-        let b = if self.axis.dot(q.axis) < 0.0 { -q.axis } else { q.axis };
-        let apart = (self.origin - q.origin).length() + (self.major - q.major).abs();
-        let lean = (self.axis - b).length() * q.major;
-        let size = self.origin.length() + q.origin.length() + self.major + q.major + self.minor + q.minor;
-        (q.minor - self.minor - apart - lean, size)
+        self.tube().above(&q.tube())
     }
 
     #[inline]
     fn deviation(&self, other: &Self, _: f64) -> f64 {
-        let lean = self.axis.cross(other.axis).length() * self.major.max(other.major);
-        let apart = (self.origin - other.origin).length() + (self.major - other.major).abs();
-        lean + apart + (self.minor - other.minor).abs()
+        self.tube().deviation(&other.tube())
     }
 
     #[inline]
