@@ -304,6 +304,9 @@ fn a_limit_of_cells_counts_their_work() {
         assert!(with(allowed - 1).spent(limit) < limit && with(allowed).spent(limit) >= limit, "{limit}");
         assert!(!with(allowed).fits(limit) && with(most / 2).fits(limit), "{limit}");
         assert_eq!(Counters { cells: limit, ..Counters::default() }.spent(limit), limit);
+        // How deep an overlap is was worked out within the same limit.
+        let split = |instant_cells| Counters { cells: limit / 2, instant_cells, ..Counters::default() };
+        assert!(split(limit - limit / 2 - 1).fits(limit) && !split(limit - limit / 2).fits(limit), "{limit}");
     }
 }
 

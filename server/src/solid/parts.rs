@@ -4,6 +4,8 @@
 //! group, a part names the group nearest to it, and a group the one of the difference around its own: however many parts
 //! share them, each hole is kept once.
 //!
+//! Of a solid that is no such union as a whole the part within a region may be: what has no say there is left out.
+//!
 //! Invariant: the same holes in the same order as if each part had a list of its own, inner differences first.
 
 use crate::math::{Ball, BallTree};
@@ -52,8 +54,13 @@ pub struct Parts {
 impl Parts {
     /// The parts of a solid; `None` where it is no union of such, or of more than are looked through.
     pub fn of(solid: &Solid) -> Option<Self> {
+        Self::within(solid, &|_| true)
+    }
+
+    /// The parts of what the nodes for which `has_say` holds leave of a solid; others have neither material nor holes.
+    pub fn within(solid: &Solid, has_say: &impl Fn(NodeId) -> bool) -> Option<Self> {
         let mut parts = Self::default();
-        parts.take(solid, solid.root, None)?;
+        parts.take(&Seen { solid, has_say }, solid.root, None)?;
         Some(parts)
     }
 
@@ -97,6 +104,29 @@ impl Parts {
         best.map(|(_, _, index)| &solid.primitives[index as usize])
     }
 
+    /// The hole of a part that a point is deepest in, or else nearest to, and before others that hold it, at most `most` in all.
+    pub fn holes_at<'s>(&self, solid: &'s Solid, part: PiercedPart, point: DVec3, most: usize) -> Vec<&'s Primitive> {
+        let mut found: Vec<&Primitive> = self.deepest(solid, part, point).into_iter().collect();
+        if found.len() >= most {
+            return found;
+        }
+        for group in self.groups_of(part) {
+            let mut look = |i: u32| {
+                let hole = &solid.primitives[group.holes[i as usize] as usize];
+                let holds = found.len() < most && hole.value(point) < 0.0;
+                if holds && !found.iter().any(|other| std::ptr::eq(*other, hole)) {
+                    found.push(hole);
+                }
+                0.0
+            };
+            match &group.tree {
+                Some(tree) => tree.visit(point, &mut look),
+                None => (0..group.holes.len() as u32).for_each(|i| _ = look(i)),
+            }
+        }
+        found
+    }
+
     /// Groups of holes of a part, the inner ones first.
     fn groups_of(&self, part: PiercedPart) -> impl Iterator<Item = &Group> {
         let group = |g: Option<u32>| g.map(|g| &self.groups[g as usize]);
@@ -104,18 +134,22 @@ impl Parts {
     }
 
     /// Adds the parts below a node, from which the holes of `outer` are taken.
-    fn take(&mut self, solid: &Solid, node: NodeId, outer: Option<u32>) -> Option<()> {
+    fn take<S: Fn(NodeId) -> bool>(&mut self, seen: &Seen<S>, node: NodeId, outer: Option<u32>) -> Option<()> {
+        let solid = seen.solid;
+        if !(seen.has_say)(node) {
+            return Some(());
+        }
         match &solid.nodes[node as usize] {
             Node::Primitive(p) if self.parts.len() < MOST_PARTS && has_no_formula(solid, *p) => {
                 self.parts.push(PiercedPart { main: *p, holes: outer });
             }
-            Node::Op(Op::Union, children) => children.iter().try_for_each(|c| self.take(solid, *c, outer))?,
+            Node::Op(Op::Union, children) => children.iter().try_for_each(|c| self.take(seen, *c, outer))?,
             Node::Op(Op::Difference, children) => {
                 let (first, rest) = children.split_first()?;
                 let mut holes = Vec::new();
-                rest.iter().try_for_each(|c| convex(solid, *c, &mut holes))?;
+                rest.iter().try_for_each(|c| convex(seen, *c, &mut holes))?;
                 let group = if holes.is_empty() { outer } else { Some(self.add(solid, holes, outer)) };
-                self.take(solid, *first, group)?;
+                self.take(seen, *first, group)?;
             }
             Node::Primitive(_) | Node::Op(Op::Intersection, _) | Node::Empty => return None,
         }
@@ -131,11 +165,21 @@ impl Parts {
     }
 }
 
+/// A solid with the nodes that have a say.
+struct Seen<'s, S> {
+    solid: &'s Solid,
+    has_say: &'s S,
+}
+
 /// The convex primitives of which a subtracted node is the union; holes in it would be material.
-fn convex(solid: &Solid, node: NodeId, out: &mut Vec<u32>) -> Option<()> {
+fn convex<S: Fn(NodeId) -> bool>(seen: &Seen<S>, node: NodeId, out: &mut Vec<u32>) -> Option<()> {
+    let solid = seen.solid;
+    if !(seen.has_say)(node) {
+        return Some(());
+    }
     match &solid.nodes[node as usize] {
         Node::Primitive(p) if has_no_formula(solid, *p) => out.push(*p),
-        Node::Op(Op::Union, children) => children.iter().try_for_each(|c| convex(solid, *c, out))?,
+        Node::Op(Op::Union, children) => children.iter().try_for_each(|c| convex(seen, *c, out))?,
         Node::Primitive(_) | Node::Op(..) | Node::Empty => return None,
     }
     Some(())

@@ -9,7 +9,7 @@ use contactd::octree::Model;
 use contactd::world::memory::{Beside, Remembered};
 use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, PairPlan, StepOptions, StepOutcome, World, record};
 use contactd_proto::contact_record::{ContactRecord, DETAIL_SLOT, DetailSlot};
-use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Rule};
+use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseRecord, Report, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
 use contactd_tests::stepped::{Act, Change, Play, Thing, block, motion_states, plate};
@@ -462,6 +462,29 @@ fn regions_that_are_kept_are_those_of_bodies_that_rest() {
     }
     assert!(all.iter().all(|w| w.difference.is_none() && w.refused.is_none()), "see above");
     assert!(regions * 8 > steps, "{regions} certificates of regions in {steps} steps");
+}
+
+/// A beam on two ridges has two regions, which are told again, both of them, while it rests.
+#[test]
+fn all_regions_of_bodies_that_rest_are_told_again() {
+    let ridge = |x: f64| Recipe::cuboid(0.2, 1.0, 0.1).at(x, 0.0, 0.3);
+    let below = part(&Recipe::cuboid(2.0, 1.0, 0.2).union(ridge(-1.0)).union(ridge(1.0)));
+    let beam = part(&Recipe::cuboid(1.5, 0.3, 0.1));
+    let [above, rest] = [0.7, 0.5].map(|z| Pose::at(DVec3::Z * z));
+    let mut world = two([&below, &beam], [Pose::IDENTITY, above], 0.0);
+    let rule = Rule { report: Report::Patch, ..Rule::new(["default".into(), "default".into()]) };
+    world.set_rules(vec![rule]).expect("a rule");
+    let options = StepOptions { clear: true, ..StepOptions::default() };
+    let mut told = Vec::new();
+    for _ in 0..4 {
+        let out = world.step(&[PoseRecord::end(2, &rest)], &options).expect("a step");
+        let regions: Vec<String> = out.pairs.iter().flat_map(|p| out.regions_of(p)).map(|r| format!("{r:?}")).collect();
+        assert_eq!(regions.len(), 2, "{regions:?}");
+        told.push((out.known, regions));
+    }
+    // The first step brings it there, the second is the first at rest.
+    assert_eq!([told[2].0, told[3].0], [1, 1], "kept");
+    assert!(told[2].1 == told[1].1 && told[3].1 == told[1].1);
 }
 
 /// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,

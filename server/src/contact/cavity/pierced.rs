@@ -9,7 +9,6 @@ use crate::contact::witness::newton::{self, Constraint};
 use crate::math::any_perpendicular;
 use crate::motion::Relative;
 use crate::solid::local::LiteralId;
-use crate::solid::parts::PiercedPart;
 use crate::solid::surface::Axis;
 use crate::solid::{Primitive, Sense};
 use glam::DVec3;
@@ -88,15 +87,14 @@ pub(super) enum First {
 }
 
 impl<'a> CavityPair<'a> {
-    /// The pair of a body and a part with a cavity near it, on `side`; `None` if they are not of that kind.
+    /// The pair of a body and a primitive that is pierced by a cavity, on `side`; `None` if they are not of that kind.
     pub(super) fn new(
         task: &Task,
         primitive: &'a Primitive,
-        part: PiercedPart,
+        (main, cavity): (&Primitive, &Primitive),
         side: Side,
         relative: &'a Relative,
     ) -> Option<Self> {
-        let model = if side == Side::A { task.model_a } else { task.model_b };
         let body = CavityBody::of(primitive)?;
         let planes = |p: &Primitive| -> SmallVec<[Plane; 6]> {
             let faces = p.faces.listed().iter().enumerate();
@@ -107,9 +105,6 @@ impl<'a> CavityPair<'a> {
                 })
                 .collect()
         };
-        // The cavity that the body is deepest in, half way of the step.
-        let center = relative.at(0.5).b_point(primitive.ball.center);
-        let cavity = model.parts.as_ref()?.deepest(&model.solid, part, center)?;
         let (mut round, mut directions) = (None, [DVec3::ZERO; 8]);
         for (i, face) in cavity.faces.listed().iter().enumerate() {
             if face.is_flat() {
@@ -127,7 +122,6 @@ impl<'a> CavityPair<'a> {
             let (g, h) = ((e + f) * FRAC_1_SQRT_2, (f - e) * FRAC_1_SQRT_2);
             directions = [e, g, f, h, -e, -g, -f, -h];
         }
-        let main = &model.solid.primitives[part.main as usize];
         let (middle, half) = (main.aabb.center(), main.aabb.half());
         // A wall that the pierced body does not reach is none.
         let is_wall = |p: &Plane| p.normal.dot(middle) + p.normal.abs().dot(half) > p.offset;

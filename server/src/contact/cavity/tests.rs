@@ -279,6 +279,70 @@ fn combs_of_pegs_are_reported() {
     assert!(reported * 5 >= count * 4, "{reported} of {count}");
 }
 
+/// A block with pegs on it and, beside them, a groove with a ridge in it, which is no union of parts: but where a lid is that lowers
+/// its holes over the pegs nothing of the groove is.
+fn block_and_lid(r: &mut Random) -> [Model; 2] {
+    let leaf = |b: &mut SolidBuilder, shape: Shape, at: DVec3| b.primitive(shape, Pose::at(at), Label::default());
+    let cylinder = |radius: f64, half_height: f64| Cylinder { radius, half_height }.into();
+    let cuboid = |x: f64, y: f64, z: f64| Cuboid { half: dvec3(x, y, z) }.into();
+    let places: Vec<DVec3> =
+        (0..1 + r.within(0.0, 4.0) as usize).map(|i| dvec3(i as f64 - 1.5, r.within(-0.4, 0.4), 0.0)).collect();
+    let (capped, counterbored) = (r.within(0.0, 1.0) < 0.5, r.within(0.0, 1.0) < 0.5);
+    let mut b = SolidBuilder::new();
+    let mut body = vec![leaf(&mut b, cuboid(2.5, 1.0, 0.4), DVec3::Z * -0.4)];
+    for at in &places {
+        body.push(leaf(&mut b, cylinder(0.24, 0.5), *at + DVec3::Z * 0.4));
+        if capped {
+            // An edge of its own that is none of the peg's.
+            body.push(leaf(&mut b, cylinder(0.24, 0.1), *at + DVec3::Z));
+        }
+    }
+    let groove = [(0.2, 0.9, 0.1), (0.1, 0.8, 0.2)];
+    let groove = groove.map(|(x, y, z)| leaf(&mut b, cuboid(x, y, z), DVec3::X * 2.2));
+    let body = b.operation(Op::Union, &body);
+    let groove = b.operation(Op::Difference, &groove);
+    let block = b.operation(Op::Difference, &[body, groove]);
+    let block = Model::new(b.finish(block));
+
+    let mut b = SolidBuilder::new();
+    // Ribs on top: with them there are more pairs of parts than are looked at.
+    let mut body = vec![leaf(&mut b, cuboid(2.5, 1.0, 0.2), DVec3::ZERO)];
+    let rib = |i: i32| DVec3::new(f64::from(i) * 0.06 - 2.1, 0.0, 3.0);
+    body.extend((0..70).map(|i| leaf(&mut b, cuboid(0.02, 0.9, 0.1), rib(i))));
+    let mut lid = vec![b.operation(Op::Union, &body)];
+    for at in &places {
+        lid.push(leaf(&mut b, cylinder(0.25, 0.5), *at));
+        if counterbored {
+            lid.push(leaf(&mut b, cylinder(0.35, 0.3), *at + DVec3::Z * 0.4));
+        }
+    }
+    let lid = b.operation(Op::Difference, &lid);
+    [block, Model::new(b.finish(lid))]
+}
+
+/// Also the long form: `CONTACTD_CAVITY_SCENES=2000 cargo test --release -p contactd --lib cavity:: -- --nocapture`.
+#[test]
+fn parts_within_the_region_are_reported() {
+    let lids = std::env::var("CONTACTD_CAVITY_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(24);
+    let (mut reported, mut met) = (0, 0);
+    for seed in 0..lids {
+        let mut own = Random(0x6c69_6400 + seed);
+        let [block, lid] = block_and_lid(&mut own);
+        let draw = |_: &mut Random| {
+            let r = &mut own;
+            let at = across(r, 0.004) + DVec3::Z * r.within(0.35, 1.6);
+            let tilt = if r.within(0.0, 1.0) < 0.5 { DVec3::ZERO } else { r.vector(0.002) };
+            let turn = if r.within(0.0, 1.0) < 0.5 { DVec3::ZERO } else { r.vector(0.02) };
+            let by = across(r, 0.1) + DVec3::Z * r.within(-0.2, 0.1);
+            (rest(), moving(at, tilt, by, turn))
+        };
+        let sum = compare(&format!("lid {seed}"), 4, draw, &block, &lid);
+        (reported, met) = (reported + sum.reported as u64, met + sum.met as u64);
+    }
+    println!("reported: {reported} of {}, {met} with a contact", 4 * lids);
+    assert!(reported >= 2 * lids && met >= lids, "{reported}, {met} of {}", 4 * lids);
+}
+
 #[test]
 fn a_proof_does_not_jump_over_an_arc() {
     // A ball on an arm of .5 swings through an arc along a pipe with .05 to spare. The arc's middle is off the axis by .06, or by
@@ -313,8 +377,9 @@ fn a_proof_does_not_jump_over_an_arc() {
         } else {
             (task.model_a, task.b, Side::A, &seen)
         };
-        let part = of_pipe.parts.as_ref().expect("a pipe").all()[0];
-        let pair = CavityPair::new(&task, &of_ball.primitives[0], part, side, relative).expect("a ball in a pipe");
+        let [main, hole] = [0, 1].map(|i| &of_pipe.solid.primitives[i]);
+        let pair =
+            CavityPair::new(&task, &of_ball.primitives[0], (main, hole), side, relative).expect("a ball in a pipe");
         let ends = [0.0, 1.0].map(|t| pair.best(&pair.moment(t), Wall::Round(DVec3::X)).phi);
         assert!(ends.iter().all(|phi| *phi > 0.0), "{ends:?}");
         let (verdict, _) = pair.prove(1.0, None);
