@@ -475,16 +475,15 @@ fn all_regions_of_bodies_that_rest_are_told_again() {
     let rule = Rule { report: Report::Patch, ..Rule::new(["default".into(), "default".into()]) };
     world.set_rules(vec![rule]).expect("a rule");
     let options = StepOptions { clear: true, ..StepOptions::default() };
+    // It comes to rest in the first step, and touches from the second on.
+    world.step(&[PoseRecord::end(2, &rest)], &options).expect("a step");
     let mut told = Vec::new();
     for _ in 0..4 {
         let out = world.step(&[PoseRecord::end(2, &rest)], &options).expect("a step");
-        let regions: Vec<String> = out.pairs.iter().flat_map(|p| out.regions_of(p)).map(|r| format!("{r:?}")).collect();
-        assert_eq!(regions.len(), 2, "{regions:?}");
-        told.push((out.known, regions));
+        let regions = out.pairs.iter().flat_map(|p| out.regions_of(p));
+        told.push(regions.map(|r| format!("{r:?}")).collect::<Vec<_>>());
     }
-    // The first step brings it there, the second is the first at rest.
-    assert_eq!([told[2].0, told[3].0], [1, 1], "kept");
-    assert!(told[2].1 == told[1].1 && told[3].1 == told[1].1);
+    assert!(told.iter().all(|regions| regions.len() == 2 && *regions == told[0]), "{told:#?}");
 }
 
 /// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,
