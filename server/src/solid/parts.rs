@@ -11,6 +11,10 @@
 use crate::math::{Ball, BallTree};
 use crate::solid::{Node, NodeId, Op, Primitive, Solid};
 use glam::DVec3;
+use smallvec::SmallVec;
+
+/// Some holes of a part.
+pub type Holes<'s> = SmallVec<[&'s Primitive; 4]>;
 
 /// Parts of one solid that are looked through.
 const MOST_PARTS: usize = 256;
@@ -105,8 +109,8 @@ impl Parts {
     }
 
     /// The hole of a part that a point is deepest in, or else nearest to, and before others that hold it, at most `most` in all.
-    pub fn holes_at<'s>(&self, solid: &'s Solid, part: PiercedPart, point: DVec3, most: usize) -> Vec<&'s Primitive> {
-        let mut found: Vec<&Primitive> = self.deepest(solid, part, point).into_iter().collect();
+    pub fn holes_at<'s>(&self, solid: &'s Solid, part: PiercedPart, point: DVec3, most: usize) -> Holes<'s> {
+        let mut found: Holes = self.deepest(solid, part, point).into_iter().collect();
         if found.len() >= most {
             return found;
         }

@@ -47,7 +47,10 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
     if let (Some(of_a), Some(of_b)) = (&task.model_a.parts, &task.model_b.parts)
         && of_a.all().len() * of_b.all().len() <= MOST_PAIRS
     {
-        let pairs: Vec<_> = of_a.all().iter().flat_map(|a| of_b.all().iter().map(|b| (*a, *b))).collect();
+        if !of_a.are_pierced() && !of_b.are_pierced() {
+            return None;
+        }
+        let pairs: SmallVec<[_; 4]> = of_a.all().iter().flat_map(|a| of_b.all().iter().map(|b| (*a, *b))).collect();
         return of_pairs(contacts, [of_a, of_b], &pairs, 1);
     }
     // At a negative depth a point lies beyond the boxes of its primitives.
@@ -78,19 +81,19 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
             return None;
         }
     }
+    if !of_a.are_pierced() && !of_b.are_pierced() {
+        return None;
+    }
     of_pairs(contacts, [&of_a, &of_b], &pairs, MOST_TRIED)
 }
 
-/// The answer for pairs of parts, beside which nothing can meet; up to `most` cavities of a part are tried for each body.
+/// The answer for pairs of parts, of which some are pierced, beside which nothing can meet; up to `most` cavities of a part are tried for each body.
 fn of_pairs(
     contacts: &mut Contacts,
     [of_a, of_b]: [&Parts; 2],
     parts: &[(PiercedPart, PiercedPart)],
     most: usize,
 ) -> Option<Ending> {
-    if !of_a.are_pierced() && !of_b.are_pierced() {
-        return None;
-    }
     let task = contacts.task;
     let (placed_a, placed_b) = task.relative.placed();
     let seen_from_a = Relative::new(placed_b, placed_a);
