@@ -17,8 +17,9 @@ mod body;
 mod pierced;
 mod proof;
 
-use crate::bound::pair::{Side as Operand, locate};
+use crate::bound::Region;
 use crate::contact::exclusion::literal::Side;
+use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::math::Aabb;
@@ -35,7 +36,7 @@ const MOST_PAIRS: usize = 256;
 /// As many of them within a collision region, those apart by their boxes left out; and most primitives of a region that is looked at.
 const MOST_NEAR: usize = 48;
 const MOST_LEFT: usize = 96;
-/// Cavities of one part that are tried for one body.
+/// Cavities of one part that are tried for one body within a region.
 const MOST_TRIED: usize = 3;
 /// Contacts that are solved for before a pair is left to the contacts.
 const MOST_CONTACTS: usize = 6;
@@ -50,131 +51,169 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
         if !of_a.are_pierced() && !of_b.are_pierced() {
             return None;
         }
-        let pairs: SmallVec<[_; 4]> = of_a.all().iter().flat_map(|a| of_b.all().iter().map(|b| (*a, *b))).collect();
-        return of_pairs(contacts, [of_a, of_b], &pairs, 1);
+        let pairs = of_a.all().iter().flat_map(|a| of_b.all().iter().map(|b| (*a, *b))).collect();
+        return Unions::new(&task, [of_a, of_b], pairs, false).answer(contacts);
     }
     // At a negative depth a point lies beyond the boxes of its primitives.
     if task.delta <= 0.0 || !task.strategies.region {
         return None;
     }
-    let (placed_a, placed_b) = task.relative.placed();
-    let [a, b] = [(task.model_a, placed_a), (task.model_b, placed_b)].map(|(model, placed)| Operand {
-        solid: &model.solid,
-        bounds: model.bounds_for(task.delta),
-        placed,
-    });
-    let region = locate(&a, &b, 0.0, 1.0, task.delta)?;
+    let region = contacts.region(0.0, 1.0)?;
     if region.a.primitives + region.b.primitives > MOST_LEFT {
         return None;
     }
     let of_a = Parts::within(task.a, &|n| region.a.node_alive(n))?;
     let of_b = Parts::within(task.b, &|n| region.b.node_alive(n))?;
+    if !of_a.are_pierced() && !of_b.are_pierced() {
+        return None;
+    }
+    let pairs = near(&task, &region, &of_a, &of_b)?;
+    Unions::new(&task, [&of_a, &of_b], pairs, true).answer(contacts)
+}
+
+/// Parts of both bodies by pairs.
+type Pairs = SmallVec<[(PiercedPart, PiercedPart); 4]>;
+
+/// The pairs of parts that may meet within a collision region: their boxes do, those of b swept. `None` where there are many.
+fn near(task: &Task, region: &Region, of_a: &Parts, of_b: &Parts) -> Option<Pairs> {
+    let (placed_a, placed_b) = task.relative.placed();
     let sweep = Sweep::new(placed_b, placed_a);
-    let of =
+    let left =
         |solid: &Solid, part: &PiercedPart, left: &Aabb| solid.primitives[part.main as usize].aabb.intersection(left);
-    let boxes_a: Vec<Aabb> = of_a.all().iter().map(|a| of(task.a, a, &region.a.aabb)).collect();
-    let mut pairs = Vec::new();
+    let boxes_a: Vec<Aabb> = of_a.all().iter().map(|a| left(task.a, a, &region.a.aabb)).collect();
+    let mut pairs = Pairs::new();
     for b in of_b.all() {
-        let swept = sweep.of_box(&of(task.b, b, &region.b.aabb), 0.0, 1.0);
+        let swept = sweep.of_box(&left(task.b, b, &region.b.aabb), 0.0, 1.0);
         pairs.extend(of_a.all().iter().zip(&boxes_a).filter(|(_, own)| own.meets(&swept)).map(|(a, _)| (*a, *b)));
         if pairs.len() > MOST_NEAR {
             return None;
         }
     }
-    if !of_a.are_pierced() && !of_b.are_pierced() {
-        return None;
-    }
-    of_pairs(contacts, [&of_a, &of_b], &pairs, MOST_TRIED)
+    Some(pairs)
 }
 
-/// The answer for pairs of parts, of which some are pierced, beside which nothing can meet; up to `most` cavities of a part are tried for each body.
-fn of_pairs(
-    contacts: &mut Contacts,
-    [of_a, of_b]: [&Parts; 2],
-    parts: &[(PiercedPart, PiercedPart)],
-    most: usize,
-) -> Option<Ending> {
-    let task = contacts.task;
-    let (placed_a, placed_b) = task.relative.placed();
-    let seen_from_a = Relative::new(placed_b, placed_a);
-    // A body and a cavity of either side, the cavities first that the body is in half way of the step, deepest first.
-    let cavities = |(a, b): (PiercedPart, PiercedPart)| -> SmallVec<[CavityPair; 2]> {
+/// Two unions of parts, some of them pierced, and the pairs of parts beside which nothing can meet.
+struct Unions<'s, 'a> {
+    task: &'s Task<'a>,
+    of_a: &'s Parts,
+    of_b: &'s Parts,
+    pairs: Pairs,
+    /// The motion with the bodies exchanged.
+    seen_from_a: Relative,
+    /// The parts are those of a collision region. There a part is often one end of others, so that not every edge that it has is met,
+    /// and lies in several cavities: contacts are solved for at once, and more than one cavity is tried.
+    in_region: bool,
+}
+
+/// What is to be proven of a pair of parts, by its index, and the direction of a round wall to be looked at first.
+struct Claim<'u> {
+    pair: CavityPair<'u>,
+    index: usize,
+    toward: Option<DVec3>,
+}
+
+impl<'s, 'a> Unions<'s, 'a> {
+    fn new(task: &'s Task<'a>, [of_a, of_b]: [&'s Parts; 2], pairs: Pairs, in_region: bool) -> Self {
+        let (placed_a, placed_b) = task.relative.placed();
+        Self { task, of_a, of_b, pairs, seen_from_a: Relative::new(placed_b, placed_a), in_region }
+    }
+
+    fn answer(&self, contacts: &mut Contacts) -> Option<Ending> {
+        let mut solved = 0;
+        let claims = self.look(contacts, &mut solved)?;
+        for claim in &claims {
+            self.prove(contacts, claim, &mut solved)?;
+        }
+        Some(contacts.end())
+    }
+
+    /// The body of one part with a cavity of the other, those first that it is in half way of the step, and the one before that it is
+    /// deepest in; then the other way round.
+    fn cavities(&self, index: usize) -> SmallVec<[CavityPair<'_>; 2]> {
+        let (a, b) = self.pairs[index];
+        let Self { task, of_a, of_b, seen_from_a, .. } = self;
         let (main_a, main_b) = (&task.a.primitives[a.main as usize], &task.b.primitives[b.main as usize]);
+        let most = if self.in_region { MOST_TRIED } else { 1 };
         let center = task.relative.at(0.5).b_point(main_a.ball.center);
         let of_b = of_b.holes_at(task.b, b, center, most).into_iter();
-        let of_b = of_b.filter_map(|hole| CavityPair::new(&task, main_a, (main_b, hole), Side::B, &task.relative));
+        let of_b = of_b.filter_map(|hole| CavityPair::new(task, main_a, (main_b, hole), Side::B, &task.relative));
         let center = seen_from_a.at(0.5).b_point(main_b.ball.center);
         let of_a = of_a.holes_at(task.a, a, center, most).into_iter();
-        let of_a = of_a.filter_map(|hole| CavityPair::new(&task, main_b, (main_a, hole), Side::A, &seen_from_a));
-        of_b.chain(of_a).take(if most == 1 { 1 } else { 2 * most }).collect()
-    };
-    let mut pairs: SmallVec<[(CavityPair, usize, Option<DVec3>); 1]> = SmallVec::new();
-    let mut guess: Option<(usize, Guess)> = None;
-    let mut until: f64 = 1.0;
-    'parts: for (i, both) in parts.iter().enumerate() {
-        for pair in cavities(*both) {
-            // Later ones than what is known are not looked for to their end.
-            match pair.first(until, &mut contacts.counters.closed_forms) {
-                // What starts as near as it may be is told where it comes no deeper.
-                First::Near => {
-                    let (verdict, looks) = pair.prove(1.0, None);
-                    contacts.counters.closed_forms += looks;
-                    if verdict != ProofEnd::Proven {
-                        continue;
-                    }
-                }
-                First::Never => pairs.push((pair, i, None)),
-                First::Guess(g) => {
-                    let toward = if let Wall::Round(u) = g.wall { Some(u) } else { None };
-                    if most == 1 {
-                        until = until.min(g.t);
-                        if guess.as_ref().is_none_or(|(_, other)| g.t < other.t) {
-                            guess = Some((pairs.len(), g));
+        let of_a = of_a.filter_map(|hole| CavityPair::new(task, main_b, (main_a, hole), Side::A, seen_from_a));
+        of_b.chain(of_a).take(if self.in_region { 2 * MOST_TRIED } else { 1 }).collect()
+    }
+
+    /// Looks for the first contact of each pair, and solves for it; what is left to be proven. `None` where a pair may touch at the
+    /// start, or is not of the kind.
+    fn look(&self, contacts: &mut Contacts, solved: &mut usize) -> Option<SmallVec<[Claim<'_>; 1]>> {
+        let mut claims: SmallVec<[Claim; 1]> = SmallVec::new();
+        let mut guess: Option<(usize, Guess)> = None;
+        // Later ones than what is known are not looked for to their end.
+        let mut until: f64 = 1.0;
+        'pairs: for index in 0..self.pairs.len() {
+            for pair in self.cavities(index) {
+                let mut toward = None;
+                match pair.first(until, &mut contacts.counters.closed_forms) {
+                    // What starts as near as it may be is told where it comes no deeper.
+                    First::Near if proves(contacts, &pair, 1.0, None) == ProofEnd::Proven => continue 'pairs,
+                    First::Near => continue,
+                    First::Never => {}
+                    First::Guess(g) => {
+                        if let Wall::Round(u) = g.wall {
+                            toward = Some(u);
                         }
-                    } else if pair.solve(contacts, &g) {
-                        // Where parts end in others, not every edge that one of them has is met: what is not does not hide a later
-                        // contact.
-                        until = until.min(contacts.goal());
+                        if !self.in_region {
+                            until = until.min(g.t);
+                            if guess.as_ref().is_none_or(|(_, other)| g.t < other.t) {
+                                guess = Some((claims.len(), g));
+                            }
+                        } else if pair.solve(contacts, &g) {
+                            until = until.min(contacts.goal());
+                        }
                     }
-                    pairs.push((pair, i, toward));
                 }
+                claims.push(Claim { pair, index, toward });
+                continue 'pairs;
             }
-            continue 'parts;
+            return None;
         }
-        return None;
+        if let Some((i, g)) = &guess {
+            *solved += 1;
+            // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
+            claims[*i].pair.solve(contacts, g);
+        }
+        Some(claims)
     }
-    let mut solved = 0;
-    if let Some((i, g)) = &guess {
-        solved += 1;
-        // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
-        pairs[*i].0.solve(contacts, g);
-    }
-    for (pair, i, toward) in &pairs {
+
+    /// Proves that a pair does not meet before the first contact, which is found first where the proof meets it; `None` if it cannot.
+    fn prove(&self, contacts: &mut Contacts, claim: &Claim, solved: &mut usize) -> Option<()> {
         loop {
-            let end = contacts.goal().min(1.0);
-            let (verdict, looks) = pair.prove(end, *toward);
-            contacts.counters.closed_forms += looks;
-            let ProofEnd::Proven = verdict else {
-                if let ProofEnd::Met(t, wall) = verdict
-                    && solved < MOST_CONTACTS
-                {
-                    solved += 1;
-                    let goal = contacts.goal();
-                    let guess = pair.settle(t, wall, 0.0, &mut contacts.counters.closed_forms);
-                    if pair.solve(contacts, &guess) && contacts.goal() < goal {
+            let goal = contacts.goal();
+            match proves(contacts, &claim.pair, goal.min(1.0), claim.toward) {
+                ProofEnd::Proven => return Some(()),
+                ProofEnd::Met(t, wall) if *solved < MOST_CONTACTS => {
+                    *solved += 1;
+                    let guess = claim.pair.settle(t, wall, 0.0, &mut contacts.counters.closed_forms);
+                    if claim.pair.solve(contacts, &guess) && contacts.goal() < goal {
                         continue;
                     }
                 }
-                // What one cavity does not show another one may, or the same parts the other way round.
-                if most > 1 && cavities(parts[*i]).iter().any(|other| other.prove(end, None).0 == ProofEnd::Proven) {
-                    break;
-                }
-                return None;
-            };
-            break;
+                ProofEnd::Met(..) | ProofEnd::Open => {}
+            }
+            // What one cavity does not show another one may, or the same parts the other way round.
+            let end = contacts.goal().min(1.0);
+            let others = if self.in_region { self.cavities(claim.index) } else { SmallVec::new() };
+            let shown = others.iter().any(|other| proves(contacts, other, end, None) == ProofEnd::Proven);
+            return shown.then_some(());
         }
     }
-    Some(contacts.end())
+}
+
+/// `CavityPair::prove`, counted.
+fn proves(contacts: &mut Contacts, pair: &CavityPair, end: f64, toward: Option<DVec3>) -> ProofEnd {
+    let (end, looks) = pair.prove(end, toward);
+    contacts.counters.closed_forms += looks;
+    end
 }
 
 #[cfg(test)]

@@ -2,6 +2,8 @@
 
 use super::options::QueryOptions;
 use super::question::{PairQuery, Strategies, without_own_spin};
+use crate::bound::Region;
+use crate::bound::pair::{Side as Operand, locate};
 use crate::contact::exclusion::literal::{Faces, View};
 use crate::contact::exclusion::rounding;
 use crate::math::tolerance;
@@ -9,6 +11,7 @@ use crate::motion::{Bounds, Instant, Relative};
 use crate::octree::Model;
 use crate::solid::{Face, Solid};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// What to search: two solids, their motion, a depth, a limit.
 #[derive(Clone, Copy, Debug)]
@@ -122,6 +125,20 @@ impl<'a> Task<'a> {
     /// overlap, and do so later than bodies are near each other.
     pub(in crate::contact) fn continues(&self) -> bool {
         self.query_options.time() && self.ignored_depth == 0.0 && self.delta > 0.0
+    }
+
+    /// The margin of S-bounds, octree and walk that holds {f <= −delta}: they keep f clamped to it. A clearance is a negative depth;
+    /// at −g what is left of f reaches g beyond the surface, at corners further.
+    pub fn level(&self) -> f64 {
+        self.delta.abs()
+    }
+
+    /// Stage 1 over [t0, t1]: what of both bodies can take part; `None` where nothing can meet.
+    pub fn region(&self, t0: f64, t1: f64) -> Option<Arc<Region>> {
+        let (placed_a, placed_b) = self.relative.placed();
+        let a = Operand { solid: self.a, bounds: self.model_a.bounds_for(self.level()), placed: placed_a };
+        let b = Operand { solid: self.b, bounds: self.model_b.bounds_for(self.level()), placed: placed_b };
+        locate(&a, &b, t0, t1, self.level()).map(Arc::new)
     }
 
     /// The largest f that a point searched for may have in a body: 0 at depths, the distance at a clearance.

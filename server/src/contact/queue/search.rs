@@ -235,8 +235,12 @@ impl<'a> Search<'a> {
             Source::Cell => self.contacts.counters.cells += 1,
             Source::Slice => {
                 self.items.scratch.enter(Stage::Region);
-                Slices { task: &self.contacts.task, items: &mut self.items, counters: &mut self.contacts.counters }
-                    .locate(&cell);
+                let located = self.contacts.task.strategies.region.then(|| self.contacts.region(cell.t, cell.until));
+                if !matches!(located, Some(None)) {
+                    let counters = &mut self.contacts.counters;
+                    Slices { task: &self.contacts.task, items: &mut self.items, counters }
+                        .decompose(&cell, located.flatten());
+                }
                 self.items.scratch.enter(Stage::Cells);
                 return None;
             }

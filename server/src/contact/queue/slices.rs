@@ -14,7 +14,7 @@ use super::items::Items;
 use super::roots;
 use super::roots::Root;
 use crate::bound::Region;
-use crate::bound::pair::{Pruned, Side as Operand, locate};
+use crate::bound::pair::Pruned;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::outcome::Counters;
 use crate::contact::query::task::Task;
@@ -49,19 +49,14 @@ pub(super) struct Slices<'s, 'a> {
 }
 
 impl<'a> Slices<'_, 'a> {
-    /// Stage 1 on a slice of time.
-    pub(super) fn locate(&mut self, cell: &Cell) {
+    /// Halves a slice of time, or hands what `region`, which stage 1 has left of both bodies in it, holds to stage 3; all of them
+    /// without one.
+    pub(super) fn decompose(&mut self, cell: &Cell, region: Option<Arc<Region>>) {
         let (t0, t1) = (cell.t, cell.until);
         let (placed_a, placed_b) = self.task.relative.placed();
         let (model_a, model_b) = (self.task.model_a, self.task.model_b);
-        // A clearance is a negative depth. S-bounds, octree and walk keep f clamped to ±margin, so with a margin of |delta| they
-        // hold {f <= −delta} whatever the sign is: at −g what is left of f reaches g beyond the surface, at corners further.
-        let level = self.task.delta.abs();
-        let mut region = None;
-        if self.task.strategies.region {
-            let a = Operand { solid: self.task.a, bounds: model_a.bounds_for(level), placed: placed_a };
-            let b = Operand { solid: self.task.b, bounds: model_b.bounds_for(level), placed: placed_b };
-            let Some(found) = locate(&a, &b, t0, t1, level) else { return };
+        let level = self.task.level();
+        if let Some(found) = &region {
             let left = found.a.primitives + found.b.primitives;
             let span = found.a.aabb.half().length().min(found.b.aabb.half().length());
             let bounds = self.task.relative.bounds(t0, t1 - t0, self.task.scale);
@@ -73,7 +68,6 @@ impl<'a> Slices<'_, 'a> {
                 return;
             }
             self.counters.after_stage1 = self.counters.after_stage1.max(left as u64);
-            region = Some(Arc::new(found));
         }
         self.items.scratch.enter(Stage::Walk);
         let (mut a, mut b) = (Vec::new(), Vec::new());

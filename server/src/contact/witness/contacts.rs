@@ -10,6 +10,7 @@ use super::known::Known;
 use super::newton::{Actives, Constraint, Problem, SETTLED, Solution, Weights};
 use super::sides::{deciding, has_both_sides};
 use super::touch::Touch;
+use crate::bound::Region;
 use crate::contact::exclusion::clause::Hint;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::outcome::Counters;
@@ -17,6 +18,7 @@ use crate::contact::query::task::{Task, witness_level};
 use crate::solid::Sense;
 use glam::DVec3;
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
@@ -46,12 +48,24 @@ pub struct Contacts<'a> {
     pub now: f64,
     /// Work done so far.
     pub counters: Counters,
+    /// The collision region of the whole step, once it was asked for; within: `None` where nothing can meet.
+    region: Option<Option<Arc<Region>>>,
 }
 
 impl<'a> Contacts<'a> {
     /// None so far.
     pub fn new(task: Task<'a>) -> Self {
-        Self { task, found: None, hints: SmallVec::new(), now: 0.0, counters: Counters::default() }
+        let counters = Counters::default();
+        Self { task, found: None, hints: SmallVec::new(), now: 0.0, counters, region: None }
+    }
+
+    /// What of both bodies can take part over [t0, t1], by stage 1; `None` where nothing can meet. That of the whole step is located
+    /// once, whoever asks.
+    pub fn region(&mut self, t0: f64, t1: f64) -> Option<Arc<Region>> {
+        if (t0, t1) == (0.0, 1.0) {
+            return self.region.get_or_insert_with(|| self.task.region(t0, t1)).clone();
+        }
+        self.task.region(t0, t1)
     }
 
     /// Time until which everything must be proven free; infinite without a contact.
