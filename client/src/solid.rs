@@ -86,6 +86,58 @@ pub fn capsule(radius: f64, length: f64) -> Solid {
     hull([end.moved(-far), end.moved(far)])
 }
 
+/// A dome along z, from its rim of radius `radius` at −height/2 to its tip at height/2: all points with
+/// (x² + y²)/radius² <= 1/2 − z/height above the rim. Scaled along x and y it is elliptic.
+pub fn paraboloid(radius: f64, height: f64) -> Solid {
+    let call = || format!("paraboloid(h = {}, r = {}, center = true", number(height), number(radius));
+    leaf("paraboloid", &[("radius", radius), ("height", height)], call, false)
+}
+
+/// A hyperboloid of one sheet about z, of radius `radius` at ±height/2 and `waist`, which is smaller, at z = 0.
+pub fn hyperboloid(radius: f64, waist: f64, height: f64) -> Solid {
+    if waist >= radius {
+        let found = format!("{} and {}", number(waist), number(radius));
+        return Solid(BuildError::new("hyperboloid", "a waist below the radius".into(), found).into());
+    }
+    let call = || {
+        let [h, r, w] = [height, radius, waist].map(number);
+        format!("hyperboloid(h = {h}, r = {r}, waist = {w}, center = true")
+    };
+    leaf("hyperboloid", &[("radius", radius), ("waist", waist), ("height", height)], call, false)
+}
+
+/// A dome as `paraboloid`, of one sheet of a hyperboloid of two: downwards it nears a cone, whose tip is `cone` above its own.
+pub fn hyperbolic_dome(radius: f64, height: f64, cone: f64) -> Solid {
+    let call = || {
+        let [h, r, c] = [height, radius, cone].map(number);
+        format!("hyperboloid(h = {h}, r = {r}, cone = {c}, center = true")
+    };
+    leaf(
+        "hyperbolic dome",
+        &[("radius", radius), ("height", height), ("distance of the cone's tip", cone)],
+        call,
+        false,
+    )
+}
+
+/// All points x of the box from `min` to `max` with [x, y, z, 1] M [x, y, z, 1]ᵀ <= 0, M symmetric: of any quadric, its sheets
+/// and branches included. Planes alone are none.
+pub fn quadric(m: &[[f64; 4]; 4], min: DVec3, max: DVec3) -> Solid {
+    let refused = |expected: &str, found: String| Solid(BuildError::new("quadric", expected.into(), found).into());
+    if m.iter().flatten().any(|x| !x.is_finite()) {
+        return refused("a matrix of finite numbers", format!("{m:?}"));
+    }
+    if let Some((i, j)) = (0..4).flat_map(|i| (0..i).map(move |j| (i, j))).find(|(i, j)| m[*i][*j] != m[*j][*i]) {
+        return refused("a symmetric matrix", format!("{} and {} across its diagonal", m[i][j], m[j][i]));
+    }
+    if !(min.cmplt(max).all() && min.is_finite() && max.is_finite()) {
+        return refused("min below max in all coordinates", format!("{min} and {max}"));
+    }
+    let rows: Vec<String> = m.iter().map(|row| list(row)).collect();
+    let [min, max] = [min, max].map(|v| list(&v.to_array()));
+    Solid(Tree::leaf(format!("quadric(m = [{}], min = {min}, max = {max}", rows.join(", ")), false))
+}
+
 /// The solid within faces, convex or not: lists of indices of `points`, counter-clockwise as seen from outside.
 pub fn polyhedron(points: &[DVec3], faces: &[impl AsRef<[u32]>]) -> Solid {
     let refused = |expected: &str, found: String| Solid(BuildError::new("polyhedron", expected.into(), found).into());

@@ -13,6 +13,7 @@ pub mod mesh_files;
 pub mod meshes;
 pub mod openscad;
 pub mod primitive_pairs;
+pub mod quadrics;
 pub mod random_solids;
 pub mod rays;
 pub mod record_judge;

@@ -4,10 +4,10 @@
 //! one point tells. Across, the lengths are no smooth function: the rule converges with the power 1.5 or so of the
 //! distance of the rays, and two rules tell how far it has come.
 
-use crate::reference::field::Image;
+use crate::reference::field::{Image, Ridge};
 use contactd::math::Aabb;
 use contactd::solid::{Face, Solid, surface};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// ∫ 1, x, y, z, xx, yy, zz, xy, xz, yz.
 pub type Integrals = [f64; 10];
@@ -71,13 +71,16 @@ fn add_roots(face: &Face, at: DVec3, roots: &mut Vec<f64>) {
             }
             return add_roots(&surface::Cylinder { origin, axis, radius }.into(), at, roots);
         }
-        Face::Elliptic(e) => {
-            // |p + z d|² = (h + z k)², both nappes of a cone.
-            let i = Image::of(&e);
-            let (p, d) = (i.across(at), (i.turn.conjugate() * DVec3::Z) * i.scale);
-            let (h, k) = (i.radius + i.fall * i.local(at).z, i.fall * (i.turn.conjugate() * DVec3::Z).z);
-            [p.dot(p) - h * h, p.dot(d) - h * k, d.dot(d) - k * k]
+        Face::Saddle(s) => {
+            // |P + z P'|² = |N + z N'|².
+            let ridge = Ridge::of(&s);
+            let e = ridge.turn.conjugate() * DVec3::Z;
+            let (now, ways) = (ridge.halves(at), ridge.scales().map(|rows| DVec2::from(rows.map(|row| row.dot(e)))));
+            let of = |f: &dyn Fn(usize) -> f64| f(0) - f(1);
+            [of(&|k| now[k].length_squared()), of(&|k| now[k].dot(ways[k])), of(&|k| ways[k].length_squared())]
         }
+        Face::Elliptic(e) => of_image(&Image::of(&e), at),
+        Face::Bowl(b) => of_image(&Image::of_bowl(&b), at),
     };
     if c2.abs() < 1e-14 {
         if c1 != 0.0 {
@@ -89,6 +92,13 @@ fn add_roots(face: &Face, at: DVec3, roots: &mut Vec<f64>) {
     if under >= 0.0 {
         roots.extend([(-c1 - under.sqrt()) / c2, (-c1 + under.sqrt()) / c2]);
     }
+}
+
+/// The coefficients of |p + z d|² = (h + z k)²: both nappes of a cone, both sheets of a hyperboloid.
+fn of_image(i: &Image, at: DVec3) -> [f64; 3] {
+    let (p, d) = (i.across(at), (i.turn.conjugate() * DVec3::Z) * i.scale);
+    let (h, k) = (i.radius + i.fall * i.local(at).z, i.fall * (i.turn.conjugate() * DVec3::Z).z);
+    [p.dot(p) - h * h, p.dot(d) - h * k, d.dot(d) - k * k]
 }
 
 /// The same of a torus: (|o|² + R² − r²)² = 4 R² ρ², all four complex roots at once (E. Durand, 1960; I. Kerner, 1966). A root too many

@@ -21,7 +21,7 @@
 use crate::engine::ReportedPoint as _;
 use crate::formula::{Formula, formula_of};
 use crate::reference::Moving;
-use crate::reference::field::{Image, Literal};
+use crate::reference::field::{Image, Literal, Ridge};
 use contactd::contact::{ContactKind, Extent, Outcome, Status};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Sense, Shape, Solid, surface};
 use contactd_proto::contact_record::NO_FACE;
@@ -139,6 +139,8 @@ impl<'a> Side<'a> {
             Face::Cone(surface::Cone { apex, .. }) => apex.length(),
             Face::Torus(surface::Torus { origin, major, minor, .. }) => origin.length() + major + minor,
             Face::Elliptic(e) => e.origin.length() + e.size,
+            Face::Bowl(b) => b.origin.length() + b.radius,
+            Face::Saddle(s) => s.origin.length() + s.size,
             Face::Capsule(surface::Capsule { origin, half, radius, .. }) => origin.length() + half + radius,
         });
         let motion = &moving.motion;
@@ -579,6 +581,16 @@ fn features(
             Face::Elliptic(e) => {
                 let slope = side.literals[*i].gradient(point).length();
                 2.0 * moves / (slope * Image::of(&e).across(point).length()).max(f64::MIN_POSITIVE)
+            }
+            Face::Bowl(b) => {
+                let slope = side.literals[*i].gradient(point).length();
+                2.0 * moves / (slope * Image::of_bowl(&b).across(point).length()).max(f64::MIN_POSITIVE)
+            }
+            // Both of its halves turn.
+            Face::Saddle(s) => {
+                let slope = side.literals[*i].gradient(point).length();
+                let per = |half: DVec2| 2.0 * moves / (slope * half.length()).max(f64::MIN_POSITIVE);
+                Ridge::of(&s).halves(point).map(per).iter().sum()
             }
         });
         each.fold(0.0, f64::max)

@@ -51,6 +51,14 @@ impl Recipe {
     pub fn capsule(half: f64, radius: f64) -> Self {
         Self::of(Capsule { half, radius })
     }
+    /// A paraboloid with its tip at z = h above its rim of radius r.
+    pub fn dome(radius: f64, height: f64) -> Self {
+        Self::of(crate::quadrics::dome_of(radius, height))
+    }
+    /// All points of a box of the given half extents with x²/a² − y²/b² <= z/c.
+    pub fn saddle(x: f64, y: f64, z: f64) -> Self {
+        Self::of(crate::quadrics::saddle_of(DVec3::new(x, y, z)))
+    }
     /// An ellipsoid with the given semi-axes.
     pub fn ellipsoid(x: f64, y: f64, z: f64) -> Self {
         Self::of(Ellipsoid { semi: DVec3::new(x, y, z) })
@@ -130,6 +138,7 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
         }
         Shape::Torus(t) => Torus { major: t.major * k, minor: t.minor * k }.into(),
         Shape::Capsule(c) => Capsule { half: c.half * k, radius: c.radius * k }.into(),
+        Shape::Quadric(q) => crate::quadrics::scaled(q, k).into(),
         Shape::Ellipsoid(e) => Ellipsoid { semi: e.semi * k }.into(),
         Shape::EllipticFrustum(c) => {
             EllipticFrustum { semi: c.semi * k, half_height: c.half_height * k, ..c.clone() }.into()

@@ -810,6 +810,21 @@ int32_t contactd_solid_torus(double major, double minor, struct contactd_solid *
 // All points within `radius` of the segment along z from -length/2 to length/2.
 int32_t contactd_solid_capsule(double radius, double length, struct contactd_solid **out);
 
+// A dome along z, from its rim of radius `radius` at -height/2 to its tip at height/2: (x^2 + y^2)/radius^2 <= 1/2 - z/height
+// above the rim.
+int32_t contactd_solid_paraboloid(double radius, double height, struct contactd_solid **out);
+
+// A hyperboloid of one sheet about z, of radius `radius` at -height/2 and height/2 and `waist`, which is smaller, at z = 0.
+int32_t contactd_solid_hyperboloid(double radius, double waist, double height, struct contactd_solid **out);
+
+// A dome as a paraboloid's, of one sheet of a hyperboloid of two: downwards it nears a cone, whose tip is `cone` above its
+// own.
+int32_t contactd_solid_hyperbolic_dome(double radius, double height, double cone, struct contactd_solid **out);
+
+// All points of the box from `min` to `max` (3 numbers each) with [x y z 1] M [x y z 1]' <= 0. `m`: the 16 numbers of M, a
+// symmetric matrix. Planes alone are none.
+int32_t contactd_solid_quadric(const double *m, const double *min, const double *max, struct contactd_solid **out);
+
 // The half-space normal.x <= offset |normal|, to be cut with something. `normal`: 3 numbers.
 int32_t contactd_solid_half_space(const double *normal, double offset, struct contactd_solid **out);
 

@@ -130,6 +130,48 @@ pub unsafe extern "C" fn contactd_solid_capsule(radius: f64, length: f64, out: *
     free(|| write_solid(solid::capsule(radius, length), out))
 }
 
+/// A dome along z, from its rim of radius `radius` at -height/2 to its tip at height/2: (x^2 + y^2)/radius^2 <= 1/2 - z/height
+/// above the rim.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_solid_paraboloid(radius: f64, height: f64, out: *mut *mut Built) -> i32 {
+    free(|| write_solid(solid::paraboloid(radius, height), out))
+}
+
+/// A hyperboloid of one sheet about z, of radius `radius` at -height/2 and height/2 and `waist`, which is smaller, at z = 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_solid_hyperboloid(radius: f64, waist: f64, height: f64, out: *mut *mut Built) -> i32 {
+    free(|| write_solid(solid::hyperboloid(radius, waist, height), out))
+}
+
+/// A dome as a paraboloid's, of one sheet of a hyperboloid of two: downwards it nears a cone, whose tip is `cone` above its
+/// own.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_solid_hyperbolic_dome(
+    radius: f64,
+    height: f64,
+    cone: f64,
+    out: *mut *mut Built,
+) -> i32 {
+    free(|| write_solid(solid::hyperbolic_dome(radius, height, cone), out))
+}
+
+/// All points of the box from `min` to `max` (3 numbers each) with [x y z 1] M [x y z 1]' <= 0. `m`: the 16 numbers of M, a
+/// symmetric matrix. Planes alone are none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_solid_quadric(
+    m: *const f64,
+    min: *const f64,
+    max: *const f64,
+    out: *mut *mut Built,
+) -> i32 {
+    free(|| {
+        // SAFETY: the caller's arrays (1).
+        let (m, min, max) = unsafe { (numbers::<16>(m, "m")?, numbers::<3>(min, "min")?, numbers::<3>(max, "max")?) };
+        let rows: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| m[4 * i + j]));
+        write_solid(solid::quadric(&rows, DVec3::from_array(*min), DVec3::from_array(*max)), out)
+    })
+}
+
 /// The half-space normal.x <= offset |normal|, to be cut with something. `normal`: 3 numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_solid_half_space(normal: *const f64, offset: f64, out: *mut *mut Built) -> i32 {

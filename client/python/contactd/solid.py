@@ -30,10 +30,14 @@ __all__ = [
     "cylinder",
     "half_space",
     "hull",
+    "hyperbolic_dome",
+    "hyperboloid",
     "intersection",
     "minkowski",
+    "paraboloid",
     "polygon",
     "polyhedron",
+    "quadric",
     "rectangle",
     "sphere",
     "torus",
@@ -69,6 +73,29 @@ def torus(major: float, minor: float) -> Solid:
 def capsule(r: float, length: float) -> Solid:
     """All points within ``r`` of the segment along z from -length/2 to length/2."""
     return _native._primitive("capsule", [r, length])
+
+
+def paraboloid(r: float, h: float) -> Solid:
+    """A dome along z, from its rim of radius ``r`` at -h/2 to its tip at h/2; scaled along x and y it is elliptic."""
+    return _native._primitive("paraboloid", [r, h])
+
+
+def hyperboloid(r: float, waist: float, h: float) -> Solid:
+    """A hyperboloid of one sheet about z, of radius ``r`` at ±h/2 and ``waist``, which is smaller, at z = 0."""
+    return _native._primitive("hyperboloid", [r, waist, h])
+
+
+def hyperbolic_dome(r: float, h: float, cone: float) -> Solid:
+    """A dome as ``paraboloid``, of one sheet of a hyperboloid of two; it nears a cone whose tip is ``cone`` above its own."""
+    return _native._primitive("hyperbolic_dome", [r, h, cone])
+
+
+def quadric(m: Sequence[Sequence[float]], min: Sequence[float], max: Sequence[float]) -> Solid:
+    """All points of a box with [x, y, z, 1] M [x, y, z, 1]ᵀ <= 0, ``m`` a symmetric matrix of four rows. Planes alone are none."""
+    rows = [list(row) for row in m]
+    if [len(row) for row in rows] != [4] * 4:
+        raise ValueError(f"quadric: expected four rows of four numbers, found rows of {[len(row) for row in rows]}")
+    return _native._primitive("quadric", [*(x for row in rows for x in row), *min, *max])
 
 
 def half_space(normal: Sequence[float], offset: float) -> Solid:

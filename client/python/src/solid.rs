@@ -164,6 +164,14 @@ pub fn primitive(name: &str, numbers: Vec<f64>) -> PyResult<Solid> {
         ("cone", &[bottom, top, h]) => solid::cone(bottom, top, h),
         ("torus", &[major, minor]) => solid::torus(major, minor),
         ("capsule", &[r, length]) => solid::capsule(r, length),
+        ("paraboloid", &[r, h]) => solid::paraboloid(r, h),
+        ("hyperboloid", &[r, waist, h]) => solid::hyperboloid(r, waist, h),
+        ("hyperbolic_dome", &[r, h, cone]) => solid::hyperbolic_dome(r, h, cone),
+        // A matrix, and two corners.
+        ("quadric", all) if all.len() == 22 => {
+            let m: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| all[4 * i + j]));
+            solid::quadric(&m, DVec3::from_slice(&all[16..]), DVec3::from_slice(&all[19..]))
+        }
         ("half_space", &[x, y, z, offset]) => solid::half_space(DVec3::new(x, y, z), offset),
         _ => return Err(PyValueError::new_err(format!("{name} of {} numbers", numbers.len()))),
     })

@@ -47,6 +47,13 @@ fn what_makes_no_sense_is_one_sentence_wherever_it_stands() {
         (cuboid(1.0, f64::NAN, 1.0), "box: expected a positive finite length along y, found NaN"),
         (cone(0.0, 0.0, 1.0), "cone: expected a positive finite larger radius, found 0"),
         (torus(1.0, 1.0), "torus: expected a major radius above the minor one, found 1 and 1"),
+        (hyperboloid(1.0, 1.0, 1.0), "hyperboloid: expected a waist below the radius, found 1 and 1"),
+        (paraboloid(1.0, 0.0), "paraboloid: expected a positive finite height, found 0"),
+        (
+            quadric(&[[0.0, 1.0, 0.0, 0.0]; 4], DVec3::ZERO, DVec3::ONE),
+            "quadric: expected a symmetric matrix, found 0 and 1",
+        ),
+        (quadric(&[[1.0; 4]; 4], DVec3::ZERO, DVec3::X), "quadric: expected min below max in all coordinates"),
         (hull([]), "hull: expected one operand or more, found none"),
         (polyhedron(&corners, &[[0, 1, 4]]), "polyhedron: expected indices of 4 points, found 4 in face 0"),
         (polyhedron(&corners, &[[0, 1, 2]]), "polyhedron: expected four faces or more, found 1"),

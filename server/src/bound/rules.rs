@@ -75,12 +75,15 @@ impl Bound {
     /// psi is convex and psi(c) = −rho at an interior point c. So y with psi(y) <= margin lies on the ray from c through
     /// a point x of the primitive with |y−c| <= (1 + margin/rho)|x−c|: scaling the primitive's own bounds about c by
     /// 1 + margin/rho bounds the dilated set, whatever the primitive. A face that is not convex is an exact distance: it alone
-    /// bounds such a primitive, and its own bounds grow by the margin. What has a formula says in which box it lies.
+    /// bounds such a primitive, and its own bounds grow by the margin. What has a formula says in which box it lies, and what such a face
+    /// has planes around.
     pub fn of_primitive(p: &Primitive, margin: f64, volumes: Volumes) -> Self {
-        if let Some(domain) = p.shape.geometry().domain() {
+        let geometry = p.shape.geometry();
+        if let Some(domain) = geometry.domain() {
             // Its planes are operands of an "and": what lies outside of them by more than the margin has a larger psi.
             let size = domain.min.abs().max(domain.max.abs()).max_element() + p.frame.position.length();
-            let own = domain.grown(margin.max(0.0) + (size + margin.abs()) * (8.0 * OUTWARD));
+            let by = margin.max(0.0) * geometry.spread();
+            let own = domain.grown(by + (size + margin.abs()) * (8.0 * OUTWARD));
             let aabb = Aabb::of_points(own.corners().map(|c| p.frame.point(c))).grown(size * OUTWARD);
             let center = p.frame.point(own.center());
             let ball = Ball { center, radius: own.half().length() * (1.0 + OUTWARD) + size * OUTWARD };

@@ -7,7 +7,7 @@
 use crate::formula::{Formula, formula_of};
 use contactd::solid::{Face, Node as TreeNode, NodeId, Op, Solid, surface};
 use contactd_proto::Pose;
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// One face with its sign: +psi of a positive primitive, −psi of a subtracted one.
 #[derive(Clone, Copy, Debug)]
@@ -38,9 +38,11 @@ impl Literal {
                     let along = axis.dot(x - origin).clamp(-half, half);
                     x.distance(origin + axis * along) - radius
                 }
-                Face::Elliptic(e) => {
-                    let e = Image::of(&e);
-                    e.across(x).length() - e.fall * e.local(x).z - e.radius
+                Face::Elliptic(e) => Image::of(&e).value(x),
+                Face::Bowl(b) => Image::of_bowl(&b).value(x),
+                Face::Saddle(s) => {
+                    let [p, n] = Ridge::of(&s).halves(x);
+                    p.length() - n.length()
                 }
             }
     }
@@ -66,9 +68,13 @@ impl Literal {
                         (x - origin - axis * half.copysign(along)).normalize_or(axis)
                     }
                 }
-                Face::Elliptic(e) => {
-                    let e = Image::of(&e);
-                    e.turn * (e.across(x).normalize_or(DVec3::X) * e.scale - DVec3::Z * e.fall)
+                Face::Elliptic(e) => Image::of(&e).gradient(x),
+                Face::Bowl(b) => Image::of_bowl(&b).gradient(x),
+                Face::Saddle(s) => {
+                    let s = Ridge::of(&s);
+                    let [p, n] = s.halves(x).map(|v| v.normalize_or(DVec2::X));
+                    let [own, other] = s.scales();
+                    s.turn * (own[0] * p.x + own[1] * p.y - other[0] * n.x - other[1] * n.y)
                 }
             }
     }
@@ -106,15 +112,26 @@ impl Image {
 
     /// A tangent of a quarter of an angle about an axis is a quaternion's vector over one more than its scalar.
     pub fn of(e: &surface::Elliptic) -> Self {
-        let square = e.turn.length_squared();
-        let v = e.turn * (2.0 / (1.0 + square));
-        let turn = DQuat::from_xyzw(v.x, v.y, v.z, (1.0 - square) / (1.0 + square)).normalize();
+        let turn = turn_of(e.turn);
         let (scale, fall, radius) = if e.third < 0.0 {
             (DVec3::new(e.size, e.second, 0.0), -e.third, 0.0)
         } else {
             (DVec3::new(Self::WHOLE, e.second, e.third), 0.0, e.size)
         };
         Self { origin: e.origin, turn, scale, fall, radius }
+    }
+
+    /// A bowl's: the same with a third row and a fall.
+    pub fn of_bowl(b: &surface::Bowl) -> Self {
+        Self { origin: b.origin, turn: turn_of(b.turn), scale: b.scale, fall: b.fall, radius: b.radius }
+    }
+
+    fn value(&self, x: DVec3) -> f64 {
+        self.across(x).length() - self.fall * self.local(x).z - self.radius
+    }
+
+    fn gradient(&self, x: DVec3) -> DVec3 {
+        self.turn * (self.across(x).normalize_or(DVec3::X) * self.scale - DVec3::Z * self.fall)
     }
 
     /// A point along its axes.
@@ -125,6 +142,53 @@ impl Image {
     /// (s_k y_k).
     pub fn across(&self, x: DVec3) -> DVec3 {
         self.local(x) * self.scale
+    }
+}
+
+fn turn_of(turn: DVec3) -> DQuat {
+    let square = turn.length_squared();
+    let v = turn * (2.0 / (1.0 + square));
+    DQuat::from_xyzw(v.x, v.y, v.z, (1.0 - square) / (1.0 + square)).normalize()
+}
+
+/// A saddle by its numbers: psi = |P| − |N|, both of two parts along y = turnᵀ(x − origin).
+#[derive(Clone, Copy, Debug)]
+pub struct Ridge {
+    /// Centre or saddle point.
+    pub origin: DVec3,
+    /// Principal axes.
+    pub turn: DQuat,
+    face: surface::Saddle,
+}
+
+impl Ridge {
+    /// Of a face.
+    pub fn of(face: &surface::Saddle) -> Self {
+        Self { origin: face.origin, turn: turn_of(face.turn), face: *face }
+    }
+
+    /// What the parts of P and of N change by, along its axes.
+    pub fn scales(&self) -> [[DVec3; 2]; 2] {
+        let s = &self.face;
+        if s.third == 0.0 {
+            let up = DVec3::Z * (0.5 * Image::WHOLE);
+            return [[DVec3::X * s.first, up], [DVec3::Y * s.second, up]];
+        }
+        [[DVec3::X * s.first, DVec3::Y * s.second], [DVec3::Z * s.third, DVec3::ZERO]]
+    }
+
+    /// What they are at the origin.
+    pub fn levels(&self) -> [DVec2; 2] {
+        let s = &self.face;
+        let half = 0.5 * Image::WHOLE * s.size;
+        if s.third == 0.0 { [DVec2::Y * -half, DVec2::Y * half] } else { [DVec2::ZERO, DVec2::Y * s.size] }
+    }
+
+    /// P and N.
+    pub fn halves(&self, x: DVec3) -> [DVec2; 2] {
+        let y = self.turn.conjugate() * (x - self.origin);
+        let (scales, levels) = (self.scales(), self.levels());
+        [0, 1].map(|k| DVec2::new(scales[k][0].dot(y), scales[k][1].dot(y)) + levels[k])
     }
 }
 
@@ -246,6 +310,13 @@ impl Field {
     }
 }
 
+/// A rotation told by a quarter of its angle, turned on.
+fn quarter(by: DQuat, turn: DVec3) -> DVec3 {
+    let q = by * turn_of(turn);
+    let q = if q.w < 0.0 { -q } else { q };
+    q.xyz() / (1.0 + q.w)
+}
+
 /// A face seen from the parent of `place`.
 fn moved(face: &Face, place: &Pose) -> Face {
     let point = |x: DVec3| place.rotation * x + place.position;
@@ -271,9 +342,13 @@ fn moved(face: &Face, place: &Pose) -> Face {
             Face::Capsule(surface::Capsule { origin: point(origin), axis: turned(axis), half, radius })
         }
         Face::Elliptic(e) => {
-            let q = place.rotation * Image::of(&e).turn;
-            let q = if q.w < 0.0 { -q } else { q };
-            Face::Elliptic(surface::Elliptic { origin: point(e.origin), turn: q.xyz() / (1.0 + q.w), ..e })
+            Face::Elliptic(surface::Elliptic { origin: point(e.origin), turn: quarter(place.rotation, e.turn), ..e })
+        }
+        Face::Bowl(b) => {
+            Face::Bowl(surface::Bowl { origin: point(b.origin), turn: quarter(place.rotation, b.turn), ..b })
+        }
+        Face::Saddle(s) => {
+            Face::Saddle(surface::Saddle { origin: point(s.origin), turn: quarter(place.rotation, s.turn), ..s })
         }
     }
 }

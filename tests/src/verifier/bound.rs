@@ -5,7 +5,8 @@
 //! middle, Hessian over the box) and by its gradient over the box; where that does not suffice the box or the span is
 //! halved, up to a budget. A budget that runs out is a refusal.
 
-use super::interval::{Interval, Jet, Vector, ZERO, cross, dot, minus, place, plus, point, times, unit, vector};
+use super::form::{along, halves, image, parts_of_saddle, rows_of_bowl, touched, walled};
+use super::interval::{Interval, Jet, Vector, ZERO, dot, minus, place, point, times, unit, vector};
 use super::motion::{Motions, in_a};
 use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
@@ -299,6 +300,16 @@ impl Bounder<'_> {
                 let rho = square_length(&across(&o, axis)).sqrt();
                 rho.scaled(point(cos)) - linear(axis, &o).scaled(point(sin))
             }
+            Face::Bowl(ref bowl) => {
+                let (rows, fall, radius) = rows_of_bowl(bowl);
+                let y = offsets(y, bowl.origin);
+                let v = rows.map(|row| linear(row, &y));
+                square_length(&v).sqrt() - linear(fall, &y).plus(radius)
+            }
+            Face::Saddle(ref saddle) => {
+                let [p, n] = halves(saddle, y);
+                (p[0].square() + p[1].square()).sqrt() - (n[0].square() + n[1].square()).sqrt()
+            }
             Face::Torus(surface::Torus { origin, axis, major, minor }) => {
                 let (o, axis) = (offsets(y, origin), unit(vector(axis.to_array())));
                 let off = square_length(&across(&o, axis)).sqrt().plus(point(-major));
@@ -330,8 +341,13 @@ impl Bounder<'_> {
         }
     }
 
-    /// What a psi is nowhere above, convex: of a torus the ball of its tube around the point of its circle on the side of `beside`.
+    /// What a psi is nowhere above, convex: of a torus the ball of its tube around the point of its circle on the side of `beside`; of a
+    /// saddle |P| − n·N with any |n| <= 1, as it points there.
     fn above(&self, face: &Face, beside: DVec3, y: &[Jet; 3]) -> Jet {
+        if let Face::Saddle(ref saddle) = *face {
+            let ([p, n], along) = (halves(saddle, y), along(saddle, beside, 1));
+            return (p[0].square() + p[1].square()).sqrt() - n[0].scaled(along[0]) - n[1].scaled(along[1]);
+        }
         let Face::Torus(surface::Torus { origin, axis, major, minor }) = *face else { return self.psi(face, y) };
         let a = unit(vector(axis.to_array()));
         let out = (beside - origin) - axis * (beside - origin).dot(axis);
@@ -428,14 +444,27 @@ impl Bounder<'_> {
                 let longer = point((point(half) - point(half_q)).mag());
                 point(radius_q) - point(radius) - length(minus(place(o), place(u))) - longer - lean * point(half_q)
             }
+            (Face::Bowl(ref one), Face::Bowl(ref other)) => {
+                walled((rows_of_bowl(one), one.origin), (rows_of_bowl(other), other.origin), far(other.origin))
+            }
+            // −|P_p − P_q| − |N_p − N_q|, part by part, turned alike.
+            (Face::Saddle(ref one), Face::Saddle(ref other)) => {
+                let (p, q) = (parts_of_saddle(one), parts_of_saddle(other));
+                let mut off = ZERO;
+                for (a, b) in p.iter().flatten().zip(q.iter().flatten()) {
+                    let sign = point(if dot(a.0, b.0).hi < 0.0 { -1.0 } else { 1.0 });
+                    let of = |(row, at): &(Vector, Interval), o: DVec3| {
+                        let way: Vector = std::array::from_fn(|i| y[i].v - point(o[i]));
+                        dot(*row, way) + *at
+                    };
+                    let apart = of(a, one.origin) - sign * of(b, other.origin);
+                    off = off + point(apart.mag());
+                }
+                point(0.0) - off
+            }
             // psi_p − psi_q >= R_q − R_p + w_p·Δ − |B_p Δ| − |x − o_q| (|B_p − B_q| + |w_p − w_q|), rows turned alike.
             (Face::Elliptic(ref one), Face::Elliptic(ref other)) => {
-                let ((p, w, r), (q, v, s)) = (image(one), image(other));
-                let like = |a: Vector, b: Vector| if dot(a, b).hi < 0.0 { times(point(-1.0), b) } else { b };
-                let off = |k: usize| length(minus(p[k], like(p[k], q[k])));
-                let lean = off(0) + off(1) + off(2) + length(minus(w, v));
-                let delta = minus(place(one.origin), place(other.origin));
-                s - r + dot(w, delta) - length(p.map(|row| dot(row, delta))) - lean * far(other.origin)
+                walled((image(one), one.origin), (image(other), other.origin), far(other.origin))
             }
             _ => return None,
         };
@@ -463,7 +492,9 @@ impl Bounder<'_> {
         }
         if p.0.on_b == q.0.on_b {
             let wall = self.wall(p.1, q.1, if p.0.on_b { b } else { a })?;
-            if wall.v.lo > 0.0 || matches!(p.1, Face::Cone(_) | Face::Elliptic(_) | Face::Capsule(_)) {
+            if wall.v.lo > 0.0
+                || matches!(p.1, Face::Cone(_) | Face::Elliptic(_) | Face::Capsule(_) | Face::Bowl(_) | Face::Saddle(_))
+            {
                 return Some(wall);
             }
         }
@@ -563,15 +594,15 @@ fn weighted(f: &Jet, [from, to]: [f64; 2], (start, end): (f64, f64), t: Interval
 }
 
 /// The length of a vector.
-fn length(v: Vector) -> Interval {
+pub(super) fn length(v: Vector) -> Interval {
     (v[0].square() + v[1].square() + v[2].square()).sqrt()
 }
 
-fn offsets(y: &[Jet; 3], o: DVec3) -> [Jet; 3] {
+pub(super) fn offsets(y: &[Jet; 3], o: DVec3) -> [Jet; 3] {
     std::array::from_fn(|i| y[i].plus(point(-o[i])))
 }
 
-fn linear(n: Vector, y: &[Jet; 3]) -> Jet {
+pub(super) fn linear(n: Vector, y: &[Jet; 3]) -> Jet {
     y[0].scaled(n[0]) + y[1].scaled(n[1]) + y[2].scaled(n[2])
 }
 
@@ -608,31 +639,8 @@ fn part_of(face: &Face, y: &[Jet; 3]) -> Option<Face> {
     }
 }
 
-/// B, w and r of an elliptic face, from its numbers: with p = `turn` and s = |p|², the quaternion (2p, 1 − s)/(1 + s).
-fn image(e: &surface::Elliptic) -> ([Vector; 3], Vector, Interval) {
-    let p = vector(e.turn.to_array());
-    let s = p[0].square() + p[1].square() + p[2].square();
-    let per = (point(1.0) + s).recip();
-    let (v, w) = (times(point(2.0) * per, p), (point(1.0) - s) * per);
-    let two = point(2.0);
-    // Column k: e + 2 w v × e + 2 v × (v × e).
-    let column = |k: usize| {
-        let unit: Vector = std::array::from_fn(|i| point(if i == k { 1.0 } else { 0.0 }));
-        let once = cross(v, unit);
-        plus(unit, plus(times(two * w, once), times(two, cross(v, once))))
-    };
-    let zero = [ZERO; 3];
-    if e.third < 0.0 {
-        let rows = [times(point(e.size), column(0)), times(point(e.second), column(1)), zero];
-        return (rows, times(point(-e.third), column(2)), ZERO);
-    }
-    let whole = 1.0 - 1.0 / (1u64 << 47) as f64;
-    let third = if e.third == 0.0 { zero } else { times(point(e.third), column(2)) };
-    ([times(point(whole), column(0)), times(point(e.second), column(1)), third], zero, point(e.size))
-}
-
 /// A unit vector made a little shorter than 1 for certain.
-fn short(v: DVec3) -> Vector {
+pub(super) fn short(v: DVec3) -> Vector {
     times(point(1.0 - 1e-15), vector(v.normalize_or_zero().to_array()))
 }
 
@@ -688,14 +696,12 @@ fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
             let back = if past.lo < 0.0 { point(2.0) * past } else { ZERO };
             linear(n, &from).plus(back + point(-radius))
         }
-        Face::Elliptic(ref e) => {
-            let (rows, fall, radius) = image(e);
-            let o = at - e.origin;
-            let middle = |row: Vector| DVec3::from_array(row.map(|x| 0.5 * (x.lo + x.hi))).dot(o);
-            let n = short(DVec3::from_array(rows.map(middle)));
-            let y = offsets(y, e.origin);
-            let v = rows.map(|row| linear(row, &y));
-            linear(n, &v) - linear(fall, &y).plus(radius)
+        Face::Elliptic(ref e) => touched(image(e), e.origin, at, y),
+        Face::Bowl(ref bowl) => touched(rows_of_bowl(bowl), bowl.origin, at, y),
+        // |P| >= p·P for every |p| <= 1; −|N| is concave, and stays as it is.
+        Face::Saddle(ref saddle) => {
+            let ([p, n], along) = (halves(saddle, y), along(saddle, at, 0));
+            p[0].scaled(along[0]) + p[1].scaled(along[1]) - (n[0].square() + n[1].square()).sqrt()
         }
     }
 }

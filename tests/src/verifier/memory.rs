@@ -194,6 +194,13 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
             point(top.hi.max(bottom.hi))
         }
         Shape::HalfSpace(_) => return f64::INFINITY,
+        Shape::Quadric(q) => match crate::quadrics::checked_box(q, 0.0) {
+            Some(held) => {
+                let each = held.corners().map(|v| dot(vector(v.to_array()), n).hi);
+                point(each.into_iter().fold(f64::NEG_INFINITY, f64::max))
+            }
+            None => return f64::INFINITY,
+        },
     };
     (at + own).hi
 }

@@ -10,6 +10,7 @@
 //! not taken from the server either.
 
 pub mod bound;
+pub mod form;
 pub mod interval;
 pub mod memory;
 pub mod motion;
@@ -574,5 +575,9 @@ fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
             std::array::from_fn(|k| top[k].hull(bottom[k]))
         }
         Shape::HalfSpace(_) => [EVERYWHERE; 3],
+        Shape::Quadric(q) => match crate::quadrics::checked_box(q, level) {
+            Some(held) => around(&held.corners(), &|_| 0.0),
+            None => [EVERYWHERE; 3],
+        },
     }
 }

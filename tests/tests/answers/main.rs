@@ -16,6 +16,7 @@ mod laws;
 mod meshes;
 mod overlap;
 mod primitive_pairs;
+mod quadrics;
 mod records;
 mod reference;
 mod tight;

@@ -15,6 +15,7 @@ use contactd::solid::local::{LiteralId, literal_token};
 use contactd::solid::primitive::{Cone, Cylinder, Sphere};
 use contactd::solid::{Face, Label, Sense, Shape, SolidBuilder, surface};
 use contactd_proto::{Motion, Pose};
+use contactd_tests::quadrics;
 use contactd_tests::random_solids::{self, Random};
 use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
@@ -165,13 +166,21 @@ fn psi(face: &Face, x: &Vector) -> Big {
             };
             o.minus(&a.times(&z)).length() - big(radius)
         }
-        Face::Elliptic(e) => {
-            let (parts, y) = (e.parts(), x.minus(&Vector::of(e.origin)));
-            Vector(parts.rows.map(|row| Vector::of(row).dot(&y))).length()
-                - Vector::of(parts.fall).dot(&y)
-                - big(parts.radius)
+        Face::Elliptic(e) => stretched(&e.parts(), &x.minus(&Vector::of(e.origin))),
+        Face::Bowl(b) => stretched(&b.parts(), &x.minus(&Vector::of(b.origin))),
+        Face::Saddle(s) => {
+            let (sides, y) = (s.sides(), x.minus(&Vector::of(s.origin)));
+            let length = |rows: [surface::Row; 2]| {
+                let [a, b] = rows.map(|row| Vector::of(row.slope).dot(&y) + big(row.at));
+                Vector([a, b, big(0.0)]).length()
+            };
+            length(sides.plus) - length(sides.minus)
         }
     }
+}
+
+fn stretched(parts: &surface::Stretch, y: &Vector) -> Big {
+    Vector(parts.rows.map(|row| Vector::of(row).dot(y))).length() - Vector::of(parts.fall).dot(y) - big(parts.radius)
 }
 
 /// G of a fit (`contact::exclusion::fit`) over A's frame, for round faces: squares, radii, depth.
@@ -189,7 +198,12 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
                 let tan = big(sin) / big(cos);
                 (Vector::of(apex + axis * (shrink / sin)), Some(axis), big(0.0), &tan * &tan)
             }
-            Face::Plane(_) | Face::Torus(_) | Face::Elliptic(_) | Face::Capsule(_) => return None,
+            Face::Plane(_)
+            | Face::Torus(_)
+            | Face::Elliptic(_)
+            | Face::Capsule(_)
+            | Face::Bowl(_)
+            | Face::Saddle(_) => return None,
         };
         let o = x.minus(&origin);
         let along = axis.map_or(big(0.0), |a| {
@@ -317,6 +331,16 @@ fn nothing_that_is_computed_of_a_capsule_differs_by_more_than_the_budget() {
     let shapes: Vec<Shape> = (0..24).map(|_| random_solids::capsule(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
     evaluate(&mut r, &models, wanted, "capsules");
+}
+
+#[test]
+fn nothing_that_is_computed_of_a_quadric_differs_by_more_than_the_budget() {
+    let wanted: u64 =
+        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
+    let mut r = Random::new(11);
+    let shapes: Vec<Shape> = (0..48).map(|_| quadrics::random(&mut r, 1.0)).collect();
+    let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
+    evaluate(&mut r, &models, wanted, "quadrics");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.
@@ -503,6 +527,16 @@ fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
         Face::Elliptic(e) => {
             let along = if e.third > 0.0 { 0.0 } else { r.within(if e.third < 0.0 { 0.0 } else { -1.0 }, 2.0) };
             e.origin + e.axis() * along
+        }
+        // On its axis; of a saddle where P, or of a hyperbolic paraboloid N, is zero, too.
+        Face::Bowl(b) => b.origin + b.axes().z_axis * r.within(-1.0, 2.0) * b.radius,
+        Face::Saddle(s) => {
+            let (axes, along) = (s.axes(), r.within(-1.0, 1.0));
+            match (s.is_parabolic(), r.chance(0.5)) {
+                (false, _) => s.origin + axes.z_axis * along,
+                (true, true) => s.origin + axes.z_axis * s.size + axes.y_axis * along,
+                (true, false) => s.origin - axes.z_axis * s.size + axes.x_axis * along,
+            }
         }
         Face::Plane(_) => return None,
     };

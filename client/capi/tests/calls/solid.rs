@@ -98,6 +98,29 @@ fn every_kind_is_there() {
 }
 
 #[test]
+fn quadrics_are_there() {
+    let saddle = [1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5, 0.0];
+    let corners = [[-1.0; 3], [1.0; 3]];
+    let all = [
+        built(|o| unsafe { contactd_solid_paraboloid(1.0, 2.0, o) }),
+        built(|o| unsafe { contactd_solid_hyperboloid(1.0, 0.5, 2.0, o) }),
+        built(|o| unsafe { contactd_solid_hyperbolic_dome(1.0, 2.0, 0.5, o) }),
+        built(|o| unsafe { contactd_solid_quadric(saddle.as_ptr(), corners[0].as_ptr(), corners[1].as_ptr(), o) }),
+    ];
+    let operands: Vec<*const Built> = all.iter().map(|s| s.0.cast_const()).collect();
+    let session = Open::embedded();
+    for operation in [UNION, INTERSECTION, DIFFERENCE] {
+        let joined = built(|o| unsafe { contactd_solid_join(operation, operands.as_ptr(), operands.len(), o) });
+        let _ = out(|o| unsafe { contactd_load_solid(session.0, c"all".as_ptr(), joined.0, 0, o) });
+    }
+    let mut handle = null_mut();
+    let sentence = "hyperboloid: expected a waist below the radius, found 2 and 1";
+    refused(unsafe { contactd_solid_hyperboloid(1.0, 2.0, 2.0, &mut handle) }, ERROR_ARGUMENT, sentence);
+    let (m, low) = (saddle.as_ptr(), corners[0].as_ptr());
+    refused(unsafe { contactd_solid_quadric(m, low, null(), &mut handle) }, ERROR_NULL, "max is NULL");
+}
+
+#[test]
 fn what_makes_no_sense_is_refused_at_once() {
     let mut handle = null_mut();
     let sentence = "sphere: expected a positive finite radius, found -1";

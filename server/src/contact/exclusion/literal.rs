@@ -23,6 +23,9 @@ use glam::DVec3;
 /// Least distance from the axis, relative to the centre's, for the slab bound: nearer, its denominator spoils it.
 const SLAB: f64 = 0.05;
 
+/// What an extent is taken for that comes from rows with some roundings more than a unit vector's.
+const MORE: f64 = 1.0 + 1e-12;
+
 /// The body a literal belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
@@ -107,6 +110,8 @@ struct Round {
     axis: Option<DVec3>,
     /// B, of the affine image of a face.
     stretch: Option<Stretch>,
+    /// Of a saddle instead of all these: the gradient of ρ, and what it bends along.
+    split: Option<[DVec3; 2]>,
     /// The face's gradient there, or any that leans against the axis on the same side.
     normal: DVec3,
 }
@@ -203,6 +208,9 @@ impl View<'_> {
     /// tangents), each the largest distance from the centre. `normal` is the face's there, both along A's axes.
     fn extents(&self, round: &Round) -> (f64, f64, f64) {
         let (along, normal) = (|n: DVec3| n.abs().dot(self.half), round.normal);
+        if let Some(split) = round.split {
+            return self.split(split);
+        }
         if let Some(b) = &round.stretch {
             return self.stretched(b, normal);
         }
@@ -220,16 +228,21 @@ impl View<'_> {
         }
     }
 
-    /// The same of B y instead of y: |B y|, its part along B(x − o) at the centre, and what is across that. B's rows and their
-    /// products have some roundings more than a unit vector's.
+    /// The same of B y instead of y: |B y|, its part along B(x − o) at the centre, and what is across that.
     #[cold]
     fn stretched(&self, b: &Stretch, normal: DVec3) -> (f64, f64, f64) {
-        const MORE: f64 = 1.0 + 1e-12;
         let reach = |v: DVec3| v.abs().dot(self.half) * MORE;
         let all = DVec3::from_array(b.rows.map(reach)).length().min(self.radius);
         let along = b.along(normal);
         let [s, t] = b.beside(along).map(|t| reach(b.back(t)));
         (all, reach(b.back(along)), s.hypot(t).min(all))
+    }
+
+    /// The same of P y, given by what it has along P(x − o) at the centre and across that.
+    #[cold]
+    fn split(&self, split: [DVec3; 2]) -> (f64, f64, f64) {
+        let [radial, tangential] = split.map(|v| v.abs().dot(self.half) * MORE);
+        (radial.hypot(tangential).min(self.radius), radial, tangential.min(self.radius))
     }
 
     /// How far a function that bends as k·ρ(x) does rises above its tangent over the cell.
@@ -242,10 +255,11 @@ impl View<'_> {
         let closest = rho - radial - way;
         // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
         let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
-        let across = match (&round.stretch, round.axis) {
-            (Some(b), _) => b.rows.iter().map(|row| *row * *row).sum(),
-            (None, Some(axis)) => DVec3::ONE - axis * axis,
-            (None, None) => DVec3::ONE,
+        let across = match (&round.stretch, round.axis, round.split) {
+            (_, _, Some([r, t])) => r * r + t * t,
+            (Some(b), ..) => b.rows.iter().map(|row| *row * *row).sum(),
+            (None, Some(axis), None) => DVec3::ONE - axis * axis,
+            (None, None, None) => DVec3::ONE,
         };
         let k = round.k;
         let cost = if slab {
@@ -313,7 +327,7 @@ impl View<'_> {
             }
             let f = self.face_at(side, face, y);
             let mut l = self.plane(side, id, f.normal, f.value - f.normal.dot(y) + delta);
-            l.cost = self.bulge(&self.round(side, face, &f));
+            l.cost = self.bulge(&self.round(side, face, (point, &f)));
             l.point = point;
             return l;
         }
@@ -323,12 +337,13 @@ impl View<'_> {
         if f.k == 0.0 {
             return self.plane(side, id, -f.normal, -f.value + delta);
         }
-        let rest = self.remainder(side, &self.round(side, face, &f));
+        let center = if side == Side::A { self.center } else { self.center_b };
+        let rest = self.remainder(side, &self.round(side, face, (center, &f)));
         let normal = match face.apex() {
             _ if !rest.far => -f.normal,
             // −psi >= −psi(c) [+ sin α axis·(x−c) for a cone] − k·D.
             Some(c) => c.sin * self.turned(side, c.axis),
-            None => DVec3::ZERO,
+            None => face.steady(center).map_or(DVec3::ZERO, |steady| -self.turned(side, steady)),
         };
         let mut l = self.plane(side, id, normal, -f.value - rest.most + delta);
         l.cost = rest.cost;
@@ -342,7 +357,9 @@ impl View<'_> {
         let center = if side == Side::A { self.center } else { self.center_b };
         let under = face.under(point, center)?;
         let [axis, normal] = [under.axis, under.out].map(|v| self.turned(side, v));
-        let rest = self.remainder(side, &Round { k: under.k, rho: under.rho, axis: Some(axis), stretch: None, normal });
+        let split = under.beside.map(|beside| [normal, self.turned(side, beside)]);
+        let axis = if split.is_some() { None } else { Some(axis) };
+        let rest = self.remainder(side, &Round { k: under.k, rho: under.rho, axis, stretch: None, split, normal });
         let normal = self.turned(side, if rest.far { under.far } else { under.normal });
         let l = self.plane(side, id, normal, under.value - rest.most + self.delta);
         let l = Linear { point, cost: rest.cost, ..l };
@@ -365,7 +382,11 @@ impl View<'_> {
             f.normal = self.at.a_vector(f.normal);
         }
         let bound = value + self.delta - rounding::of_distance((center - point).length());
-        Linear { point, cost: self.bulge(&self.round(side, face, &f)), ..self.plane(side, id, f.normal, bound) }
+        Linear {
+            point,
+            cost: self.bulge(&self.round(side, face, (point, &f))),
+            ..self.plane(side, id, f.normal, bound)
+        }
     }
 
     /// A bound by a plane that is fixed in its body.
@@ -391,12 +412,17 @@ impl View<'_> {
         }
     }
 
-    /// How a face bends where `f` was taken.
+    /// How a face bends at `x`, a point of its own body's frame, where `f` was taken.
     #[inline]
-    fn round(&self, side: Side, face: &Face, f: &FaceAt) -> Round {
+    fn round(&self, side: Side, face: &Face, (x, f): (DVec3, &FaceAt)) -> Round {
         let axis = face.developable().map(|axis| self.turned(side, axis));
-        let turned = |b: Stretch| Stretch { rows: b.rows.map(|row| self.turned(side, row)), ..b };
-        Round { k: f.k, rho: f.rho, axis, stretch: face.stretch().map(turned), normal: f.normal }
+        let turned = |b: Stretch| Stretch {
+            rows: b.rows.map(|row| self.turned(side, row)),
+            fall: self.turned(side, b.fall),
+            ..b
+        };
+        let split = face.split(x).map(|split| split.map(|v| self.turned(side, v)));
+        Round { k: f.k, rho: f.rho, axis, stretch: face.stretch().map(turned), split, normal: f.normal }
     }
 
     /// How much each half extent weighs in how far a face bends away from its tangent: k·(tangent component)²·e²/(2ρ).
@@ -404,16 +430,17 @@ impl View<'_> {
         if round.k == 0.0 {
             return DVec3::ZERO;
         }
-        let across = match (&round.stretch, round.axis) {
-            (Some(b), _) => {
+        let across = match (&round.stretch, round.axis, round.split) {
+            (_, _, Some([_, t])) => t * t,
+            (Some(b), ..) => {
                 let [s, t] = b.beside(b.along(round.normal)).map(|t| b.back(t));
                 s * s + t * t
             }
-            (None, Some(axis)) => {
+            (None, Some(axis), None) => {
                 let t = axis.cross(round.normal);
                 t * t
             }
-            (None, None) => DVec3::ONE - round.normal * round.normal,
+            (None, None, None) => DVec3::ONE - round.normal * round.normal,
         };
         across * self.half * self.half * (round.k / (2.0 * round.rho.max(self.radius)))
     }

@@ -202,14 +202,14 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
             };
             Some([(-c.half_height, c.bottom), (c.half_height, c.top)].into_iter().flat_map(rim).collect())
         }
-        Shape::HalfSpace(_) => None,
+        Shape::HalfSpace(_) | Shape::Quadric(_) => None,
     }
 }
 
 /// The pieces of a union of convex solids, as what each is the hull of; `None` where it is no such union.
 pub fn pieces(parts: &Parts<'_>, root: PartId) -> Option<Vec<Vec<Element>>> {
     let (leaves, false) = parts.leaves(root)? else { return None };
-    let hollow = |shape: &Shape| shape.formula().is_some() || matches!(shape, Shape::Torus(_));
+    let hollow = |shape: &Shape| shape.formula().is_some() || matches!(shape, Shape::Torus(_) | Shape::Quadric(_));
     let convex = |p: &PartId| !matches!(&parts.list[*p], Part::Leaf(shape, ..) if hollow(shape));
     leaves.iter().map(|p| if convex(p) { of_leaf(parts, *p) } else { None }).collect()
 }

@@ -16,6 +16,7 @@ use super::outlines::{self, flat_of, flats};
 use super::parts::{Part, PartId, Parts, emit, is_unbounded};
 use super::place;
 use super::polygon::Region;
+use super::quadrics;
 use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
 use super::syntax::{Call, CallId, File, Value, ValueKind};
@@ -240,6 +241,13 @@ impl<'a> Lowering<'a> {
                     _ => self.shapes.polyhedron(call, &context.outer, context.hull),
                 }
                 .map(Step::Leaf)
+            }
+            "paraboloid" | "hyperboloid" | "quadric" => {
+                no_children(call)?;
+                Ok(Step::Leaf(match context.plane {
+                    None => quadrics::quadric(&mut self.shapes, call, &context.outer)?,
+                    Some(_) => self.shapes.nothing(call, "inside of a 2D shape"),
+                }))
             }
             "circle" | "square" | "polygon" => {
                 no_children(call)?;

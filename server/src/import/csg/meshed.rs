@@ -9,7 +9,7 @@ use super::parts::{Part, PartId, Parts};
 use super::place;
 use super::{Place, Problem};
 use crate::math::{Aabb, any_perpendicular, halt};
-use crate::solid::primitive::MeshFault;
+use crate::solid::primitive::{Geometry as _, MeshFault};
 use crate::solid::{Op, Shape};
 use contactd_proto::Pose;
 use glam::{DAffine3, DVec2, DVec3};
@@ -223,6 +223,11 @@ impl Maker<'_, '_> {
                 let (points, triangles) = torus(t.major, t.minor, turn);
                 let points: Vec<DVec3> = points.into_iter().map(|p| frame.point(p)).collect();
                 Ok(of_triangles(&points, &triangles))
+            }
+            Shape::Quadric(q) => {
+                let hint =
+                    " (hull, minkowski, projection and what else needs facets take no quadric that is cut by planes)";
+                Err((self.at, Problem::Unsupported { construct: format!("facets of a {}", q.kind()), hint }))
             }
             Shape::Sphere(_)
             | Shape::Capsule(_)

@@ -30,6 +30,7 @@ mod outlines;
 mod parts;
 mod place;
 mod polygon;
+mod quadrics;
 mod resize;
 mod revolve;
 mod shadow;

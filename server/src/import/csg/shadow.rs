@@ -170,7 +170,8 @@ impl Cut {
             | Shape::Torus(_)
             | Shape::Ellipsoid(_)
             | Shape::EllipticFrustum(_)
-            | Shape::Capsule(_) => None,
+            | Shape::Capsule(_)
+            | Shape::Quadric(_) => None,
         }
     }
 

@@ -169,6 +169,7 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::TriangleMesh(_) => "mesh",
         Shape::Ellipsoid(_) => "ellipsoid",
         Shape::Capsule(_) => "capsule",
+        Shape::Quadric(_) => "quadric",
         Shape::EllipticFrustum(_) => "elliptic frustum",
     }
 }

@@ -12,6 +12,8 @@
 //! | sphere, cylinder | 1/r | 2/(r + √(r² − T²)) | q >= 0, T < r |
 //! | cone | 2 cos α/(q⁺ + √(q⁺² + T²)) | cos α/q⁻ | q⁻ > 0 |
 //! | elliptic | as the face it is an image of, in the coordinates B(x − o), of a cone with cos α = 1 | | |
+//! | bowl | as an elliptic cone's, q⁻ > 0 | | |
+//! | saddle | −1/q⁻ of \|N\| | 1/q⁻ of \|P\| | both > 0 |
 //! | torus | min(0, n_ρ)/q⁻ | 2/(r + √(r² − T²)) | q⁻ > 0, T < r, the box no deeper than the middle of the tube |
 //!
 //! with T the largest τ and q⁻, q⁺ the range of q over the box. Sphere: x is inside where (r + v + n·(x − c))² + τ² <= r²,
@@ -70,7 +72,7 @@ impl Slab {
         let at = face.at(center);
         let Bend { law, radial: (rho, radial), tangents, core } = face.bend(center, &at);
         let mut slab = Self {
-            law,
+            law: law.over(half),
             gradient: at.normal * half,
             slope: at.slope,
             value: at.value,
@@ -139,6 +141,7 @@ impl Slab {
     pub fn dent(&self) -> Option<f64> {
         match (self.law, self.curve) {
             (Law::Ring { lean, .. }, None) if lean > 0.0 => None,
+            (Law::Saddle { .. }, None) => None,
             (_, curve) => Some(curve.map_or(0.0, |c| 0.5 * (-c.range[0]).max(0.0) * c.reach * c.reach)),
         }
     }
@@ -191,15 +194,17 @@ impl Slab {
 mod tests {
     use super::*;
     use crate::math::random::Random;
-    use crate::solid::surface::{Cone, Cylinder, Elliptic, Plane, Sphere, Torus};
+    use crate::solid::surface::{Bowl, Cone, Cylinder, Elliptic, Plane, Saddle, Sphere, Torus};
 
     #[test]
     fn the_surface_lies_between_the_planes() {
         let mut r = Random(11);
         let (mut tight, mut seen, mut tighter) = (0, 0, 0);
-        for i in 0..9600 {
+        for i in 0..13_200 {
             let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
-            let face = match i % 8 {
+            let axes = glam::DMat3::from_rotation_y(n.y);
+            let bends = glam::DVec2::new(r.within(0.3, 2.0), r.within(0.3, 2.0));
+            let face = match i % 11 {
                 0 => Plane { normal: n, offset: r.within(-1.0, 1.0) }.into(),
                 1 => Sphere { center: o, radius: r.within(0.2, 2.0) }.into(),
                 2 => Cylinder { origin: o, axis: n, radius: r.within(0.2, 2.0) }.into(),
@@ -209,6 +214,9 @@ mod tests {
                     Elliptic::ellipsoid(o, glam::DMat3::from_rotation_x(n.x), semi).into()
                 }
                 5 => Elliptic::cylinder(o, [r.vector(1.0) + DVec3::X, r.vector(1.0) + DVec3::Y]).into(),
+                7 => Bowl::new(o, axes, bends, [r.within(-0.1, 1.0), r.within(0.3, 1.0)], 1.0).into(),
+                8 => Saddle::hyperboloid(o, axes, DVec3::new(0.3, r.within(0.4, 1.0), r.within(0.3, 2.0))).into(),
+                9 => Saddle::paraboloid(o, axes, bends, 1.0).into(),
                 6 => Elliptic::cone(o, [r.vector(1.0) + DVec3::X, r.vector(1.0) + DVec3::Y], DVec3::Z).into(),
                 _ => {
                     let (sin, cos) = r.within(0.1, 1.4).sin_cos();

@@ -21,6 +21,7 @@ mod ellipsoid;
 mod elliptic_frustum;
 mod half_space;
 mod polyhedron;
+pub mod quadric;
 mod sphere;
 mod torus;
 mod triangle_mesh;
@@ -34,6 +35,7 @@ pub use ellipsoid::Ellipsoid;
 pub use elliptic_frustum::EllipticFrustum;
 pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
+pub use quadric::Quadric;
 pub use sphere::Sphere;
 pub use torus::Torus;
 pub use triangle_mesh::{MeshFault, Repair, TriangleMesh, WELD};
@@ -54,10 +56,14 @@ pub trait Geometry {
     fn formula(&self) -> Option<&Formula> {
         None
     }
-    /// Of what has a formula: a box in its frame whose six planes it is and-ed with, so that psi is at most a margin only in the
-    /// box grown by that margin.
+    /// Of what has a formula, or a face that is not convex beside others: a box in its frame such that psi is at most a margin only in
+    /// the box grown by that margin times `spread`, for the planes around it that it is and-ed with.
     fn domain(&self) -> Option<Aabb> {
         None
+    }
+    /// By how much more than such planes that box grows: 1 of planes along the axes.
+    fn spread(&self) -> f64 {
+        1.0
     }
     /// Name of face `index` of `faces`, in the field's words: "side", "top", "+x", "face 3".
     fn face_name(&self, index: usize) -> String;
@@ -193,6 +199,7 @@ shapes!(
     Ellipsoid = 8,
     EllipticFrustum = 9,
     Capsule = 10,
+    Quadric = 11,
 );
 
 /// A primitive placed in a model.
@@ -235,10 +242,10 @@ impl Primitive {
         geometry.face_name(if self.label.mirrored { geometry.mirrored_face(index) } else { index })
     }
 
-    /// True where it is the intersection of convex faces; another one has a formula, or one face alone whose psi is the exact
-    /// distance.
+    /// True where it is the intersection of convex faces; another one has a formula, or a first face that is not convex: alone, its psi
+    /// the exact distance, or with planes around it (`Geometry::domain`).
     pub fn is_convex(&self) -> bool {
-        self.shape.formula().is_none() && (self.faces.len() != 1 || self.faces[0].is_convex())
+        self.shape.formula().is_none() && self.faces[0].is_convex()
     }
 
     /// psi of the whole primitive: the largest of its faces' values, or what its formula makes of them. 1-Lipschitz, negative

@@ -40,6 +40,15 @@ pub enum Law {
         /// The normal's part towards the axis, 0 where it leads away.
         lean: f64,
     },
+    /// A bowl's: as a cone's, along no line of its own.
+    Focal,
+    /// A saddle's: above by |P|, below by |N|.
+    Saddle {
+        /// |N| at the middle of the box, or after `over` the least of it by its gradient there; a length.
+        rho: f64,
+        /// Gradient of |N| there.
+        radial: DVec3,
+    },
 }
 
 impl Law {
@@ -53,6 +62,15 @@ impl Law {
     #[inline]
     pub fn changes_along(&self) -> bool {
         matches!(self, Law::Conical { .. })
+    }
+
+    /// The same over a box of the half extents `half`.
+    #[inline]
+    pub fn over(self, half: DVec3) -> Self {
+        match self {
+            Law::Saddle { rho, radial } => Law::Saddle { rho: rho - radial.abs().dot(half), radial },
+            Law::Straight | Law::Round { .. } | Law::Conical { .. } | Law::Ring { .. } | Law::Focal => self,
+        }
     }
 
     /// κ⁻ and κ⁺, per length, where τ is at most `t` and the distance from the centre or axis along the radial direction from
@@ -73,6 +91,10 @@ impl Law {
                     let low = if lean == 0.0 { 0.0 } else { -lean / (least - pad) };
                     [low, high]
                 })
+            }
+            Law::Focal => (least > 16.0 * pad).then(|| [2.0 / (most + most.hypot(t)), 1.0 / (least - pad)]),
+            Law::Saddle { rho, .. } => {
+                (least > 16.0 * pad && rho > 16.0 * pad).then(|| [-1.0 / (rho - pad), 1.0 / (least - pad)])
             }
         }
     }

@@ -189,7 +189,7 @@ impl Surface for Capsule {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
-        [o.x, o.y, o.z, a.x, a.y, a.z, self.half, self.radius, 0.0]
+        [o.x, o.y, o.z, a.x, a.y, a.z, self.half, self.radius, 0.0, 0.0, 0.0]
     }
 
     /// From the first to the last of the ball at either end and of the cylinder between them.

@@ -190,7 +190,7 @@ impl Surface for Cone {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.apex, self.axis);
-        [o.x, o.y, o.z, a.x, a.y, a.z, self.sin, self.cos, 0.0]
+        [o.x, o.y, o.z, a.x, a.y, a.z, self.sin, self.cos, 0.0, 0.0, 0.0]
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

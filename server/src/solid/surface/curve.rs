@@ -98,8 +98,9 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
             }
         }
         (_, Face::Capsule(_)) => common(q, p, size, least, found),
-        // Other curves of elliptic faces are no lines, and circles by chance alone.
-        (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => {}
+        // Other curves of elliptic faces and quadrics are no lines that are looked for, and circles by chance alone.
+        (Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_), _)
+        | (_, Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_)) => {}
         (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
         (_, Face::Torus(_)) => common(q, p, size, least, found),
     }
@@ -142,7 +143,7 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut
             }
         }
         // Of these `common` knows more.
-        Face::Elliptic(_) | Face::Torus(_) | Face::Capsule(_) => {}
+        Face::Elliptic(_) | Face::Torus(_) | Face::Capsule(_) | Face::Bowl(_) | Face::Saddle(_) => {}
     }
 }
 
@@ -236,7 +237,9 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
             | Face::Cylinder(_)
             | Face::Torus(_)
             | Face::Elliptic(_)
-            | Face::Capsule(_) => true,
+            | Face::Capsule(_)
+            | Face::Bowl(_)
+            | Face::Saddle(_) => true,
         };
         if is_on && p.x > 0.0 {
             circle(x, axis, p.x * p.x);
@@ -265,7 +268,7 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         Face::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
         Face::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
         // About no axis, and of several pieces.
-        Face::Elliptic(_) | Face::Capsule(_) => return,
+        Face::Elliptic(_) | Face::Capsule(_) | Face::Bowl(_) | Face::Saddle(_) => return,
     };
     let way = center - tube;
     let d = way.length();
@@ -374,7 +377,8 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             tangent(p, Outward { face: &Cylinder { origin, axis, radius }.into(), ..q }, out_of_q, within)
         }
         // Touching others, they do so at points, or along no line or circle that is looked for.
-        (Face::Elliptic(_), _) | (_, Face::Elliptic(_)) => None,
+        (Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_), _)
+        | (_, Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_)) => None,
         // A plane touches what is round, and a hollow what is in it, the other way round.
         (Face::Plane(_), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_) | Face::Torus(_))
         | (Face::Cylinder(_) | Face::Cone(_), Face::Sphere(_) | Face::Torus(_))

@@ -125,7 +125,7 @@ impl Surface for Cylinder {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
-        [o.x, o.y, o.z, a.x, a.y, a.z, self.radius, 0.0, 0.0]
+        [o.x, o.y, o.z, a.x, a.y, a.z, self.radius, 0.0, 0.0, 0.0, 0.0]
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

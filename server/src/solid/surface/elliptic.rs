@@ -51,7 +51,7 @@ pub struct Stretch {
 }
 
 /// What stands for 1: the rows that `stretch` makes of a rotation are those of one to 30 half units in the last place.
-const WHOLE: f64 = 1.0 - 32.0 * f64::EPSILON;
+pub(super) const WHOLE: f64 = 1.0 - 32.0 * f64::EPSILON;
 
 /// Where a point stands: B(x − o), its length, and the unit vector along it.
 struct Seen {
@@ -63,7 +63,7 @@ struct Seen {
 
 impl Stretch {
     #[inline]
-    fn of(&self, y: DVec3) -> DVec3 {
+    pub(super) fn of(&self, y: DVec3) -> DVec3 {
         let [a, b, c] = self.rows;
         DVec3::new(a.dot(y), b.dot(y), c.dot(y))
     }
@@ -75,8 +75,10 @@ impl Stretch {
         a * v.x + b * v.y + c * v.z
     }
 
-    /// n of a gradient Bᵀn − w, or of a multiple of one that is not a cone's: a unit vector.
+    /// n of a gradient Bᵀn − w, or where B has two rows or w is zero of a multiple of one that is not a cone's: a unit vector.
     pub fn along(&self, gradient: DVec3) -> DVec3 {
+        // A third row lies along w.
+        let gradient = if self.rows[2] == DVec3::ZERO { gradient } else { gradient + self.fall };
         let part = |row: DVec3| if row == DVec3::ZERO { 0.0 } else { row.dot(gradient) / row.length_squared() };
         let v = DVec3::from_array(self.rows.map(part));
         v.try_normalize().unwrap_or(DVec3::X)
@@ -89,6 +91,44 @@ impl Stretch {
         }
         let t = any_perpendicular(along);
         [t, along.cross(t)]
+    }
+
+    /// Lower bound of psi less that of `q` over the ball of radius r around c, and the size of the numbers at hand:
+    /// r_q − r_p + w_p·Δ − |B_p Δ| − |x − o_q| (|B_p − B_q| + |w_p − w_q|), rows turned so that they point the same way; Δ = o_p − o_q.
+    pub(super) fn above(&self, o: DVec3, (q, u): (&Self, DVec3), c: DVec3, r: f64) -> (f64, f64) {
+        let off = |a: DVec3, b: DVec3| (a - if a.dot(b) < 0.0 { -b } else { b }).length();
+        let lean = (0..3).map(|k| off(self.rows[k], q.rows[k])).sum::<f64>() + (self.fall - q.fall).length();
+        let far = (c - u).length() + r;
+        let tilt = if lean == 0.0 { 0.0 } else { lean * far };
+        let delta = o - u;
+        let size = o.length() + u.length() + self.radius + q.radius + 2.0 * (far + c.length());
+        (q.radius - self.radius + self.fall.dot(delta) - self.of(delta).length() - tilt, size)
+    }
+
+    /// Where |B o + t B d| <= r + w·(o + t d).
+    pub(super) fn crossed(&self, o: DVec3, d: DVec3) -> Option<(f64, f64)> {
+        let (p, e) = (self.of(o), self.of(d));
+        let (h, k) = (self.radius + self.fall.dot(o), self.fall.dot(d));
+        let (a, b, c) = (e.length_squared() - k * k, p.dot(e) - h * k, p.length_squared() - h * h);
+        if self.fall == DVec3::ZERO {
+            if a < 1e-24 {
+                return (c <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
+            }
+            return between_roots(a, b, c);
+        }
+        // As of a circular cone, which it is in these coordinates; of what has a focus likewise, whose other sheet is the other nappe.
+        let on_nappe = |t: f64| h + t * k >= 0.0;
+        if a.abs() < 1e-14 * (e.length_squared() + k * k) {
+            let (from, to) = half_line(2.0 * b, c)?;
+            let probe = if from.is_finite() { from + 1.0 } else { to - 1.0 };
+            return on_nappe(probe).then_some((from, to));
+        }
+        if a > 0.0 {
+            let (from, to) = between_roots(a, b, c)?;
+            return on_nappe(0.5 * (from + to)).then_some((from, to));
+        }
+        let (low, high) = between_roots(-a, -b, -c)?;
+        Some(if k > 0.0 { (high, f64::INFINITY) } else { (f64::NEG_INFINITY, low) })
     }
 }
 
@@ -150,18 +190,7 @@ impl Elliptic {
     /// Its principal axes: the rotation that `turn` tells.
     #[inline]
     pub fn axes(&self) -> DMat3 {
-        let p = self.turn;
-        let s = p.length_squared();
-        let d = 1.0 / ((1.0 + s) * (1.0 + s));
-        let (k, m) = (8.0 * d, 4.0 * (1.0 - s) * d);
-        let (xx, yy, zz) = (k * p.x * p.x, k * p.y * p.y, k * p.z * p.z);
-        let (xy, xz, yz) = (k * p.x * p.y, k * p.x * p.z, k * p.y * p.z);
-        let t = p * m;
-        DMat3::from_cols(
-            DVec3::new(1.0 - (yy + zz), xy + t.z, xz - t.y),
-            DVec3::new(xy - t.z, 1.0 - (xx + zz), yz + t.x),
-            DVec3::new(xz + t.y, yz - t.x, 1.0 - (xx + yy)),
-        )
+        axes_of(self.turn)
     }
 
     /// What psi is made of.
@@ -215,8 +244,24 @@ impl Elliptic {
     }
 }
 
+/// The rotation that is told by the unit axis times the tangent of a quarter of the angle.
+#[inline]
+pub(super) fn axes_of(p: DVec3) -> DMat3 {
+    let s = p.length_squared();
+    let d = 1.0 / ((1.0 + s) * (1.0 + s));
+    let (k, m) = (8.0 * d, 4.0 * (1.0 - s) * d);
+    let (xx, yy, zz) = (k * p.x * p.x, k * p.y * p.y, k * p.z * p.z);
+    let (xy, xz, yz) = (k * p.x * p.y, k * p.x * p.z, k * p.y * p.z);
+    let t = p * m;
+    DMat3::from_cols(
+        DVec3::new(1.0 - (yy + zz), xy + t.z, xz - t.y),
+        DVec3::new(xy - t.z, 1.0 - (xx + zz), yz + t.x),
+        DVec3::new(xz + t.y, yz - t.x, 1.0 - (xx + yy)),
+    )
+}
+
 /// A rotation by the images of x and y, unit vectors square to each other to rounding.
-fn turn_of(x: DVec3, y: DVec3) -> DVec3 {
+pub(super) fn turn_of(x: DVec3, y: DVec3) -> DVec3 {
     let z = x.cross(y).normalize();
     let q = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
     let q = if q.w < 0.0 { -q } else { q };
@@ -245,7 +290,7 @@ pub fn squared([n, m]: [DVec3; 2]) -> [DVec3; 2] {
 
 /// The principal axes of a symmetric form and its values along them (C. Jacobi, 1846; G. Golub, C. Van Loan, Matrix Computations,
 /// 8.5).
-fn principal(form: DMat3) -> (DMat3, DVec3) {
+pub fn principal(form: DMat3) -> (DMat3, DVec3) {
     let mut a = form.to_cols_array_2d();
     let mut axes = DMat3::IDENTITY;
     for _ in 0..12 {
@@ -377,8 +422,7 @@ impl Surface for Elliptic {
         self.origin + slid + self.rim(along)
     }
 
-    /// r_q − r_p + w_p·Δ − |B_p Δ| − |x − o_q| (|B_p − B_q| + |w_p − w_q|), rows turned so that they point the same way; Δ = o_p − o_q,
-    /// of cylinders between the points of the axes next to c.
+    /// Of cylinders between the points of the axes next to c.
     fn above(&self, q: &Self, c: DVec3, r: f64) -> (f64, f64) {
         if self.is_cone() != q.is_cone() || self.is_cylinder() != q.is_cylinder() {
             return (f64::NEG_INFINITY, 0.0);
@@ -387,14 +431,7 @@ impl Surface for Elliptic {
             let slid = face.axis() * (c - face.origin).dot(face.axis());
             if face.is_cylinder() { face.origin + slid } else { face.origin }
         };
-        let (o, u, p, s) = (foot(self), foot(q), self.parts(), q.parts());
-        let off = |a: DVec3, b: DVec3| (a - if a.dot(b) < 0.0 { -b } else { b }).length();
-        let lean = (0..3).map(|k| off(p.rows[k], s.rows[k])).sum::<f64>() + (p.fall - s.fall).length();
-        let far = (c - u).length() + r;
-        let tilt = if lean == 0.0 { 0.0 } else { lean * far };
-        let delta = o - u;
-        let size = o.length() + u.length() + p.radius + s.radius + 2.0 * (far + c.length());
-        (s.radius - p.radius + p.fall.dot(delta) - p.of(delta).length() - tilt, size)
+        self.parts().above(foot(self), (&q.parts(), foot(q)), c, r)
     }
 
     /// What psi is off there, as a distance where it is flattest.
@@ -414,39 +451,10 @@ impl Surface for Elliptic {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, t) = (self.origin, self.turn);
-        [o.x, o.y, o.z, t.x, t.y, t.z, self.size, self.second, self.third]
+        [o.x, o.y, o.z, t.x, t.y, t.z, self.size, self.second, self.third, 0.0, 0.0]
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
-        self.crossed(origin, d).into_iter().collect()
-    }
-}
-
-impl Elliptic {
-    /// Where |B o + t B d| <= r + w·(o + t d).
-    fn crossed(&self, origin: DVec3, d: DVec3) -> Option<(f64, f64)> {
-        let (stretch, o) = (self.parts(), origin - self.origin);
-        let (p, e) = (stretch.of(o), stretch.of(d));
-        let (h, k) = (stretch.radius + stretch.fall.dot(o), stretch.fall.dot(d));
-        let (a, b, c) = (e.length_squared() - k * k, p.dot(e) - h * k, p.length_squared() - h * h);
-        if !self.is_cone() {
-            if a < 1e-24 {
-                return (c <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
-            }
-            return between_roots(a, b, c);
-        }
-        // As of a circular cone, which it is in these coordinates.
-        let on_nappe = |t: f64| h + t * k >= 0.0;
-        if a.abs() < 1e-14 * (e.length_squared() + k * k) {
-            let (from, to) = half_line(2.0 * b, c)?;
-            let probe = if from.is_finite() { from + 1.0 } else { to - 1.0 };
-            return on_nappe(probe).then_some((from, to));
-        }
-        if a > 0.0 {
-            let (from, to) = between_roots(a, b, c)?;
-            return on_nappe(0.5 * (from + to)).then_some((from, to));
-        }
-        let (low, high) = between_roots(-a, -b, -c)?;
-        Some(if k > 0.0 { (high, f64::INFINITY) } else { (f64::NEG_INFINITY, low) })
+        self.parts().crossed(origin - self.origin, d).into_iter().collect()
     }
 }

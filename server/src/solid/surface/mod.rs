@@ -1,5 +1,5 @@
 //! Surfaces of faces: the 1-Lipschitz functions psi whose common negative part is a primitive, one file each. All are convex
-//! but the torus', which says how far it falls below its tangents ([`Surface::under`]).
+//! but a torus' and a saddle's, which say how far they fall below their tangents ([`Surface::under`]).
 //!
 //! | face | psi |
 //! |---|---|
@@ -10,6 +10,8 @@
 //! | torus | hypot(ρ − R, z) − r, R the radius of its circle, r that of the tube |
 //! | capsule | \|x − q\| − r, q the point of a segment next to x |
 //! | elliptic: the image of a sphere, cylinder or cone | \|B(x − o)\| − w·(x − o) − r |
+//! | bowl: another convex quadric, o its focus | the same |
+//! | saddle: a quadric that is not convex | \|P(x)\| − \|N(x)\|, P and N affine |
 //!
 //! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
 //! functions. Nobody outside of this folder asks of what kind a face is, only what it can tell: whether it is flat, about what
@@ -23,12 +25,14 @@
 //! distance from the axis, so `ON_AXIS` is rounding and no more.
 
 mod bend;
+mod bowl;
 mod capsule;
 mod cone;
 pub mod curve;
 mod cylinder;
 pub mod elliptic;
 mod plane;
+mod saddle;
 mod sphere;
 mod symmetry;
 #[cfg(test)]
@@ -37,12 +41,14 @@ mod torus;
 mod tube;
 
 pub use bend::{Bend, Law};
+pub use bowl::Bowl;
 pub use capsule::Capsule;
 pub use cone::{Apex, Cone};
 pub use curve::Curve;
 pub use cylinder::Cylinder;
 pub use elliptic::{Elliptic, Stretch};
 pub use plane::Plane;
+pub use saddle::{Row, Saddle, Sides};
 pub use sphere::Sphere;
 pub use symmetry::{Axis, Symmetry};
 pub use torus::Torus;
@@ -57,22 +63,29 @@ use smallvec::SmallVec;
 pub struct FaceAt {
     /// psi(x): signed distance-like value, length.
     pub value: f64,
-    /// Gradient of psi: a unit vector, but of elliptic faces, where psi may grow slower than the distance. What bounds psi goes
-    /// by this; what looks for a direction goes by `unit`.
+    /// Gradient of psi: a unit vector, but of elliptic faces and quadrics, where psi may grow slower than the distance. What bounds psi
+    /// goes by this; what looks for a direction goes by `unit`.
     pub normal: DVec3,
-    /// Its length: 1 at most, and just that of all but elliptic faces.
+    /// Its length: 1 at most, and just that of all but these.
     pub slope: f64,
     /// Curvature factor k: 0 plane, cos α cone, 1 any other. psi rises above its tangent by k D²/(2ρ) at most.
     pub k: f64,
-    /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0); of an elliptic face |B(x − o)|.
+    /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0); of an elliptic face or a bowl
+    /// |B(x − o)|, of a saddle |P(x)|.
     pub rho: f64,
 }
 
 impl FaceAt {
-    /// The unit normal: the gradient made as long as 1.
+    /// The unit normal: the gradient made as long as 1; any where it is zero, as on a bowl's axis beyond its focus.
     #[inline]
     pub fn unit(&self) -> DVec3 {
-        if self.slope == 1.0 { self.normal } else { self.normal / self.slope }
+        if self.slope == 1.0 {
+            self.normal
+        } else if self.slope > 0.0 {
+            self.normal / self.slope
+        } else {
+            DVec3::Z
+        }
     }
 }
 
@@ -124,7 +137,8 @@ fn outer(u: DVec3, v: DVec3) -> DMat3 {
 ///
 /// psi(y) >= value + normal·(y − c) − k (√(p² + T²) − p),
 ///
-/// what bends away as a subtracted cone does; k T²/(2ρ) at most for |y − c| <= T. In the face's own frame.
+/// what bends away as a subtracted cone does; k T²/(2ρ) at most for |y − c| <= T. In the face's own frame. Of a saddle `out` is no unit
+/// vector, and T what is along `beside`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Under {
     /// At c, a length.
@@ -141,6 +155,8 @@ pub struct Under {
     pub axis: DVec3,
     /// Unit direction from the axis to c.
     pub out: DVec3,
+    /// What T is along, of a saddle alone: 1 long at most, as `out`.
+    pub beside: Option<DVec3>,
 }
 
 impl Under {
@@ -203,6 +219,18 @@ pub trait Surface: Copy {
     /// leaves out an axis.
     #[inline]
     fn stretch(&self) -> Option<Stretch> {
+        None
+    }
+
+    /// The gradient at `x` of what of psi is not k·ρ, of a face where that is not zero; `apex` tells a round cone's.
+    #[inline]
+    fn steady(&self, _x: DVec3) -> Option<DVec3> {
+        None
+    }
+
+    /// Gradient of the length |P| by which psi bends at `x`, and what that bends along, where P is of two rows; 1 long at most.
+    #[inline]
+    fn split(&self, _x: DVec3) -> Option<[DVec3; 2]> {
         None
     }
 
@@ -346,7 +374,7 @@ pub trait Surface: Copy {
 }
 
 /// Most numbers that tell a face.
-pub const NUMBERS: usize = 9;
+pub const NUMBERS: usize = 11;
 
 /// Any direction that no design has: what faces are sorted along.
 const SKEW: DVec3 = DVec3::new(0.481_726_53, 0.663_114_9, 0.572_917_13);
@@ -398,6 +426,8 @@ faces! {$
     Torus = 4: "All points within a radius of a circle.",
     Elliptic = 5: "The affine image of a sphere, a cylinder or a cone.",
     Capsule = 6: "All points within a radius of a segment.",
+    Bowl = 7: "A convex open quadric: a paraboloid or one sheet of a hyperboloid.",
+    Saddle = 8: "A quadric of two positive and two negative squares.",
 }
 
 impl Face {
@@ -441,6 +471,18 @@ impl Face {
     #[inline]
     pub fn stretch(&self) -> Option<Stretch> {
         each!(self, f => f.stretch())
+    }
+
+    /// See [`Surface::steady`].
+    #[inline]
+    pub fn steady(&self, x: DVec3) -> Option<DVec3> {
+        each!(self, f => f.steady(x))
+    }
+
+    /// See [`Surface::split`].
+    #[inline]
+    pub fn split(&self, x: DVec3) -> Option<[DVec3; 2]> {
+        each!(self, f => f.split(x))
     }
 
     /// The unit normal at `x`.

@@ -117,7 +117,7 @@ impl Surface for Plane {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let n = self.normal;
-        [n.x, n.y, n.z, self.offset, 0.0, 0.0, 0.0, 0.0, 0.0]
+        [n.x, n.y, n.z, self.offset, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
     #[inline]

@@ -116,7 +116,7 @@ impl Surface for Sphere {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let o = self.center;
-        [o.x, o.y, o.z, self.radius, 0.0, 0.0, 0.0, 0.0, 0.0]
+        [o.x, o.y, o.z, self.radius, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
     fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {

@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::math::random::Random;
-use glam::DQuat;
+use glam::{DMat3, DQuat, DVec2};
 
 /// One face of each kind, somewhere.
-fn faces(r: &mut Random) -> [Face; 11] {
+fn faces(r: &mut Random) -> [Face; 18] {
     let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
     let radius = r.within(0.2, 2.0);
     let (sin, cos) = r.within(0.1, 1.2).sin_cos();
@@ -23,7 +23,30 @@ fn faces(r: &mut Random) -> [Face; 11] {
         // One that leans over its ellipse, and an upright one.
         Elliptic::cone(r.vector(1.0), [r.vector(1.0) + DVec3::X, r.vector(1.0) + DVec3::Y], DVec3::Z).into(),
         Elliptic::cone(o, [DVec3::X * r.within(0.5, 2.0), DVec3::Y * r.within(0.5, 2.0)], DVec3::Z * radius).into(),
+        bowl(r, 0.0).into(),
+        bowl(r, radius).into(),
+        // A long ellipsoid, and a cylinder.
+        bowl(r, -0.2).into(),
+        Bowl { scale: DVec3::new(0.6, 0.0, 0.4), fall: 0.6, ..bowl(r, 0.0) }.into(),
+        hyperboloid(r, 0.7).into(),
+        hyperboloid(r, f64::INFINITY).into(),
+        Saddle::paraboloid(r.vector(1.0), turned(r), DVec2::new(r.within(0.3, 2.0), r.within(0.3, 2.0)), 2.0).into(),
     ]
+}
+
+fn turned(r: &mut Random) -> DMat3 {
+    let q = DQuat::from_xyzw(r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0));
+    DMat3::from_quat(q.normalize())
+}
+
+fn bowl(r: &mut Random, kappa: f64) -> Bowl {
+    let (bends, g) = (DVec2::new(r.within(0.3, 2.0), r.within(0.3, 2.0)), r.within(0.3, 1.5));
+    Bowl::new(r.vector(1.0), turned(r), bends, [kappa, g], 2.0)
+}
+
+fn hyperboloid(r: &mut Random, second: f64) -> Saddle {
+    let semi = DVec3::new(r.within(0.2, 0.4), second * r.within(0.6, 1.4), r.within(0.3, 1.5));
+    Saddle::hyperboloid(r.vector(1.0), turned(r), semi)
 }
 
 fn ellipsoid(r: &mut Random) -> Elliptic {
@@ -42,7 +65,10 @@ fn a_face_at_a_point_is_its_value_with_its_derivatives() {
             assert!((at.value - face.value(x)).abs() < 1e-14 && (at.normal.length() - at.slope).abs() < 1e-14);
             assert!(at.slope < 1.0 + 1e-14 && (at.unit().length() - 1.0).abs() < 1e-14, "{face:?}");
             // Near an axis or a centre the third derivative is large.
-            if at.rho < 0.2 || face.axis().is_some_and(|axis| (x - axis.origin).cross(axis.direction).length() < 0.2) {
+            if at.rho < 0.2
+                || face.under(x, x).is_some_and(|u| u.rho < 0.2)
+                || face.axis().is_some_and(|axis| (x - axis.origin).cross(axis.direction).length() < 0.2)
+            {
                 continue;
             }
             let (h, d) = (1e-5, r.vector(1.0).normalize());
@@ -138,7 +164,9 @@ fn capabilities_agree_with_psi() {
                     assert!(face.value(apex.point).abs() < 1e-14 && at.normal.dot(apex.axis) + apex.sin < 1e-12);
                 }
                 // What lies within a tube that meets itself is none of the surface.
-                let is_whole = |foot: DVec3| face.is_convex() || face.value(foot) > -1e-9;
+                // Nor do all gradients of an open quadric occur on it: then the foot is the point itself.
+                let is_near = |foot: DVec3| foot != x && foot.length() < 100.0;
+                let is_whole = |foot: DVec3| is_near(foot) && (face.is_convex() || face.value(foot) > -1e-9);
                 if !face.is_flat() && is_whole(face.foot(x, at.normal, 1.0)) {
                     let foot = face.foot(x, at.normal, 1.0);
                     assert!(face.value(foot).abs() < 1e-12, "{face:?}");
@@ -156,7 +184,7 @@ fn capabilities_agree_with_psi() {
 
 /// What `Under` promises, at a point `y` off the centre.
 fn beneath(u: &Under, y: DVec3) -> f64 {
-    let (p, t) = (u.rho + u.out.dot(y), u.axis.cross(u.out).dot(y));
+    let (p, t) = (u.rho + u.out.dot(y), u.beside.unwrap_or(u.axis.cross(u.out)).dot(y));
     u.value + u.normal.dot(y) - u.k * (p.hypot(t) - p)
 }
 
@@ -223,4 +251,35 @@ fn an_elliptic_face_is_the_image_of_a_round_one() {
         let psi = ball.value(on + out * far);
         assert!(psi <= far + 1e-13 && psi >= far * ball.third - 1e-13, "{ball:?}");
     }
+}
+
+#[test]
+fn a_bowl_and_a_saddle_are_the_quadrics_that_they_are_made_of() {
+    let mut r = Random(19);
+    let mut inside = 0;
+    for _ in 0..4000 {
+        let (axes, o, depth) = (turned(&mut r), r.vector(1.0), r.within(0.1, 4.0));
+        let (bends, g) = (DVec2::new(r.within(0.3, 2.0), r.within(0.0, 2.0)), r.within(0.3, 1.5));
+        let bends = if r.unit() < 0.2 { DVec2::new(bends.x, 0.0) } else { bends };
+        let kappa = if r.unit() < 0.3 { 0.0 } else { r.within(-1.0, 2.0) };
+        let kappa = kappa.max(-bends.min_element());
+        let x = o + r.vector(2.0);
+        let y = axes.transpose() * (x - o);
+        let bowl = Bowl::new(o, axes, bends, [kappa, g], depth);
+        // Of a hyperboloid the other sheet lies beyond its centre at −g/κ, and so does half of an ellipsoid.
+        let form = bends.x * y.x * y.x + bends.y * y.y * y.y - kappa * y.z * y.z - 2.0 * g * y.z;
+        let own = kappa <= 0.0 || y.z > -g / kappa;
+        let is_inside = own && form < 0.0;
+        assert!(form.abs() < 1e-9 || is_inside == (bowl.value(x) < 0.0), "{bowl:?} {x}");
+        let semi = DVec3::new(r.within(0.2, 0.4), r.within(0.4, 1.0), r.within(0.3, 1.5));
+        let waist = Saddle::hyperboloid(o, axes, semi);
+        let form = (y.truncate() / semi.truncate()).length_squared() - 1.0 - (y.z / semi.z) * (y.z / semi.z);
+        assert!(form.abs() < 1e-9 || (form < 0.0) == (waist.value(x) < 0.0), "{waist:?} {x}");
+        let bends = DVec2::new(r.within(0.3, 2.0), r.within(0.3, 2.0));
+        let saddle = Saddle::paraboloid(o, axes, bends, depth);
+        let form = bends.x * y.x * y.x - bends.y * y.y * y.y - y.z;
+        assert!(form.abs() < 1e-9 || (form < 0.0) == (saddle.value(x) < 0.0), "{saddle:?} {x}");
+        inside += usize::from(is_inside);
+    }
+    assert!(inside > 800, "{inside}");
 }

@@ -128,6 +128,7 @@ impl Surface for Torus {
             rho: c.rho,
             axis: self.axis,
             out: c.out,
+            beside: None,
         })
     }
 
@@ -203,7 +204,7 @@ impl Surface for Torus {
     #[inline]
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
-        [o.x, o.y, o.z, a.x, a.y, a.z, self.major, self.minor, 0.0]
+        [o.x, o.y, o.z, a.x, a.y, a.z, self.major, self.minor, 0.0, 0.0, 0.0]
     }
 
     /// With t from the ray's point next to the centre and w = |x|² + R² − r²: w² = 4 R² ρ², of degree four.
