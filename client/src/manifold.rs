@@ -116,13 +116,13 @@ pub struct Manifolds {
 /// What one step told.
 #[derive(Clone, Debug, Default)]
 struct Reported {
-    pairs: Vec<Pair>,
+    pairs: Vec<PairPoints>,
     groups: Vec<Group>,
     points: Vec<Point>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Pair {
+struct PairPoints {
     objects: [u32; 2],
     status: u8,
     is_complete: bool,
@@ -191,7 +191,7 @@ impl Manifolds {
         }
         let objects = [record.a, record.b];
         let before = self.before.find(objects);
-        let mut pair = Pair {
+        let mut pair = PairPoints {
             objects,
             status: record.status,
             is_complete: record.flags & REGIONS_INCOMPLETE == 0,
@@ -277,7 +277,7 @@ impl Manifolds {
     }
 
     /// Says of each candidate which kept point of the step before it is, one to one, the surest first.
-    fn recognise(&mut self, before: &Pair, pair: &Pair) {
+    fn recognise(&mut self, before: &PairPoints, pair: &PairPoints) {
         let old = &self.before.points[before.points[0]..before.points[1]];
         let old_groups = &self.before.groups[before.groups[0]..before.groups[1]];
         let new_groups = &self.now.groups[pair.groups[0]..pair.groups[1]];
@@ -326,7 +326,7 @@ impl Manifolds {
     }
 
     /// Chooses a group's points and gives the new ones their ids.
-    fn choose(&mut self, group: u32, pair: &mut Pair) {
+    fn choose(&mut self, group: u32, pair: &mut PairPoints) {
         let candidates = &mut self.candidates;
         // The group's to the front, in the order in which they were told.
         let mut count = 0;
@@ -364,12 +364,12 @@ impl Manifolds {
 }
 
 impl Reported {
-    fn find(&self, objects: [u32; 2]) -> Option<Pair> {
+    fn find(&self, objects: [u32; 2]) -> Option<PairPoints> {
         self.pairs.binary_search_by_key(&objects, |p| p.objects).ok().map(|at| self.pairs[at])
     }
 
-    fn manifold(&self, pair: &Pair) -> Manifold<'_> {
-        let Pair { objects: [a, b], status, is_complete, points: [from, to], .. } = *pair;
+    fn manifold(&self, pair: &PairPoints) -> Manifold<'_> {
+        let PairPoints { objects: [a, b], status, is_complete, points: [from, to], .. } = *pair;
         Manifold { a, b, status, is_complete, points: &self.points[from..to] }
     }
 }

@@ -108,7 +108,7 @@ pub struct Coupling<T: Transport> {
     table: Arc<RwLock<Table>>,
     manifolds: Manifolds,
     /// By object id.
-    objects: Vec<Placed>,
+    objects: Vec<PlacedObject>,
     batch: Vec<u32>,
     deep: Vec<(u32, u32, Point)>,
     /// The answer to a request did not come in time; it is still to come.
@@ -119,7 +119,7 @@ pub struct Coupling<T: Transport> {
 
 /// An object as it stands.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
+struct PlacedObject {
     /// Where rapier has it.
     pose: WorldPose,
     /// How far it was moved back for the second request.
@@ -131,7 +131,7 @@ struct Placed {
     collider: Option<ColliderHandle>,
 }
 
-impl Placed {
+impl PlacedObject {
     fn world_pose(&self) -> WorldPose {
         WorldPose::new(self.pose.position + self.back, self.pose.rotation)
     }
@@ -308,7 +308,7 @@ impl<T: Transport> Coupling<T> {
         let object = Object::new(name, model.id).group(GROUP).at(pose);
         let object = self.session.add_object(if is_fixed { object.fixed() } else { object })?;
         // Ids count up from 1.
-        let nowhere = Placed { pose, back: DVec3::ZERO, is_fixed, is_stale: !is_fixed, collider: None };
+        let nowhere = PlacedObject { pose, back: DVec3::ZERO, is_fixed, is_stale: !is_fixed, collider: None };
         self.objects.resize(object as usize + 1, nowhere);
         let solid = Solid { object, is_fixed, bounds: model.bounds, mass: model.mass };
         Ok(ColliderBuilder::new(SharedShape::new(solid)).contact_skin(0.5 * self.settings.gap))

@@ -14,7 +14,7 @@ use rayon::ThreadPool;
 use std::sync::Arc;
 
 /// What is to be done.
-pub enum Work {
+pub enum JobKind {
     /// A model to be imported.
     Import(Import),
     /// A model to be integrated over.
@@ -29,11 +29,11 @@ pub enum Finished {
     Integrated(Answer),
 }
 
-impl Work {
+impl JobKind {
     fn run(self, models: &Models) -> Finished {
         match self {
-            Work::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
-            Work::Integrate(integration) => Finished::Integrated(integration.answer()),
+            JobKind::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
+            JobKind::Integrate(integration) => Finished::Integrated(integration.answer()),
         }
     }
 }
@@ -50,7 +50,7 @@ impl Job {
     /// # Errors
     /// `Internal` when no thread can be started.
     pub fn start(
-        work: Work,
+        work: JobKind,
         threads: usize,
         models: Arc<Models>,
         done: impl FnOnce(Finished) + Send + 'static,
@@ -103,7 +103,7 @@ mod tests {
         let many: String = (0..20_000).map(sphere).collect();
         let import = |model, text: String| {
             let file = ModelFile { name: "m.csg".into(), format: String::new(), bytes: text.into() };
-            Work::Import(Import { model, file, facets: Facets::Auto })
+            JobKind::Import(Import { model, file, facets: Facets::Auto })
         };
         let start = |model, text: String| {
             let to = to.clone();

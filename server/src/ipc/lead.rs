@@ -10,7 +10,7 @@
 //! Where requests come from is behind a port (`port`): the loop knows no shared memory.
 
 use super::config::ServerConfig;
-use super::jobs::{Finished, Job, Work};
+use super::jobs::{Finished, Job, JobKind};
 use super::models::{Models, warn};
 use super::port::{CommandCall, Port, StepCall, Wake};
 use super::relay::Relay;
@@ -332,8 +332,8 @@ impl<P: Port> Lead<P> {
                 session.wake.notify();
                 return;
             }
-            CommandOutcome::Import(import) => Work::Import(import),
-            CommandOutcome::Integrate(integration) => Work::Integrate(integration),
+            CommandOutcome::Import(import) => JobKind::Import(import),
+            CommandOutcome::Integrate(integration) => JobKind::Integrate(integration),
         };
         // A core is left to the loop; the others are shared between the jobs by the system.
         let threads = self.cores.saturating_sub(1) / (self.pending.len() + 1);

@@ -22,7 +22,7 @@ pub use approach::Approach;
 pub use nodes::{Census, Eco, Limits, Node};
 pub use snapshot::{Snapshot, SnapshotView};
 pub use tables::{Meet, NodeKind, meet};
-pub use walk::{Candidates, Detail, Element, Pair, PairKind, Walk};
+pub use walk::{Candidates, Detail, Element, PairKind, SurfacePair, Walk};
 
 use crate::bound::{SBounds, Volumes};
 use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};

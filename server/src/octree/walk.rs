@@ -35,7 +35,7 @@ pub struct Element {
 
 /// A pair of surfaces, one of A and one of B.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Pair {
+pub struct SurfacePair {
     /// Of A.
     pub a: Element,
     /// Of B.
@@ -53,7 +53,7 @@ pub enum PairKind {
     Nn,
 }
 
-impl Pair {
+impl SurfacePair {
     /// p-, n- or nn-pair.
     pub fn kind(&self) -> PairKind {
         match (self.a.complemented, self.b.complemented) {
@@ -83,7 +83,7 @@ impl Default for Detail {
 #[derive(Clone, Debug, Default)]
 pub struct Candidates {
     /// Pairs in order, each once.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<SurfacePair>,
     /// Pairs of nodes looked at.
     pub node_pairs: usize,
 }
@@ -223,16 +223,16 @@ impl<'m> Walk<'m> {
     /// The candidate pairs of primitives, each once.
     pub fn candidates(&self) -> Candidates {
         let (ends, node_pairs) = self.ends();
-        let mut found: BTreeSet<Pair> = BTreeSet::new();
+        let mut found: BTreeSet<SurfacePair> = BTreeSet::new();
         for end in &ends {
             for a in self.elements(&self.a.solid, end.a, self.region.as_ref().map(|r| &r.a)) {
                 for b in self.elements(&self.b.solid, end.b, self.region.as_ref().map(|r| &r.b)) {
-                    found.insert(Pair { a, b });
+                    found.insert(SurfacePair { a, b });
                 }
             }
         }
         // A pair of surfaces named with its volumes need not be named without.
-        let named = |p: &Pair| {
+        let named = |p: &SurfacePair| {
             let known = |e: Element| !e.complemented || e.volume.is_some();
             usize::from(known(p.a)) + usize::from(known(p.b))
         };

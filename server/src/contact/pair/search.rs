@@ -75,9 +75,9 @@ fn search(query: &PairQuery, quick: Quick, outcome: &mut Outcome, scratch: &mut 
 
 /// What is told of two bodies that do not meet, so far.
 fn clear(query: &PairQuery) -> Outcome {
-    let mut outcome = Outcome::clear(query.resolution);
-    outcome.counters.primitives = 2;
-    outcome
+    let resolution = query.resolution;
+    let counters = Counters { primitives: 2, ..Counters::default() };
+    Outcome { resolution, depth: resolution, counters, ..Outcome::default() }
 }
 
 /// What is told of two whole primitives without a search; `outcome` is clear before.
@@ -203,9 +203,12 @@ impl<'a> PairSearch<'a> {
         scratch: Scratch,
     ) -> Self {
         let (a, b) = (task.a, task.b);
-        let mut outcome = Outcome::clear(task.delta);
-        outcome.counters.primitives = (a.primitives.len() + b.primitives.len()) as u64;
-        outcome.counters.closed_forms = before.counters.closed_forms;
+        let counters = Counters {
+            primitives: (a.primitives.len() + b.primitives.len()) as u64,
+            closed_forms: before.counters.closed_forms,
+            ..Counters::default()
+        };
+        let outcome = Outcome { resolution: task.delta, depth: task.delta, counters, ..Outcome::default() };
         let mut contacts = Contacts::new(task);
         let (mut ending, mut overlap) = (None, None);
         // Of what has no volume nothing is asked.

@@ -314,19 +314,26 @@ impl Verdict {
     }
 }
 
-impl Outcome {
-    /// The answer "they don't meet".
-    pub fn clear(resolution: f64) -> Self {
+impl Default for Outcome {
+    /// The answer "they don't meet", without work, of no resolution yet.
+    fn default() -> Self {
         Self {
             verdict: Verdict::Clear { until: 1.0, rest: None },
             touching: false,
             apart: f64::NEG_INFINITY,
-            resolution,
-            depth: resolution,
+            resolution: 0.0,
+            depth: 0.0,
             margin_time: 1.0,
             past: false,
             counters: Counters::default(),
         }
+    }
+}
+
+impl Outcome {
+    /// The answer "they don't meet".
+    pub fn clear(resolution: f64) -> Self {
+        Self { resolution, depth: resolution, ..Self::default() }
     }
 
     /// What became of the pair.

@@ -14,7 +14,7 @@ const FAR: f64 = 64.0;
 
 /// How two facets lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pair {
+pub enum FacetPair {
     /// They share what joins them and nothing else, by far.
     Apart,
     /// Not to be told from here.
@@ -128,14 +128,14 @@ impl Facet {
 }
 
 /// How two facets lie to each other.
-pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> Pair {
+pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> FacetPair {
     let near = NEAR * tolerance;
     let (ids, at) = (facets.map(|f| f.ids), facets.map(|f| f.at));
     let own = [0, 1].map(|k| ids[k].map(|v| !ids[1 - k].contains(&v)));
     let owned = |k: usize| (0..3).filter(move |m| own[k][*m]).map(move |m| at[k][m]);
     for k in 0..2 {
         if facets[k].thin {
-            return Pair::Doubtful;
+            return FacetPair::Doubtful;
         }
         // All that the other one has for itself on one side of this one's plane, and not near it.
         let (n, least) = (facets[k].area, near * facets[k].length);
@@ -145,7 +145,7 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> Pair {
             (above, below, count) = (above && height > least, below && height < -least, count + 1);
         }
         if count > 0 && (above || below) {
-            return Pair::Apart;
+            return FacetPair::Apart;
         }
     }
     let shared = own[0].iter().filter(|own| !**own).count();
@@ -154,7 +154,7 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> Pair {
     let far = if shared == 0 { near } else { FAR * near };
     let sides = |k: usize| std::array::from_fn(|m| shared == 0 || !own[k][m] || !own[k][(m + 1) % 3]);
     if shared < 2 && (0..2).any(|k| facets[k].is_beside(sides(k), owned(1 - k), far)) {
-        return Pair::Apart;
+        return FacetPair::Apart;
     }
     match shared {
         0 => {
@@ -163,12 +163,12 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> Pair {
                 for m in 0..3 {
                     let (p, q) = (at[k][m], at[k][(m + 1) % 3]);
                     if pierces(p, q, at[1 - k]) {
-                        return Pair::Crossing;
+                        return FacetPair::Crossing;
                     }
                     least = least.min(beside(p, q, at[1 - k]));
                 }
             }
-            if least <= near { Pair::Doubtful } else { Pair::Apart }
+            if least <= near { FacetPair::Doubtful } else { FacetPair::Apart }
         }
         1 => {
             let mut least = f64::INFINITY;
@@ -176,17 +176,21 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> Pair {
                 let m = (0..3).find(|m| !own[k][*m]).unwrap_or(0);
                 let (p, q) = (at[k][(m + 1) % 3], at[k][(m + 2) % 3]);
                 if pierces(p, q, at[1 - k]) {
-                    return Pair::Crossing;
+                    return FacetPair::Crossing;
                 }
                 least = least.min(beside(p, q, at[1 - k]));
             }
-            if least <= near { Pair::Doubtful } else { Pair::Apart }
+            if least <= near { FacetPair::Doubtful } else { FacetPair::Apart }
         }
         2 => {
             // In one plane, or nearly: on both sides of their edge.
-            if facets[0].area.dot(facets[1].area) > 0.0 && ids_run_against(ids) { Pair::Apart } else { Pair::Doubtful }
+            if facets[0].area.dot(facets[1].area) > 0.0 && ids_run_against(ids) {
+                FacetPair::Apart
+            } else {
+                FacetPair::Doubtful
+            }
         }
-        _ => Pair::Crossing,
+        _ => FacetPair::Crossing,
     }
 }
 

@@ -14,7 +14,7 @@
 //! late.
 
 use super::MeshFault;
-use super::apart::{self, Facet, Pair, pair};
+use super::apart::{self, Facet, FacetPair, pair};
 use super::cells::{self, checked};
 use super::edges::NONE;
 use super::local::{Expr, Local};
@@ -282,9 +282,9 @@ impl Builder<'_> {
                     continue;
                 }
                 match pair(self.surface.tolerance, [&facets[i], &facets[j]]) {
-                    Pair::Apart => {}
-                    Pair::Doubtful => doubt = true,
-                    Pair::Crossing => return Err(MeshFault::Crossing(boxes[i].intersection(&boxes[j]).center())),
+                    FacetPair::Apart => {}
+                    FacetPair::Doubtful => doubt = true,
+                    FacetPair::Crossing => return Err(MeshFault::Crossing(boxes[i].intersection(&boxes[j]).center())),
                 }
             }
         }
