@@ -21,4 +21,5 @@ pub mod record_scenes;
 pub mod reference;
 pub mod scenes;
 pub mod stepped;
+pub mod sweep;
 pub mod verifier;

@@ -17,6 +17,7 @@ use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{SEARCH_ALONE, ask_models, ask_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
+use contactd_tests::sweep::sized;
 use glam::DVec3;
 
 const SPHERE: usize = 0;
@@ -156,7 +157,7 @@ impl Tally {
 const NAMES: [&str; 4] = ["sphere", "cylinder", "cone", "polyhedron"];
 
 fn pairs(default: usize) -> usize {
-    std::env::var("CONTACTD_PAIRS").ok().and_then(|n| n.parse().ok()).unwrap_or(default)
+    sized("CONTACTD_PAIRS", default)
 }
 
 fn at_rest(model: Recipe) -> (Model, Placed) {

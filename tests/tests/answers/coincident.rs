@@ -14,6 +14,7 @@ use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::question_of;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe, Scene};
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3};
 
 /// A scene with what is known of its answer.
@@ -23,10 +24,6 @@ struct Known {
     plain: Option<Scene>,
     /// How far the plainer solid's surface may be from this one's, a length.
     off: f64,
-}
-
-fn number(name: &str, short: usize) -> usize {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(short)
 }
 
 /// A number whose logarithm is uniform.
@@ -279,8 +276,8 @@ fn wrong(rng: &mut Random, known: &Known, o: &Outcome) -> Option<String> {
 
 /// Asks scenes of a class; no answer may be undecided or wrong, nor dearer than `most` cells (the median than `median`).
 fn hold(name: &str, draw: fn(&mut Random) -> Known, [median, most]: [u64; 2]) {
-    let (first, count) = (number("CONTACTD_COINCIDENT_FIRST", 0), number("CONTACTD_COINCIDENT_SCENES", 20));
-    let limit = number("CONTACTD_COINCIDENT_CELLS", 100_000) as u64;
+    let (first, count) = (sized("CONTACTD_COINCIDENT_FIRST", 0), sized("CONTACTD_COINCIDENT_SCENES", 20));
+    let limit = sized("CONTACTD_COINCIDENT_CELLS", 100_000_u64);
     let mut cells = Vec::new();
     let mut faults = Vec::new();
     let mut shares = std::collections::BTreeMap::<&str, usize>::new();

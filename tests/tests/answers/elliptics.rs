@@ -60,7 +60,7 @@ fn off_ellipsoid(semi: DVec3, y: DVec3) -> f64 {
 
 #[test]
 fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
-    let count = pairs(120);
+    let count = pairs(70);
     let on_plane = |r: &mut Random, shape: Shape| {
         let floor = Recipe::cuboid(8.0, 8.0, 1.0).at(0.0, 0.0, -1.0);
         let motions = [past(r, 2.5), Motion::resting(Pose::new(r.vector(0.2), r.rotation()))];
@@ -122,7 +122,7 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
 
 #[test]
 fn certificates_of_elliptic_solids_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(120);
+    let count = pairs(70);
     certify_all("kinds", (count, 0xe1_1195), |r| {
         let other = if r.chance(0.3) { elliptic(r, 0.8) } else { shape(r, 0.8) };
         [(alone(elliptic(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]

@@ -8,19 +8,16 @@ use contactd::world::{StepOutcome, record};
 use contactd_proto::contact_record::{COARSER_RESOLUTION, NO_FACE};
 use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::families::{Course, Effort, Fault, NAMES, Node, Scene, Shape, ask, examine, judge, scene};
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3, dvec3};
 use rayon::prelude::*;
 
 /// Cells that a scene of the command's may cost: a fiftieth of the engine's limit.
 const CELLS: u64 = 20_000;
 
-fn number(name: &str, few: u64) -> u64 {
-    std::env::var(name).map_or(few, |n| n.parse().expect("a number"))
-}
-
 #[test]
 fn nothing_is_wrong_and_nothing_undecided() {
-    let (scenes, seed) = (number("CONTACTD_FAMILY_SCENES", 40), number("CONTACTD_FAMILY_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 30), sized("CONTACTD_FAMILY_SEED", 1));
     let cells = if scenes > 40 { 0 } else { CELLS };
     let of_family = |family: usize| {
         let verdicts: Vec<_> = (0..scenes)

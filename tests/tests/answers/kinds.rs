@@ -17,11 +17,12 @@ use contactd_tests::record_judge;
 use contactd_tests::reference::Moving;
 use contactd_tests::reference::field::Field;
 use contactd_tests::scenes::Recipe;
+use contactd_tests::sweep::sized;
 use glam::DVec3;
 
 /// How many pairs: `default`, or what the environment says.
 pub fn pairs(default: usize) -> usize {
-    std::env::var("CONTACTD_PAIRS").ok().map_or(default, |n| n.parse().expect("a number of pairs"))
+    sized("CONTACTD_PAIRS", default)
 }
 
 /// The model of one primitive.

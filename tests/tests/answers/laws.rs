@@ -17,6 +17,7 @@ use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
 use contactd_tests::reference::{Verdict, field::Field};
 use contactd_tests::scenes::{self, Recipe, Scene, Share};
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3};
 use std::cell::{Cell, RefCell};
 use std::f64::consts::FRAC_PI_2;
@@ -56,10 +57,10 @@ fn ask(scene: &Scene) -> Outcome {
 }
 
 /// Scenes of a law in the command.
-const SCENES: u64 = 200;
+const SCENES: u64 = 100;
 
 /// The same where each takes the reference a tenth of a second.
-const SLOW_SCENES: u64 = 60;
+const SLOW_SCENES: u64 = 40;
 
 /// Runs `law` over random scenes and prints the shares; a law returns what is wrong.
 fn hold(name: &str, seed: u64, law: impl Fn(&mut Random, &Scene, &Outcome) -> Result<(), String>) {
@@ -73,9 +74,7 @@ fn hold_over(
     draw: impl Fn(&mut Random) -> Scene,
     law: impl Fn(&mut Random, &Scene, &Outcome) -> Result<(), String>,
 ) {
-    let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
-    let count = number("CONTACTD_LAW_SCENES").unwrap_or(scenes);
-    let from = number("CONTACTD_LAW_FIRST").unwrap_or(0);
+    let (count, from) = (sized("CONTACTD_LAW_SCENES", scenes), sized("CONTACTD_LAW_FIRST", 0));
     let mut share = Share::default();
     let mut wrong = vec![];
     for i in from..from + count {

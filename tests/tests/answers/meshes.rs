@@ -56,7 +56,7 @@ fn a_point_is_inside_where_the_mesh_winds_around_it_and_f_is_no_more_than_its_di
 
 #[test]
 fn trees_with_meshes_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    values_and_volumes(shape_or_mesh, (pairs(150).div_ceil(40).min(9), 2, pairs(150) * 4), [84, 55]);
+    values_and_volumes(shape_or_mesh, (pairs(150).div_ceil(75).min(9), 2, pairs(150) * 4), [84, 55]);
 }
 
 /// Enclosed volume, by signed tetrahedra.
@@ -78,7 +78,7 @@ fn the_volume_of_a_mesh_is_that_of_its_tetrahedra() {
 
 #[test]
 fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(50);
+    let count = pairs(25);
     certify_all("kinds", (count, 0x3e_5105), |r| {
         let mesh = |r: &mut Random| Shape::from(meshes::solid(&meshes::random(r, 0.8)));
         let other = if r.chance(0.3) { mesh(r) } else { shape(r, 0.8) };
@@ -104,7 +104,7 @@ fn fine(r: &mut Random) -> Mesh {
 fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_and_its_certificates_hold() {
     let mut r = Random::new(0xd1);
     let (mut contacts, mut worst) = (0, 0.0_f64);
-    let count = pairs(40);
+    let count = pairs(20);
     for i in 0..count {
         let mesh = if r.chance(0.3) { meshes::random(&mut r, 0.8) } else { fine(&mut r) };
         let [whole, divided] = [alone(meshes::solid(&mesh)), alone(meshes::divided(&mesh))];
@@ -142,7 +142,7 @@ fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_a
 fn a_convex_mesh_meets_when_the_polyhedron_of_its_points_does() {
     let mut r = Random::new(3);
     let (mut contacts, mut worst) = (0, 0.0_f64);
-    let count = pairs(100);
+    let count = pairs(60);
     for i in 0..count {
         let mesh = if r.chance(0.5) {
             let radius = r.within(0.3, 0.8);

@@ -23,6 +23,7 @@ use contactd_tests::record_judge::{Lie, holds, lies};
 use contactd_tests::record_scenes::FAMILIES;
 use contactd_tests::reference::Moving;
 use contactd_tests::scenes::{self, Recipe, Scene};
+use contactd_tests::sweep::sized;
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -42,7 +43,7 @@ fn judged(scene: &Scene) -> (Outcome, Vec<(Lie, String)>) {
 
 /// Scenes of each family: a few in the command, `CONTACTD_RECORDS` in the long form.
 fn rounds(few: u64) -> u64 {
-    std::env::var("CONTACTD_RECORDS").map_or(few, |n| n.parse().expect("a number"))
+    sized("CONTACTD_RECORDS", few)
 }
 
 /// Judges scenes of a family: (contacts, records wrong, not continued).

@@ -1,9 +1,10 @@
-//! The reference against answers that need no program, and against itself.
+//! The reference against answers that need no program, and against itself (`CONTACTD_LAW_SCENES` scenes).
 
 use contactd_proto::{Motion, Pose};
 use contactd_tests::random_solids::Random;
 use contactd_tests::reference::{Effort, Verdict};
 use contactd_tests::scenes::{self, Recipe, Scene, Share};
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3};
 use std::f64::consts::FRAC_PI_2;
 
@@ -105,7 +106,7 @@ fn deep_overlap_at_the_start_is_told_with_its_depth() {
 #[test]
 fn random_scenes_meet_often_enough_and_the_swapped_pair_agrees() {
     let mut share = Share::default();
-    for seed in 0..60 {
+    for seed in 0..sized("CONTACTD_LAW_SCENES", 40) {
         let scene = scenes::any(&mut Random::new(seed));
         let (t, s) = (scene.truth(Effort::QUICK), scene.swapped().truth(Effort::QUICK));
         assert_eq!(t.verdict, s.verdict, "seed {seed} {}: {t:?} {s:?}", scene.class);

@@ -18,6 +18,7 @@ use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe, Scene};
+use contactd_tests::sweep::sized;
 use glam::{DMat3, DQuat, DVec3, dvec3};
 use std::f64::consts::{PI, TAU};
 
@@ -555,8 +556,7 @@ fn a_leaning_peg_that_turns_many_times_comes_to_the_walls_of_its_hole() {
 
 #[test]
 fn tight_and_tiny_scenes_are_decided() {
-    let number = |name: &str, or: u64| std::env::var(name).map_or(or, |v| v.parse().expect("a number"));
-    let (scenes, seed) = (number("CONTACTD_TIGHT_SCENES", 16), number("CONTACTD_TIGHT_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_TIGHT_SCENES", 16_u64), sized("CONTACTD_TIGHT_SEED", 1_u64));
     let kinds: [(&str, fn(&mut Random) -> Scene); 4] =
         [("small", small), ("rim", rim), ("pocket", pocket), ("screw", screw)];
     let mut bad = Vec::new();

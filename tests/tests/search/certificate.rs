@@ -13,6 +13,7 @@ use contactd_proto::{Motion, Pose};
 use contactd_tests::judge::cases;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe, Scene};
+use contactd_tests::sweep::sized;
 use contactd_tests::verifier::{Checked, check};
 use glam::{DQuat, DVec3};
 use std::collections::BTreeMap;
@@ -146,9 +147,7 @@ fn certificates_of_the_cases_hold() {
 
 #[test]
 fn certificates_of_random_scenes_hold() {
-    let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
-    let count = number("CONTACTD_CERTIFICATES").unwrap_or(200);
-    let first = number("CONTACTD_CERTIFICATE_FIRST").unwrap_or(0);
+    let (count, first) = (sized("CONTACTD_CERTIFICATES", 120), sized("CONTACTD_CERTIFICATE_FIRST", 0));
     let sum = over(count, |i| {
         let scene = scenes::any(&mut Random::new(0x00CE_27F1_0000 + first + i));
         (scene.class.into(), of_scene(&scene, CELLS))

@@ -9,6 +9,7 @@ use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes;
+use contactd_tests::sweep::sized;
 use rayon::prelude::*;
 
 /// Of two contacts that come at one time, as mirror images do, either may be told.
@@ -19,7 +20,7 @@ fn are_tied(x: &Outcome, y: &Outcome, size: f64) -> bool {
 
 #[test]
 fn what_is_told_in_front_of_the_search_is_what_the_search_says() {
-    let count = std::env::var("CONTACTD_FRONTS").ok().and_then(|n| n.parse().ok()).unwrap_or(1_000u64);
+    let count = sized("CONTACTD_FRONTS", 600_u64);
     let all: Vec<(bool, bool, Option<String>)> = (0..count)
         .into_par_iter()
         .map(|i| {

@@ -17,6 +17,7 @@ use contactd::solid::{Face, Label, Sense, Shape, SolidBuilder, surface};
 use contactd_proto::{Motion, Pose};
 use contactd_tests::quadrics;
 use contactd_tests::random_solids::{self, Random};
+use contactd_tests::sweep::sized;
 use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
 use glam::{DQuat, DVec3};
@@ -294,43 +295,40 @@ impl Worst {
     }
 }
 
+/// How many numbers each test compares.
+fn evaluations() -> u64 {
+    sized("CONTACTD_EVALUATIONS", 50_000)
+}
+
 #[test]
 fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget() {
-    let wanted: u64 =
-        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
     let mut r = Random::new(7);
     let models = models(&mut r);
-    evaluate(&mut r, &models, wanted, "all kinds");
+    evaluate(&mut r, &models, evaluations(), "all kinds");
 }
 
 #[test]
 fn nothing_that_is_computed_of_a_torus_differs_by_more_than_the_budget() {
-    let wanted: u64 =
-        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
     let mut r = Random::new(8);
     let shapes: Vec<Shape> = (0..24).map(|_| random_solids::torus(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, wanted, "tori");
+    evaluate(&mut r, &models, evaluations(), "tori");
 }
 
 #[test]
 fn nothing_that_is_computed_of_an_elliptic_face_differs_by_more_than_the_budget() {
-    let wanted: u64 =
-        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
     let mut r = Random::new(9);
     let shapes: Vec<Shape> = (0..48).map(|_| random_solids::elliptic(&mut r, 1.0)).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, wanted, "elliptic faces");
+    evaluate(&mut r, &models, evaluations(), "elliptic faces");
 }
 
 #[test]
 fn nothing_that_is_computed_of_a_capsule_differs_by_more_than_the_budget() {
-    let wanted: u64 =
-        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
     let mut r = Random::new(10);
     let shapes: Vec<Shape> = (0..24).map(|_| random_solids::capsule(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, wanted, "capsules");
+    evaluate(&mut r, &models, evaluations(), "capsules");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use contactd::world::{MeasuredModel, ObjectSpec, PairOutcome, StepOptions, StepO
 use contactd_proto::{Motion, Pose, PoseRecord, Report, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{self, Recipe};
+use contactd_tests::sweep::sized;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -141,7 +142,7 @@ fn run(seed: u64) -> Work {
 
 #[test]
 fn what_is_remembered_changes_no_bit_of_an_answer() {
-    let count = std::env::var("CONTACTD_COHERENT_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
+    let count = sized("CONTACTD_COHERENT_SCENES", 60);
     let all: Vec<Work> = (0..count).into_par_iter().map(|i| run(7_000_001 + i)).collect();
     let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
     let (steps, contacts, clear, known) = (sum(|w| w.steps), sum(|w| w.contacts), sum(|w| w.clear), sum(|w| w.known));

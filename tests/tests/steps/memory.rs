@@ -13,6 +13,7 @@ use contactd_proto::{Detect, InitialOverlap, Motion, MotionState, Pose, PoseReco
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
 use contactd_tests::stepped::{Act, Change, Play, Thing, block, motion_states, plate};
+use contactd_tests::sweep::sized;
 use contactd_tests::verifier::UNSHOWN;
 use contactd_tests::verifier::memory::{Proven, Truth, UNTOLD, check};
 use glam::DVec3;
@@ -398,13 +399,13 @@ fn unproven(all: &[Work]) -> String {
 
 /// Steps of the random plays.
 fn steps() -> usize {
-    std::env::var("CONTACTD_MEMORY_STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(2_000)
+    sized("CONTACTD_MEMORY_STEPS", 1_200)
 }
 
 #[test]
 fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
     let steps = steps();
-    let first: u64 = std::env::var("CONTACTD_MEMORY_SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(40_000_001);
+    let first: u64 = sized("CONTACTD_MEMORY_SEED", 40_000_001);
     let plays = steps.div_ceil(STEPS) as u64;
     let all: Vec<Work> = (0..plays).into_par_iter().map(|i| run(first + i, STEPS)).collect();
     let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
@@ -495,10 +496,10 @@ fn plays_that_were_told_wrong_once_are_told_right() {
         40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_000_682, 40_001_917, 40_001_935, 40_002_002, 40_002_375,
         40_003_306, 40_002_817,
     ];
-    for seed in seeds {
+    seeds.into_par_iter().for_each(|seed| {
         let work = run(seed, STEPS);
         assert_eq!((work.difference, work.refused, work.steps), (None, None, STEPS), "seed {seed}");
-    }
+    });
 }
 
 /// Two objects in a world.

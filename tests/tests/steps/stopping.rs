@@ -20,6 +20,7 @@ use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3, dvec3};
 
 /// Stops of the plain test command, and how often a body is pressed on before it is dropped anew.
@@ -197,7 +198,7 @@ fn run(
 }
 
 fn stops() -> usize {
-    std::env::var("CONTACTD_STOPS").ok().and_then(|n| n.parse().ok()).unwrap_or(STOPS)
+    sized("CONTACTD_STOPS", STOPS)
 }
 
 fn check(seen: [usize; 3], stops: usize) {
