@@ -333,12 +333,10 @@ fn nothing_that_is_computed_of_a_capsule_differs_by_more_than_the_budget() {
 
 #[test]
 fn nothing_that_is_computed_of_a_quadric_differs_by_more_than_the_budget() {
-    let wanted: u64 =
-        std::env::var("CONTACTD_EVALUATIONS").ok().map_or(100_000, |n| n.parse().expect("a number of evaluations"));
     let mut r = Random::new(11);
     let shapes: Vec<Shape> = (0..48).map(|_| quadrics::random(&mut r, 1.0)).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, wanted, "quadrics");
+    evaluate(&mut r, &models, evaluations(), "quadrics");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.
