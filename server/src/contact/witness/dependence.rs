@@ -148,11 +148,13 @@ fn cells(gradients: &[DVec3]) -> Vec<DVec3> {
     for (i, w) in walls.iter().enumerate() {
         for (j, v) in walls.iter().enumerate().skip(i + 1) {
             let line = w.cross(*v).normalize();
-            let passes = |w: &DVec3| w.dot(line).abs() <= PARALLEL;
+            // The two themselves, too, where they are so nearly parallel that their line is known no better.
+            let passes = |k: usize| k == i || k == j || walls[k].dot(line).abs() <= PARALLEL;
             // Each line once, by the first two walls through it.
-            if walls[..j].iter().enumerate().all(|(k, w)| k == i || !passes(w)) {
-                let through: SmallVec<[DVec3; 8]> = walls.iter().copied().filter(passes).collect();
-                let off = walls.iter().filter(|w| !passes(w)).map(|w| w.dot(line).abs()).fold(1.0, f64::min);
+            if (0..j).all(|k| k == i || !passes(k)) {
+                let through: SmallVec<[DVec3; 8]> = (0..walls.len()).filter(|k| passes(*k)).map(|k| walls[k]).collect();
+                let beside = (0..walls.len()).filter(|k| !passes(*k));
+                let off = beside.map(|k| walls[k].dot(line).abs()).fold(1.0, f64::min);
                 for aside in between(line, &through) {
                     out.extend(
                         [line, -line]
@@ -256,6 +258,17 @@ mod tests {
             }
         }
         assert_eq!(between(DVec3::Z, &[DVec3::X, DVec3::Y]).len(), 2);
+    }
+
+    #[test]
+    fn walls_that_are_nearly_parallel_have_cells_too() {
+        for i in 0..200 {
+            let u = f64::from(i);
+            let turn = glam::DQuat::from_xyzw(u.sin(), (2.3 * u).cos(), (0.7 * u).sin(), (1.9 * u).cos()).normalize();
+            let gradients = [DVec3::X, -DVec3::X, DVec3::new(-1.0, 3e-9, 0.0).normalize()].map(|g| turn * g);
+            let known = cells(&gradients);
+            assert!(known.len() >= 4 && known.iter().all(|d| d.is_finite()), "{i}: {known:?}");
+        }
     }
 
     /// A body y <= 0 less (a prism less itself): f = max(y, −|c|), c = max(n1, n2). Where y < 0 is n2 above n1.
