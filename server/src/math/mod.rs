@@ -7,6 +7,7 @@ pub mod ball;
 pub mod ball_tree;
 pub mod f64x2;
 pub mod halt;
+pub mod mix;
 pub mod moments;
 pub mod oriented;
 #[cfg(test)]

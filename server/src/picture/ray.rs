@@ -3,15 +3,14 @@
 //! Idea (S. Roth, "Ray casting for modeling solids", CGIP 18, 1982): a line meets a convex primitive in one span, cut out by
 //! its faces, and a torus in two; the tree's operations then combine lists of spans. Planes give a half-line, spheres and
 //! cylinders the two roots of a quadratic, the cone's nappe at most one span of its quadratic's sign.
-//! A mesh is a formula of planes: the line is halved until what is left of the formula beside a piece is short.
+//! Of a mesh those triangles are met that a tree of boxes leaves (`mesh`).
 //! Invariant: spans are disjoint, ascending, none a skin (`THIN`).
 //! Not promised: skins thinner than `THIN`, and rays that graze a face, may go either way. Pictures only.
 
+use super::mesh::Mesh;
 use crate::math::Aabb;
-use crate::solid::local::{self, LiteralId, Token, Truth};
-use crate::solid::{Node, NodeId, Op, Primitive, Sense, Solid};
+use crate::solid::{Node, NodeId, Op, Primitive, Solid};
 use glam::DVec3;
-use smallvec::SmallVec;
 
 /// A line with unit direction; positions are lengths along it.
 #[derive(Clone, Copy, Debug)]
@@ -55,14 +54,16 @@ pub struct Crossing {
 pub type Span = (Crossing, Crossing);
 
 /// Spans shorter than this fraction of their distance along the ray are skins of coincident faces.
-const THIN: f64 = 1e-9;
+pub(super) const THIN: f64 = 1e-9;
 
-/// A solid prepared for rays: a box for every node.
+/// A solid prepared for rays: a box for every node, a tree of boxes for every mesh.
 #[derive(Debug)]
 pub struct Traced<'a> {
     /// The solid.
     pub solid: &'a Solid,
     boxes: Vec<Aabb>,
+    /// Of each primitive that is one.
+    meshes: Vec<Option<Mesh<'a>>>,
 }
 
 impl<'a> Traced<'a> {
@@ -83,7 +84,8 @@ impl<'a> Traced<'a> {
                 }
             });
         }
-        Self { solid, boxes }
+        let prepared = |p: &'a Primitive| p.shape.geometry().facets().map(|facets| Mesh::new(p, facets));
+        Self { solid, boxes, meshes: solid.primitives.iter().map(prepared).collect() }
     }
 
     /// The box of the whole solid.
@@ -91,7 +93,7 @@ impl<'a> Traced<'a> {
         self.boxes[self.solid.root as usize]
     }
 
-    /// The spans of `ray` (in the solid's frame) inside the solid, ascending.
+    /// The spans of `ray` (in the solid's frame) inside the solid, ascending: all ahead of its origin, and of those behind some.
     pub fn spans(&self, ray: &Ray) -> Vec<Span> {
         self.spans_of(self.solid.root, ray)
     }
@@ -102,13 +104,10 @@ impl<'a> Traced<'a> {
         }
         match &self.solid.nodes[node as usize] {
             Node::Empty => vec![],
-            Node::Primitive(p) => {
-                let primitive = &self.solid.primitives[*p as usize];
-                match primitive.shape.formula() {
-                    Some(_) => Pieces::of(primitive, ray),
-                    None => spans_of_primitive(primitive, ray),
-                }
-            }
+            Node::Primitive(p) => match &self.meshes[*p as usize] {
+                Some(mesh) => mesh.spans(ray),
+                None => spans_of_primitive(&self.solid.primitives[*p as usize], ray),
+            },
             Node::Op(op, children) => {
                 let mut lists: Vec<(usize, Vec<Span>)> = Vec::with_capacity(children.len());
                 for (i, child) in children.iter().enumerate() {
@@ -128,8 +127,8 @@ impl<'a> Traced<'a> {
         }
     }
 
-    /// A lower bound of the distance from `x` (in the solid's frame) that is f where the solid is near, and some value
-    /// above `reach` elsewhere.
+    /// A lower bound of the distance from `x` (in the solid's frame) that is f where the solid is near, of meshes the distance, and
+    /// some value of at least `reach` elsewhere.
     pub fn clearance(&self, x: DVec3, reach: f64) -> f64 {
         self.clearance_of(self.solid.root, x, reach)
     }
@@ -142,7 +141,10 @@ impl<'a> Traced<'a> {
         }
         match &self.solid.nodes[node as usize] {
             Node::Empty => f64::INFINITY,
-            Node::Primitive(p) => self.solid.primitives[*p as usize].value(x),
+            Node::Primitive(p) => match &self.meshes[*p as usize] {
+                Some(mesh) => mesh.clearance(x, reach),
+                None => self.solid.primitives[*p as usize].value(x),
+            },
             Node::Op(op, children) => match op {
                 Op::Union => children.iter().fold(f64::INFINITY, |m, c| m.min(self.clearance_of(*c, x, reach.min(m)))),
                 Op::Intersection => {
@@ -184,125 +186,6 @@ fn spans_of_primitive(primitive: &Primitive, ray: &Ray) -> Vec<Span> {
     }
     spans.retain(|(enter, leave)| leave.at - enter.at > THIN * enter.at.abs().min(leave.at.abs()));
     spans
-}
-
-/// Tokens up to which what is left of a formula is looked at from crossing to crossing.
-const FEW_TOKENS: usize = 24;
-/// A piece of a line that is this fraction of the whole is halved no more.
-const SHORTEST: f64 = 1e-9;
-
-/// The pieces of a line that are inside a primitive with a formula.
-struct Pieces<'a> {
-    primitive: &'a Primitive,
-    ray: &'a Ray,
-    shortest: f64,
-    spans: Vec<Span>,
-    /// Where the last piece that is inside has begun.
-    open: Option<Crossing>,
-}
-
-impl<'a> Pieces<'a> {
-    fn of(primitive: &'a Primitive, ray: &'a Ray) -> Vec<Span> {
-        let Some((from, to)) = ray.through(&primitive.aabb) else { return vec![] };
-        let mut pieces = Self { primitive, ray, shortest: SHORTEST * (to - from), spans: Vec::new(), open: None };
-        pieces.piece(from, to, None);
-        pieces.turns(to, None, false);
-        pieces.spans
-    }
-
-    /// Goes on with the piece from one length to another, beside which some tokens are left; all, where none is said.
-    fn piece(&mut self, from: f64, to: f64, around: Option<&[Token]>) {
-        let (a, b) = (self.ray.at(from), self.ray.at(to));
-        let (center, half) = (0.5 * (a + b), 0.5 * (b - a).abs());
-        let (primitive, mut left) = (self.primitive, Vec::new());
-        let mut known = |id: LiteralId| {
-            let (low, high) = primitive.faces[(id.face() - primitive.first_face) as usize].span(center, half);
-            let (low, high) = if id.sense() == Sense::Positive { (low, high) } else { (-high, -low) };
-            match (low > 0.0, high < 0.0) {
-                (true, _) => Truth::False,
-                (_, true) => Truth::True,
-                _ => Truth::Open,
-            }
-        };
-        let truth = match around {
-            Some(tokens) => primitive.prune(tokens, &mut left, &mut known),
-            None => primitive.pruned(Sense::Positive, &mut left, &mut known),
-        };
-        match truth {
-            Truth::True => self.turns(from, None, true),
-            Truth::False => self.turns(from, None, false),
-            Truth::Open
-                if left.len() <= FEW_TOKENS && !left.iter().any(|t| local::is_part(*t))
-                    || to - from <= self.shortest =>
-            {
-                self.crossings(&left, from, to)
-            }
-            Truth::Open => {
-                let middle = 0.5 * (from + to);
-                self.piece(from, middle, Some(&left));
-                self.piece(middle, to, Some(&left));
-            }
-        }
-    }
-
-    /// From one crossing of a face to the next.
-    fn crossings(&mut self, left: &[Token], from: f64, to: f64) {
-        let mut at: SmallVec<[(f64, Option<u32>); 16]> = SmallVec::new();
-        at.push((from, None));
-        for id in local::literals(left) {
-            let face = &self.primitive.faces[(id.face() - self.primitive.first_face) as usize];
-            for (enter, leave) in face.inside(self.ray.origin, self.ray.direction) {
-                at.extend([enter, leave].into_iter().filter(|t| (from..to).contains(t)).map(|t| (t, Some(id.face()))));
-            }
-        }
-        at.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for i in 0..at.len() {
-            let next = at.get(i + 1).map_or(to, |next| next.0);
-            if next - at[i].0 > 0.0 {
-                let inside = self.value(left, 0.5 * (at[i].0 + next)) < 0.0;
-                self.turns(at[i].0, at[i].1, inside);
-            }
-        }
-    }
-
-    fn value(&self, tokens: &[Token], t: f64) -> f64 {
-        let x = self.ray.at(t);
-        local::value(tokens, &mut |f| self.primitive.faces[(f - self.primitive.first_face) as usize].value(x))
-    }
-
-    /// From here on the line is inside, or it is not; `face` is the one that it crosses, where that is known.
-    fn turns(&mut self, at: f64, face: Option<u32>, inside: bool) {
-        if inside == self.open.is_some() {
-            return;
-        }
-        let face = face.unwrap_or_else(|| self.nearest(at));
-        let normal = self.primitive.faces[(face - self.primitive.first_face) as usize].at(self.ray.at(at)).normal;
-        let outward = (normal.dot(self.ray.direction) < 0.0) == inside;
-        let crossing = Crossing { at, face, outward };
-        match self.open.take() {
-            None => self.open = Some(crossing),
-            Some(enter) if at - enter.at > THIN * enter.at.abs().min(at.abs()) => self.spans.push((enter, crossing)),
-            Some(_) => {}
-        }
-    }
-
-    /// The face that decides at a point of the surface which lies between two pieces.
-    fn nearest(&self, at: f64) -> u32 {
-        let x = self.ray.at(at);
-        let mut tokens = Vec::new();
-        let psi = |f: u32| self.primitive.faces[(f - self.primitive.first_face) as usize].value(x);
-        // Of a large mesh what passes next to the point.
-        let close = self.shortest.max(THIN * x.abs().max_element());
-        let mut near = |id: LiteralId| match self.primitive.shape.formula() {
-            Some(formula) if formula.is_divided() => {
-                local::truth_of(id.sense(), (psi(id.face()), psi(id.face())), 0.0, close)
-            }
-            _ => Truth::Open,
-        };
-        self.primitive.pruned(Sense::Positive, &mut tokens, &mut near);
-        let decided = if tokens.is_empty() { None } else { local::decided(&tokens, &mut |f| psi(f)) };
-        decided.map_or(self.primitive.first_face, |d| d.1.face())
-    }
 }
 
 /// Combines the spans of several children; children without spans are left out of `lists` but counted in `arity`.
@@ -440,11 +323,17 @@ mod tests {
             let mut next = || DVec3::new(noise(&mut state), noise(&mut state), noise(&mut state));
             let (origin, target) = (next() * 6.0, tilt * (next() * 1.2 + DVec3::new(1.0, 1.0, 0.5)));
             let ray = Ray { origin, direction: (target - origin).normalize() };
-            let (a, b) = (one.spans(&ray), other.spans(&ray));
+            let [a, b] = [&one, &other].map(|traced| {
+                // What lies ahead of the origin.
+                let mut spans = traced.spans(&ray);
+                spans.retain(|(_, leave)| leave.at > 0.0);
+                spans.iter_mut().for_each(|(enter, _)| enter.at = enter.at.max(0.0));
+                spans
+            });
             assert_eq!(a.len(), b.len(), "{a:?} {b:?}");
             for ((enter, leave), (enter_too, leave_too)) in a.iter().zip(&b) {
                 assert!((enter.at - enter_too.at).abs() < 1e-9 && (leave.at - leave_too.at).abs() < 1e-9);
-                for (c, entering) in [(enter, true), (leave, false)] {
+                for (c, entering) in [(enter, true), (leave, false)].into_iter().filter(|c| c.0.at > 0.0) {
                     let normal =
                         of_mesh.faces[c.face as usize].at(ray.at(c.at)).normal * if c.outward { 1.0 } else { -1.0 };
                     assert!((normal.dot(ray.direction) < 0.0) == entering);

@@ -183,21 +183,25 @@ impl<'a> Arguments<'a> {
         Ok(points)
     }
 
-    /// A list of lists of indices below `count`.
-    pub fn index_lists(&self, name: &str, count: usize) -> Result<Vec<Vec<u32>>> {
+    /// A list of lists of indices, without those from `count` on, and how many of these there are.
+    pub fn index_lists(&self, name: &str, count: usize) -> Result<(Vec<Vec<u32>>, usize)> {
         let what = "a list of lists of indices";
         let v = self.required(name, what)?;
         let ValueKind::List(items) = &v.kind else { return Err(self.wrong(v, what, name)) };
-        let mut lists = Vec::with_capacity(items.len());
+        let (mut lists, mut beyond) = (Vec::with_capacity(items.len()), 0);
         for item in items {
             let ValueKind::List(indices) = &item.kind else { return Err(self.wrong(item, what, name)) };
-            let list = indices.iter().map(|i| match i.kind {
-                ValueKind::Number(n) if n >= 0.0 && n < count as f64 && n.fract() == 0.0 => Ok(n as u32),
-                _ => Err(self.wrong(i, &format!("an index below {count}"), name)),
-            });
-            lists.push(list.collect::<Result<_>>()?);
+            let mut list = Vec::with_capacity(indices.len());
+            for i in indices {
+                match i.kind {
+                    ValueKind::Number(n) if n >= 0.0 && n.fract() == 0.0 && n < count as f64 => list.push(n as u32),
+                    ValueKind::Number(n) if n >= 0.0 && n.fract() == 0.0 => beyond += 1,
+                    _ => return Err(self.wrong(i, &format!("an index below {count}"), name)),
+                }
+            }
+            lists.push(list);
         }
-        Ok(lists)
+        Ok((lists, beyond))
     }
 
     /// Where the call stands.

@@ -362,6 +362,14 @@ fn what_is_left_out_is_reported() {
             "polyhedron([[0,0,0],[0,1,0],[1,1,0],[1,0,0],[0.5,0.5,0.5]], [[0,1,2],[0,2,3],[0,1,4],[1,2,4],[2,3,4],[3,0,4]]);",
             "1:1: a polyhedron with 2 faces that run the other way round than their neighbours: turned",
         ),
+        (
+            "polyhedron([[0,0,0],[0,1,0],[1,0,0],[0,0,1]], [[0,2,1],[0,1,3,4],[1,2,3],[2,0,3],[4,4]]);",
+            "1:1: a polyhedron whose faces name 3 points that it has not: left out, as OpenSCAD does",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon(points = [[0,0],[2,0],[0,2]], paths = [[0,1,2,3]]); }",
+            "1:30: a polygon whose paths name 1 points that it has not: left out, as OpenSCAD does",
+        ),
         ("cube(1); group() { cube(2); square(1); }", "1:29: square among solids: a 2D shape, left out"),
         (
             "cube(1); group() { hull() { circle(1); } cube(2); }",

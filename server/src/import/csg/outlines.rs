@@ -11,6 +11,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use manifold_rust::cross_section::CrossSection;
 use manifold_rust::linalg::Vec2;
 use manifold_rust::types::OpType;
+use smallvec::SmallVec;
 use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -92,24 +93,53 @@ pub fn paths(parts: &mut Parts<'_>, at: Place, roots: &[PartId], who: &str) -> R
     if parts.affordable(at, corners).is_err() {
         return clipped(parts, at, roots, &order, (&of_each, &place));
     }
-    let list = &parts.list;
-    let inside = |of: &[bool]| {
-        let mut truth: HashMap<PartId, bool> = HashMap::with_capacity(order.len());
-        for p in &order {
-            let holds = match &list[*p] {
-                Part::Flat(_) => of[place[p]],
-                Part::Op(Op::Union, _, c) => c.iter().any(|c| truth[c]),
-                Part::Op(Op::Intersection, _, c) => !c.is_empty() && c.iter().all(|c| truth[c]),
-                Part::Op(Op::Difference, _, c) => {
-                    c.first().is_some_and(|f| truth[f]) && !c.iter().skip(1).any(|c| truth[c])
-                }
-                Part::Empty | Part::Leaf(..) | Part::Stray(..) => false,
-            };
-            truth.insert(*p, holds);
-        }
-        roots.iter().any(|r| truth[r])
-    };
+    let within = Within::of(parts, &order, roots, &place);
+    let inside = |of: &[bool]| within.holds(of);
     overlay(&of_each, &inside).ok_or_else(|| (at, crossing()))
+}
+
+/// What a point is in of some parts, each by its place in an order that has operands before operations.
+struct Within {
+    steps: Vec<Step>,
+    roots: Vec<usize>,
+}
+
+enum Step {
+    /// The leaf of a number.
+    Flat(usize),
+    Op(Op, Vec<usize>),
+    Nothing,
+}
+
+impl Within {
+    fn of(parts: &Parts<'_>, order: &[PartId], roots: &[PartId], leaves: &HashMap<PartId, usize>) -> Self {
+        // Of a part that is there twice the first counts, which stands before all that have it.
+        let mut at: HashMap<PartId, usize> = HashMap::with_capacity(order.len());
+        order.iter().enumerate().for_each(|(i, p)| _ = at.entry(*p).or_insert(i));
+        let step = |p: &PartId| match &parts.list[*p] {
+            Part::Flat(_) => Step::Flat(leaves[p]),
+            Part::Op(op, _, of) => Step::Op(*op, of.iter().map(|c| at[c]).collect()),
+            Part::Empty | Part::Leaf(..) | Part::Stray(..) => Step::Nothing,
+        };
+        Self { steps: order.iter().map(step).collect(), roots: roots.iter().map(|r| at[r]).collect() }
+    }
+
+    /// True where a point is inside that lies in some of the leaves.
+    fn holds(&self, of: &[bool]) -> bool {
+        let mut truth: SmallVec<[bool; 64]> = SmallVec::with_capacity(self.steps.len());
+        for step in &self.steps {
+            truth.push(match step {
+                Step::Flat(leaf) => of[*leaf],
+                Step::Op(Op::Union, c) => c.iter().any(|c| truth[*c]),
+                Step::Op(Op::Intersection, c) => !c.is_empty() && c.iter().all(|c| truth[*c]),
+                Step::Op(Op::Difference, c) => {
+                    c.first().is_some_and(|f| truth[*f]) && !c.iter().skip(1).any(|c| truth[*c])
+                }
+                Step::Nothing => false,
+            });
+        }
+        self.roots.iter().any(|r| truth[*r])
+    }
 }
 
 /// The same of more corners than can be held against each other one by one: by Clipper (of manifold-rust), as in OpenSCAD, on a grid

@@ -155,11 +155,22 @@ impl Shapes<'_> {
         Ok(self.parts.push(Part::Op(Op::Intersection, call.at, made)))
     }
 
+    fn note_beyond(&mut self, call: &Call, lists: &str, beyond: usize) {
+        if beyond > 0 {
+            let what = format!("a {} whose {lists} name {beyond} points that it has not", call.name);
+            self.parts.note(call.at, format!("{what}: left out, as OpenSCAD does"), None);
+        }
+    }
+
     /// `polyhedron`; below a hull the points of its faces are enough.
     pub fn polyhedron(&mut self, call: &Call, outer: &DAffine3, hull: bool) -> Result<PartId> {
         let arguments = Arguments::new(call, &["points", "faces"])?;
         let points: Vec<DVec3> = arguments.points::<3>("points")?.into_iter().map(DVec3::from_array).collect();
-        let faces = arguments.index_lists("faces", points.len())?;
+        let (mut faces, beyond) = arguments.index_lists("faces", points.len())?;
+        if beyond > 0 {
+            faces.retain(|face| face.len() >= 3);
+            self.note_beyond(call, "faces", beyond);
+        }
         self.of_faces(call, outer, hull, (points, faces))
     }
 
@@ -290,7 +301,8 @@ impl Shapes<'_> {
                 let paths = match arguments.get("paths") {
                     None => vec![points],
                     Some(_) => {
-                        let lists = arguments.index_lists("paths", points.len())?;
+                        let (lists, beyond) = arguments.index_lists("paths", points.len())?;
+                        self.note_beyond(call, "paths", beyond);
                         lists.iter().map(|l| l.iter().map(|i| points[*i as usize]).collect()).collect()
                     }
                 };

@@ -370,8 +370,8 @@ fn every_refusal_is_a_sentence_with_its_place() {
             "1:1: expected a closed mesh, found one that crosses itself, lies on itself or is inside out near [",
         ),
         (
-            "polyhedron(points = [[0, 0, 0]], faces = [[0, 1, 2]]);".into(),
-            "1:47: expected an index below 1 as faces of polyhedron, found 1",
+            "polyhedron(points = [[0, 0, 0]], faces = [[0, -1, 2]]);".into(),
+            "1:47: expected an index below 1 as faces of polyhedron, found -1",
         ),
         (
             under("[1e99, 0, 0, 0], [0, 1e99, 0, 0], [0, 0, 1e99, 0]", "cube(1e250);"),

@@ -3,7 +3,9 @@
 use super::{Bodies, Line, Polygons, Result};
 use crate::import::problem::Problem;
 use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
+use crate::math::mix::Mixed;
 use glam::DVec3;
+use std::collections::hash_map::Entry;
 
 /// The row of `format::FORMATS`.
 pub const FORMAT: Format = Format { name: "stl", endings: &["stl"], read: import, names: |_, _| Vec::new() };
@@ -47,21 +49,31 @@ fn binary(bytes: &[u8], count: usize, limits: &Limits) -> Result<Polygons> {
     if count > limits.mesh_facets {
         return Err((Place::START, Problem::Limit { what: "triangles of a mesh", limit: limits.mesh_facets }));
     }
+    // Each corner is there as often as it has triangles: equal ones are kept once.
+    let mut known: Mixed<[u32; 3], u32> = Mixed::with_capacity_and_hasher(count / 2, Default::default());
     for (i, triangle) in bytes.chunks_exact(TRIANGLE).enumerate() {
         let number = |k: usize| {
             let b = &triangle[12 + 4 * k..16 + 4 * k];
-            f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            f32::from_le_bytes([b[0], b[1], b[2], b[3]])
         };
-        let first = mesh.points.len() as u32;
-        for k in 0..3 {
-            let point = DVec3::new(number(3 * k), number(3 * k + 1), number(3 * k + 2));
-            if !point.is_finite() {
-                let found = format!("{point} in triangle {i}");
-                return Err((Place::START, Problem::syntax("finite numbers", found)));
-            }
-            mesh.points.push(point);
+        let mut corners = [0; 3];
+        for (k, corner) in corners.iter_mut().enumerate() {
+            let at = [number(3 * k), number(3 * k + 1), number(3 * k + 2)];
+            // Adding 0 turns -0 into 0.
+            *corner = match known.entry(at.map(|x| (x + 0.0).to_bits())) {
+                Entry::Occupied(known) => *known.get(),
+                Entry::Vacant(free) => {
+                    let point = DVec3::from_array(at.map(f64::from));
+                    if !point.is_finite() {
+                        let found = format!("{point} in triangle {i}");
+                        return Err((Place::START, Problem::syntax("finite numbers", found)));
+                    }
+                    mesh.points.push(point);
+                    *free.insert(mesh.points.len() as u32 - 1)
+                }
+            };
         }
-        mesh.push(&[first, first + 1, first + 2], Place::START, &mut triangles, limits)?;
+        mesh.push(&corners, Place::START, &mut triangles, limits)?;
     }
     Ok(mesh)
 }

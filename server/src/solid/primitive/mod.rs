@@ -65,6 +65,10 @@ pub trait Geometry {
     fn spread(&self) -> f64 {
         1.0
     }
+    /// Of what has a formula: its surface as triangles, which rays of pictures meet.
+    fn facets(&self) -> Option<Facets<'_>> {
+        None
+    }
     /// Name of face `index` of `faces`, in the field's words: "side", "top", "+x", "face 3".
     fn face_name(&self, index: usize) -> String;
     /// Tight axis-aligned box after the placement `frame`.
@@ -103,6 +107,24 @@ pub trait Geometry {
     fn read(from: &mut dyn Source) -> Checked<Self>
     where
         Self: Sized;
+}
+
+/// A closed surface of triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct Facets<'a> {
+    /// Its corners, in the primitive's frame.
+    pub vertices: &'a [DVec3],
+    /// Indices of corners, counter-clockwise from outside.
+    pub triangles: &'a [[u32; 3]],
+    /// Of each triangle its face, `u32::MAX` where it is too thin to have one.
+    faces: &'a [u32],
+}
+
+impl Facets<'_> {
+    /// The number of a triangle's face among those of the primitive; `None` of one that is too thin to have a plane.
+    pub fn face_of(&self, triangle: u32) -> Option<u32> {
+        Some(self.faces[triangle as usize]).filter(|face| *face != u32::MAX)
+    }
 }
 
 /// What should have been in some bytes.

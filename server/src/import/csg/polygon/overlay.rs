@@ -37,8 +37,9 @@ pub fn overlay(operands: &[Vec<Vec<DVec2>>], inside: &dyn Fn(&[bool]) -> bool) -
         }
     }
     let pieces = pieces(&edges, operands.len());
+    let columns = [false, true].map(|steep| Columns::of(&pieces, steep));
     let kept: Vec<[DVec2; 2]> =
-        pieces.iter().filter(|(e, own)| bounds(*e, own, &pieces, inside)).map(|(e, _)| *e).collect();
+        pieces.iter().filter(|(e, own)| bounds(*e, own, (&pieces, &columns), inside)).map(|(e, _)| *e).collect();
     let (rings, open) = traced(&kept);
     (!open).then(|| simple(rings))
 }
@@ -58,13 +59,49 @@ fn pieces(edges: &[Owned], operands: usize) -> Vec<([DVec2; 2], Vec<bool>)> {
     pieces
 }
 
+/// The edges over each of some intervals of x, of y where they are taken `steep`.
+struct Columns {
+    from: f64,
+    width: f64,
+    edges: Vec<Vec<u32>>,
+}
+
+impl Columns {
+    fn of(pieces: &[([DVec2; 2], Vec<bool>)], steep: bool) -> Self {
+        let ends = |e: &[DVec2; 2]| if steep { (e[0].y, e[1].y) } else { (e[0].x, e[1].x) };
+        let spans = || pieces.iter().map(|(e, _)| ends(e));
+        let (low, high) = spans()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (a, b)| (low.min(a.min(b)), high.max(a.max(b))));
+        // So few that even edges over all of them take no more room than what follows takes time.
+        let count = 1 + 4 * pieces.len().isqrt();
+        let mut this = Self { from: low, width: (high - low) / count as f64, edges: vec![Vec::new(); count] };
+        for (i, (a, b)) in spans().enumerate() {
+            for k in this.column(a.min(b))..=this.column(a.max(b)) {
+                this.edges[k].push(i as u32);
+            }
+        }
+        this
+    }
+
+    fn column(&self, x: f64) -> usize {
+        // What is not a number is 0.
+        (((x - self.from) / self.width) as usize).min(self.edges.len() - 1)
+    }
+}
+
 /// True when the result lies on one side of an edge: counted along a ray from its middle, up or, from a steep one, to the right.
-fn bounds(e: [DVec2; 2], own: &[bool], pieces: &[([DVec2; 2], Vec<bool>)], inside: &dyn Fn(&[bool]) -> bool) -> bool {
+fn bounds(
+    e: [DVec2; 2],
+    own: &[bool],
+    (pieces, columns): (&[([DVec2; 2], Vec<bool>)], &[Columns; 2]),
+    inside: &dyn Fn(&[bool]) -> bool,
+) -> bool {
     let steep = (e[1].y - e[0].y).abs() > (e[1].x - e[0].x).abs();
     let flip = |p: DVec2| if steep { DVec2::new(p.y, p.x) } else { p };
     let middle = flip((e[0] + e[1]) * 0.5);
     let mut beside = vec![false; own.len()];
-    for (other, owners) in pieces {
+    let columns = &columns[usize::from(steep)];
+    for (other, owners) in columns.edges[columns.column(middle.x)].iter().map(|i| &pieces[*i as usize]) {
         if *other == e {
             continue;
         }

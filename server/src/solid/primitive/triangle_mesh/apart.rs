@@ -130,8 +130,12 @@ impl Facet {
 /// How two facets lie to each other.
 pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> FacetPair {
     let near = NEAR * tolerance;
-    let (ids, at) = (facets.map(|f| f.ids), facets.map(|f| f.at));
-    let own = [0, 1].map(|k| ids[k].map(|v| !ids[1 - k].contains(&v)));
+    let (ids, at) = ([facets[0].ids, facets[1].ids], [&facets[0].at, &facets[1].at]);
+    let others = |k: usize| {
+        let ([a, b, c], others) = (ids[k], &ids[1 - k]);
+        [!others.contains(&a), !others.contains(&b), !others.contains(&c)]
+    };
+    let own = [others(0), others(1)];
     let owned = |k: usize| (0..3).filter(move |m| own[k][*m]).map(move |m| at[k][m]);
     for k in 0..2 {
         if facets[k].thin {
@@ -162,10 +166,10 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> FacetPair {
             for k in 0..2 {
                 for m in 0..3 {
                     let (p, q) = (at[k][m], at[k][(m + 1) % 3]);
-                    if pierces(p, q, at[1 - k]) {
+                    if pierces(p, q, *at[1 - k]) {
                         return FacetPair::Crossing;
                     }
-                    least = least.min(beside(p, q, at[1 - k]));
+                    least = least.min(beside(p, q, *at[1 - k]));
                 }
             }
             if least <= near { FacetPair::Doubtful } else { FacetPair::Apart }
@@ -175,10 +179,10 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> FacetPair {
             for k in 0..2 {
                 let m = (0..3).find(|m| !own[k][*m]).unwrap_or(0);
                 let (p, q) = (at[k][(m + 1) % 3], at[k][(m + 2) % 3]);
-                if pierces(p, q, at[1 - k]) {
+                if pierces(p, q, *at[1 - k]) {
                     return FacetPair::Crossing;
                 }
-                least = least.min(beside(p, q, at[1 - k]));
+                least = least.min(beside(p, q, *at[1 - k]));
             }
             if least <= near { FacetPair::Doubtful } else { FacetPair::Apart }
         }

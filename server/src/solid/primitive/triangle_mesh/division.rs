@@ -339,18 +339,25 @@ impl Builder<'_> {
             return true;
         }
         let (center, half) = (cell.center(), cell.half() + DVec3::splat(8.0 * self.surface.tolerance));
-        let [a, b, c] = corners.map(|c| c - center);
+        let [a, b, c] = [corners[0] - center, corners[1] - center, corners[2] - center];
         let sides = [b - a, c - b, a - c];
-        let parts = |n: DVec3| {
-            let at = [n.dot(a), n.dot(b), n.dot(c)];
-            let (low, high) = (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]));
-            let r = half.dot(n.abs()) * (1.0 + 1e-12);
-            low > r || high < -r
+        let apart = |[p, q, r]: [f64; 3], reach: f64| {
+            let reach = reach * (1.0 + 1e-12);
+            p.min(q).min(r) > reach || p.max(q).max(r) < -reach
         };
-        if parts(sides[0].cross(sides[1])) {
+        let n = sides[0].cross(sides[1]);
+        if apart([n.dot(a), n.dot(b), n.dot(c)], half.dot(n.abs())) {
             return false;
         }
-        !sides.iter().any(|side| DVec3::AXES.iter().any(|axis| parts(axis.cross(*side))))
+        // Each side crossed with each axis k: in the other two coordinates.
+        !(0..3).any(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            sides.iter().any(|side| {
+                let (u, v) = (-side[j], side[i]);
+                let at = |x: DVec3| u * x[i] + v * x[j];
+                apart([at(a), at(b), at(c)], u.abs() * half[i] + v.abs() * half[j])
+            })
+        })
     }
 
     /// Where a cell is divided: near the middle of its facets, with both planes clear of corners.
@@ -419,6 +426,8 @@ pub struct Divided {
     leaves: Vec<Leaf>,
     facets: Vec<u32>,
     made: Made,
+    /// The largest distance of a plane from the origin.
+    reach: f64,
 }
 
 /// Parts that are written out.
@@ -449,7 +458,9 @@ impl Divided {
         }
         let made = Made((0..tree.leaves.len()).map(|_| OnceLock::new()).collect());
         let Tree { nodes, leaves, facets } = tree;
-        let mut this = Self { surface, domain, top, nodes, leaves, facets, made };
+        let cuts = domain.min.abs().max(domain.max.abs()).max_element();
+        let reach = surface.planes.iter().fold(cuts, |most, (_, d)| most.max(d.abs()));
+        let mut this = Self { surface, domain, top, nodes, leaves, facets, made, reach };
         this.decide();
         this.is_outward(opposite)?;
         Ok(this)
@@ -676,8 +687,7 @@ impl Planes for Divided {
     }
 
     fn reach(&self) -> f64 {
-        let cuts = self.domain.min.abs().max(self.domain.max.abs()).max_element();
-        self.surface.planes.iter().fold(cuts, |most, (_, d)| most.max(d.abs()))
+        self.reach
     }
 }
 

@@ -4,7 +4,7 @@
 //! is of them a formula tells (`local`), not their intersection: written out for few facets (`cells`), a tree whose parts are
 //! written out when they are looked at for many (`division`).
 
-use super::{Checked, Convex, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use super::{Checked, Convex, Facets, Geometry, Shape, Sink, Source, read_vector, write_vector};
 use crate::math::{Aabb, Ball, Moments, tolerance::ROUNDING};
 use crate::solid::faces::Planes;
 use crate::solid::surface::{Plane, Surface as _};
@@ -17,7 +17,6 @@ mod cells;
 mod division;
 mod edges;
 mod local;
-mod mix;
 mod moments;
 mod piece;
 mod planes;
@@ -235,6 +234,10 @@ impl Geometry for TriangleMesh {
     }
     fn domain(&self) -> Option<Aabb> {
         Some(cells::domain(&self.surface.around))
+    }
+    fn facets(&self) -> Option<Facets<'_>> {
+        let surface = &*self.surface;
+        Some(Facets { vertices: &surface.vertices, triangles: &surface.triangles, faces: &surface.face_of })
     }
     fn face_name(&self, index: usize) -> String {
         let faces = self.bounding_faces();

@@ -1,6 +1,6 @@
 //! The planes of a mesh's facets: neighbours in one plane are one face.
 
-use super::mix::Mixed;
+use crate::math::mix::Mixed;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::cmp::Ordering;

@@ -6,8 +6,8 @@
 
 use super::MeshFault;
 use super::edges::Edges;
-use super::mix::Mixed;
 use crate::math::Aabb;
+use crate::math::mix::Mixed;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
