@@ -51,6 +51,7 @@ impl Body {
             Shape::Sphere(s) => (SharedShape::ball(s.radius), Pose::IDENTITY),
             Shape::Cuboid(c) => (SharedShape::cuboid(c.half.x, c.half.y, c.half.z), Pose::IDENTITY),
             Shape::Cylinder(c) => (SharedShape::cylinder(c.half_height, c.radius), upright),
+            Shape::Capsule(c) => (SharedShape::capsule_z(c.half, c.radius), Pose::IDENTITY),
             Shape::Cone(c) if c.top == 0.0 => (SharedShape::cone(c.half_height, c.bottom), upright),
             other => panic!("no peer for {other:?}"),
         };

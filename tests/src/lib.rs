@@ -20,6 +20,8 @@ pub mod record_judge;
 pub mod record_scenes;
 pub mod reference;
 pub mod scenes;
+pub mod shells;
 pub mod stepped;
 pub mod sweep;
+pub mod triangles;
 pub mod verifier;

@@ -1,5 +1,6 @@
 //! Meshes as operands: membership, values, volumes, certificates; against convex polyhedra and the exact solids that they facet.
 //!
+//! `CONTACTD_FACETS=1024` tessellates as finely, else in 64 pieces a turn.
 //! `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers meshes:: -- --nocapture` sets the number of
 //! pairs.
 
@@ -18,7 +19,9 @@ use contactd_tests::engine::question;
 use contactd_tests::meshes::{self, Mesh, bumps, distance, prism, torus, winding};
 use contactd_tests::random_solids::{Random, shape, shape_or_mesh, solid_of};
 use contactd_tests::scenes::Recipe;
-use glam::DVec3;
+use contactd_tests::shells::lathe;
+use contactd_tests::sweep::sized;
+use glam::{DVec2, DVec3};
 
 fn ask(a: &Model, b: &Model, motions: [Motion; 2]) -> Outcome {
     let [ma, mb] = motions.map(placed);
@@ -196,14 +199,19 @@ fn facets_close_in(name: &str, (exact, is_convex): (Recipe, bool), counts: &[u32
         let motions = [Motion::resting(Pose::IDENTITY), Motion { start: Pose::at(start), velocity, spin: DVec3::ZERO }];
         let o = ask(&exact, &ball, motions);
         assert_ne!(o.status(), Status::Undecided, "{name} {i}");
+        let mut coarser = f64::INFINITY;
         for (k, (model, deviation)) in meshes.iter().enumerate() {
             let m = ask(model, &ball, motions);
             assert_ne!(m.status(), Status::Undecided, "{name} {i}, {} facets: {m:?}", counts[k]);
             if m.status() != Status::Contact {
+                assert!(coarser == f64::INFINITY || !is_convex, "{name} {i}, {}: clear after {coarser}", counts[k]);
                 continue;
             }
             assert!(o.status() == Status::Contact || !is_convex, "{name} {i}: {o:?}, {m:?}");
             assert!(m.time() >= o.time() - 1e-12 || !is_convex, "{name} {i}, {}: {m:?} before {o:?}", counts[k]);
+            // Corners of the coarser one are corners of the finer one, so a convex one holds the coarser one.
+            assert!(m.time() <= coarser + 1e-12 || !is_convex, "{name} {i}, {}: {m:?} after {coarser}", counts[k]);
+            coarser = m.time();
             // Where it meets the mesh the exact solid is no farther than the deviation.
             let depth = ball.solid.value(m.at().point - (start + velocity * m.time())).abs();
             assert!(depth < 1e-9, "{name} {i}: {depth}");
@@ -226,13 +234,27 @@ fn facets_close_in(name: &str, (exact, is_convex): (Recipe, bool), counts: &[u32
 
 #[test]
 fn finer_facets_meet_as_what_they_facet() {
-    let counts = [16, 32, 64, 128];
+    // Up to so many pieces a turn; `CONTACTD_FACETS=1024` is the long form.
+    let most = sized("CONTACTD_FACETS", 64);
+    let counts: Vec<u32> = [16, 32, 64, 128, 256, 512, 1024].into_iter().filter(|n| *n <= most).collect();
     let sagitta = |radius: f64, n: u32| radius * (1.0 - (std::f64::consts::PI / f64::from(n)).cos());
     facets_close_in("cylinder", (Recipe::cylinder(0.8, 0.5), true), &counts, |n| {
         (prism(&vec![0.8; n as usize], 0.5), sagitta(0.8, n))
     });
-    facets_close_in("torus", (Recipe::torus(0.9, 0.3), false), &counts[..3], |n| {
-        (meshes::torus((0.9, 0.3), n, n), sagitta(0.3, n) + sagitta(1.2, n))
+    facets_close_in("cone", (Recipe::cone(0.8, 0.0, 0.6), true), &counts, |n| {
+        let profile = [DVec2::new(0.0, -0.6), DVec2::new(0.8, -0.6), DVec2::new(0.0, 0.6)];
+        (lathe(&profile, n, false), sagitta(0.8, n))
+    });
+    facets_close_in("ball", (Recipe::sphere(0.8), true), &counts, |n| {
+        let angle = |i: u32| std::f64::consts::PI * (f64::from(2 * i) / f64::from(n) - 0.5);
+        let profile: Vec<DVec2> = (0..=n / 2)
+            .map(|i| 0.8 * DVec2::new(if i % (n / 2) == 0 { 0.0 } else { angle(i).cos() }, angle(i).sin()))
+            .collect();
+        // Half the diagonal of a field at the equator, and a little for the sphere's bend.
+        (lathe(&profile, n, false), 0.8 * (1.0 - (1.05 * 2.0_f64.sqrt() * std::f64::consts::PI / f64::from(n)).cos()))
+    });
+    facets_close_in("torus", (Recipe::torus(0.9, 0.3), false), &counts, |n| {
+        (meshes::torus((0.9, 0.3), n, n / 2), sagitta(0.3, n / 2) + sagitta(1.2, n))
     });
 }
 
