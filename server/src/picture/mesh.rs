@@ -5,7 +5,7 @@
 //! S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2, 2013). So a line leaves a closed mesh as often as
 //! it enters it. Pictures only.
 
-use super::ray::{Crossing, Ray, Span, THIN};
+use super::line::{Crossing, Ray, Span, THIN};
 use crate::math::Aabb;
 use crate::solid::Primitive;
 use crate::solid::primitive::Facets;

@@ -7,6 +7,7 @@
 
 pub mod contacts;
 pub mod drawing;
+mod line;
 mod mesh;
 pub mod ray;
 pub mod scene;
