@@ -164,7 +164,8 @@ pub fn polyhedron(points: &[DVec3], faces: &[impl AsRef<[u32]>]) -> Solid {
     Solid(Tree::leaf(call, false))
 }
 
-/// The half-space normal·x <= offset |normal|, to be cut with something: a solid that reaches to infinity does not load.
+/// The half-space normal·x <= offset |normal|: a floor or a wall of its own, or to be cut with something. A solid that
+/// reaches to infinity has no mass properties.
 pub fn half_space(normal: DVec3, offset: f64) -> Solid {
     let Some(n) = normal.try_normalize().filter(|_| offset.is_finite()) else {
         let found = format!("{normal} and {offset}");
@@ -174,6 +175,37 @@ pub fn half_space(normal: DVec3, offset: f64) -> Solid {
     let frame = DAffine3::from_mat3_translation(DMat3::from_cols(y, x, -n), n * offset);
     // All of z >= 0.
     Solid(Tree::leaf("cylinder(h = inf, r1 = inf, r2 = inf".into(), false)).transformed(&frame)
+}
+
+/// The solid between the plane z = `base` and heights above it: rows that go up in y, of the same number of heights
+/// each, which go up in x, at the corners of equal cells of a rectangle of the lengths `x` and `y` about the origin.
+/// Each cell is two triangles that meet along the diagonal from its corner of least x and y to that of most. OpenSCAD
+/// does not have it: what is printed only loads here.
+pub fn height_field(rows: &[impl AsRef<[f64]>], x: f64, y: f64, base: f64) -> Solid {
+    let refused = |expected: &str, found: String| Solid(BuildError::new("height field", expected.into(), found).into());
+    let columns = rows.first().map_or(0, |r| r.as_ref().len());
+    if rows.len() < 2 || columns < 2 {
+        return refused("two rows of two heights or more", format!("{} of {columns}", rows.len()));
+    }
+    let mut lowest = f64::INFINITY;
+    for (i, row) in rows.iter().enumerate() {
+        let row = row.as_ref();
+        if row.len() != columns {
+            return refused("rows of one length", format!("{columns} heights in row 0 and {} in row {i}", row.len()));
+        }
+        if let Some(z) = row.iter().find(|z| !z.is_finite()) {
+            return refused("finite heights", format!("{z} in row {i}"));
+        }
+        lowest = row.iter().copied().fold(lowest, f64::min);
+    }
+    if !(base < lowest && base.is_finite()) {
+        return refused(&format!("a base below the lowest height, {lowest}"), number(base));
+    }
+    let call = || {
+        let rows: Vec<String> = rows.iter().map(|r| list(r.as_ref())).collect();
+        format!("height_field(heights = [{}], size = {}, base = {}", rows.join(", "), list(&[x, y]), number(base))
+    };
+    leaf("height field", &[("length along x", x), ("length along y", y)], call, false)
 }
 
 /// All points of any of some solids.

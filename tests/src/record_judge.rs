@@ -126,7 +126,8 @@ impl<'a> Side<'a> {
         let (mut literals, mut ids) = (vec![], vec![]);
         let root = lower(solid, &first, solid.root, false, &mut literals, &mut ids);
         let bounds = solid.aabb();
-        let (radius, reach) = if solid.is_empty() {
+        // What reaches to infinity has no size of its own: its partner's counts.
+        let (radius, reach) = if solid.is_empty() || !bounds.is_finite() {
             (0.0, 0.0)
         } else {
             ((bounds.max - bounds.min).length() / 2.0, bounds.min.abs().max(bounds.max.abs()).length())

@@ -225,6 +225,30 @@ impl Play {
         play
     }
 
+    /// A play of settling whose first body is a floor, or a wall, that reaches to infinity.
+    pub fn on_floor(seed: u64) -> Self {
+        let mut play = Self::settling(seed);
+        let model = play.recipes.len();
+        play.recipes.push(Recipe::of(HalfSpace));
+        let rotation = if play.rng.chance(0.5) { DQuat::IDENTITY } else { play.rng.rotation() };
+        let below = Pose::new(rotation * DVec3::Z * -play.rng.within(0.5, 1.0), rotation);
+        let first = &mut play.actors[0];
+        first.thing = Thing { model, is_static: true, place: Pose::IDENTITY, pose: below, ..first.thing.clone() };
+        (first.pose, first.home, first.manner) = (below, below, Manner::Rests);
+        // The others come down from above it.
+        for actor in &mut play.actors[1..] {
+            let up = rotation * DVec3::Z;
+            let low = up.dot(actor.pose.position - below.position);
+            actor.pose.position += up * (2.0 * low.abs() - low + 0.5 * (1.0 - low.signum()));
+            actor.home = actor.pose;
+            actor.thing.pose = actor.pose;
+            if let Manner::Goes { velocity, .. } = &mut actor.manner {
+                *velocity -= up * (up.dot(*velocity) + 0.3);
+            }
+        }
+        play
+    }
+
     fn snap(&self, x: DVec3) -> DVec3 {
         if self.grid > 0.0 { (x / self.grid).round() * self.grid } else { x }
     }

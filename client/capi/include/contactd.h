@@ -825,8 +825,20 @@ int32_t contactd_solid_hyperbolic_dome(double radius, double height, double cone
 // symmetric matrix. Planes alone are none.
 int32_t contactd_solid_quadric(const double *m, const double *min, const double *max, struct contactd_solid **out);
 
-// The half-space normal.x <= offset |normal|, to be cut with something. `normal`: 3 numbers.
+// The half-space normal.x <= offset |normal|: a floor or a wall of its own, or to be cut with something. `normal`: 3
+// numbers.
 int32_t contactd_solid_half_space(const double *normal, double offset, struct contactd_solid **out);
+
+// The solid between the plane z = `base` and heights above it: `rows` rows that go up in y, each of `columns` heights
+// that go up in x, at the corners of equal cells of a rectangle of the lengths `x` and `y` about the origin. Each cell
+// is two triangles that meet along the diagonal from its corner of least x and y to that of most.
+int32_t contactd_solid_height_field(const double *heights,
+                                    size_t rows,
+                                    size_t columns,
+                                    double x,
+                                    double y,
+                                    double base,
+                                    struct contactd_solid **out);
 
 // The solid within faces, convex or not. `points`: 3 numbers each. `corners`: indices of points, those of each face
 // counter-clockwise as seen from outside, one face after the other; `sides`: how many of them each face has.

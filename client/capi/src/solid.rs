@@ -172,13 +172,36 @@ pub unsafe extern "C" fn contactd_solid_quadric(
     })
 }
 
-/// The half-space normal.x <= offset |normal|, to be cut with something. `normal`: 3 numbers.
+/// The half-space normal.x <= offset |normal|: a floor or a wall of its own, or to be cut with something. `normal`: 3
+/// numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_solid_half_space(normal: *const f64, offset: f64, out: *mut *mut Built) -> i32 {
     free(|| {
         // SAFETY: the caller's array (1).
         let normal = unsafe { numbers::<3>(normal, "normal")? };
         write_solid(solid::half_space(DVec3::from_array(*normal), offset), out)
+    })
+}
+
+/// The solid between the plane z = `base` and heights above it: `rows` rows that go up in y, each of `columns` heights
+/// that go up in x, at the corners of equal cells of a rectangle of the lengths `x` and `y` about the origin. Each cell
+/// is two triangles that meet along the diagonal from its corner of least x and y to that of most.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_solid_height_field(
+    heights: *const f64,
+    rows: usize,
+    columns: usize,
+    x: f64,
+    y: f64,
+    base: f64,
+    out: *mut *mut Built,
+) -> i32 {
+    free(|| {
+        let count = rows.checked_mul(columns).ok_or_else(|| Failure::argument("heights: more than memory holds"))?;
+        // SAFETY: the caller's array (1).
+        let heights = unsafe { row(heights, count, "heights")? };
+        let rows: Vec<&[f64]> = heights.chunks_exact(columns.max(1)).collect();
+        write_solid(solid::height_field(&rows, x, y, base), out)
     })
 }
 

@@ -29,6 +29,7 @@ __all__ = [
     "cone",
     "cylinder",
     "half_space",
+    "height_field",
     "hull",
     "hyperbolic_dome",
     "hyperboloid",
@@ -99,8 +100,18 @@ def quadric(m: Sequence[Sequence[float]], min: Sequence[float], max: Sequence[fl
 
 
 def half_space(normal: Sequence[float], offset: float) -> Solid:
-    """The half-space normal·x <= offset |normal|, to be cut with something."""
+    """The half-space normal·x <= offset |normal|: a floor or a wall of its own, or to be cut with something."""
     return _native._primitive("half_space", [*normal, offset])
+
+
+def height_field(rows: Iterable[Sequence[float]], x: float, y: float, base: float) -> Solid:
+    """The solid between the plane z = ``base`` and heights above it.
+
+    Rows go up in y, heights within one in x, at the corners of equal cells of a rectangle of the lengths ``x`` and ``y``
+    about the origin. Each cell is two triangles that meet along the diagonal from its corner of least x and y to that of
+    most.
+    """
+    return _native._height_field([list(row) for row in rows], x, y, base)
 
 
 def polyhedron(points: Iterable[Sequence[float]], faces: Iterable[Sequence[int]]) -> Solid:

@@ -48,7 +48,7 @@ mod _native {
     #[pymodule_export]
     use crate::slots::Slots;
     #[pymodule_export]
-    use crate::solid::{Outline, Solid, flat, join, join_outlines, polygon, polyhedron, primitive};
+    use crate::solid::{Outline, Solid, flat, height_field, join, join_outlines, polygon, polyhedron, primitive};
 
     /// Version of the package.
     #[pymodule_export]

@@ -201,6 +201,12 @@ pub fn polyhedron(points: Vec<[f64; 3]>, faces: Vec<Vec<u32>>) -> PyResult<Solid
     solid(solid::polyhedron(&points, &faces))
 }
 
+/// The solid under rows of heights.
+#[pyfunction(name = "_height_field")]
+pub fn height_field(rows: Vec<Vec<f64>>, x: f64, y: f64, base: f64) -> PyResult<Solid> {
+    solid(solid::height_field(&rows, x, y, base))
+}
+
 /// Union, intersection, hull or Minkowski sum of solids.
 #[pyfunction(name = "_join")]
 pub fn join(name: &str, of: Vec<PyRef<'_, Solid>>) -> PyResult<Solid> {

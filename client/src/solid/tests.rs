@@ -64,6 +64,26 @@ fn what_makes_no_sense_is_one_sentence_wherever_it_stands() {
         ),
         (circle(1.0).revolve_part(7.0), "revolution: expected an angle above 0, at most 2π, found 7"),
         (sphere(1.0).with_pieces(8), "pieces: expected 9 pieces of a curve or more"),
+        (
+            height_field(&[[1.0, 2.0]], 1.0, 1.0, 0.0),
+            "height field: expected two rows of two heights or more, found 1 of 2",
+        ),
+        (
+            height_field(&[vec![1.0, 2.0], vec![1.0]], 1.0, 1.0, 0.0),
+            "height field: expected rows of one length, found 2 heights in row 0 and 1 in row 1",
+        ),
+        (
+            height_field(&[[1.0, 2.0], [1.0, f64::NAN]], 1.0, 1.0, 0.0),
+            "height field: expected finite heights, found NaN in row 1",
+        ),
+        (
+            height_field(&[[1.0, 2.0], [1.0, 0.5]], 1.0, 1.0, 0.5),
+            "height field: expected a base below the lowest height, 0.5, found 0.5",
+        ),
+        (
+            height_field(&[[1.0, 2.0], [1.0, 0.5]], 1.0, 0.0, 0.0),
+            "height field: expected a positive finite length along y, found 0",
+        ),
         (half_space(DVec3::ZERO, 1.0), "half-space: expected a direction and a finite offset, found [0, 0, 0] and 1"),
     ] {
         let found = told(solid);

@@ -1,4 +1,5 @@
-//! Height fields that an OpenSCAD text's `surface` names: rows of numbers (DAT), or a picture (PNG).
+//! Height fields: what an OpenSCAD text's `surface` names, rows of numbers (DAT) or a picture (PNG), and grids of
+//! heights.
 //!
 //! As OpenSCAD 2021.01 builds them: a number is a corner of a square of side 1, rows go up in y (of a picture the lowest is the first);
 //! each square has a corner in its middle, as high as its four are in the mean; the solid reaches down to one below the lowest, or to
@@ -9,7 +10,7 @@ use super::Place;
 use super::mesh::Polygons;
 use super::problem::Problem;
 use super::{Limits, mesh};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -18,6 +19,47 @@ struct Heights {
     rows: usize,
     columns: usize,
     all: Vec<f64>,
+}
+
+/// The solid between the plane z = `base` and heights above it, given in rows that go up in y, each of `columns` in x,
+/// at the corners of equal cells of a rectangle of this size about the origin. Each cell is two triangles that meet
+/// along the diagonal from its corner of least x and y to that of most. Two rows of two are needed.
+pub fn grid(heights: &[f64], columns: usize, size: DVec2, base: f64) -> Polygons {
+    let rows = heights.len() / columns;
+    let mut mesh = Polygons::default();
+    let along = |k: usize, count: usize, length: f64| (k as f64 / (count - 1) as f64 - 0.5) * length;
+    let at =
+        |row: usize, column: usize, z: f64| DVec3::new(along(column, columns, size.x), along(row, rows, size.y), z);
+    for (row, of_row) in heights.chunks_exact(columns).enumerate() {
+        mesh.points.extend(of_row.iter().enumerate().map(|(column, z)| at(row, column, *z)));
+    }
+    let corner = |row: usize, column: usize| (row * columns + column) as u32;
+    for (row, column) in (1..rows).flat_map(|r| (1..columns).map(move |c| (r, c))) {
+        let [low, high] = [corner(row - 1, column - 1), corner(row, column)];
+        mesh.append(&[low, corner(row - 1, column), high]);
+        mesh.append(&[low, high, corner(row, column - 1)]);
+    }
+    close(&mut mesh, (rows, columns), |row, column| at(row, column, base));
+    mesh
+}
+
+/// Walls from the rim of a grid, whose points come first in a mesh, down to `below`, and the floor.
+fn close(mesh: &mut Polygons, (rows, columns): (usize, usize), below: impl Fn(usize, usize) -> DVec3) {
+    let corner = |row: usize, column: usize| (row * columns + column) as u32;
+    // Once around, counter-clockwise as seen from above.
+    let mut rim: Vec<(usize, usize)> = (0..columns - 1).map(|c| (0, c)).collect();
+    rim.extend((0..rows - 1).map(|r| (r, columns - 1)));
+    rim.extend((1..columns).rev().map(|c| (rows - 1, c)));
+    rim.extend((1..rows).rev().map(|r| (r, 0)));
+    let first = mesh.points.len() as u32;
+    mesh.points.extend(rim.iter().map(|(r, c)| below(*r, *c)));
+    let count = rim.len();
+    for (i, (row, column)) in rim.iter().enumerate() {
+        let j = (i + 1) % count;
+        let next = rim[j];
+        mesh.append(&[first + i as u32, first + j as u32, corner(next.0, next.1), corner(*row, *column)]);
+    }
+    mesh.append(&(first..first + count as u32).rev().collect::<Vec<u32>>());
 }
 
 /// The solid under a file's heights; one without a square is empty.
@@ -52,20 +94,7 @@ pub fn read(bytes: &[u8], (center, invert): (bool, bool), limits: &Limits) -> Re
             mesh.append(&[corner(a.0, a.1), corner(b.0, b.1), middle]);
         }
     }
-    // Once around, counter-clockwise as seen from above.
-    let mut rim: Vec<(usize, usize)> = (0..columns - 1).map(|c| (0, c)).collect();
-    rim.extend((0..rows - 1).map(|r| (r, columns - 1)));
-    rim.extend((1..columns).rev().map(|c| (rows - 1, c)));
-    rim.extend((1..rows).rev().map(|r| (r, 0)));
-    let first = mesh.points.len() as u32;
-    mesh.points.extend(rim.iter().map(|(r, c)| at(*r as f64, *c as f64, base)));
-    let count = rim.len();
-    for (i, (row, column)) in rim.iter().enumerate() {
-        let j = (i + 1) % count;
-        let next = rim[j];
-        mesh.append(&[first + i as u32, first + j as u32, corner(next.0, next.1), corner(*row, *column)]);
-    }
-    mesh.append(&(first..first + count as u32).rev().collect::<Vec<u32>>());
+    close(&mut mesh, (rows, columns), |row, column| at(row as f64, column as f64, base));
     Ok(mesh)
 }
 

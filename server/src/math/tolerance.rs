@@ -42,6 +42,10 @@ pub const MODEL_MARGIN: f64 = 1e-5;
 /// bounds would tell the parts of a model apart less well.
 pub const WIDE_MARGIN: f64 = 1.0 / 128.0;
 
+/// The same of a model that reaches to infinity, a length: its partner says how far is looked, and it has no size to be
+/// measured by.
+pub const UNBOUNDED_MARGIN: f64 = 1e12;
+
 /// Relative rounding of a point carried through a few rotations and translations.
 pub const CARRIED: f64 = 64.0 * f64::EPSILON;
 

@@ -25,7 +25,7 @@ pub use tables::{Meet, NodeKind, meet};
 pub use walk::{Candidates, Detail, Element, PairKind, SurfacePair, Walk};
 
 use crate::bound::{SBounds, Volumes};
-use crate::math::tolerance::{MODEL_MARGIN, WIDE_MARGIN};
+use crate::math::tolerance::{MODEL_MARGIN, UNBOUNDED_MARGIN, WIDE_MARGIN};
 use crate::solid;
 use crate::solid::local::{LiteralId, Token, Truth};
 use crate::solid::revolution::Revolution;
@@ -48,7 +48,8 @@ const WORTHWHILE: f64 = 0.75;
 pub struct Model {
     /// The solid.
     pub solid: Solid,
-    /// Its S-bounds, with a margin of `MODEL_MARGIN` times the radius.
+    /// Its S-bounds, with a margin of `MODEL_MARGIN` times the radius, or of how far faces lie from the origin where
+    /// there is none.
     pub bounds: SBounds,
     /// Its extended CSG octree.
     pub octree: Eco,
@@ -68,7 +69,8 @@ pub struct Model {
     pub parts: Option<Parts>,
     /// About what it may be symmetric.
     revolution: Option<Revolution>,
-    /// S-bounds for clearances, with a margin of `WIDE_MARGIN` times the radius; taken when first asked for.
+    /// S-bounds for clearances, with a margin of `WIDE_MARGIN` times the radius, or `UNBOUNDED_MARGIN`; taken when
+    /// first asked for.
     wide: OnceLock<SBounds>,
 }
 
@@ -86,7 +88,9 @@ impl Model {
     /// Preprocesses a solid with other bounding volumes for stage 1: for comparison, the answers are as good with any.
     pub fn with_volumes(solid: Solid, limits: Limits, volumes: Volumes) -> Self {
         let radius = SBounds::shared(&solid, 0.0, Volumes::default()).root().ball.radius.max(0.0);
-        let margin = if radius.is_finite() { MODEL_MARGIN * radius } else { 0.0 };
+        // Without a radius by where the faces are.
+        let size = if radius.is_finite() { radius } else { solid.faces.reach() };
+        let margin = MODEL_MARGIN * size;
         let bounds = SBounds::shared(&solid, margin, volumes);
         let octree = Eco::new(&solid, &bounds, limits);
         Self::of_parts(solid, bounds, octree, radius)
@@ -117,15 +121,21 @@ impl Model {
         Self { solid, bounds, octree, radius, extents, face_reach, ball, hollow, narrowest, parts, revolution, wide }
     }
 
+    /// What lengths of a pair are measured by: the bounding radius, 0 of an unbounded solid, whose partner has one.
+    pub fn size(&self) -> f64 {
+        if self.radius.is_finite() { self.radius } else { 0.0 }
+    }
+
     /// S-bounds that tell the truth about f up to a depth or distance of `level` (a length), the closest there are; those
     /// with the widest margin where even that is less.
     pub fn bounds_for(&self, level: f64) -> &SBounds {
-        if level <= self.margin() || self.radius.is_infinite() {
+        if level <= self.margin() {
             return &self.bounds;
         }
         // On this thread alone: other searches may wait for them.
         let volumes = self.bounds.volumes();
-        self.wide.get_or_init(|| SBounds::with_volumes(&self.solid, WIDE_MARGIN * self.radius, volumes))
+        let margin = if self.radius.is_finite() { WIDE_MARGIN * self.radius } else { UNBOUNDED_MARGIN };
+        self.wide.get_or_init(|| SBounds::with_volumes(&self.solid, margin, volumes))
     }
 
     /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.

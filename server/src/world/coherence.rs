@@ -360,10 +360,20 @@ impl PredictedMotion {
             let turned = half_angle_sine(motion.start.rotation, pose.rotation);
             // Chords of the angle at the start and of what it grows by, at the farthest point.
             let turning = 2.0 * turned + (motion.spin - spin).length();
-            let size = motion.start.position.abs().max_element() + pose.position.abs().max_element() + body.reach();
+            // Of a body without bounds every point is off by as much, or there is no telling by how much.
+            let reach = match body.reach() {
+                reach if reach.is_finite() => reach,
+                _ if motion.start.rotation == pose.rotation && motion.spin == spin => {
+                    let size = motion.start.position.abs().max_element() + pose.position.abs().max_element();
+                    sum += off.length().max(later.length()) + size * ROUNDING;
+                    continue;
+                }
+                _ => return None,
+            };
+            let size = motion.start.position.abs().max_element() + pose.position.abs().max_element() + reach;
             // Within a margin it is f that counts: of points that may lie farther out than that.
             let beyond = body.part.reach_of_level(if q.margin > 0.0 { 0.5 * (q.margin + self.clearance) } else { 0.0 });
-            let arm = body.reach() + self.clearance.max(beyond);
+            let arm = reach + self.clearance.max(beyond);
             sum += off.length().max(later.length()) + turning.min(2.0) * arm + size * ROUNDING;
         }
         Some(sum)

@@ -326,7 +326,11 @@ impl Convex {
                 let corners = contactd::math::Aabb::around(DVec3::ZERO, half).corners();
                 Convex::Poly(Poly::new(corners.to_vec(), planes()))
             }
-            primitive::Convex::Capsule { .. } | primitive::Convex::Other => return None,
+            primitive::Convex::Capsule { .. }
+            | primitive::Convex::Ellipsoid(_)
+            | primitive::Convex::Elliptic(_)
+            | primitive::Convex::HalfSpace
+            | primitive::Convex::Other => return None,
         })
     }
 

@@ -230,6 +230,31 @@ impl<'a> Truth<'a> {
         Self { placed: Placed { motion, ..self.placed }, ..self }
     }
 
+    /// The outward normal of a half-space, and how far its plane lies from its object's origin along it, along the
+    /// world's axes at a time of a motion; `None` for another solid.
+    fn plane(&self, motion: &Motion, t: f64) -> Option<(Vector, Interval)> {
+        let Node::Primitive(p) = self.solid.nodes[self.solid.root as usize] else { return None };
+        let primitive = &self.solid.primitives[p as usize];
+        if !matches!(primitive.shape, Shape::HalfSpace(_)) {
+            return None;
+        }
+        let place = rotation(&self.placed.place);
+        let r = product(&turned(vector(motion.spin.to_array()), point(t)), &rotation(&motion.start));
+        let turn = product(&r, &place);
+        let n = apply(&product(&turn, &rotation(&primitive.frame)), vector([0.0, 0.0, 1.0]));
+        let at = plus(
+            apply(&place, vector(primitive.frame.position.to_array())),
+            vector(self.placed.place.position.to_array()),
+        );
+        Some((n, dot(apply(&r, at), n)))
+    }
+
+    /// How far a point of it is displaced by a turn of this size, at most; none displaces no point of a body without
+    /// bounds.
+    fn swing(&self, turn: f64) -> f64 {
+        if turn == 0.0 { 0.0 } else { turn * self.reach }
+    }
+
     /// How far it reaches from its object's origin along a direction of the world at a time of a motion.
     fn support(&self, motion: &Motion, n: Vector, t: f64, by: By) -> f64 {
         let r = product(&turned(vector(motion.spin.to_array()), point(t)), &rotation(&motion.start));
@@ -249,6 +274,17 @@ fn gap(bodies: &[Truth; 2], motions: &[Motion; 2], n: Vector, t: f64, by: By) ->
     let [p, q] = motions.map(|m| vector(m.start.position.to_array()));
     let [v, w] = motions.map(|m| vector(m.velocity.to_array()));
     let way = plus(minus(q, p), times(point(t), minus(w, v)));
+    // A half-space reaches nowhere but along its own normal: that stands for a direction that is it but for rounding.
+    let own = [bodies[0].plane(&motions[0], t), bodies[1].plane(&motions[1], t)];
+    if let [Some((u, far)), None] | [None, Some((u, far))] = own {
+        let (k, sign) = if own[0].is_some() { (1, 1.0) } else { (0, -1.0) };
+        let along = times(point(sign), u);
+        if length(minus(along, n)) > 1e-9 {
+            return f64::NEG_INFINITY;
+        }
+        let other = bodies[k].support(&motions[k], times(point(-1.0), u), t, by);
+        return (dot(way, along) - point(other) - far).lo;
+    }
     let back = times(point(-1.0), n);
     let (a, b) = (bodies[0].support(&motions[0], n, t, by), bodies[1].support(&motions[1], back, t, by));
     if a == f64::NEG_INFINITY || b == f64::NEG_INFINITY {
@@ -274,11 +310,12 @@ fn apart_by(
     by: By,
 ) -> bool {
     let up = 1.0 + 1e-12;
-    let reach = [bodies[0].reach, bodies[1].reach];
     let omega = motions.map(|m| m.spin.length() * up);
     let way = (motions[0].velocity - motions[1].velocity).length() * up;
-    let speed = way + omega[0] * reach[0] + omega[1] * reach[1];
-    let pull = omega[0] * omega[0] * reach[0] + omega[1] * omega[1] * reach[1];
+    // What turns without bounds has no bound of its own.
+    let swing = [bodies[0].swing(omega[0]), bodies[1].swing(omega[1])];
+    let speed = way + swing[0] + swing[1];
+    let pull = omega[0] * swing[0] + omega[1] * swing[1];
     let longest = n0.length().max(n1.length()) * up;
     let turn = if t1 > t0 { (n1 - n0).length() / (t1 - t0) * up } else { 0.0 };
     let curve = (2.0 * turn * speed + longest * pull) * up;
@@ -323,7 +360,9 @@ fn strays(body: &Truth, expected: &Motion) -> f64 {
     let turned = 2.0 * half_angle_sine(truth.start.rotation, expected.start.rotation);
     let turning = (turned + (truth.spin - expected.spin).length()).min(2.0);
     let size = truth.start.position.abs().max_element() + expected.start.position.abs().max_element();
-    (off.length().max(later.length()) + turning * body.reach) * (1.0 + 1e-14) + 4.0 * f64::EPSILON * size
+    let stays = truth.start.rotation == expected.start.rotation && truth.spin == expected.spin;
+    let turning = if stays { 0.0 } else { turning };
+    (off.length().max(later.length()) + body.swing(turning)) * (1.0 + 1e-14) + 4.0 * f64::EPSILON * size
 }
 
 /// True when a point of the world lies for certain at a depth in both bodies at a time; of a negative depth: no farther from them, as
@@ -368,7 +407,9 @@ pub fn check(
             let then = poses.map(Motion::resting);
             let unit = (along.length() - 1.0).abs() < 1e-9;
             let gone = strays(&bodies[0], &then[0]) + strays(&bodies[1], &then[1]);
-            let size = 1e-12 * (bodies[0].reach + bodies[1].reach + gone);
+            // A half-space is measured by where its body stands.
+            let far = |k: usize| Some(bodies[k].reach).filter(|r| r.is_finite()).unwrap_or(poses[k].position.length());
+            let size = 1e-12 * (far(0) + far(1) + gone);
             let n = vector(along.to_array());
             let least = (clearance - size).max((gone + resolution) * (1.0 + 1e-8));
             let mut apart = f64::NEG_INFINITY;

@@ -9,7 +9,7 @@
 //! pairs, and of trees.
 
 use super::kinds::{Scene, alone, at_rest, compare, pairs, past, placed, speed, turning, values_and_volumes};
-use contactd::contact::Extent;
+use contactd::contact::{Extent, Status, Strategies};
 use contactd::import::{Facets, Limits, import_csg};
 use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
@@ -17,6 +17,7 @@ use contactd::solid::Shape;
 use contactd::solid::primitive::{Ellipsoid, EllipticFrustum};
 use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::{certify_all, certify_trees};
+use contactd_tests::engine::{SEARCH_ALONE, ask_with, differences};
 use contactd_tests::random_solids::{Random, elliptic, shape, shape_or_elliptic};
 use contactd_tests::scenes::Recipe;
 use glam::{DMat3, DVec2, DVec3, dvec3};
@@ -118,6 +119,31 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
         let gap = Box::new(move |a: &Pose, b: &Pose| -off_ellipsoid(semi, a.inverse().point(b.position)) - ball);
         Scene { a: block, b: Recipe::sphere(ball), motions, gap, speed }
     });
+}
+
+#[test]
+fn elliptic_solids_meet_convex_bodies_in_front_of_the_search_as_in_it() {
+    let count = pairs(150);
+    let mut r = Random::new(0xe11);
+    let (mut contacts, mut clear, mut in_front, mut apart) = (0, 0, 0, 0);
+    for i in 0..count {
+        let other = if r.chance(0.4) { elliptic(&mut r, 0.8) } else { shape(&mut r, 0.8) };
+        let a = (alone(elliptic(&mut r, 0.8)), placed(turning(&mut r)));
+        let b = (alone(other), placed(past(&mut r, 2.2)));
+        let [by_search, o] = [SEARCH_ALONE, Strategies::default()]
+            .map(|strategies| ask_with((&a.0, a.1), (&b.0, b.1), None, strategies));
+        if [&by_search, &o].iter().any(|o| matches!(o.status(), Status::Undecided | Status::Overlap)) {
+            assert!(o.status() != Status::Undecided && o.status() == by_search.status(), "{i}: {o:?}, {by_search:?}");
+            continue;
+        }
+        apart += 1;
+        in_front += usize::from(o.counters.cells == 0);
+        *if o.status() == Status::Contact { &mut contacts } else { &mut clear } += 1;
+        let differing = differences(&o, &by_search, a.0.radius.max(b.0.radius));
+        assert!(differing.is_empty(), "{i}: {differing:?}: {o:?}, {by_search:?}");
+    }
+    println!("{contacts} contacts, {clear} clear, {in_front} of {apart} without a cell");
+    assert!(contacts * 3 > count && in_front * 100 >= apart * 97, "{in_front} of {apart}");
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod kinds;
 mod laws;
 mod meshes;
 mod overlap;
+mod planes;
 mod primitive_pairs;
 mod quadrics;
 mod records;

@@ -465,6 +465,29 @@ fn regions_that_are_kept_are_those_of_bodies_that_rest() {
     assert!(regions * 8 > steps, "{regions} certificates of regions in {steps} steps");
 }
 
+/// Bodies that come down on a floor without bounds and rest on it, slide or press: a session that remembers tells what
+/// a new one does.
+#[test]
+fn bodies_on_a_floor_without_bounds_are_told_as_by_a_new_session() {
+    let steps = steps().div_ceil(5);
+    let plays = steps.div_ceil(SETTLING) as u64;
+    let all: Vec<Work> =
+        (0..plays).into_par_iter().map(|i| run_play(i, Play::on_floor(90_000_000 + i), SETTLING)).collect();
+    let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
+    println!(
+        "{} steps: {} with a contact, {} clear; certificates {:?}",
+        sum(|w| w.steps),
+        sum(|w| w.contacts),
+        sum(|w| w.clear),
+        std::array::from_fn::<usize, 8, _>(|k| all.iter().map(|w| w.proven[k]).sum())
+    );
+    for w in all.iter().filter_map(|w| w.difference.as_ref().or(w.refused.as_ref())).take(5) {
+        println!("{w}");
+    }
+    assert!(all.iter().all(|w| w.difference.is_none() && w.refused.is_none()), "see above");
+    assert!(sum(|w| w.contacts) * 10 > steps, "hardly anything meets");
+}
+
 /// A beam on two ridges has two regions, which are told again, both of them, while it rests.
 #[test]
 fn all_regions_of_bodies_that_rest_are_told_again() {

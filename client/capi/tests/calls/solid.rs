@@ -86,8 +86,17 @@ fn every_kind_is_there() {
         built(|o| unsafe { contactd_solid_capsule(1.0, 1.0, o) }),
         built(|o| unsafe { contactd_solid_polyhedron(points.as_ptr(), 4, corners.as_ptr(), sides.as_ptr(), 4, o) }),
     ];
+    let heights = [1.0, 2.0, 1.0, 0.5, 1.0, 3.0];
+    let field = built(|o| unsafe { contactd_solid_height_field(heights.as_ptr(), 2, 3, 4.0, 2.0, 0.0, o) });
+    let text = string(out(|o| unsafe { contactd_solid_text(field.0, o) }));
+    let expected = "height_field(heights = [[1, 2, 1], [0.5, 1, 3]], size = [4, 2], base = 0);\n";
+    assert_eq!(text, expected);
     let operands: Vec<*const Built> = all.iter().map(|s| s.0.cast_const()).collect();
     let session = Open::embedded();
+    let floor = built(|o| unsafe { contactd_solid_half_space([0.0, 0.0, 2.0].as_ptr(), -0.5, o) });
+    for (name, solid) in [(c"floor", floor.0), (c"field", field.0)] {
+        let _ = out(|o| unsafe { contactd_load_solid(session.0, name.as_ptr(), solid, 0, o) });
+    }
     for operation in [UNION, INTERSECTION, HULL] {
         let joined = built(|o| unsafe { contactd_solid_join(operation, operands.as_ptr(), operands.len(), o) });
         let half = built(|o| unsafe { contactd_solid_half_space([0.0, 0.0, 1.0].as_ptr(), 0.1, o) });

@@ -123,8 +123,9 @@ impl<'a> CavityPair<'a> {
             directions = [e, g, f, h, -e, -g, -f, -h];
         }
         let (middle, half) = (main.aabb.center(), main.aabb.half());
-        // A wall that the pierced body does not reach is none.
-        let is_wall = |p: &Plane| p.normal.dot(middle) + p.normal.abs().dot(half) > p.offset;
+        // A wall that the pierced body does not reach is none. One without bounds has no middle, and reaches all.
+        let reach = |p: &Plane| p.normal.dot(middle) + p.normal.abs().dot(half);
+        let is_wall = |p: &Plane| reach(p).is_nan() || reach(p) > p.offset;
         let flats = planes(cavity).into_iter().filter(is_wall).collect();
         let far = (primitive.ball.center - relative.center_a()).length() + primitive.ball.radius;
         Some(Self {

@@ -3,6 +3,7 @@
 //! See `convex`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
 
 use super::gjk::{GOOD, Nearest, nearest};
+use super::plane::{self, Floor, is_half_space};
 use super::proof::{Gap, Pace};
 use super::support::ConvexBody;
 use super::whole::{APART, body_of, excluded};
@@ -44,6 +45,9 @@ const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 pub fn answer(contacts: &mut Contacts, along: Option<DVec3>) -> Option<Ending> {
     let task = contacts.task;
     let (a, b) = (task.a.whole()?, task.b.whole()?);
+    if is_half_space(b) {
+        return plane::stays_free(&task).then_some(Ending::Clear);
+    }
     let (body_a, body_b) = (body_of(a)?, body_of(b)?);
     let advance = Advance::new(task, (a, body_a), (b, body_b));
     if advance.never_near() { Some(Ending::Clear) } else { advance.run(contacts, along) }
@@ -51,19 +55,62 @@ pub fn answer(contacts: &mut Contacts, along: Option<DVec3>) -> Option<Ending> {
 
 /// Two solids that are one convex primitive each, to be asked how far apart they are.
 pub struct ConvexPair<'a> {
-    advance: Advance<'a>,
+    bodies: Bodies<'a>,
     /// The distance at the start, in its direction.
     start: Gap,
 }
 
+/// What is asked how far apart it is.
+enum Bodies<'a> {
+    /// Two bounded bodies.
+    Two(Box<Advance<'a>>),
+    /// A body and a half-space that keeps its normal, along which everything is told; the body need not be convex.
+    Floor(Box<Floor<'a>>),
+}
+
+impl Bodies<'_> {
+    /// φ along a direction of the world at a time; above a floor along its normal, which is the only one.
+    fn gap(&self, t: f64, n: DVec3) -> Option<Gap> {
+        match self {
+            Self::Two(advance) => Some(advance.gap(&advance.moment(t), n)),
+            Self::Floor(floor) => floor.gap(t),
+        }
+    }
+
+    /// The gap at a time along the line of nearest points, looked for from a direction of the world.
+    fn widest(&self, t: f64, n: DVec3) -> Option<Gap> {
+        match self {
+            Self::Two(advance) => {
+                let m = advance.moment(t);
+                advance.widest(&m, m.at.world_from_a.transpose() * n)
+            }
+            Self::Floor(floor) => floor.gap(t),
+        }
+    }
+
+    /// Up to where a gap is proven to stay above `least`, given another one in its direction.
+    fn proven(&self, from: &Gap, to: &Gap, least: f64) -> Option<f64> {
+        match self {
+            Self::Two(advance) => Some(Pace { least, ..advance.pace }.proven(from, to)),
+            Self::Floor(floor) => floor.proven(from, to, least),
+        }
+    }
+}
+
 impl<'a> ConvexPair<'a> {
-    /// `None` for other solids, and where no direction is found that separates them.
+    /// `None` for other solids, and where no direction is found that separates them. A body above a half-space need not
+    /// be convex.
     pub fn new(task: Task<'a>) -> Option<Self> {
         let (a, b) = (task.a.whole()?, task.b.whole()?);
+        if is_half_space(b) {
+            let floor = Floor::new(&task)?;
+            let start = floor.gap(0.0)?;
+            return Some(Self { bodies: Bodies::Floor(Box::new(floor)), start });
+        }
         let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
         let m = advance.moment(0.0);
         let start = advance.widest(&m, m.b.support(DVec3::ZERO) - a.ball.center)?;
-        Some(Self { advance, start })
+        Some(Self { bodies: Bodies::Two(Box::new(advance)), start })
     }
 
     /// True for two solids that are one convex primitive each, whether a direction separates them or not.
@@ -100,19 +147,17 @@ impl<'a> ConvexPair<'a> {
         self.advance_to(least, NEARED, 0.0, &mut |_| {})
     }
 
-    fn advance_to(mut self, least: f64, most: u64, shortest: f64, step: &mut impl FnMut(&Gap)) -> (f64, f64, u64) {
-        self.advance.pace.least = least;
+    fn advance_to(self, least: f64, most: u64, shortest: f64, step: &mut impl FnMut(&Gap)) -> (f64, f64, u64) {
         let (mut here, mut count) = (self.start, 1);
         while here.phi > least && count < most {
             step(&here);
-            let m = self.advance.moment(1.0);
-            let until = self.advance.pace.proven(&here, &self.advance.gap(&m, here.n));
+            let end = self.bodies.gap(1.0, here.n);
+            let Some(until) = end.and_then(|end| self.bodies.proven(&here, &end, least)) else { break };
             if until >= 1.0 {
                 return (1.0, here.phi, count);
             }
             // From where this direction gives out another one.
-            let m = self.advance.moment(until);
-            let Some(next) = self.advance.widest(&m, m.at.world_from_a.transpose() * here.n) else { break };
+            let Some(next) = self.bodies.widest(until, here.n) else { break };
             count += 1;
             let short = next.t - here.t <= shortest;
             here = next;

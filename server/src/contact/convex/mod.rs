@@ -25,6 +25,7 @@ mod boxes;
 mod gjk;
 mod overlap;
 mod part;
+mod plane;
 mod proof;
 mod slabs;
 mod steer;
@@ -45,6 +46,7 @@ pub(super) use advance::{ConvexPair, answer};
 pub(super) use balls::quick as balls;
 use glam::DVec3;
 use overlap::{Look, Start};
+use plane::PlanePair;
 use straight::Straight;
 pub use swept_shape::{AxisSearch, Hull, SeparatingAxisTest, SweptShape};
 use turning::Turning;
@@ -82,6 +84,13 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         [Convex::Cuboid(p), Convex::Cuboid(q)] if moves_along() => {
             boxes::meet(&pair, [p, q], query.query_options, outcome)
         }
+        // Of another body than a half-space, which the first one never is: there is one bounded body at least.
+        [_, Convex::HalfSpace] => {
+            return match PlanePair::new(&pair).and_then(|plane| plane.meet(query.query_options, outcome)) {
+                Some(()) => reported(outcome, swapped),
+                None => nothing,
+            };
+        }
         // Every other pair is open here, of whatever forms.
         [_, _] => None,
     };
@@ -116,6 +125,11 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
             Look::Open => return nothing,
         }
     }
+    reported(outcome, swapped)
+}
+
+/// An answer with the bodies in the order of the question.
+fn reported(outcome: &mut Outcome, swapped: bool) -> Quick {
     if swapped && outcome.meets() {
         outcome.swap_sides();
     }

@@ -174,7 +174,7 @@ impl<'a> Start<'a> {
         let values = p.faces.listed().iter().map(|face| face.value(own));
         let first = (0, f64::NEG_INFINITY);
         let (face, f) = values.enumerate().fold(first, |best, (i, f)| if f > best.1 { (i, f) } else { best });
-        Slope { f, normal: self.axes[k] * p.faces[face].at(own).normal, face: face as u32 }
+        Slope { f, normal: self.axes[k] * p.faces[face].at(own).unit(), face: face as u32 }
     }
 
     /// The first of some points that is `least` deep in both bodies, or the last: each is the nearest to the one before that
@@ -243,7 +243,7 @@ impl<'a> Start<'a> {
         for k in 0..2 {
             let own = self.own(k, p);
             let faces = self.pair.primitives[k].faces.listed().iter().filter(|f| f.value(own) > -near);
-            outward.extend(faces.map(|f| self.axes[k] * f.at(own).normal));
+            outward.extend(faces.map(|f| self.axes[k] * f.at(own).unit()));
         }
         Some(-gjk::least_of(&outward)?.try_normalize()?)
     }

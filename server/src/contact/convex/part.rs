@@ -26,6 +26,11 @@ impl<'a> ConvexPart<'a> {
         Some(Self { primitive, axes, features: Features::new(primitive.shape.convex())? })
     }
 
+    /// A primitive of which nothing is asked but its faces.
+    pub fn plain(primitive: &'a Primitive, axes: DMat3) -> Self {
+        Self { primitive, axes, features: Features::none() }
+    }
+
     /// What holds the unit outward direction m, as `Features::held` has it.
     pub fn held(&self, m: DVec3, tol: f64) -> (u8, bool) {
         self.features.held(&self.axes, m, tol)

@@ -140,9 +140,14 @@ impl<'a> Stand<'a> {
 
     /// A point in a body's own model.
     #[inline]
-    fn own(&self, k: usize, x: DVec3) -> DVec3 {
+    pub fn own(&self, k: usize, x: DVec3) -> DVec3 {
         let x = if k == 0 { x } else { x - self.way };
         self.models[k].transpose() * x + self.parts[k].primitive.frame.position
+    }
+
+    /// A direction along a body's own model.
+    pub fn own_vector(&self, k: usize, n: DVec3) -> DVec3 {
+        self.models[k].transpose() * n
     }
 
     /// True when a point lies this deep in both bodies.
@@ -185,9 +190,8 @@ impl<'a> Stand<'a> {
     /// The contact at a time, along n and between the features shown there, if both trees confirm it. The bodies are left at
     /// another time.
     pub fn confirm(&mut self, n: DVec3, t: f64, shown: &[Shown; 2]) -> Option<Touch> {
-        let pair = self.pair;
         self.to(t);
-        let mut x = self.point(n, shown)?;
+        let x = self.point(n, shown)?;
         let mut active = Active::new();
         self.parts[0].faces(Side::A, n, self.models[0].transpose() * n, &shown[0], &mut active);
         let of_a = active.len();
@@ -195,14 +199,22 @@ impl<'a> Stand<'a> {
         if active.len() > MAX_ACTIVE {
             return None;
         }
+        self.confirm_at(x, n, (&active, of_a), false)
+    }
+
+    /// The contact at the time of now in a point of both bodies, along n and between active faces, the first `of_a` of
+    /// which are A's; the bodies are left at another time. What `any` more faces pass through the point, they hold
+    /// nothing that n does not tell.
+    pub fn confirm_at(&mut self, mut x: DVec3, n: DVec3, (active, of_a): (&Active, usize), any: bool) -> Option<Touch> {
+        let pair = self.pair;
         let mut rows = [Row::default(); MAX_ACTIVE];
-        self.rows(&active, x, &mut rows);
+        self.rows(active, x, &mut rows);
         let tol = INCIDENT * pair.rounding;
         let passing = match self.passing(x, tol) {
             Some(passing) => passing,
             None => {
                 x = self.sink(&rows, active.len(), x, 0.0)?;
-                self.rows(&active, x, &mut rows);
+                self.rows(active, x, &mut rows);
                 self.passing(x, tol)?
             }
         };
@@ -219,10 +231,10 @@ impl<'a> Stand<'a> {
             extent: Extent::Point,
             faces: [[NO_FACE; 3]; 2],
         };
-        touch.describe(&active, of_a, &rows, pair.scale);
+        touch.describe(active, of_a, &rows, pair.scale);
         let noted = [0, 1].map(|k| extent::noted(&touch.faces[k]));
         // Faces that pass through the point and hold nothing are the search's to tell.
-        if touch.kind == ContactKind::VertexVertex || (touch.extent == Extent::Point && passing != noted) {
+        if touch.kind == ContactKind::VertexVertex || (!any && touch.extent == Extent::Point && passing != noted) {
             return None;
         }
         // Round faces bend away from the first order: the deeper, the farther.
@@ -233,7 +245,7 @@ impl<'a> Stand<'a> {
             if is_deep {
                 break;
             }
-            self.rows(&active, deep, &mut rows);
+            self.rows(active, deep, &mut rows);
             deep = self.sink(&rows, active.len(), deep, pair.witness_level())?;
             is_deep = self.is_deep(deep, level);
         }

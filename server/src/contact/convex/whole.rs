@@ -47,7 +47,7 @@ impl<'a> PrimitivePair<'a> {
         let turns = [length(from.spin), length(to.spin)];
         let motion = Rounding::with(turns[0] + turns[1], apart, places[0] + places[1]);
         let rounding = rounding::of_motion(a.model, b.model, places, apart, &motion);
-        let scale = a.model.radius.max(b.model.radius);
+        let scale = a.model.size().max(b.model.size());
         // Sums of components: no less than lengths, and no roots.
         let center = |body: &question::PlacedModel| body.model.bounds.root().ball.center.abs().element_sum();
         let centers = [center(a), center(b)];

@@ -93,9 +93,11 @@ impl Default for Strategies {
 /// A hollow body counts as this much larger when the reference body of the cells is chosen.
 const HOLLOW: f64 = 2.0;
 
-/// 1e-9 of the larger bounding radius of the two models.
+/// 1e-9 of the larger bounding radius of the two models; of one without bounds the other's counts. Infinite for two
+/// without.
 pub fn default_resolution(a: &Model, b: &Model) -> f64 {
-    tolerance::DEFAULT_RESOLUTION * a.radius.max(b.radius)
+    let radius = if a.radius.min(b.radius).is_finite() { a.size().max(b.size()) } else { f64::INFINITY };
+    tolerance::DEFAULT_RESOLUTION * radius
 }
 
 /// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
@@ -121,11 +123,12 @@ const OFF_AXIS: f64 = 0.02;
 /// Cosine of the angle between a wall and an axis up to which the one is along the other.
 const ALONG: f64 = 0.1;
 
-/// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the other one, which is
-/// bounded, has subtracted planes along that axis or subtracted cones.
+/// True when a body without cavities spins nearly about an axis of revolution of its own, but not exactly, and the
+/// other one has subtracted planes along that axis or subtracted cones.
 fn turns_in_a_hole(peg: &PlacedModel, hole: &PlacedModel) -> bool {
     let spin = peg.placed.motion.spin;
-    let candidates = hole.model.hollow && !peg.model.hollow && hole.model.radius.is_finite();
+    let bounded = peg.model.radius.is_finite() && hole.model.radius.is_finite();
+    let candidates = hole.model.hollow && !peg.model.hollow && bounded;
     if !candidates || spin.length_squared() < SPINS * SPINS {
         return false;
     }

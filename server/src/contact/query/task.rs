@@ -57,7 +57,7 @@ impl<'a> Task<'a> {
         let (a, b) = (&model_a.solid, &model_b.solid);
         let relative = Relative::new(without_own_spin(&reference), without_own_spin(&other));
         let (ball_a, ball_b) = (model_a.bounds.root().ball, model_b.bounds.root().ball);
-        let scale = model_a.radius.max(model_b.radius);
+        let scale = model_a.size().max(model_b.size());
         let extent = ball_a.center.length()
             + ball_b.center.length()
             + 2.0 * scale

@@ -1,11 +1,11 @@
 //! `import` of meshes and drawings: files beside the text, which whoever read it has read too.
 
-use super::arguments::Arguments;
+use super::arguments::{Arguments, finite};
 use super::flat::{Flat, Outline};
 use super::parts::{Part, PartId};
 use super::shapes::Shapes;
 use super::slices::Curve;
-use super::syntax::{Call, ValueKind};
+use super::syntax::{Call, Value, ValueKind};
 use super::{Place, Problem};
 use crate::import::{Attachment, drawing, mesh, surface};
 use crate::solid::Op;
@@ -145,6 +145,47 @@ pub fn surface(
         return Ok(shapes.nothing(call, &format!("of {name:?}, which has no two rows of two heights")));
     }
     of_polygons(shapes, call, (outer, hull), polygons)
+}
+
+/// The solid under a grid of heights, which OpenSCAD does not have: `height_field(heights = [[z, ...], ...], size = [x,
+/// y], base = z)`.
+///
+/// # Errors
+/// What is wrong with the call, and where.
+pub fn height_field(shapes: &mut Shapes<'_>, call: &Call, (outer, hull): (&DAffine3, bool)) -> Result<PartId> {
+    let arguments = Arguments::new(call, &["heights", "size", "base"])?;
+    let listed = arguments.required("heights", "rows of heights")?;
+    let wrong = |v: &Value, what: &str| Err((v.at, Problem::syntax(what, v.found())));
+    let ValueKind::List(rows) = &listed.kind else { return wrong(listed, "rows of heights") };
+    if rows.len() < 2 {
+        return wrong(listed, "two rows of heights or more");
+    }
+    let (mut heights, mut columns) = (Vec::new(), 0);
+    for row in rows {
+        let ValueKind::List(of_row) = &row.kind else { return wrong(row, "a row of heights") };
+        if columns == 0 && of_row.len() >= 2 {
+            columns = of_row.len();
+            heights.reserve(columns.saturating_mul(rows.len()).min(shapes.limits.values));
+        }
+        if of_row.len() != columns {
+            let expected = if columns == 0 { "a row of two heights or more" } else { "rows of one length" };
+            return Err((row.at, Problem::syntax(expected, format!("one of {}", of_row.len()))));
+        }
+        for z in of_row {
+            heights.push(finite(z)?);
+        }
+    }
+    let squares = DVec2::new((columns - 1) as f64, (rows.len() - 1) as f64);
+    let Some(size) = (if arguments.get("size").is_some() { arguments.sizes_2d("size")? } else { Some(squares) }) else {
+        return Ok(shapes.nothing(call, "of no size"));
+    };
+    let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+    let base = arguments.number_or("base", lowest - 1.0)?;
+    if !(base < lowest && base.is_finite()) {
+        let expected = format!("a base below the lowest height, {lowest}");
+        return Err((call.at, Problem::syntax(expected, format!("base = {base}"))));
+    }
+    of_polygons(shapes, call, (outer, hull), surface::grid(&heights, columns, size, base))
 }
 
 /// What an `import` is, before it is read: a drawing, or a solid.

@@ -37,16 +37,16 @@ pub fn lower(file: &File, (facets, attached): (Facets, Option<&[Attachment]>), l
     let root = lowering.tree()?;
     let Parts { mut notes, list, .. } = lowering.shapes.parts;
     let solid = emit(list, root, &mut notes);
-    notes.sort_by_key(|n| (n.at.line, n.at.column));
     let unbounded = solid.primitives.iter().find(|p| is_unbounded(&p.shape));
     if let Some(p) = unbounded
         && !solid.aabb().is_empty()
         && !solid.aabb().is_finite()
     {
         let at = Place { line: p.label.line, column: p.label.column };
-        let expected = "something bounded that this infinite primitive is cut down by";
-        return Err((at, Problem::syntax(expected, "a solid that reaches to infinity")));
+        let text = "the model reaches to infinity by this half-space: a floor or a wall, without mass properties";
+        notes.push(Note { at, text: text.into(), amount: None });
     }
+    notes.sort_by_key(|n| (n.at.line, n.at.column));
     if solid.is_empty() {
         notes.push(Note { at: Place::START, text: "the model is empty: nothing can touch it".into(), amount: None });
     }
@@ -229,7 +229,7 @@ impl<'a> Lowering<'a> {
                 Ok(Step::open(CallKind::Offset(offset, pieces), Context { plane: Some(local), ..context }))
             }
             "linear_extrude" | "rotate_extrude" => self.extrusion(call, context),
-            "sphere" | "cylinder" | "cube" | "polyhedron" => {
+            "sphere" | "cylinder" | "cube" | "polyhedron" | "half_space" => {
                 no_children(call)?;
                 if context.plane.is_some() {
                     return Ok(Step::Leaf(self.shapes.nothing(call, "inside of a 2D shape")));
@@ -238,6 +238,7 @@ impl<'a> Lowering<'a> {
                     "sphere" => self.shapes.sphere(call, &context.outer),
                     "cylinder" => self.shapes.cylinder(call, &context.outer),
                     "cube" => self.shapes.cube(call, &context.outer),
+                    "half_space" => self.shapes.half_space(call, &context.outer),
                     _ => self.shapes.polyhedron(call, &context.outer, context.hull),
                 }
                 .map(Step::Leaf)
@@ -271,6 +272,13 @@ impl<'a> Lowering<'a> {
                 let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
                 no_children(call)?;
                 Ok(Step::Leaf(id))
+            }
+            "height_field" => {
+                no_children(call)?;
+                if context.plane.is_some() {
+                    return Ok(Step::Leaf(self.shapes.nothing(call, "inside of a 2D shape")));
+                }
+                imports::height_field(&mut self.shapes, call, (&context.outer, context.hull)).map(Step::Leaf)
             }
             "surface" => {
                 let id = imports::surface(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;

@@ -2,13 +2,13 @@
 //!
 //! What has no size is nothing, with a note, as in OpenSCAD.
 
-use super::arguments::Arguments;
+use super::arguments::{Arguments, finite};
 use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
 use super::hull::point_hull;
 use super::parts::{Part, PartId, Parts};
 use super::place::{self, PlacedShape};
-use super::syntax::Call;
+use super::syntax::{Call, ValueKind};
 use super::{Facets, Limits, Place, Problem};
 use crate::import::mesh::{Polygons, oriented};
 use crate::solid::primitive::{MeshError, MeshFault, Repair};
@@ -129,6 +129,26 @@ impl Shapes<'_> {
         }
         let middle = if center { DVec3::ZERO } else { size * 0.5 };
         self.leaf(call, place::cuboid(outer, middle, size * 0.5))
+    }
+
+    /// `half_space`, which OpenSCAD does not have: all points x with n·x <= offset |n|, by default z <= 0.
+    pub fn half_space(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
+        let arguments = Arguments::new(call, &["normal", "offset"])?;
+        let normal = match arguments.get("normal") {
+            None => DVec3::Z,
+            Some(v) => match &v.kind {
+                ValueKind::List(of) if of.len() == 3 => DVec3::new(finite(&of[0])?, finite(&of[1])?, finite(&of[2])?),
+                _ => return Err((v.at, Problem::syntax("a normal of 3 numbers", v.found()))),
+            },
+        };
+        let Some(n) = normal.try_normalize() else {
+            return Err((call.at, Problem::syntax("a normal that is not 0", format!("half_space along {normal}"))));
+        };
+        let offset = arguments.number_or("offset", 0.0)?;
+        if !offset.is_finite() {
+            return Err((call.at, Problem::syntax("a finite offset", format!("half_space at {offset}"))));
+        }
+        self.leaf(call, Ok(place::half_space(outer, n, offset)))
     }
 
     /// A box with infinite sides: an intersection of half-spaces. A centred infinite side has no ends, any other begins

@@ -278,9 +278,16 @@ fn infinite_primitives_are_half_spaces() {
         under("[1, 0, 0, 1], [0, 0, 1, 0], [0, -1, 0, 0]", half)
     ));
     assert!(cut.solid.value(DVec3::new(0.0, -1.0, 0.0)) < 0.0 && cut.solid.value(DVec3::new(0.0, 1.0, 0.0)) > 0.0);
+    let floor = import(&format!("union() {{ sphere(r = 1); {half} }}"));
+    assert!((floor.solid.value(DVec3::new(1e6, 0.0, 1.0)) + 1.0).abs() < 1e-9);
+    assert!((floor.solid.value(DVec3::NEG_Z * 2.0) - 1.0).abs() < 1e-15);
+    let told: Vec<String> = floor.notes.iter().map(|n| format!("{}: {}", n.at, n.text)).collect();
     assert_eq!(
-        refused(&format!("union() {{ sphere(r = 1); {half} }}")),
-        "m.csg:1:26: expected something bounded that this infinite primitive is cut down by, found a solid that reaches to infinity"
+        told,
+        [
+            "1:26: an infinite cylinder: 1 half-space(s)",
+            "1:26: the model reaches to infinity by this half-space: a floor or a wall, without mass properties"
+        ]
     );
     assert_eq!(
         refused("cube(size = inf, center = true);"),

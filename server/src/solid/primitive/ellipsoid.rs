@@ -39,7 +39,7 @@ impl Geometry for Ellipsoid {
     }
     #[inline]
     fn convex(&self) -> Convex<'_> {
-        Convex::Other
+        Convex::Ellipsoid(self.semi)
     }
     fn moments(&self) -> Option<Moments> {
         let volume = 4.0 / 3.0 * PI * self.semi.x * self.semi.y * self.semi.z;

@@ -1,7 +1,7 @@
 //! Elliptic cylinder, cone or frustum, upright or leaning.
 
 use super::{Checked, Convex, Geometry, Shape, Sink, Source};
-use crate::math::{Aabb, Ball, Moments};
+use crate::math::{Aabb, Ball, Lanes, Moments};
 use crate::solid::Face;
 use crate::solid::primitive::{Cone, Cylinder};
 use crate::solid::surface::{Elliptic, Plane};
@@ -38,6 +38,43 @@ impl EllipticFrustum {
     fn end(&self, above: bool) -> (DVec3, DVec2) {
         let (z, size) = if above { (self.half_height, self.top) } else { (-self.half_height, self.bottom) };
         ((self.lean * z).extend(z), self.semi * size)
+    }
+
+    /// How far the ellipse of size 1 about the axis reaches along m, and how far the middle of the upper end does.
+    #[inline]
+    pub(super) fn rim_and_up<T: Lanes>(&self, m: [T; 3]) -> [T; 2] {
+        let [x, y] = [m[0] * self.semi.x, m[1] * self.semi.y];
+        [(x * x + y * y).sqrt(), (m[2] + m[0] * self.lean.x + m[1] * self.lean.y) * self.half_height]
+    }
+
+    /// The point of an end that is farthest along m, of any length; its middle where all of it is, up to `flat`.
+    fn farthest_of(&self, above: bool, m: DVec3, flat: f64) -> DVec3 {
+        let (center, semi) = self.end(above);
+        let along = semi * m.truncate();
+        let length = along.length();
+        let out = if length > flat { semi * along / length } else { DVec2::ZERO };
+        center + out.extend(0.0)
+    }
+
+    /// A farthest point along m, of any length.
+    pub(super) fn support(&self, m: DVec3) -> DVec3 {
+        let [rim, up] = self.rim_and_up([m.x, m.y, m.z]);
+        self.farthest_of(self.top * rim + up >= self.bottom * rim - up, m, 0.0)
+    }
+
+    /// The middle of what is farthest along the unit vector m, told as `Convex::farthest` does.
+    pub(super) fn farthest(&self, m: DVec3, flat: f64) -> DVec3 {
+        let size = self.half_height + self.semi.max_element();
+        let [rim, up] = self.rim_and_up([m.x, m.y, m.z]);
+        let [above, below] = [true, false].map(|above| self.farthest_of(above, m, flat * size));
+        let off = rim * (self.top - self.bottom) + 2.0 * up;
+        if off.abs() <= flat * size {
+            0.5 * (above + below)
+        } else if off > 0.0 {
+            above
+        } else {
+            below
+        }
     }
 
     fn has_top(&self) -> bool {
@@ -107,7 +144,7 @@ impl Geometry for EllipticFrustum {
     }
     #[inline]
     fn convex(&self) -> Convex<'_> {
-        Convex::Other
+        Convex::Elliptic(self)
     }
     fn moments(&self) -> Option<Moments> {
         let half_height = self.half_height;

@@ -1,4 +1,4 @@
-//! Half-space z <= 0: only as an operand that something bounded cuts down.
+//! Half-space z <= 0: a floor or a wall of its own, or an operand that something bounded cuts down.
 
 use super::{Checked, Convex, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
@@ -41,7 +41,7 @@ impl Geometry for HalfSpace {
     }
     #[inline]
     fn convex(&self) -> Convex<'_> {
-        Convex::Other
+        Convex::HalfSpace
     }
     fn moments(&self) -> Option<Moments> {
         None

@@ -28,7 +28,7 @@ mod triangle_mesh;
 
 pub use capsule::Capsule;
 pub use cone::Cone;
-pub use convex::{Convex, Discs, Features, Hold, Shown, Slope};
+pub use convex::{Convex, Discs, Farthest, Features, Hold, Shown, Slope};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use ellipsoid::Ellipsoid;
@@ -81,6 +81,11 @@ pub trait Geometry {
     fn interior_point(&self) -> DVec3;
     /// What it is to those who compute with convex bodies, in its frame.
     fn convex(&self) -> Convex<'_>;
+    /// What of it is farthest along the unit direction m of its frame, as `Convex::farthest` has it; of what is not
+    /// convex with its hull.
+    fn farthest(&self, m: DVec3, flat: f64) -> Option<Farthest> {
+        self.convex().farthest(m, flat)
+    }
     /// Its moments in its frame, by a formula (`octree::mass::closed` has them all); `None` where there is none.
     fn moments(&self) -> Option<Moments>;
     /// What they leave open of its volume beside the rounding of a few formulas.

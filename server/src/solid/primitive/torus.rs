@@ -1,7 +1,7 @@
 //! Torus around z.
 
 use super::cylinder::disc_half_extents;
-use super::{Checked, Convex, Cylinder, Geometry, Shape, Sink, Source};
+use super::{Checked, Convex, Cylinder, Farthest, Geometry, Shape, Sink, Source};
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface;
@@ -42,6 +42,13 @@ impl Geometry for Torus {
     #[inline]
     fn convex(&self) -> Convex<'_> {
         Convex::Other
+    }
+    /// Where it lies flat a whole circle is farthest: a point of that.
+    fn farthest(&self, m: DVec3, flat: f64) -> Option<Farthest> {
+        let across = DVec3::new(m.x, m.y, 0.0);
+        let length = across.length();
+        let out = if length <= flat { DVec3::X } else { across / length };
+        Some(Farthest { reach: self.major * length + self.minor, middle: out * self.major + m * self.minor })
     }
     /// Pappus: 2π²Rr², and moments over the disc that is revolved. Of a tube that meets itself there is no such formula.
     fn moments(&self) -> Option<Moments> {

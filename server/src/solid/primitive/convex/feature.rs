@@ -41,7 +41,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// `None` for a shape that is told by corners, and for what is not known.
+    /// `None` for a shape that is told by corners, for an elliptic one, and for what is not known.
     #[inline]
     pub fn new(shape: Convex<'_>) -> Option<Self> {
         let lean = match shape {
@@ -50,9 +50,16 @@ impl Features {
                 if drop == 0.0 { 0.0 } else { drop / (drop * drop + 4.0 * half * half).sqrt() }
             }
             Convex::Ball(_) | Convex::Cuboid(_) | Convex::Capsule { .. } => 0.0,
-            Convex::Corners(_) | Convex::Other => return None,
+            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Corners(_) | Convex::HalfSpace | Convex::Other => {
+                return None;
+            }
         };
         Some(Self { shape: shape.of_few()?, lean })
+    }
+
+    /// Of a shape of which nothing is known: it shows nothing.
+    pub fn none() -> Self {
+        Self { shape: Convex::Other, lean: 0.0 }
     }
 
     /// Half the height of a round one, and the radius of its disc above or below.
@@ -77,7 +84,12 @@ impl Features {
                 (u8::from(!flat && (l.z - self.lean).abs() <= tol) << 2, flat)
             }
             Convex::Capsule { .. } => (u8::from(l.z.abs() <= tol) << 2, false),
-            Convex::Ball(_) | Convex::Corners(_) | Convex::Other => (0, false),
+            Convex::Ball(_)
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => (0, false),
         }
     }
 
@@ -118,7 +130,7 @@ impl Features {
                 shown.bend = if rho > 0.0 { radii[upper] / rho } else { 0.0 };
                 shown.tangent = *axes * DVec3::new(-u.y, u.x, 0.0);
             }
-            Convex::Corners(_) | Convex::Other => {}
+            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Corners(_) | Convex::HalfSpace | Convex::Other => {}
         }
         shown
     }
@@ -151,7 +163,7 @@ impl Features {
                     hold(Hold::Apex);
                 }
             }
-            Convex::Corners(_) | Convex::Other => {}
+            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Corners(_) | Convex::HalfSpace | Convex::Other => {}
         }
     }
 }

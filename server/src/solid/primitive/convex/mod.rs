@@ -3,13 +3,16 @@
 //! How far it reaches along a direction and with which point, how deep a point lies in it, and what it shows along a direction
 //! (`feature`). Nobody outside of this folder asks which of these it is, but who chooses between closed forms.
 
+mod farthest;
 mod feature;
 
+use super::elliptic_frustum::EllipticFrustum;
 use super::polyhedron::middle;
 use crate::math::Lanes;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
+pub use farthest::Farthest;
 pub use feature::{Features, Hold, Shown};
 
 /// A convex shape in its own frame, centred there but for corners: the few numbers that tell it, or its corners. Two kinds of
@@ -36,9 +39,15 @@ pub enum Convex<'a> {
         /// Radius.
         radius: f64,
     },
+    /// The semi-axes of an ellipsoid along the axes.
+    Ellipsoid(DVec3),
+    /// What any affine map makes of a solid of revolution between two discs.
+    Elliptic(&'a EllipticFrustum),
     /// The corners.
     Corners(&'a [DVec3]),
-    /// None of these: without bounds, or of a kind that those who compute with forms do not know. They leave it to the search.
+    /// All of z <= 0: it reaches 0 along z, and to infinity along any other direction.
+    HalfSpace,
+    /// None of these: of a kind that those who compute with forms do not know. They leave it to the search.
     Other,
 }
 
@@ -61,9 +70,14 @@ impl Convex<'_> {
     pub fn middle(&self) -> DVec3 {
         match self {
             Convex::Corners(corners) => middle(corners),
-            Convex::Ball(_) | Convex::Cuboid(_) | Convex::Round { .. } | Convex::Capsule { .. } | Convex::Other => {
-                DVec3::ZERO
-            }
+            Convex::Ball(_)
+            | Convex::Cuboid(_)
+            | Convex::Round { .. }
+            | Convex::Capsule { .. }
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::HalfSpace
+            | Convex::Other => DVec3::ZERO,
         }
     }
 
@@ -74,8 +88,10 @@ impl Convex<'_> {
             Convex::Cuboid(half) => Some(Convex::Cuboid(half)),
             Convex::Round { bottom, top, half } => Some(Convex::Round { bottom, top, half }),
             Convex::Capsule { half, radius } => Some(Convex::Capsule { half, radius }),
+            Convex::Ellipsoid(semi) => Some(Convex::Ellipsoid(semi)),
+            Convex::HalfSpace => Some(Convex::HalfSpace),
             Convex::Other => Some(Convex::Other),
-            Convex::Corners(_) => None,
+            Convex::Elliptic(_) | Convex::Corners(_) => None,
         }
     }
 
@@ -90,11 +106,19 @@ impl Convex<'_> {
                 let (across, up) = ((m[0] * m[0] + m[1] * m[1]).sqrt(), m[2] * *half);
                 (across * *top + up).max(across * *bottom - up)
             }
+            Convex::Ellipsoid(semi) => {
+                let [x, y, z] = [m[0] * semi.x, m[1] * semi.y, m[2] * semi.z];
+                (x * x + y * y + z * z).sqrt()
+            }
+            Convex::Elliptic(f) => {
+                let [rim, up] = f.rim_and_up(m);
+                (rim * f.top + up).max(rim * f.bottom - up)
+            }
             Convex::Corners(corners) => {
                 corners.iter().fold(T::all(f64::NEG_INFINITY), |far, v| far.max(m[0] * v.x + m[1] * v.y + m[2] * v.z))
             }
             Convex::Capsule { half, radius } => m[2].abs() * *half + T::all(*radius),
-            Convex::Other => T::all(f64::INFINITY),
+            Convex::HalfSpace | Convex::Other => T::all(f64::INFINITY),
         }
     }
 
@@ -113,15 +137,19 @@ impl Convex<'_> {
         match self {
             Convex::Ball(radius) => radius * n.length(),
             Convex::Capsule { half, radius } => axes.z_axis.dot(n).abs() * half + radius * n.length(),
-            Convex::Cuboid(_) | Convex::Round { .. } | Convex::Corners(_) | Convex::Other => {
-                self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)])
-            }
+            Convex::Cuboid(_)
+            | Convex::Round { .. }
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)]),
         }
     }
 
-    /// False for what those who compute with forms leave to the search.
+    /// False for what those who compute with bounded forms leave to others.
     pub fn is_known(&self) -> bool {
-        !matches!(self, Convex::Other)
+        !matches!(self, Convex::HalfSpace | Convex::Other)
     }
 
     /// The radius of a ball.
@@ -133,7 +161,13 @@ impl Convex<'_> {
     pub fn margin(&self) -> f64 {
         match self {
             Convex::Ball(radius) | Convex::Capsule { radius, .. } => *radius,
-            Convex::Cuboid(_) | Convex::Round { .. } | Convex::Corners(_) | Convex::Other => 0.0,
+            Convex::Cuboid(_)
+            | Convex::Round { .. }
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => 0.0,
         }
     }
 
@@ -149,10 +183,16 @@ impl Convex<'_> {
             DVec3::new(k * m.x, k * m.y, z)
         };
         let local = match *self {
-            Convex::Ball(_) | Convex::Other => return origin,
+            Convex::Ball(_) | Convex::HalfSpace | Convex::Other => return origin,
             Convex::Round { bottom, top, half } => round(bottom, top, half),
             Convex::Capsule { half, .. } => DVec3::Z * half.copysign(m.z),
             Convex::Cuboid(half) => DVec3::new(half.x.copysign(m.x), half.y.copysign(m.y), half.z.copysign(m.z)),
+            Convex::Ellipsoid(semi) => {
+                let along = semi * m;
+                let length = along.length();
+                if length > 0.0 { semi * along / length } else { DVec3::ZERO }
+            }
+            Convex::Elliptic(f) => f.support(m),
             Convex::Corners(corners) => {
                 let mut best = (f64::NEG_INFINITY, corners[0]);
                 for v in corners {
@@ -168,7 +208,7 @@ impl Convex<'_> {
     }
 
     /// How deep a point is, seen `from` the frame's centre, by f, the largest of its faces' values: the same as `Primitive::value` but for rounding,
-    /// in a fraction of the time. `None` for a polyhedron.
+    /// in a fraction of the time. `None` for a polyhedron and what is elliptic.
     #[inline]
     pub fn slope(&self, axes: &DMat3, from: DVec3) -> Option<Slope> {
         let own = || DVec3::new(axes.x_axis.dot(from), axes.y_axis.dot(from), axes.z_axis.dot(from));
@@ -226,7 +266,9 @@ impl Convex<'_> {
                 let length = out.length();
                 reported(length - radius, if length > 0.0 { out / length } else { axes.x_axis }, 0)
             }
-            Convex::Corners(_) | Convex::Other => return None,
+            // Their faces' gradients are no unit vectors: a plane along one would not lie below f.
+            Convex::Ellipsoid(_) | Convex::Elliptic(_) => return None,
+            Convex::Corners(_) | Convex::HalfSpace | Convex::Other => return None,
         })
     }
 
@@ -246,7 +288,13 @@ impl Convex<'_> {
                     _ => 1,
                 }
             }
-            Convex::Ball(_) | Convex::Round { .. } | Convex::Capsule { .. } | Convex::Other => 0,
+            Convex::Ball(_)
+            | Convex::Round { .. }
+            | Convex::Capsule { .. }
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::HalfSpace
+            | Convex::Other => 0,
         }
     }
 
@@ -257,11 +305,17 @@ impl Convex<'_> {
             Convex::Cuboid(_) => [x, y, z],
             Convex::Round { .. } => [z, (way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO],
             Convex::Capsule { .. } => [(way - z * way.dot(z)).normalize_or_zero(), DVec3::ZERO, DVec3::ZERO],
-            Convex::Ball(_) | Convex::Corners(_) | Convex::Other => [DVec3::ZERO; 3],
+            Convex::Ball(_)
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => [DVec3::ZERO; 3],
         }
     }
 
-    /// The discs about z whose hull it is, in its own frame, or the balls; `None` for what is not known. Of a cuboid and of corners these
+    /// The discs about z whose hull it is, in its own frame, or the balls; `None` for what is not such a hull. Of a
+    /// cuboid and of corners these
     /// are points.
     pub fn discs(&self) -> Option<Discs> {
         Some(match self {
@@ -280,7 +334,7 @@ impl Convex<'_> {
                 (0..8).map(corner).collect()
             }
             Convex::Corners(corners) => corners.iter().map(|v| (*v, 0.0)).collect(),
-            Convex::Other => return None,
+            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::HalfSpace | Convex::Other => return None,
         })
     }
 }
