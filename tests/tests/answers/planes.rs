@@ -36,6 +36,7 @@ fn reach(shape: &Shape, m: DVec3) -> f64 {
         Shape::Polyhedron(p) => p.vertices.iter().map(|v| v.dot(m)).fold(f64::NEG_INFINITY, f64::max),
         Shape::TriangleMesh(t) => t.vertices().iter().map(|v| v.dot(m)).fold(f64::NEG_INFINITY, f64::max),
         Shape::HalfSpace(_) => f64::INFINITY,
+        Shape::Quadric(_) => unreachable!("none is drawn here: `quadrics` has its own heights above planes"),
     }
 }
 
