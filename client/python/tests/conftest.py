@@ -33,8 +33,8 @@ def binary(request):
 
 @pytest.fixture(scope="session")
 def runtime():
-    """A runtime folder of the tests' own; sockets' paths are short."""
-    folder = tempfile.mkdtemp(prefix="ct", dir="/tmp")
+    """A runtime folder of the tests' own, in memory where that can be had; sockets' paths are short."""
+    folder = tempfile.mkdtemp(prefix="ct", dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else "/tmp")
     before = os.environ.get("XDG_RUNTIME_DIR")
     os.environ["XDG_RUNTIME_DIR"] = folder
     yield folder
