@@ -61,11 +61,15 @@ pub struct ConvexPair<'a> {
 }
 
 /// What is asked how far apart it is.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one a question, on the stack: a box would be an allocation in a warm step"
+)]
 enum Bodies<'a> {
     /// Two bounded bodies.
-    Two(Box<Advance<'a>>),
+    Two(Advance<'a>),
     /// A body and a half-space that keeps its normal, along which everything is told; the body need not be convex.
-    Floor(Box<Floor<'a>>),
+    Floor(Floor<'a>),
 }
 
 impl Bodies<'_> {
@@ -105,12 +109,12 @@ impl<'a> ConvexPair<'a> {
         if is_half_space(b) {
             let floor = Floor::new(&task)?;
             let start = floor.gap(0.0)?;
-            return Some(Self { bodies: Bodies::Floor(Box::new(floor)), start });
+            return Some(Self { bodies: Bodies::Floor(floor), start });
         }
         let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
         let m = advance.moment(0.0);
         let start = advance.widest(&m, m.b.support(DVec3::ZERO) - a.ball.center)?;
-        Some(Self { bodies: Bodies::Two(Box::new(advance)), start })
+        Some(Self { bodies: Bodies::Two(advance), start })
     }
 
     /// True for two solids that are one convex primitive each, whether a direction separates them or not.
