@@ -7,13 +7,14 @@
 //!
 //! Peers: parry and rapier in double precision (`parry3d-f64`, `rapier3d-f64`), built as this crate is, their shapes built
 //! outside the timer.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod callgrind;
 pub mod effects;
 pub mod facets;
 pub mod figure;
 pub mod measure;
+pub mod memory;
 pub mod options;
 pub mod page;
 pub mod peer;

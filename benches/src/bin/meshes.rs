@@ -20,6 +20,7 @@ use contactd::import::{Facets, Limits, read_model};
 use contactd::octree::Model;
 use contactd::solid::Shape;
 use contactd::solid::primitive::{Capsule, Cuboid, Cylinder, Sphere};
+use contactd_benches::memory::{self, Counting};
 use contactd_benches::options::Options;
 use contactd_benches::race::{Lap, Plan, median, race, worst};
 use contactd_benches::table::Table;
@@ -32,33 +33,9 @@ use contactd_tests::scenes::Recipe;
 use contactd_tests::{shells, triangles};
 use glam::{DVec3, dvec3};
 use parry3d_f64::shape::{SharedShape, TriMesh};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicIsize, Ordering};
 use std::time::{Duration, Instant};
-
-/// The system's allocator, with a count of the bytes that are in use, and the most that were.
-struct Counting;
-
-static IN_USE: AtomicIsize = AtomicIsize::new(0);
-static MOST: AtomicIsize = AtomicIsize::new(0);
-
-// SAFETY: every call goes to the system's allocator with the same arguments; the counts are beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let size = layout.size() as isize;
-        MOST.fetch_max(IN_USE.fetch_add(size, Ordering::Relaxed) + size, Ordering::Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        IN_USE.fetch_sub(layout.size() as isize, Ordering::Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(at, layout) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -482,14 +459,13 @@ fn loads(options: &Options) -> std::io::Result<()> {
         let mut laps = Vec::new();
         let (mut kept, mut most) = (0, 0);
         for _ in 0..options.pick(5, 3) {
-            let before = IN_USE.load(Ordering::Relaxed);
-            MOST.store(before, Ordering::Relaxed);
+            let before = memory::forget_most();
             let from = Instant::now();
             let import = read_model(&file, Facets::Auto, &Limits::default()).expect("a closed mesh");
             let model = Model::new(import.solid);
             laps.push(1e3 * from.elapsed().as_secs_f64());
-            kept = IN_USE.load(Ordering::Relaxed) - before;
-            most = MOST.load(Ordering::Relaxed) - before;
+            kept = memory::in_use() - before;
+            most = memory::most() - before;
             drop(model);
         }
         let each = |bytes: isize| bytes as f64 / corners.len() as f64;

@@ -15,6 +15,7 @@ use contactd::import::{FORMATS, Facets, Limits, Source, import_csg};
 use contactd::octree::Model;
 use contactd::solid::primitive::Cylinder;
 use contactd_benches::facets::{Drilled, Outline};
+use contactd_benches::memory::{self, Counting};
 use contactd_benches::options::Options;
 use contactd_benches::race::{Plan, median, race, worst};
 use contactd_benches::table::Table;
@@ -24,30 +25,8 @@ use contactd_proto::{Motion, Pose};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
 use glam::{DVec2, DVec3, dvec3};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write as _;
-use std::sync::atomic::{AtomicIsize, Ordering};
 use std::time::{Duration, Instant};
-
-/// The system's allocator, with a count of the bytes that are in use.
-struct Counting;
-
-static IN_USE: AtomicIsize = AtomicIsize::new(0);
-
-// SAFETY: every call goes to the system's allocator with the same arguments; the count is beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        IN_USE.fetch_add(layout.size() as isize, Ordering::Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        IN_USE.fetch_sub(layout.size() as isize, Ordering::Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(at, layout) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -63,11 +42,11 @@ struct Made<T> {
 fn made<T>(times: usize, make: impl Fn() -> T) -> Made<T> {
     let mut seconds = Vec::new();
     loop {
-        let before = IN_USE.load(Ordering::Relaxed);
+        let before = memory::in_use();
         let from = Instant::now();
         let value = make();
         seconds.push(from.elapsed().as_secs_f64());
-        let megabytes = (IN_USE.load(Ordering::Relaxed) - before) as f64 / 1e6;
+        let megabytes = (memory::in_use() - before) as f64 / 1e6;
         if seconds.len() == times {
             return Made { value, seconds: median(seconds), megabytes };
         }

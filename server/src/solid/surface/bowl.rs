@@ -15,7 +15,7 @@
 //! square s₃ (1 − t²) + (s₃ t − w)², which falls with t from (s₃ + w)² = 1 at t = −1, where the vertex is. Away from it psi is flatter
 //! than the distance: on the axis inside of the focus it does not fall below −r. All s and w are a hair smaller (`WHOLE`).
 
-use super::elliptic::{WHOLE, axes_of, turn_of};
+use super::elliptic::{Seen, WHOLE, axes_of, turn_of};
 use super::{
     Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretch, Stretches, Surface, Symmetry, largest_corner,
     tangent,
@@ -35,14 +35,6 @@ pub struct Bowl {
     pub fall: f64,
     /// r, a length.
     pub radius: f64,
-}
-
-/// Where a point stands: B(x − o), its length, and the unit vector along it.
-struct Seen {
-    stretch: Stretch,
-    length: f64,
-    along: DVec3,
-    value: f64,
 }
 
 impl Bowl {
@@ -92,14 +84,9 @@ impl Bowl {
         Stretch { rows, fall: axes.z_axis * self.fall, radius: self.radius }
     }
 
+    #[inline]
     fn seen(&self, x: DVec3) -> Seen {
-        let stretch = self.parts();
-        let y = x - self.origin;
-        let v = stretch.of(y);
-        let length = v.length();
-        // Any unit vector gives a tangent at the focus, as far off as what rounding has left of v.
-        let along = if length > 0.0 { v / length } else { DVec3::X };
-        Seen { stretch, length, along, value: length - stretch.fall.dot(y) - stretch.radius }
+        self.parts().seen(x - self.origin)
     }
 }
 
@@ -120,22 +107,11 @@ impl Surface for Bowl {
     }
 
     fn at(&self, x: DVec3) -> FaceAt {
-        let Seen { stretch, length, along, value } = self.seen(x);
-        let normal = stretch.back(along) - stretch.fall;
-        FaceAt { value, normal, slope: normal.length(), k: 1.0, rho: length }
+        self.seen(x).at()
     }
 
-    /// Bᵀ(I − n nᵀ)B/|B(x − o)|.
-    fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature {
-        let seen = self.seen(x);
-        let [one, other] = seen.stretch.beside(seen.along).map(|t| seen.stretch.back(t));
-        Curvature {
-            each: 0.0,
-            factor: one.length_squared() / at.rho,
-            along: one.normalize_or_zero(),
-            other: other.length_squared() / at.rho,
-            beside: other.normalize_or_zero(),
-        }
+    fn curvature(&self, x: DVec3, _: &FaceAt) -> Curvature {
+        self.seen(x).curvature()
     }
 
     #[inline]
@@ -158,10 +134,7 @@ impl Surface for Bowl {
     }
 
     fn bend(&self, x: DVec3, _: &FaceAt) -> Bend {
-        let seen = self.seen(x);
-        let tangents = seen.stretch.beside(seen.along).map(|t| seen.stretch.back(t));
-        let radial = (seen.length, seen.stretch.back(seen.along));
-        Bend { law: Law::Focal, radial, tangents, core: f64::INFINITY }
+        self.seen(x).bend(Law::Focal)
     }
 
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {

@@ -3,10 +3,11 @@
 //! The distance from a convex set is convex, and that from one of its points is nowhere less. So psi lies above its tangents and below
 //! the ball of radius r around the point next to where they are taken: each bound of a sphere holds of it from that side.
 
+use super::roots::between_roots;
 use super::tube::Tube;
 use super::{
     Axis, Bend, Curvature, Cylinder, Face, FaceAt, Law, NUMBERS, Section, Sphere, Stretches, Surface, Symmetry, around,
-    between_roots, largest_corner, radial, tangent,
+    largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;

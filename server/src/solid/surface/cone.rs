@@ -3,9 +3,10 @@
 //! The function is exact in sign everywhere (the mirror nappe has z < 0, hence psi > 0); inside, −psi is the exact
 //! distance to the lateral surface; outside it is the distance where ρ sin α + z cos α >= 0 and a lower bound elsewhere.
 
+use super::roots::between_roots_of_nappe;
 use super::{
     Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
-    between_roots, half_line, largest_corner, radial, tangent,
+    largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -207,19 +208,6 @@ impl Cone {
         let a = cc * e.length_squared() - ss * dz * dz;
         let b = cc * p.dot(e) - ss * z * dz;
         let c = cc * p.length_squared() - ss * z * z;
-        let on_nappe = |t: f64| z + t * dz >= 0.0;
-        if a.abs() < 1e-14 {
-            // Parallel to a generator: one crossing.
-            let (from, to) = half_line(2.0 * b, c)?;
-            let probe = if from.is_finite() { from + 1.0 } else { to - 1.0 };
-            return on_nappe(probe).then_some((from, to));
-        }
-        if a > 0.0 {
-            let (from, to) = between_roots(a, b, c)?;
-            return on_nappe(0.5 * (from + to)).then_some((from, to));
-        }
-        // Steeper than the cone: the line is inside both nappes, beyond either root.
-        let (low, high) = between_roots(-a, -b, -c)?;
-        Some(if dz > 0.0 { (high, f64::INFINITY) } else { (f64::NEG_INFINITY, low) })
+        between_roots_of_nappe([a, b, c], 1e-14, (z, dz))
     }
 }

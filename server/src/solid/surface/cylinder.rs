@@ -1,8 +1,9 @@
 //! Cylinder: psi = ρ − r, ρ the distance from the axis.
 
+use super::roots::between_roots;
 use super::{
     Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
-    between_roots, largest_corner, radial, tangent,
+    largest_corner, radial, tangent,
 };
 use glam::DVec3;
 

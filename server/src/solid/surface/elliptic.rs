@@ -16,10 +16,8 @@
 //! distance, and as short as a₁/a₃ elsewhere (of a cone longer). So psi is 1-Lipschitz, convex, and a lower bound of the distance
 //! that is at most a₃/a₁ times too small. All s and w are a hair smaller than that (`WHOLE`): 1-Lipschitz for certain.
 
-use super::{
-    Apex, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, between_roots, half_line,
-    largest_corner, tangent,
-};
+use super::roots::{between_roots, between_roots_of_nappe};
+use super::{Apex, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, largest_corner, tangent};
 use crate::math::any_perpendicular;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -53,12 +51,41 @@ pub struct Stretch {
 /// What stands for 1: the rows that `stretch` makes of a rotation are those of one to 30 half units in the last place.
 pub(super) const WHOLE: f64 = 1.0 - 32.0 * f64::EPSILON;
 
-/// Where a point stands: B(x − o), its length, and the unit vector along it.
-struct Seen {
+/// Where a point stands: the length of B(x − o), the unit vector along it, and psi.
+pub(super) struct Seen {
     stretch: Stretch,
     length: f64,
     along: DVec3,
     value: f64,
+}
+
+impl Seen {
+    pub(super) fn at(&self) -> FaceAt {
+        let normal = self.stretch.back(self.along) - self.stretch.fall;
+        FaceAt { value: self.value, normal, slope: normal.length(), k: 1.0, rho: self.length }
+    }
+
+    /// Bᵀt for the unit vectors t square to B(x − o).
+    fn beside(&self) -> [DVec3; 2] {
+        self.stretch.beside(self.along).map(|t| self.stretch.back(t))
+    }
+
+    /// Bᵀ(I − n nᵀ)B/|B(x − o)|.
+    pub(super) fn curvature(&self) -> Curvature {
+        let [one, other] = self.beside();
+        Curvature {
+            each: 0.0,
+            factor: one.length_squared() / self.length,
+            along: one.normalize_or_zero(),
+            other: other.length_squared() / self.length,
+            beside: other.normalize_or_zero(),
+        }
+    }
+
+    pub(super) fn bend(&self, law: Law) -> Bend {
+        let radial = (self.length, self.stretch.back(self.along));
+        Bend { law, radial, tangents: self.beside(), core: f64::INFINITY }
+    }
 }
 
 impl Stretch {
@@ -66,6 +93,16 @@ impl Stretch {
     pub(super) fn of(&self, y: DVec3) -> DVec3 {
         let [a, b, c] = self.rows;
         DVec3::new(a.dot(y), b.dot(y), c.dot(y))
+    }
+
+    /// Where a point stands, y = x − o.
+    #[inline]
+    pub(super) fn seen(self, y: DVec3) -> Seen {
+        let v = self.of(y);
+        let length = v.length();
+        // Any unit vector gives a tangent in the middle, as far off as what rounding has left of v.
+        let along = if length > 0.0 { v / length } else { DVec3::X };
+        Seen { stretch: self, length, along, value: length - self.fall.dot(y) - self.radius }
     }
 
     /// Bᵀv.
@@ -117,18 +154,7 @@ impl Stretch {
             return between_roots(a, b, c);
         }
         // As of a circular cone, which it is in these coordinates; of what has a focus likewise, whose other sheet is the other nappe.
-        let on_nappe = |t: f64| h + t * k >= 0.0;
-        if a.abs() < 1e-14 * (e.length_squared() + k * k) {
-            let (from, to) = half_line(2.0 * b, c)?;
-            let probe = if from.is_finite() { from + 1.0 } else { to - 1.0 };
-            return on_nappe(probe).then_some((from, to));
-        }
-        if a > 0.0 {
-            let (from, to) = between_roots(a, b, c)?;
-            return on_nappe(0.5 * (from + to)).then_some((from, to));
-        }
-        let (low, high) = between_roots(-a, -b, -c)?;
-        Some(if k > 0.0 { (high, f64::INFINITY) } else { (f64::NEG_INFINITY, low) })
+        between_roots_of_nappe([a, b, c], 1e-14 * (e.length_squared() + k * k), (h, k))
     }
 }
 
@@ -211,14 +237,7 @@ impl Elliptic {
 
     #[inline]
     fn seen(&self, x: DVec3) -> Seen {
-        let stretch = self.parts();
-        let y = x - self.origin;
-        let v = stretch.of(y);
-        let length = v.length();
-        // Any unit vector gives a tangent in the middle, as far off as what rounding has left of v.
-        let along = if length > 0.0 { v / length } else { DVec3::X };
-        let value = if self.is_cone() { length - stretch.fall.dot(y) } else { length - stretch.radius };
-        Seen { stretch, length, along, value }
+        self.parts().seen(x - self.origin)
     }
 
     /// The point of an image of a sphere, or of the cross-section of one of a cylinder, at which the gradient lies along Bᵀn: from
@@ -331,22 +350,11 @@ impl Surface for Elliptic {
     }
 
     fn at(&self, x: DVec3) -> FaceAt {
-        let Seen { stretch, length, along, value } = self.seen(x);
-        let normal = stretch.back(along) - stretch.fall;
-        FaceAt { value, normal, slope: normal.length(), k: 1.0, rho: length }
+        self.seen(x).at()
     }
 
-    /// Bᵀ(I − n nᵀ)B/|B(x − o)|.
-    fn curvature(&self, x: DVec3, at: &FaceAt) -> Curvature {
-        let seen = self.seen(x);
-        let [one, other] = seen.stretch.beside(seen.along).map(|t| seen.stretch.back(t));
-        Curvature {
-            each: 0.0,
-            factor: one.length_squared() / at.rho,
-            along: one.normalize_or_zero(),
-            other: other.length_squared() / at.rho,
-            beside: other.normalize_or_zero(),
-        }
+    fn curvature(&self, x: DVec3, _: &FaceAt) -> Curvature {
+        self.seen(x).curvature()
     }
 
     #[inline]
@@ -366,10 +374,7 @@ impl Surface for Elliptic {
 
     /// In the coordinates B(x − o) it is a sphere's, a cylinder's or a cone's of the half angle whose cosine and sine are 1.
     fn bend(&self, x: DVec3, _: &FaceAt) -> Bend {
-        let seen = self.seen(x);
-        let tangents = seen.stretch.beside(seen.along).map(|t| seen.stretch.back(t));
-        let law = if self.is_cone() { Law::Conical { cos: 1.0 } } else { Law::Round { radius: self.size } };
-        Bend { law, radial: (seen.length, seen.stretch.back(seen.along)), tangents, core: f64::INFINITY }
+        self.seen(x).bend(if self.is_cone() { Law::Conical { cos: 1.0 } } else { Law::Round { radius: self.size } })
     }
 
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {

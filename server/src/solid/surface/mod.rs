@@ -32,6 +32,7 @@ pub mod curve;
 mod cylinder;
 pub mod elliptic;
 mod plane;
+mod roots;
 mod saddle;
 mod sphere;
 mod symmetry;
@@ -702,27 +703,4 @@ fn largest_corner(face: &impl Surface, c: DVec3, e: DVec3) -> f64 {
         }
     }
     hi
-}
-
-/// Where slope·t + value <= 0.
-fn half_line(slope: f64, value: f64) -> Option<(f64, f64)> {
-    if slope == 0.0 {
-        return (value <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
-    }
-    let at = -value / slope;
-    Some(if slope > 0.0 { (f64::NEG_INFINITY, at) } else { (at, f64::INFINITY) })
-}
-
-/// The roots of a t² + 2 b t + c for a > 0, without cancellation.
-fn between_roots(a: f64, b: f64, c: f64) -> Option<(f64, f64)> {
-    let discriminant = b * b - a * c;
-    if discriminant < 0.0 {
-        return None;
-    }
-    let q = -(b + discriminant.sqrt().copysign(b));
-    if q == 0.0 {
-        return Some((0.0, 0.0));
-    }
-    let (s, t) = (q / a, c / q);
-    Some((s.min(t), s.max(t)))
 }

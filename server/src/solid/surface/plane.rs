@@ -1,6 +1,7 @@
 //! Plane: psi = n·x − d.
 
-use super::{Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, half_line};
+use super::roots::half_line;
+use super::{Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry};
 use contactd_proto::Pose;
 use glam::DVec3;
 

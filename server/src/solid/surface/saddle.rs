@@ -19,9 +19,8 @@
 //! are a hair smaller (`WHOLE`). psi is flatter than the distance away from there: of a hyperboloid at its waist by 1/√(1 + a²/c²).
 
 use super::elliptic::{WHOLE, axes_of, turn_of};
-use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, Under, between_roots, half_line,
-};
+use super::roots::{between_roots, half_line};
+use super::{Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, Under};
 use glam::{DMat3, DVec2, DVec3};
 
 /// A quadric of two positive and two negative squares.

@@ -1,8 +1,8 @@
 //! Sphere: psi = |x − o| − r.
 
+use super::roots::between_roots;
 use super::{
-    Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, between_roots,
-    largest_corner,
+    Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, largest_corner,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
