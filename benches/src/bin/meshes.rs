@@ -530,7 +530,8 @@ fn main() -> std::io::Result<()> {
         "first_ms: our first question about these models, which makes what it sees of them; peer_off: worst, in steps"
     );
     table.publish("meshes", &options.folder())?;
-    for (name, ratios) in ["straight (cast_shapes)", "turning (cast_shapes_nonlinear)"].iter().zip(&ratios) {
+    let names = ["straight (cast_shapes)", "turning (cast_shapes_nonlinear)"];
+    for (name, ratios) in names.iter().zip(&ratios).filter(|(_, ratios)| !ratios.is_empty()) {
         let ahead = ratios.iter().filter(|r| **r < 1.0).count();
         let (count, median) = (ratios.len(), median(ratios.iter().copied()));
         println!("{name}: median ratio {median:.3}, ours ahead in {ahead} of {count}");
