@@ -7,14 +7,14 @@
 //! ```text
 //! φ(t) = min over x of z(x),    z = u·(x − o),    φ = u·(c − o) − h(−u)
 //! z'   = u'·(x − o) + u·(x − o)'
-//! |z''| <= Q = w ω_P D + 2 w (|v₀| + ω ρ) + p,    w = |ω_P × u|,   D = max |x − o|,   p = ω² ρ, where w = 0: |ω × u| ω
-//! ρ
+//! |z''| <= Q = w ω_P D + 2 w (|v₀| + ω ρ) + p,    w = |ω_P × u|,   D = max |x − o|,
+//! p = ω² ρ, where w = 0: |ω × u| ω ρ
 //! ```
 //!
 //! since |u'| = w and |u''| = w ω_P. φ is a minimum of such z, so between two times it lies above the line between its
 //! values by no less than −½ Q s(1−s) h² (`proof`): the direction that proves a pair apart turns with the plane and is
-//! never looked for. A body that spins about the plane's normal, or a plane that does, costs nothing: w = 0 and ω × u =
-//! 0.
+//! never looked for. A body that spins about the plane's normal, or a plane that does, costs nothing: w = 0 and
+//! ω × u = 0.
 //!
 //! Nothing is asked of the body but its support: of a torus that of its hull serves, which meets a plane where the
 //! torus does. A contact of depth delta needs φ <= −2 delta, as between convex bodies. Newton on φ finds the time, the

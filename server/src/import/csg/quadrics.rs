@@ -1,7 +1,7 @@
 //! Words of its own: `paraboloid`, `hyperboloid`, `quadric`. Any affine image of a quadric is one, so none of them is refused under a
 //! matrix.
 
-use super::arguments::{Arguments, finite};
+use super::arguments::{Arguments, finite, vector};
 use super::parts::PartId;
 use super::place::{self, PlacedShape};
 use super::shapes::Shapes;
@@ -109,13 +109,6 @@ fn general(call: &Call) -> Result<Asked> {
     Ok(Asked { form: Form::of_matrix(&m), around, cage: around, cut: (0..6).collect(), holds: None })
 }
 
-fn vector(value: &Value) -> Result<DVec3> {
-    match &value.kind {
-        ValueKind::List(l) if l.len() == 3 => Ok(DVec3::new(finite(&l[0])?, finite(&l[1])?, finite(&l[2])?)),
-        _ => Err((value.at, Problem::syntax("three numbers", value.found()))),
-    }
-}
-
 fn symmetric(value: &Value) -> Result<[[f64; 4]; 4]> {
     let wrong = |v: &Value| (v.at, Problem::syntax("a symmetric matrix with 4 rows of 4 numbers", v.found()));
     let ValueKind::List(rows) = &value.kind else { return Err(wrong(value)) };
@@ -177,7 +170,13 @@ fn made(shapes: &mut Shapes<'_>, call: &Call, outer: &DAffine3, asked: Asked) ->
     for side in sides {
         let cut = if side.is_convex() { asked.cut.clone() } else { (0..6).collect() };
         let cut = cut.into_iter().map(|k| (k, all[usize::from(k)])).collect();
-        let Some(shape) = Quadric::new(side, cut, around) else { continue };
+        let Some(shape) = Quadric::new(side, cut, around) else {
+            // One that stays clear of the box is none of it.
+            if side.span(around.center(), around.half()).0 <= 0.0 {
+                shapes.parts.note(call.at, "a piece of a quadric that is thin or not in its box: left out", None);
+            }
+            continue;
+        };
         let placed = PlacedShape { shape: shape.into(), frame, mirrored: false, notes: Vec::new() };
         let leaf = shapes.parts.leaf(&call.name, call.at, Ok(placed))?;
         pieces.push(shapes.parts.push(leaf));

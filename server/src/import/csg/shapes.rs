@@ -2,13 +2,13 @@
 //!
 //! What has no size is nothing, with a note, as in OpenSCAD.
 
-use super::arguments::{Arguments, finite};
+use super::arguments::{Arguments, vector};
 use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
 use super::hull::point_hull;
 use super::parts::{Part, PartId, Parts};
 use super::place::{self, PlacedShape};
-use super::syntax::{Call, ValueKind};
+use super::syntax::Call;
 use super::{Facets, Limits, Place, Problem};
 use crate::import::mesh::{Polygons, oriented};
 use crate::solid::primitive::{MeshError, MeshFault, Repair};
@@ -134,13 +134,7 @@ impl Shapes<'_> {
     /// `half_space`, which OpenSCAD does not have: all points x with n·x <= offset |n|, by default z <= 0.
     pub fn half_space(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
         let arguments = Arguments::new(call, &["normal", "offset"])?;
-        let normal = match arguments.get("normal") {
-            None => DVec3::Z,
-            Some(v) => match &v.kind {
-                ValueKind::List(of) if of.len() == 3 => DVec3::new(finite(&of[0])?, finite(&of[1])?, finite(&of[2])?),
-                _ => return Err((v.at, Problem::syntax("a normal of 3 numbers", v.found()))),
-            },
-        };
+        let normal = arguments.get("normal").map_or(Ok(DVec3::Z), vector)?;
         let Some(n) = normal.try_normalize() else {
             return Err((call.at, Problem::syntax("a normal that is not 0", format!("half_space along {normal}"))));
         };

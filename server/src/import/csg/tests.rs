@@ -497,3 +497,20 @@ proptest! {
         survives(&text);
     }
 }
+
+/// Of two sheets within a box both are taken; one of which only rounding is in it is left out with a note; one that stays
+/// clear of it is nothing, without one.
+#[test]
+fn a_sheet_of_a_quadric_is_never_left_out_in_silence() {
+    let sheets = |top: &str| {
+        let m = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]";
+        let text = format!("quadric(m = {m}, min = [-2, -2, -3], max = [2, 2, {top}]);");
+        let import = import(&text);
+        let notes: Vec<String> = import.notes.iter().map(ToString::to_string).collect();
+        (import.solid.primitives.len(), notes)
+    };
+    assert_eq!(sheets("3"), (2, vec![]));
+    assert_eq!(sheets("0"), (1, vec![]));
+    let left = "1:1: a piece of a quadric that is thin or not in its box: left out";
+    assert_eq!(sheets("1.0000000000001"), (1, vec![left.to_string()]));
+}

@@ -15,7 +15,7 @@
 //! square s₃ (1 − t²) + (s₃ t − w)², which falls with t from (s₃ + w)² = 1 at t = −1, where the vertex is. Away from it psi is flatter
 //! than the distance: on the axis inside of the focus it does not fall below −r. All s and w are a hair smaller (`WHOLE`).
 
-use super::elliptic::{Seen, WHOLE, axes_of, turn_of};
+use super::elliptic::{Seen, WHOLE, axes_of, moved_turn, turn_of};
 use super::{
     Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretch, Stretches, Surface, Symmetry, largest_corner,
     tangent,
@@ -138,9 +138,7 @@ impl Surface for Bowl {
     }
 
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {
-        let axes = self.axes();
-        let turn = turn_of(vector(axes.x_axis).normalize(), vector(axes.y_axis).normalize());
-        Self { origin: point(self.origin), turn, ..*self }
+        Self { origin: point(self.origin), turn: moved_turn(self.axes(), vector), ..*self }
     }
 
     #[inline]

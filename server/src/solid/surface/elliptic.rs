@@ -287,6 +287,11 @@ pub(super) fn turn_of(x: DVec3, y: DVec3) -> DVec3 {
     DVec3::new(q.x, q.y, q.z) / (1.0 + q.w)
 }
 
+/// The rotation of principal axes that are moved along with their face, by what moves a direction.
+pub(super) fn moved_turn(axes: DMat3, vector: impl Fn(DVec3) -> DVec3) -> DVec3 {
+    turn_of(vector(axes.x_axis).normalize(), vector(axes.y_axis).normalize())
+}
+
 fn outer(v: DVec3) -> DMat3 {
     super::outer(v, v)
 }
@@ -378,9 +383,7 @@ impl Surface for Elliptic {
     }
 
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {
-        let axes = self.axes();
-        let turn = turn_of(vector(axes.x_axis).normalize(), vector(axes.y_axis).normalize());
-        Self { origin: point(self.origin), turn, ..*self }
+        Self { origin: point(self.origin), turn: moved_turn(self.axes(), vector), ..*self }
     }
 
     #[inline]

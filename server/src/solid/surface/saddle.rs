@@ -18,7 +18,7 @@
 //! s₁² p₁² + s₂² n₁² + ¼ (p₂ − n₂)² <= s² (2 − p₂² − n₂²) + ½ (p₂² + n₂²) <= 1 where s² = max(s₁², s₂²) = h max(α, β) <= ½. All rows
 //! are a hair smaller (`WHOLE`). psi is flatter than the distance away from there: of a hyperboloid at its waist by 1/√(1 + a²/c²).
 
-use super::elliptic::{WHOLE, axes_of, turn_of};
+use super::elliptic::{WHOLE, axes_of, moved_turn, turn_of};
 use super::roots::{between_roots, half_line};
 use super::{Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, Under};
 use glam::{DMat3, DVec2, DVec3};
@@ -247,9 +247,7 @@ impl Surface for Saddle {
     }
 
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {
-        let axes = self.axes();
-        let turn = turn_of(vector(axes.x_axis).normalize(), vector(axes.y_axis).normalize());
-        Self { origin: point(self.origin), turn, ..*self }
+        Self { origin: point(self.origin), turn: moved_turn(self.axes(), vector), ..*self }
     }
 
     #[inline]

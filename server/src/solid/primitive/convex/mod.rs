@@ -315,8 +315,7 @@ impl Convex<'_> {
     }
 
     /// The discs about z whose hull it is, in its own frame, or the balls; `None` for what is not such a hull. Of a
-    /// cuboid and of corners these
-    /// are points.
+    /// cuboid and of corners these are points.
     pub fn discs(&self) -> Option<Discs> {
         Some(match self {
             Convex::Ball(radius) => SmallVec::from_slice(&[(DVec3::ZERO, *radius)]),
