@@ -27,15 +27,13 @@ fn every_model_of_the_project_loads_in_every_way() {
             let import = read_model(&file, facets, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
             let solid = &import.solid;
             assert!(!solid.is_empty() && solid.aabb().is_finite(), "{}", file.display());
-            let flat = |s: &Shape| matches!(s, Shape::Cuboid(_) | Shape::Polyhedron(_) | Shape::TriangleMesh(_));
+            let flat = |s: &Shape| match s {
+                Shape::Cuboid(_) | Shape::Polyhedron(_) | Shape::TriangleMesh(_) | Shape::HalfSpace(_) => true,
+                Shape::Sphere(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) | Shape::Capsule(_) => false,
+                Shape::Ellipsoid(_) | Shape::EllipticFrustum(_) | Shape::Quadric(_) => false,
+            };
             let curved = solid.primitives.iter().any(|p| !flat(&p.shape));
-            // Outlines that revolve, which the models for pictures have, stay round.
-            let revolves = file.parent().is_some_and(|f| f.ends_with("pictures"));
-            assert!(
-                revolves || !(curved && facets == Facets::AsWritten),
-                "{}: a curved primitive is left",
-                file.display()
-            );
+            assert!(!(curved && facets == Facets::AsWritten), "{}: a curved primitive is left", file.display());
         }
     }
 }
