@@ -105,15 +105,24 @@ impl Scene {
 /// resolutions may be told as touching. Returns how far off the worst contact is, in sizes, and the cells of pairs that
 /// begin apart.
 pub fn compare(name: &str, counted: (usize, u64, f64), make: impl Fn(&mut Random) -> Scene) -> (f64, u64) {
-    compare_told(name, counted, true, make)
+    compare_told(name, counted, Told::Judged, make)
 }
 
-/// The same; whether records are `judged` is said: of the corners of meshes the judge does not see every face by
-/// itself.
+/// By what a record is held to be right.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Told {
+    /// By the judge, which looks at every face.
+    Judged,
+    /// The second body is a half-space: whatever meets it, the contact's normal is its own. For meshes, of whose corners the
+    /// judge does not see every face by itself.
+    Plane,
+}
+
+/// The same, with records held to be right by what is said.
 pub fn compare_told(
     name: &str,
     (count, seed, near): (usize, u64, f64),
-    judged: bool,
+    told: Told,
     make: impl Fn(&mut Random) -> Scene,
 ) -> (f64, u64) {
     let mut r = Random::new(seed);
@@ -131,7 +140,9 @@ pub fn compare_told(
             place: Pose::IDENTITY,
             motion: s.motions[k],
         });
-        lies += usize::from(judged && !record_judge::holds(&format!("{name} {i}"), &moving[0], &moving[1], &o));
+        lies += usize::from(
+            told == Told::Judged && !record_judge::holds(&format!("{name} {i}"), &moving[0], &moving[1], &o),
+        );
         if s.at(0.0) <= near * query.resolution {
             assert!(s.at(0.0) > 0.0 || o.status() != Status::Clear, "{name} {i}: {o:?}");
             overlap += 1;
@@ -155,6 +166,10 @@ pub fn compare_told(
                 let off = (t - o.time()).abs() * speed.abs().max(o.at().normal_speed.abs()) / size;
                 worst = worst.max(off);
                 assert!(off <= 1e-12, "{name} {i}: {off:e}: {t} at {speed}, not {o:?}");
+                if told == Told::Plane {
+                    let up = s.motions[1].at(o.time()).rotation * DVec3::Z;
+                    assert!((o.at().normal + up).length() < 1e-12, "{name} {i}: {up} is up: {o:?}");
+                }
             }
             // A graze within the depth at which contacts are decided is none.
             (Some((t, speed)), Status::Clear) => assert!(speed.abs() < 1e-3, "{name} {i}: missed at {t}, {speed}"),

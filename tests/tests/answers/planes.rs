@@ -5,7 +5,7 @@
 //! the rest in front of it, without a cell. `CONTACTD_PAIRS=10000 cargo test --release -p contactd-tests --test answers
 //! planes:: -- --nocapture` sets the number of pairs.
 
-use super::kinds::{Scene, alone, at_rest, compare, compare_told, pairs, past, placed, speed, turning};
+use super::kinds::{Scene, Told, alone, at_rest, compare, compare_told, pairs, past, placed, speed, turning};
 use contactd::contact::region::{regions, threshold};
 use contactd::contact::{ContactKind, Extent, Outcome, QueryOptions, Scratch, Status, clearance, earliest_contact};
 use contactd::octree::Model;
@@ -109,7 +109,7 @@ fn trees_meshes_and_elliptic_bodies_meet_planes_when_their_supports_say_so() {
             let shape = elliptic(r, 0.9);
             falling(r, one(shape), tilts)
         });
-        compare_told(&format!("mesh, {word}"), (count.div_ceil(4), 2, 4.0), false, |r| {
+        compare_told(&format!("mesh, {word}"), (count.div_ceil(4), 2, 4.0), Told::Plane, |r| {
             let mesh = contactd_tests::meshes::solid(&contactd_tests::meshes::random(r, 0.8));
             falling(r, one(mesh.into()), tilts)
         });

@@ -399,7 +399,7 @@ fn unproven(all: &[Work]) -> String {
 
 /// Steps of the random plays.
 fn steps() -> usize {
-    sized("CONTACTD_MEMORY_STEPS", 1_200)
+    sized("CONTACTD_MEMORY_STEPS", 2_000)
 }
 
 #[test]
