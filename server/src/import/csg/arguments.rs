@@ -245,11 +245,11 @@ pub fn finite(v: &Value) -> Result<f64> {
     }
 }
 
-/// Three finite numbers in a list.
-pub fn vector(v: &Value) -> Result<DVec3> {
+/// Three finite numbers in a list, `expected` in words.
+pub fn vector(v: &Value, expected: &str) -> Result<DVec3> {
     match &v.kind {
         ValueKind::List(of) if of.len() == 3 => Ok(DVec3::new(finite(&of[0])?, finite(&of[1])?, finite(&of[2])?)),
-        _ => Err((v.at, Problem::syntax("three numbers", v.found()))),
+        _ => Err((v.at, Problem::syntax(expected, v.found()))),
     }
 }
 

@@ -97,7 +97,7 @@ fn of_revolution(call: &Call, is_paraboloid: bool) -> Result<Option<Asked>> {
 fn general(call: &Call) -> Result<Asked> {
     let arguments = Arguments::new(call, &["m", "min", "max"])?;
     let m = symmetric(arguments.required("m", "a symmetric 4×4 matrix")?)?;
-    let corner = |name| arguments.required(name, "three numbers").and_then(vector);
+    let corner = |name| arguments.required(name, "three numbers").and_then(|v| vector(v, "three numbers"));
     let (min, max) = (corner("min")?, corner("max")?);
     if !min.cmplt(max).all() {
         return Err((

@@ -134,7 +134,7 @@ impl Shapes<'_> {
     /// `half_space`, which OpenSCAD does not have: all points x with n·x <= offset |n|, by default z <= 0.
     pub fn half_space(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
         let arguments = Arguments::new(call, &["normal", "offset"])?;
-        let normal = arguments.get("normal").map_or(Ok(DVec3::Z), vector)?;
+        let normal = arguments.get("normal").map_or(Ok(DVec3::Z), |v| vector(v, "a normal of 3 numbers"))?;
         let Some(n) = normal.try_normalize() else {
             return Err((call.at, Problem::syntax("a normal that is not 0", format!("half_space along {normal}"))));
         };
