@@ -22,6 +22,7 @@ pub mod queries;
 pub mod race;
 pub mod raw;
 pub mod report;
+pub mod resting;
 pub mod socket;
 pub mod stepped;
 pub mod table;

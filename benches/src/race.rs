@@ -4,6 +4,8 @@
 //! in short blocks, each block's ratio is of neighbours in time, and the median over the blocks is what counts.
 
 use std::hint::black_box;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// How long a race is.
@@ -79,6 +81,30 @@ fn timed<R>(n: u32, mut call: impl FnMut() -> R) -> f64 {
         black_box(&answer);
     }
     from.elapsed().as_secs_f64() / f64::from(n)
+}
+
+/// What `of` makes of 0..n, in order. Plain threads, as many as rayon would use, take one after the other: were they rayon's, one
+/// that waits for another within a step could take on a second step and count its time twice.
+pub fn spread<T: Send>(n: u64, of: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let next = AtomicU64::new(0);
+    let out = Mutex::new(Vec::with_capacity(n as usize));
+    std::thread::scope(|scope| {
+        for _ in 0..rayon::current_num_threads() {
+            scope.spawn(|| {
+                loop {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    if i >= n {
+                        break;
+                    }
+                    let made = of(i);
+                    out.lock().expect("no panic while it is held").push((i, made));
+                }
+            });
+        }
+    });
+    let mut out = out.into_inner().expect("no panic while it was held");
+    out.sort_by_key(|(i, _)| *i);
+    out.into_iter().map(|(_, made)| made).collect()
 }
 
 /// The `q` quantile (0..1) of some numbers: the smallest that at least that share does not exceed; NaN when there are none.

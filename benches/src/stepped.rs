@@ -24,9 +24,31 @@ pub struct Scene {
     pub name: &'static str,
     /// Its objects.
     pub recipes: Vec<Recipe>,
-    fixed: usize,
-    pose: fn(usize, usize) -> Pose,
-    rules: Vec<Rule>,
+    /// So many of them, the first ones, are static.
+    pub fixed: usize,
+    /// Where an object is after a step.
+    pub pose: fn(usize, usize) -> Pose,
+    /// How far objects are to fall in a step from where they are put at its start; `None`: they go from where the step before
+    /// left them, to their pose.
+    pub fall: Option<f64>,
+    /// Rules of the world.
+    pub rules: Vec<Rule>,
+}
+
+impl Scene {
+    /// The records of a step.
+    fn records(&self, step: usize) -> Vec<PoseRecord> {
+        let mut records = Vec::new();
+        for i in self.fixed..self.recipes.len() {
+            let mut pose = (self.pose)(i, step);
+            if let Some(fall) = self.fall {
+                records.push(PoseRecord::start(i as u32, &pose));
+                pose.position.z -= fall;
+            }
+            records.push(PoseRecord::end(i as u32, &pose));
+        }
+        records
+    }
 }
 
 fn circling(object: usize, step: usize) -> Pose {
@@ -66,15 +88,16 @@ pub fn scenes() -> [Scene; 3] {
             recipes: (0..512).map(|i| kinds[i % 3].clone()).collect(),
             fixed: 0,
             pose: circling,
+            fall: None,
             rules: vec![],
         },
-        Scene { name: "peg", recipes: vec![plate, peg], fixed: 1, pose: descending, rules: vec![] },
-        Scene { name: "rest", recipes: lying_blocks, fixed: 1, pose: lying, rules: vec![patches] },
+        Scene { name: "peg", recipes: vec![plate, peg], fixed: 1, pose: descending, fall: None, rules: vec![] },
+        Scene { name: "rest", recipes: lying_blocks, fixed: 1, pose: lying, fall: None, rules: vec![patches] },
     ]
 }
 
 fn world(scene: &Scene) -> Result<World, Box<dyn std::error::Error>> {
-    let mut world = World::new(scene.recipes.len(), scene.recipes.len());
+    let mut world = World::new(scene.recipes.len(), 2 * scene.recipes.len());
     world.set_rules(scene.rules.clone())?;
     for (i, recipe) in scene.recipes.iter().enumerate() {
         let part = Arc::new(MeasuredModel::new(Arc::new(Model::new(recipe.build()))));
@@ -107,8 +130,7 @@ pub fn walk(scene: &Scene, steps: usize) -> Result<Walked, Box<dyn std::error::E
     let mut worlds = [world(scene)?, world(scene)?];
     let mut walked = Walked::default();
     for step in 1..=steps {
-        let named = scene.fixed..scene.recipes.len();
-        let records: Vec<PoseRecord> = named.map(|i| PoseRecord::end(i as u32, &(scene.pose)(i, step))).collect();
+        let records = scene.records(step);
         worlds[1].forget();
         // Who goes first changes from step to step.
         for k in [step % 2, 1 - step % 2] {

@@ -12,15 +12,13 @@
 use clap::Parser;
 use contactd::contact::Status;
 use contactd_benches::options::Options;
-use contactd_benches::race::{quantile, worst};
+use contactd_benches::race::{quantile, spread, worst};
 use contactd_benches::row;
 use contactd_benches::table::Table;
 use contactd_tests::families::{Effort, NAMES, Verdict, examine, scene, write};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What this benchmark asks for beside the common options.
 #[derive(Debug, Parser)]
@@ -125,29 +123,12 @@ fn main() -> std::io::Result<ExitCode> {
     Ok(if bad.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// The verdicts on the scenes of a family, in order. Plain threads take one scene after the other: were they rayon's, one
-/// that waits for another within a step could take on a second step and count its time twice.
+/// The verdicts on the scenes of a family, in order.
 fn judged(arguments: &Arguments, family: usize, scenes: u64) -> Vec<(u64, Verdict)> {
-    let next = AtomicU64::new(0);
-    let out = Mutex::new(Vec::with_capacity(scenes as usize));
-    std::thread::scope(|scope| {
-        for _ in 0..rayon::current_num_threads() {
-            scope.spawn(|| {
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    if i >= scenes {
-                        break;
-                    }
-                    let index = arguments.first + i;
-                    let thorough = arguments.thorough > 0 && index.is_multiple_of(arguments.thorough);
-                    let effort = if thorough { Effort::Thorough } else { Effort::Quick };
-                    let verdict = examine(&scene(arguments.seed, family, index), arguments.cells, effort);
-                    out.lock().expect("no panic while it is held").push((index, verdict));
-                }
-            });
-        }
-    });
-    let mut out = out.into_inner().expect("no panic while it was held");
-    out.sort_by_key(|(index, _)| *index);
-    out
+    spread(scenes, |i| {
+        let index = arguments.first + i;
+        let thorough = arguments.thorough > 0 && index.is_multiple_of(arguments.thorough);
+        let effort = if thorough { Effort::Thorough } else { Effort::Quick };
+        (index, examine(&scene(arguments.seed, family, index), arguments.cells, effort))
+    })
 }

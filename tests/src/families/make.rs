@@ -59,7 +59,7 @@ pub fn scene(seed: u64, family: usize, index: u64) -> Scene {
 }
 
 /// Kinds of primitives, by number.
-const ALL: &[usize] = &[0, 1, 2, 3, 4, 5, 6];
+pub(super) const ALL: &[usize] = &[0, 1, 2, 3, 4, 5, 6];
 const ROUND: &[usize] = &[0, 2, 3, 4];
 
 /// A primitive of about unit radius: ball, box, cylinder, cone, frustum, prism, polyhedron.
@@ -135,7 +135,7 @@ fn leaf(d: &mut Draw, kinds: &[usize]) -> Node {
 }
 
 /// A tree of n primitives that hang together more or less.
-fn tree(d: &mut Draw, n: usize, kinds: &[usize]) -> Node {
+pub(super) fn tree(d: &mut Draw, n: usize, kinds: &[usize]) -> Node {
     if n <= 1 {
         let size = d.within(0.5, 1.0);
         return leaf(d, kinds).scaled(size);
@@ -163,7 +163,7 @@ fn tree(d: &mut Draw, n: usize, kinds: &[usize]) -> Node {
 
 /// What `aimed` is told.
 #[derive(Clone, Copy, Default)]
-struct Aim {
+pub(super) struct Aim {
     /// Turns of a body in the step, else drawn.
     turns: Option<f64>,
     /// Where on a to aim, in its frame.
@@ -192,7 +192,7 @@ fn seen(d: &mut Draw, field: &Field, (c, r): (DVec3, f64), u: DVec3) -> DVec3 {
 }
 
 /// b comes at a so that a point of its surface meets one of a's about when it is drawn; seven in ten within the step.
-fn aimed(d: &mut Draw, a: Node, b: Node, aim: Aim) -> Scene {
+pub(super) fn aimed(d: &mut Draw, a: Node, b: Node, aim: Aim) -> Scene {
     let (fa, fb) = (a.field(), b.field());
     let (ball_a, ball_b) = (a.ball(), b.ball());
     let turned = |d: &mut Draw| {
@@ -417,7 +417,7 @@ fn needles(d: &mut Draw) -> Scene {
 
 /// A male part in its female one, clearances from touching to a hundredth and interferences; with `screw` it spins about its
 /// axis of travel.
-fn fit(d: &mut Draw, screw: bool) -> Scene {
+pub(super) fn fit(d: &mut Draw, screw: bool) -> Scene {
     let r = d.within(0.15, 1.5);
     let clearance = match d.below(10) {
         0 => 0.0,

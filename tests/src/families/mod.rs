@@ -23,12 +23,14 @@ mod draw;
 mod judge;
 mod make;
 mod run;
+mod sized;
 mod tree;
 
 pub use draw::Draw;
 pub use judge::{Effort, Fault, judge};
 pub use make::{NAMES, scene};
 pub use run::{Answer, Verdict, ask, examine, write};
+pub use sized::of_size;
 pub use tree::{Field, Join, Node, Shape};
 
 use glam::{DMat3, DQuat, DVec3};
