@@ -44,7 +44,7 @@ struct Arguments {
     /// This family alone.
     #[arg(long, value_name = "NAME")]
     family: Option<String>,
-    /// Writes the answers about random pairs to a file, a line each, and nothing else: of two builds `diff` tells which have moved.
+    /// Writes the answers about random pairs and those of the stepped scenes to a file, a line each, and nothing else: of two builds `diff` tells which have moved.
     #[arg(long, value_name = "FILE")]
     answers: Option<PathBuf>,
     /// One run in this process, on the threads that RAYON_NUM_THREADS says, for the process that compares.
@@ -79,6 +79,8 @@ struct Told {
     hash: blake3::Hasher,
     /// Answers by status: contact, clear, overlap, undecided.
     statuses: [u64; 4],
+    /// The same as text, where it is asked for.
+    lines: Option<String>,
 }
 
 /// A family's hash and what it is of.
@@ -158,7 +160,12 @@ impl Told {
             let PairOutcome { a, b, outcome, regions_complete, .. } = p;
             [u64::from(*a), u64::from(*b), u64::from(*regions_complete)].into_iter().for_each(|w| self.word(w));
             self.outcome(outcome);
-            out.regions_of(p).iter().for_each(|r| self.region(r));
+            let regions = out.regions_of(p);
+            regions.iter().for_each(|r| self.region(r));
+            if let Some(lines) = &mut self.lines {
+                let outcome = Outcome { counters: Counters::default(), apart: 0.0, ..*outcome };
+                *lines += &format!("{a} {b}: {outcome:?}, complete: {regions_complete}, {regions:?}\n");
+            }
         }
     }
 
@@ -226,7 +233,7 @@ fn known_pairs() -> Golden {
 }
 
 /// A random scene, stepped by a world that remembers: bodies on their ways, disturbed, set back, taken out, at rest.
-fn stepped(seed: u64) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
+fn stepped(seed: u64, mut reported: Told) -> Result<Told, Box<dyn Error>> {
     let mut r = Random::new(seed ^ 0x5eed_0000);
     let (every, many) = CROWD;
     let count = if seed % every == every - 1 { many } else { BODIES[seed as usize % BODIES.len()] };
@@ -265,7 +272,7 @@ fn stepped(seed: u64) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
         ..StepOptions::default()
     };
     let (stops, jitter) = (r.chance(0.3), if r.chance(0.5) { 0.0 } else { 10f64.powf(r.within(-9.0, -2.0)) });
-    let (mut reported, mut advance) = (Told::default(), 1.0);
+    let mut advance = 1.0;
     for k in 1..=STEPS {
         let mut records = Vec::new();
         for (i, way) in ways.iter().enumerate().filter(|(i, _)| !(crowd && i % 7 == 3)) {
@@ -284,7 +291,7 @@ fn stepped(seed: u64) -> Result<([u8; 32], [u64; 4]), Box<dyn Error>> {
         reported.step(out);
         advance = if stops { out.safe_time.clamp(0.0, 1.0) } else { 1.0 };
     }
-    Ok(reported.end())
+    Ok(reported)
 }
 
 /// No rules, or those of two groups.
@@ -325,9 +332,9 @@ fn demo() -> Result<Golden, Box<dyn Error>> {
     Ok(together(vec![reported.end()]))
 }
 
-/// Writes the answers about the random pairs of the classes asked for, work left out, a line each.
+/// Writes the answers about the random pairs of the classes asked for and of the stepped scenes, work left out, a line each.
 fn write_answers(arguments: &Arguments, file: &Path) -> Result<(), Box<dyn Error>> {
-    let count = PAIRS[usize::from(arguments.options.quick)];
+    let [count, scenes] = [PAIRS, STEPPED].map(|counts| counts[usize::from(arguments.options.quick)]);
     let wanted = |name: &str| arguments.family.as_deref().is_none_or(|only| only == name);
     let mut text = String::new();
     for (name, class) in CLASSES.into_iter().filter(|(name, _)| wanted(name)) {
@@ -336,6 +343,10 @@ fn write_answers(arguments: &Arguments, file: &Path) -> Result<(), Box<dyn Error
             format!("{name} {seed}: {outcome:?}\n")
         };
         text.extend((0..count).into_par_iter().map(line).collect::<Vec<_>>());
+    }
+    for seed in (0..scenes).filter(|_| wanted("stepped")) {
+        let reported = stepped(seed, Told { lines: Some(String::new()), ..Told::default() })?;
+        text.extend(reported.lines.unwrap_or_default().lines().map(|line| format!("stepped {seed}, {line}\n")));
     }
     std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()).into())
 }
@@ -357,7 +368,10 @@ fn alone(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         report(name, &|| Ok(pairs(class, pick(PAIRS))))?;
     }
     report("stepped", &|| {
-        let each = (0..pick(STEPPED)).into_par_iter().map(|s| stepped(s).map_err(|e| format!("stepped {s}: {e}")));
+        let each = (0..pick(STEPPED)).into_par_iter().map(|s| match stepped(s, Told::default()) {
+            Ok(reported) => Ok(reported.end()),
+            Err(e) => Err(format!("stepped {s}: {e}")),
+        });
         Ok(together(each.collect::<Result<_, String>>()?))
     })?;
     report("demo", &demo)

@@ -14,12 +14,22 @@ use contactd_benches::stepped::walk;
 use contactd_benches::table::Table;
 use std::error::Error;
 
+/// What this benchmark asks for beside the common options.
+#[derive(Debug, Parser)]
+struct Arguments {
+    #[command(flatten)]
+    options: Options,
+    /// Scenes alone whose names contain this.
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
+    let Arguments { options, only } = Arguments::parse();
     let steps = options.pick(1000, 60);
     let mut table =
         Table::new(&["scene", "reported", "cells", "cells_cold", "us_p50", "us_p99", "us_largest", "us_cold", "ratio"]);
-    for scene in scenes() {
+    for scene in scenes().into_iter().filter(|scene| scene.name.contains(&only)) {
         let walked = walk(&scene, steps)?;
         let n = steps as f64;
         let micros = |k: usize| walked.times[k].iter().map(|t| 1e6 * t);

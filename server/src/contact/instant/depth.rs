@@ -101,7 +101,7 @@ fn lower(task: &Task, at: &Instant, far: f64, work: &Work, mut found: impl FnMut
                 level = found(Some(x));
             }
         }
-        cover.split(place);
+        cover.split(place, |_| true);
     }
     cover.is_done()
 }

@@ -165,9 +165,9 @@ impl<'t, 'a> Cover<'t, 'a> {
         None
     }
 
-    /// Puts the halves of a box back: cut across the axis that costs its bound most, as the search does, unless that would
-    /// make a slab of it.
-    pub fn split(&mut self, place: Place) {
+    /// Puts the halves of a box back that are to be looked at: cut across the axis that costs its bound most, as the search does,
+    /// unless that would make a slab of it.
+    pub fn split(&mut self, place: Place, is_open: impl Fn(&Place) -> bool) {
         let dearest = clause::axis_to_halve(place.cost, place.half);
         let longest = place.half.max_position();
         let k = if place.half[dearest] * SLAB < place.half[longest] { longest } else { dearest };
@@ -175,7 +175,9 @@ impl<'t, 'a> Cover<'t, 'a> {
             let mut child = place.clone();
             child.half[k] *= 0.5;
             child.center[k] += sign * child.half[k];
-            self.stack.push(child);
+            if is_open(&child) {
+                self.stack.push(child);
+            }
         }
     }
 }

@@ -40,7 +40,7 @@ pub(in crate::contact) fn within(task: &Task, at: &Instant, level: f64, work: &W
         if place.half.max_element() <= smallest {
             return Within::Open;
         }
-        cover.split(place);
+        cover.split(place, |_| true);
     }
     if cover.is_done() { Within::Apart } else { Within::Open }
 }

@@ -232,9 +232,46 @@ impl<'t, 'a> Bodies<'t, 'a> {
     }
 }
 
-/// True when a unit direction is found along which every one of some gradients falls by more than `least`: the
-/// perceptron's rule. Then no combination of them is zero, nor shorter than `least`.
+/// Gradients up to which `has_descent` tries every direction that can be the best one.
+const FEW: usize = 6;
+
+/// True when a unit direction is found along which every one of some gradients falls by `least` or more. Then no combination of
+/// them (weights >= 0, sum 1) is shorter than that: the direction that falls most is the opposite of their hull's point next to
+/// the origin (E. G. Gilbert, D. W. Johnson, S. S. Keerthi 1988), which one, two or three of them span.
 pub fn has_descent(gradients: &[DVec3], least: f64) -> bool {
+    let falls = |p: DVec3| {
+        let d = p.normalize_or_zero();
+        gradients.iter().all(|g| g.dot(d) >= least)
+    };
+    if falls(gradients.iter().sum()) {
+        return true;
+    }
+    if gradients.len() > FEW {
+        return falls_by_turns(gradients, least);
+    }
+    for (i, &p) in gradients.iter().enumerate() {
+        if falls(p) {
+            return true;
+        }
+        for (j, &q) in gradients.iter().enumerate().skip(i + 1) {
+            // Next to the origin on the line through p and q, and in the plane through a third one.
+            let way = q - p;
+            if falls(p * way.length_squared() - way * p.dot(way)) {
+                return true;
+            }
+            for &r in &gradients[j + 1..] {
+                let n = way.cross(r - p);
+                if falls(n * p.dot(n)) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// The same of many, by the perceptron's rule: one that it does not find may be there.
+fn falls_by_turns(gradients: &[DVec3], least: f64) -> bool {
     let mut d = -gradients.iter().copied().sum::<DVec3>();
     for _ in 0..64 {
         d = d.normalize_or_zero();

@@ -274,11 +274,18 @@ fn cover(bodies: &Bodies) -> (Vec<Place>, bool) {
         }
         let few = sides[0].len() + sides[1].len() <= FEW_FACES;
         let is_flat = sides.iter().flatten().all(|l| bodies.face(*l).is_flat());
-        let simple = few && (is_flat || radius <= ROUND * 0.5 * bodies.size || is_simple(bodies, &place));
+        let simple = few
+            && (is_flat
+                || radius <= ROUND * 0.5 * bodies.size
+                || is_simple(bodies, &place)
+                || point::meets_once(bodies, &place));
         if simple || radius <= smallest {
             places.push(place);
-        } else if !few || point::may_meet(bodies, &place) {
-            cover.split(place);
+        } else if !few {
+            cover.split(place, |_| true);
+        } else if point::may_meet(bodies, &place) {
+            // Few faces that touch along no area and no line: halves in which nothing meets need no look.
+            cover.split(place, |half| point::may_meet(bodies, half));
         }
     }
     (places, cover.is_done())

@@ -12,9 +12,11 @@ use crate::contact::instant::depth::Deepest;
 use crate::contact::instant::separation::Place;
 use crate::contact::witness::newton::{MAX_UNKNOWNS, cholesky_solve, damped_step};
 use crate::solid::Sense;
-use crate::solid::surface::Apex;
+use crate::solid::surface::{Apex, Symmetry};
 use glam::DVec3;
+use smallvec::{SmallVec, smallvec};
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 /// A stationary point of the distance of two bodies.
 #[derive(Clone, Debug)]
@@ -35,6 +37,9 @@ impl Meeting {
 
 /// Multipliers below this, and sums of gradients above it, are no balance.
 const BALANCE: f64 = 1e-7;
+
+/// Faces of both sides together that balance, at most.
+const MOST_BALANCED: usize = 4;
 
 /// How far off its box a meeting may be found, in boxes.
 const SLACK: f64 = 1e-3;
@@ -82,52 +87,120 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
 fn systems<'p>(bodies: &Bodies, places: &'p [Place]) -> BTreeMap<Vec<Lit>, Vec<&'p Place>> {
     let mut found: BTreeMap<Vec<Lit>, Vec<&Place>> = BTreeMap::new();
     for place in places {
-        let ways_b = choices(&place.lits(Side::B));
-        for of_a in choices(&place.lits(Side::A)) {
-            for of_b in ways_b.iter().filter(|of_b| of_a.len() + of_b.len() <= 4) {
-                if bodies.work.is_spent() {
-                    return found;
-                }
-                let lits = [of_a.as_slice(), of_b.as_slice()].concat();
-                if may_balance(bodies, place, &lits) {
-                    found.entry(lits).or_default().push(place);
-                }
-            }
+        if bodies.work.is_spent() {
+            return found;
         }
+        let _ = each_system(bodies, place, |lits| {
+            found.entry(lits).or_default().push(place);
+            ControlFlow::Continue(())
+        });
     }
     found
 }
 
 /// False when nothing balances in a box.
 pub fn may_meet(bodies: &Bodies, place: &Place) -> bool {
-    !systems(bodies, std::slice::from_ref(place)).is_empty()
+    each_system(bodies, place, |_| ControlFlow::Break(())).is_break()
 }
 
-/// False when some direction leads down all of some literals wherever one is in a box: their gradients have no sum zero.
-fn may_balance(bodies: &Bodies, place: &Place, lits: &[Lit]) -> bool {
-    let reach = place.half.length() * (1.0 + SLACK);
-    let mut gradients = Vec::with_capacity(lits.len());
-    let mut turn: f64 = 10.0 * BALANCE;
-    for lit in lits {
-        let face = bodies.face(*lit);
+/// True when a box has one meeting and it is found.
+pub fn meets_once(bodies: &Bodies, place: &Place) -> bool {
+    is_unique(bodies, place) && !meetings(bodies, std::slice::from_ref(place)).is_empty()
+}
+
+/// True where no more than one point of a box can be a balance: there a ball and one other face are. With a convex one F is strictly
+/// convex. Out of a hollow one the ball's centre c must be seen along the face's normal, and a gradient of length 1 is the same all
+/// along a normal up to the face's focus: while that is farther than c from everywhere in the box, the normal through c is the one
+/// line on which the balance lies, and the levels agree there once.
+fn is_unique(bodies: &Bodies, place: &Place) -> bool {
+    let [of_a, of_b] = [Side::A, Side::B].map(|side| place.lits(side));
+    let ([p], [q]) = (&of_a[..], &of_b[..]) else { return false };
+    let reach = place.half.length() * (1.0 + SLACK) + bodies.eps;
+    let with = |ball: Lit, other: Lit| {
+        let (Some((center, _)), Sense::Positive) = (bodies.face(ball).ball(), ball.1.sense()) else { return false };
+        let face = bodies.face(other);
+        if other.1.sense() == Sense::Positive {
+            return face.is_convex();
+        }
         let at = face.at(place.center);
-        // How far a gradient turns on the way through the box.
-        turn = turn.max(face.turn(place.center, &at, reach));
-        gradients.push(if lit.1.sense() == Sense::Positive { at.normal } else { -at.normal });
-    }
-    bodies.work.look(2 * lits.len());
-    !has_descent(&gradients, turn)
+        let far = (place.center - center).length() + reach;
+        // Of elliptic faces and quadrics, which have no symmetry, no gradient is of length 1.
+        face.symmetry() != Symmetry::None && far * at.k < (at.rho - reach) * (1.0 - SLACK)
+    };
+    bodies.work.look(2);
+    with(*p, *q) || with(*q, *p)
 }
 
-/// All choices of one to three of some literals; of many, those of one and two.
-fn choices(lits: &[Lit]) -> Vec<Vec<Lit>> {
+/// A literal in a box: its value and gradient at the centre, how far the gradient turns on the way through the box.
+struct InBox {
+    lit: Lit,
+    value: f64,
+    gradient: DVec3,
+    turn: f64,
+}
+
+impl InBox {
+    /// False where the box has no point at which this literal and another one are on one level that is near enough to touch: half
+    /// their sum changes by their gradients' sum alone.
+    fn may_level(&self, other: &Self, reach: f64, most: f64) -> bool {
+        let change = (self.gradient + other.gradient).length() + self.turn + other.turn;
+        (self.value + other.value).abs() <= 2.0 * most + change * reach
+    }
+}
+
+/// Hands over the sets that may balance in a box, or some of them where the work runs out. Of others two are on no common level in
+/// it, or some direction leads down all of their literals wherever one is, so that their gradients have no sum zero.
+fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(Vec<Lit>) -> ControlFlow<()>) -> ControlFlow<()> {
+    let reach = place.half.length() * (1.0 + SLACK) + bodies.eps;
+    let most = 0.5 * bodies.tau + 2.0 * bodies.eps;
+    let [of_a, of_b] = [Side::A, Side::B].map(|side| {
+        let in_box = |lit: Lit| {
+            let face = bodies.face(lit);
+            let at = face.at(place.center);
+            let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
+            let turn = face.turn(place.center, &at, reach);
+            InBox { lit, value: at.value * sign, gradient: at.normal * sign, turn }
+        };
+        place.lits(side).into_iter().map(in_box).collect::<Vec<_>>()
+    });
+    bodies.work.look(of_a.len() + of_b.len());
+    let level = |way: &[usize], of: &[InBox]| {
+        way.iter().enumerate().all(|(n, i)| way[..n].iter().all(|j| of[*i].may_level(&of[*j], reach, most)))
+    };
+    let mut ways_b = choices(of_b.len());
+    ways_b.retain(|way| level(way, &of_b));
+    let meets: Vec<bool> = of_a.iter().flat_map(|p| of_b.iter().map(|q| p.may_level(q, reach, most))).collect();
+    let mut gradients = SmallVec::<[DVec3; MOST_BALANCED]>::new();
+    for way_a in choices(of_a.len()).iter().filter(|way| level(way, &of_a)) {
+        if bodies.work.is_spent() {
+            break;
+        }
+        for way_b in ways_b.iter().filter(|way_b| way_a.len() + way_b.len() <= MOST_BALANCED) {
+            if !way_a.iter().all(|i| way_b.iter().all(|j| meets[i * of_b.len() + j])) {
+                continue;
+            }
+            let chosen = || way_a.iter().map(|i| &of_a[*i]).chain(way_b.iter().map(|j| &of_b[*j]));
+            gradients.clear();
+            gradients.extend(chosen().map(|c| c.gradient));
+            let turn = chosen().fold(10.0 * BALANCE, |most, c| most.max(c.turn));
+            bodies.work.look(1);
+            if !has_descent(&gradients, turn) {
+                found(chosen().map(|c| c.lit).collect())?;
+            }
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+/// All choices of one to three of `count`, as indices; of many, those of one and two.
+fn choices(count: usize) -> Vec<SmallVec<[usize; 3]>> {
     let mut out = Vec::new();
-    for (i, p) in lits.iter().enumerate() {
-        out.push(vec![*p]);
-        for (j, q) in lits.iter().enumerate().skip(i + 1) {
-            out.push(vec![*p, *q]);
-            if lits.len() <= 8 {
-                out.extend(lits[j + 1..].iter().map(|r| vec![*p, *q, *r]));
+    for i in 0..count {
+        out.push(smallvec![i]);
+        for j in i + 1..count {
+            out.push(smallvec![i, j]);
+            if count <= 8 {
+                out.extend((j + 1..count).map(|k| smallvec![i, j, k]));
             }
         }
     }
@@ -277,7 +350,11 @@ fn follow(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> DVec3 {
             rhs[i] = -at[i].value;
         }
         let Some(y) = cholesky_solve(&mut gram, rhs, m) else { break };
-        x += (0..m).map(|i| at[i].normal * y[i]).sum::<DVec3>();
+        let next = x + (0..m).map(|i| at[i].normal * y[i]).sum::<DVec3>();
+        if next == x {
+            break;
+        }
+        x = next;
     }
     x
 }
