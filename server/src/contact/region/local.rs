@@ -314,3 +314,39 @@ pub fn holds(tokens: &[Token], truth: &mut impl FnMut(LiteralId) -> bool) -> boo
     }
     of(local::first(tokens).0, truth)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::has_descent;
+    use crate::math::random::Random;
+    use glam::DVec3;
+
+    #[test]
+    fn a_common_descent_is_found_where_there_is_one() {
+        // Directions spread evenly (a Fibonacci lattice on the sphere), about .03 from each other.
+        let all: Vec<DVec3> = (0..12_000)
+            .map(|k| {
+                let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 12_000.0;
+                let (s, c) = (f64::from(k) * 2.399_963_229_728_653).sin_cos();
+                DVec3::new(c, s, 0.0) * (1.0 - z * z).sqrt() + DVec3::Z * z
+            })
+            .collect();
+        let mut r = Random(0x0066_616c_6c73);
+        let mut counts = [0; 2];
+        for i in 0..600 {
+            let mut draw = || DVec3::from_array(std::array::from_fn(|_| r.within(-1.0, 1.0))).normalize();
+            let mut gradients: Vec<DVec3> = (0..2 + i % 4).map(|_| draw()).collect();
+            if i % 3 == 0 {
+                // Opposite but for a little.
+                gradients[1] = (draw() * 0.05 - gradients[0]).normalize();
+            }
+            let least = [1e-6, 0.02, 0.3, 0.8][i / 5 % 4];
+            let best = all.iter().map(|d| gradients.iter().map(|g| g.dot(*d)).fold(f64::INFINITY, f64::min));
+            let best = best.fold(f64::NEG_INFINITY, f64::max);
+            let has = has_descent(&gradients, least);
+            counts[usize::from(has)] += 1;
+            assert!(if has { best >= least - 0.04 } else { best < least }, "{i}: {has}, {best} for {least}");
+        }
+        assert!(counts.iter().all(|n| *n > 100), "{counts:?}");
+    }
+}

@@ -387,3 +387,148 @@ fn at_apex(bodies: &Bodies, side: Side, apex: DVec3, others: &[Lit]) -> Option<M
     let gap = (feet[1] - feet[0]).dot(normal);
     (gap.abs() <= bodies.tau + eps).then_some(Meeting { feet, normal, gap })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::instant::separation::Cover;
+    use crate::contact::instant::work::Work;
+    use crate::contact::query::options::QueryOptions;
+    use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
+    use crate::contact::query::task::Task;
+    use crate::math::random::Random;
+    use crate::motion::Placed;
+    use crate::octree::Model;
+    use crate::octree::testing::{pierced, simple};
+    use crate::solid::Shape;
+    use crate::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, Sphere, Torus};
+    use contactd_proto::motion::quat_of_rotation_vector;
+    use contactd_proto::{Motion, Pose};
+    use glam::dvec3;
+
+    /// A shape of about unit size.
+    fn shape(r: &mut Random, kind: usize) -> Shape {
+        match kind {
+            0 => Sphere { radius: r.within(0.5, 1.1) }.into(),
+            1 => Cylinder { radius: r.within(0.4, 0.9), half_height: r.within(0.5, 1.2) }.into(),
+            2 => Cone { bottom: 0.0, top: r.within(0.6, 1.2), half_height: r.within(0.4, 0.8) }.into(),
+            3 => Capsule { half: r.within(0.2, 0.6), radius: r.within(0.3, 0.6) }.into(),
+            4 => Torus { major: r.within(0.6, 0.8), minor: r.within(0.2, 0.5) }.into(),
+            _ => Cuboid { half: dvec3(r.within(0.3, 0.8), r.within(0.3, 0.8), r.within(0.3, 0.8)) }.into(),
+        }
+    }
+
+    /// Shows some boxes of what a body and another solid or hollow one have in common, within a wide distance.
+    fn each_place(
+        r: &mut Random,
+        body: (Model, DVec3),
+        other: Model,
+        mut seen: impl FnMut(&Bodies, &Place, &mut Random),
+    ) {
+        let (body, center) = body;
+        let turn = quat_of_rotation_vector(r.vector(2.0));
+        let resting = |model, pose| PlacedModel {
+            model,
+            placed: Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) },
+        };
+        let query = PairQuery {
+            a: resting(&body, Pose::new(center, turn)),
+            b: resting(&other, Pose::IDENTITY),
+            resolution: default_resolution(&body, &other),
+            cell_limit: 1000,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
+        };
+        let (task, _) = Task::of(&query);
+        let (instant, work) = (task.relative.at(0.0), Work::new(1_000_000));
+        let bodies = Bodies::new(&task, &instant, 0.25, &work);
+        let mut cover = Cover::new(&task, &instant, bodies.tau, bodies.tau, &work);
+        for _ in 0..60 {
+            let Some(place) = cover.next(0.5 * bodies.tau) else { break };
+            seen(&bodies, &place, r);
+            cover.split(place, |_| true);
+        }
+    }
+
+    /// What balances in a box, found from many starts in it.
+    fn balances(bodies: &Bodies, place: &Place, lits: &[Lit], r: &mut Random) -> Vec<DVec3> {
+        let starts = (0..24).map(|_| place.center + place.half * r.vector(1.0));
+        let found = starts.filter_map(|x| balance(bodies, lits, x));
+        let found = found.filter(|(x, level, _)| place.holds(*x, 0.0) && level.abs() <= 0.5 * bodies.tau);
+        found.map(|(x, ..)| x).collect()
+    }
+
+    #[test]
+    fn a_box_said_to_hold_one_balance_holds_no_other() {
+        let mut r = Random(0x0062_616c_6c73);
+        let (mut unique, mut met, mut several) = (0, 0, 0);
+        for i in 0..120 {
+            let hollow = shape(&mut r, i % 5);
+            let other = if i / 5 % 3 == 0 {
+                simple(hollow)
+            } else {
+                pierced(Cuboid { half: DVec3::splat(2.0) }, vec![(hollow, Pose::IDENTITY)])
+            };
+            // As large as its place allows, or a little larger or smaller; in hollows also about their middle.
+            let about = if i / 5 % 3 == 1 && i % 5 != 4 { 0.08 } else { 1.5 };
+            let (center, gap) = loop {
+                let x = r.vector(about);
+                let gap = other.solid.value(x);
+                if (0.05..1.2).contains(&gap) {
+                    break (x, gap);
+                }
+            };
+            let ball = simple(Sphere { radius: gap * r.within(0.95, 1.05) });
+            each_place(&mut r, (ball, center), other, |bodies, place, r| {
+                let lits: Vec<Lit> = [Side::A, Side::B].iter().flat_map(|side| place.lits(*side)).collect();
+                if lits.len() != 2 || lits[0].0 == lits[1].0 {
+                    return;
+                }
+                let found = balances(bodies, place, &lits, r);
+                let spread = found.iter().map(|x| (*x - found[0]).length()).fold(0.0, f64::max);
+                if is_unique(bodies, place) {
+                    unique += 1;
+                    met += usize::from(!found.is_empty());
+                    assert!(spread <= 1e-5 * bodies.size, "{i}: balances {spread} apart");
+                } else {
+                    several += usize::from(spread > 1e-3 * bodies.size);
+                }
+            });
+        }
+        assert!(unique > 1000 && met > 50 && several > 5, "{unique} said to hold one, {met} do; {several} hold more");
+    }
+
+    #[test]
+    fn every_set_that_balances_in_a_box_is_handed_over() {
+        let mut r = Random(0x0073_6574_7300);
+        let (mut balanced, mut kept_out) = (0, 0);
+        for i in 0..60 {
+            let [p, q, hole] = [i % 6, i / 6 % 6, (i + 1) % 6].map(|kind| shape(&mut r, kind));
+            let at = Pose::at(r.vector(0.3));
+            let center = r.vector(0.9);
+            let body = if i % 3 == 0 { pierced(p, vec![(hole, at)]) } else { simple(p) };
+            each_place(&mut r, (body, center), simple(q), |bodies, place, r| {
+                let mut listed = Vec::new();
+                let _ = each_system(bodies, place, |lits| {
+                    listed.push(lits);
+                    ControlFlow::Continue(())
+                });
+                for p in place.lits(Side::A) {
+                    for q in place.lits(Side::B) {
+                        let lits = vec![p, q];
+                        if listed.contains(&lits) {
+                            continue;
+                        }
+                        kept_out += 1;
+                        let found = balances(bodies, place, &lits, r);
+                        assert!(found.is_empty(), "{i}: {lits:?} balance at {found:?} and were left out");
+                    }
+                }
+                for lits in &listed {
+                    balanced += usize::from(!balances(bodies, place, lits, r).is_empty());
+                }
+            });
+        }
+        assert!(balanced > 100 && kept_out > 2000, "{balanced} balance, {kept_out} left out");
+    }
+}
