@@ -502,12 +502,18 @@ mod tests {
     fn every_set_that_balances_in_a_box_is_handed_over() {
         let mut r = Random(0x0073_6574_7300);
         let (mut balanced, mut kept_out) = (0, 0);
-        for i in 0..60 {
+        for i in 0..144 {
             let [p, q, hole] = [i % 6, i / 6 % 6, (i + 1) % 6].map(|kind| shape(&mut r, kind));
             let at = Pose::at(r.vector(0.3));
-            let center = r.vector(0.9);
-            let body = if i % 3 == 0 { pierced(p, vec![(hole, at)]) } else { simple(p) };
-            each_place(&mut r, (body, center), simple(q), |bodies, place, r| {
+            let (body, other) = (if i % 3 == 0 { pierced(p, vec![(hole, at)]) } else { simple(p) }, simple(q));
+            // Near enough to touch, more or less.
+            let center = loop {
+                let x = r.vector(1.5);
+                if (0.3..0.8).contains(&other.solid.value(x)) {
+                    break x;
+                }
+            };
+            each_place(&mut r, (body, center), other, |bodies, place, r| {
                 let mut listed = Vec::new();
                 let _ = each_system(bodies, place, |lits| {
                     listed.push(lits);
