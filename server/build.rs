@@ -5,8 +5,16 @@ use std::path::{Path, PathBuf};
 
 /// Floors up to the octree, poses, and the versions of the packages. What is missing in a packaged crate is named by the
 /// crate's version.
-const SOURCES: [&str; 8] =
-    ["src/math", "src/motion", "src/solid", "src/import", "src/bound", "src/octree", "../proto/src", "../Cargo.lock"];
+const SOURCES: [&str; 8] = [
+    "engine/src/math",
+    "engine/src/motion",
+    "engine/src/solid",
+    "src/import",
+    "engine/src/bound",
+    "engine/src/octree",
+    "../proto/src",
+    "../Cargo.lock",
+];
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

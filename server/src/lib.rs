@@ -38,22 +38,23 @@
 //!
 //! # The floors
 //!
-//! Each module imports from smaller floors only; a test reads the table in `docs/architecture.md` and holds them to it.
+//! Each module imports from smaller floors only; a test reads the table in `docs/architecture.md` and holds them to it. Floors
+//! 0 to 6 are the engine, a package of its own (`contactd-engine`, in `server/engine`) that is handed on here.
 //!
 //! | floor | module | |
 //! |---|---|---|
 //! | 0 | [`math`] | boxes, balls, every tolerance with its reason |
 //! | 1 | [`motion`] | a step's motion, one body seen from the other, bounds on speed and acceleration |
 //! | 2 | [`solid`] | faces ψ <= 0, primitives, trees, f at a point, what is left of a tree in a small box |
-//! | 3 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
-//! | 4 | [`bound`] | stage 1 |
-//! | 5 | [`octree`] | stage 2: extended CSG octrees and their walk |
-//! | 6 | [`contact`] | stage 3 and the queue: the answer for a pair |
-//! | 6 | [`cache`] | preprocessed models kept on disk |
-//! | 7 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
-//! | 8 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
-//! | 9 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
-//! | 10 | [`demo`] | the show |
+//! | 3 | [`bound`] | stage 1 |
+//! | 4 | [`octree`] | stage 2: extended CSG octrees and their walk |
+//! | 5 | [`contact`] | stage 3 and the queue: the answer for a pair |
+//! | 6 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
+//! | 7 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
+//! | 8 | [`cache`] | preprocessed models kept on disk |
+//! | 9 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
+//! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
+//! | 11 | [`demo`] | the show |
 //!
 //! # In one's own process
 //!
@@ -82,20 +83,14 @@
 //! The algorithm with its figures, formulas and sources: `docs/algorithm.md`.
 #![forbid(unsafe_code)]
 
-pub mod bound;
 pub mod cache;
 pub mod check;
-pub mod contact;
 pub mod demo;
 pub mod import;
 pub mod inspect;
 pub mod ipc;
-pub mod math;
-pub mod motion;
-pub mod octree;
 pub mod picture;
 pub mod report;
-pub mod solid;
-pub mod world;
 
+pub use contactd_engine::{bound, contact, math, motion, octree, solid, world};
 pub use ipc::embedded;

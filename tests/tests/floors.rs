@@ -1,5 +1,5 @@
-//! The floors of the server: each folder imports only from floors below it, as the table in docs/architecture.md says; and no files
-//! import each other in a circle, in any package. `floors/docs.rs` holds the documents to what is there.
+//! The floors of the engine and the server: each folder imports only from floors below it, as the table in docs/architecture.md
+//! says; and no files import each other in a circle, in any package. `floors/docs.rs` holds the documents to what is there.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -10,6 +10,11 @@ mod docs;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Where the floors stand: those of the engine, and above them those of the server.
+fn sources() -> [PathBuf; 2] {
+    [root().join("server/engine/src"), root().join("server/src")]
 }
 
 /// Floor numbers by module, from the table rows `| 3 | import | … |`.
@@ -86,18 +91,19 @@ fn imports(text: &str) -> BTreeSet<String> {
 #[test]
 fn every_folder_imports_only_from_floors_below() {
     let floors = floors();
-    let source = root().join("server/src");
-    let mut files = Vec::new();
-    rust_files(&source, &mut files);
     let mut edges = 0;
-    for file in &files {
-        let relative = file.strip_prefix(&source).unwrap();
+    for (source, file) in sources().iter().flat_map(|source| {
+        let mut files = Vec::new();
+        rust_files(source, &mut files);
+        files.into_iter().map(move |file| (source, file))
+    }) {
+        let relative = file.strip_prefix(source).unwrap();
         let module = relative.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs").to_owned();
         if module == "lib" {
             continue;
         }
         let Some(floor) = floors.get(&module) else { panic!("docs/architecture.md has no floor for {module}") };
-        for import in imports(&std::fs::read_to_string(file).unwrap()) {
+        for import in imports(&std::fs::read_to_string(&file).unwrap()) {
             let Some(below) = floors.get(&import) else { continue };
             edges += (import != module) as usize;
             assert!(
@@ -109,8 +115,8 @@ fn every_folder_imports_only_from_floors_below() {
     }
     assert!(edges > 20, "only {edges} imports were found: the reader of sources is broken");
     for (module, _) in floors {
-        let exists = source.join(&module).is_dir() || source.join(format!("{module}.rs")).is_file();
-        assert!(exists, "docs/architecture.md names {module}, which is not in server/src");
+        let exists = sources().iter().any(|s| s.join(&module).is_dir() || s.join(format!("{module}.rs")).is_file());
+        assert!(exists, "docs/architecture.md names {module}, which is neither in the engine nor in the server");
     }
 }
 
@@ -123,15 +129,14 @@ fn imports_are_read_from_lists_and_paths() {
 
 #[test]
 fn only_the_transports_name_iceoryx2_and_no_crate_allows_unsafe() {
-    for (folder, head) in [("proto", "lib.rs"), ("server", "lib.rs"), ("client", "lib.rs"), ("client/rapier", "lib.rs")]
-    {
-        let text = std::fs::read_to_string(root().join(folder).join("src").join(head)).unwrap();
+    for folder in ["proto", "server/engine", "server", "client", "client/rapier"] {
+        let text = std::fs::read_to_string(root().join(folder).join("src/lib.rs")).unwrap();
         assert!(text.contains("#![forbid(unsafe_code)]"), "{folder}");
     }
     let mut files = Vec::new();
-    rust_files(&root().join("server/src"), &mut files);
+    sources().iter().for_each(|source| rust_files(source, &mut files));
     for file in files {
-        let relative = file.strip_prefix(root().join("server/src")).unwrap();
+        let relative = file.strip_prefix(root().join("server/src")).unwrap_or(&file);
         if !relative.starts_with("ipc") && !relative.starts_with("main.rs") {
             let text = std::fs::read_to_string(&file).unwrap();
             assert!(!text.contains("use iceoryx2"), "{} names iceoryx2", file.display());
@@ -322,13 +327,21 @@ fn uphill(all: &BTreeMap<Module, Names>, floors: &BTreeMap<Module, (u32, u32)>) 
 fn the_folders_within_a_folder_import_only_from_floors_below() {
     let floors = inner_floors();
     assert!(floors.len() > 8, "docs/architecture.md has no floors within folders");
-    let (outer, source) = (self::floors(), root().join("server/src"));
+    let outer = self::floors();
     for (path, (whole, _)) in &floors {
-        let folder = source.join(path.join("/"));
-        assert!(folder.is_dir() || folder.with_extension("rs").is_file(), "{path:?} is not in server/src");
+        let exists = sources().iter().any(|source| {
+            let folder = source.join(path.join("/"));
+            folder.is_dir() || folder.with_extension("rs").is_file()
+        });
+        assert!(exists, "{path:?} is neither in the engine nor in the server");
         assert_eq!(outer.get(&path[0]), Some(whole), "{path:?}");
     }
-    let (found, down) = uphill(&modules(&source), &floors);
+    let (mut found, mut down) = (Vec::new(), 0);
+    for source in sources() {
+        let (more, count) = uphill(&modules(&source), &floors);
+        found.extend(more);
+        down += count;
+    }
     println!("{down} imports go down");
     assert!(found.is_empty(), "{found:#?}");
     assert!(down > 60, "only {down} imports were found: the reader of sources is broken");
@@ -354,7 +367,14 @@ fn an_import_that_goes_up_within_a_folder_is_seen() {
 
 #[test]
 fn no_files_import_each_other_in_a_circle() {
-    for (package, least) in [("proto", 4), ("client", 20), ("server", 300), ("client/capi", 10), ("client/rapier", 1)] {
+    for (package, least) in [
+        ("proto", 4),
+        ("client", 20),
+        ("server/engine", 200),
+        ("server", 100),
+        ("client/capi", 10),
+        ("client/rapier", 1),
+    ] {
         let (found, count) = circle(&modules(&root().join(package).join("src")));
         println!("{package}: {count} imports");
         assert!(found.is_none(), "{package}: {:?} import each other", found.unwrap());

@@ -9,7 +9,7 @@
 //! file or none. They are not forced to the disk; what a power failure leaves is found by the checksum. Nothing here
 //! fails: a folder that cannot be used is a sentence to be told, and models are imported as without one.
 //!
-//! Floor 6: imports `octree`, `import`, `math`.
+//! Floor 8: imports `octree`, `import`, `math`.
 
 mod file;
 mod key;

@@ -4,7 +4,7 @@
 //! back. With `embedded` the same script runs on an engine in this process, with the same bits. Whatever ends the demo,
 //! the server is stopped and waited for, so that nothing stays behind.
 //!
-//! Floor 10, below main only: may import everything else.
+//! Floor 11, below main only: may import everything else.
 
 mod play;
 pub mod scene;

@@ -5,7 +5,7 @@
 //! OpenSCAD's facets would have it is a `Note`, so that `inspect` can tell. Nothing here panics, whatever the bytes, and
 //! `Limits` bound what a file may ask for before memory is spent on it.
 //!
-//! Floor 3: imports `solid`, `math`, `proto`.
+//! Floor 7: imports `solid`, `math`, `proto`.
 
 pub mod csg;
 pub mod drawing;

@@ -8,7 +8,7 @@
 //! Invariant: what lies in shared memory is copied before it is branched on. It is no security boundary between
 //! processes of one user: any of them can write to the segments.
 //!
-//! Floor 9: imports `world`, `import` and everything below.
+//! Floor 10: imports `world`, `import` and everything below.
 
 pub mod config;
 mod embedded;

@@ -3,7 +3,7 @@
 //! `ray` traces trees exactly, `view` turns that into an image, `drawing` adds lines and text and writes SVG or PNG.
 //! Deterministic: the same scene gives the same file. Nothing here is used by the search.
 //!
-//! Floor 8, beside the reports: imports everything down to `math`; nothing below imports it.
+//! Floor 9, beside the reports: imports everything down to `math`; nothing below imports it.
 
 pub mod contacts;
 pub mod drawing;

@@ -140,7 +140,8 @@ impl Known {
         }
         let kind = Path::new(word).extension().and_then(|e| e.to_str()).unwrap_or("");
         let is_file = ["rs", "md", "py", "c", "h", "patch", "csv", "png"].contains(&kind);
-        let bases = [root(), root().join("server/src"), at.parent().unwrap().to_owned()];
+        let [engine, server] = super::sources();
+        let bases = [root(), engine, server, at.parent().unwrap().to_owned()];
         // A path may leave out where it begins, and a module its ending.
         let first = word.split('/').next().unwrap_or_default();
         let is_path = word.contains('/') && bases.iter().any(|base| base.join(first).is_dir());

@@ -5,7 +5,7 @@
 //! octrees hand to stage 3, `snapshot` writes a model down and reads it back, `mass` integrates over a solid. A `Model` holds
 //! a solid with all that is worked out once for it, and tells f at a point by its octree.
 //!
-//! Floor 5: imports `bound`, `motion`, `solid`, `math`.
+//! Floor 4: imports `bound`, `motion`, `solid`, `math`.
 
 pub mod approach;
 pub mod local;

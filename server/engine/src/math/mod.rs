@@ -10,8 +10,7 @@ pub mod halt;
 pub mod mix;
 pub mod moments;
 pub mod oriented;
-#[cfg(test)]
-pub(crate) mod random;
+pub mod random;
 pub mod tolerance;
 
 pub use aabb::Aabb;

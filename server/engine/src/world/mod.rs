@@ -9,7 +9,7 @@
 //! Invariant: ids are never used again; pairs of two static bodies never exist; buffers are kept from step to step.
 //! It does not know files, sockets or wire layouts other than the two record types.
 //!
-//! Floor 7: imports `contact`, `octree`, `motion`, `solid`, `math`, `proto`.
+//! Floor 6: imports `contact`, `octree`, `motion`, `solid`, `math`, `proto`.
 
 pub mod body;
 mod boxes;

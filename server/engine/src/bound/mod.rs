@@ -5,7 +5,7 @@
 //! `SBounds` holds them for a model (`tree`), `Region` is the result for a pair over its motion (`pair`). Balls alone, boxes
 //! alone and boxes along other axes (`Volumes`) are there to be compared; the default costs nothing for it.
 //!
-//! Floor 4: imports `solid`, `motion`, `math`.
+//! Floor 3: imports `solid`, `motion`, `math`.
 
 pub mod pair;
 pub mod rules;

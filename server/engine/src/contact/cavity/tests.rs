@@ -320,7 +320,7 @@ fn block_and_lid(r: &mut Random) -> [Model; 2] {
     [block, Model::new(b.finish(lid))]
 }
 
-/// Also the long form: `CONTACTD_CAVITY_SCENES=2000 cargo test --release -p contactd --lib cavity:: -- --nocapture`.
+/// Also the long form: `CONTACTD_CAVITY_SCENES=2000 cargo test --release -p contactd-engine --lib cavity:: -- --nocapture`.
 #[test]
 fn parts_within_the_region_are_reported() {
     let lids = std::env::var("CONTACTD_CAVITY_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(24);
