@@ -190,31 +190,7 @@ impl Neighbours {
             return;
         }
         self.stale = false;
-        // A path length that has gone beyond all numbers begins anew, and what was noted by it is forgotten.
-        let mut anew = Vec::new();
-        for (i, (body, path_length)) in bodies.iter().zip(&mut self.path_lengths).enumerate() {
-            if !path_length.end.is_finite() && body.reach().is_finite() {
-                *path_length = PathLength { start: 0.0, end: body.travel(1.0) };
-                anew.push(i as u32);
-            }
-        }
-        self.boxes.clear();
-        self.fences.clear();
-        self.homes.clear();
-        for (body, path_length) in bodies.iter().zip(&self.path_lengths) {
-            let way = path_length.end - path_length.start;
-            let more =
-                if body.is_static { 0.0 } else { (STEPS * way).min(MOST * body.reach()).max(LEAST * body.reach()) };
-            // What turns without bounds has no way that could be told.
-            let clearance = if way.is_finite() { way + more } else { 0.0 };
-            self.boxes.push(if way.is_finite() {
-                body.still().grown(clearance + reach(body, clearance))
-            } else {
-                Aabb::ALL
-            });
-            self.fences.push(path_length.start + SAFE * clearance);
-            self.homes.push((body.motion_state.motion.start, clearance));
-        }
+        let anew = self.grow(bodies, reach);
         let (found, boxes) = (&mut self.found, &self.boxes);
         found.clear();
         self.broad.run(boxes, |i| bodies[i].is_static, |i, j| found.push((i.min(j), i.max(j))));
@@ -260,6 +236,36 @@ impl Neighbours {
             self.entries.push(Entry { resolution, pair_cache: None });
         }
         old.for_each(|(_, entry)| leaves(entry));
+    }
+
+    /// Grows a box around each body in which it is to stay for some steps. Tells whose path lengths had to begin anew.
+    fn grow(&mut self, bodies: &[Body], reach: impl Fn(&Body, f64) -> f64) -> Vec<u32> {
+        // A path length that has gone beyond all numbers begins anew, and what was noted by it is forgotten.
+        let mut anew = Vec::new();
+        for (i, (body, path_length)) in bodies.iter().zip(&mut self.path_lengths).enumerate() {
+            if !path_length.end.is_finite() && body.reach().is_finite() {
+                *path_length = PathLength { start: 0.0, end: body.travel(1.0) };
+                anew.push(i as u32);
+            }
+        }
+        self.boxes.clear();
+        self.fences.clear();
+        self.homes.clear();
+        for (body, path_length) in bodies.iter().zip(&self.path_lengths) {
+            let way = path_length.end - path_length.start;
+            let more =
+                if body.is_static { 0.0 } else { (STEPS * way).min(MOST * body.reach()).max(LEAST * body.reach()) };
+            // What turns without bounds has no way that could be told.
+            let clearance = if way.is_finite() { way + more } else { 0.0 };
+            self.boxes.push(if way.is_finite() {
+                body.still().grown(clearance + reach(body, clearance))
+            } else {
+                Aabb::ALL
+            });
+            self.fences.push(path_length.start + SAFE * clearance);
+            self.homes.push((body.motion_state.motion.start, clearance));
+        }
+        anew
     }
 
     /// True when a body stays in its grown box over this step: as its path length tells, or because it has come back.

@@ -229,27 +229,6 @@ impl<'a> Lowering<'a> {
                 Ok(Step::open(CallKind::Offset(offset, pieces), Context { plane: Some(local), ..context }))
             }
             "linear_extrude" | "rotate_extrude" => self.extrusion(call, context),
-            "sphere" | "cylinder" | "cube" | "polyhedron" | "half_space" => {
-                no_children(call)?;
-                if context.plane.is_some() {
-                    return Ok(Step::Leaf(self.shapes.nothing(call, "inside of a 2D shape")));
-                }
-                match call.name.as_str() {
-                    "sphere" => self.shapes.sphere(call, &context.outer),
-                    "cylinder" => self.shapes.cylinder(call, &context.outer),
-                    "cube" => self.shapes.cube(call, &context.outer),
-                    "half_space" => self.shapes.half_space(call, &context.outer),
-                    _ => self.shapes.polyhedron(call, &context.outer, context.hull),
-                }
-                .map(Step::Leaf)
-            }
-            "paraboloid" | "hyperboloid" | "quadric" => {
-                no_children(call)?;
-                Ok(Step::Leaf(match context.plane {
-                    None => quadrics::quadric(&mut self.shapes, call, &context.outer)?,
-                    Some(_) => self.shapes.nothing(call, "inside of a 2D shape"),
-                }))
-            }
             "circle" | "square" | "polygon" => {
                 no_children(call)?;
                 let (inner, overshoot) = placed();
@@ -268,28 +247,45 @@ impl<'a> Lowering<'a> {
                 no_children(call)?;
                 Ok(self.flat_leaf(call, context, id))
             }
+            _ => self.solid(call, context).map(Step::Leaf),
+        }
+    }
+
+    /// A solid that has no operands; what is none of these is a construct that is not known.
+    fn solid(&mut self, call: &Call, context: Context) -> Result<PartId> {
+        let (outer, attached) = (&context.outer, self.attached);
+        let hulled = (outer, context.hull);
+        match call.name.as_str() {
             "import" => {
-                let id = imports::import(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
-                no_children(call)?;
-                Ok(Step::Leaf(id))
-            }
-            "height_field" => {
-                no_children(call)?;
-                if context.plane.is_some() {
-                    return Ok(Step::Leaf(self.shapes.nothing(call, "inside of a 2D shape")));
-                }
-                imports::height_field(&mut self.shapes, call, (&context.outer, context.hull)).map(Step::Leaf)
+                let id = imports::import(&mut self.shapes, call, hulled, attached)?;
+                return no_children(call).map(|()| id);
             }
             "surface" => {
-                let id = imports::surface(&mut self.shapes, call, (&context.outer, context.hull), self.attached)?;
+                let id = imports::surface(&mut self.shapes, call, hulled, attached)?;
                 no_children(call)?;
-                Ok(Step::Leaf(match context.plane {
-                    None => id,
-                    Some(_) => self.shapes.nothing(call, "inside of a 2D shape"),
-                }))
+                return Ok(if context.plane.is_none() { id } else { self.within_a_plane(call) });
             }
-            other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
+            "sphere" | "cylinder" | "cube" | "polyhedron" | "half_space" | "height_field" | "paraboloid"
+            | "hyperboloid" | "quadric" => no_children(call)?,
+            other => return Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
+        if context.plane.is_some() {
+            return Ok(self.within_a_plane(call));
+        }
+        match call.name.as_str() {
+            "sphere" => self.shapes.sphere(call, outer),
+            "cylinder" => self.shapes.cylinder(call, outer),
+            "cube" => self.shapes.cube(call, outer),
+            "half_space" => self.shapes.half_space(call, outer),
+            "height_field" => imports::height_field(&mut self.shapes, call, hulled),
+            "polyhedron" => self.shapes.polyhedron(call, outer, context.hull),
+            _ => quadrics::quadric(&mut self.shapes, call, outer),
+        }
+    }
+
+    /// What a solid is inside of a 2D shape.
+    fn within_a_plane(&mut self, call: &Call) -> PartId {
+        self.shapes.nothing(call, "inside of a 2D shape")
     }
 
     /// What a call that resizes its operands opens.

@@ -306,24 +306,7 @@ impl<'a> Advance<'a> {
                     return contacts.found.take().map(Ending::Contact);
                 }
             }
-            // As far as this direction proves; a nearer end tightens the bound.
-            let mut end = goal;
-            let mut until = t;
-            for _ in 0..6 {
-                let there = if end == 1.0 { last } else { self.gap(&self.moment(end), n) };
-                let proven = self.pace.proven(&here, &there);
-                until = until.max(proven);
-                if proven >= end {
-                    break;
-                }
-                if proven - t > 0.25 * (end - t) {
-                    break;
-                }
-                end = (t + 2.0 * (proven - t)).min(end);
-                if end <= t {
-                    break;
-                }
-            }
+            let until = self.until(t, &here, &last, goal);
             if until >= 1.0 {
                 return if contact.is_none() { Some(Ending::Clear) } else { None };
             }
@@ -333,6 +316,25 @@ impl<'a> Advance<'a> {
             t = until;
         }
         None
+    }
+
+    /// Until when the direction of `here`, the gap at `t`, keeps the bodies apart, as far as `goal`; `last` is its gap at the
+    /// end of the step. A nearer end tightens the bound.
+    fn until(&self, t: f64, here: &Gap, last: &Gap, goal: f64) -> f64 {
+        let (mut end, mut until) = (goal, t);
+        for _ in 0..6 {
+            let there = if end == 1.0 { *last } else { self.gap(&self.moment(end), here.n) };
+            let proven = self.pace.proven(here, &there);
+            until = until.max(proven);
+            if proven >= end || proven - t > 0.25 * (end - t) {
+                break;
+            }
+            end = (t + 2.0 * (proven - t)).min(end);
+            if end <= t {
+                break;
+            }
+        }
+        until
     }
 
     /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees

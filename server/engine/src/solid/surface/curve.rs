@@ -312,11 +312,33 @@ pub struct Nearness {
     pub size: f64,
 }
 
+impl Nearness {
+    /// Whether a distance counts as none.
+    fn is_near(&self, d: f64) -> bool {
+        d.abs() <= self.near
+    }
+
+    /// Whether directions an angle apart that has this sine count as parallel.
+    fn is_parallel(&self, sine: f64) -> bool {
+        (sine * self.size).abs() <= self.lie
+    }
+}
+
+/// The line along which the cylinder `p` touches the cylinder `q` from outside, or from inside where `q` is a wall around it.
+fn side_by_side(p: &Cylinder, q: &Cylinder, q_is_convex: bool, within: &Nearness) -> Option<Curve> {
+    let way = q.origin - p.origin;
+    let u = (way - p.axis * way.dot(p.axis)).try_normalize()?;
+    let d = way.dot(u);
+    let (gap, u) = if q_is_convex { (d - p.radius - q.radius, u) } else { (q.radius - p.radius - d, -u) };
+    (within.is_near(gap) && within.is_parallel(p.axis.cross(q.axis).length()))
+        .then_some(Curve::Line { origin: p.origin + u * p.radius, along: p.axis })
+}
+
 /// The curve along which the face `p` of one body touches the face `q` of another without lying on it; `out_of_q` is the outward
 /// normal of the body of `q` at a point. `None` also for pairs that are told the other way round.
 pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within: &Nearness) -> Option<Curve> {
-    let near = |d: f64| d.abs() <= within.near;
-    let parallel = |sine: f64| (sine * within.size).abs() <= within.lie;
+    let near = |d: f64| within.is_near(d);
+    let parallel = |sine: f64| within.is_parallel(sine);
     match (*p.face, *q.face) {
         (Face::Cylinder(Cylinder { origin, axis, radius }), Face::Plane(_)) => {
             if !p.is_convex {
@@ -335,17 +357,12 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let u = -(g - axis * g.dot(axis)).try_normalize()?;
             parallel(g.dot(axis) - sin).then_some(Curve::Line { origin: apex, along: axis * cos + u * sin })
         }
-        (
-            Face::Cylinder(Cylinder { origin: o, axis: a, radius: r }),
-            Face::Cylinder(Cylinder { origin: c, axis: b, radius: s }),
-        ) => {
-            if !p.is_convex {
-                return None;
+        (Face::Cylinder(own), Face::Cylinder(other)) => {
+            if p.is_convex {
+                side_by_side(&own, &other, q.is_convex, within)
+            } else {
+                None
             }
-            let u = ((c - o) - a * (c - o).dot(a)).try_normalize()?;
-            let d = (c - o).dot(u);
-            let (gap, u) = if q.is_convex { (d - r - s, u) } else { (s - r - d, -u) };
-            (near(gap) && parallel(a.cross(b).length())).then_some(Curve::Line { origin: o + u * r, along: a })
         }
         (Face::Sphere(Sphere { center, radius }), Face::Cylinder(Cylinder { origin, axis, radius: s })) => {
             if !p.is_convex || q.is_convex {
