@@ -188,7 +188,7 @@ const KINDS: [Construct; 23] = [
 ];
 
 /// Kinds of nodes and modules of OpenSCAD that make or change shapes in ways that are not imported.
-const REFUSED: [&str; 24] = [
+const REFUSED: [&str; 20] = [
     "roof",
     "import",
     "surface",
@@ -200,10 +200,6 @@ const REFUSED: [&str; 24] = [
     "cgaladv",
     "subdiv",
     "glide",
-    "translate",
-    "rotate",
-    "scale",
-    "mirror",
     "for",
     "intersection_for",
     "if",

@@ -19,7 +19,7 @@ use super::polygon::Region;
 use super::quadrics;
 use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
-use super::syntax::{Call, CallId, File, Value, ValueKind};
+use super::syntax::{Call, CallId, FLATTEN, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
 use super::{resize, shadow, text, twist};
 use crate::import::{Attachment, Note};
@@ -207,7 +207,7 @@ impl<'a> Lowering<'a> {
             "intersection" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Set(Op::Intersection))),
             "render" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "color" => Arguments::new(call, &["c", "alpha"]).and_then(|_| inside(CallKind::Set(Op::Union))),
-            "multmatrix" => Ok(match self.multmatrix(call, context)? {
+            "multmatrix" | "translate" | "rotate" | "scale" | "mirror" => Ok(match self.multmatrix(call, context)? {
                 Some(context) => Step::open(CallKind::Set(Op::Union), context),
                 None => Step::Leaf(self.shapes.nothing(call, "that flattens what is inside of it")),
             }),
@@ -759,8 +759,7 @@ fn no_children(call: &Call) -> Result<()> {
 /// What to do about a construct that is not supported.
 fn hint(name: &str) -> &'static str {
     match name {
-        "translate" | "rotate" | "scale" | "mirror" | "for" | "intersection_for" | "if" | "let" | "assign" | "echo"
-        | "assert" | "children" | "child" => " (flatten the file first: openscad -o model.csg model.scad)",
+        "for" | "intersection_for" | "if" | "let" | "assign" | "echo" | "assert" | "children" | "child" => FLATTEN,
         "import_stl" | "import_off" | "import_dxf" => OTHER_FILES,
         "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
         _ => "",

@@ -1,4 +1,5 @@
-//! OpenSCAD's flattened tree (`openscad -o model.csg model.scad`): `lexer` and `syntax` read it, `lower` makes a solid.
+//! OpenSCAD's flattened tree (`openscad -o model.csg model.scad`), or the like written by hand: `lexer` and `syntax` read it,
+//! `written` makes it flat where it is not, `lower` makes a solid.
 //!
 //! docs/openscad.md lists what loads and what it becomes. A cylinder with infinite radius and height, or a cube with infinite
 //! sides, is a half-space or an intersection of some. What is not listed is refused by name.
@@ -43,6 +44,7 @@ mod text;
 mod twist;
 #[cfg(test)]
 mod whole;
+mod written;
 
 use super::problem::Problem;
 use super::{Attachment, Facets, Format, Import, ImportError, Limits, Named, Note, Place, Source};
@@ -59,8 +61,21 @@ fn import_with(
     limits: &Limits,
 ) -> Result<Import, ImportError> {
     syntax::parse(text, limits)
-        .and_then(|tree| lower::lower(&tree, (facets, attached), limits))
+        .and_then(|mut tree| {
+            written::flatten(&mut tree)?;
+            lower::lower(&tree, (facets, attached), limits)
+        })
+        .map_err(|(at, problem)| (at, if is_stl(text) { Problem::syntax(CSG, STL) } else { problem }))
         .map_err(|(at, problem)| ImportError::Content { file: file.to_owned(), at, problem })
+}
+
+const CSG: &str = "OpenSCAD's CSG text";
+const STL: &str = "an STL file (load it as such: by a name that ends in .stl, or with the format \"stl\")";
+
+/// Whether a text that is no CSG begins as an STL file does.
+fn is_stl(text: &str) -> bool {
+    let mut words = text.split_whitespace();
+    words.next() == Some("solid") && text.contains("facet") && !text.trim_start().starts_with("solid(")
 }
 
 /// The row of `format::FORMATS`.

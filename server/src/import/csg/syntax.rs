@@ -1,6 +1,6 @@
 //! The syntax tree of a flattened file, and its parser.
 //!
-//! A file is a list of calls `modifiers name(arguments) ;` or `… { calls }`. Calls lie in one array in file order, so
+//! A file is a list of calls `modifiers name(arguments) ;`, or `… { calls }`, or `… call` with one operand. Calls lie in one array in file order, so
 //! a parent comes before its children, and the parser keeps its open braces on a stack of its own: depth costs no
 //! machine stack and is limited by name. Brackets in values nest at most `VALUE_DEPTH` deep.
 
@@ -101,11 +101,12 @@ pub fn parse(text: &str, limits: &Limits) -> Result<File, (Place, Problem)> {
     if text.len() > limits.bytes {
         return Err((Place::START, Problem::Limit { what: "bytes of text", limit: limits.bytes }));
     }
-    let mut parser = Parser { lexer: Lexer::new(text), limits };
+    let mut parser = Parser { lexer: Lexer::new(text), seen: None, limits };
     let mut file = File::default();
-    let mut open: Vec<(CallId, Place)> = Vec::new();
+    // Calls whose operands are being read, with their braces; without, where one operand follows.
+    let mut open: Vec<(CallId, Option<Place>)> = Vec::new();
     loop {
-        let (mut token, mut at) = parser.lexer.next()?;
+        let (mut token, mut at) = parser.next()?;
         let (mut background, mut disabled, mut root, mut modified) = (false, false, false, false);
         while let Token::Mark(mark @ ('%' | '*' | '#' | '!')) = token {
             match mark {
@@ -115,55 +116,87 @@ pub fn parse(text: &str, limits: &Limits) -> Result<File, (Place, Problem)> {
                 _ => {}
             }
             modified = true;
-            (token, at) = parser.lexer.next()?;
+            (token, at) = parser.next()?;
         }
         let name = match token {
+            Token::Word(name) if LANGUAGE.contains(&name) => {
+                return Err((at, Problem::Unsupported { construct: name.to_owned(), hint: FLATTEN }));
+            }
             Token::Word(name) => name.to_owned(),
             Token::Mark(';') if !modified => continue,
             Token::Mark('}') if !modified && !open.is_empty() => {
                 open.pop();
+                end_of_call(&mut open);
                 continue;
             }
-            Token::End if !modified && open.is_empty() => return Ok(file),
-            Token::End if !modified => {
-                let (_, brace) = open[open.len() - 1];
-                return Err((at, Problem::syntax(format!("\"}}\" closing line {}", brace.line), token.found())));
-            }
+            Token::End if !modified => match open.last() {
+                None => return Ok(file),
+                Some((_, brace)) => {
+                    let line = brace.map_or(at.line, |brace| brace.line);
+                    return Err((at, Problem::syntax(format!("\"}}\" closing line {line}"), token.found())));
+                }
+            },
             other => return Err((at, Problem::syntax("a call such as union() or cube(…)", other.found()))),
         };
         if file.calls.len() >= limits.nodes {
             return Err((at, Problem::Limit { what: "nodes", limit: limits.nodes }));
         }
-        let arguments = parser.arguments()?;
+        let arguments = parser.arguments(&name)?;
         let id = file.calls.len();
         file.calls.push(Call { name, at, background, disabled, root, arguments, children: Vec::new() });
         match open.last() {
             Some((parent, _)) => file.calls[*parent].children.push(id),
             None => file.top.push(id),
         }
-        match parser.lexer.next()? {
-            (Token::Mark(';'), _) => {}
-            (Token::Mark('{'), brace) => {
-                if open.len() >= limits.depth {
-                    return Err((brace, Problem::Limit { what: "levels of nesting", limit: limits.depth }));
-                }
-                open.push((id, brace));
+        let (next, after) = parser.next()?;
+        let brace = match next {
+            Token::Mark(';') => {
+                end_of_call(&mut open);
+                continue;
             }
-            (other, at) => return Err((at, Problem::syntax("\";\" or \"{\"", other.found()))),
+            Token::Mark('{') => Some(after),
+            Token::Word(_) | Token::Mark('%' | '*' | '#' | '!') => None,
+            other => return Err((after, Problem::syntax("\";\", \"{\" or a call", other.found()))),
+        };
+        if open.len() >= limits.depth {
+            return Err((after, Problem::Limit { what: "levels of nesting", limit: limits.depth }));
+        }
+        open.push((id, brace));
+        if brace.is_none() {
+            parser.seen = Some((next, after));
         }
     }
 }
 
+/// A call has ended: so have those whose one operand it is.
+fn end_of_call(open: &mut Vec<(CallId, Option<Place>)>) {
+    while open.pop_if(|(_, brace)| brace.is_none()).is_some() {}
+}
+
+/// Words that begin what only OpenSCAD itself can work out.
+const LANGUAGE: [&str; 4] = ["module", "function", "use", "include"];
+
+/// What to do about OpenSCAD's language.
+pub const FLATTEN: &str =
+    " (this is .scad: load the file by that ending, or flatten it first: openscad -o model.csg model.scad)";
+
 struct Parser<'a> {
     lexer: Lexer<'a>,
+    /// A token that was read to see what follows.
+    seen: Option<(Token<'a>, Place)>,
     limits: &'a Limits,
 }
 
-impl Parser<'_> {
+impl<'a> Parser<'a> {
+    fn next(&mut self) -> Result<(Token<'a>, Place), (Place, Problem)> {
+        self.seen.take().map_or_else(|| self.lexer.next(), Ok)
+    }
+
     /// `( name = value, … )`.
-    fn arguments(&mut self) -> Result<Vec<Argument>, (Place, Problem)> {
+    fn arguments(&mut self, call: &str) -> Result<Vec<Argument>, (Place, Problem)> {
         match self.lexer.next()? {
             (Token::Mark('('), _) => {}
+            (Token::Mark('='), at) => return Err((at, variable(call))),
             (other, at) => return Err((at, Problem::syntax("\"(\"", other.found()))),
         }
         let mut arguments = Vec::new();
@@ -176,6 +209,7 @@ impl Parser<'_> {
                 Token::Word(word) if constant(word).is_none() => {
                     match self.lexer.next()? {
                         (Token::Mark('='), _) => {}
+                        (Token::Mark(',' | ')' | '*' | '+' | '-'), _) => return Err((at, variable(word))),
                         (other, at) => return Err((at, Problem::syntax(format!("\"=\" after {word}"), other.found()))),
                     }
                     let first = self.lexer.next()?;
@@ -187,6 +221,7 @@ impl Parser<'_> {
             match next {
                 (Token::Mark(','), _) => {}
                 (Token::Mark(')'), _) => return Ok(arguments),
+                (Token::Mark('*' | '+' | '-'), at) => return Err((at, expression())),
                 (other, at) => return Err((at, Problem::syntax("\",\" or \")\"", other.found()))),
             }
         }
@@ -200,7 +235,7 @@ impl Parser<'_> {
             Token::Text(t) => ValueKind::Text(t),
             Token::Word(w) => match constant(w) {
                 Some(kind) => kind,
-                None => return Err((at, Problem::syntax("a value", Token::Word(w).found()))),
+                None => return Err((at, variable(w))),
             },
             Token::Mark(sign @ ('-' | '+')) => {
                 let flip = if sign == '-' { -1.0 } else { 1.0 };
@@ -237,6 +272,17 @@ impl Parser<'_> {
         };
         Ok(Value { at, kind })
     }
+}
+
+/// A variable, which flattened files do not have.
+fn variable(word: &str) -> Problem {
+    let short: String = word.chars().take(40).collect();
+    Problem::Unsupported { construct: format!("the variable {short}"), hint: FLATTEN }
+}
+
+/// Something to be worked out.
+fn expression() -> Problem {
+    Problem::Unsupported { construct: "an expression".into(), hint: FLATTEN }
 }
 
 /// The words that are values.

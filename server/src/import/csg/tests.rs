@@ -311,16 +311,14 @@ fn every_refusal_is_a_sentence_with_its_place() {
             "1:1: expected an outline on one side of the axis of rotate_extrude, found one on both",
         ),
         (
-            "translate([1, 2, 3]) { }".into(),
-            "1:1: expected a supported construct, found translate, which is not supported (flatten the file first: \
-             openscad -o model.csg model.scad)",
+            "for(i = [1, 2, 3]) { }".into(),
+            "1:1: expected a supported construct, found for, which is not supported (this is .scad: load the file by that \
+             ending, or flatten it first: openscad -o model.csg model.scad)",
         ),
         ("sphere(r = nan);".into(), "1:12: expected a positive number as r of sphere, found nan"),
         ("sphere(r = -inf);".into(), "1:12: expected a positive number as r of sphere, found -inf"),
         ("sphere(r = inf);".into(), "1:12: expected a finite number as r of sphere, found inf"),
-        ("sphere();".into(), "1:1: expected a positive number as r of sphere, found none"),
         ("sphere(r = undef);".into(), "1:1: expected a positive number as r of sphere, found undef"),
-        ("sphere(d = 1);".into(), "1:8: expected the argument r of sphere, found \"d\""),
         ("sphere(1, r = 2);".into(), "1:11: expected each argument of sphere once, found a second r"),
         ("sphere(1, 2);".into(), "1:11: expected at most 1 unnamed arguments of sphere, found another"),
         (
@@ -338,13 +336,16 @@ fn every_refusal_is_a_sentence_with_its_place() {
             "1:41: expected true or false as center of cube, found the string \"a\"",
         ),
         ("cube(1) { sphere(1); }".into(), "1:1: expected nothing inside of cube, found calls"),
-        ("cube(1)".into(), "1:8: expected \";\" or \"{\", found the end of the file"),
+        ("cube(1)".into(), "1:8: expected \";\", \"{\" or a call, found the end of the file"),
         ("cube(1;".into(), "1:7: expected \",\" or \")\", found \";\""),
         ("cube(size 1);".into(), "1:11: expected \"=\" after size, found the number 1"),
         ("cube(size = );".into(), "1:13: expected a value, found \")\""),
         ("cube(size = [1 2]);".into(), "1:16: expected \",\" or \"]\", found the number 2"),
         ("cube(size = -x);".into(), "1:14: expected a number, found \"x\""),
-        ("x = 3;".into(), "1:3: expected \"(\", found \"=\""),
+        (
+            "x = 3;".into(),
+            "1:3: expected a supported construct, found the variable x, which is not supported (this is .scad:",
+        ),
         ("}".into(), "1:1: expected a call such as union() or cube(…), found \"}\""),
         ("%".into(), "1:2: expected a call such as union() or cube(…), found the end of the file"),
         ("union() {\n\nsphere(1);".into(), "3:11: expected \"}\" closing line 1, found the end of the file"),
