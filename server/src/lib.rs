@@ -51,7 +51,7 @@
 //! | 5 | [`contact`] | stage 3 and the queue: the answer for a pair |
 //! | 6 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
 //! | 7 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
-//! | 8 | [`cache`] | preprocessed models kept on disk |
+//! | 8 | [`cache`], [`terminal`] | preprocessed models kept on disk; text of 80 columns |
 //! | 9 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 11 | [`demo`] | the show |
@@ -91,6 +91,7 @@ pub mod inspect;
 pub mod ipc;
 pub mod picture;
 pub mod report;
+pub mod terminal;
 
 pub use contactd_engine::{bound, contact, math, motion, octree, solid, world};
 pub use ipc::embedded;

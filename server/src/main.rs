@@ -14,10 +14,12 @@ use contactd::picture::{
     drawing::Drawing,
     scene::{Actor, Meeting},
 };
-use contactd::report::{self, Answer, PairReport};
+use contactd::report::{self, Answer, PairReport, TableStyle};
+use contactd::terminal::{Colour, Paint};
+use contactd::world::{PairOutcome, StepOutcome};
 use contactd_proto::names::Address;
 use std::error::Error;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -27,6 +29,9 @@ use std::time::Duration;
 #[derive(Parser)]
 #[command(version, about)]
 struct Arguments {
+    /// Colour in what is printed: auto is where it goes to a terminal, unless NO_COLOR is set.
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_possible_values = true)]
+    color: Colour,
     #[command(subcommand)]
     command: Command,
 }
@@ -60,8 +65,11 @@ enum Command {
         /// Also write every contact, numbers exact, into a file.
         #[arg(long, value_name = "FILE")]
         csv: Option<PathBuf>,
+        /// One line for each contact of the table, however long, with its point and normal; else it has 80 columns.
+        #[arg(long)]
+        wide: bool,
         /// Write the scene of one step instead, for `contactd check`.
-        #[arg(long, value_name = "STEP", conflicts_with_all = ["embedded", "csv", "cache"])]
+        #[arg(long, value_name = "STEP", conflicts_with_all = ["embedded", "csv", "cache", "wide"])]
         scene_of: Option<usize>,
         /// Where that scene and its models go.
         #[arg(long, value_name = "FOLDER", default_value = ".", requires = "scene_of")]
@@ -132,9 +140,15 @@ struct CheckArguments {
     /// The scene's .toml file; or models, which are taken as they stand.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// One JSON object instead of a table.
+    /// One JSON object instead of a table: every pair, every digit.
     #[arg(long)]
     json: bool,
+    /// Clear pairs in the table, too: else those alone that touch or come within their margin.
+    #[arg(long)]
+    all: bool,
+    /// One line for each pair, however long, and nine digits; else the table has 80 columns.
+    #[arg(long)]
+    wide: bool,
     /// Resolution for every pair, in the models' unit.
     #[arg(long, value_parser = length)]
     resolution: Option<f64>,
@@ -166,15 +180,23 @@ enum Done {
 }
 
 fn main() -> ExitCode {
-    let command = Arguments::parse().command;
+    let Arguments { color, command } = Arguments::parse();
+    let environment = |name: &str| std::env::var_os(name);
+    let paint = color.paint(
+        std::io::stdout().is_terminal(),
+        environment("NO_COLOR").as_deref(),
+        environment("TERM").as_deref(),
+    );
     if let Err(sentence) = contactd::ipc::ready_threads() {
         say(&format!("contactd: expected to start threads, found: {sentence}"));
         return ExitCode::from(2);
     }
     let done = match command {
-        Command::Check(arguments) => check_scene(&arguments),
+        Command::Check(arguments) => check_scene(&arguments, paint),
         Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
-        Command::Demo { embedded, csv, cache, .. } => run_demo(embedded, csv.as_deref(), cache),
+        Command::Demo { embedded, csv, cache, wide, .. } => {
+            run_demo(embedded, csv.as_deref(), cache, TableStyle { wide, paint, ..TableStyle::default() })
+        }
         Command::Inspect { file, facets, picture, access, cache } => {
             inspect_file(&file, facets, picture.as_deref(), &access, &cache)
         }
@@ -215,8 +237,13 @@ fn serve(
     Ok(Done::Well)
 }
 
-fn run_demo(embedded: bool, csv: Option<&Path>, cache: CacheArguments) -> Result<Done, Box<dyn Error>> {
-    let (text, run) = contactd::demo::run(embedded, csv, &cache.cache.unwrap_or_default())?;
+fn run_demo(
+    embedded: bool,
+    csv: Option<&Path>,
+    cache: CacheArguments,
+    style: TableStyle,
+) -> Result<Done, Box<dyn Error>> {
+    let (text, run) = contactd::demo::run(embedded, csv, &cache.cache.unwrap_or_default(), &style)?;
     print(&text)?;
     Ok(if run.undecided > 0 { Done::Undecided } else { Done::Well })
 }
@@ -248,7 +275,7 @@ fn is_scene(file: &Path) -> bool {
     file.extension().is_some_and(|e| e == "toml")
 }
 
-fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
+fn check_scene(arguments: &CheckArguments, paint: Paint) -> Result<Done, Box<dyn Error>> {
     let scene = match arguments.files.as_slice() {
         [file] if is_scene(file) => import::read_scene(file)?,
         files => match files.iter().find(|f| is_scene(f)) {
@@ -262,7 +289,7 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
     if scene.file.is_empty() {
         for (source, p) in scene.models.iter().zip(&prepared) {
-            p.notes.iter().for_each(|n| warn(&format!("{}:{n}", source.path.display())));
+            inspect::grouped(&p.notes).iter().for_each(|n| warn(&format!("{}:{n}", source.text_name())));
         }
     }
     let mut check = Check::new(&scene, &models_of(&prepared), arguments.resolution)?;
@@ -275,28 +302,17 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
         }
     }
     let undecided = outcome.undecided || outcome.pairs.iter().any(|p| p.outcome.status() == Status::Undecided);
-    let bodies = check.world.bodies();
-    let pairs: Vec<PairReport<'_>> = outcome
-        .pairs
-        .iter()
-        .map(|p| {
-            let [a, b] = [p.a, p.b].map(|id| &bodies[id as usize]);
-            PairReport {
-                names: [&a.name, &b.name],
-                solids: [&a.part.model.solid, &b.part.model.solid],
-                outcome: &p.outcome,
-                report: p.plan.report,
-                regions: outcome.regions_of(p),
-                regions_complete: p.regions_complete,
-            }
-        })
-        .collect();
+    let files: Vec<String> = scene.models.iter().map(|m| m.text_name()).collect();
+    let pairs = pairs_of(&scene, &files, &check, &outcome);
     // Over all pairs, also those that --first does not show.
     let answer = Answer { safe_time: outcome.safe_time, ..Answer::of_pairs(&pairs) };
-    let mut text = if arguments.json { answer.json()? + "\n" } else { answer.table() };
+    let style = TableStyle { all: arguments.all, wide: arguments.wide, paint };
+    let mut text = if arguments.json { answer.json()? + "\n" } else { answer.table(&style) };
     if arguments.explain {
-        let work =
-            report::work_table(&pairs, &check.clocks(&outcome)) + &report::effects_line(&outcome.effect_counters);
+        // Beside JSON it goes to standard error, which may be a file.
+        let style = if arguments.json { TableStyle { paint: Paint::default(), ..style } } else { style };
+        let work = report::work_table(&pairs, &check.clocks(&outcome), &style)
+            + &report::effects_line(&outcome.effect_counters);
         if arguments.json {
             eprint!("{work}");
         } else {
@@ -305,6 +321,24 @@ fn check_scene(arguments: &CheckArguments) -> Result<Done, Box<dyn Error>> {
     }
     print(&text)?;
     Ok(if undecided { Done::Undecided } else { Done::Well })
+}
+
+/// The answers of a step with what it takes to tell them; `files` are those of the scene's models.
+fn pairs_of<'a>(scene: &Scene, files: &'a [String], check: &'a Check, outcome: &'a StepOutcome) -> Vec<PairReport<'a>> {
+    let bodies = check.world.bodies();
+    let pair = |p: &'a PairOutcome| {
+        let [a, b] = [p.a, p.b].map(|id| &bodies[id as usize]);
+        PairReport {
+            names: [&a.name, &b.name],
+            solids: [&a.part.model.solid, &b.part.model.solid],
+            files: [p.a, p.b].map(|id| files[scene.objects[id as usize].model].as_str()),
+            outcome: &p.outcome,
+            report: p.plan.report,
+            regions: outcome.regions_of(p),
+            regions_complete: p.regions_complete,
+        }
+    };
+    outcome.pairs.iter().map(pair).collect()
 }
 
 /// The models of a scene, with a word on standard error where the cache is in trouble.

@@ -22,6 +22,21 @@ fn checked(scene_file: &Path, a: &str, b: &str) -> Outcome {
     pair.outcome
 }
 
+/// Each row has faces of both bodies, by a line of the model's file that names the primitive.
+fn faces_stand_in_their_files(text: &str, rows: usize) {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    let mut faces = 0;
+    let words = text.split_whitespace().collect::<Vec<_>>();
+    for pair in words.windows(2).filter(|pair| pair[0].contains(".csg:")) {
+        let (file, line) = pair[0].split_once(':').expect("file:line");
+        let source = std::fs::read_to_string(models.join(file)).expect("a model of the project");
+        let line = source.lines().nth(line.parse::<usize>().expect("a line") - 1).expect("a line of the file");
+        assert!(line.contains(pair[1].trim_end_matches(',')), "{pair:?}: {line}");
+        faces += 1;
+    }
+    assert!(faces >= 2 * rows, "{faces} faces of {rows} rows");
+}
+
 #[test]
 fn every_row_of_the_table_is_what_check_says_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -37,6 +52,12 @@ fn every_row_of_the_table_is_what_check_says_bit_for_bit() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains("p99.9"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert!(!text.contains('\u{1b}'), "colour in a pipe");
+    // What does not depend on the machine is what the front page says.
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).expect("a README");
+    let counts: Vec<&str> = text.lines().take(3).collect();
+    assert!(readme.contains(&format!("```text\n{}\n", counts.join("\n"))), "{counts:?}");
 
     // The records as they came through shared memory, exact.
     let file = std::fs::read_to_string(&csv).expect("the contacts");
@@ -59,8 +80,13 @@ fn every_row_of_the_table_is_what_check_says_bit_for_bit() {
     assert_eq!(run.undecided, 0);
     assert_eq!(contactd::demo::csv(&run), file, "shared memory and the embedded session differ");
 
+    let undecided = format!("{} undecided", run.undecided);
+    let counted = [format!("{} steps", run.steps), format!("{} with a contact", run.steps_with_contact), undecided];
+    assert!(counted.iter().all(|words| counts[0].contains(words)), "{counts:?}");
+    assert!(counts[1].starts_with(&format!("{} contacts, {subtracted} of them", run.rows.len())), "{counts:?}");
     let rows = chosen(&run);
     assert!(rows.len() >= 20);
+    faces_stand_in_their_files(&text, rows.len());
     for row in rows {
         let [a, b] = &row.names;
         let line = &sent[&(row.step.to_string(), a.clone(), b.clone())];

@@ -15,6 +15,7 @@ pub use play::{Row, Run, play};
 pub use table::{chosen, csv};
 
 use crate::ipc::{CacheFolder, ServerConfig};
+use crate::report::TableStyle;
 use contactd_client::Session;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{BufRead as _, BufReader};
@@ -30,12 +31,17 @@ const PATIENCE: Duration = Duration::from_secs(20);
 ///
 /// # Errors
 /// One sentence.
-pub fn run(embedded: bool, csv_file: Option<&Path>, cache: &CacheFolder) -> Result<(String, Run), String> {
+pub fn run(
+    embedded: bool,
+    csv_file: Option<&Path>,
+    cache: &CacheFolder,
+    style: &TableStyle,
+) -> Result<(String, Run), String> {
     let acts = script::acts();
     let total: usize = acts.iter().map(|a| a.steps).sum();
     let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr_with_hz(10));
-    let style = "{msg:24} [{bar:48}] {pos}/{len} steps, {elapsed}";
-    bar.set_style(ProgressStyle::with_template(style).map_err(|e| e.to_string())?.progress_chars("=> "));
+    let template = "{msg:24} [{bar:24}] {pos}/{len} steps, {elapsed}";
+    bar.set_style(ProgressStyle::with_template(template).map_err(|e| e.to_string())?.progress_chars("=> "));
     let progress = |act: &script::Act, step: usize| {
         bar.set_message(act.title);
         bar.set_position(step as u64);
@@ -58,7 +64,7 @@ pub fn run(embedded: bool, csv_file: Option<&Path>, cache: &CacheFolder) -> Resu
     if let Some(path) = csv_file {
         std::fs::write(path, csv(&run)).map_err(|e| format!("{}: expected to write, found {e}", path.display()))?;
     }
-    let text = table::contacts(&run) + &table::summary(&run, way);
+    let text = table::summary(&run, way, style.paint) + &table::contacts(&run, style);
     Ok((text, run))
 }
 

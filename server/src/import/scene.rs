@@ -58,6 +58,14 @@ pub struct ModelSource {
     pub at: Place,
 }
 
+impl ModelSource {
+    /// What sentences call the text that lines are counted in: the file, or what OpenSCAD makes of it.
+    pub fn text_name(&self) -> String {
+        let flattened = if super::openscad::is_source(&self.path) { ", flattened" } else { "" };
+        format!("{}{flattened}", self.path.display())
+    }
+}
+
 /// An object of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneObject {

@@ -1,6 +1,7 @@
 //! What a scene computes for which pairs, and what not: its rules as the world compiles them, pair by pair of groups.
 
 use crate::import::{Scene, SceneObject};
+use crate::terminal::sentence;
 use crate::world::{PairPlan, Plans};
 use contactd_proto::effects::{self, Effect};
 use glam::DVec3;
@@ -74,12 +75,13 @@ pub fn effects(scene: &Scene) -> String {
             Fate::Searched(words) => words,
             Fate::Off(why) => *why,
         };
-        let _ = writeln!(out, "    {g} - {h}: {count} {}: {words}", if *count == 1 { "pair" } else { "pairs" });
+        let pairs = if *count == 1 { "pair" } else { "pairs" };
+        out += &sentence("    ", &format!("{g} - {h}: {count} {pairs}: {words}"));
     }
     let asked = |effect: &Effect| effect.asked.is_none_or(|asked| used.iter().any(|plan| asked(plan)));
     let not: Vec<&str> = effects::ALL.iter().filter(|effect| !asked(effect)).map(|effect| effect.word).collect();
     if !(used.is_empty() || not.is_empty()) {
-        let _ = writeln!(out, "    for no pair: {}", not.join(", "));
+        out += &sentence("    ", &format!("for no pair: {}", not.join(", ")));
     }
     let (mut rest, mut slide, mut turn) = (0, 0, 0);
     for o in &scene.objects {
@@ -89,11 +91,11 @@ pub fn effects(scene: &Scene) -> String {
             (false, false) => turn += 1,
         }
     }
-    let _ = writeln!(
-        out,
-        "  of the objects, in this step: at rest {rest} (two of them: asked about the start alone), translating {slide} (no \
+    let told = format!(
+        "of the objects, in this step: at rest {rest} (two of them: asked about the start alone), translating {slide} (no \
          bounds of rotation), turning {turn}"
     );
+    out += &sentence("  ", &told);
     out
 }
 
@@ -137,7 +139,10 @@ mod tests {
             text += &format!("[[object]]\nname = \"{name}\"\nmodel = \"m\"\ngroup = \"{group}\"\n{motion}\n");
         }
         let scene = Scene::parse("s.toml", &(text + rules), Path::new("")).expect("a scene");
-        effects(&scene)
+        let text = effects(&scene);
+        assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+        // As if no line were broken.
+        text.replace("\n      ", " ")
     }
 
     #[test]

@@ -9,7 +9,9 @@ use crate::math::Aabb;
 use crate::octree::Model;
 use crate::octree::mass::mass_properties;
 use crate::solid::{Node, NodeId, Op, Sense, Solid};
+use crate::terminal::{Paint, fold, number, sentence};
 use contactd_proto::MassOptions;
+use glam::DVec3;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -18,6 +20,9 @@ const TREE_LINES: usize = 400;
 
 /// What a look at a model spends on its mass properties: a tenth of a second or so, a second at most whatever its boxes take.
 const MASS: MassOptions = MassOptions { tolerance: 1e-4, boxes: 100_000 };
+
+/// Significant digits of what is told of a model.
+const DIGITS: i32 = 8;
 
 /// All about one model and what its import had to say; `file` is its heading.
 pub fn model(file: &str, model: &Model, notes: &[Note]) -> String {
@@ -43,10 +48,10 @@ pub fn model(file: &str, model: &Model, notes: &[Note]) -> String {
     for (kind, (positive, negative)) in kinds {
         let _ = writeln!(out, "    {:>6} {kind} ({negative} subtracted)", positive + negative);
     }
-    let _ = writeln!(out, "  bounds {}", bounds(&solid.aabb()));
-    let _ = writeln!(out, "  mass {}", mass(model));
+    out += &bounds(&solid.aabb());
+    out += &mass(model);
     for line in grouped(notes) {
-        let _ = writeln!(out, "  note: {line}");
+        out += &sentence("  note: ", &line);
     }
     out.push_str(&tree(solid));
     out
@@ -62,7 +67,7 @@ pub fn scene(scene: &Scene) -> String {
         let how = match (o.is_static, o.motion.is_rest()) {
             (true, _) => "static",
             (false, true) => "at rest",
-            (false, false) if o.motion.spin == glam::DVec3::ZERO => "translating",
+            (false, false) if o.motion.spin == DVec3::ZERO => "translating",
             _ => "turning",
         };
         let _ = writeln!(out, "  object {}: model {}, group {}, {how}", o.name, scene.models[o.model].name, o.group);
@@ -79,7 +84,7 @@ pub fn scene(scene: &Scene) -> String {
 }
 
 /// Equal notes as one line with their number, the first place and the largest amount.
-fn grouped(notes: &[Note]) -> Vec<String> {
+pub fn grouped(notes: &[Note]) -> Vec<String> {
     let mut order: Vec<&Note> = Vec::new();
     let mut groups: BTreeMap<&str, (usize, Option<f64>)> = BTreeMap::new();
     for n in notes {
@@ -98,42 +103,59 @@ fn grouped(notes: &[Note]) -> Vec<String> {
     order.iter().map(line).collect()
 }
 
-fn bounds(b: &Aabb) -> String {
-    if b.is_empty() {
-        return "none: it is empty".into();
-    }
-    let (lo, hi, size) = (b.min, b.max, b.max - b.min);
-    format!(
-        "[{:.6}, {:.6}, {:.6}] to [{:.6}, {:.6}, {:.6}], size {:.6} x {:.6} x {:.6}",
-        lo.x, lo.y, lo.z, hi.x, hi.y, hi.z, size.x, size.y, size.z
-    )
+/// A vector of numbers that are known to within `error`.
+fn vector(v: DVec3, error: f64) -> String {
+    format!("[{}]", v.to_array().map(|x| number(x, error, DIGITS)).join(", "))
 }
 
-/// Volume, centre and the inertia's diagonal of density 1, each with the bound of its error.
+fn bounds(b: &Aabb) -> String {
+    if b.is_empty() {
+        return "  bounds none: it is empty\n".into();
+    }
+    let size = b.max - b.min;
+    // What is a billionth of its size is rounding.
+    let fine = 1e-9 * size.max_element();
+    let [lo, hi] = [b.min, b.max].map(|v| vector(v, fine));
+    let size = size.to_array().map(|x| number(x, fine, DIGITS)).join(" x ");
+    let pieces = [format!("bounds {lo} to {hi}"), format!("size {size}")];
+    fold("  ", ", ", &pieces.map(|text| (None, text)), Paint::default())
+}
+
+/// Volume, centre and the inertia's diagonal of density 1, each with the bound of its error: digits beyond it are left out.
 fn mass(model: &Model) -> String {
     let m = match mass_properties(model, &MASS) {
         Ok(m) => m,
-        Err(e) => return format!("none: {e}"),
+        Err(e) => return sentence("  mass none: ", &e.to_string()),
     };
     let how = match m.boxes {
         0 => "closed form".into(),
         boxes if m.volume_error <= MASS.tolerance * (m.volume - m.volume_error) => format!("{boxes} boxes"),
         boxes => format!("{boxes} boxes: the limit of their work, short of ± {:.0e} of the volume", MASS.tolerance),
     };
-    let (c, i) = (m.center, m.inertia);
-    format!(
-        "volume {:.6} ± {:.1e}, centre [{:.6}, {:.6}, {:.6}] ± {:.1e}, inertia [{:.6}, {:.6}, {:.6}] ± {:.1e} at density 1, {how}",
-        m.volume,
-        m.volume_error,
-        c.x,
-        c.y,
-        c.z,
-        m.center_error.max_element(),
-        i[0],
-        i[1],
-        i[2],
-        m.inertia_error[..3].iter().copied().fold(0.0, f64::max)
-    )
+    let (i, spread) = (m.inertia, m.inertia_error[..3].iter().copied().fold(0.0, f64::max));
+    let off = m.center_error.max_element();
+    // One digit more than the bound's first.
+    let known = |error: f64| error / 10.0;
+    let pieces = [
+        format!("mass volume {} ± {:.1e}", number(m.volume, known(m.volume_error), DIGITS), m.volume_error),
+        format!("centre {} ± {off:.1e}", vector(m.center, known(off))),
+        format!("inertia {} ± {spread:.1e}", vector(DVec3::new(i[0], i[1], i[2]), known(spread))),
+        "at density 1".into(),
+        how,
+    ];
+    fold("  ", ", ", &pieces.map(|text| (None, text)), Paint::default())
+}
+
+/// Sizes in words, their numbers without the last digits, which are rounding.
+fn sizes(words: &str) -> String {
+    let short = |word: &str| {
+        let bare = word.trim_end_matches(',');
+        match bare.parse::<f64>() {
+            Ok(x) if bare.len() > DIGITS as usize + 2 => word.replace(bare, &number(x, 0.0, DIGITS)),
+            _ => word.to_owned(),
+        }
+    };
+    words.split(' ').map(short).collect::<Vec<_>>().join(" ")
 }
 
 fn levels(solid: &Solid) -> usize {
@@ -173,7 +195,7 @@ fn tree(solid: &Solid) -> String {
             Node::Primitive(i) => {
                 let p = &solid.primitives[*i as usize];
                 let geometry = p.shape.geometry();
-                let words = [&p.label.name, geometry.kind(), &geometry.dimensions()];
+                let words = [&p.label.name, geometry.kind(), &sizes(&geometry.dimensions())];
                 let mut words: Vec<&str> = words.into_iter().filter(|w| !w.is_empty()).collect();
                 words.dedup();
                 writeln!(out, "{indent}{i} {} at {}:{}", words.join(" "), p.label.line, p.label.column)

@@ -1,16 +1,9 @@
-//! Answers as users read them: the JSON object of `check --json`, the table, the work behind each answer.
-//!
-//! Numbers in JSON are the shortest decimals that read back to the same bits; the table shows nine digits. A field
-//! without meaning for a status is null: a clear pair has no point. Features name the primitive by its index in file
-//! order and the format's name, its face, and its sense in the solid.
+//! The answer for each pair, as the JSON object of `check --json` has it.
 
-use crate::contact::{Clock, Counters, Outcome, Region, Stage, Status};
+use crate::contact::{Outcome, Region, Status};
 use crate::solid::{Sense, Solid};
-use contactd_proto::{EffectCounters, Report};
-use glam::DVec3;
+use contactd_proto::Report;
 use serde::Serialize;
-use std::fmt::Write as _;
-use std::time::Duration;
 
 /// One answer with what it takes to name its features.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +12,8 @@ pub struct PairReport<'a> {
     pub names: [&'a str; 2],
     /// Their solids.
     pub solids: [&'a Solid; 2],
+    /// The files that these come from.
+    pub files: [&'a str; 2],
     /// The answer.
     pub outcome: &'a Outcome,
     /// How much of it is told.
@@ -72,6 +67,9 @@ pub struct PairAnswer {
     /// Told when the work limit cut the search for regions.
     #[serde(skip_serializing_if = "is_true")]
     pub regions_complete: bool,
+    /// The larger bounding radius of the two, for rounding.
+    #[serde(skip)]
+    pub size: f64,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
@@ -125,11 +123,14 @@ pub struct Feature {
     pub face: String,
     /// "positive", or "negative" where the primitive is subtracted.
     pub sense: &'static str,
+    /// The file that it comes from, and its line there; 0 where there is none.
+    #[serde(skip)]
+    pub at: (String, u32),
 }
 
 impl Feature {
-    /// The feature behind a face id of `solid`; `None` for an id that it does not have.
-    pub fn of_face(solid: &Solid, face: u32) -> Option<Self> {
+    /// The feature behind a face id of `solid`, which comes from `file`; `None` for an id that it does not have.
+    pub fn of_face(file: &str, solid: &Solid, face: u32) -> Option<Self> {
         let primitive = *solid.face_owner.get(face as usize)?;
         let p = &solid.primitives[primitive as usize];
         let sense = match solid.senses[primitive as usize] {
@@ -137,7 +138,7 @@ impl Feature {
             Sense::Negative => "negative",
         };
         let face = p.face_name((face - p.first_face) as usize);
-        Some(Self { primitive, name: p.label.name.clone(), face, sense })
+        Some(Self { primitive, name: p.label.name.clone(), face, sense, at: (file.to_owned(), p.label.line) })
     }
 }
 
@@ -151,48 +152,6 @@ impl Answer {
     /// One line of JSON.
     pub fn json(&self) -> serde_json::Result<String> {
         serde_json::to_string(self)
-    }
-
-    /// The table for people: nine digits, one line per pair, features below those that have some.
-    pub fn table(&self) -> String {
-        let header = ["a", "b", "status", "time", "separation", "normal speed", "kind", "extent", "point", "normal"];
-        let mut rows = vec![header.map(String::from)];
-        for p in &self.pairs {
-            let mut status = String::from(p.status);
-            if p.touching {
-                status += " (touching)";
-            }
-            if p.not_continued {
-                status += " (not continued)";
-            }
-            rows.push([
-                p.a.clone(),
-                p.b.clone(),
-                status,
-                p.time.map_or_else(String::new, digits),
-                p.separation.map_or_else(String::new, digits),
-                p.normal_speed.map_or_else(String::new, digits),
-                p.kind.unwrap_or_default().into(),
-                p.extent.unwrap_or_default().into(),
-                p.point.map_or_else(String::new, vector),
-                p.normal.map_or_else(String::new, vector),
-            ]);
-        }
-        let mut out = aligned(&rows);
-        for p in &self.pairs {
-            if let Some(x) = &p.penetration {
-                let _ = writeln!(out, "{} deep along {} at {}", digits(x.depth), vector(x.direction), vector(x.point));
-            }
-            if let Some(t) = p.margin_time {
-                let _ = writeln!(out, "{} and {} farther apart than their margin until {}", p.a, p.b, digits(t));
-            }
-            if let Some(f) = &p.features {
-                let side = |f: &[Feature]| f.iter().map(Feature::to_string).collect::<Vec<_>>().join(", ");
-                let _ = writeln!(out, "{} on {}, {} on {}", side(&f.a), p.a, side(&f.b), p.b);
-            }
-        }
-        let _ = writeln!(out, "safe time {}", digits(self.safe_time));
-        out
     }
 }
 
@@ -212,8 +171,9 @@ impl PairAnswer {
         let point = o.point().filter(|_| rests || o.meets() && reported(Report::Contact));
         // Bodies that overlap meet in no one way.
         let met = point.filter(|_| o.status() != Status::Overlap);
-        let features = |solid: &Solid, faces: &[u32; 3]| {
-            faces.iter().filter_map(|f| Feature::of_face(solid, *f)).collect::<Vec<_>>()
+        let features = |side: usize, faces: &[u32; 3]| {
+            let feature = |face: &u32| Feature::of_face(pair.files[side], pair.solids[side], *face);
+            faces.iter().filter_map(feature).collect::<Vec<_>>()
         };
         Self {
             a: pair.names[0].to_owned(),
@@ -231,8 +191,7 @@ impl PairAnswer {
             kind: met.map(|p| p.kind.name()),
             extent: met.map(|p| p.extent.name()),
             resolution: o.resolution,
-            features: point
-                .map(|p| Features { a: features(pair.solids[0], &p.faces_a), b: features(pair.solids[1], &p.faces_b) }),
+            features: point.map(|p| Features { a: features(0, &p.faces_a), b: features(1, &p.faces_b) }),
             cells: o.counters.cells,
             penetration: o.penetration().map(|p| Penetration {
                 depth: p.depth,
@@ -249,123 +208,30 @@ impl PairAnswer {
                     normal: r.normal.to_array(),
                     points: r.points.iter().map(|p| p.point.to_array()).collect(),
                     separations: r.points.iter().map(|p| p.separation).collect(),
-                    features: Features {
-                        a: features(pair.solids[0], &r.faces_a),
-                        b: features(pair.solids[1], &r.faces_b),
-                    },
+                    features: Features { a: features(0, &r.faces_a), b: features(1, &r.faces_b) },
                 })
                 .collect(),
             regions_complete: pair.regions_complete,
+            size: pair.solids.map(radius).into_iter().fold(0.0, f64::max),
         }
     }
 }
 
-/// What each answer cost: the stage that told it, primitives before and after stage 1, octree nodes, candidates, cells,
-/// clauses, attempts, whole-primitive answers, and the time of each stage by a clock for each pair; `None`: no search was
-/// needed.
-pub fn work_table(pairs: &[PairReport<'_>], clocks: &[Option<Clock>]) -> String {
-    let header = [
-        "a",
-        "b",
-        "reported by",
-        "primitives",
-        "after stage 1",
-        "node pairs",
-        "candidates",
-        "cells",
-        "clauses",
-        "newton",
-        "closed forms",
-        "instant cells",
-        "in front",
-        "stage 1",
-        "stage 2",
-        "stage 3",
-        "in all",
-    ];
-    let mut rows = vec![header.map(String::from)];
-    let mut sums = [Duration::ZERO; Stage::ALL.len()];
-    for (p, clock) in pairs.iter().zip(clocks) {
-        let Counters {
-            after_stage1, node_pairs, candidates, cells, clauses, newton, closed_forms, instant_cells, ..
-        } = p.outcome.counters;
-        let primitives: usize = p.solids.iter().map(|s| s.primitives.len()).sum();
-        let reported = clock.as_ref().map_or("boxes", |c| c.last().name());
-        let searched = clock.as_ref().is_some_and(|c| c.last() != Stage::Front);
-        // What is answered in front never comes to stage 1.
-        let left = if searched { after_stage1.to_string() } else { String::new() };
-        let [a, b] = p.names.map(String::from);
-        let counts =
-            [node_pairs, candidates, cells, clauses, newton, closed_forms, instant_cells].map(|n| n.to_string());
-        let [c0, c1, c2, c3, c4, c5, c6] = counts;
-        let times = Stage::ALL.map(|s| clock.as_ref().map_or_else(String::new, |c| micros(c.of(s))));
-        let [t0, t1, t2, t3] = times;
-        let total = clock.as_ref().map_or_else(String::new, |c| micros(c.total()));
-        for (sum, s) in sums.iter_mut().zip(Stage::ALL) {
-            *sum += clock.as_ref().map_or(Duration::ZERO, |c| c.of(s));
-        }
-        let primitives = primitives.to_string();
-        rows.push([a, b, reported.into(), primitives, left, c0, c1, c2, c3, c4, c5, c6, t0, t1, t2, t3, total]);
-    }
-    let mut out = aligned(&rows);
-    let total: Duration = sums.iter().sum();
-    let share = |d: &Duration| 100.0 * d.as_secs_f64() / total.as_secs_f64().max(1e-9);
-    let shares = sums.iter().zip(Stage::ALL).map(|(d, s)| format!("{} {:.0} %", s.name(), share(d)));
-    let _ = writeln!(
-        out,
-        "in all {} us: {} (one thread, nothing remembered; the least of some runs of each pair)",
-        micros(total),
-        shares.collect::<Vec<_>>().join(", ")
-    );
-    out
-}
-
-/// What the step worked out beside whether its pairs meet: each effect that ran, and how often.
-pub fn effects_line(effects: &EffectCounters) -> String {
-    let ran: Vec<String> =
-        effects.each().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}")).collect();
-    if ran.is_empty() { "effects: none\n".into() } else { format!("effects: {}\n", ran.join(", ")) }
-}
-
-/// Microseconds, to three digits.
-fn micros(d: Duration) -> String {
-    let us = 1e6 * d.as_secs_f64();
-    match us {
-        0.0 => "0".into(),
-        _ if us < 10.0 => format!("{us:.2}"),
-        _ if us < 100.0 => format!("{us:.1}"),
-        _ => format!("{us:.0}"),
-    }
-}
-
-/// Columns as wide as their widest entry.
-fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
-    let width = |k: usize| rows.iter().map(|r| r[k].chars().count()).max().unwrap_or(0);
-    let widths: [usize; N] = std::array::from_fn(width);
-    let mut out = String::new();
-    for row in rows {
-        let cells = row.iter().zip(widths).map(|(c, w)| format!("{c:<w$}"));
-        out.push_str(cells.collect::<Vec<_>>().join("  ").trim_end());
-        out.push('\n');
-    }
-    out
-}
-
-/// Nine significant digits where the number is near 1, scientific where it is tiny.
-fn digits(x: f64) -> String {
-    if x != 0.0 && !(1e-4..1e6).contains(&x.abs()) { format!("{x:.8e}") } else { format!("{x:.9}") }
-}
-
-fn vector(v: [f64; 3]) -> String {
-    let v = DVec3::from_array(v);
-    format!("({}, {}, {})", digits(v.x), digits(v.y), digits(v.z))
+/// The radius of the ball around a solid's box; 0 where it has none.
+fn radius(solid: &Solid) -> f64 {
+    let bounds = solid.aabb();
+    let radius = (bounds.max - bounds.min).length() / 2.0;
+    if bounds.is_empty() || !radius.is_finite() { 0.0 } else { radius }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::TableStyle;
+    use super::super::work::work_table;
     use super::*;
-    use crate::contact::{Contact, ContactKind, ContactPoint, Extent, Verdict};
+    use crate::contact::{Clock, Contact, ContactKind, ContactPoint, Counters, Extent, Verdict};
     use crate::import::{Facets, Limits, import_csg};
+    use glam::DVec3;
 
     fn plate() -> Solid {
         let text =
@@ -399,6 +265,7 @@ mod tests {
         PairReport {
             names: ["a", "b"],
             solids: [solid, solid],
+            files: ["models/plate.csg"; 2],
             outcome,
             report: Report::Contact,
             regions: &[],
@@ -432,7 +299,9 @@ mod tests {
         }
         let answer = Answer::of_pairs(&[report(&solid, &outcome)]);
         assert!(answer.json().expect("json").contains(r#""touching":false,"not_continued":true,"point""#));
-        assert!(answer.table().contains("contact (not continued)"), "{}", answer.table());
+        let tables = [false, true].map(|wide| answer.table(&TableStyle { wide, ..TableStyle::default() }));
+        assert!(tables[0].contains("not continued"), "{}", tables[0]);
+        assert!(tables[1].contains("contact (not continued)"), "{}", tables[1]);
         let hit = PairReport { report: Report::Hit, ..report(&solid, &outcome) };
         assert!(!Answer::of_pairs(&[hit]).json().expect("json").contains("not_continued"), "a hit has no time");
     }
@@ -459,7 +328,8 @@ mod tests {
             ..contact()
         };
         let pairs = [report(&solid, &clear), report(&solid, &searched)];
-        let text = work_table(&pairs, &[None, Some(Clock::default())]);
+        let wide = TableStyle { wide: true, ..TableStyle::default() };
+        let text = work_table(&pairs, &[None, Some(Clock::default())], &wide);
         let words: Vec<Vec<&str>> = text.lines().map(|l| l.split_whitespace().collect()).collect();
         assert_eq!(words[1][..4], ["a", "b", "boxes", "4"], "{text}");
         assert_eq!(words[2][..5], ["a", "b", "in", "front", "4"], "{text}");
@@ -467,19 +337,29 @@ mod tests {
     }
 
     #[test]
-    fn the_table_has_nine_digits() {
+    fn the_table_has_a_block_of_80_columns_or_a_line_of_nine_digits() {
         let solid = plate();
-        let outcome = contact();
-        let pair = PairReport {
-            names: ["peg", "plate"],
-            solids: [&solid, &solid],
-            outcome: &outcome,
-            report: Report::Contact,
-            regions: &[],
-            regions_complete: true,
-        };
-        let table = Answer::of_pairs(&[pair]).table();
-        assert!(table.contains("0.300000000"), "{table}");
-        assert!(table.contains("side of subtracted cylinder 1 on peg"), "{table}");
+        let mut outcome = contact();
+        let Verdict::Contact(contact) = &mut outcome.verdict else { panic!("a contact") };
+        let point = contact.point.as_mut().expect("a point");
+        (point.point, point.normal) = (DVec3::new(1.0, -3.55e-15, 0.123_456_789), DVec3::new(-0.0, 1e-17, -1.0));
+        let pair = PairReport { names: ["peg", "plate"], ..report(&solid, &outcome) };
+        let table = |wide| Answer::of_pairs(&[pair]).table(&TableStyle { wide, ..TableStyle::default() });
+        let narrow = "1 pair: 1 contact, proven clear until t = 0.100000000\n\n\
+                      time         status     a    b\n\
+                      0.300000000  contact    peg  plate\n    \
+                      edge-face (line), proven clear until 0.100000000, at (1, 0, 0.12346),\n    \
+                      normal (0, 0, -1), normal speed 0\n    \
+                      a  plate.csg:2 cylinder, side (subtracted)\n    \
+                      b  plate.csg:1 cube, +x; plate.csg:1 cube, +z\n";
+        assert_eq!(table(false), narrow);
+        for word in [
+            "0.300000000",
+            "0.123456789",
+            "(0.000000000, 0.000000000, -1.000000000)",
+            "models/plate.csg:2 1 cylinder, side",
+        ] {
+            assert!(table(true).contains(word), "{word} in {}", table(true));
+        }
     }
 }
