@@ -541,22 +541,74 @@ pub(in crate::contact) fn damped_step(
     n: usize,
     mu: f64,
 ) -> Option<[f64; MAX_UNKNOWNS]> {
-    let (mut a, mut b) = ([[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS], [0.0; MAX_UNKNOWNS]);
-    for i in 0..n {
-        for j in 0..=i {
-            let mut s = 0.0;
-            for r in 0..n {
-                s += jac[r][i] * jac[r][j];
+    // Of a size that is known beforehand the loops hold no tests of their own.
+    match n {
+        6 => damped_step_of::<6>(jac, f, mu),
+        7 => damped_step_of::<7>(jac, f, mu),
+        8 => damped_step_of::<8>(jac, f, mu),
+        9 => damped_step_of::<9>(jac, f, mu),
+        10 => damped_step_of::<10>(jac, f, mu),
+        _ => unreachable!("between two and six faces meet"),
+    }
+}
+
+fn damped_step_of<const N: usize>(
+    jac: &[[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS],
+    f: &[f64; MAX_UNKNOWNS],
+    mu: f64,
+) -> Option<[f64; MAX_UNKNOWNS]> {
+    // Row by row of J, so that sums stand side by side; each is summed in the order of the rows.
+    let (mut a, mut b) = ([[0.0; N]; N], [0.0; N]);
+    for r in 0..N {
+        let row: [f64; N] = std::array::from_fn(|k| jac[r][k]);
+        for i in 0..N {
+            // Most of J is zeros.
+            if row[i] != 0.0 {
+                for j in 0..N {
+                    a[i][j] += row[i] * row[j];
+                }
+                b[i] -= row[i] * f[r];
             }
-            a[i][j] = s;
-            a[j][i] = s;
-        }
-        a[i][i] += mu;
-        for r in 0..n {
-            b[i] -= jac[r][i] * f[r];
         }
     }
-    cholesky_solve(&mut a, b, n)
+    for i in 0..N {
+        a[i][i] += mu;
+    }
+    // Cholesky's factors, column by column: what is behind a column is updated at once.
+    for k in 0..N {
+        let d = a[k][k];
+        if d.is_nan() || d <= 0.0 {
+            return None;
+        }
+        let root = d.sqrt();
+        let mut column = [0.0; N];
+        for i in k..N {
+            a[i][k] /= root;
+            column[i] = a[i][k];
+        }
+        for i in k + 1..N {
+            if column[i] != 0.0 {
+                for j in k + 1..N {
+                    a[i][j] -= column[i] * column[j];
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        for k in 0..i {
+            b[i] -= a[i][k] * b[k];
+        }
+        b[i] /= a[i][i];
+    }
+    for i in (0..N).rev() {
+        for k in i + 1..N {
+            b[i] -= a[k][i] * b[k];
+        }
+        b[i] /= a[i][i];
+    }
+    let mut step = [0.0; MAX_UNKNOWNS];
+    step[..N].copy_from_slice(&b);
+    Some(step)
 }
 
 /// Solves a symmetric positive definite system in place.
