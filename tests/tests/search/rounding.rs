@@ -460,13 +460,14 @@ fn evaluate(r: &mut Random, models: &[Model], wanted: u64, name: &str) {
                 if let (Sense::Positive, Some(i)) = (sense, fitting) {
                     let other_side = if side == Side::A { Side::B } else { Side::A };
                     let q = LiteralId::new(i as u32, Sense::Negative);
-                    for l in fit::fit(&view, (side, id), (other_side, q)) {
+                    let both = fit::Fitted::of(&view, side, id).zip(fit::Fitted::of(&view, other_side, q));
+                    for (l, touchable) in both.iter().flat_map(|(p, q)| fit::fit(&view, p, q)) {
                         let Some(mu) = l.weights else { continue };
                         let (in_p, in_q) = if side == Side::A { (&x_a, &x_b) } else { (&x_b, &x_a) };
                         let g = exact_fit((face, in_p), (&other.faces[i], in_q), view.delta, mu).expect("round");
                         // Its own rounding is subtracted already; E stands for the sums.
                         worst.see(|w| &mut w.fit, double(&(plane(&l) - &g)).max(0.0), budget, &what);
-                        let touched = fit::touch(&view, &l, inside(r) - center).expect("curved fits");
+                        let touched = fit::touch(&view, &l, &touchable.expect("curved fits"), inside(r) - center);
                         worst.see(|w| &mut w.fit, double(&(plane(&touched) - &g)).max(0.0), budget, &what);
                     }
                 }

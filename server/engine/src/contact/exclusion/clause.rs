@@ -13,13 +13,14 @@
 //! program's minimiser there (the cutting planes of Kelley 1960), which replaces one tangent plane by the face's shape.
 
 use super::course::Course;
-use super::fit::{self, fit, spun};
+use super::fit::{self, Fitted, Touchable, fit, spun};
 use super::literal::{Linear, Side, View};
-use super::lp::{self, Solution};
+use super::lp::{self, Planes, Solution};
 use crate::solid::Sense;
 use crate::solid::alike::{Ball, above};
 use crate::solid::local::{LiteralId, Token};
 use glam::DVec3;
+use smallvec::SmallVec;
 
 /// Weight of a concave literal's own cost in the choice of the axis to split, whether it holds the bound or not.
 const IDLE_COST: f64 = 0.25;
@@ -27,8 +28,6 @@ const IDLE_COST: f64 = 0.25;
 const IDLE_CONVEX: f64 = 1e-3;
 /// The same where a fit stands for the literal, which costs more of what matters.
 const FITTED_COST: f64 = 0.02;
-/// Comparisons of two literals that cost as much as one evaluation of a literal.
-const COMPARED: u64 = 16;
 /// Planes that a pivot of the linear program costs beside those that it looks at; and looks of it at a plane that cost as
 /// much as one evaluation of a literal.
 const PIVOT: u64 = 12;
@@ -70,10 +69,15 @@ pub struct Hint {
 #[derive(Default, Debug)]
 pub struct Scratch {
     pub(super) lits: Vec<Linear>,
-    normals: Vec<DVec3>,
-    b: Vec<f64>,
-    /// Of each of `lits`, the lists of alternatives that it rests on.
-    pub(super) uses: Vec<Lists>,
+    planes: Planes,
+    /// Of each of `lits`, what it rests on and what touches it elsewhere.
+    pub(super) notes: Vec<Note>,
+    /// The literals among `lits` that were taken from the expressions, without tangents and fits.
+    pub(super) taken: Vec<Taken>,
+    /// By the places of `made`, the index in `fitted`; `UNMADE` before it was asked for, `UNFIT` where there is none.
+    pub(super) fitted_at: Vec<u32>,
+    pub(super) fitted: Vec<Fitted>,
+    pub(super) touchables: Vec<Touchable>,
     /// Where the clause's last program ended.
     pub(super) warm: lp::Warm,
     pub(super) ors: Vec<List>,
@@ -113,6 +117,41 @@ pub(super) struct List {
 
 /// No bound made yet.
 pub(super) const UNMADE: u32 = u32::MAX;
+/// A literal that fits nothing.
+const UNFIT: u32 = u32::MAX - 1;
+
+/// What stands beside a bound.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Note {
+    /// The lists of alternatives that it rests on.
+    pub uses: Lists,
+    /// What it becomes where it is touched at another point.
+    touch: Touch,
+}
+
+/// How a bound may be had at other points of touch; of several of one literal the first one alone says so.
+#[derive(Clone, Copy, Debug)]
+enum Touch {
+    /// Not at all.
+    Never,
+    /// As a tangent of its face.
+    Face,
+    /// As a fit, by its index in `Scratch::touchables`.
+    Fit(u32),
+    /// As a quadric that spins.
+    Spun,
+}
+
+/// A literal of the clause in hand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taken {
+    /// Its index among the bounds.
+    pub lit: u32,
+    side: Side,
+    id: LiteralId,
+    /// Its index in `Scratch::made`.
+    made: u32,
+}
 
 /// Two literals of one body that contradict each other.
 #[derive(Clone, Copy, Debug)]
@@ -212,9 +251,9 @@ pub(super) struct Run<'a, 'p> {
 }
 
 impl Run<'_, '_> {
-    pub fn push(&mut self, bounds: impl IntoIterator<Item = Linear>, uses: Lists) {
+    fn push(&mut self, bounds: impl IntoIterator<Item = Linear>, uses: Lists, touch: Touch) {
         self.scratch.lits.extend(bounds);
-        self.scratch.uses.resize(self.scratch.lits.len(), uses);
+        self.scratch.notes.resize(self.scratch.lits.len(), Note { uses, touch });
     }
 
     /// The bound of the literal at a place of its body's expression, touched at the cell's centre; an index of `made`.
@@ -224,37 +263,77 @@ impl Run<'_, '_> {
         if self.scratch.places[place] == UNMADE {
             self.scratch.places[place] = self.scratch.made.len() as u32;
             self.scratch.made.push(self.view.linear(side, id, DVec3::ZERO));
+            self.scratch.fitted_at.push(UNMADE);
         }
         self.scratch.places[place] as usize
     }
 
+    /// What the fits of a literal have in common, by its index in `made`: an index of `fitted`.
+    fn fitted(&mut self, side: Side, id: LiteralId, made: u32) -> Option<usize> {
+        let scratch = &mut *self.scratch;
+        let at = &mut scratch.fitted_at[made as usize];
+        if *at == UNMADE {
+            *at = UNFIT;
+            if let Some(fitted) = Fitted::of(self.view, side, id) {
+                *at = scratch.fitted.len() as u32;
+                scratch.fitted.push(fitted);
+            }
+        }
+        (*at != UNFIT).then_some(*at as usize)
+    }
+
     /// Adds a literal's bound, with the tangents and fits it brings along.
     pub fn add(&mut self, side: Side, id: LiteralId, at: u32, list: Lists) {
+        // What stands twice in a clause brings along nothing new.
+        let again = self.scratch.taken.iter().any(|t| (t.side, t.id) == (side, id));
+        let mut touch = if !again && self.view.is_curved_convex(side, id) { Touch::Face } else { Touch::Never };
         for h in self.hints {
             if (h.side, h.id) == (side, id) {
-                self.push(Some(self.view.tangent(side, id, h.point)), list);
+                self.push(Some(self.view.tangent(side, id, h.point)), list, touch);
+                touch = Touch::Never;
             }
         }
         let before = self.scratch.lits.len();
         let made = self.made(side, id, at);
-        self.scratch.lits.push(self.scratch.made[made]);
-        self.scratch.uses.push(list);
+        self.push(Some(self.scratch.made[made]), list, touch);
         if self.view.faces(side).solid.alike.has_walls(self.view.wall) {
             self.against_own(side, id, before, list);
         }
-        for i in 0..if self.view.fits { before } else { 0 } {
-            let l = &self.scratch.lits[i];
-            if l.side == side || l.id.sense() == id.sense() || l.other.is_some() {
-                continue;
-            }
-            let (p, q) =
-                if id.sense() == Sense::Positive { ((side, id), (l.side, l.id)) } else { ((l.side, l.id), (side, id)) };
-            self.push(fit(self.view, p, q), list | self.scratch.uses[i]);
+        if self.view.fits && !again {
+            self.fit_with_others(side, id, made as u32, list);
         }
-        if side == Side::B && self.view.fits && self.view.curved && !self.view.b.is_guard(id.face()) {
-            self.push(spun(self.view, id), list);
+        self.scratch.taken.push(Taken { lit: before as u32, side, id, made: made as u32 });
+        if side == Side::B && self.view.fits && self.view.curved && !again && !self.view.b.is_guard(id.face()) {
+            let touch = if id.sense() == Sense::Positive { Touch::Spun } else { Touch::Never };
+            self.push(spun(self.view, id), list, touch);
         }
         self.against_walls(side, id, before, list);
+    }
+
+    /// Adds the fits of a literal with those of the other body that were taken before.
+    fn fit_with_others(&mut self, side: Side, id: LiteralId, made: u32, list: Lists) {
+        if self.view.faces(side).get(id.face()).is_flat() {
+            return;
+        }
+        for i in 0..self.scratch.taken.len() {
+            let Taken { lit, side: other_side, id: other, made: other_made } = self.scratch.taken[i];
+            if other_side == side || other.sense() == id.sense() {
+                continue;
+            }
+            let Some(theirs) = self.fitted(other_side, other, other_made) else { continue };
+            let Some(own) = self.fitted(side, id, made) else { return };
+            let uses = list | self.scratch.notes[lit as usize].uses;
+            let (own, theirs) = (&self.scratch.fitted[own], &self.scratch.fitted[theirs]);
+            let (p, q) = if id.sense() == Sense::Positive { (own, theirs) } else { (theirs, own) };
+            let fits: SmallVec<[fit::Fit; 2]> = fit(self.view, p, q).collect();
+            for (bound, touchable) in fits {
+                let touch = touchable.map_or(Touch::Never, |touchable| {
+                    self.scratch.touchables.push(touchable);
+                    Touch::Fit(self.scratch.touchables.len() as u32 - 1)
+                });
+                self.push(Some(bound), uses, touch);
+            }
+        }
     }
 
     /// Touches faces that spin about their own axes where they look against flat walls of the other body.
@@ -269,14 +348,14 @@ impl Run<'_, '_> {
             let spun = self.scratch.lits[..before].iter().position(is_spun);
             if let Some(i) = spun.filter(|_| wall.id == id && is_wall(self.view, &wall)) {
                 let touched = fit::touch_spun_against(self.view, &self.scratch.lits[i], wall.normal);
-                self.push(touched, list | self.scratch.uses[i]);
+                self.push(touched, list | self.scratch.notes[i].uses, Touch::Never);
             }
         } else if let Some(spun) = self.scratch.lits[before..end].iter().find(|l| is_spun(l)).copied() {
             for i in 0..before {
                 let wall = self.scratch.lits[i];
                 if is_wall(self.view, &wall) {
                     let touched = fit::touch_spun_against(self.view, &spun, wall.normal);
-                    self.push(touched, list | self.scratch.uses[i]);
+                    self.push(touched, list | self.scratch.notes[i].uses, Touch::Never);
                 }
             }
         }
@@ -307,12 +386,12 @@ impl Run<'_, '_> {
                     && above(one, other, &ball).is_some_and(|least| least > -2.0 * v.wall + 2.0 * v.rounding)
             };
             if wall > -2.0 * self.view.wall || here() {
-                let uses = list | self.scratch.uses[i];
+                let uses = list | self.scratch.notes[i].uses;
                 self.scratch.clash.get_or_insert(Clash { before, side, literals: [p, q], uses });
                 return;
             }
             if self.view.fits {
-                self.push(fit::within(self.view, side, p, q), list | self.scratch.uses[i]);
+                self.push(fit::within(self.view, side, p, q), list | self.scratch.notes[i].uses, Touch::Never);
             }
         }
     }
@@ -322,8 +401,8 @@ impl Run<'_, '_> {
     pub fn clause(&mut self, rounds: usize, enough: f64) -> Bounded {
         let h = self.view.motion.h;
         let last = self.solve(h);
-        let mut best = Reach { dt: f64::NEG_INFINITY, path: [last; 2], enough };
-        let mut gone = Gone { look: h, course: self.course(&last), lowest: last };
+        let mut best = Reach { dt: f64::NEG_INFINITY, path: [last.solution; 2], enough };
+        let mut gone = Gone { look: h, lowest: last };
         if self.improve(&mut best, None, &last, h) {
             return self.finish(&best, &last, &gone);
         }
@@ -347,7 +426,7 @@ impl Run<'_, '_> {
                     look = (look + beyond).min(h);
                     if best.dt > 0.0 && gone.look > look {
                         let fails = if round % 2 == 0 {
-                            gone.course.back(gone.look, half)
+                            gone.lowest.course.back(gone.look, half)
                         } else {
                             0.5 * (best.dt + gone.look)
                         };
@@ -368,10 +447,9 @@ impl Run<'_, '_> {
                         return self.finish(&best, &lowest, &gone);
                     }
                 }
-                touched |= self.touch(&lowest, look);
-                let course = self.course(&lowest);
-                if look < gone.look && course.at(look, half) < 0.0 {
-                    gone = Gone { look, course, lowest };
+                touched |= self.touch(&lowest.solution, look);
+                if look < gone.look && lowest.course.at(look, half) < 0.0 {
+                    gone = Gone { look, lowest };
                 }
             }
             let nearer = gone.look < gone_before - 0.02 * (gone_before - best.dt.max(0.0));
@@ -387,24 +465,22 @@ impl Run<'_, '_> {
 
     /// Tries the multipliers of `s`, the best at `look`, alone or as the end of a path from those of `from`; true when
     /// as much is proven free as is enough.
-    fn improve(&self, best: &mut Reach, from: Option<&Solution>, s: &Solution, look: f64) -> bool {
-        let h = self.view.motion.h;
-        let end = self.course(s);
+    fn improve(&self, best: &mut Reach, from: Option<&Solved>, s: &Solved, look: f64) -> bool {
+        let (h, half) = (self.view.motion.h, self.view.half);
         match from {
             None => {
-                let dt = end.from(0.0, self.view.half).min(h);
+                let dt = s.course.from(0.0, half).min(h);
                 if dt > best.dt {
-                    *best = Reach { dt, path: [*s; 2], ..*best };
+                    *best = Reach { dt, path: [s.solution; 2], ..*best };
                 }
             }
             Some(first) => {
-                let start = self.course(first);
-                if start.at(0.0, self.view.half) > 0.0 && end.at(look, self.view.half) > 0.0 {
-                    let far = end.from(look, self.view.half).min(h);
+                if first.course.at(0.0, half) > 0.0 && s.course.at(look, half) > 0.0 {
+                    let far = s.course.from(look, half).min(h);
                     let part = if self.scratch.record.is_some() { RECORDED } else { 1.0 - 1e-12 };
                     for dt in [far, 0.5 * (look + far), look] {
-                        if dt > best.dt && start.leads_to(&end, dt, self.view.half, part) {
-                            *best = Reach { dt, path: [*first, *s], ..*best };
+                        if dt > best.dt && first.course.leads_to(&s.course, dt, half, part) {
+                            *best = Reach { dt, path: [first.solution, s.solution], ..*best };
                             break;
                         }
                     }
@@ -440,24 +516,12 @@ impl Run<'_, '_> {
     fn touch(&mut self, s: &Solution, look: f64) -> bool {
         let low = LowPoint { look, y: s.y, z: s.z };
         let mut added = false;
-        // Each literal is compared with those before it.
-        let count = self.scratch.lits.len() as u64;
-        self.scratch.evaluations += count + count * count / COMPARED;
+        self.scratch.evaluations += self.scratch.lits.len() as u64;
         for i in 0..self.scratch.lits.len() {
-            let l = &self.scratch.lits[i];
-            if l.other.is_none() && l.weights.is_none() && !self.view.is_curved_convex(l.side, l.id) {
-                continue;
-            }
-            let again = self.scratch.lits[..i]
-                .iter()
-                .any(|o| (o.side, o.id, o.other, o.weights) == (l.side, l.id, l.other, l.weights));
-            if again {
-                continue;
-            }
-            if let Some(t) = self.touched(l, &low)
+            if let Some(t) = self.touched(i, &low)
                 && t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * self.view.delta
             {
-                self.push(Some(t), self.scratch.uses[i]);
+                self.push(Some(t), self.scratch.notes[i].uses, Touch::Never);
                 added = true;
             }
         }
@@ -465,40 +529,42 @@ impl Run<'_, '_> {
     }
 
     /// A bound touched at a low point instead, where another point of touch makes another bound.
-    pub fn touched(&self, l: &Linear, low: &LowPoint) -> Option<Linear> {
+    pub fn touched(&self, i: usize, low: &LowPoint) -> Option<Linear> {
+        let (v, l) = (self.view, &self.scratch.lits[i]);
+        match self.scratch.notes[i].touch {
+            Touch::Never => None,
+            Touch::Face => Some(self.tangent(l, low)),
+            Touch::Fit(at) => Some(fit::touch(v, l, &self.scratch.touchables[at as usize], low.y)),
+            Touch::Spun => fit::touch_spun(v, l, low.y),
+        }
+    }
+
+    /// The tangent of a literal's face beside a low point.
+    pub fn tangent(&self, l: &Linear, low: &LowPoint) -> Linear {
         let v = self.view;
-        if l.other.is_some() {
-            return fit::touch(v, l, low.y);
-        }
-        if l.weights.is_some() {
-            return fit::touch_spun(v, l, low.y);
-        }
-        if !v.is_curved_convex(l.side, l.id) {
-            return None;
-        }
         let point = match l.side {
             Side::A => v.center + low.y,
             Side::B => v.center_b + v.at.b_from_a * (low.y + v.velocity * low.look),
         };
-        Some(v.tangent(l.side, l.id, point))
+        v.tangent(l.side, l.id, point)
     }
 
-    /// The linear program with bounds looked ahead to `look`.
-    fn solve(&mut self, look: f64) -> Solution {
+    /// The linear program with bounds looked ahead to `look`, and what its multipliers give through time.
+    fn solve(&mut self, look: f64) -> Solved {
         let s = &mut *self.scratch;
-        s.b.clear();
-        s.normals.clear();
+        s.planes.clear();
         for l in &s.lits {
-            s.b.push(l.ahead(look));
-            s.normals.push(l.normal_ahead(look));
+            s.planes.push(l.normal_ahead(look), l.ahead(look));
         }
         s.evaluations += s.lits.len() as u64;
-        if !self.view.multipliers {
-            return lp::best_alone(&s.normals, &s.b, self.view.half);
-        }
-        let solution = lp::min_max(&s.normals, &s.b, self.view.half, &mut s.warm);
-        s.evaluations += s.warm.pivots * (s.lits.len() as u64 + PIVOT) / SIMPLEX;
-        solution
+        let solution = if self.view.multipliers {
+            let solution = lp::min_max(&s.planes, self.view.half, &mut s.warm);
+            s.evaluations += s.warm.pivots * (s.lits.len() as u64 + PIVOT) / SIMPLEX;
+            solution
+        } else {
+            lp::best_alone(&s.planes, self.view.half)
+        };
+        Solved { solution, course: self.course(&solution) }
     }
 
     /// The bound that the multipliers of `s` give, through time.
@@ -521,8 +587,9 @@ impl Run<'_, '_> {
         c
     }
 
-    fn finish(&mut self, best: &Reach, s: &Solution, gone: &Gone) -> Bounded {
+    fn finish(&mut self, best: &Reach, lowest: &Solved, gone: &Gone) -> Bounded {
         self.note(best);
+        let s = &lowest.solution;
         let dt = best.dt;
         let is_spun = self.scratch.lits.iter().any(|l| l.weights.is_some() && l.other.is_none());
         let now = if is_spun { self.course(&best.path[0]).at(0.0, self.view.half) } else { f64::INFINITY };
@@ -545,16 +612,18 @@ impl Run<'_, '_> {
             }
         }
         // A curved literal that stands aside may do so only because the cell is too large for it.
+        let others: SmallVec<[_; 8]> = self.scratch.lits.iter().filter_map(|l| l.other).collect();
         for l in &self.scratch.lits {
-            let key = Some((l.side, l.id));
-            let fitted = l.id.sense() == Sense::Negative && self.scratch.lits.iter().any(|o| o.other == key);
+            let fitted = l.id.sense() == Sense::Negative && others.contains(&(l.side, l.id));
             a.cost += l.cost * if fitted { FITTED_COST } else { idle_cost(l) };
         }
         a.cost += (w.abs() + turn.abs() * dt.max(0.0)) * self.view.half;
-        let rests_on =
-            |s: &Solution| s.support[..s.count].iter().fold(0, |uses, (i, _)| uses | self.scratch.uses[*i as usize]);
+        let rests_on = |s: &Solution| {
+            s.support[..s.count].iter().fold(0, |uses, (i, _)| uses | self.scratch.notes[*i as usize].uses)
+        };
         let uses = if dt < 0.0 { Lists::MAX } else { rests_on(&best.path[0]) | rests_on(&best.path[1]) };
-        let low = LowPoint { look: gone.look, y: gone.lowest.y, z: gone.lowest.z };
+        let lowest = &gone.lowest.solution;
+        let low = LowPoint { look: gone.look, y: lowest.y, z: lowest.z };
         Bounded { advance: a, uses, gives_out: Some(low) }
     }
 }
@@ -567,11 +636,17 @@ pub(super) fn idle_cost(l: &Linear) -> f64 {
     }
 }
 
+/// A program's solution, and what its multipliers prove through time.
+#[derive(Clone, Copy, Debug)]
+struct Solved {
+    solution: Solution,
+    course: Course,
+}
+
 /// The earliest time ahead at which bounds were seen to fail.
 struct Gone {
     look: f64,
-    course: Course,
-    lowest: Solution,
+    lowest: Solved,
 }
 
 /// How long a clause is proven free, and by which multipliers: from the first to the last, linearly over that time.

@@ -45,7 +45,11 @@ pub fn advance(
     scratch: &mut Scratch,
 ) -> Advance {
     scratch.lits.clear();
-    scratch.uses.clear();
+    scratch.notes.clear();
+    scratch.taken.clear();
+    scratch.fitted_at.clear();
+    scratch.fitted.clear();
+    scratch.touchables.clear();
     scratch.ors.clear();
     scratch.made.clear();
     scratch.places.clear();
@@ -90,7 +94,9 @@ impl Run<'_, '_> {
     /// Takes back what was added beyond so many bounds and lists.
     fn take_back(&mut self, lits: usize, ors: usize) {
         self.scratch.lits.truncate(lits);
-        self.scratch.uses.truncate(lits);
+        self.scratch.notes.truncate(lits);
+        let taken = self.scratch.taken.iter().rposition(|t| (t.lit as usize) < lits).map_or(0, |last| last + 1);
+        self.scratch.taken.truncate(taken);
         self.scratch.ors.truncate(ors);
         self.scratch.clash = self.scratch.clash.filter(|clash| clash.before < lits);
     }
@@ -234,7 +240,7 @@ impl Run<'_, '_> {
         for i in lits..self.scratch.lits.len() {
             let l = &self.scratch.lits[i];
             if l.other.is_some() || l.weights.is_some() {
-                height = height.max(self.value_at(l, low));
+                height = height.max(self.value_at(l, low, || self.touched(i, low)));
             }
         }
         self.scratch.evaluations += (self.scratch.lits.len() - lits) as u64;
@@ -253,9 +259,11 @@ impl Run<'_, '_> {
                 Expression::Literal(id) => {
                     let i = self.made(side, id, at);
                     let l = &self.scratch.made[i];
-                    let height = self.value_at(l, low);
+                    let curved = self.view.is_curved_convex(side, id);
+                    let height = self.value_at(l, low, || curved.then(|| self.tangent(l, low)));
+                    let held = if height > low.z { Ok(height) } else { Err(l.cost * idle_cost(l)) };
                     self.scratch.checked += 1;
-                    if height > low.z { Ok(height) } else { Err(l.cost * idle_cost(l)) }
+                    held
                 }
                 Expression::Part(_) => Err(DVec3::ZERO),
                 Expression::And(_) => self.alone_above(side, (at + 1, next), low),
@@ -282,12 +290,12 @@ impl Run<'_, '_> {
     }
 
     /// A bound at a low point, touched there if that is higher.
-    fn value_at(&self, l: &Linear, low: &LowPoint) -> f64 {
+    fn value_at(&self, l: &Linear, low: &LowPoint, touched: impl FnOnce() -> Option<Linear>) -> f64 {
         let value = |l: &Linear| l.ahead(low.look) + l.normal_ahead(low.look).dot(low.y);
         let own = value(l);
         if own > low.z {
             return own;
         }
-        self.touched(l, low).map_or(own, |t| own.max(value(&t)))
+        touched().map_or(own, |t| own.max(value(&t)))
     }
 }

@@ -45,6 +45,8 @@ fn quadric(face: &Face, sense: Sense, delta: f64) -> Option<Quadric> {
     face.quadric(if sense == Sense::Positive { delta } else { -delta })
 }
 
+/// A round face about a cell, along A's axes.
+#[derive(Clone, Copy, Debug)]
 struct Around {
     u: DVec3,
     axis: Option<DVec3>,
@@ -72,6 +74,51 @@ impl Around {
         }
         let bend = axis.map_or(DVec3::ZERO, |a| a * (1.0 + q.slope * q.slope).sqrt());
         Self { u, axis, z, arm, rho: q.radius + q.slope * z, slope: q.slope, bend }
+    }
+
+    /// Q at the cell's centre.
+    fn value(&self) -> f64 {
+        self.u.length_squared() - self.rho * self.rho
+    }
+
+    /// Half its gradient there.
+    fn slope_of(&self) -> DVec3 {
+        self.u - self.axis.map_or(DVec3::ZERO, |a| a * (self.slope * self.rho))
+    }
+}
+
+/// What all fits of one literal have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted {
+    side: Side,
+    id: LiteralId,
+    /// The literal's face, or a simpler one that is the same all over the cell for the whole span.
+    face: Face,
+    /// Its quadric about the cell; `None` of a cone that is fitted by its tip alone.
+    around: Option<Around>,
+    /// How a point of the quadric's axis travels, of a face of B.
+    travel: Option<Travel>,
+}
+
+impl Fitted {
+    /// `None` for a literal that fits nothing.
+    pub fn of(view: &View, side: Side, id: LiteralId) -> Option<Self> {
+        if view.faces(side).get(id.face()).is_flat() {
+            return None;
+        }
+        let face = view.face(side, id);
+        let around = quadric(&face, id.sense(), view.delta)
+            .filter(|q| view.curved || q.slope == 0.0)
+            .map(|q| Around::of(&q, view, side));
+        if around.is_none() && face.apex().is_none() {
+            return None;
+        }
+        let travel = around.filter(|_| side == Side::B).map(|f| Travel::of(view, view.center - f.u));
+        Some(Self { side, id, face, around, travel })
+    }
+
+    fn key(&self) -> (Side, LiteralId) {
+        (self.side, self.id)
     }
 }
 
@@ -154,107 +201,109 @@ fn weights(p: &Around, q: &Around, even: bool) -> [f64; 2] {
     [if p.rho > 0.0 { (0.25 / p.rho).clamp(of_q, 4.0 * of_q) } else { of_q }, of_q]
 }
 
+/// The convex part of a fit's second order, for tangents at other points.
+#[derive(Clone, Copy, Debug)]
+pub struct Touchable {
+    convex: DMat3,
+    /// How steep the two quadrics are at most, weighed.
+    steep: f64,
+}
+
+/// A fit's bound, and what it is touched by at other points; `None` for cones taken by their tips, and within one body.
+pub type Fit = (Linear, Option<Touchable>);
+
 /// The bounds G of a positive literal `p` against a negative literal `q` of the other body, where both are round alike.
-pub fn fit(
-    view: &View,
-    (side_p, p): (Side, LiteralId),
-    (side_q, q): (Side, LiteralId),
-) -> impl Iterator<Item = Linear> {
-    debug_assert!(side_p != side_q && p.sense() == Sense::Positive && q.sense() == Sense::Negative);
-    let (face_p, face_q) = (view.face(side_p, p), view.face(side_q, q));
-    let of = |even| quadrics(view, (side_p, p, &face_p), (side_q, q, &face_q), even);
-    let even = of(true);
+pub fn fit(view: &View, p: &Fitted, q: &Fitted) -> impl Iterator<Item = Fit> {
+    debug_assert!(p.side != q.side && p.id.sense() == Sense::Positive && q.id.sense() == Sense::Negative);
+    let even = quadrics(view, p, q, true);
     // Radii alike to a hundredth bend alike: one bound will do.
-    let steep =
-        even.filter(|_| view.curved).and_then(|_| of(false)).filter(|l| l.weights.is_some_and(|[p, q]| p > 1.01 * q));
-    let tips = if even.is_none() { cones(view, (side_p, p, &face_p), (side_q, q, &face_q)) } else { None };
-    [even, steep, tips].into_iter().flatten()
+    let steep = even
+        .filter(|_| view.curved)
+        .and_then(|_| quadrics(view, p, q, false))
+        .filter(|(l, _)| l.weights.is_some_and(|[p, q]| p > 1.01 * q));
+    let tips = if even.is_none() { cones(view, (p.side, p.id, &p.face), (q.side, q.id, &q.face)) } else { None };
+    [even, steep, tips.map(|l| (l, None))].into_iter().flatten()
 }
 
 /// The bound G of a positive and a negative literal of one body, where both are round alike and near each other: two sides of
 /// a thin wall, or of a crescent. With even weights it is next to linear, and moves with its body as a plane does.
 pub fn within(view: &View, side: Side, p: LiteralId, q: LiteralId) -> Option<Linear> {
     let (face_p, face_q) = (view.face(side, p), view.face(side, q));
-    quadrics(view, (side, p, &face_p), (side, q, &face_q), true).filter(|l| l.normal.length() <= 1.0)
-}
-
-fn quadrics(
-    view: &View,
-    (side_p, p, face_p): (Side, LiteralId, &Face),
-    (side_q, q, face_q): (Side, LiteralId, &Face),
-    even: bool,
-) -> Option<Linear> {
     let (round_p, round_q) =
-        (quadric(face_p, Sense::Positive, view.delta)?, quadric(face_q, Sense::Negative, view.delta)?);
+        (quadric(&face_p, Sense::Positive, view.delta)?, quadric(&face_q, Sense::Negative, view.delta)?);
     if !view.curved && (round_p.slope > 0.0 || round_q.slope > 0.0) {
         return None;
     }
-    let (at_p, at_q) = (Around::of(&round_p, view, side_p), Around::of(&round_q, view, side_q));
-    // Where coordinates near the end of the numbers have no differences left there is no fit; nor round nothing.
-    if !(at_p.rho.is_finite() && at_q.rho.is_finite() && at_q.rho > 0.0) {
+    let (at_p, at_q) = (Around::of(&round_p, view, side), Around::of(&round_q, view, side));
+    let way = if side == Side::B { view.motion.speed * view.motion.h } else { 0.0 };
+    if !fits(view, &at_p, &at_q, way) {
         return None;
     }
-    let way = if side_q == Side::B { view.motion.speed * view.motion.h } else { 0.0 };
-    if at_q.slope > 0.0 && at_q.z <= view.radius + way {
-        return None;
-    }
-    if let (Some(a), Some(b)) = (at_p.axis, at_q.axis)
-        && a.cross(b).length() > LEAN
-    {
-        return None;
-    }
-    let mu = weights(&at_p, &at_q, even);
-    let own = side_p == side_q;
+    let mu = weights(&at_p, &at_q, true);
     // What stays curved moves with the cell over a body of its own: bounded wherever that takes it in the span.
-    let half = if own { view.half + DVec3::splat(way) } else { view.half };
-    let bend = Bend::of(&at_p, &at_q, mu, half, view.curved);
-    // Value and half the gradient of Q at the cell's centre.
-    let value = |f: &Around| f.u.length_squared() - f.rho * f.rho;
-    let slope = |f: &Around| f.u - f.axis.map_or(DVec3::ZERO, |a| a * (f.slope * f.rho));
-    let (sigma, mu_b, moved) = if side_p == Side::B { (1.0, mu[0], &at_p) } else { (-1.0, mu[1], &at_q) };
+    let bend = Bend::of(&at_p, &at_q, mu, view.half + DVec3::splat(way), view.curved);
+    let off = view.rounding + view.motion.rounding.matrix * (at_p.arm + at_q.arm + view.radius);
+    let normal = 2.0 * (at_p.slope_of() * mu[0] - at_q.slope_of() * mu[1]);
+    // Where the body is shifts both alike: what stays is what rounding does to each offset, and to the squares. The
+    // clause takes a literal's whole rounding off, of which only the sums' share is this one's.
+    let each = |f: &Around, mu: f64| {
+        let arm = f.arm + f.u.length() + view.radius;
+        mu * f64::EPSILON * (32.0 * (1.0 + f.slope) * (f.u.length() + f.slope * f.rho.abs()) * arm + 8.0 * arm * arm)
+    };
+    let reach = (round_p.origin.length() + round_q.origin.length()) * 2.0 * f64::EPSILON;
+    let lost = each(&at_p, mu[0]) + each(&at_q, mu[1]) + reach + 2.0 * off * normal.length() - SPARED * view.rounding;
+    let bound = at_p.value() * mu[0] - at_q.value() * mu[1] - bend.remainder - lost;
+    let plane = view.plane(side, p, normal, bound);
+    let fit = Linear { other: Some((side, q)), weights: Some(mu), point: view.center, cost: bend.cost, ..plane };
+    Some(fit).filter(|l| l.normal.length() <= 1.0)
+}
+
+/// True where two round faces may have a fit; `way` is how far a subtracted one may move in the span.
+fn fits(view: &View, p: &Around, q: &Around, way: f64) -> bool {
+    // Where coordinates near the end of the numbers have no differences left there is no fit; nor round nothing.
+    if !(p.rho.is_finite() && q.rho.is_finite() && q.rho > 0.0) {
+        return false;
+    }
+    if q.slope > 0.0 && q.z <= view.radius + way {
+        return false;
+    }
+    !matches!((p.axis, q.axis), (Some(a), Some(b)) if a.cross(b).length() > LEAN)
+}
+
+fn quadrics(view: &View, p: &Fitted, q: &Fitted, even: bool) -> Option<Fit> {
+    let (at_p, at_q) = (p.around.as_ref()?, q.around.as_ref()?);
+    let way = if q.side == Side::B { view.motion.speed * view.motion.h } else { 0.0 };
+    if !fits(view, at_p, at_q, way) {
+        return None;
+    }
+    let mu = weights(at_p, at_q, even);
+    let bend = Bend::of(at_p, at_q, mu, view.half, view.curved);
+    let (sigma, mu_b, moved) = if p.side == Side::B { (1.0, mu[0], p) } else { (-1.0, mu[1], q) };
     // What rounding may do to u and z and, times the arm, to an axis; and through them to G over the cell.
     let off = view.rounding + view.motion.rounding.matrix * (at_p.arm + at_q.arm + view.radius);
     let gradient = |f: &Around| (1.0 + f.slope * f.slope) * (f.u.length() + f.rho.abs() + 2.0 * view.radius);
-    let lost = off * (1.0 + 4.0 * (mu[0] * gradient(&at_p) + mu[1] * gradient(&at_q)));
-    let normal = 2.0 * (slope(&at_p) * mu[0] - slope(&at_q) * mu[1]);
-    if own {
-        // Where the body is shifts both alike: what stays is what rounding does to each offset, and to the squares. The
-        // clause takes a literal's whole rounding off, of which only the sums' share is this one's.
-        let each = |f: &Around, mu: f64| {
-            let arm = f.arm + f.u.length() + view.radius;
-            mu * f64::EPSILON
-                * (32.0 * (1.0 + f.slope) * (f.u.length() + f.slope * f.rho.abs()) * arm + 8.0 * arm * arm)
-        };
-        let reach = (round_p.origin.length() + round_q.origin.length()) * 2.0 * f64::EPSILON;
-        let lost =
-            each(&at_p, mu[0]) + each(&at_q, mu[1]) + reach + 2.0 * off * normal.length() - SPARED * view.rounding;
-        let bound = value(&at_p) * mu[0] - value(&at_q) * mu[1] - bend.remainder - lost;
-        let plane = view.plane(side_p, p, normal, bound);
-        return Some(Linear {
-            other: Some((side_q, q)),
-            weights: Some(mu),
-            point: view.center,
-            cost: bend.cost,
-            ..plane
-        });
-    }
-    let m = moving(view, sigma, moved, off)?;
+    let lost = off * (1.0 + 4.0 * (mu[0] * gradient(at_p) + mu[1] * gradient(at_q)));
+    let normal = 2.0 * (at_p.slope_of() * mu[0] - at_q.slope_of() * mu[1]);
+    let m = moving(view, sigma, (moved.around.as_ref()?, moved.travel.as_ref()?), off)?;
     let twice = 2.0 * mu_b;
-    Some(Linear {
-        side: side_p,
-        id: p,
-        other: Some((side_q, q)),
+    let fit = Linear {
+        side: p.side,
+        id: p.id,
+        other: Some(q.key()),
         weights: Some(mu),
         point: view.center,
         normal,
-        bound: value(&at_p) * mu[0] - value(&at_q) * mu[1] - bend.remainder - lost,
+        bound: at_p.value() * mu[0] - at_q.value() * mu[1] - bend.remainder - lost,
         rate: m.rate * twice,
         turn: m.turn * twice,
         s: m.s * twice,
         q: m.second * twice,
         rigid: false,
         cost: bend.cost,
-    })
+    };
+    let steep = (1.0 + at_p.slope * at_p.slope) * mu[0] + (1.0 + at_q.slope * at_q.slope) * mu[1];
+    let touchable = (view.curved || p.face.ball().is_some()).then_some(Touchable { convex: bend.convex, steep });
+    Some((fit, touchable))
 }
 
 /// How much faster than everything else a round face must spin about its own axis for a bound of its own.
@@ -306,7 +355,7 @@ pub fn spun(view: &View, id: LiteralId) -> Option<Linear> {
     let off = view.rounding + view.motion.rounding.matrix * (f.arm + view.radius);
     let steep = (1.0 + f.slope * f.slope) * (f.u.length() + f.rho + 2.0 * view.radius);
     let lost = off * (1.0 + 4.0 * mu * steep);
-    let m = moving(view, sigma, &f, off)?;
+    let m = moving(view, sigma, (&f, &Travel::of(view, view.center - f.u)), off)?;
     let gradient = f.u - f.axis.map_or(DVec3::ZERO, |a| a * (f.slope * f.rho));
     let twice = 2.0 * mu;
     Some(Linear {
@@ -372,24 +421,13 @@ pub fn first_off_axis(at: &Instant, (side_p, p): (Side, &Face), q: &Face, x: DVe
     Some(o_p + direction.try_normalize()? * radius)
 }
 
-/// The bound of a fit, its convex part yᵀCy touched at another point `y` of the cell; `None` for cones taken by their tips.
-pub fn touch(view: &View, fit: &Linear, y: DVec3) -> Option<Linear> {
-    let ((side_q, q), mu) = (fit.other?, fit.weights?);
-    if side_q == fit.side {
-        return None;
-    }
-    let (p, q) = (&view.face(fit.side, fit.id), &view.face(side_q, q));
-    if !view.curved && p.ball().is_none() {
-        return None;
-    }
-    let at_p = Around::of(&quadric(p, Sense::Positive, view.delta)?, view, fit.side);
-    let at_q = Around::of(&quadric(q, Sense::Negative, view.delta)?, view, side_q);
-    let pull = Bend::of(&at_p, &at_q, mu, view.half, view.curved).convex * y;
+/// The bound of a fit, its convex part yᵀCy touched at another point `y` of the cell.
+pub fn touch(view: &View, fit: &Linear, touchable: &Touchable, y: DVec3) -> Linear {
+    let pull = touchable.convex * y;
     // |∇G| has grown: its rounding, and that of C.
-    let steep = (1.0 + at_p.slope * at_p.slope) * mu[0] + (1.0 + at_q.slope * at_q.slope) * mu[1];
-    let lost = view.rounding * (2.0 * pull.length() + 8.0 * steep * view.radius);
+    let lost = view.rounding * (2.0 * pull.length() + 8.0 * touchable.steep * view.radius);
     let bound = fit.bound - y.dot(pull) - lost;
-    Some(Linear { point: view.center + y, normal: fit.normal + 2.0 * pull, bound, ..*fit })
+    Linear { point: view.center + y, normal: fit.normal + 2.0 * pull, bound, ..*fit }
 }
 
 /// The bound of a cone in a cone hole of (nearly) the same angle and direction. With common axis a and angle α,
@@ -443,6 +481,7 @@ fn cones(
 }
 
 /// How a point o of B travels as A sees it over the span.
+#[derive(Clone, Copy, Debug)]
 struct Travel {
     /// Velocity of A against B at o.
     w: DVec3,
@@ -481,11 +520,12 @@ struct Moving {
     second: f64,
 }
 
-fn moving(view: &View, sigma: f64, f: &Around, off: f64) -> Option<Moving> {
+/// Of a face of B, and of how the point of its axis next to the cell's centre travels.
+fn moving(view: &View, sigma: f64, (f, travel): (&Around, &Travel), off: f64) -> Option<Moving> {
     let (at, h, r, u) = (view.at, view.motion.h, view.radius, f.u);
     let (omega, spin_b) = (at.omega, at.spin_b);
     let spin_a = omega + spin_b;
-    let Travel { w, speed, growth: c, pull, slip } = Travel::of(view, view.center - u);
+    let Travel { w, speed, growth: c, pull, slip } = *travel;
     let lost = (u.length() + r) * slip + off * speed;
     let Some(a) = f.axis else {
         let reach = u.length() + r + h * speed;

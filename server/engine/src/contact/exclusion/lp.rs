@@ -24,11 +24,75 @@ pub struct Solution {
     pub count: usize,
 }
 
+/// Planes b + n·y, coordinate by coordinate: the program looks at one number of each at a time.
+#[derive(Clone, Debug, Default)]
+pub struct Planes {
+    normals: [Vec<f64>; 3],
+    b: Vec<f64>,
+}
+
+impl Planes {
+    /// Takes all away.
+    pub fn clear(&mut self) {
+        self.normals.iter_mut().for_each(Vec::clear);
+        self.b.clear();
+    }
+
+    /// Adds a plane.
+    pub fn push(&mut self, normal: DVec3, b: f64) {
+        self.normals.iter_mut().zip(normal.to_array()).for_each(|(all, n)| all.push(n));
+        self.b.push(b);
+    }
+
+    fn len(&self) -> usize {
+        self.b.len()
+    }
+
+    fn normal(&self, i: usize) -> DVec3 {
+        let [x, y, z] = &self.normals;
+        DVec3::new(x[i], y[i], z[i])
+    }
+
+    /// The plane that is highest above another one, n = −(y0, y1, y2), b = −y3, if it is by more than `gain`; and by how much.
+    fn highest(&self, y: [f64; 4], gain: f64) -> Option<(usize, f64)> {
+        let count = self.b.len();
+        let [nx, ny, nz] = &self.normals;
+        let (nx, ny, nz, b) = (&nx[..count], &ny[..count], &nz[..count], &self.b[..count]);
+        let (mut best, mut gain) = (None, gain);
+        let mut from = 0;
+        // A few at a time, side by side; then the largest of these.
+        while from + LANES <= count {
+            let mut g = [0.0; LANES];
+            let at = from..from + LANES;
+            let (nx, ny, nz, b) = (&nx[at.clone()], &ny[at.clone()], &nz[at.clone()], &b[at]);
+            for k in 0..LANES {
+                g[k] = b[k] - (nx[k] * y[0] + ny[k] * y[1] + nz[k] * y[2] + y[3]);
+            }
+            for (k, g) in g.into_iter().enumerate() {
+                if g > gain {
+                    (best, gain) = (Some(from + k), g);
+                }
+            }
+            from += LANES;
+        }
+        for i in from..count {
+            let g = b[i] - (nx[i] * y[0] + ny[i] * y[1] + nz[i] * y[2] + y[3]);
+            if g > gain {
+                (best, gain) = (Some(i), g);
+            }
+        }
+        best.map(|i| (i, gain))
+    }
+}
+
+/// Planes looked at side by side.
+const LANES: usize = 4;
+
 /// The plane that is highest at its lowest point over the box, alone: the program without multipliers.
-pub fn best_alone(normals: &[DVec3], b: &[f64], half: DVec3) -> Solution {
-    let lowest = |i: usize| b[i] - normals[i].abs().dot(half);
-    let best = (0..normals.len()).max_by(|i, j| lowest(*i).total_cmp(&lowest(*j))).unwrap_or(0);
-    let y = -half * normals[best].signum();
+pub fn best_alone(planes: &Planes, half: DVec3) -> Solution {
+    let lowest = |i: usize| planes.b[i] - planes.normal(i).abs().dot(half);
+    let best = (0..planes.len()).max_by(|i, j| lowest(*i).total_cmp(&lowest(*j))).unwrap_or(0);
+    let y = -half * planes.normal(best).signum();
     Solution { z: lowest(best), y, support: [(best as u32, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)], count: 1 }
 }
 
@@ -48,13 +112,13 @@ pub struct Warm {
 
 impl Warm {
     /// The inverse of the basis over these planes; `None` if it is none, nearly singular, or not feasible.
-    fn inverse(&self, normals: &[DVec3], count: usize) -> Option<([usize; 4], [[f64; 4]; 4])> {
+    fn inverse(&self, planes: &Planes) -> Option<([usize; 4], [[f64; 4]; 4])> {
         let basis = self.basis?;
-        if basis.iter().any(|c| *c >= SLACKS + count) {
+        if basis.iter().any(|c| *c >= SLACKS + planes.len()) {
             return None;
         }
         let column = |c: usize| match c.checked_sub(SLACKS) {
-            Some(i) => normals[i].extend(1.0),
+            Some(i) => planes.normal(i).extend(1.0),
             None => {
                 let mut v = [0.0; 4];
                 v[c / 2] = if c.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -71,55 +135,45 @@ impl Warm {
     }
 }
 
-/// Solves the program for planes (n_i, b_i), i < b.len(); at least one is needed. `warm` is where to start, and is left
-/// where this ended.
-pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3, warm: &mut Warm) -> Solution {
-    let count = b.len();
-    debug_assert!(count > 0 && normals.len() >= count);
+/// Solves the program for some planes; at least one is needed. `warm` is where to start, and is left where this ended.
+pub fn min_max(planes: &Planes, half: DVec3, warm: &mut Warm) -> Solution {
+    let b = &planes.b[..];
+    debug_assert!(!b.is_empty());
     let scale = b.iter().fold(half.max_element(), |m: f64, b| m.max(b.abs()));
     let tol = 1e-14 * scale;
     // Rows of the basis inverse; `basis[r]` is the column in row r.
-    let (mut basis, mut inv) = warm.inverse(normals, count).unwrap_or_else(|| single(normals, b, half));
-    let profit = |c: usize| if c >= SLACKS { b[c - SLACKS] } else { -half[c / 2] };
+    let (mut basis, mut inv) = warm.inverse(planes).unwrap_or_else(|| single(planes, half));
+    let e = half.to_array();
+    let profit = |c: usize| if c >= SLACKS { b[c - SLACKS] } else { -e[c / 2] };
+    let mut p = basis.map(profit);
     let mut y = [0.0; 4];
     let mut pivots = 0;
     for _ in 0..MAX_PIVOTS {
         pivots += 1;
-        let p = [profit(basis[0]), profit(basis[1]), profit(basis[2]), profit(basis[3])];
         for k in 0..4 {
             y[k] = p[0] * inv[0][k] + p[1] * inv[1][k] + p[2] * inv[2][k] + p[3] * inv[3][k];
         }
         // Entering column: the largest reduced profit.
-        let (mut entering, mut gain) = (NONE, tol);
-        for i in 0..count {
-            let n = normals[i];
-            let g = b[i] - (n.x * y[0] + n.y * y[1] + n.z * y[2] + y[3]);
-            if g > gain {
-                (entering, gain) = (SLACKS + i, g);
-            }
-        }
+        let (mut entering, mut gain) = planes.highest(y, tol).map_or((NONE, tol), |(i, gain)| (SLACKS + i, gain));
         for k in 0..3 {
-            let e = half[k];
-            if y[k] - e > gain {
-                (entering, gain) = (2 * k, y[k] - e);
-            }
-            if -y[k] - e > gain {
-                (entering, gain) = (2 * k + 1, -y[k] - e);
+            let over = y[k].abs() - e[k];
+            if over > gain {
+                (entering, gain) = (2 * k + usize::from(y[k] < 0.0), over);
             }
         }
         if entering == NONE {
             break;
         }
-        let mut d = [0.0; 4];
-        for r in 0..4 {
-            d[r] = if entering >= SLACKS {
-                let n = normals[entering - SLACKS];
-                inv[r][0] * n.x + inv[r][1] * n.y + inv[r][2] * n.z + inv[r][3]
-            } else {
-                let k = entering / 2;
-                if entering.is_multiple_of(2) { -inv[r][k] } else { inv[r][k] }
-            };
-        }
+        let d: [f64; 4] = match entering.checked_sub(SLACKS) {
+            Some(i) => {
+                let n = planes.normal(i);
+                std::array::from_fn(|r| inv[r][0] * n.x + inv[r][1] * n.y + inv[r][2] * n.z + inv[r][3])
+            }
+            None => std::array::from_fn(|r| {
+                let v = inv[r][entering / 2];
+                if entering.is_multiple_of(2) { -v } else { v }
+            }),
+        };
         let (mut leaving, mut ratio) = (NONE, f64::INFINITY);
         for r in 0..4 {
             if d[r] > 1e-12 {
@@ -134,17 +188,14 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3, warm: &mut Warm) -> So
             break;
         }
         let pivot = 1.0 / d[leaving];
-        for k in 0..4 {
-            inv[leaving][k] *= pivot;
-        }
+        let row = inv[leaving].map(|v| v * pivot);
         for r in 0..4 {
-            if r != leaving && d[r] != 0.0 {
-                for k in 0..4 {
-                    inv[r][k] -= d[r] * inv[leaving][k];
-                }
+            for k in 0..4 {
+                inv[r][k] -= d[r] * row[k];
             }
         }
-        basis[leaving] = entering;
+        inv[leaving] = row;
+        (basis[leaving], p[leaving]) = (entering, profit(entering));
     }
     *warm = Warm { basis: Some(basis), pivots };
     let mut s = Solution { z: y[3], y: DVec3::new(-y[0], -y[1], -y[2]), support: [(0, 0.0); 4], count: 0 };
@@ -159,17 +210,17 @@ pub fn min_max(normals: &[DVec3], b: &[f64], half: DVec3, warm: &mut Warm) -> So
 }
 
 /// The first basis: the plane whose own minimum over the box is highest, with its slacks.
-fn single(normals: &[DVec3], b: &[f64], half: DVec3) -> ([usize; 4], [[f64; 4]; 4]) {
+fn single(planes: &Planes, half: DVec3) -> ([usize; 4], [[f64; 4]; 4]) {
     let mut best = (f64::NEG_INFINITY, 0);
-    for (i, b) in b.iter().enumerate() {
-        let own = b - normals[i].abs().dot(half);
+    for (i, b) in planes.b.iter().enumerate() {
+        let own = b - planes.normal(i).abs().dot(half);
         if own > best.0 {
             best = (own, i);
         }
     }
     let (mut basis, mut inv) = ([SLACKS + best.1; 4], [[0.0; 4]; 4]);
     for k in 0..3 {
-        let n = normals[best.1][k];
+        let n = planes.normal(best.1)[k];
         let (column, sign) = if n >= 0.0 { (2 * k, -1.0) } else { (2 * k + 1, 1.0) };
         basis[k] = column;
         inv[k][k] = sign;
@@ -185,13 +236,18 @@ mod tests {
     use crate::math::random::Random;
 
     fn check(normals: &[DVec3], b: &[f64], half: DVec3) {
+        let planes = |b: &[f64]| {
+            let mut planes = Planes::default();
+            normals.iter().zip(b).for_each(|(n, b)| planes.push(*n, *b));
+            planes
+        };
         let mut warm = Warm::default();
-        let cold = min_max(normals, b, half, &mut warm);
+        let cold = min_max(&planes(b), half, &mut warm);
         judge(&cold, normals, b, half);
         // The same program, and one a little further on, from the basis of the first.
-        judge(&min_max(normals, b, half, &mut warm), normals, b, half);
+        judge(&min_max(&planes(b), half, &mut warm), normals, b, half);
         let moved: Vec<f64> = b.iter().enumerate().map(|(i, b)| b + 0.1 * (i as f64).sin()).collect();
-        judge(&min_max(normals, &moved, half, &mut warm), normals, &moved, half);
+        judge(&min_max(&planes(&moved), half, &mut warm), normals, &moved, half);
     }
 
     fn judge(s: &Solution, normals: &[DVec3], b: &[f64], half: DVec3) {
