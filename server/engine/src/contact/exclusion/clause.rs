@@ -558,7 +558,7 @@ impl Run<'_, '_> {
         }
         s.evaluations += s.lits.len() as u64;
         let solution = if self.view.multipliers {
-            let solution = lp::min_max(&s.planes, self.view.half, &mut s.warm);
+            let solution = lp::min_max(&mut s.planes, self.view.half, &mut s.warm);
             s.evaluations += s.warm.pivots * (s.lits.len() as u64 + PIVOT) / SIMPLEX;
             solution
         } else {

@@ -29,6 +29,8 @@ pub struct Solution {
 pub struct Planes {
     normals: [Vec<f64>; 3],
     b: Vec<f64>,
+    /// Working memory: how high each is above what the program has come to.
+    heights: Vec<f64>,
 }
 
 impl Planes {
@@ -53,35 +55,25 @@ impl Planes {
         DVec3::new(x[i], y[i], z[i])
     }
 
-    /// The plane that is highest above another one, n = −(y0, y1, y2), b = −y3, if it is by more than `gain`; and by how much.
-    fn highest(&self, y: [f64; 4], gain: f64) -> Option<(usize, f64)> {
-        let count = self.b.len();
-        let [nx, ny, nz] = &self.normals;
-        let (nx, ny, nz, b) = (&nx[..count], &ny[..count], &nz[..count], &self.b[..count]);
-        let (mut best, mut gain) = (None, gain);
-        let mut from = 0;
-        // A few at a time, side by side; then the largest of these.
-        while from + LANES <= count {
-            let mut g = [0.0; LANES];
-            let at = from..from + LANES;
-            let (nx, ny, nz, b) = (&nx[at.clone()], &ny[at.clone()], &nz[at.clone()], &b[at]);
-            for k in 0..LANES {
-                g[k] = b[k] - (nx[k] * y[0] + ny[k] * y[1] + nz[k] * y[2] + y[3]);
-            }
-            for (k, g) in g.into_iter().enumerate() {
-                if g > gain {
-                    (best, gain) = (Some(from + k), g);
-                }
-            }
-            from += LANES;
+    /// The plane that is highest above another one, n = −(y0, y1, y2), b = −y3, if it is by more than `gain`; and by how much. The
+    /// first of equals.
+    fn highest(&mut self, y: [f64; 4], gain: f64) -> Option<(usize, f64)> {
+        let Self { normals: [nx, ny, nz], b, heights } = self;
+        let count = b.len();
+        heights.resize(count, 0.0);
+        let (nx, ny, nz, b, heights) = (&nx[..count], &ny[..count], &nz[..count], &b[..count], &mut heights[..count]);
+        for i in 0..count {
+            heights[i] = b[i] - (nx[i] * y[0] + ny[i] * y[1] + nz[i] * y[2] + y[3]);
         }
-        for i in from..count {
-            let g = b[i] - (nx[i] * y[0] + ny[i] * y[1] + nz[i] * y[2] + y[3]);
-            if g > gain {
-                (best, gain) = (Some(i), g);
+        let mut most = [gain; LANES];
+        let (chunks, rest) = heights.as_chunks::<LANES>();
+        for chunk in chunks {
+            for (most, height) in most.iter_mut().zip(chunk) {
+                *most = if *height > *most { *height } else { *most };
             }
         }
-        best.map(|i| (i, gain))
+        let highest = most.iter().chain(rest).fold(gain, |most, height| if *height > most { *height } else { most });
+        if highest > gain { heights.iter().position(|h| *h == highest).map(|i| (i, highest)) } else { None }
     }
 }
 
@@ -136,16 +128,15 @@ impl Warm {
 }
 
 /// Solves the program for some planes; at least one is needed. `warm` is where to start, and is left where this ended.
-pub fn min_max(planes: &Planes, half: DVec3, warm: &mut Warm) -> Solution {
-    let b = &planes.b[..];
-    debug_assert!(!b.is_empty());
-    let scale = b.iter().fold(half.max_element(), |m: f64, b| m.max(b.abs()));
+pub fn min_max(planes: &mut Planes, half: DVec3, warm: &mut Warm) -> Solution {
+    debug_assert!(planes.len() > 0);
+    let scale = planes.b.iter().fold(half.max_element(), |m: f64, b| m.max(b.abs()));
     let tol = 1e-14 * scale;
     // Rows of the basis inverse; `basis[r]` is the column in row r.
     let (mut basis, mut inv) = warm.inverse(planes).unwrap_or_else(|| single(planes, half));
     let e = half.to_array();
-    let profit = |c: usize| if c >= SLACKS { b[c - SLACKS] } else { -e[c / 2] };
-    let mut p = basis.map(profit);
+    let profit = |planes: &Planes, c: usize| if c >= SLACKS { planes.b[c - SLACKS] } else { -e[c / 2] };
+    let mut p = basis.map(|c| profit(planes, c));
     let mut y = [0.0; 4];
     let mut pivots = 0;
     for _ in 0..MAX_PIVOTS {
@@ -195,7 +186,7 @@ pub fn min_max(planes: &Planes, half: DVec3, warm: &mut Warm) -> Solution {
             }
         }
         inv[leaving] = row;
-        (basis[leaving], p[leaving]) = (entering, profit(entering));
+        (basis[leaving], p[leaving]) = (entering, profit(planes, entering));
     }
     *warm = Warm { basis: Some(basis), pivots };
     let mut s = Solution { z: y[3], y: DVec3::new(-y[0], -y[1], -y[2]), support: [(0, 0.0); 4], count: 0 };
@@ -242,12 +233,12 @@ mod tests {
             planes
         };
         let mut warm = Warm::default();
-        let cold = min_max(&planes(b), half, &mut warm);
+        let cold = min_max(&mut planes(b), half, &mut warm);
         judge(&cold, normals, b, half);
         // The same program, and one a little further on, from the basis of the first.
-        judge(&min_max(&planes(b), half, &mut warm), normals, b, half);
+        judge(&min_max(&mut planes(b), half, &mut warm), normals, b, half);
         let moved: Vec<f64> = b.iter().enumerate().map(|(i, b)| b + 0.1 * (i as f64).sin()).collect();
-        judge(&min_max(&planes(&moved), half, &mut warm), normals, &moved, half);
+        judge(&min_max(&mut planes(&moved), half, &mut warm), normals, &moved, half);
     }
 
     fn judge(s: &Solution, normals: &[DVec3], b: &[f64], half: DVec3) {

@@ -557,21 +557,29 @@ fn damped_step_of<const N: usize>(
     f: &[f64; MAX_UNKNOWNS],
     mu: f64,
 ) -> Option<[f64; MAX_UNKNOWNS]> {
-    // Row by row of J, so that sums stand side by side; each is summed in the order of the rows.
+    // Of J the rows of constraints hold nothing of the multipliers: but for the last four a block of 4 by 4. Sums stand side by
+    // side; each is summed in the order of the rows.
+    let m = N - 4;
+    debug_assert!(jac[..m].iter().all(|row| row[4..].iter().all(|v| *v == 0.0)));
     let (mut a, mut b) = ([[0.0; N]; N], [0.0; N]);
-    for r in 0..N {
-        let row: [f64; N] = std::array::from_fn(|k| jac[r][k]);
-        for i in 0..N {
-            // Most of J is zeros.
-            if row[i] != 0.0 {
-                for j in 0..N {
-                    a[i][j] += row[i] * row[j];
-                }
-                b[i] -= row[i] * f[r];
+    for (row, f) in jac[..m].iter().zip(f) {
+        for i in 0..4 {
+            for j in 0..4 {
+                a[i][j] += row[i] * row[j];
             }
+            b[i] -= row[i] * f;
         }
     }
+    let last: [[f64; N]; 4] = std::array::from_fn(|k| std::array::from_fn(|j| jac[m + k][j]));
     for i in 0..N {
+        let mut sums = a[i];
+        for (row, f) in last.iter().zip(&f[m..N]) {
+            for j in 0..N {
+                sums[j] += row[i] * row[j];
+            }
+            b[i] -= row[i] * f;
+        }
+        a[i] = sums;
         a[i][i] += mu;
     }
     // Cholesky's factors, column by column: what is behind a column is updated at once.
