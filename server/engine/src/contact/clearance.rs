@@ -7,6 +7,7 @@
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
 use crate::bound::{Bound, Volumes};
+use crate::contact::cavity;
 use crate::contact::certificate::{self, Certificate};
 use crate::contact::convex::ConvexPair;
 use crate::contact::instant::depth;
@@ -235,6 +236,10 @@ fn standing(body: PlacedModel<'_>) -> PlacedModel<'_> {
     PlacedModel { placed: Placed { motion, ..body.placed }, ..body }
 }
 
+/// How many times farther apart than the touching distance bodies are whom their parts show to be apart. What is nearer is searched,
+/// which asks for f: at sharp edges that falls below the distance.
+const FAR: f64 = 4.0;
+
 /// Whether the bodies of a question are within `distance` (a length) of each other at the start, proven or witnessed, and
 /// the cells' worth of work that it took. Within the models' reach it is the search for a contact of that negative depth, of
 /// bodies that stand still there; farther it covers the whole trees.
@@ -246,6 +251,11 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
     }
     // Of two convex primitives the nearest points tell, where they are apart.
     if ConvexPair::new(task).is_some_and(|c| c.distance() > distance + 8.0 * task.rounding) {
+        return (Within::Apart, 0);
+    }
+    let known = task.model_a.margin().min(task.model_b.margin());
+    let asks_parts = task.strategies.cavities && FAR * distance <= known;
+    if asks_parts && cavity::keeps_apart(&task, FAR * distance) {
         return (Within::Apart, 0);
     }
     let level = 0.5 * distance;

@@ -67,20 +67,48 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
     if !of_a.are_pierced() && !of_b.are_pierced() {
         return None;
     }
-    let pairs = near(&task, &region, &of_a, &of_b)?;
+    let pairs = near(&task, &region, &of_a, &of_b, 0.0)?;
     Unions::new(&task, [&of_a, &of_b], pairs, true).answer(contacts)
+}
+
+/// True where no two points of the bodies are within `way` (a length) of each other over the whole step of a task, as far as the
+/// kernel can tell by parts and their cavities. It takes next to nothing where the bodies are of another kind.
+///
+/// Of two such points x of a and y of b each has f up to `way` in the other body, so both lie in the region of that level, and in
+/// parts of it. What a direction proves for them, w·(y − x) >= φ, is more than |w|·`way`: the proof for a depth of 0 with as much
+/// taken off beside rounding.
+pub(super) fn keeps_apart(task: &Task, way: f64) -> bool {
+    if !task.strategies.region || !way.is_finite() {
+        return false;
+    }
+    let Some(region) = (Task { delta: -way, ..*task }).region(0.0, 1.0) else { return true };
+    if region.a.primitives + region.b.primitives > MOST_LEFT {
+        return false;
+    }
+    let of_a = Parts::within(task.a, &|n| region.a.node_alive(n));
+    let of_b = Parts::within(task.b, &|n| region.b.node_alive(n));
+    let (Some(of_a), Some(of_b)) = (of_a, of_b) else { return false };
+    let Some(pairs) = near(task, &region, &of_a, &of_b, way) else { return false };
+    if !pairs.is_empty() && !of_a.are_pierced() && !of_b.are_pierced() {
+        return false;
+    }
+    let task = Task { delta: 0.0, rounding: task.rounding + 0.5 * way, ..*task };
+    let unions = Unions::new(&task, [&of_a, &of_b], pairs, true);
+    (0..unions.pairs.len())
+        .all(|index| unions.cavities(index).iter().any(|pair| pair.prove(1.0, None).0 == ProofEnd::Proven))
 }
 
 /// Parts of both bodies by pairs.
 type Pairs = SmallVec<[(PiercedPart, PiercedPart); 4]>;
 
-/// The pairs of parts that may meet within a collision region: their boxes do, those of b swept. `None` where there are many.
-fn near(task: &Task, region: &Region, of_a: &Parts, of_b: &Parts) -> Option<Pairs> {
+/// The pairs of parts that may come within `way` of each other in a collision region: their boxes do, those of b swept. `None` where
+/// there are many.
+fn near(task: &Task, region: &Region, of_a: &Parts, of_b: &Parts, way: f64) -> Option<Pairs> {
     let (placed_a, placed_b) = task.relative.placed();
     let sweep = Sweep::new(placed_b, placed_a);
     let left =
         |solid: &Solid, part: &PiercedPart, left: &Aabb| solid.primitives[part.main as usize].aabb.intersection(left);
-    let boxes_a: Vec<Aabb> = of_a.all().iter().map(|a| left(task.a, a, &region.a.aabb)).collect();
+    let boxes_a: Vec<Aabb> = of_a.all().iter().map(|a| left(task.a, a, &region.a.aabb).grown(way)).collect();
     let mut pairs = Pairs::new();
     for b in of_b.all() {
         let swept = sweep.of_box(&left(task.b, b, &region.b.aabb), 0.0, 1.0);

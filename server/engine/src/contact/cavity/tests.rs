@@ -105,6 +105,38 @@ fn moving(at: DVec3, tilt: DVec3, by: DVec3, spin: DVec3) -> Motion {
     Motion::turning(Pose::new(at, quat_of_rotation_vector(tilt)), at + by, spin)
 }
 
+#[test]
+fn what_is_shown_to_keep_apart_is_farther_apart() {
+    let (plate, peg) = (plate(), simple(Cylinder { radius: 0.2, half_height: 0.5 }));
+    let mut n = Random(17);
+    let mut shown = 0;
+    for i in 0..400 {
+        // Upright, so that the gap between peg and wall is known.
+        let off = n.within(0.0, 0.06);
+        let at = across(&mut n, off) + DVec3::Z * n.within(-0.3, 0.3);
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let still = Motion::resting(Pose::new(at, quat_of_rotation_vector(DVec3::Z * n.within(0.0, 3.0))));
+        let sides = [(&plate, rest()), (&peg, still)].map(|(model, m)| PlacedModel { model, placed: placed(m) });
+        let [a, b] = if i % 2 == 0 { sides } else { [sides[1], sides[0]] };
+        let query = PairQuery {
+            a,
+            b,
+            resolution: default_resolution(&plate, &peg),
+            cell_limit: 1000,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
+        };
+        let (task, _) = Task::of(&query);
+        let (gap, way) = (0.25 - 0.2 - off, n.within(0.0, 0.06));
+        let kept = super::keeps_apart(&task, way);
+        assert!(!kept || way <= gap, "{i}: {way} of {gap}");
+        shown += u32::from(kept);
+        // Half of it is lost to the weights.
+        assert!(kept || way > 0.4 * gap, "{i}: {way} of {gap}");
+    }
+    assert!(shown > 60, "{shown}");
+}
+
 fn plate() -> Model {
     pierced(
         Cuboid { half: dvec3(0.5, 0.5, 0.1) },
