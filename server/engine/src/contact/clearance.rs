@@ -128,9 +128,15 @@ pub fn certify_kept(query: &PairQuery, margin: f64, (way, clearance): (f64, f64)
 }
 
 /// Until when a pair keeps its surfaces a distance apart that leaves `clearance` (a length) for displacements, or as much of it
-/// as the models' bounds can tell. The query's limit bounds the work; what was proven when it ran out counts. What comes
-/// within `lead` (fraction of the motion) of the end of that time need not be told exactly.
-pub fn keep(query: &PairQuery, margin: f64, clearance: f64, proof_slack: f64, scratch: &mut Scratch) -> Kept {
+/// as the models' bounds can tell. The query's limit and that of evaluations bound the work; what was proven when it ran out counts.
+/// What comes within `proof_slack` (fraction of the motion) of the end of that time need not be told exactly.
+pub fn keep(
+    query: &PairQuery,
+    margin: f64,
+    clearance: f64,
+    (proof_slack, most_evaluations): (f64, u64),
+    scratch: &mut Scratch,
+) -> Kept {
     let (mut task, _) = Task::of(query);
     task.query_options = QueryOptions::CONTACT;
     if let Some(pair) = ConvexPair::new(task) {
@@ -148,7 +154,7 @@ pub fn keep(query: &PairQuery, margin: f64, clearance: f64, proof_slack: f64, sc
     if !(clearance > 0.0 && level.is_finite()) {
         return Kept { until: 0.0, clearance, counters: Counters::default() };
     }
-    task.proof_slack = proof_slack;
+    (task.proof_slack, task.most_evaluations) = (proof_slack, most_evaluations);
     let (ending, counters) = nearing(task, level, scratch);
     let until = match ending {
         Some(Ending::Clear) | None => 1.0,

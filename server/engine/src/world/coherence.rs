@@ -31,10 +31,10 @@ const FIRST_CLEARANCE: f64 = 1e-3;
 const MOST_CLEARANCE: f64 = 1.0 / 80.0;
 /// … and the least that is tried, in resolutions.
 const LEAST_CLEARANCE: f64 = 64.0;
-/// A predicted motion may cost this many cells …
-const CELLS: u64 = 64;
-/// … or this many times what the pair's last search did.
-const CELLS_FACTOR: u64 = 4;
+/// A predicted motion may cost this many times what the pair's last search did, in cells and in evaluations of literals …
+const FACTOR: u64 = 4;
+/// … where what a search does beside its cells counts as so many of them.
+const BESIDE_CELLS: [u64; 2] = [8, 256];
 /// The end of a predicted motion is found to this part of a step.
 const PROOF_SLACK: f64 = 0.25;
 /// Failed predicted motions double the steps that pass before the next one is tried, up to two to this power.
@@ -110,8 +110,8 @@ pub struct PairCache {
     /// Failed predicted motions in a row, and steps to let pass before the next one.
     failures: u32,
     wait: u32,
-    /// Cells of the last search; `None` before the first one and after any that was not clear.
-    cells: Option<u64>,
+    /// Cells and evaluations of the last search; `None` before the first one and after any that was not clear.
+    work: Option<[u64; 2]>,
     /// What has answered last.
     via: Via,
 }
@@ -149,7 +149,7 @@ impl PairCache {
 
     /// True when nothing in it could answer a question.
     pub fn is_blank(&self) -> bool {
-        !self.answered && !self.on_prediction && self.cells.is_none()
+        !self.answered && !self.on_prediction && self.work.is_none()
     }
 
     /// Answers from what is known, or from what little work makes known; `None`: search. `counters` counts the work.
@@ -186,7 +186,7 @@ impl PairCache {
             self.on_prediction = false;
         }
         // A pair that was never searched, or that met something, is searched first.
-        let cells = self.cells?;
+        let work = self.work?;
         if let Some(clearance) = clearance::at_start(&q.query, q.margin) {
             counters.closed_forms += 1;
             let travel = q.travel();
@@ -197,12 +197,12 @@ impl PairCache {
             }
             // They will be near soon: how they go on is worth more than how far apart they are.
             self.clearance = HALF * clearance;
-            if clearance > 0.0 && self.try_prediction(q, cells, scratch, counters) {
+            if clearance > 0.0 && self.try_prediction(q, work, scratch, counters) {
                 return Some((clear(), Some(0.0)));
             }
             return (clearance > travel).then(|| (clear(), Some(clearance)));
         }
-        self.try_prediction(q, cells, scratch, counters).then(|| (clear(), Some(0.0)))
+        self.try_prediction(q, work, scratch, counters).then(|| (clear(), Some(0.0)))
     }
 
     /// What was told of the answer that was recalled.
@@ -219,12 +219,12 @@ impl PairCache {
     }
 
     /// Plans a predicted motion, unless others have failed of late.
-    fn try_prediction(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
+    fn try_prediction(&mut self, q: &Question, work: [u64; 2], scratch: &mut Scratch, counters: &mut Counters) -> bool {
         if self.wait > 0 {
             self.wait -= 1;
             return false;
         }
-        self.plan_prediction(q, cells, scratch, counters)
+        self.plan_prediction(q, work, scratch, counters)
     }
 
     /// The answer to a question: what is known, or what little work makes known; `counters` (0 before) counts that work. `None`:
@@ -236,7 +236,13 @@ impl PairCache {
     }
 
     /// Tries to prove a predicted motion from here; true when it holds over this step at least.
-    fn plan_prediction(&mut self, q: &Question, cells: u64, scratch: &mut Scratch, counters: &mut Counters) -> bool {
+    fn plan_prediction(
+        &mut self,
+        q: &Question,
+        work: [u64; 2],
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> bool {
         let size = q.size();
         if self.steps == 0.0 {
             self.steps = FIRST;
@@ -250,8 +256,10 @@ impl PairCache {
             body.placed.motion.velocity *= self.steps;
             body.placed.motion.spin *= self.steps;
         }
-        query.cell_limit = CELLS.max(CELLS_FACTOR * cells).min(query.cell_limit);
-        let kept = clearance::keep(&query, q.margin, self.clearance, PROOF_SLACK / self.steps, scratch);
+        let [cells, evaluations] = std::array::from_fn(|k| FACTOR * (BESIDE_CELLS[k] + work[k]));
+        query.cell_limit = query.cell_limit.min(cells);
+        let limits = (PROOF_SLACK / self.steps, evaluations);
+        let kept = clearance::keep(&query, q.margin, self.clearance, limits, scratch);
         *counters += kept.counters;
         let until = if kept.until >= 1.0 { f64::INFINITY } else { kept.until * self.steps };
         if until < 1.0 {
@@ -284,7 +292,8 @@ impl PairCache {
     /// Learns from a search that was allowed so much work.
     pub fn learn(&mut self, q: &Question, limit: u64, outcome: &Outcome) {
         self.via = Via::Search;
-        self.cells = (outcome.status() == Status::Clear && !outcome.touching).then_some(outcome.counters.cells);
+        let Counters { cells, evaluations, .. } = outcome.counters;
+        self.work = (outcome.status() == Status::Clear && !outcome.touching).then_some([cells, evaluations]);
         // More work might tell an overlap that was to be searched past.
         let open = outcome.status() == Status::Overlap && q.query.query_options.past_overlap;
         // What moves is hardly ever asked the same again, and what took no search is found as quickly as it is kept.

@@ -46,6 +46,8 @@ pub struct Task<'a> {
     pub limit: u64,
     /// The limit that the question gives; `limit` may be lowered for a part of the search.
     pub asked_limit: u64,
+    /// Evaluations of literals that may be spent, whatever the limit of cells allows: of what is only meant to save work.
+    pub most_evaluations: u64,
 }
 
 impl<'a> Task<'a> {
@@ -82,6 +84,7 @@ impl<'a> Task<'a> {
             proof_slack: 0.0,
             limit: query.cell_limit,
             asked_limit: query.cell_limit,
+            most_evaluations: u64::MAX,
         };
         (task, swapped)
     }

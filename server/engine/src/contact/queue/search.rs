@@ -182,6 +182,7 @@ impl<'a> Search<'a> {
             // Slices of time are few, and cost no cells.
             if cell.source == Source::Cell
                 && (self.contacts.counters.spent(self.contacts.task.asked_limit) >= self.contacts.task.limit
+                    || self.contacts.counters.evaluations >= self.contacts.task.most_evaluations
                     || self.is_halted())
             {
                 return Some(Ending::Limit(cell.t));
