@@ -45,7 +45,9 @@ impl Proposals<'_, '_> {
         // A fit weighs both of its literals: together they are 1 again.
         let total: f64 = support.iter().map(|l| l.2).sum();
         let lambda: Vec<_> = support.iter().map(|l| l.2 / total).collect();
+        // What leads to the contact that is known already leads to no other.
         let _ = self.solve(active.clone(), x, t, lambda.clone())
+            || self.contacts.again
             || self.attempt_fit(&advance.support, x, t, (&active, &lambda))
             || self.attempt_with_others(cell, x, t, (&active, &lambda))
             || self.attempt_apexes(cell, &support, t, at);

@@ -46,6 +46,8 @@ pub struct Contacts<'a> {
     pub hints: SmallVec<[Hint; MAX_HINTS]>,
     /// Nothing happens before it: how far a search has come.
     pub now: f64,
+    /// The last guess has led to the contact that is known already.
+    pub again: bool,
     /// Work done so far.
     pub counters: Counters,
     /// The collision region of the whole step, once it was asked for; within: `None` where nothing can meet.
@@ -56,7 +58,7 @@ impl<'a> Contacts<'a> {
     /// None so far.
     pub fn new(task: Task<'a>) -> Self {
         let counters = Counters::default();
-        Self { task, found: None, hints: SmallVec::new(), now: 0.0, counters, region: None }
+        Self { task, found: None, hints: SmallVec::new(), now: 0.0, again: false, counters, region: None }
     }
 
     /// What of both bodies can take part over [t0, t1], by stage 1; `None` where nothing can meet. That of the whole step is located
@@ -176,6 +178,7 @@ impl<'a> Contacts<'a> {
     /// multipliers was confirmed.
     pub fn polish(&mut self, known: Known, patient: bool, guess: Guess) -> bool {
         let Guess { mut active, x, t, mut lambda } = guess;
+        self.again = false;
         let level = witness_level(self.task.delta, self.task.rounding);
         for _ in 0..7 {
             debug_assert!(
@@ -190,7 +193,8 @@ impl<'a> Contacts<'a> {
                 Some(f) if settled => f.latest_rival(),
                 _ => self.goal() + SAME_TIME,
             };
-            if s.t < 0.0 || s.t > 1.0 || s.t >= latest || self.is_found(&s) {
+            self.again = self.is_found(&s);
+            if s.t < 0.0 || s.t > 1.0 || s.t >= latest || self.again {
                 return false;
             }
             // A negative multiplier: that literal holds nothing back.
