@@ -6,11 +6,13 @@
         for _ in range(1000):
             coupling.step(data)
 
+Or ``contactd.mujoco.attach(model, {"plate": "plate.csg"})``: then all other geoms meet as the exact solids that they are, too.
+
 Bodies that have a solid meet as these solids do; their geoms are still drawn and still give them mass, but no longer
 collide until the coupling is closed. Other bodies keep MuJoCo's own collisions among themselves. Between bodies that have solids the model's
 filters are kept: ``<exclude>``, parents, ``contype`` and ``conaffinity``. What a coupling would lose or cannot keep (contacts with bodies
-that have no solid, a ``<pair>``) is refused by name, and what it takes in another way (``margin``, ``gap``, geoms of one body that differ)
-is a ``CouplingWarning``. A step is MuJoCo's staged step: ``mj_step1``, one batched
+that have no solid, a ``<pair>`` with one geom of a body that has a solid) is refused by name, and what it takes in another way (``margin``, ``gap``,
+geoms of one body that differ) is a ``CouplingWarning``. A step is MuJoCo's staged step: ``mj_step1``, one batched
 request to contactd, ``mj_addContact`` for each point of the answer, the constraints anew, ``mj_step2``.
 
 MuJoCo's contacts are soft: bodies at rest sink into each other a little, and solids that overlap touch nowhere. So each contact
@@ -24,6 +26,8 @@ waits for the answer that is still under way.
 
 from __future__ import annotations
 
+import os
+import pathlib
 import warnings
 from typing import Any, Container, Mapping
 
@@ -34,28 +38,52 @@ from . import session as sessions
 from .convention import contact_to_mujoco, quaternion_from_wxyz
 from .errors import Error
 from .manifold import Manifold, Manifolds, Point
-from .mujoco_filter import CouplingWarning, Filter
+from .mujoco_filter import CouplingWarning, Filter, Part
+from .mujoco_geoms import MESHES, solid_of
 from .pose import Pose
 from .records import Order, Status
-from .session import Reply, Rule, Session, embedded
+from .session import Reply, Session, embedded
+from .solid import Solid
 
-__all__ = ["Coupling", "CouplingWarning"]
+__all__ = ["Coupling", "CouplingWarning", "attach"]
 
-_GROUP = "mujoco"
+
+#: A solid as it is given: OpenSCAD CSG text, a solid that was built, or the path of a file (CSG, STL, OFF …).
+Given = str | os.PathLike | Solid
+
+
+def attach(
+    model: mj.MjModel,
+    replace: Mapping[str, Given] | None = None,
+    *,
+    meshes: str = "hull",
+    skin: float = 2e-4,
+    unit: float = 1.0,
+    session: Session | None = None,
+) -> Coupling:
+    """contactd's contacts for a whole ``MjModel``: each geom that collides meets others as the exact solid that it is.
+
+    ``replace``: for bodies by name, a solid in place of all geoms of the body, as for ``Coupling``. ``meshes``: "hull", as in
+    MuJoCo's own collisions, or "exact". Contacts are those that MuJoCo's rules ask for, geom by geom: ``contype``,
+    ``conaffinity``, ``<exclude>``, ``<pair>``, parents, ``condim``, friction, solver parameters. What has no solid (a signed distance
+    function of a plugin) is refused by name. The rest is ``Coupling``'s.
+    """
+    return Coupling(model, replace or {}, geoms=True, meshes=meshes, skin=skin, unit=unit, session=session)
 
 
 class Coupling:
     """contactd's contacts for the bodies of an ``MjModel``.
 
-    ``solids``: for each body by name, its solid as OpenSCAD CSG text in the body's frame; the text's unit is ``unit`` lengths
-    of MuJoCo (0.001: models in millimetres in a scene in metres). Bodies welded to the world are fixed, unless they hang on a mocap
-    body. ``skin``: the gap, in MuJoCo's
-    unit, at which contacts begin to act. ``session``: to use one that is open (by default an embedded one is opened, and closed
-    with the coupling); its rules are replaced.
+    ``solids``: for each body by name, its solid in the body's frame: OpenSCAD CSG text, a solid that was built
+    (``contactd.solid``), or the path of a file; its unit is ``unit`` lengths of MuJoCo (0.001: models in millimetres in a scene in
+    metres). ``geoms``: every other geom that collides gets its own solid, too (``attach``); ``meshes``: what a mesh then stands
+    for, "hull" or "exact". Bodies welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
+    unit, at which contacts begin to act, in place of the geoms' ``margin``. ``session``: to use one that is open (by
+    default an embedded one is opened, and closed with the coupling); its rules are replaced.
 
-    Geoms of these bodies get ``contype`` and ``conaffinity`` 0 until the coupling is closed. Friction, ``solref``, ``solimp``, ``condim`` are
-    those of the bodies' first colliding geoms, combined as MuJoCo does. The filters are read once: what is changed in the model
-    later is not seen.
+    Geoms that have a solid get ``contype`` and ``conaffinity`` 0 until the coupling is closed, and no contact of a ``<pair>``. What
+    makes contacts (friction, ``solref``, ``condim`` …) is that of the geoms, of a body with a solid that of its first colliding
+    geom, combined as MuJoCo does. The filters are read once: what is changed in the model later is not seen.
 
     Raises ``ValueError`` before anything is changed where contacts would not be those that the model asks for; warns
     (``CouplingWarning``) where they are taken in another way. Each sentence names the body or geom and says what to do.
@@ -64,37 +92,44 @@ class Coupling:
     def __init__(
         self,
         model: mj.MjModel,
-        solids: Mapping[str, str],
+        solids: Mapping[str, Given],
         *,
+        geoms: bool = False,
+        meshes: str = "hull",
         skin: float = 2e-4,
         unit: float = 1.0,
         session: Session | None = None,
     ) -> None:
         if not 0.0 < skin < np.inf or not 0.0 < unit < np.inf:
             raise ValueError(f"expected a finite skin and unit above 0, found {skin} and {unit}")
-        bodies = {name: mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, name) for name in solids}
-        for name, body in bodies.items():
-            if body < 0:
-                raise ValueError(f"the model has no body called {name!r}")
-        rules = Filter(model, list(bodies.values()))
-        for sentence in rules.warnings:
-            warnings.warn(sentence, CouplingWarning, stacklevel=2)
+        if meshes not in MESHES:
+            raise ValueError(f"expected one of {', '.join(map(repr, MESHES))} for meshes, found {meshes!r}")
         self.model = model
         self.skin = skin
         self.unit = unit
+        self._filter = Filter(model)
+        given = self._given(solids)
+        if geoms:
+            given += self._own_solids(meshes, {part.body for part, _ in given})
+        self._filter.take([part for part, _ in given])
+        for sentence in self._filter.warnings:
+            warnings.warn(sentence, CouplingWarning, stacklevel=2 + geoms)
         #: Second requests so far, for pairs in overlap.
         self.retracted = 0
         #: The contacts of the last step in the order in which MuJoCo got them: the bodies' ids in MuJoCo, and the point in contactd's
-        #: unit. Its ``id`` names it within the pair for as long as it lasts.
+        #: unit. Its ``id`` names it within the pair of solids for as long as it lasts.
         self.contacts: list[tuple[int, int, Point]] = []
+        #: The geoms of each of ``contacts``, by name, in the same order; "geom 3" for one without.
+        self.geoms: list[tuple[str, str]] = []
         self._manifolds = Manifolds()
         self._in_flight = False
         self._own = session is None
         self.session = embedded() if session is None else session
-        #: The geoms that no longer collide, with their contype and conaffinity.
+        #: What no longer collides: geoms with their contype and conaffinity, pairs with their margin.
         self._silenced: list[tuple[int, int, int]] = []
+        self._unpaired: list[tuple[int, float]] = []
         try:
-            self._add(solids, bodies, rules)
+            self._add(given)
         except BaseException:
             self.close()
             raise
@@ -106,30 +141,68 @@ class Coupling:
         self.close()
 
     def close(self) -> None:
-        """Lets the bodies' geoms collide again as they did; closes the session, if the coupling opened it."""
+        """Lets the geoms collide again as they did; closes the session, if the coupling opened it."""
         for geom, contype, conaffinity in self._silenced:
             self.model.geom_contype[geom], self.model.geom_conaffinity[geom] = contype, conaffinity
-        self._silenced = []
+        for pair, margin in self._unpaired:
+            self.model.pair_margin[pair] = margin
+        self._silenced, self._unpaired = [], []
         if self._own:
             self.session.close()
 
-    def _add(self, solids: Mapping[str, str], bodies: Mapping[str, int], rules: Filter) -> None:
+    def _given(self, solids: Mapping[str, Given]) -> list[tuple[Part, Given]]:
+        """The solids that stand in for whole bodies."""
+        found = []
+        for name, solid in solids.items():
+            body = mj.mj_name2id(self.model, mj.mjtObj.mjOBJ_BODY, name)
+            if body < 0:
+                raise ValueError(f"the model has no body called {name!r}")
+            found.append((self._filter.whole(name, body), solid))
+        return found
+
+    def _own_solids(self, meshes: str, taken: Container[int]) -> list[tuple[Part, Given]]:
+        """The solids of all geoms that collide, or that a ``<pair>`` names, but those of bodies that have one already."""
+        found = []
+        for body in range(self.model.nbody):
+            for geom in () if body in taken else self._filter.meeting(body):
+                called = self._filter.geom(geom)
+                try:
+                    solid = solid_of(self.model, geom, self.unit, meshes)
+                except ValueError as e:
+                    raise ValueError(f"{called}: {e}: give its body a solid by replace=, or contype and conaffinity 0") from None
+                found.append((Part(called, body, [geom], False), solid))
+        return found
+
+    def _load(self, part: Part, given: Given) -> sessions.Model:
+        """Loads a solid; a file by its ending."""
+        if isinstance(given, os.PathLike) or isinstance(given, str) and _names_a_file(given):
+            path = pathlib.Path(given)
+            return self.session.load_model(path.name, path.read_bytes())
+        return self.session.load_model(f"{part.name}.csg", given)
+
+    def _add(self, given: list[tuple[Part, Given]]) -> None:
         model, session = self.model, self.session
+        groups, rules = self._filter.rules(self.skin / self.unit)
+        rest = mj.MjData(model)
+        mj.mj_kinematics(model, rest)
         self._bodies: dict[int, int] = {}
         self._geoms: dict[int, int] = {}
         self._fixed: dict[int, Pose] = {}
         loaded: dict[str, sessions.Model] = {}
         moving = []
-        for name, text in solids.items():
-            body = bodies[name]
-            if text not in loaded:
-                loaded[text] = session.load_model(f"{name}.csg", text)
-            fixed = not rules.moves(body)
-            position, rotation = self._rest(body)
-            at = Pose(position / self.unit, rotation)
-            object = session.add_object(name, loaded[text], group=_GROUP, fixed=fixed, at=at)
-            self._bodies[object] = body
-            self._geoms[object] = rules.geoms[body]
+        for (part, solid), group in zip(given, groups):
+            key = solid.text if isinstance(solid, Solid) else str(solid)
+            if key not in loaded:
+                loaded[key] = self._load(part, solid)
+            fixed = not self._filter.moves(part.body)
+            at = Pose(rest.xpos[part.body] / self.unit, quaternion_from_wxyz(rest.xquat[part.body]))
+            first = part.geoms[0]
+            place = None
+            if not part.is_whole:
+                place = Pose(model.geom_pos[first] / self.unit, quaternion_from_wxyz(model.geom_quat[first]))
+            object = session.add_object(part.name, loaded[key], group=group, fixed=fixed, at=at, place=place)
+            self._bodies[object] = part.body
+            self._geoms[object] = first
             if fixed:
                 self._fixed[object] = at
             else:
@@ -137,22 +210,17 @@ class Coupling:
         self._moving = np.array(moving, dtype=np.uint32)
         self._index = {object: i for i, object in enumerate(moving)}
         self._moving_bodies = np.array([self._bodies[o] for o in moving], dtype=int)
-        names = {body: name for name, body in bodies.items()}
-        apart = [(names[a], names[b]) for a, b in rules.apart if rules.moves(a) or rules.moves(b)]
-        margin = self.skin / self.unit
-        session.set_rules([Rule((_GROUP, _GROUP), except_=apart, report="patch", margin=margin, penetration=True)])
+        session.set_rules(rules)
         session.options.details = True
         # Last, so that what is refused before has changed nothing.
-        for body in bodies.values():
-            first = int(model.body_geomadr[body])
-            for geom in range(first, first + int(model.body_geomnum[body])):
-                self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
-                model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
-
-    def _rest(self, body: int) -> tuple[np.ndarray, np.ndarray]:
-        data = mj.MjData(self.model)
-        mj.mj_kinematics(self.model, data)
-        return data.xpos[body].copy(), quaternion_from_wxyz(data.xquat[body])
+        for geom in sorted(g for part, _ in given for g in part.geoms):
+            self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
+            model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
+        for (g1, g2), pair in self._filter.pairs.items():
+            self._unpaired.append((pair, float(model.pair_margin[pair])))
+            # With this margin MuJoCo's test of bounding balls leaves the pair out; planes have none, and no distance is so small.
+            bounds = float(model.geom_rbound[g1]), float(model.geom_rbound[g2])
+            model.pair_margin[pair] = -sum(bounds) if all(bounds) else -mj.mjMAXVAL
 
     def step(self, data: mj.MjData) -> int:
         """One step of MuJoCo with contactd's contacts; returns how many there were."""
@@ -173,9 +241,10 @@ class Coupling:
         positions = data.xpos[self._moving_bodies] / self.unit
         rotations = quaternion_from_wxyz(data.xquat[self._moving_bodies])
         points = self._points(positions, rotations)
-        self.contacts = []
+        self.contacts, self.geoms = [], []
         for a, b, point in points:
             self.contacts.append((self._bodies[a], self._bodies[b], point))
+            self.geoms.append((self._name(self._geoms[a]), self._name(self._geoms[b])))
             contact = self._contact(a, b, point)
             if mj.mj_addContact(self.model, data, contact) != 0:
                 raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")
@@ -258,19 +327,41 @@ class Coupling:
         self._in_flight = False
         return reply
 
+    def _name(self, geom: int) -> str:
+        return mj.mj_id2name(self.model, mj.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
+
     def _contact(self, a: int, b: int, point: Point) -> mj.MjContact:
         model = self.model
-        g1, g2 = self._geoms[a], self._geoms[b]
+        g1, g2, normal = self._geoms[a], self._geoms[b], point.normal
+        k = self._filter.pairs.get((min(g1, g2), max(g1, g2)))
+        # MuJoCo tells the geoms of a contact by their types, where these are the same by their bodies, or as the pair does.
+        first = int(model.pair_geom1[k]) if k is not None else -1
+        if self._order(g2, first) < self._order(g1, first):
+            g1, g2, normal = g2, g1, -normal
         contact = mj.MjContact()
         contact.pos, contact.frame, contact.dist = contact_to_mujoco(
-            point.position * self.unit, point.normal, point.separation * self.unit
+            point.position * self.unit, normal, point.separation * self.unit
         )
-        contact.includemargin = self.skin
         contact.geom = [g1, g2]
         contact.flex = contact.elem = contact.vert = [-1, -1]
-        contact.exclude = 0
         contact.efc_address = -1
-        # As mj_contactParam: the geom of higher priority, else the larger condim and friction, and solver parameters mixed.
+        contact.includemargin = self.skin
+        contact.exclude = 0
+        if k is None:
+            self._parameters(contact, g1, g2)
+        else:
+            contact.dim = int(model.pair_dim[k])
+            contact.friction = np.maximum(model.pair_friction[k], mj.mjMINMU)
+            contact.solref, contact.solimp = model.pair_solref[k], model.pair_solimp[k]
+            contact.solreffriction = model.pair_solreffriction[k]
+        return contact
+
+    def _order(self, geom: int, first: int) -> tuple[int, bool, int, int]:
+        return int(self.model.geom_type[geom]), geom != first, int(self.model.geom_bodyid[geom]), geom
+
+    def _parameters(self, contact: mj.MjContact, g1: int, g2: int) -> None:
+        """As mj_contactParam: the geom of higher priority, else the larger condim and friction, and solver parameters mixed."""
+        model = self.model
         p1, p2 = model.geom_priority[g1], model.geom_priority[g2]
         if p1 != p2:
             g = g1 if p1 > p2 else g2
@@ -287,7 +378,11 @@ class Coupling:
         slide, spin, roll = np.maximum(friction, mj.mjMINMU)
         contact.friction = [slide, slide, spin, roll, roll]
         contact.solref, contact.solimp = solref, solimp
-        return contact
+
+
+def _names_a_file(text: str) -> bool:
+    """Whether a string is a path, not a CSG text: texts have calls."""
+    return "(" not in text and ";" not in text and bool(pathlib.PurePath(text).suffix)
 
 
 def _mix(first: float, second: float) -> float:

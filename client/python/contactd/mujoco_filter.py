@@ -2,21 +2,36 @@
 
 MuJoCo's rules (engine_collision_driver.c): geoms of two bodies meet when the ``contype`` of one has a bit of the other's
 ``conaffinity``, unless the bodies are welded to each other, one is the parent of the other (and neither welded to the world), or an
-``<exclude>`` names them; a ``<pair>`` meets whatever these say. A coupling takes the bodies' geoms out of MuJoCo's collisions
-and puts solids in their place. So between two coupled bodies it keeps these rules body by body; what it would lose, or
-could not keep, is refused before anything is changed.
+``<exclude>`` names them; a ``<pair>`` meets whatever these say. A coupling takes geoms out of MuJoCo's collisions and puts
+solids in their place, each for one geom or for all of a body. Between two of them it keeps these rules; what it would
+lose, or could not keep, is refused before anything is changed.
 """
 
 from __future__ import annotations
 
-from typing import Any, Iterable, Sequence
+from typing import Any, Iterable, NamedTuple, Sequence
 
 import mujoco as mj
 import numpy as np
 
+from .rules import Rule
+
 
 class CouplingWarning(UserWarning):
     """The coupling takes something in another way than MuJoCo; the sentence names the body or geom and says what to do."""
+
+
+class Part(NamedTuple):
+    """A solid that stands in for geoms."""
+
+    #: How the session calls it.
+    name: str
+    #: The body that it rides on.
+    body: int
+    #: The colliding geoms that it stands for. Its contacts have the parameters of the first, and are told by it.
+    geoms: Sequence[int]
+    #: It stands for all geoms of the body; otherwise for one geom.
+    is_whole: bool
 
 
 #: What makes contacts of geoms: the parameters of which one geom of a body has to speak for all.
@@ -33,25 +48,28 @@ _OPTIONS = {
 
 
 class Filter:
-    """What MuJoCo lets meet in ``model``, whose bodies ``coupled`` are to have solids; raises ``ValueError`` where the coupling would
-    make other physics of it, and has the sentences of ``warnings`` for what it takes in another way."""
+    """What MuJoCo lets meet in ``model``: ``take`` says which solids are to stand in for which of its geoms."""
 
-    def __init__(self, model: mj.MjModel, coupled: Sequence[int]) -> None:
+    def __init__(self, model: mj.MjModel) -> None:
         self._model = model
         self._excluded = {int(s) for s in model.exclude_signature}
         self._parents = not model.opt.disableflags & mj.mjtDisableBit.mjDSBL_FILTERPARENT
-        self._coupled = coupled
-        self._is_coupled = np.zeros(model.nbody, dtype=bool)
-        self._is_coupled[list(coupled)] = True
         self.warnings: list[str] = []
+        #: ``<pair>`` by its two geoms, the smaller id first, where solids stand in for both.
+        self.pairs: dict[tuple[int, int], int] = {}
         self._options()
-        #: For each coupled body the geom that its contacts have their parameters of, and are told by: the first one that collides.
-        self.geoms = {body: self._speaker(body) for body in coupled}
-        self._pairs()
+
+    def take(self, parts: Sequence[Part]) -> None:
+        """Raises ``ValueError`` where solids in place of these geoms would make other physics; ``warnings`` are the sentences for what
+        is taken in another way."""
+        self._parts = parts
+        self._part_of = {g: i for i, part in enumerate(parts) for g in part.geoms}
+        for part in parts:
+            self._check(part)
+        self._find_pairs()
         self._others()
         self._flexes()
-        #: Coupled bodies that do not meet.
-        self.apart = self._apart()
+        self._mixed()
 
     def body(self, body: int) -> str:
         """How a sentence calls a body."""
@@ -86,8 +104,14 @@ class Filter:
         first = int(self._model.body_geomadr[body])
         return range(first, first + int(self._model.body_geomnum[body])) if first >= 0 else range(0)
 
-    def _colliding(self, body: int) -> list[int]:
+    def colliding(self, body: int) -> list[int]:
+        """The geoms of a body that collide."""
         return [g for g in self._all_geoms(body) if self._model.geom_contype[g] or self._model.geom_conaffinity[g]]
+
+    def meeting(self, body: int) -> list[int]:
+        """The geoms of a body that collide, or that a ``<pair>`` names."""
+        named = {int(g) for g in (*self._model.pair_geom1, *self._model.pair_geom2)}
+        return sorted({*self.colliding(body), *named.intersection(self._all_geoms(body))})
 
     def _bits(self, geoms: Any, others: Any) -> np.ndarray:
         """For each of ``geoms`` (rows) and ``others`` (columns) whether their bits let them meet."""
@@ -107,38 +131,40 @@ class Filter:
             if model.opt.enableflags & int(getattr(mj.mjtEnableBit, bit, 0)):
                 raise ValueError(f"contacts of solids do not know {what}: switch it off")
 
-    def _speaker(self, body: int) -> int:
-        model = self._model
+    def whole(self, name: str, body: int) -> Part:
+        """The part of a solid that stands in for all geoms of a body."""
         if not self._all_geoms(body):
             raise ValueError(f"{self.body(body)} has no geom: contacts need one, for friction and to be told by")
-        colliding = self._colliding(body)
+        colliding = self.colliding(body)
         if not colliding:
             raise ValueError(
                 f"no geom of {self.body(body)} collides (contype and conaffinity are 0; another coupling's bodies are so until it is "
                 "closed): give one of them contype=\"1\" conaffinity=\"1\", or leave the body without a solid"
             )
-        first = colliding[0]
+        return Part(name, body, colliding, True)
+
+    def _check(self, part: Part) -> None:
+        model, (first, *more) = self._model, part.geoms
         for field in _PARAMETERS:
             values = getattr(model, f"geom_{field}")
-            others = [g for g in colliding if not np.array_equal(values[g], values[first])]
+            others = [g for g in more if not np.array_equal(values[g], values[first])]
             if others:
                 self.warnings.append(
-                    f"contacts of {self.body(body)} have the {field} of its first colliding geom, {self.geom(first)}; {self._names(others)} "
-                    "differ: give all of them the same, or make bodies of them"
+                    f"contacts of {self.body(part.body)} have the {field} of its first colliding geom, {self.geom(first)}; "
+                    f"{self._names(others)} differ: give all of them the same, or make bodies of them"
                 )
         for field, word in _UNKNOWN.items():
             values = getattr(model, field, None)
-            some = [g for g in colliding if values is not None and np.any(values[g])]
+            some = [g for g in part.geoms if values is not None and np.any(values[g])]
             if some:
                 raise ValueError(f"contacts of solids do not know {word}, which {self._names(some)} has: take it out")
         for field in ("margin", "gap"):
-            some = [g for g in colliding if getattr(model, f"geom_{field}")[g]]
+            some = [g for g in part.geoms if getattr(model, f"geom_{field}")[g]]
             if some:
                 self.warnings.append(
-                    f"the {field} of {self._names(some)} has no effect: contacts of {self.body(body)} act from the coupling's skin on; take "
+                    f"the {field} of {self._names(some)} has no effect: contacts of {self.body(part.body)} act from the coupling's skin on; take "
                     "it out and choose skin"
                 )
-        return first
 
     def _names(self, geoms: Iterable[int]) -> str:
         """Some geoms in a sentence, the first three by name."""
@@ -146,31 +172,38 @@ class Filter:
         more = f" and {len(names) - 3} more" if len(names) > 3 else ""
         return ", ".join(names[:3]) + more
 
-    def _pairs(self) -> None:
+    def _find_pairs(self) -> None:
         model = self._model
         for k in range(model.npair):
             geoms = int(model.pair_geom1[k]), int(model.pair_geom2[k])
-            theirs = [int(model.geom_bodyid[g]) for g in geoms]
-            for body in theirs:
-                if self._is_coupled[body]:
+            parts = [self._parts[self._part_of[g]] if g in self._part_of else None for g in geoms]
+            if all(part is not None and not part.is_whole for part in parts):
+                self.pairs[min(geoms), max(geoms)] = k
+                if model.pair_margin[k] or model.pair_gap[k]:
+                    self.warnings.append(
+                        f"margin and gap of the <pair> of {self.geom(geoms[0])} and {self.geom(geoms[1])} have no effect: its contacts act "
+                        "from the coupling's skin on; take them out and choose skin"
+                    )
+                continue
+            for part in parts:
+                if part is not None:
                     name = mj.mj_id2name(model, mj.mjtObj.mjOBJ_PAIR, k)
                     pair = f"the <pair> {name!r}" if name else "a <pair>"
                     raise ValueError(
                         f"{pair} makes MuJoCo's contacts between {self.geom(geoms[0])} and {self.geom(geoms[1])} beside those of the solid of "
-                        f"{self.body(body)}: take it out, and give its parameters to the geoms"
+                        f"{self.body(part.body)}: take it out, and give its parameters to the geoms"
                     )
 
     def _others(self) -> None:
         """Refuses contacts that the coupling would take away: between a coupled body and one without a solid."""
         model = self._model
-        others = np.flatnonzero(~self._is_coupled[model.geom_bodyid])
-        for body in self._coupled:
-            geoms = self._colliding(body)
-            lost = {}
-            for k, j in zip(*np.nonzero(self._bits(geoms, others))):
+        others = np.array([g for g in range(model.ngeom) if g not in self._part_of], dtype=int)
+        for part in self._parts:
+            body, lost = part.body, {}
+            for k, j in zip(*np.nonzero(self._bits(list(part.geoms), others))):
                 other = int(model.geom_bodyid[others[j]])
                 if other not in lost and self.bodies_meet(body, other):
-                    lost[other] = (geoms[k], int(others[j]))
+                    lost[other] = (part.geoms[k], int(others[j]))
             if lost:
                 other, (g1, g2) = next(iter(lost.items()))
                 more = f", and so with {len(lost) - 1} more" if len(lost) > 1 else ""
@@ -184,28 +217,58 @@ class Filter:
         model = self._model
         for flex in range(getattr(model, "nflex", 0)):
             contype, conaffinity = int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])
-            for body in self._coupled:
-                for g in self._colliding(body):
-                    if model.geom_contype[g] & conaffinity or model.geom_conaffinity[g] & contype:
-                        name = mj.mj_id2name(model, mj.mjtObj.mjOBJ_FLEX, flex)
-                        raise ValueError(
-                            f"{self.body(body)} has a solid, so {self.geom(g)} and the flex {name!r} would no longer meet: say in the model "
-                            "that they do not (contype and conaffinity), or leave the body without a solid"
-                        )
+            for g, part in self._part_of.items():
+                if model.geom_contype[g] & conaffinity or model.geom_conaffinity[g] & contype:
+                    name = mj.mj_id2name(model, mj.mjtObj.mjOBJ_FLEX, flex)
+                    raise ValueError(
+                        f"{self.body(self._parts[part].body)} has a solid, so {self.geom(g)} and the flex {name!r} would no longer meet: say "
+                        "in the model that they do not (contype and conaffinity), or leave the body without a solid"
+                    )
 
-    def _apart(self) -> list[tuple[int, int]]:
-        found = []
-        colliding = {body: self._colliding(body) for body in self._coupled}
-        for i, a in enumerate(self._coupled):
-            for b in self._coupled[i + 1 :]:
-                bits = self._bits(colliding[a], colliding[b])
-                if not self.bodies_meet(a, b) or not bits.any():
-                    found.append((a, b))
-                elif not bits.all():
+    def _mixed(self) -> None:
+        """Warns where some geoms of two parts meet and others do not."""
+        whole = [part for part in self._parts if part.is_whole]
+        for i, a in enumerate(whole):
+            for b in whole[i + 1 :] + [part for part in self._parts if not part.is_whole]:
+                bits = self._bits(list(a.geoms), list(b.geoms))
+                if bits.any() and not bits.all() and self.bodies_meet(a.body, b.body):
                     k, j = (int(x[0]) for x in np.nonzero(~bits))
                     self.warnings.append(
-                        f"{self.body(a)} and {self.body(b)} meet as whole solids, though {self.geom(colliding[a][k])} and "
-                        f"{self.geom(colliding[b][j])} do not by their contype and conaffinity: make bodies of them, or give all geoms of a "
+                        f"{self.body(a.body)} and {self.body(b.body)} meet as whole solids, though {self.geom(a.geoms[k])} and "
+                        f"{self.geom(b.geoms[j])} do not by their contype and conaffinity: make bodies of them, or give all geoms of a "
                         "body the same"
                     )
+
+    def rules(self, margin: float) -> tuple[list[str], list[Rule]]:
+        """The group of each part, and the rules between groups, which report from ``margin`` on: parts that no rule names do not meet.
+
+        Parts that meet the same others share a group; those of a ``<pair>`` have their own."""
+        model, paired = self._model, {g for pair in self.pairs for g in pair}
+        keys: dict[Any, list[int]] = {}
+        for i, part in enumerate(self._parts):
+            bits = tuple(sorted({(int(model.geom_contype[g]), int(model.geom_conaffinity[g])) for g in part.geoms}))
+            keys.setdefault((bits, i if part.geoms[0] in paired else -1), []).append(i)
+        members = list(keys.values())
+        groups = [""] * len(self._parts)
+        for number, group in enumerate(members):
+            for i in group:
+                groups[i] = f"mujoco {number}"
+        rule = lambda between, apart: Rule(between, except_=apart, report="patch", margin=margin, penetration=True)  # noqa: E731
+        rules = [rule((groups[self._part_of[g1]], groups[self._part_of[g2]]), ()) for g1, g2 in self.pairs]
+        for number, group in enumerate(members):
+            for other in members[number:]:
+                a, b = self._parts[group[0]], self._parts[other[0]]
+                if self._bits(list(a.geoms), list(b.geoms)).any():
+                    rules.append(rule((groups[group[0]], groups[other[0]]), self._apart(group, other)))
+        return groups, rules
+
+    def _apart(self, group: list[int], other: list[int]) -> list[tuple[str, str]]:
+        """Pairs of two groups that do not meet by their bodies, as far as one of the two moves."""
+        found = []
+        for i in group:
+            for j in other:
+                a, b = self._parts[i], self._parts[j]
+                if (group is not other or i < j) and (self.moves(a.body) or self.moves(b.body)):
+                    if not self.bodies_meet(a.body, b.body):
+                        found.append((a.name, b.name))
         return found

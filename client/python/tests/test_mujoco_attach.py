@@ -1,0 +1,318 @@
+"""A whole model of MuJoCo with contactd's contacts: random models, judged by MuJoCo's own contacts.
+
+Long form: CONTACTD_MUJOCO_MODELS=1000 python -m pytest tests/test_mujoco_attach.py
+"""
+
+import os
+import warnings
+
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco")
+
+import contactd  # noqa: E402
+from contactd.mujoco import CouplingWarning, attach  # noqa: E402
+
+MODELS = int(os.environ.get("CONTACTD_MUJOCO_MODELS", 40))
+STATES = 5
+SKIN = 1e-4
+
+
+def words(**attributes):
+    return " ".join(f'{k}="{v}"' for k, v in attributes.items())
+
+
+def numbers(values):
+    return " ".join(f"{x:.6g}" for x in values)
+
+
+class Maker:
+    """A random model: a tree of bodies around the origin, so that many of them meet."""
+
+    def __init__(self, seed):
+        self.rng = np.random.default_rng(seed)
+        self.names = []
+
+    def chance(self, p):
+        return self.rng.random() < p
+
+    def geom(self, name, kinds):
+        rng = self.rng
+        kind = rng.choice(kinds)
+        size = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3, "plane": 3}[kind]
+        more = {}
+        if self.chance(0.3):
+            more |= {"contype": rng.integers(0, 4), "conaffinity": rng.integers(0, 4)}
+        if self.chance(0.3):
+            more |= {"friction": numbers(rng.uniform(0, 1, 3)), "condim": rng.choice([1, 3, 4, 6])}
+        if self.chance(0.3):
+            more |= {"solref": numbers(rng.uniform(0.01, 1, 2)), "solmix": round(rng.uniform(0, 2), 3)}
+        if self.chance(0.2):
+            more |= {"solref": numbers(-rng.uniform(1, 100, 2))}
+        if self.chance(0.2):
+            more |= {"solimp": numbers([*np.sort(rng.uniform(0.1, 0.95, 2)), 0.01, 0.4, 2]), "priority": rng.integers(0, 3)}
+        at = {"pos": numbers(rng.uniform(-0.1, 0.1, 3)), "euler": numbers(rng.uniform(-90, 90, 3))}
+        if kind == "plane":
+            at = {"pos": numbers([0, 0, rng.uniform(-0.3, -0.1)]), "euler": numbers([*rng.uniform(-10, 10, 2), 0])}
+        self.names.append(name)
+        return f'<geom name="{name}" type="{kind}" size="{numbers(rng.uniform(0.05, 0.15, size))}" {words(**at, **more)}/>'
+
+    def body(self, depth):
+        rng, name = self.rng, f"b{len(self.bodies)}"
+        self.bodies.append(name)
+        joint = "<freejoint/>" if depth == 0 else rng.choice(["", '<joint type="ball"/>', '<joint axis="0 1 0"/>'])
+        kinds = ["sphere", "capsule", "cylinder", "box", "ellipsoid"]
+        geoms = "".join(self.geom(f"{name}g{i}", kinds) for i in range(rng.integers(1, 4)))
+        inner = "".join(self.body(depth + 1) for _ in range(rng.integers(0, 3))) if depth < 2 else ""
+        return f'<body name="{name}" pos="{numbers(rng.uniform(-0.2, 0.2, 3))}">{joint}{geoms}{inner}</body>'
+
+    def text(self):
+        rng, self.bodies = self.rng, []
+        floor = "".join(self.geom(f"w{i}", ["plane", "box", "cylinder"]) for i in range(rng.integers(0, 3)))
+        trees = "".join(self.body(0) for _ in range(rng.integers(2, 4)))
+        inside = ""
+        if self.chance(0.5):
+            a, b = rng.choice(self.bodies, 2, replace=False)
+            inside += f'<exclude body1="{a}" body2="{b}"/>'
+        if self.chance(0.5):
+            a, b = rng.choice([n for n in self.names if n[0] == "b"], 2, replace=False)
+            more = words(condim=rng.choice([1, 3, 4, 6]), friction=numbers(rng.uniform(0.1, 1, 5)), solref=numbers(rng.uniform(0.01, 1, 2)))
+            inside += f'<pair geom1="{a}" geom2="{b}" {more}/>'
+        flag = '<flag filterparent="disable"/>' if self.chance(0.2) else ""
+        return f'<mujoco><option>{flag}</option><worldbody>{floor}{trees}</worldbody><contact>{inside}</contact></mujoco>'
+
+
+def contacts(model, data):
+    """Contacts by their geoms: the least distance, and the parameters, which are the same for all of a pair."""
+    found = {}
+    for c in data.contact:
+        pair = (int(c.geom[0]), int(c.geom[1]))
+        fields = (c.dim, *c.friction, *c.solref, *c.solreffriction, *c.solimp)
+        dist, _ = found.get(pair, (np.inf, None))
+        found[pair] = (min(dist, float(c.dist)), np.array(fields))
+    return found
+
+
+def shuffled(model, data, rng):
+    """Bodies anywhere near the origin, in a heap or with room."""
+    mujoco.mj_resetData(model, data)
+    room = rng.choice([0.25, 0.5, 1.0])
+    for j in range(model.njnt):
+        at = model.jnt_qposadr[j]
+        kind = model.jnt_type[j]
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            data.qpos[at : at + 3] = rng.uniform(-room, room, 3)
+            at += 3
+        if kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+            q = rng.normal(size=4)
+            data.qpos[at : at + 4] = q / np.linalg.norm(q)
+        elif kind == mujoco.mjtJoint.mjJNT_HINGE:
+            data.qpos[at] = rng.uniform(-np.pi, np.pi)
+
+
+def judged(seed):
+    """Compares all contacts of some states of a random model; tells how many pairs were told by both."""
+    text = Maker(seed).text()
+    stock, model = (mujoco.MjModel.from_xml_string(text) for _ in range(2))
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    rng = np.random.default_rng(seed)
+    common = 0
+    kind = lambda g: mujoco.mjtGeom(stock.geom_type[g]).name.removeprefix("mjGEOM_").lower()  # noqa: E731
+    with attach(model, skin=SKIN) as coupling:
+        for state in range(STATES):
+            shuffled(stock, theirs, rng)
+            data.qpos[:] = theirs.qpos
+            mujoco.mj_forward(stock, theirs)
+            mujoco.mj_step1(model, data)
+            assert data.ncon == 0, "MuJoCo's own contacts are off"
+            coupling.add_contacts(data)
+            own, stocks = contacts(model, data), contacts(stock, theirs)
+            for pair in own.keys() | stocks.keys():
+                what = f"model {seed}, state {state}, {[kind(g) for g in pair]} {pair}"
+                told, asked = own.get(pair), stocks.get(pair)
+                # Near the border MuJoCo's iterations and the skin may differ.
+                if asked is None:
+                    assert pair[::-1] not in stocks, f"{what}: told the other way round"
+                    assert told[0] > -1e-5, f"{what}: at {told[0]} here alone"
+                elif told is None:
+                    assert asked[0] > -1e-5, f"{what}: at {asked[0]} by MuJoCo alone"
+                else:
+                    common += 1
+                    assert np.allclose(told[1], asked[1], atol=1e-12), f"{what}: {told[1]} and {asked[1]}"
+    return common
+
+
+def test_random_models_have_the_contacts_that_mujoco_gives_them():
+    common = sum(judged(seed) for seed in range(MODELS))
+    print(f"{MODELS} models, {STATES} states each: {common} pairs told by both")
+    assert common > 5 * MODELS
+
+
+@pytest.mark.parametrize("kinds", [("sphere", "sphere"), ("sphere", "capsule"), ("capsule", "capsule"), ("plane", "sphere"), ("plane", "capsule")])
+def test_distances_are_mujocos_where_it_has_closed_forms(kinds):
+    first, second = (f'type="{kind}" size="{"1 1 1" if kind == "plane" else ".08 .1"}"' for kind in kinds)
+    inner = f'<geom {first}/><body><freejoint/><geom {second}/></body>'
+    stock, model = scene(inner), scene(inner)
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    rng = np.random.default_rng(11)
+    worst, met = 0.0, 0
+    with attach(model, skin=SKIN) as coupling:
+        for _ in range(100 * MODELS // 40):
+            shuffled(stock, theirs, rng)
+            theirs.qpos[:3] *= 0.3 / np.linalg.norm(theirs.qpos[:3]) * rng.uniform(0.2, 1.0)
+            data.qpos[:] = theirs.qpos
+            mujoco.mj_forward(stock, theirs)
+            mujoco.mj_step1(model, data)
+            coupling.add_contacts(data)
+            own, stocks = (min((c.dist for c in d.contact), default=1.0) for d in (data, theirs))
+            # Of what lies deeper than its radius the depth is that of the largest ball that both hold. Where two capsules cross, the
+            # direction of the depth is found to some hundredths alone, so the distance along it to their square.
+            if -0.05 < stocks < 0:
+                assert own == pytest.approx(stocks, abs=1e-6 if "capsule" not in kinds[:1] else 1e-2 * abs(stocks))
+                worst, met = max(worst, abs(own - stocks)), met + 1
+    print(f"{kinds[0]} and {kinds[1]}: {met} in overlap, {worst:.2g} at most apart from MuJoCo's")
+    assert met > 3
+
+
+def scene(inner, *, option="", assets="", after=""):
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.001">{option}</option><asset>{assets}</asset><worldbody>{inner}</worldbody>{after}</mujoco>'
+    )
+
+
+FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
+BALL = '<body name="ball" pos="{} {} {}"><freejoint/><geom name="ball" size=".05"/></body>'
+
+
+def after(model, steps, **options):
+    """The state after some steps, and the contacts of the last by name."""
+    data = mujoco.MjData(model)
+    with attach(model, **options) as coupling:
+        for _ in range(steps):
+            coupling.step(data)
+        return data, coupling.geoms
+
+
+def test_contacts_are_told_by_the_names_of_their_geoms():
+    model = scene(FLOOR + BALL.format(0, 0, 0.051) + '<body pos="1 0 .051"><freejoint/><geom size=".05"/></body>')
+    data, names = after(model, 100)
+    assert sorted(names) == [("floor", "ball"), ("floor", "geom 2")] and data.qpos[2] == pytest.approx(0.05, abs=2e-4)
+
+
+def test_a_body_with_a_solid_of_its_own_meets_the_geoms_of_others(tmp_path):
+    plate = "difference() { cube(size = [200, 200, 20], center = true); cylinder(h = 60, r1 = 60, r2 = 60, center = true); }"
+    (tmp_path / "plate.csg").write_text(plate)
+    inner = '<body name="plate"><geom name="slab" type="box" size=".1 .1 .01"/></body>' + BALL.format(0, 0, 0.2)
+    # The box is whole: the ball rests on it. The plate has a hole: it falls through, and from no file as from one.
+    assert after(scene(inner), 400)[0].qpos[2] > 0.059
+    for given in (tmp_path / "plate.csg", str(tmp_path / "plate.csg"), plate):
+        assert after(scene(inner), 400, replace={"plate": given}, unit=1e-3)[0].qpos[2] < -0.1
+    # On the rim it rests, where geometry says: 40 mm off the axis the ball of 50 meets the edge of the hole of 60 and falls in.
+    beside = inner.replace('pos="0 0 0.2"', 'pos="0.08 0 0.08"')
+    data, names = after(scene(beside), 1, replace={"plate": plate}, unit=1e-3)
+    assert names == [] and data.qpos[2] < 0.08
+    solid = contactd.solid.box(0.2, 0.2, 0.02) - contactd.solid.cylinder(0.06, 0.06)
+    assert after(scene(inner), 400, replace={"plate": solid})[0].qpos[2] < -0.1
+
+
+def corner(size):
+    """Corners and triangles of an L of two boxes: concave."""
+    outline = np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]) * size
+    n = len(outline)
+    points = [(*p, z) for z in (0.0, size) for p in outline]
+    faces = [(i, (i + 1) % n, n + (i + 1) % n) for i in range(n)] + [(i, n + (i + 1) % n, n + i) for i in range(n)]
+    caps = [(0, 1, 3), (1, 2, 3), (0, 3, 5), (3, 4, 5)]
+    faces += [tuple(n + k for k in f) for f in caps] + [f[::-1] for f in caps]
+    return numbers(np.ravel(points)), " ".join(str(i) for f in faces for i in f)
+
+
+def test_a_mesh_is_its_hull_or_itself():
+    vertices, faces = corner(0.1)
+    mesh = f'<mesh name="corner" vertex="{vertices}" face="{faces}" inertia="exact"/>'
+    # In the inner corner, a little above the floor: within the hull, beside the mesh.
+    inner = '<geom name="corner" type="mesh" mesh="corner" pos="0 0 0"/>' + BALL.format(0.16, 0.16, 0.05).replace(".05\"/>", ".02\"/>")
+    make = lambda: scene(inner, assets=mesh, option='<flag gravity="disable"/>')  # noqa: E731
+    stock = make()
+    stock.geom_pos[0] = (0, 0, 0)
+    data = mujoco.MjData(make())
+    for meshes, meets in (("hull", True), ("exact", False)):
+        model = make()
+        data = mujoco.MjData(model)
+        # The mesh's frame is about its centre of mass; MuJoCo has moved the geom there.
+        with attach(model, meshes=meshes) as coupling:
+            mujoco.mj_step1(model, data)
+            assert (coupling.add_contacts(data) > 0) == meets, meshes
+    own = mujoco.MjData(stock := make())
+    mujoco.mj_forward(stock, own)
+    assert own.ncon > 0, "stock MuJoCo meets the hull"
+    with pytest.raises(ValueError, match="expected one of 'hull', 'exact' for meshes, found 'convex'"):
+        attach(make(), meshes="convex")
+
+
+def test_a_ball_on_a_height_field_stands_where_mujocos_own_does():
+    rng = np.random.default_rng(3)
+    heights = rng.uniform(0, 1, (6, 5))
+    field = f'<hfield name="hills" nrow="6" ncol="5" size=".5 .6 .1 .05" elevation="{numbers(heights.ravel())}"/>'
+    inner = '<geom name="hills" type="hfield" hfield="hills"/>' + BALL.format(0, 0, 0)
+    stock, model = (scene(inner, assets=field) for _ in range(2))
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    met = 0
+    with attach(model, skin=SKIN) as coupling:
+        for _ in range(60):
+            data.qpos[:3] = theirs.qpos[:3] = (*rng.uniform(-0.4, 0.4, 2), rng.uniform(0.05, 0.2))
+            mujoco.mj_forward(stock, theirs)
+            mujoco.mj_step1(model, data)
+            coupling.add_contacts(data)
+            depth = lambda d: min((c.dist for c in d.contact), default=1.0)  # noqa: E731
+            met += depth(theirs) < 0
+            if abs(depth(theirs)) > 2e-3:
+                assert (depth(theirs) < 0) == (depth(data) < SKIN)
+    assert met > 10
+
+
+def test_what_has_no_solid_is_refused_by_name():
+    model = scene(FLOOR + BALL.format(0, 0, 1))
+    model.geom_type[1] = mujoco.mjtGeom.mjGEOM_SDF
+    with pytest.raises(ValueError, match="geom 'ball': its kind, sdf, has no solid here: give its body a solid by replace="):
+        attach(model)
+    with attach(model, {"ball": "sphere(r = 0.05);"}):
+        pass
+
+
+def test_a_pair_is_met_by_its_own_parameters_and_given_back():
+    pair = '<contact><pair name="grip" geom1="floor" geom2="ball" condim="4" friction=".5 .4 .3 .2 .1"/></contact>'
+    model = scene(FLOOR + BALL.format(0, 0, 0.0501), after=pair)
+    data = mujoco.MjData(model)
+    with attach(model) as coupling:
+        mujoco.mj_step1(model, data)
+        assert data.ncon == 0 and coupling.add_contacts(data) == 1
+        contact = data.contact[0]
+        assert contact.dim == 4 and contact.friction.tolist() == [0.5, 0.4, 0.3, 0.2, 0.1] and contact.includemargin == 2e-4
+        assert contact.dist == pytest.approx(0.0001, abs=1e-9) and list(contact.geom) == [0, 1]
+    assert model.pair_margin[0] == 0 and model.geom_contype.tolist() == [1, 1]
+
+
+def test_a_settled_scene_stays_as_still_as_mujocos_own():
+    bodies = "".join(
+        f'<body pos="{0.3 * (i % 5)} {0.3 * (i // 5)} .05"><freejoint/><geom type="{kind}" size=".05 .05 .05"/></body>'
+        for i, kind in enumerate(["box", "cylinder"] * 10)
+    )
+    stock, model = scene(FLOOR + bodies), scene(FLOOR + bodies)
+    theirs = mujoco.MjData(stock)
+    data = mujoco.MjData(model)
+    with attach(model) as coupling:
+        for _ in range(1500):
+            mujoco.mj_step(stock, theirs)
+            coupling.step(data)
+    own, stocks = (np.abs(d.qvel).max() for d in (data, theirs))
+    print(f"fastest of 20 bodies after 1500 steps: {own} here, {stocks} in stock MuJoCo")
+    assert own < max(2 * stocks, 1e-9)
+
+
+def test_a_model_without_anything_to_warn_of_warns_of_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CouplingWarning)
+        attach(scene(FLOOR + BALL.format(0, 0, 1))).close()
+    with pytest.warns(CouplingWarning, match="the margin of geom 'ball' has no effect"):
+        attach(scene(FLOOR + BALL.format(0, 0, 1).replace('size=".05"', 'size=".05" margin=".01"'))).close()
