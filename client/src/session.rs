@@ -243,7 +243,7 @@ impl<T: Transport> Session<T> {
         for command in self.journal.replay() {
             match self.transport.command(command, self.command_timeout)? {
                 Answer::Refused { code, index, detail } => return Err(refused(code, index, detail)),
-                Answer::Opened { .. } | Answer::Loaded { .. } | Answer::Done | Answer::Mass(_) => {}
+                Answer::Opened { .. } | Answer::Loaded { .. } | Answer::Done | Answer::Mass(_) | Answer::Status(_) => {}
             }
         }
         self.stage = Stage::Idle;

@@ -247,6 +247,69 @@ pub enum Command {
         /// As in [`MassOptions`](crate::MassOptions).
         boxes: u64,
     },
+    /// What the server's sessions are and how its steps do; asked of no session.
+    Status,
+    /// Ends the session of this id, whoever's it is; asked of no session.
+    EndSession(u64),
+}
+
+/// One session as its server counts it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Encode, Decode)]
+pub struct SessionStatus {
+    /// Its id.
+    pub id: u64,
+    /// Its client's process id, as the client said it.
+    pub process: u32,
+    /// Milliseconds since it was opened.
+    pub open_ms: u64,
+    /// Milliseconds since its client asked something.
+    pub idle_ms: u64,
+    /// Its objects.
+    pub objects: u32,
+    /// Its models.
+    pub models: u32,
+    /// Its steps that were taken.
+    pub steps: u64,
+    /// Those of them that left a pair undecided.
+    pub undecided: u64,
+    /// A step, an import or an integral of it is under way.
+    pub is_busy: bool,
+}
+
+/// The steps of about the last minute: from when the server takes a request to its reply.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Encode, Decode)]
+pub struct LatestSteps {
+    /// How many milliseconds these are: fewer than a minute's soon after the start.
+    pub window_ms: u64,
+    /// Steps taken within them.
+    pub steps: u64,
+    /// The time, in nanoseconds, within which half of them were answered, to 1 %.
+    pub p50_ns: u64,
+    /// The same for 99 of 100.
+    pub p99_ns: u64,
+    /// The same for 999 of 1000.
+    pub p999_ns: u64,
+    /// The longest.
+    pub largest_ns: u64,
+}
+
+/// What a server says of itself when it is asked.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Encode, Decode)]
+pub struct ServerStatus {
+    /// Its process id.
+    pub pid: u32,
+    /// Milliseconds since its start.
+    pub uptime_ms: u64,
+    /// Its sessions, by id.
+    pub sessions: Vec<SessionStatus>,
+    /// Models in use, each counted once however many sessions have it.
+    pub models: u32,
+    /// Steps that were taken since the start.
+    pub steps: u64,
+    /// Those of them that left a pair undecided.
+    pub undecided: u64,
+    /// The steps of the last minute.
+    pub latest: LatestSteps,
 }
 
 /// A face of a model, as the client may name it.
@@ -294,6 +357,8 @@ pub enum Answer {
     },
     /// A model's mass properties.
     Mass(WireMass),
+    /// What the server says of itself.
+    Status(ServerStatus),
 }
 
 /// A command with its session (0 for `Open`).

@@ -55,6 +55,7 @@ codes! {
     24 BadCommand "the command cannot be decoded",
     25 BadNumber "an option of the request is out of its range",
     26 Unbounded "the model reaches to infinity",
+    27 SessionEnded "the session was ended on its server, with `contactd sessions end`",
 }
 
 impl ErrorCode {

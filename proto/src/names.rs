@@ -103,6 +103,18 @@ impl Address {
         Ok(Self { name: name.into(), uid, base: base.into(), code })
     }
 
+    /// The addresses of all servers beside this one: those that have a folder under its base, whether they run or not; by name.
+    pub fn beside(&self) -> Vec<Self> {
+        let folders = std::fs::read_dir(&self.base).into_iter().flatten().flatten();
+        let mut names: Vec<String> = folders
+            .filter(|e| e.file_type().is_ok_and(|t| t.is_dir()))
+            .filter_map(|e| e.file_name().into_string().ok())
+            .collect();
+        names.sort();
+        // What iceoryx2 keeps begins with a dot, which no name of a server has.
+        names.iter().filter_map(|name| Self::under(&self.base, name).ok()).collect()
+    }
+
     /// The server's name.
     pub fn name(&self) -> &str {
         &self.name

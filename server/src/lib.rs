@@ -54,6 +54,7 @@
 //! | 8 | [`cache`], [`terminal`] | preprocessed models kept on disk; text of 80 columns |
 //! | 9 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
+//! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`demo`] | the show |
 //!
 //! # In one's own process
@@ -89,6 +90,7 @@ pub mod demo;
 pub mod import;
 pub mod inspect;
 pub mod ipc;
+pub mod operator;
 pub mod picture;
 pub mod report;
 pub mod terminal;

@@ -7,8 +7,9 @@ use contactd::check::Check;
 use contactd::contact::Status;
 use contactd::import::{self, Access, Facets, Limits, ModelBytes, Openscad, Scene};
 use contactd::inspect;
-use contactd::ipc::{CacheFolder, ServerConfig};
+use contactd::ipc::{CacheFolder, Level, ServerConfig};
 use contactd::octree::Model;
+use contactd::operator;
 use contactd::picture::{
     self,
     drawing::Drawing,
@@ -17,6 +18,7 @@ use contactd::picture::{
 use contactd::report::{self, Answer, PairReport, TableStyle};
 use contactd::terminal::{Colour, Paint};
 use contactd::world::{PairOutcome, StepOutcome};
+use contactd_proto::ErrorCode;
 use contactd_proto::names::Address;
 use std::error::Error;
 use std::io::{IsTerminal as _, Write as _};
@@ -41,21 +43,20 @@ enum Command {
     /// One step of a scene in this process, without a server: the earliest contact of every pair. Of models: whether they overlap.
     Check(CheckArguments),
     /// The server, until SIGINT or SIGTERM; prints one line when ready.
-    Serve {
-        /// Its name: clients connect to it by this.
-        #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
-        name: String,
-        /// A TOML file of limits and waiting times.
+    Serve(ServeArguments),
+    /// The servers of this user: their sessions, steps a second, how long steps took in the last minute, memory.
+    Status {
+        /// Only the server of this name.
         #[arg(long)]
-        config: Option<PathBuf>,
-        /// Milliseconds within which a step is answered, undecided where it is not known by then; 0: no such limit.
-        #[arg(long, value_name = "MS")]
-        deadline: Option<u64>,
-        /// A folder of this machine: texts that clients send may import files of it and below. Else they import none.
-        #[arg(long, value_name = "DIR")]
-        import_root: Option<PathBuf>,
-        #[command(flatten)]
-        cache: CacheArguments,
+        name: Option<String>,
+        /// One JSON object instead of text.
+        #[arg(long)]
+        json: bool,
+    },
+    /// What can be done to a server's sessions; `contactd status` lists them.
+    Sessions {
+        #[command(subcommand)]
+        what: SessionsCommand,
     },
     /// A server process and a client process on real parts: steps, earliest contacts, latencies.
     Demo {
@@ -92,6 +93,43 @@ enum Command {
         #[command(flatten)]
         cache: CacheArguments,
     },
+}
+
+#[derive(Subcommand)]
+enum SessionsCommand {
+    /// Ends a session; its client is told, and others go on.
+    End {
+        /// Its number, as `contactd status` tells it.
+        #[arg(value_name = "N")]
+        session: u64,
+        /// The server.
+        #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
+        name: String,
+    },
+}
+
+#[derive(clap::Args)]
+struct ServeArguments {
+    /// Its name: clients connect to it by this.
+    #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
+    name: String,
+    /// A TOML file of limits and waiting times.
+    #[arg(long)]
+    config: Option<PathBuf>,
+    /// Milliseconds within which a step is answered, undecided where it is not known by then; 0: no such limit.
+    #[arg(long, value_name = "MS")]
+    deadline: Option<u64>,
+    /// A folder of this machine: texts that clients send may import files of it and below. Else they import none.
+    #[arg(long, value_name = "DIR")]
+    import_root: Option<PathBuf>,
+    /// Tells models and refused commands too, on standard error; else as CONTACTD_LOG says (warn, info, debug), or sessions alone.
+    #[arg(short, long, conflicts_with = "quiet")]
+    verbose: bool,
+    /// Tells only what is wrong.
+    #[arg(short, long)]
+    quiet: bool,
+    #[command(flatten)]
+    cache: CacheArguments,
 }
 
 /// What reading a file may reach beside it.
@@ -200,9 +238,9 @@ fn main() -> ExitCode {
         Command::Inspect { file, facets, picture, access, cache } => {
             inspect_file(&file, facets, picture.as_deref(), &access, &cache)
         }
-        Command::Serve { name, config, deadline, import_root, cache } => {
-            serve(&name, config.as_deref(), (deadline, import_root), cache)
-        }
+        Command::Serve(arguments) => serve(arguments),
+        Command::Status { name, json } => status(name.as_deref(), json, paint),
+        Command::Sessions { what: SessionsCommand::End { session, name } } => end_session(session, &name),
     };
     match done {
         Ok(Done::Well) => ExitCode::SUCCESS,
@@ -214,13 +252,9 @@ fn main() -> ExitCode {
     }
 }
 
-fn serve(
-    name: &str,
-    config: Option<&Path>,
-    (deadline, import_root): (Option<u64>, Option<PathBuf>),
-    cache: CacheArguments,
-) -> Result<Done, Box<dyn Error>> {
-    let mut config = config.map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
+fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
+    let ServeArguments { name, config, deadline, import_root, verbose, quiet, cache } = arguments;
+    let mut config = config.as_deref().map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
     // The command line stands before the file, `off` too.
     config.cache = cache.cache.unwrap_or(config.cache);
     config.deadline_ms = deadline.unwrap_or(config.deadline_ms);
@@ -228,12 +262,46 @@ fn serve(
         return Err(format!("expected a folder as import root, found {}", root.display()).into());
     }
     config.import_root = import_root.or(config.import_root);
+    config.log = match (verbose, quiet) {
+        (true, _) => Level::Debug,
+        (_, true) => Level::Warn,
+        _ => log_of_environment()?.unwrap_or(config.log),
+    };
     let ready = || {
         let pid = std::process::id();
         // A reader that has gone away does not stop a server.
         let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol 1, process {pid})\n"));
     };
-    contactd::ipc::serve(&Address::of(name)?, config, ready)?;
+    contactd::ipc::serve(&Address::of(&name)?, config, ready)?;
+    Ok(Done::Well)
+}
+
+/// What the environment says of the log; an empty word says nothing.
+fn log_of_environment() -> Result<Option<Level>, String> {
+    let Some(word) = std::env::var_os(LOG).filter(|word| !word.is_empty()) else { return Ok(None) };
+    Level::of_name(&word.to_string_lossy()).map(Some).map_err(|e| format!("{LOG}: {e}"))
+}
+
+/// The variable of the environment that says how much a server tells.
+const LOG: &str = "CONTACTD_LOG";
+
+fn status(name: Option<&str>, json: bool, paint: Paint) -> Result<Done, Box<dyn Error>> {
+    let servers = operator::servers(name)?;
+    print(&if json { servers.json()? + "\n" } else { servers.text(paint) })?;
+    Ok(Done::Well)
+}
+
+fn end_session(session: u64, name: &str) -> Result<Done, Box<dyn Error>> {
+    match operator::end_session(name, session) {
+        Ok(()) => print(&format!("session {session} of \"{name}\" is ended\n"))?,
+        Err(e) if e.code() == Some(ErrorCode::SessionGone) => {
+            let asked = format!("contactd status --name {name}");
+            return Err(
+                format!("there is no session {session} on \"{name}\": `{asked}` lists those that are open").into()
+            );
+        }
+        Err(e) => return Err(e.into()),
+    }
     Ok(Done::Well)
 }
 

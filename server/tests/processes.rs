@@ -1,5 +1,6 @@
 //! A server and its clients as processes of their own: the same bits as embedded, death on either side, bad input.
 
+#[allow(dead_code, reason = "other tests use the rest of it")]
 mod harness;
 
 use contactd::ipc::ServerConfig;

@@ -99,6 +99,9 @@
 // the model reaches to infinity.
 #define CONTACTD_ERROR_UNBOUNDED 26
 
+// the session was ended on its server, with `contactd sessions end`.
+#define CONTACTD_ERROR_SESSION_ENDED 27
+
 // Done.
 #define CONTACTD_OK 0
 

@@ -34,6 +34,7 @@ class ErrorCode(enum.IntEnum):
     BAD_COMMAND = 24
     BAD_NUMBER = 25
     UNBOUNDED = 26
+    SESSION_ENDED = 27
 
 
 class Error(Exception):

@@ -141,7 +141,7 @@ impl<T: Transport> Session<T> {
         // Where the reply is lost the server did what was asked, or refused it: the journal cannot tell, so the server can no
         // longer be trusted to stand where the journal does. A replay settles it.
         let lost = matches!(error, Error::ServerLost | Error::ReplyLost);
-        if lost || error.code() == Some(ErrorCode::SessionGone) {
+        if lost || matches!(error.code(), Some(ErrorCode::SessionGone | ErrorCode::SessionEnded)) {
             self.lose();
         } else if matches!(self.stage, Stage::Sent { .. }) {
             self.stage = Stage::Idle;

@@ -3,7 +3,9 @@
 //! Waiting spins for as long as the server advised, then blocks on the session's own wake service in slices; between two
 //! slices it looks whether the server still lives, since iceoryx2 never announces a killed peer.
 
+mod control;
 pub mod link;
+pub mod operator;
 mod steps;
 pub mod watch;
 

@@ -1,21 +1,19 @@
 //! The client's ports and the one request that may be under way.
 
-use super::link::{self, ControlClient, StepClient, Variant, system};
-use super::watch::ProcessWatch;
+use super::control::{self, Control, SLICE};
+use super::link::{self, StepClient, Variant, system};
 use crate::Error;
 use crate::transport::{Opened, Transport};
-use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, encode};
-use contactd_proto::names::{self, Address, Incarnation, PROTOCOL_VERSION};
+use contactd_proto::control::{Answer, Command};
+use contactd_proto::names::{self, Address, PROTOCOL_VERSION};
 use contactd_proto::status::StatusRecord;
 use contactd_proto::step::ASK_POLLING;
 use contactd_proto::{ContactRecord, ErrorCode, PoseRecord, StepReply, StepRequest};
 use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::listener::Listener;
-use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::*;
 use iceoryx2::request_mut::RequestMut;
 use iceoryx2::response::Response;
-use rustix::fs::{FlockOperation, flock};
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -23,9 +21,7 @@ type Loan = RequestMut<Variant, [PoseRecord], StepRequest, [ContactRecord], Step
 type Pending = PendingResponse<Variant, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
 type Arrived = Response<Variant, [ContactRecord], StepReply>;
 
-/// Longest wait between two looks at whether the server lives.
-const SLICE: Duration = Duration::from_millis(50);
-/// The same for a client that polls. Nor is a server looked after whose last answer is no older: that is a system call.
+/// Longest wait between two looks at whether the server lives, for a client that polls. Nor is a server looked after whose last answer is no older: that is a system call.
 const POLLED: Duration = Duration::from_millis(1);
 /// Looks for a reply for each look at the clock.
 const LOOKS: u64 = 8;
@@ -50,43 +46,14 @@ struct Link {
     pending: Option<Pending>,
     loan: Option<Loan>,
     wake: Option<Listener<Variant>>,
-    server: Notifier<Variant>,
     steps: StepClient,
-    control: ControlClient,
-    life: Life,
-    epoch: u64,
+    control: Control,
     session: u64,
     spin: Duration,
     /// The request under way asked the server not to wake this client.
     polling: bool,
     /// When the server was last known to live.
     alive: Instant,
-    node: Node<Variant>,
-}
-
-/// How the server's life is watched.
-enum Life {
-    /// By its process.
-    Process(ProcessWatch),
-    /// By its lock: its process is not visible from here.
-    Lock(Address, u64),
-}
-
-impl Life {
-    fn is_over(&self) -> bool {
-        match self {
-            Self::Process(watch) => watch.is_dead(),
-            Self::Lock(address, epoch) => {
-                !is_locked(address) || address.current().is_none_or(|now| now.epoch != *epoch)
-            }
-        }
-    }
-}
-
-/// True when a server holds its lock.
-fn is_locked(address: &Address) -> bool {
-    let Ok(file) = std::fs::File::open(address.lock_file()) else { return false };
-    flock(&file, FlockOperation::NonBlockingLockShared).is_err()
 }
 
 impl SharedMemory {
@@ -100,9 +67,7 @@ impl SharedMemory {
     /// # Errors
     /// `NoServer`, `Address`, `System`.
     pub fn status(address: &Address) -> Result<StatusRecord, Error> {
-        let (incarnation, _) = find(address)?;
-        let node = link::node(&link::config(address, incarnation.epoch)?)?;
-        read_status(&node)
+        control::shown(address)
     }
 
     fn link(&mut self) -> Result<&mut Link, Error> {
@@ -110,53 +75,14 @@ impl SharedMemory {
     }
 }
 
-/// The serving incarnation and a watch on its life.
-fn find(address: &Address) -> Result<(Incarnation, Life), Error> {
-    let none = || Error::NoServer(address.name().into());
-    if !address.folder().exists() {
-        return Err(none());
-    }
-    address.check_private()?;
-    let now = address.current().ok_or_else(none)?;
-    let life = match ProcessWatch::of(now.pid, now.start) {
-        Some(watch) => Life::Process(watch),
-        None => Life::Lock(address.clone(), now.epoch),
-    };
-    // Read again after the watch stands: what it watches is the incarnation that serves.
-    if address.current() != Some(now) || life.is_over() || !is_locked(address) {
-        return Err(none());
-    }
-    Ok((now, life))
-}
-
-fn read_status(node: &Node<Variant>) -> Result<StatusRecord, Error> {
-    let name = link::service_name(names::STATUS_SERVICE)?;
-    let service = node.service_builder(&name).blackboard_opener::<u32>().open();
-    let service = service.map_err(|e| system(names::STATUS_SERVICE, e))?;
-    let reader = service.reader_builder().create().map_err(|e| system("status reader", e))?;
-    let entry = reader.entry::<StatusRecord>(&link::STATUS_KEY).map_err(|e| system("status entry", e))?;
-    Ok(*entry.get())
-}
-
 impl Link {
     fn new(address: &Address) -> Result<Self, Error> {
-        let (incarnation, life) = find(address)?;
-        let node = link::node(&link::config(address, incarnation.epoch)?)?;
-        match Self::on(node, life, incarnation.epoch) {
-            // What cannot be opened because its server is just going is no fault of the system.
-            Err(Error::System(_)) if !is_locked(address) || address.current() != Some(incarnation) => {
-                Err(Error::NoServer(address.name().into()))
-            }
-            other => other,
-        }
+        Control::with(address, Self::on)
     }
 
-    fn on(node: Node<Variant>, life: Life, epoch: u64) -> Result<Self, Error> {
-        let status = read_status(&node)?;
-        if !(status.version_min..=status.version_max).contains(&PROTOCOL_VERSION) {
-            return Err(Error::Version { min: status.version_min, max: status.version_max });
-        }
-        let steps = node
+    fn on(control: Control) -> Result<Self, Error> {
+        let steps = control
+            .node
             .service_builder(&link::service_name(names::STEP_SERVICE)?)
             .request_response::<[PoseRecord], [ContactRecord]>()
             .request_user_header::<StepRequest>()
@@ -169,80 +95,28 @@ impl Link {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| system("step port", e))?;
-        let control = node
-            .service_builder(&link::service_name(names::CONTROL_SERVICE)?)
-            .request_response::<[u8], [u8]>()
-            .request_user_header::<ControlHeader>()
-            .response_user_header::<ControlHeader>()
-            .open()
-            .map_err(|e| system(names::CONTROL_SERVICE, e))?
-            .client_builder()
-            .initial_max_slice_len(4096)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|e| system("control port", e))?;
-        let server = node
-            .service_builder(&link::service_name(names::WAKE_SERVICE)?)
-            .event()
-            .open()
-            .map_err(|e| system(names::WAKE_SERVICE, e))?
-            .notifier_builder()
-            .create()
-            .map_err(|e| system("wake port", e))?;
         Ok(Self {
             reply: None,
             pending: None,
             loan: None,
             wake: None,
-            server,
             steps,
             control,
-            life,
-            epoch,
             session: 0,
             spin: Duration::ZERO,
             polling: false,
             alive: Instant::now(),
-            node,
         })
     }
 
     fn command(&mut self, command: Command, timeout: Duration) -> Result<Answer, Error> {
-        let bytes = encode(&Envelope { epoch: self.epoch, session: self.session, command }).map_err(Error::refused)?;
-        let mut request = self
-            .control
-            .loan_slice_uninit(bytes.len())
-            .map_err(|e| system("no memory for a command", e))?
-            .write_from_slice(&bytes);
-        *request.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };
-        let pending = request.send().map_err(|e| system("a command cannot be sent", e))?;
-        self.wake_server();
-        let start = Instant::now();
-        loop {
-            let connected = pending.is_connected();
-            match pending.receive() {
-                Ok(Some(answer)) => {
-                    // One copy: what is decoded can no longer change.
-                    let bytes = answer.payload().to_vec();
-                    return decode(&bytes).map_err(Error::refused);
-                }
-                Ok(None) if self.life.is_over() => return Err(Error::ServerLost),
-                Ok(None) if !connected => return Err(Error::ReplyLost),
-                Ok(None) => {}
-                Err(e) => return Err(system("an answer cannot be received", e)),
-            }
-            if start.elapsed() > timeout {
-                return Err(Error::Timeout);
-            }
-            // The waits grow with what has been waited: a load of seconds is not polled by microseconds.
-            self.wait((start.elapsed() / 4).clamp(Duration::from_micros(100), SLICE));
-        }
+        self.control.command(self.session, command, timeout, |time| self.wait(time))
     }
 
     /// Makes the port on which the server wakes this session's client.
     fn listen(&mut self) -> Result<(), Error> {
         let service = self
+            .control
             .node
             .service_builder(&link::service_name(&names::wake_service_of(self.session))?)
             .event()
@@ -262,11 +136,6 @@ impl Link {
         if waited.is_err() {
             std::thread::sleep(time.min(Duration::from_millis(1)));
         }
-    }
-
-    fn wake_server(&self) {
-        // A server that cannot be woken is dead or full of wake-ups: either shows elsewhere.
-        let _ = self.server.notify();
     }
 }
 
@@ -294,7 +163,7 @@ impl Transport for SharedMemory {
         };
         link.session = session;
         link.spin = Duration::from_nanos(spin_ns);
-        let epoch = link.epoch;
+        let epoch = link.control.epoch;
         let listens = link.listen();
         self.link = Some(link);
         if let Err(e) = listens {
@@ -335,7 +204,7 @@ impl Transport for SharedMemory {
 
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         let link = self.link()?;
-        if link.alive.elapsed() > POLLED && link.life.is_over() {
+        if link.alive.elapsed() > POLLED && link.control.life.is_over() {
             return Err(Error::ServerLost);
         }
         let Some(mut loan) = link.loan.take() else {
@@ -344,7 +213,7 @@ impl Transport for SharedMemory {
         *loan.user_header_mut() = request;
         link.polling = request.asked & ASK_POLLING != 0;
         link.pending = Some(loan.send().map_err(|e| system("a batch cannot be sent", e))?);
-        link.wake_server();
+        link.control.wake_server();
         Ok(())
     }
 
@@ -381,7 +250,7 @@ impl Transport for SharedMemory {
                 continue;
             }
             looked = Instant::now();
-            if link.life.is_over() {
+            if link.control.life.is_over() {
                 return Err(Error::ServerLost);
             }
             if !connected {
@@ -403,7 +272,7 @@ impl Transport for SharedMemory {
 
     fn leave(&mut self) {
         // Where it does not arrive the server finds that nobody listens.
-        if let Some(link) = self.link.as_mut().filter(|link| !link.life.is_over()) {
+        if let Some(link) = self.link.as_mut().filter(|link| !link.control.life.is_over()) {
             let _ = link.command(Command::Close, GOODBYE);
         }
     }

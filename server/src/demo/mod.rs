@@ -77,7 +77,7 @@ impl ServerProcess {
     fn start(name: &str, cache: &CacheFolder) -> Result<Self, String> {
         let program = std::env::current_exe().map_err(|e| format!("expected to find this program, found {e}"))?;
         let mut command = Command::new(program);
-        command.args(["serve", "--name", name]).stdin(Stdio::null()).stdout(Stdio::piped());
+        command.args(["serve", "--quiet", "--name", name]).stdin(Stdio::null()).stdout(Stdio::piped());
         if let Some(folder) = cache.folder() {
             command.arg("--cache").arg(folder);
         }

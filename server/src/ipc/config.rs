@@ -1,5 +1,6 @@
 //! What a server is told at its start: limits and waiting. Every field has a default that suits a workstation.
 
+use super::log::Level;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -42,6 +43,8 @@ pub struct ServerConfig {
     /// A folder of this machine: texts that clients send may import files of it and below, by names relative to it. None: a text
     /// that is sent names no files.
     pub import_root: Option<PathBuf>,
+    /// How much a server tells on standard error.
+    pub log: Level,
 }
 
 /// Where preprocessed models are kept between runs, if anywhere.
@@ -88,6 +91,7 @@ impl Default for ServerConfig {
             cache: CacheFolder::default(),
             cache_mb: crate::cache::DEFAULT_BYTES >> 20,
             import_root: None,
+            log: Level::default(),
         }
     }
 }
@@ -178,6 +182,7 @@ mod tests {
             ("sessions = ", "c.toml:1:"),
             ("cache_mb = 0", "cache_mb = 0: expected 1 to 1048576"),
             ("cache = 1", "c.toml:1:9: invalid type"),
+            ("log = \"loud\"", "c.toml:1:7: unknown variant `loud`, expected one of `warn`, `info`, `debug`"),
         ] {
             let sentence = ServerConfig::parse("c.toml", text).unwrap_err();
             assert!(sentence.contains(what), "{sentence}");

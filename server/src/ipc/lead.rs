@@ -11,19 +11,21 @@
 
 use super::config::ServerConfig;
 use super::jobs::{Finished, Job, JobKind};
-use super::models::{Models, warn};
+use super::log::Log;
+use super::models::Models;
 use super::port::{CommandCall, Port, StepCall, Wake};
 use super::relay::Relay;
 use super::scene::{CommandOutcome, Scene, refusal, refused};
-use super::session::{Session, fresh_heed};
-use super::task::{Mailbox, Ran, Report, Task};
+use super::session::{Over, Session, fresh_heed};
+use super::tally::{Tally, millis};
+use super::task::{Did, Mailbox, Ran, Report, Task};
 use crate::world::{Refusal, yield_to_others};
-use contactd_proto::control::{Answer, Command, Envelope, decode, encode};
+use contactd_proto::control::{Answer, Command, Envelope, ServerStatus, decode, encode};
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::status::StatusRecord;
-use contactd_proto::step::ASK_POLLING;
+use contactd_proto::step::{ASK_POLLING, STEP_REFUSED, STEP_UNDECIDED};
 use contactd_proto::{ContactRecord, EffectCounters, ErrorCode};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Weak};
@@ -39,6 +41,8 @@ const SHORT: Duration = Duration::from_millis(1);
 const CALM: u32 = 16;
 /// How long the end of a server waits for what it has cancelled.
 const CANCELLED: Duration = Duration::from_secs(2);
+/// How many sessions that were ended from outside are remembered.
+const REMEMBERED: usize = 1000;
 /// The part of a deadline that is left to the reply.
 const REPLY_PART: u32 = 10;
 
@@ -66,6 +70,10 @@ pub struct Lead<P: Port> {
     config: ServerConfig,
     last_session: u64,
     steps: u64,
+    tally: Tally,
+    log: Log,
+    /// Sessions that were ended from outside, the latest: their clients are told so.
+    ended: VecDeque<u64>,
     /// What they worked out.
     effects: EffectCounters,
     beats: u64,
@@ -142,7 +150,7 @@ fn lead_on<'scope, 'env, P: Port>(
                     Some(back) => lead = back,
                     None => return Some((task, ran)),
                 }
-                lead.effects += ran.0;
+                lead.count(id, &ran.0, task.began.elapsed());
                 let scene = task.answer(ran);
                 lead.put_back(id, scene);
             }
@@ -180,9 +188,12 @@ impl<P: Port> Lead<P> {
             mailbox: Arc::new(Mailbox { reports: to, bell }),
             port,
             models: Arc::new(Models::new(&config)),
+            log: Log::new(config.log),
             config,
             last_session: 0,
             steps: 0,
+            tally: Tally::new(Instant::now()),
+            ended: VecDeque::new(),
             effects: EffectCounters::default(),
             beats: 0,
             last_work: Instant::now(),
@@ -210,14 +221,27 @@ impl<P: Port> Lead<P> {
             heard = true;
             match report {
                 Report::Job(finished) => self.finished(session, finished),
-                Report::Stepped { scene, effects, short, thread } => {
-                    self.effects += effects;
+                Report::Stepped { scene, did, took, short, thread } => {
+                    self.count(session, &did, took);
                     self.stepped(session, short, thread);
                     self.put_back(session, scene);
                 }
             }
         }
         heard
+    }
+
+    /// A step is done; one that was refused is no step.
+    fn count(&mut self, id: u64, did: &Did, took: Duration) {
+        self.effects += did.effects;
+        if did.status == STEP_REFUSED {
+            return;
+        }
+        let is_undecided = did.status == STEP_UNDECIDED;
+        self.tally.count(took, is_undecided);
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.count(is_undecided);
+        }
     }
 
     /// A session's step is done on another thread.
@@ -255,7 +279,8 @@ impl<P: Port> Lead<P> {
         }
         let session = if is_mine { self.sessions.get_mut(&request.session) } else { None };
         let Some(session) = session else {
-            let code = if request.version == PROTOCOL_VERSION { ErrorCode::SessionGone } else { ErrorCode::Version };
+            let gone = gone(&self.ended, request.session, is_mine);
+            let code = if request.version == PROTOCOL_VERSION { gone } else { ErrorCode::Version };
             refuse(call, code);
             return None;
         };
@@ -278,7 +303,8 @@ impl<P: Port> Lead<P> {
             }
         }
         let (heed, wake, mailbox) = (session.heed.clone(), session.wake.clone(), self.mailbox.clone());
-        let task = Task { session: request.session, scene, heed, request, call, wake, mailbox };
+        let began = Instant::now();
+        let task = Task { session: request.session, scene, heed, request, began, call, wake, mailbox };
         let Some(thread) = &session.thread else { return Some(task) };
         match thread.send(task) {
             Ok(()) => None,
@@ -305,19 +331,30 @@ impl<P: Port> Lead<P> {
             Err(code) => return answer(call, &refused(Refusal::new(code, ""))),
         };
         if let Command::Open { version, process } = envelope.command {
-            let opened = self.open(version, process).unwrap_or_else(refused);
+            let opened = self.open(version, process).unwrap_or_else(|refusal| {
+                let why = sentence(&refusal);
+                self.log.info(|| format!("a session for process {} was refused: {why}", process.0));
+                refused(refusal)
+            });
             return answer(call, &opened);
         }
         let id = envelope.session;
         self.hear();
-        let session = if envelope.epoch == self.epoch { self.sessions.get_mut(&id) } else { None };
+        let is_mine = envelope.epoch == self.epoch;
+        match envelope.command {
+            Command::Status if is_mine => return answer(call, &Answer::Status(self.status())),
+            Command::EndSession(which) if is_mine => return answer(call, &self.end_from_outside(which)),
+            _ => {}
+        }
+        let session = if is_mine { self.sessions.get_mut(&id) } else { None };
         let Some(session) = session else {
-            return answer(call, &refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}"))));
+            let code = gone(&self.ended, id, is_mine);
+            return answer(call, &refused(Refusal::new(code, format!("session {id}"))));
         };
         session.has_asked();
         // Whatever is under way: what comes of it has nobody to go to.
         if envelope.command == Command::Close {
-            self.remove(id);
+            self.remove(id, "its client closed it");
             self.show();
             return answer(call, &Answer::Done);
         }
@@ -326,8 +363,11 @@ impl<P: Port> Lead<P> {
             let detail = if session.waiting { "a model is being imported or integrated over" } else { "a step runs" };
             return answer(call, &refused(Refusal::new(ErrorCode::Busy, detail)));
         };
-        let work = match scene.command(envelope.command) {
+        let outcome = scene.command(envelope.command);
+        session.counts = scene.counts();
+        let work = match outcome {
             CommandOutcome::Answered(a) => {
+                debug_refusal(&mut self.log, id, &a);
                 answer(call, &a);
                 session.wake.notify();
                 return;
@@ -369,6 +409,8 @@ impl<P: Port> Lead<P> {
         self.last_session = id;
         let session = Session::new(Scene::new(&self.config), wake, process, self.cores);
         self.sessions.insert(id, session);
+        let (open, most) = (self.sessions.len(), self.config.sessions);
+        self.log.info(|| format!("session {id} is opened by process {} ({open} of {most} are open)", process.0));
         self.active += 1;
         self.show();
         // The client polls beside the server: only where both have a core.
@@ -383,31 +425,80 @@ impl<P: Port> Lead<P> {
         let Some(session) = self.sessions.get_mut(&id) else { return };
         session.waiting = false;
         let said = match (finished, session.scene.as_mut()) {
-            (Finished::Imported(model, text, loaded), Some(scene)) => scene.loaded(model, text, loaded),
+            (Finished::Imported(model, text, loaded), Some(scene)) => {
+                let said = scene.loaded(model, text, loaded);
+                session.counts = scene.counts();
+                if let Answer::Loaded { faces, .. } = &said {
+                    let faces = faces.len();
+                    self.log
+                        .debug(|| format!("session {id}: {text} bytes were read as model {model}, of {faces} faces"));
+                }
+                said
+            }
             (Finished::Imported(..), None) => refused(Refusal::new(ErrorCode::Busy, "a step runs")),
             (Finished::Integrated(said), _) => said,
         };
+        debug_refusal(&mut self.log, id, &said);
         answer(call, &said);
         session.wake.notify();
     }
 
     /// Ends a session: what runs for it is cancelled, and its scene freed on another thread.
-    fn remove(&mut self, id: u64) {
+    fn remove(&mut self, id: u64, why: &str) {
         self.pending.remove(&id);
-        if let Some(mut session) = self.sessions.remove(&id)
-            && let Some(scene) = session.scene.take()
-        {
+        let Some(mut session) = self.sessions.remove(&id) else { return };
+        let (process, steps) = (session.process, session.steps);
+        self.log.info(|| format!("session {id} of process {process} is ended after {steps} steps: {why}"));
+        if let Some(scene) = session.scene.take() {
             discard(scene);
+        }
+    }
+
+    /// Ends a session because somebody else than its client asks for it.
+    fn end_from_outside(&mut self, id: u64) -> Answer {
+        let Some(session) = self.sessions.get(&id) else {
+            return refused(Refusal::new(ErrorCode::SessionGone, format!("session {id}")));
+        };
+        let wake = session.wake.clone();
+        // A client that waits for a model hears of it by this answer, another one by the next.
+        if let Some((call, _job)) = self.pending.remove(&id) {
+            answer(call, &refused(Refusal::new(ErrorCode::SessionEnded, format!("session {id}"))));
+        }
+        self.ended.push_back(id);
+        if self.ended.len() > REMEMBERED {
+            self.ended.pop_front();
+        }
+        self.remove(id, "`contactd sessions end` asked for it");
+        wake.notify();
+        self.show();
+        Answer::Done
+    }
+
+    /// What the server says of itself, from what is counted anyway.
+    fn status(&mut self) -> ServerStatus {
+        let now = Instant::now();
+        ServerStatus {
+            pid: std::process::id(),
+            uptime_ms: millis(self.tally.age(now)),
+            sessions: self.sessions.iter().map(|(id, session)| session.status(*id)).collect(),
+            models: u32::try_from(self.models.count()).unwrap_or(u32::MAX),
+            steps: self.tally.steps,
+            undecided: self.tally.undecided,
+            latest: self.tally.latest(now),
         }
     }
 
     /// Ends the sessions that are over.
     fn end_sessions(&mut self) {
         let idle = Duration::from_secs(self.config.idle_s);
-        let over: Vec<u64> =
-            self.sessions.iter_mut().filter_map(|(id, session)| session.is_over(idle).then_some(*id)).collect();
-        for id in &over {
-            self.remove(*id);
+        let over: Vec<(u64, Over)> =
+            self.sessions.iter_mut().filter_map(|(id, session)| Some((*id, session.is_over(idle)?))).collect();
+        for (id, why) in &over {
+            match why {
+                Over::Died => self.remove(*id, "its client's process has ended"),
+                Over::Left => self.remove(*id, "its client has left without a word"),
+                Over::Idle => self.remove(*id, &format!("its client asked nothing for {} s", idle.as_secs())),
+            }
         }
         if !over.is_empty() {
             self.port.sweep_dead();
@@ -422,8 +513,9 @@ impl<P: Port> Lead<P> {
         if self.beats.is_multiple_of(200) {
             self.port.sweep_dead();
         }
+        self.tally.turn(Instant::now());
         if self.hangup.swap(false, Ordering::Relaxed) {
-            warn("SIGHUP: there is nothing to read again, the server goes on");
+            self.log.warn("SIGHUP: there is nothing to read again, the server goes on");
         }
         self.show();
     }
@@ -431,7 +523,7 @@ impl<P: Port> Lead<P> {
     /// Tells, once, that nobody watches.
     fn is_alone(&mut self) {
         if !self.watched && !self.alone {
-            warn("no thread can be started: a step that takes long delays all sessions");
+            self.log.warn("no thread can be started: a step that takes long delays all sessions");
         }
         self.alone = !self.watched;
     }
@@ -439,9 +531,12 @@ impl<P: Port> Lead<P> {
     /// Ends what runs for its sessions, and waits for it.
     fn end(&mut self) {
         let until = Instant::now() + CANCELLED;
-        for session in self.sessions.values_mut() {
+        for (id, session) in &mut self.sessions {
             session.heed.halt();
             session.thread = None;
+            let (process, steps) = (session.process, session.steps);
+            self.log
+                .info(|| format!("session {id} of process {process} is ended after {steps} steps: the server stops"));
         }
         let mut left: usize = self.pending.len();
         self.pending.clear();
@@ -456,6 +551,25 @@ impl<P: Port> Lead<P> {
         let status = status(self.epoch, &self.config, self.sessions.len(), self.steps);
         self.port.show(StatusRecord { effects: self.effects, ..status });
     }
+}
+
+/// Why there is no session of this id: it was ended from outside, or is not there for another reason.
+fn gone(ended: &VecDeque<u64>, id: u64, is_mine: bool) -> ErrorCode {
+    if is_mine && ended.contains(&id) { ErrorCode::SessionEnded } else { ErrorCode::SessionGone }
+}
+
+/// Tells, to who wants to know, that a command was refused.
+fn debug_refusal(log: &mut Log, id: u64, said: &Answer) {
+    if let Answer::Refused { code, detail, .. } = said {
+        let code = ErrorCode::of_number(*code).unwrap_or(ErrorCode::Internal);
+        log.debug(|| format!("session {id}: a command is refused: {}", sentence(&Refusal::new(code, detail.as_str()))));
+    }
+}
+
+/// A refusal as a sentence.
+fn sentence(refusal: &Refusal) -> String {
+    let detail = if refusal.detail.is_empty() { String::new() } else { format!(": {}", refusal.detail) };
+    format!("{}{detail}", refusal.code)
 }
 
 /// When a step that begins now must have been searched.

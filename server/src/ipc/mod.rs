@@ -14,6 +14,7 @@ pub mod config;
 mod embedded;
 mod jobs;
 mod lead;
+mod log;
 mod models;
 mod port;
 mod relay;
@@ -22,8 +23,10 @@ mod scene;
 mod serve;
 mod services;
 mod session;
+mod tally;
 mod task;
 
 pub use config::{CacheFolder, ServerConfig};
 pub use embedded::{Embedded, embedded};
+pub use log::Level;
 pub use serve::{ServeError, Server, ready_threads, serve};

@@ -74,6 +74,12 @@ impl Models {
         Ok(loaded)
     }
 
+    /// Models in use.
+    pub fn count(&self) -> usize {
+        let map = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        map.values().filter(|model| model.strong_count() > 0).count()
+    }
+
     fn make(&self, source: &Source, facets: Facets) -> Result<Loaded, Refusal> {
         let facets = match facets {
             Facets::Auto => import::Facets::Auto,

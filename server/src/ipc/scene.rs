@@ -86,7 +86,13 @@ impl Scene {
         }
     }
 
-    /// Obeys a command other than open and close.
+    /// How many objects and models there are.
+    pub fn counts(&self) -> (u32, u32) {
+        let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        (count(self.world.bodies().len()), count(self.models.len()))
+    }
+
+    /// Obeys a command that is not the server's own.
     pub fn command(&mut self, command: Command) -> CommandOutcome {
         self.obey(command).unwrap_or_else(|refusal| CommandOutcome::Answered(refused(refusal)))
     }
@@ -121,8 +127,8 @@ impl Scene {
 
     fn obey(&mut self, command: Command) -> Result<CommandOutcome, Refusal> {
         match command {
-            Command::Open { .. } | Command::Close => {
-                return Err(Refusal::new(ErrorCode::BadCommand, "open and close are the server's own"));
+            Command::Open { .. } | Command::Close | Command::Status | Command::EndSession(_) => {
+                return Err(Refusal::new(ErrorCode::BadCommand, "the command is the server's own"));
             }
             Command::LoadModel { model, file, facets } => {
                 if model <= self.last_model {

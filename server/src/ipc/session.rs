@@ -2,9 +2,11 @@
 
 use super::port::{Port, Wake};
 use super::scene::Scene;
+use super::tally::millis;
 use super::task::Task;
 use crate::world::{Crew, Heed};
 use contactd_client::shm::watch::ProcessWatch;
+use contactd_proto::control::SessionStatus;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
@@ -19,6 +21,8 @@ pub struct Session<P: Port> {
     /// Its scene; `None` while another thread runs a step on it.
     pub scene: Option<Box<Scene>>,
     pub wake: Arc<P::Wake>,
+    /// Its client's process.
+    pub process: u32,
     opened: Instant,
     /// Its client was seen to listen, or has asked something, before which it listens.
     arrived: bool,
@@ -34,6 +38,22 @@ pub struct Session<P: Port> {
     /// Its own thread, since its steps take long; and how many short ones in a row it has run.
     pub thread: Option<Sender<Task<P>>>,
     pub calm: u32,
+    /// Its objects and models, as of its last command: the scene may be elsewhere.
+    pub counts: (u32, u32),
+    /// Steps that were taken, and those of them that left a pair undecided.
+    pub steps: u64,
+    pub undecided: u64,
+}
+
+/// Why a session is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Over {
+    /// Its client's process has ended.
+    Died,
+    /// Its client has asked nothing for long, and cannot be watched.
+    Idle,
+    /// Its client no longer listens, or never did.
+    Left,
 }
 
 impl<P: Port> Session<P> {
@@ -42,6 +62,7 @@ impl<P: Port> Session<P> {
         Self {
             scene: Some(Box::new(scene)),
             wake: Arc::new(wake),
+            process: process.0,
             opened: Instant::now(),
             arrived: false,
             life: ProcessWatch::of(process.0, process.1),
@@ -51,6 +72,9 @@ impl<P: Port> Session<P> {
             heed: fresh_heed(cores),
             thread: None,
             calm: 0,
+            counts: (0, 0),
+            steps: 0,
+            undecided: 0,
         }
     }
 
@@ -59,16 +83,38 @@ impl<P: Port> Session<P> {
         (self.last_request, self.arrived) = (Instant::now(), true);
     }
 
-    /// True when its client died, has long asked nothing where it cannot be watched, or left and was not heard: its goodbye dies with
-    /// its ports, so that it may miss a server that is busy with a step.
-    pub fn is_over(&mut self, idle: Duration) -> bool {
-        let is_gone = match &self.life {
-            Some(life) => life.is_dead(),
-            None => self.scene.is_some() && self.last_request.elapsed() >= idle,
+    /// A step was taken.
+    pub fn count(&mut self, is_undecided: bool) {
+        self.steps += 1;
+        self.undecided += u64::from(is_undecided);
+    }
+
+    /// What is told of it.
+    pub fn status(&self, id: u64) -> SessionStatus {
+        SessionStatus {
+            id,
+            process: self.process,
+            open_ms: millis(self.opened.elapsed()),
+            idle_ms: millis(self.last_request.elapsed()),
+            objects: self.counts.0,
+            models: self.counts.1,
+            steps: self.steps,
+            undecided: self.undecided,
+            is_busy: self.waiting || self.scene.is_none(),
+        }
+    }
+
+    /// Why it is over, if it is: its client died, has long asked nothing where it cannot be watched, or left and was not heard: its
+    /// goodbye dies with its ports, so that it may miss a server that is busy with a step.
+    pub fn is_over(&mut self, idle: Duration) -> Option<Over> {
+        let gone = match &self.life {
+            Some(life) => life.is_dead().then_some(Over::Died),
+            None => (self.scene.is_some() && self.last_request.elapsed() >= idle).then_some(Over::Idle),
         };
         let is_heard = self.wake.is_heard();
         self.arrived |= is_heard;
-        is_gone || !is_heard && (self.arrived || self.opened.elapsed() >= ARRIVAL)
+        let has_left = !is_heard && (self.arrived || self.opened.elapsed() >= ARRIVAL);
+        gone.or(has_left.then_some(Over::Left))
     }
 
     /// Its client may be polling, or will soon ask.

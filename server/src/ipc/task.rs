@@ -8,6 +8,7 @@ use contactd_proto::step::ASK_POLLING;
 use contactd_proto::{EffectCounters, StepRequest};
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
 
 /// The leader's mailbox and its bell: how other threads report to it.
 pub struct Mailbox<P: Port> {
@@ -35,7 +36,9 @@ pub enum Report<P: Port> {
         /// The scene comes back.
         scene: Box<Scene>,
         /// What was worked out.
-        effects: EffectCounters,
+        did: Did,
+        /// How long it took, from its request to its reply.
+        took: Duration,
         /// It took no longer than the loop may wait.
         short: bool,
         /// A thread that its session has got for its steps.
@@ -53,6 +56,8 @@ pub struct Task<P: Port> {
     pub heed: Arc<Heed>,
     /// A copy of the request's header.
     pub request: StepRequest,
+    /// When it was taken up.
+    pub began: Instant,
     /// The call.
     pub call: P::Step,
     /// Wakes the client.
@@ -61,15 +66,24 @@ pub struct Task<P: Port> {
     pub mailbox: Arc<Mailbox<P>>,
 }
 
-/// What a step has worked out, and its reply: written, not yet sent.
-pub type Ran<P> = (EffectCounters, Option<<<P as Port>::Step as StepCall>::Reply>);
+/// What a step has done, as it is counted.
+#[derive(Clone, Copy)]
+pub struct Did {
+    /// What it worked out.
+    pub effects: EffectCounters,
+    /// The reply's status.
+    pub status: u32,
+}
+
+/// What a step has done, and its reply: written, not yet sent.
+pub type Ran<P> = (Did, Option<<<P as Port>::Step as StepCall>::Reply>);
 
 impl<P: Port> Task<P> {
     /// Runs it; the reply is written and not yet sent.
     pub fn run(&mut self) -> Ran<P> {
         let Self { scene, heed, request, call, .. } = self;
         scene.step(request, call.records(), Some(heed), |n, reply, slot| {
-            (reply.effect_counters, call.write(n, reply, slot))
+            (Did { effects: reply.effect_counters, status: reply.status }, call.write(n, reply, slot))
         })
     }
 
@@ -81,8 +95,9 @@ impl<P: Port> Task<P> {
 
     /// Answers, on another thread. The scene is back before the client can ask again.
     pub fn answer_from_afar(self, ran: Ran<P>, short: bool, thread: Option<Sender<Self>>) {
-        let Self { session, scene, request, call, wake, mailbox, .. } = self;
-        mailbox.report(session, Report::Stepped { scene, effects: ran.0, short, thread });
+        let Self { session, scene, request, began, call, wake, mailbox, .. } = self;
+        let took = began.elapsed();
+        mailbox.report(session, Report::Stepped { scene, did: ran.0, took, short, thread });
         send::<P>(call, ran, &request, &wake);
     }
 }

@@ -124,6 +124,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
         #[test]
         fn no_line_is_too_long_and_no_piece_that_fits_is_lost(
             words in proptest::collection::vec("[a-zé世]{1,100}", 0..12),

@@ -67,6 +67,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
         #[test]
         fn what_is_told_is_near_and_short(mantissa in -10.0..10.0f64, e in -14..14i32, q in -12..2i32, digits in 1..11i32) {
             let (x, quantum) = (mantissa * 10f64.powi(e), 10f64.powi(q));

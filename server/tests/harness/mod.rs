@@ -25,10 +25,22 @@ pub struct ServerProcess {
 impl ServerProcess {
     /// Starts one and waits until it is ready.
     pub fn start(name: &str, config: &str) -> Self {
+        Self::start_as(name, config, |_| {})
+    }
+
+    /// The same, with more to its command.
+    pub fn start_as(name: &str, config: &str, more: impl FnOnce(&mut Command)) -> Self {
         let runtime = runtime_folder();
         let address = Address::under(&runtime.path().join("contactd"), name).expect("an address");
-        let child = spawn(runtime.path(), name, config);
+        let mut command = serve_command(runtime.path(), name);
+        more(&mut command);
+        let child = spawn(runtime.path(), command, config);
         Self { address, runtime, config: config.into(), child }
+    }
+
+    /// The server's standard error, where it is a pipe.
+    pub fn stderr(&mut self) -> std::process::ChildStderr {
+        self.child.stderr.take().expect("a pipe")
     }
 
     /// The runtime folder.
@@ -74,7 +86,8 @@ impl ServerProcess {
 
     /// Starts it again, after `kill`.
     pub fn restart(&mut self) {
-        self.child = spawn(self.runtime.path(), self.address.name(), &self.config);
+        let command = serve_command(self.runtime.path(), self.address.name());
+        self.child = spawn(self.runtime.path(), command, &self.config);
     }
 
     /// SIGTERM, and the end.
@@ -119,13 +132,14 @@ fn shared_memory_of(address: &Address) -> Vec<String> {
 pub fn serve_command(runtime: &Path, name: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_contactd"));
     command.args(["serve", "--name", name]).env("XDG_RUNTIME_DIR", runtime).stdin(Stdio::null());
+    // What a test does to sessions is no news.
+    command.env("CONTACTD_LOG", "warn");
     command
 }
 
-fn spawn(runtime: &Path, name: &str, config: &str) -> Child {
+fn spawn(runtime: &Path, mut command: Command, config: &str) -> Child {
     let file = runtime.join("server.toml");
     std::fs::write(&file, config).expect("a settings file");
-    let mut command = serve_command(runtime, name);
     let mut child = command.arg("--config").arg(file).stdout(Stdio::piped()).spawn().expect("the server's program");
     let mut line = String::new();
     BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("its output");
