@@ -19,7 +19,7 @@ use contactd::report::{self, Answer, PairReport, TableStyle};
 use contactd::terminal::{Colour, Paint};
 use contactd::world::{PairOutcome, StepOutcome};
 use contactd_proto::ErrorCode;
-use contactd_proto::names::Address;
+use contactd_proto::names::{Address, PROTOCOL_VERSION};
 use std::error::Error;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -270,7 +270,7 @@ fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
     let ready = || {
         let pid = std::process::id();
         // A reader that has gone away does not stop a server.
-        let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol 1, process {pid})\n"));
+        let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol {PROTOCOL_VERSION}, process {pid})\n"));
     };
     contactd::ipc::serve(&Address::of(&name)?, config, ready)?;
     Ok(Done::Well)
