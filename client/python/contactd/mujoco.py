@@ -38,7 +38,7 @@ from . import session as sessions
 from .convention import contact_to_mujoco, quaternion_from_wxyz
 from .errors import Error
 from .manifold import Manifold, Manifolds, Point
-from .mujoco_filter import CouplingWarning, Filter, Part
+from .mujoco_filter import CouplingWarning, Filter, StandIn
 from .mujoco_geoms import MESHES, solid_of
 from .pose import Pose
 from .records import Order, Status
@@ -120,7 +120,7 @@ class Coupling:
         #: unit. Its ``id`` names it within the pair of solids for as long as it lasts.
         self.contacts: list[tuple[int, int, Point]] = []
         #: The geoms of each of ``contacts``, by name, in the same order; "geom 3" for one without.
-        self.geoms: list[tuple[str, str]] = []
+        self.contact_geoms: list[tuple[str, str]] = []
         self._manifolds = Manifolds()
         self._in_flight = False
         self._own = session is None
@@ -150,7 +150,7 @@ class Coupling:
         if self._own:
             self.session.close()
 
-    def _given(self, solids: Mapping[str, Given]) -> list[tuple[Part, Given]]:
+    def _given(self, solids: Mapping[str, Given]) -> list[tuple[StandIn, Given]]:
         """The solids that stand in for whole bodies."""
         found = []
         for name, solid in solids.items():
@@ -160,7 +160,7 @@ class Coupling:
             found.append((self._filter.whole(name, body), solid))
         return found
 
-    def _own_solids(self, meshes: str, taken: Container[int]) -> list[tuple[Part, Given]]:
+    def _own_solids(self, meshes: str, taken: Container[int]) -> list[tuple[StandIn, Given]]:
         """The solids of all geoms that collide, or that a ``<pair>`` names, but those of bodies that have one already."""
         found = []
         for body in range(self.model.nbody):
@@ -170,17 +170,17 @@ class Coupling:
                     solid = solid_of(self.model, geom, self.unit, meshes)
                 except ValueError as e:
                     raise ValueError(f"{called}: {e}: give its body a solid by replace=, or contype and conaffinity 0") from None
-                found.append((Part(called, body, [geom], False), solid))
+                found.append((StandIn(called, body, [geom], False), solid))
         return found
 
-    def _load(self, part: Part, given: Given) -> sessions.Model:
+    def _load(self, part: StandIn, given: Given) -> sessions.Model:
         """Loads a solid; a file by its ending."""
         if isinstance(given, os.PathLike) or isinstance(given, str) and _names_a_file(given):
             path = pathlib.Path(given)
             return self.session.load_model(path.name, path.read_bytes())
         return self.session.load_model(f"{part.name}.csg", given)
 
-    def _add(self, given: list[tuple[Part, Given]]) -> None:
+    def _add(self, given: list[tuple[StandIn, Given]]) -> None:
         model, session = self.model, self.session
         groups, rules = self._filter.rules(self.skin / self.unit)
         rest = mj.MjData(model)
@@ -241,10 +241,10 @@ class Coupling:
         positions = data.xpos[self._moving_bodies] / self.unit
         rotations = quaternion_from_wxyz(data.xquat[self._moving_bodies])
         points = self._points(positions, rotations)
-        self.contacts, self.geoms = [], []
+        self.contacts, self.contact_geoms = [], []
         for a, b, point in points:
             self.contacts.append((self._bodies[a], self._bodies[b], point))
-            self.geoms.append((self._name(self._geoms[a]), self._name(self._geoms[b])))
+            self.contact_geoms.append((self._name(self._geoms[a]), self._name(self._geoms[b])))
             contact = self._contact(a, b, point)
             if mj.mj_addContact(self.model, data, contact) != 0:
                 raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")

@@ -21,7 +21,7 @@ class CouplingWarning(UserWarning):
     """The coupling takes something in another way than MuJoCo; the sentence names the body or geom and says what to do."""
 
 
-class Part(NamedTuple):
+class StandIn(NamedTuple):
     """A solid that stands in for geoms."""
 
     #: How the session calls it.
@@ -59,7 +59,7 @@ class Filter:
         self.pairs: dict[tuple[int, int], int] = {}
         self._options()
 
-    def take(self, parts: Sequence[Part]) -> None:
+    def take(self, parts: Sequence[StandIn]) -> None:
         """Raises ``ValueError`` where solids in place of these geoms would make other physics; ``warnings`` are the sentences for what
         is taken in another way."""
         self._parts = parts
@@ -131,7 +131,7 @@ class Filter:
             if model.opt.enableflags & int(getattr(mj.mjtEnableBit, bit, 0)):
                 raise ValueError(f"contacts of solids do not know {what}: switch it off")
 
-    def whole(self, name: str, body: int) -> Part:
+    def whole(self, name: str, body: int) -> StandIn:
         """The part of a solid that stands in for all geoms of a body."""
         if not self._all_geoms(body):
             raise ValueError(f"{self.body(body)} has no geom: contacts need one, for friction and to be told by")
@@ -141,9 +141,9 @@ class Filter:
                 f"no geom of {self.body(body)} collides (contype and conaffinity are 0; another coupling's bodies are so until it is "
                 "closed): give one of them contype=\"1\" conaffinity=\"1\", or leave the body without a solid"
             )
-        return Part(name, body, colliding, True)
+        return StandIn(name, body, colliding, True)
 
-    def _check(self, part: Part) -> None:
+    def _check(self, part: StandIn) -> None:
         model, (first, *more) = self._model, part.geoms
         for field in _PARAMETERS:
             values = getattr(model, f"geom_{field}")

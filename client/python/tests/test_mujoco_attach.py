@@ -191,7 +191,7 @@ def after(model, steps, **options):
     with attach(model, **options) as coupling:
         for _ in range(steps):
             coupling.step(data)
-        return data, coupling.geoms
+        return data, coupling.contact_geoms
 
 
 def test_contacts_are_told_by_the_names_of_their_geoms():

@@ -481,6 +481,7 @@ fn eliminate(
     f: [f64; MAX_UNKNOWNS],
     n: usize,
 ) -> Option<[f64; MAX_UNKNOWNS]> {
+    debug_assert!((6..=10).contains(&n), "{n} unknowns: between two and six faces meet");
     // Of a size that is known beforehand the loops hold no tests of their own.
     match n {
         6 => eliminate_of::<6>(a, f),
@@ -488,7 +489,8 @@ fn eliminate(
         8 => eliminate_of::<8>(a, f),
         9 => eliminate_of::<9>(a, f),
         10 => eliminate_of::<10>(a, f),
-        _ => unreachable!("between two and six faces meet"),
+        // No step leads on where the faces of one body alone would meet: whoever asks has other ways.
+        _ => None,
     }
 }
 
@@ -541,6 +543,7 @@ pub(in crate::contact) fn damped_step(
     n: usize,
     mu: f64,
 ) -> Option<[f64; MAX_UNKNOWNS]> {
+    debug_assert!((6..=10).contains(&n), "{n} unknowns: between two and six faces meet");
     // Of a size that is known beforehand the loops hold no tests of their own.
     match n {
         6 => damped_step_of::<6>(jac, f, mu),
@@ -548,7 +551,8 @@ pub(in crate::contact) fn damped_step(
         8 => damped_step_of::<8>(jac, f, mu),
         9 => damped_step_of::<9>(jac, f, mu),
         10 => damped_step_of::<10>(jac, f, mu),
-        _ => unreachable!("between two and six faces meet"),
+        // No step leads on where the faces of one body alone would meet: whoever asks has other ways.
+        _ => None,
     }
 }
 
@@ -602,20 +606,8 @@ fn damped_step_of<const N: usize>(
             }
         }
     }
-    for i in 0..N {
-        for k in 0..i {
-            b[i] -= a[i][k] * b[k];
-        }
-        b[i] /= a[i][i];
-    }
-    for i in (0..N).rev() {
-        for k in i + 1..N {
-            b[i] -= a[k][i] * b[k];
-        }
-        b[i] /= a[i][i];
-    }
     let mut step = [0.0; MAX_UNKNOWNS];
-    step[..N].copy_from_slice(&b);
+    step[..N].copy_from_slice(&substituted(&a, b, N));
     Some(step)
 }
 
@@ -623,7 +615,7 @@ fn damped_step_of<const N: usize>(
 #[inline]
 pub(in crate::contact) fn cholesky_solve<const N: usize>(
     a: &mut [[f64; N]; N],
-    mut b: [f64; N],
+    b: [f64; N],
     n: usize,
 ) -> Option<[f64; N]> {
     for j in 0..n {
@@ -642,6 +634,12 @@ pub(in crate::contact) fn cholesky_solve<const N: usize>(
             a[i][j] /= r;
         }
     }
+    Some(substituted(a, b, n))
+}
+
+/// Solves L Lᵀ x = b, of which L is the lower triangle of `a`.
+#[inline(always)]
+fn substituted<const N: usize>(a: &[[f64; N]; N], mut b: [f64; N], n: usize) -> [f64; N] {
     for i in 0..n {
         for k in 0..i {
             b[i] -= a[i][k] * b[k];
@@ -654,5 +652,5 @@ pub(in crate::contact) fn cholesky_solve<const N: usize>(
         }
         b[i] /= a[i][i];
     }
-    Some(b)
+    b
 }
