@@ -119,7 +119,7 @@ class Coupling:
         #: The contacts of the last step in the order in which MuJoCo got them: the bodies' ids in MuJoCo, and the point in contactd's
         #: unit. Its ``id`` names it within the pair of solids for as long as it lasts.
         self.contacts: list[tuple[int, int, Point]] = []
-        #: The geoms of each of ``contacts``, by name, in the same order; "geom 3" for one without.
+        #: The names of the geoms by which MuJoCo is told of each of ``contacts``; "geom 3" for one without.
         self.contact_geoms: list[tuple[str, str]] = []
         self._manifolds = Manifolds()
         self._in_flight = False
@@ -244,8 +244,8 @@ class Coupling:
         self.contacts, self.contact_geoms = [], []
         for a, b, point in points:
             self.contacts.append((self._bodies[a], self._bodies[b], point))
-            self.contact_geoms.append((self._name(self._geoms[a]), self._name(self._geoms[b])))
             contact = self._contact(a, b, point)
+            self.contact_geoms.append((self._name(int(contact.geom[0])), self._name(int(contact.geom[1]))))
             if mj.mj_addContact(self.model, data, contact) != 0:
                 raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")
         return len(points)
