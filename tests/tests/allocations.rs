@@ -1,15 +1,20 @@
-//! A step that starts no search allocates nothing: whether pairs are known to be apart, are asked how far, meet or overlap.
+//! A step that starts no search allocates nothing: whether pairs are known to be apart, are asked how far, meet or overlap. Nor
+//! does what keeps a pair's points from step to step. A program of their own: counting costs the others a twentieth.
 #![allow(missing_docs)]
 
 use contactd::contact::Status;
+use contactd::ipc::ServerConfig;
 use contactd::octree::Model;
 use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, StepOutcome, World};
+use contactd_client::Object;
+use contactd_client::manifold::Manifolds;
 use contactd_proto::motion::quat_of_rotation_vector;
-use contactd_proto::{Pose, PoseRecord};
+use contactd_proto::{Pose, PoseRecord, Report, Rule};
 use contactd_tests::scenes::Recipe;
 use glam::DVec3;
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use std::time::Duration;
 
 const OBJECTS: u32 = 27;
 /// Steps of a round.
@@ -93,4 +98,32 @@ fn a_warm_step_of_bodies_that_meet_allocates_nothing() {
     );
     assert!(warm > 150 && contacts > 100 && overlaps > 1000, "the scene says little");
     assert_eq!(kept, warm);
+}
+
+/// A cylinder that turns over the hole of a plate, within the margin at which its points are told.
+#[test]
+fn an_update_of_points_that_is_warm_allocates_nothing() {
+    let mut session = contactd::embedded(&ServerConfig::default()).expect("a session");
+    let plate =
+        "difference() { cube(size = [8, 8, 2], center = true); cylinder(h = 4, r1 = 0.25, r2 = 0.25, center = true); }";
+    let cylinder = "cylinder(h = 2, r1 = 0.5, r2 = 0.5, center = true);";
+    let [plate, body] = [plate, cylinder].map(|text| session.load_model("part.csg", text).expect("a model").id);
+    let below = Pose::at(DVec3::NEG_Z);
+    session.add_object(Object::new("plate", plate).fixed().at(below)).expect("an object");
+    let body = session.add_object(Object::new("body", body).at(Pose::at(DVec3::Z * 9.0))).expect("an object");
+    let mut rule = Rule::new(["default".into(), "default".into()]);
+    (rule.report, rule.margin, rule.penetration) = (Report::Patch, 4e-3, true);
+    session.set_rules(&[rule]).expect("a rule");
+    session.options.details = true;
+    let mut manifolds = Manifolds::default();
+    for k in 0..40 {
+        let turn = quat_of_rotation_vector(DVec3::Z * (0.1 * f64::from(k)));
+        let pose = Pose::new(DVec3::new(0.01 * f64::from(k % 7), 0.0, 1.0 + 1e-3), turn);
+        session.begin_step(1).expect("a batch")[0] = PoseRecord::start(body, &pose);
+        let reply = session.finish(Duration::from_secs(60)).expect("a step");
+        let of = |object: u32, _: f64| if object == body { pose } else { below };
+        let made = allocation_counter::measure(|| manifolds.update(&reply, of)).count_total;
+        assert!(k < 20 || made == 0, "step {k}: {made} allocations");
+        assert_eq!(manifolds.pairs().next().expect("a pair").points.len(), 4);
+    }
 }

@@ -9,7 +9,7 @@ use super::{Best, Round};
 use contactd::math::{any_perpendicular, tolerance::PARALLEL};
 
 /// Offers every configuration of a pair with parallel axes; false if they are not, exactly.
-pub(super) fn parallel(a: &Round, b: &Round, best: &mut Best) -> bool {
+pub fn parallel(a: &Round, b: &Round, best: &mut Best) -> bool {
     if a.axis.cross(b.axis).length_squared() > PARALLEL * PARALLEL {
         return false;
     }

@@ -18,18 +18,16 @@ mod cone_cone;
 mod cylinder_cone;
 mod cylinder_cylinder;
 mod directions;
-mod meridian;
+pub mod meridian;
 pub mod miller;
 mod polyhedron_polyhedron;
 mod quadric_polyhedron;
-mod round_round;
+pub mod round_round;
 mod sphere_cone;
 mod sphere_cylinder;
 mod sphere_polyhedron;
 mod sphere_sphere;
-#[cfg(test)]
-mod tests;
-mod trig;
+pub mod trig;
 
 pub use advance::{Bracket, Meeting, time_of_contact, time_of_leaving};
 pub use body::{Ball, Convex, Edge, Feature, Poly, Round, Stand};
@@ -54,7 +52,7 @@ pub struct Separation {
 }
 
 /// The best direction so far, by its proven separation.
-struct Best<'a> {
+pub struct Best<'a> {
     a: &'a Convex,
     b: &'a Convex,
     value: f64,
@@ -62,12 +60,18 @@ struct Best<'a> {
 }
 
 impl<'a> Best<'a> {
-    fn new(a: &'a Convex, b: &'a Convex, hint: Option<DVec3>) -> Self {
+    /// None yet, or the one that is given.
+    pub fn new(a: &'a Convex, b: &'a Convex, hint: Option<DVec3>) -> Self {
         let mut best = Self { a, b, value: f64::NEG_INFINITY, normal: DVec3::X };
         if let Some(n) = hint {
             best.offer(n);
         }
         best
+    }
+
+    /// The separation along it.
+    pub fn value(&self) -> f64 {
+        self.value
     }
 
     /// Tries the unit direction n from a to b.
@@ -107,9 +111,8 @@ macro_rules! pairs {
                 $((Convex::$b(_), Convex::$a(_)))|+ => -direction(b, a, hint.map(|n| -n)),
             }
         }
-        /// The rows, for the tests that count them.
-        #[cfg(test)]
-        const ROWS: &[(&str, &str)] = &[$((stringify!($a), stringify!($b))),+];
+        /// The rows: the forms of both bodies.
+        pub const ROWS: &[(&str, &str)] = &[$((stringify!($a), stringify!($b))),+];
     };
 }
 

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 const NEARLY_TOUCHING: f64 = 1e-9;
 
 /// Offers every configuration of a pair in general position.
-pub(super) fn general(a: &Round, b: &Round, best: &mut Best) {
+pub fn general(a: &Round, b: &Round, best: &mut Best) {
     let mut list = vec![a.axis, -a.axis, b.axis, -b.axis];
     best.offer_all(&mut list);
 

@@ -179,35 +179,3 @@ fn roots_in_chart(p: &Poly, take: &mut impl FnMut(f64)) {
         (ends, count) = (found, n + 1);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_product_of_shifted_sines_has_their_roots() {
-        // sin(θ − a) for four angles a: eight roots, a and a + π.
-        let angles = [0.3, 1.1, 1.9, 2.6f64];
-        let factor = |a: f64| Trig::linear(0.0, -a.sin(), a.cos());
-        let product = angles.iter().map(|a| factor(*a)).reduce(|p, q| p.times(&q)).expect("four");
-        for x in [0.0, 0.7, 2.0, 4.0, -1.0f64] {
-            let direct: f64 = angles.iter().map(|a| (x - a).sin()).product();
-            assert!((product.at(x) - direct).abs() < 1e-15);
-        }
-        let mut found = Vec::new();
-        product.roots(|r| found.push(r.rem_euclid(PI)));
-        found.sort_by(f64::total_cmp);
-        assert_eq!(found.len(), 8);
-        for (i, r) in found.iter().enumerate() {
-            assert!((r - angles[i / 2]).abs() < 1e-13, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn the_slope_is_the_derivative() {
-        let t = Trig::linear(0.3, 1.0, -0.4).times(&Trig::linear(1.0, 0.2, 0.7));
-        for x in [0.1, 2.0, 5.0f64] {
-            assert!((t.slope().at(x) - (t.at(x + 1e-6) - t.at(x - 1e-6)) / 2e-6).abs() < 1e-8);
-        }
-    }
-}

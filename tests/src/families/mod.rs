@@ -19,6 +19,7 @@
 //! A scene is what its seed, its family and its index say. It is asked as `contactd check` asks: text through the reader, one
 //! step of a world.
 
+mod aim;
 mod draw;
 mod judge;
 mod make;

@@ -1,8 +1,9 @@
 //! Pairs of trees of a given number of primitives, with what makes parts dear: holes, fits and thin walls.
 
 use super::Scene;
+use super::aim::{ALL, Aim, aimed, tree};
 use super::draw::Draw;
-use super::make::{ALL, Aim, aimed, fit, tree};
+use super::make::fit;
 use super::tree::{Node, Shape, placed};
 use glam::{DMat3, DVec3};
 

@@ -1,17 +1,20 @@
 //! Minimum-norm least squares for the handful of unknowns of a contact: one-sided Jacobi rotations (Hestenes 1958).
 
-/// The shortest `x` that minimises |J x − b|, J given by columns; singular values below `cut` times the largest are
-/// taken for zero.
+/// The shortest `x` that minimises |J x − b|, J given by columns as long as b; singular values below `cut` times the
+/// largest are taken for zero.
 pub fn least_squares(columns: &[Vec<f64>], b: &[f64], cut: f64) -> Vec<f64> {
-    let n = columns.len();
-    let mut u: Vec<Vec<f64>> = columns.to_vec();
-    let mut v: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| f64::from(i == j)).collect()).collect();
-    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
+    let (n, rows) = (columns.len(), b.len());
+    // Columns one after the other, with their squares: a turn changes two of them.
+    let mut u: Vec<f64> = columns.concat();
+    let mut v = vec![0.0; n * n];
+    (0..n).for_each(|k| v[k * n + k] = 1.0);
+    let column = |k: usize| k * rows..(k + 1) * rows;
+    let mut squares: Vec<f64> = columns.iter().map(|c| dot(c, c)).collect();
     for _ in 0..40 {
         let mut turned = false;
         for p in 0..n {
             for q in p + 1..n {
-                let (alpha, beta, gamma) = (dot(&u[p], &u[p]), dot(&u[q], &u[q]), dot(&u[p], &u[q]));
+                let (alpha, beta, gamma) = (squares[p], squares[q], dot(&u[column(p)], &u[column(q)]));
                 if gamma == 0.0 || gamma.abs() <= 1e-16 * (alpha * beta).sqrt() {
                     continue;
                 }
@@ -19,13 +22,10 @@ pub fn least_squares(columns: &[Vec<f64>], b: &[f64], cut: f64) -> Vec<f64> {
                 let zeta = (beta - alpha) / (2.0 * gamma);
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let c = 1.0 / t.hypot(1.0);
-                let s = c * t;
-                for m in [&mut u, &mut v] {
-                    for i in 0..m[p].len() {
-                        let (x, y) = (m[p][i], m[q][i]);
-                        m[p][i] = c * x - s * y;
-                        m[q][i] = s * x + c * y;
-                    }
+                turn(&mut u, rows, [p, q], (c, c * t));
+                turn(&mut v, n, [p, q], (c, c * t));
+                for k in [p, q] {
+                    squares[k] = dot(&u[column(k)], &u[column(k)]);
                 }
             }
         }
@@ -33,27 +33,33 @@ pub fn least_squares(columns: &[Vec<f64>], b: &[f64], cut: f64) -> Vec<f64> {
             break;
         }
     }
-    let sigma: Vec<f64> = u.iter().map(|c| dot(c, c).sqrt()).collect();
-    let top = sigma.iter().copied().fold(0.0, f64::max);
+    let top = squares.iter().copied().fold(0.0, f64::max).sqrt();
     let mut x = vec![0.0; n];
-    for k in (0..n).filter(|k| sigma[*k] > cut * top) {
-        let w = dot(&u[k], b) / (sigma[k] * sigma[k]);
+    for k in (0..n).filter(|k| squares[*k].sqrt() > cut * top) {
+        let sigma = squares[k].sqrt();
+        let w = dot(&u[column(k)], b) / (sigma * sigma);
         for i in 0..n {
-            x[i] += w * v[k][i];
+            x[i] += w * v[k * n + i];
         }
     }
     x
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (mut sum, b) = (0.0, &b[..a.len()]);
+    for i in 0..a.len() {
+        sum += a[i] * b[i];
+    }
+    sum
+}
 
-    #[test]
-    fn a_regular_system_is_solved_and_a_singular_one_takes_the_shortest_answer() {
-        let x = least_squares(&[vec![2.0, 1.0], vec![1.0, 3.0]], &[5.0, 10.0], 1e-12);
-        assert!((x[0] - 1.0).abs() < 1e-14 && (x[1] - 3.0).abs() < 1e-14);
-        let x = least_squares(&[vec![1.0, 1.0], vec![1.0, 1.0]], &[2.0, 2.0], 1e-12);
-        assert!((x[0] - 1.0).abs() < 1e-14 && (x[1] - 1.0).abs() < 1e-14);
+/// Turns two columns of `len` numbers, p before q, into each other.
+fn turn(columns: &mut [f64], len: usize, [p, q]: [usize; 2], (c, s): (f64, f64)) {
+    let (before, from) = columns.split_at_mut(q * len);
+    let (one, other) = (&mut before[p * len..][..len], &mut from[..len]);
+    for i in 0..len {
+        let (x, y) = (one[i], other[i]);
+        one[i] = c * x - s * y;
+        other[i] = s * x + c * y;
     }
 }

@@ -11,7 +11,7 @@
 //! start in every surviving box. It is no server: a query takes milliseconds to seconds.
 
 pub mod field;
-mod linear;
+pub mod linear;
 pub mod solve;
 
 use contactd::solid::Solid;

@@ -5,9 +5,13 @@
 //! middle, Hessian over the box) and by its gradient over the box; where that does not suffice the box or the span is
 //! halved, up to a budget. A budget that runs out is a refusal.
 
-use super::form::{along, halves, image, parts_of_saddle, rows_of_bowl, touched, walled};
-use super::interval::{Interval, Jet, Vector, ZERO, dot, minus, place, point, times, unit, vector};
+use super::form::{along, halves, image, parts_of_saddle, rows_of_bowl, walled};
+use super::interval::{
+    Interval, Jet, Vector, ZERO, across, dot, hull, length, linear, minus, offsets, place, point, square_length, times,
+    unit, vector,
+};
 use super::motion::{Motions, in_a};
+use super::tangent::{part_of, tangent};
 use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
 
@@ -591,117 +595,4 @@ fn weighted(f: &Jet, [from, to]: [f64; 2], (start, end): (f64, f64), t: Interval
         j.h[place(k, 3)] = j.h[place(k, 3)] + twice * slope * f.g[k];
     }
     j
-}
-
-/// The length of a vector.
-pub(super) fn length(v: Vector) -> Interval {
-    (v[0].square() + v[1].square() + v[2].square()).sqrt()
-}
-
-pub(super) fn offsets(y: &[Jet; 3], o: DVec3) -> [Jet; 3] {
-    std::array::from_fn(|i| y[i].plus(point(-o[i])))
-}
-
-pub(super) fn linear(n: Vector, y: &[Jet; 3]) -> Jet {
-    y[0].scaled(n[0]) + y[1].scaled(n[1]) + y[2].scaled(n[2])
-}
-
-fn across(y: &[Jet; 3], axis: Vector) -> [Jet; 3] {
-    let along = linear(axis, y);
-    std::array::from_fn(|i| y[i] - along.scaled(axis[i]))
-}
-
-fn square_length(y: &[Jet; 3]) -> Jet {
-    y[0].square() + y[1].square() + y[2].square()
-}
-
-/// What holds both.
-fn hull(p: &Jet, q: &Jet) -> Jet {
-    Jet {
-        v: p.v.hull(q.v),
-        g: std::array::from_fn(|k| p.g[k].hull(q.g[k])),
-        h: std::array::from_fn(|k| p.h[k].hull(q.h[k])),
-    }
-}
-
-/// The face itself, or of a capsule what it is over a whole region: its cylinder, or the ball at one of its ends.
-fn part_of(face: &Face, y: &[Jet; 3]) -> Option<Face> {
-    let Face::Capsule(surface::Capsule { origin, axis, half, radius }) = *face else { return Some(*face) };
-    let along = linear(unit(vector(axis.to_array())), &offsets(y, origin)).v;
-    if along.mag() <= half {
-        Some(surface::Cylinder { origin, axis, radius }.into())
-    } else if along.lo >= half {
-        Some(surface::Sphere { center: origin + axis * half, radius }.into())
-    } else if along.hi <= -half {
-        Some(surface::Sphere { center: origin - axis * half, radius }.into())
-    } else {
-        None
-    }
-}
-
-/// A unit vector made a little shorter than 1 for certain.
-pub(super) fn short(v: DVec3) -> Vector {
-    times(point(1.0 - 1e-15), vector(v.normalize_or_zero().to_array()))
-}
-
-/// A plane below a convex psi: |v| >= n·v for every |n| <= 1. Below a torus' psi what is concave, too.
-fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
-    let perpendicular = |axis: DVec3, o: DVec3| {
-        let a = unit(vector(axis.to_array()));
-        let m = short({
-            let o = at - o;
-            o - axis * o.dot(axis)
-        });
-        minus(m, times(dot(m, a), a))
-    };
-    match *face {
-        Face::Plane(surface::Plane { normal, offset }) => linear(vector(normal.to_array()), y).plus(point(-offset)),
-        Face::Sphere(surface::Sphere { center, radius }) => {
-            linear(short(at - center), &offsets(y, center)).plus(point(-radius))
-        }
-        Face::Cylinder(surface::Cylinder { origin, axis, radius }) => {
-            linear(perpendicular(axis, origin), &offsets(y, origin)).plus(point(-radius))
-        }
-        Face::Cone(surface::Cone { apex, axis, sin, cos }) => {
-            let a = unit(vector(axis.to_array()));
-            let m = perpendicular(axis, apex);
-            linear(minus(times(point(cos), m), times(point(sin), a)), &offsets(y, apex))
-        }
-        // hypot(ρ − R, z) >= n_ρ (ρ − R) + n_z z for every |n| <= 1; where n_ρ < 0 that is concave, and stays as it is.
-        Face::Torus(surface::Torus { origin, axis, major, minor }) => {
-            let a = unit(vector(axis.to_array()));
-            let (z, off) = {
-                let (o, axis) = (at - origin, axis.normalize());
-                let z = o.dot(axis);
-                (z, (o - axis * z).length() - major)
-            };
-            let size = off.hypot(z) * (1.0 + 1e-15);
-            let (lean, up) = if size > 0.0 { (off / size, z / size) } else { (0.0, 0.0) };
-            let o = offsets(y, origin);
-            let rho =
-                if lean < 0.0 { square_length(&across(&o, a)).sqrt() } else { linear(perpendicular(axis, origin), &o) };
-            rho.plus(point(-major)).scaled(point(lean)) + linear(a, &o).scaled(point(up)).plus(point(-minor))
-        }
-        // |x − q| >= n·(x − q) for every |n| <= 1 that leads to no other point of the segment: across it, or past an end.
-        Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
-            let along = (at - origin).dot(axis);
-            if along.abs() <= half {
-                return linear(perpendicular(axis, origin), &offsets(y, origin)).plus(point(-radius));
-            }
-            let a = times(point(half.copysign(along)), unit(vector(axis.to_array())));
-            let n = short(at - origin - axis * half.copysign(along));
-            let (o, past) = (offsets(y, origin), dot(n, a));
-            // Rounding may leave it leading back.
-            let from: [Jet; 3] = std::array::from_fn(|i| o[i].plus(-a[i]));
-            let back = if past.lo < 0.0 { point(2.0) * past } else { ZERO };
-            linear(n, &from).plus(back + point(-radius))
-        }
-        Face::Elliptic(ref e) => touched(image(e), e.origin, at, y),
-        Face::Bowl(ref bowl) => touched(rows_of_bowl(bowl), bowl.origin, at, y),
-        // |P| >= p·P for every |p| <= 1; −|N| is concave, and stays as it is.
-        Face::Saddle(ref saddle) => {
-            let ([p, n], along) = (halves(saddle, y), along(saddle, at, 0));
-            p[0].scaled(along[0]) + p[1].scaled(along[1]) - (n[0].square() + n[1].square()).sqrt()
-        }
-    }
 }

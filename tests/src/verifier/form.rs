@@ -1,7 +1,8 @@
 //! Affine images of round faces, and quadrics, from their numbers: psi is |B y| − w·y − r, or |P| − |N|.
 
-use super::bound::{length, linear, offsets, short};
-use super::interval::{Interval, Jet, Vector, ZERO, cross, dot, minus, plus, point, times, vector};
+use super::interval::{
+    Interval, Jet, Vector, ZERO, cross, dot, length, linear, minus, offsets, plus, point, short, times, vector,
+};
 use contactd::solid::surface;
 use glam::DVec3;
 

@@ -14,6 +14,7 @@ pub mod form;
 pub mod interval;
 pub mod memory;
 pub mod motion;
+pub mod tangent;
 
 use crate::formula::{Formula, formula_of};
 use bound::{Bounder, Literal, Region, Term};

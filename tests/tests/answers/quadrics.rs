@@ -72,7 +72,7 @@ fn off_parabola(alpha: f64, own: f64, z: f64) -> f64 {
 
 #[test]
 fn quadrics_meet_planes_and_balls_when_closed_forms_say_so() {
-    let count = pairs(100);
+    let count = pairs(40);
     let on_plane = |r: &mut Random, body: Recipe, reach: Box<dyn Fn(DVec3) -> f64>| {
         let floor = Recipe::cuboid(8.0, 8.0, 1.0).at(0.0, 0.0, -1.0);
         let motions = [past(r, 2.8), Motion::resting(Pose::new(r.vector(0.2), r.rotation()))];

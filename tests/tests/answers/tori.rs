@@ -25,7 +25,7 @@ fn from_circle(pose: &Pose, major: f64, x: DVec3) -> f64 {
 
 #[test]
 fn a_torus_meets_a_ball_and_a_plane_and_leaves_round_walls_when_closed_forms_say_so() {
-    let count = pairs(75);
+    let count = pairs(50);
     compare("ball", (count, 1, 4.0), |r| {
         let (t, ball) = (torus(r, 1.0), r.within(0.05, 0.6));
         let motions = [turning(r), past(r, 2.0)];

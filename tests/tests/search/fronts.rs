@@ -1,6 +1,6 @@
 //! What is told in front of the search (whole primitives, bodies in holes) is what the search says by itself.
 //!
-//! 1,000 random scenes here; for more
+//! 600 random scenes here; for more
 //! `CONTACTD_FRONTS=100000 cargo test -p contactd-tests --test search fronts:: -- --nocapture`.
 //! The two share the trees' values and Newton's equations, and nothing of how time before a contact is excluded.
 

@@ -456,20 +456,3 @@ fn regions_are_told_of_pairs_that_only_come_near() {
     assert_eq!((found.status, found.points.len()), (CLEAR, 4));
     assert!(s.manifolds.pair(s.body, s.plate).is_none() && s.manifolds.pair(s.plate, 99).is_none());
 }
-
-#[test]
-fn an_update_that_is_warm_allocates_nothing() {
-    let mut s = Scene::new(DRILLED, CYLINDER);
-    let poses =
-        |k: i32| Pose::new(dvec3(0.01 * f64::from(k % 7), 0.0, 1.0 + 1e-3), turned(DVec3::Z, 0.1 * f64::from(k)));
-    for k in 0..40 {
-        let pose = poses(k);
-        s.session.begin_step(1).unwrap()[0] = PoseRecord::start(s.body, &pose);
-        let reply = s.session.finish(Duration::from_secs(60)).unwrap();
-        let (body, manifolds) = (s.body, &mut s.manifolds);
-        let of = |object: u32, _: f64| if object == body { pose } else { Pose::at(DVec3::NEG_Z) };
-        let made = allocation_counter::measure(|| manifolds.update(&reply, of)).count_total;
-        assert!(k < 20 || made == 0, "step {k}: {made} allocations");
-        assert_eq!(manifolds.pairs().next().unwrap().points.len(), 4);
-    }
-}

@@ -1,8 +1,11 @@
 //! Separations against their own optimality: disjoint bodies are proven by a slab and by witnesses of equal distance.
 
-use super::*;
 use contactd::solid::{Shape, primitive as shape};
 use contactd_proto::motion::quat_of_rotation_vector;
+use contactd_tests::closed::{
+    Ball, Best, Convex, Feature, ROWS, Round, Stand, clearance, meridian, miller, round_round, separation,
+    separation_only, tangency_of_cavities,
+};
 use glam::{DMat3, DVec3};
 
 /// Pseudo-random numbers (splitmix64), the same ones for the same seed.
@@ -51,22 +54,20 @@ impl Dice {
 
 const KINDS: usize = 9;
 
-impl Convex {
-    /// Scaled about its middle by `k`.
-    fn shrink(&mut self, k: f64) {
-        let middle = self.ball().0;
-        let to = |p: &mut DVec3| *p = middle + (*p - middle) * k;
-        match self {
-            Convex::Ball(b) => b.radius *= k,
-            Convex::Cylinder(r) | Convex::Cone(r) => {
-                r.centers.iter_mut().for_each(to);
-                r.radii = r.radii.map(|x| x * k);
-            }
-            Convex::Poly(p) => {
-                p.vertices.iter_mut().for_each(to);
-                p.edges.iter_mut().flat_map(|e| &mut e.ends).for_each(to);
-                p.planes.iter_mut().for_each(|(n, d)| *d = n.dot(middle) + (*d - n.dot(middle)) * k);
-            }
+/// The body scaled about its middle by `k`.
+fn shrink(body: &mut Convex, k: f64) {
+    let middle = body.ball().0;
+    let to = |p: &mut DVec3| *p = middle + (*p - middle) * k;
+    match body {
+        Convex::Ball(b) => b.radius *= k,
+        Convex::Cylinder(r) | Convex::Cone(r) => {
+            r.centers.iter_mut().for_each(to);
+            r.radii = r.radii.map(|x| x * k);
+        }
+        Convex::Poly(p) => {
+            p.vertices.iter_mut().for_each(to);
+            p.edges.iter_mut().flat_map(|e| &mut e.ends).for_each(to);
+            p.planes.iter_mut().for_each(|(n, d)| *d = n.dot(middle) + (*d - n.dot(middle)) * k);
         }
     }
 }
@@ -177,7 +178,7 @@ fn parallel_cylinders_agree_with_the_general_configurations() {
         let (Convex::Cylinder(p), Convex::Cylinder(q)) = (&a, &b) else { unreachable!() };
         let mut best = Best::new(&a, &b, None);
         round_round::general(p, q, &mut best);
-        assert!((best.value - value).abs() < 1e-13, "{} {value}", best.value);
+        assert!((best.value() - value).abs() < 1e-13, "{} {value}", best.value());
     }
 }
 
@@ -198,10 +199,10 @@ fn parallel_cones_agree_with_the_general_configurations() {
         let (Convex::Cylinder(p) | Convex::Cone(p), Convex::Cone(q)) = (&a, &b) else { unreachable!() };
         let (mut planar, mut general) = (Best::new(&a, &b, None), Best::new(&a, &b, None));
         assert!(meridian::parallel(p, q, &mut planar), "axes in one direction");
-        if planar.value > 0.0 {
+        if planar.value() > 0.0 {
             apart += 1;
             round_round::general(p, q, &mut general);
-            assert!((general.value - planar.value).abs() < 1e-12, "{} {}", general.value, planar.value);
+            assert!((general.value() - planar.value()).abs() < 1e-12, "{} {}", general.value(), planar.value());
         }
     }
     assert!(apart > 200, "{apart}");
@@ -278,7 +279,7 @@ fn the_clearance_in_a_cavity_is_that_of_its_nearest_point() {
                 let b = Convex::of(&b).expect("bounded").placed(&s);
                 // Small enough to find room: shrunk about its middle.
                 let scale = dice.0.within(0.15, 0.6);
-                a.shrink(scale);
+                shrink(&mut a, scale);
                 let c = clearance(&a, &b);
                 if c.value <= 0.0 {
                     continue;
