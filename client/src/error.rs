@@ -5,8 +5,8 @@ use contactd_proto::ErrorCode;
 use contactd_proto::names::AddressError;
 use std::fmt;
 
-/// Why a call of a session failed.
-#[derive(Clone, Debug, PartialEq)]
+/// Why a call of a session failed. `Debug` prints the sentence, too: a `main` that returns one ends with what a user can read.
+#[derive(Clone, PartialEq)]
 pub enum Error {
     /// The server refused; nothing has changed there.
     Refused {
@@ -88,6 +88,12 @@ impl fmt::Display for Error {
             Self::Misuse(what) => f.write_str(what),
             Self::System(what) => f.write_str(what),
         }
+    }
+}
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

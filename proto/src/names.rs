@@ -31,8 +31,8 @@ pub fn wake_service_of(session: u64) -> String {
     format!("{WAKE_SERVICE}/{session}")
 }
 
-/// Why there is no address for a server.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why there is no address for a server. `Debug` prints the sentence, too: it is what a `main` that returns one ends with.
+#[derive(Clone, PartialEq, Eq)]
 pub enum AddressError {
     /// The name is not of the form `[a-z0-9_-]{1,32}`.
     Name(String),
@@ -48,6 +48,12 @@ impl fmt::Display for AddressError {
             }
             Self::Folder(path, why) => write!(f, "{}: {why}", path.display()),
         }
+    }
+}
+
+impl fmt::Debug for AddressError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

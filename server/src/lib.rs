@@ -56,15 +56,17 @@
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`demo`] | the show |
+//! | 12 | [`command_line`] | the command `contactd` |
 //!
 //! # In one's own process
 //!
-//! [`embedded`] gives a session without a server: the same calls, the same bits.
+//! [`embedded`] gives a session without a server: the same calls, the same bits. Vectors and quaternions are [`glam`]'s, in `f64`.
+//! With the packages `contactd` and `contactd-client`:
 //!
 //! ```
+//! use contactd::glam::DVec3;
 //! use contactd_client::Object;
-//! use contactd_proto::{Pose, PoseRecord};
-//! use glam::DVec3;
+//! use contactd_client::proto::{Pose, PoseRecord};
 //!
 //! let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default())?;
 //! let plate = "difference() { cube(size = [40, 40, 4], center = true); cylinder(h = 9, r1 = 3, r2 = 3, center = true); }";
@@ -86,6 +88,7 @@
 
 pub mod cache;
 pub mod check;
+pub mod command_line;
 pub mod demo;
 pub mod import;
 pub mod inspect;
@@ -96,4 +99,5 @@ pub mod report;
 pub mod terminal;
 
 pub use contactd_engine::{bound, contact, math, motion, octree, solid, world};
+pub use glam;
 pub use ipc::embedded;

@@ -87,7 +87,7 @@ fn a_long_step_is_passed(name: &str, model: &str, count: u32, rules: &[Rule]) {
         begin(&mut hard, &ids, round);
         assert_eq!(hard.finish(PATIENCE).map(|r| r.header().records).unwrap(), 0);
     }
-    // A server that is told to stop does not wait for a step whose answer nobody will get.
+    // A server that is told to stop waits for a step, but not for long.
     hard.set_rules(rules).unwrap();
     begin(&mut hard, &ids, 3);
     hard.send().unwrap();

@@ -2,6 +2,8 @@
 
 #[allow(dead_code, reason = "other tests use the rest of it")]
 mod harness;
+#[path = "operator/service.rs"]
+mod service;
 
 use contactd_client::proto::step::STEP_UNDECIDED;
 use contactd_client::proto::{ErrorCode, Pose, PoseRecord};

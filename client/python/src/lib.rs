@@ -1,4 +1,5 @@
-//! Native module of the Python package `contactd`: one session type over shared memory or an engine in this process.
+//! Native module of the Python package `contactd`: one session type over shared memory or an engine in this process, and the
+//! command `contactd`.
 //!
 //! It holds what needs Rust, and what every step does: the session, the memory of its poses and replies, the records' layouts.
 //! Views, rules, poses and exceptions are Python (`contactd/*.py`), which is what users see.
@@ -7,6 +8,7 @@
 //! around a session that belongs to one thread (`confined.rs`).
 
 mod bench;
+mod command;
 mod confined;
 mod errors;
 mod layout;
@@ -29,6 +31,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::bench::{fields_in_rust, whole_in_rust};
+    #[pymodule_export]
+    use crate::command::command_line;
     #[pymodule_export]
     use crate::errors::error_codes;
     #[pymodule_export]

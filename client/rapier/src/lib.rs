@@ -43,6 +43,7 @@ mod dispatch;
 mod solid;
 
 pub use dispatch::Dispatcher;
+pub use glam;
 pub use solid::Solid;
 
 use contactd::import::{Facets, Limits, import_csg};

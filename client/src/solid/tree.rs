@@ -7,8 +7,8 @@ use std::sync::Arc;
 /// Levels of nesting that are printed: as many as the server reads by its default.
 const DEEPEST: u32 = 1_000;
 
-/// What made no sense in a solid that was built.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What made no sense in a solid that was built. `Debug` prints the sentence, too: it is what a `main` that returns one ends with.
+#[derive(Clone, PartialEq, Eq)]
 pub struct BuildError {
     what: &'static str,
     expected: String,
@@ -25,6 +25,12 @@ impl std::fmt::Display for BuildError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { what, expected, found } = self;
         write!(f, "{what}: expected {expected}, found {found}")
+    }
+}
+
+impl std::fmt::Debug for BuildError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Display::fmt(self, f)
     }
 }
 

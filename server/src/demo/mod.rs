@@ -1,10 +1,10 @@
 //! `contactd demo`: a server process and this one as its client, on real parts.
 //!
-//! The server is this same binary, started as `serve` under a name of its own; every step goes through shared memory and
-//! back. With `embedded` the same script runs on an engine in this process, with the same bits. Whatever ends the demo,
+//! The server is this same program, started as `serve` under a name of its own; every step goes through shared memory and
+//! back. Without a program the same script runs on an engine in this process, with the same bits. Whatever ends the demo,
 //! the server is stopped and waited for, so that nothing stays behind.
 //!
-//! Floor 11, below main only: may import everything else.
+//! Floor 11, below the command line only: may import everything else.
 
 mod play;
 pub mod scene;
@@ -18,21 +18,31 @@ use crate::ipc::{CacheFolder, ServerConfig};
 use crate::report::TableStyle;
 use contactd_client::Session;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::ffi::OsString;
 use std::io::{BufRead as _, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// How long the server may take to start, and to stop.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// How a program that is `contactd` is started again.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// What is executed.
+    pub path: PathBuf,
+    /// What stands before the command's own arguments.
+    pub arguments: Vec<OsString>,
+}
+
 /// Runs the demo and returns what it prints; contacts in full go to `csv_file` when there is one. Its models are kept in
-/// `cache`.
+/// `cache`. `server`: what is started as the server; `None` for the engine in this process.
 ///
 /// # Errors
 /// One sentence.
 pub fn run(
-    embedded: bool,
+    server: Option<&Program>,
     csv_file: Option<&Path>,
     cache: &CacheFolder,
     style: &TableStyle,
@@ -47,18 +57,21 @@ pub fn run(
         bar.set_position(step as u64);
     };
     let failed = |e: contactd_client::Error| format!("demo: {e}");
-    let (run, way) = if embedded {
-        let mut session =
-            crate::ipc::embedded(&ServerConfig { cache: cache.clone(), ..ServerConfig::default() }).map_err(failed)?;
-        (play(&mut session, progress).map_err(failed)?, "in this process")
-    } else {
-        let name = format!("demo-{}", std::process::id());
-        let mut server = ServerProcess::start(&name, cache)?;
-        let mut session = Session::connect(&name).map_err(failed)?;
-        let run = play(&mut session, progress).map_err(failed)?;
-        session.close().map_err(failed)?;
-        server.stop()?;
-        (run, "through shared memory and back")
+    let (run, way) = match server {
+        None => {
+            let config = ServerConfig { cache: cache.clone(), ..ServerConfig::default() };
+            let mut session = crate::ipc::embedded(&config).map_err(failed)?;
+            (play(&mut session, progress).map_err(failed)?, "in this process")
+        }
+        Some(program) => {
+            let name = format!("demo-{}", std::process::id());
+            let mut server = ServerProcess::start(program, &name, cache)?;
+            let mut session = Session::connect(&name).map_err(failed)?;
+            let run = play(&mut session, progress).map_err(failed)?;
+            session.close().map_err(failed)?;
+            server.stop()?;
+            (run, "through shared memory and back")
+        }
     };
     bar.finish_and_clear();
     if let Some(path) = csv_file {
@@ -74,10 +87,13 @@ struct ServerProcess {
 }
 
 impl ServerProcess {
-    fn start(name: &str, cache: &CacheFolder) -> Result<Self, String> {
-        let program = std::env::current_exe().map_err(|e| format!("expected to find this program, found {e}"))?;
-        let mut command = Command::new(program);
-        command.args(["serve", "--quiet", "--name", name]).stdin(Stdio::null()).stdout(Stdio::piped());
+    fn start(program: &Program, name: &str, cache: &CacheFolder) -> Result<Self, String> {
+        let mut command = Command::new(&program.path);
+        command
+            .args(&program.arguments)
+            .args(["serve", "--quiet", "--name", name])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped());
         if let Some(folder) = cache.folder() {
             command.arg("--cache").arg(folder);
         }

@@ -12,6 +12,7 @@
 use super::config::ServerConfig;
 use super::jobs::{Finished, Job, JobKind};
 use super::log::Log;
+use super::manager::Manager;
 use super::models::Models;
 use super::port::{CommandCall, Port, StepCall, Wake};
 use super::relay::Relay;
@@ -26,7 +27,7 @@ use contactd_proto::status::StatusRecord;
 use contactd_proto::step::{ASK_POLLING, STEP_REFUSED, STEP_UNDECIDED};
 use contactd_proto::{ContactRecord, EffectCounters, ErrorCode};
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Weak};
 use std::thread::{Builder, Scope};
@@ -39,14 +40,16 @@ const LOOKS: usize = 8;
 /// A step on a thread of its session's own is short below this; after so many of them in a row the session has none any more.
 const SHORT: Duration = Duration::from_millis(1);
 const CALM: u32 = 16;
-/// How long the end of a server waits for what it has cancelled.
+/// How long the end of a server waits for the steps that were asked for before it was to end.
+const DRAINED: Duration = Duration::from_secs(3);
+/// How long it waits for what it has cancelled.
 const CANCELLED: Duration = Duration::from_secs(2);
 /// How many sessions that were ended from outside are remembered.
 const REMEMBERED: usize = 1000;
 /// The part of a deadline that is left to the reply.
 const REPLY_PART: u32 = 10;
 
-/// Serves until `stop` is set; gives back what the last leader held, to be dropped by the caller.
+/// Serves until `stop` is set and the steps that were asked for before are answered; gives back what the last leader held, to be dropped by the caller.
 pub fn run<P: Port>(lead: Box<Lead<P>>, stop: &AtomicBool) -> Option<Box<Lead<P>>> {
     let relay = Relay::new(lead);
     std::thread::scope(|scope| {
@@ -76,7 +79,8 @@ pub struct Lead<P: Port> {
     ended: VecDeque<u64>,
     /// What they worked out.
     effects: EffectCounters,
-    beats: u64,
+    /// Goes on with every beat.
+    beats: Arc<AtomicU64>,
     last_work: Instant,
     last_beat: Instant,
     /// Sessions that have asked something lately, as of the last beat; new ones count.
@@ -87,6 +91,10 @@ pub struct Lead<P: Port> {
     alone: bool,
     /// Set when the process was sent a hangup.
     pub hangup: Arc<AtomicBool>,
+    /// Who started the server as a service.
+    manager: Manager,
+    /// The server is to end: until when steps are waited for, and how many that have arrived are yet to be taken.
+    closing: Option<(Instant, usize)>,
     /// The server's incarnation.
     epoch: u64,
 }
@@ -130,7 +138,7 @@ fn lead_on<'scope, 'env, P: Port>(
     own: rustix::process::Pid,
 ) -> Option<(Task<P>, Ran<P>)> {
     lead.watched = false;
-    while !stop.load(Ordering::Relaxed) {
+    while !lead.is_over(stop) {
         if !lead.watched {
             let watch = move || follow(scope, relay, relay.watch(), stop);
             lead.watched = Builder::new().name("contactd-watch".into()).spawn_scoped(scope, watch).is_ok();
@@ -140,7 +148,7 @@ fn lead_on<'scope, 'env, P: Port>(
         let spins = lead.last_work.elapsed() < lead.spin();
         // Steps first: while it polls it looks for them several times for each look at all else.
         for _ in 0..if spins { LOOKS } else { 1 } {
-            while let Some(call) = lead.port.next_step() {
+            while let Some(call) = lead.next_step() {
                 worked = true;
                 let Some(mut task) = lead.begin(call) else { continue };
                 let id = task.session;
@@ -156,7 +164,9 @@ fn lead_on<'scope, 'env, P: Port>(
             }
             std::hint::spin_loop();
         }
-        while let Some(call) = lead.port.next_command() {
+        while lead.closing.is_none()
+            && let Some(call) = lead.port.next_command()
+        {
             lead.command(call);
             worked = true;
         }
@@ -167,7 +177,7 @@ fn lead_on<'scope, 'env, P: Port>(
         }
         if worked {
             lead.last_work = Instant::now();
-        } else if !spins && !lead.port.wait(BEAT) {
+        } else if !spins && !lead.is_over(stop) && !lead.port.wait(BEAT) {
             // An interrupted wait ends early, a failing one must not become a busy loop.
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -195,7 +205,7 @@ impl<P: Port> Lead<P> {
             tally: Tally::new(Instant::now()),
             ended: VecDeque::new(),
             effects: EffectCounters::default(),
-            beats: 0,
+            beats: Arc::default(),
             last_work: Instant::now(),
             last_beat: Instant::now(),
             active: 0,
@@ -203,8 +213,41 @@ impl<P: Port> Lead<P> {
             watched: false,
             alone: false,
             hangup: Arc::default(),
+            manager: Manager::default(),
+            closing: None,
             epoch,
         }
+    }
+
+    /// Tells the service manager that started this process, if one did, that the server is ready.
+    pub fn tells_manager(&mut self) {
+        match Manager::ready(self.beats.clone()) {
+            Ok(manager) => self.manager = manager,
+            Err(e) => self.log.warn(&format!("the service manager was not told that the server is ready: {e}")),
+        }
+    }
+
+    /// Whether the server is to end and has answered the steps that were asked for before, as far as it waits for them.
+    fn is_over(&mut self, stop: &AtomicBool) -> bool {
+        if !stop.load(Ordering::Relaxed) {
+            return false;
+        }
+        let Some((until, waiting)) = self.closing else {
+            self.manager.stopping();
+            // One a session: a client that goes on asking keeps no server from ending.
+            self.closing = Some((Instant::now() + DRAINED, self.sessions.len()));
+            return false;
+        };
+        let is_idle = waiting == 0 && self.sessions.values().all(|session| session.scene.is_some());
+        is_idle || Instant::now() >= until
+    }
+
+    /// A step that has arrived; those that arrive while the server ends are not taken.
+    fn next_step(&mut self) -> Option<P::Step> {
+        let Some((_, waiting)) = &mut self.closing else { return self.port.next_step() };
+        let call = if *waiting > 0 { self.port.next_step() } else { None };
+        *waiting = if call.is_some() { *waiting - 1 } else { 0 };
+        call
     }
 
     /// How long to poll before blocking: not at all when the clients that poll need the cores. Who has asked nothing of late
@@ -508,9 +551,9 @@ impl<P: Port> Lead<P> {
     fn beat(&mut self) {
         self.end_sessions();
         self.active = self.sessions.values().filter(|s| s.is_active()).count();
-        self.beats += 1;
+        let beats = self.beats.fetch_add(1, Ordering::Relaxed) + 1;
         // A client may also die without a session: rarely looked for, since the look costs milliseconds.
-        if self.beats.is_multiple_of(200) {
+        if beats.is_multiple_of(200) {
             self.port.sweep_dead();
         }
         self.tally.turn(Instant::now());

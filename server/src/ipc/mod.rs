@@ -15,6 +15,7 @@ mod embedded;
 mod jobs;
 mod lead;
 mod log;
+mod manager;
 mod models;
 mod port;
 mod relay;

@@ -6,11 +6,12 @@ use super::root::{Root, RootError};
 use super::services::Services;
 use contactd_client::Error;
 use contactd_proto::names::Address;
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Why a server does not run.
-#[derive(Debug, thiserror::Error)]
+/// Why a server does not run. `Debug` prints the sentence, too: it is what a `main` that returns one ends with.
+#[derive(thiserror::Error)]
 pub enum ServeError {
     /// It has no place.
     #[error(transparent)]
@@ -21,6 +22,12 @@ pub enum ServeError {
     /// Shared memory failed.
     #[error("{0}")]
     System(Error),
+}
+
+impl fmt::Debug for ServeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
 }
 
 impl From<Error> for ServeError {
@@ -58,7 +65,14 @@ impl Server {
         }
     }
 
-    /// Serves until `stop` is set.
+    /// Tells the service manager that started this process, if one did, that clients can connect; and then of the loop.
+    fn tells_manager(&mut self) {
+        if let Some(lead) = &mut self.lead {
+            lead.tells_manager();
+        }
+    }
+
+    /// Serves until `stop` is set, and the steps that were asked for before are answered.
     pub fn run(&mut self, stop: &AtomicBool) {
         if let Some(lead) = self.lead.take() {
             self.lead = lead::run(lead, stop);
@@ -79,8 +93,11 @@ pub fn ready_threads() -> Result<(), String> {
     }
 }
 
-/// Serves until SIGINT or SIGTERM; calls `ready` once clients can connect. SIGHUP, which a terminal sends that is closed, is a
-/// line on standard error.
+/// Serves until SIGINT or SIGTERM; calls `ready` once clients can connect. Steps that were asked for before the signal are
+/// answered. SIGHUP, which a terminal sends that is closed, is a line on standard error.
+///
+/// A service manager that speaks systemd's protocol (`NOTIFY_SOCKET`, `WATCHDOG_USEC`) is told when clients can connect, that the
+/// loop goes round, and that the server stops.
 ///
 /// # Errors
 /// As `Server::start`.
@@ -96,6 +113,7 @@ pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce()) -> R
     let mut server = Server::start(address, config)?;
     server.hears(hangup);
     ready();
+    server.tells_manager();
     server.run(&stop);
     Ok(())
 }

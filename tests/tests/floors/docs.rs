@@ -23,6 +23,7 @@ fn markdown_files(folder: &Path, found: &mut Vec<PathBuf>) {
 
 fn documents() -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = ["README.md", HISTORY, "client/python/README.md"].map(|f| root().join(f)).into();
+    all.extend(super::packages::published().iter().map(|(folder, _)| folder.join("README.md")));
     markdown_files(&root().join("docs"), &mut all);
     all
 }

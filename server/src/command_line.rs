@@ -1,35 +1,41 @@
 //! The command line: arguments in, text out, exit status 0 done, 2 bad input, 3 some pair undecided.
-#![forbid(unsafe_code)]
+//!
+//! It is a function of the library, so that a program of another language is the same command (the Python package's is).
+//!
+//! Floor 12: may import everything else.
 
-use clap::{Parser, Subcommand};
-use contactd::cache::{self, Cache, Prepared};
-use contactd::check::Check;
-use contactd::contact::Status;
-use contactd::import::{self, Access, Facets, Limits, ModelBytes, Openscad, Scene};
-use contactd::inspect;
-use contactd::ipc::{CacheFolder, Level, ServerConfig};
-use contactd::octree::Model;
-use contactd::operator;
-use contactd::picture::{
+mod pages;
+
+use crate::cache::{self, Cache, Prepared};
+use crate::check::Check;
+use crate::contact::Status;
+use crate::demo::Program;
+use crate::import::{self, Access, Facets, Limits, ModelBytes, Openscad, Scene};
+use crate::inspect;
+use crate::ipc::{CacheFolder, Level, ServerConfig};
+use crate::octree::Model;
+use crate::operator;
+use crate::picture::{
     self,
     drawing::Drawing,
     scene::{Actor, Meeting},
 };
-use contactd::report::{self, Answer, PairReport, TableStyle};
-use contactd::terminal::{Colour, Paint};
-use contactd::world::{PairOutcome, StepOutcome};
+use crate::report::{self, Answer, PairReport, TableStyle};
+use crate::terminal::{Colour, Paint};
+use crate::world::{PairOutcome, StepOutcome};
+use clap::{Parser, Subcommand};
 use contactd_proto::ErrorCode;
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
 use std::error::Error;
+use std::ffi::OsString;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Certified earliest contact of solids modelled by constructive solid geometry.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(name = "contactd", bin_name = "contactd", version, about)]
 struct Arguments {
     /// Colour in what is printed: auto is where it goes to a terminal, unless NO_COLOR is set.
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_possible_values = true)]
@@ -92,6 +98,18 @@ enum Command {
         access: AccessArguments,
         #[command(flatten)]
         cache: CacheArguments,
+    },
+    /// A script for a shell that completes these commands and their options: bash, elvish, fish, powershell or zsh.
+    Completions {
+        /// The shell.
+        #[arg(hide_possible_values = true)]
+        shell: clap_complete::Shell,
+    },
+    /// This program's pages for `man`, one for each command.
+    Man {
+        /// The folder that they go to, made if need be.
+        #[arg(value_name = "FOLDER")]
+        folder: PathBuf,
     },
 }
 
@@ -217,23 +235,35 @@ enum Done {
     Undecided,
 }
 
-fn main() -> ExitCode {
-    let Arguments { color, command } = Arguments::parse();
+/// The command `contactd`, whole: what it prints goes to standard output and standard error. `arguments` begin with the program's own
+/// name; `program` is how this program is started again, which the demo does for its server.
+///
+/// Gives the exit status: 0 done, 2 bad input, 3 some pair undecided.
+pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> u8 {
+    let Arguments { color, command } = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        // Help and version are such errors, too, of status 0.
+        Err(e) => {
+            let _ = e.print();
+            return u8::try_from(e.exit_code()).unwrap_or(BAD_INPUT);
+        }
+    };
     let environment = |name: &str| std::env::var_os(name);
     let paint = color.paint(
         std::io::stdout().is_terminal(),
         environment("NO_COLOR").as_deref(),
         environment("TERM").as_deref(),
     );
-    if let Err(sentence) = contactd::ipc::ready_threads() {
+    if let Err(sentence) = crate::ipc::ready_threads() {
         say(&format!("contactd: expected to start threads, found: {sentence}"));
-        return ExitCode::from(2);
+        return BAD_INPUT;
     }
     let done = match command {
         Command::Check(arguments) => check_scene(&arguments, paint),
         Command::Demo { scene_of: Some(step), into, .. } => demo_scene(step, &into),
         Command::Demo { embedded, csv, cache, wide, .. } => {
-            run_demo(embedded, csv.as_deref(), cache, TableStyle { wide, paint, ..TableStyle::default() })
+            let server = (!embedded).then_some(program);
+            run_demo(server, csv.as_deref(), cache, TableStyle { wide, paint, ..TableStyle::default() })
         }
         Command::Inspect { file, facets, picture, access, cache } => {
             inspect_file(&file, facets, picture.as_deref(), &access, &cache)
@@ -241,15 +271,34 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => serve(arguments),
         Command::Status { name, json } => status(name.as_deref(), json, paint),
         Command::Sessions { what: SessionsCommand::End { session, name } } => end_session(session, &name),
+        Command::Completions { shell } => completions(shell),
+        Command::Man { folder } => man(&folder),
     };
-    match done {
-        Ok(Done::Well) => ExitCode::SUCCESS,
-        Ok(Done::Undecided) => ExitCode::from(3),
+    let status = match done {
+        Ok(Done::Well) => 0,
+        Ok(Done::Undecided) => 3,
         Err(sentence) => {
             say(&sentence.to_string());
-            ExitCode::from(2)
+            BAD_INPUT
         }
+    };
+    // Where another program's runtime ends the process nobody else does.
+    let _ = std::io::stdout().flush();
+    status
+}
+
+const BAD_INPUT: u8 = 2;
+
+fn completions(shell: clap_complete::Shell) -> Result<Done, Box<dyn Error>> {
+    print(&pages::completions(shell))?;
+    Ok(Done::Well)
+}
+
+fn man(folder: &Path) -> Result<Done, Box<dyn Error>> {
+    for path in pages::write_man(folder)? {
+        print(&format!("{}\n", path.display()))?;
     }
+    Ok(Done::Well)
 }
 
 fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
@@ -272,7 +321,7 @@ fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
         // A reader that has gone away does not stop a server.
         let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol {PROTOCOL_VERSION}, process {pid})\n"));
     };
-    contactd::ipc::serve(&Address::of(&name)?, config, ready)?;
+    crate::ipc::serve(&Address::of(&name)?, config, ready)?;
     Ok(Done::Well)
 }
 
@@ -306,18 +355,18 @@ fn end_session(session: u64, name: &str) -> Result<Done, Box<dyn Error>> {
 }
 
 fn run_demo(
-    embedded: bool,
+    server: Option<&Program>,
     csv: Option<&Path>,
     cache: CacheArguments,
     style: TableStyle,
 ) -> Result<Done, Box<dyn Error>> {
-    let (text, run) = contactd::demo::run(embedded, csv, &cache.cache.unwrap_or_default(), &style)?;
+    let (text, run) = crate::demo::run(server, csv, &cache.cache.unwrap_or_default(), &style)?;
     print(&text)?;
     Ok(if run.undecided > 0 { Done::Undecided } else { Done::Well })
 }
 
 fn demo_scene(step: usize, into: &Path) -> Result<Done, Box<dyn Error>> {
-    let path = contactd::demo::scene::write(step, into)?;
+    let path = crate::demo::scene::write(step, into)?;
     print(&format!("{}\n", path.display()))?;
     Ok(Done::Well)
 }
