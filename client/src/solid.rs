@@ -138,6 +138,17 @@ pub fn quadric(m: &[[f64; 4]; 4], min: DVec3, max: DVec3) -> Solid {
     Solid(Tree::leaf(format!("quadric(m = [{}], min = {min}, max = {max}", rows.join(", ")), false))
 }
 
+/// All points with (|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) <= 1 for the semi-axes `radii` = (a, b, c) and the exponents
+/// e1 (north to south) and e2 (east to west), each from 0.1 to 1: an ellipsoid with both 1, towards 0 a box.
+pub fn superellipsoid(radii: DVec3, [north, east]: [f64; 2]) -> Solid {
+    if let Some(e) = [north, east].into_iter().find(|e| !(0.1..=1.0).contains(e)) {
+        return Solid(BuildError::new("superellipsoid", "exponents from 0.1 to 1".into(), number(e)).into());
+    }
+    let lengths = [("radius along x", radii.x), ("radius along y", radii.y), ("radius along z", radii.z)];
+    let call = || format!("superellipsoid(r = {}, e = {}", list(&radii.to_array()), list(&[north, east]));
+    leaf("superellipsoid", &lengths, call, false)
+}
+
 /// The solid within faces, convex or not: lists of indices of `points`, counter-clockwise as seen from outside.
 pub fn polyhedron(points: &[DVec3], faces: &[impl AsRef<[u32]>]) -> Solid {
     let refused = |expected: &str, found: String| Solid(BuildError::new("polyhedron", expected.into(), found).into());

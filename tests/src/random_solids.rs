@@ -2,7 +2,8 @@
 
 use contactd::motion::Placed;
 use contactd::solid::primitive::{
-    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, HalfSpace, Polyhedron, Shape, Sphere, Torus,
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, HalfSpace, Polyhedron, Shape, Sphere, Superellipsoid,
+    Torus,
 };
 use contactd::solid::{Label, NodeId, Op, Solid, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -114,6 +115,26 @@ pub fn capsule(r: &mut Random, size: f64) -> Capsule {
 /// The same as `shape`, or a capsule, one in three.
 pub fn shape_or_capsule(r: &mut Random, size: f64) -> Shape {
     if r.below(3) == 0 { capsule(r, size).into() } else { shape(r, size) }
+}
+
+/// A random superellipsoid of size about `size`: exponents at either end of what there is, one like a box, or any.
+pub fn superellipsoid(r: &mut Random, size: f64) -> Superellipsoid {
+    let mut s = || size * r.within(0.15, 1.0);
+    let (a, b, c) = (s(), s(), s());
+    let e = |r: &mut Random| match r.below(8) {
+        0 => 1.0,
+        1 => 0.1,
+        2 => 0.5,
+        _ => r.within(0.1, 1.0),
+    };
+    let exponents = DVec2::new(e(r), e(r));
+    let semi = if r.below(4) == 0 { DVec3::new(a, a, b) } else { DVec3::new(a, b, c) };
+    Superellipsoid { semi, exponents }
+}
+
+/// The same as `shape`, or a superellipsoid, one in three.
+pub fn shape_or_superellipsoid(r: &mut Random, size: f64) -> Shape {
+    if r.below(3) == 0 { superellipsoid(r, size).into() } else { shape(r, size) }
 }
 
 /// The same as `shape`, or an elliptic one, one in three.

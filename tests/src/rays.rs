@@ -4,7 +4,7 @@
 //! one point tells. Across, the lengths are no smooth function: the rule converges with the power 1.5 or so of the
 //! distance of the rays, and two rules tell how far it has come.
 
-use crate::reference::field::{Image, Ridge};
+use crate::reference::field::{Ball, Image, Ridge};
 use contactd::math::Aabb;
 use contactd::solid::{Face, Solid, surface};
 use glam::{DVec2, DVec3};
@@ -64,6 +64,7 @@ fn add_roots(face: &Face, at: DVec3, roots: &mut Vec<f64>) {
             [o.dot(o) * c - h * h * s, o.dot(d) * c - h * k * s, d.dot(d) * c - k * k * s]
         }
         Face::Torus(torus) => return add_roots_of_torus(&torus, at, roots),
+        Face::Superellipsoid(s) => return add_roots_of_norm(&s, at, roots),
         // Of its cylinder and its balls: a root too many only divides an interval.
         Face::Capsule(surface::Capsule { origin, axis, half, radius }) => {
             for end in [half, -half] {
@@ -136,6 +137,30 @@ fn add_roots_of_torus(torus: &surface::Torus, at: DVec3, roots: &mut Vec<f64>) {
         }
     }
     roots.extend(all.iter().filter(|z| z.1.abs() < 1e-5 * size).map(|z| start + z.0));
+}
+
+/// The same of a superellipsoid: sN is convex along the line, so its least value is found by thirds, and the two ends by halves.
+fn add_roots_of_norm(face: &surface::Superellipsoid, at: DVec3, roots: &mut Vec<f64>) {
+    let (ball, size) = (Ball::of(face), face.semi.length());
+    let level = |z: f64| ball.length(at + DVec3::Z * z) - face.semi.min_element() * Image::WHOLE;
+    let (low, high) = (face.origin.z - size, face.origin.z + size);
+    let (mut a, mut b) = (low, high);
+    for _ in 0..200 {
+        let (c, d) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
+        if level(c) < level(d) { b = d } else { a = c }
+    }
+    let middle = 0.5 * (a + b);
+    if level(middle) >= 0.0 {
+        return;
+    }
+    for mut out in [low, high] {
+        let mut within = middle;
+        for _ in 0..60 {
+            let half = 0.5 * (out + within);
+            if level(half) < 0.0 { within = half } else { out = half }
+        }
+        roots.push(within);
+    }
 }
 
 fn across(v: DVec3, axis: DVec3) -> DVec3 {

@@ -20,7 +20,7 @@
 
 use crate::engine::ReportedPoint as _;
 use crate::reference::Moving;
-use crate::reference::field::{Image, Ridge};
+use crate::reference::field::{Ball, Image, Ridge};
 use contactd::contact::{ContactKind, Extent, Outcome, Status};
 use contactd::solid::{Face, Sense, surface};
 use contactd_proto::contact_record::NO_FACE;
@@ -286,6 +286,10 @@ fn features(
             Face::Bowl(b) => {
                 let slope = side.literals[*i].gradient(point).length();
                 2.0 * moves / (slope * Image::of_bowl(&b).across(point).length()).max(f64::MIN_POSITIVE)
+            }
+            Face::Superellipsoid(s) => {
+                let slope = side.literals[*i].gradient(point).length();
+                2.0 * moves * Ball::of(&s).turns(point) / slope
             }
             // Both of its halves turn.
             Face::Saddle(s) => {

@@ -7,7 +7,8 @@
 use crate::random_solids::Random;
 use crate::reference::{self, Effort, Moving, Truth};
 use contactd::solid::primitive::{
-    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Torus, TriangleMesh,
+    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Superellipsoid, Torus,
+    TriangleMesh,
 };
 use contactd::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
@@ -140,6 +141,7 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
         Shape::Capsule(c) => Capsule { half: c.half * k, radius: c.radius * k }.into(),
         Shape::Quadric(q) => crate::quadrics::scaled(q, k).into(),
         Shape::Ellipsoid(e) => Ellipsoid { semi: e.semi * k }.into(),
+        Shape::Superellipsoid(s) => Superellipsoid { semi: s.semi * k, exponents: s.exponents }.into(),
         Shape::EllipticFrustum(c) => {
             EllipticFrustum { semi: c.semi * k, half_height: c.half_height * k, ..c.clone() }.into()
         }

@@ -172,6 +172,21 @@ pub unsafe extern "C" fn contactd_solid_quadric(
     })
 }
 
+/// All points with (|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) <= 1. `radii`: a, b and c; `exponents`: e1 (north to south) and e2
+/// (east to west), each from 0.1 to 1.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_solid_superellipsoid(
+    radii: *const f64,
+    exponents: *const f64,
+    out: *mut *mut Built,
+) -> i32 {
+    free(|| {
+        // SAFETY: the caller's arrays (1).
+        let (radii, exponents) = unsafe { (numbers::<3>(radii, "radii")?, numbers::<2>(exponents, "exponents")?) };
+        write_solid(solid::superellipsoid(DVec3::from_array(*radii), *exponents), out)
+    })
+}
+
 /// The half-space normal.x <= offset |normal|: a floor or a wall of its own, or to be cut with something. `normal`: 3
 /// numbers.
 #[unsafe(no_mangle)]

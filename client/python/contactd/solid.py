@@ -41,6 +41,7 @@ __all__ = [
     "quadric",
     "rectangle",
     "sphere",
+    "superellipsoid",
     "torus",
     "union",
 ]
@@ -97,6 +98,16 @@ def quadric(m: Sequence[Sequence[float]], min: Sequence[float], max: Sequence[fl
     if [len(row) for row in rows] != [4] * 4:
         raise ValueError(f"quadric: expected four rows of four numbers, found rows of {[len(row) for row in rows]}")
     return _native._primitive("quadric", [*(x for row in rows for x in row), *min, *max])
+
+
+def superellipsoid(r: Sequence[float], e: Sequence[float]) -> Solid:
+    """All points with (|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) <= 1, ``r`` = (a, b, c) and ``e`` = (e1, e2).
+
+    e1 shapes it north to south, e2 east to west, each from 0.1 to 1: an ellipsoid with both 1, towards 0 a box.
+    """
+    if len(r) != 3 or len(e) != 2:
+        raise ValueError(f"superellipsoid: expected three radii and two exponents, found {len(r)} and {len(e)}")
+    return _native._primitive("superellipsoid", [*r, *e])
 
 
 def half_space(normal: Sequence[float], offset: float) -> Solid:

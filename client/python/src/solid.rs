@@ -172,6 +172,7 @@ pub fn primitive(name: &str, numbers: Vec<f64>) -> PyResult<Solid> {
             let m: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| all[4 * i + j]));
             solid::quadric(&m, DVec3::from_slice(&all[16..]), DVec3::from_slice(&all[19..]))
         }
+        ("superellipsoid", &[a, b, c, north, east]) => solid::superellipsoid(DVec3::new(a, b, c), [north, east]),
         ("half_space", &[x, y, z, offset]) => solid::half_space(DVec3::new(x, y, z), offset),
         _ => return Err(PyValueError::new_err(format!("{name} of {} numbers", numbers.len()))),
     })

@@ -27,6 +27,7 @@ from contactd.solid import (
     quadric,
     rectangle,
     sphere,
+    superellipsoid,
     torus,
     union,
 )
@@ -58,6 +59,8 @@ FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
         (hyperboloid(1.5, 0.5, 2), math.pi * 2 / 3 * (2 * 0.25 + 2.25)),
         (hyperbolic_dome(1, 1, 1), math.pi / 3 * (7 / 3 - 1)),
         (quadric([[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 0.5], [0, 0, 0.5, 0]], (-1, -1, -2), (1, 1, 2)), 8),
+        (superellipsoid((1, 2, 3), (1, 1)), 8 * math.pi),
+        (superellipsoid((1, 2, 3), (0.5, 1)), math.pi * 2 * 3 * 2 * math.gamma(1.25) * math.gamma(1.5) / math.gamma(1.75)),
         (box(2, 2, 2) & half_space((0, 0, 3), 0.5), 4 * 1.5),
         (polyhedron(CORNERS, FACES), 1 / 6),
         ((rectangle(4, 4) - circle(1)).extrude(2), 2 * (16 - math.pi)),

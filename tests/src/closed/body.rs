@@ -329,6 +329,7 @@ impl Convex {
             primitive::Convex::Capsule { .. }
             | primitive::Convex::Ellipsoid(_)
             | primitive::Convex::Elliptic(_)
+            | primitive::Convex::Superellipsoid(_)
             | primitive::Convex::HalfSpace
             | primitive::Convex::Other => return None,
         })

@@ -61,6 +61,7 @@ impl<'a> Side<'a> {
             Face::Torus(surface::Torus { origin, major, minor, .. }) => origin.length() + major + minor,
             Face::Elliptic(e) => e.origin.length() + e.size,
             Face::Bowl(b) => b.origin.length() + b.radius,
+            Face::Superellipsoid(s) => s.origin.length() + s.semi.min_element(),
             Face::Saddle(s) => s.origin.length() + s.size,
             Face::Capsule(surface::Capsule { origin, half, radius, .. }) => origin.length() + half + radius,
         });

@@ -40,6 +40,7 @@ impl Literal {
                 }
                 Face::Elliptic(e) => Image::of(&e).value(x),
                 Face::Bowl(b) => Image::of_bowl(&b).value(x),
+                Face::Superellipsoid(s) => Ball::of(&s).value(x),
                 Face::Saddle(s) => {
                     let [p, n] = Ridge::of(&s).halves(x);
                     p.length() - n.length()
@@ -70,6 +71,7 @@ impl Literal {
                 }
                 Face::Elliptic(e) => Image::of(&e).gradient(x),
                 Face::Bowl(b) => Image::of_bowl(&b).gradient(x),
+                Face::Superellipsoid(s) => Ball::of(&s).gradient(x),
                 Face::Saddle(s) => {
                     let s = Ridge::of(&s);
                     let [p, n] = s.halves(x).map(|v| v.normalize_or(DVec2::X));
@@ -149,6 +151,62 @@ fn turn_of(turn: DVec3) -> DQuat {
     let square = turn.length_squared();
     let v = turn * (2.0 / (1.0 + square));
     DQuat::from_xyzw(v.x, v.y, v.z, (1.0 - square) / (1.0 + square)).normalize()
+}
+
+/// A superellipsoid by its numbers: psi = s (N(y) − 1), y along its axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Ball {
+    face: surface::Superellipsoid,
+    turn: DQuat,
+    size: f64,
+}
+
+impl Ball {
+    /// Of a face.
+    pub fn of(face: &surface::Superellipsoid) -> Self {
+        Self { face: *face, turn: turn_of(face.turn), size: face.semi.min_element() * Image::WHOLE }
+    }
+
+    /// y over the semi-axes, N, and the largest of the former.
+    fn seen(&self, x: DVec3) -> (DVec3, f64) {
+        let v = self.turn.conjugate() * (x - self.face.origin) / self.face.semi;
+        let (w, m) = (v.abs(), v.abs().max_element());
+        if m == 0.0 {
+            return (v, 0.0);
+        }
+        let (e, f) = (self.face.exponents.x, self.face.exponents.y);
+        let [a, b, c] = (w / m).to_array();
+        let flat = a.powf(2.0 / f) + b.powf(2.0 / f);
+        (v, m * (flat.powf(f / e) + c.powf(2.0 / e)).powf(0.5 * e))
+    }
+
+    /// s N.
+    pub fn length(&self, x: DVec3) -> f64 {
+        self.seen(x).1 * self.size
+    }
+
+    fn value(&self, x: DVec3) -> f64 {
+        self.length(x) - self.size
+    }
+
+    fn gradient(&self, x: DVec3) -> DVec3 {
+        let (v, n) = self.seen(x);
+        let (p, q) = (2.0 / self.face.exponents.x, 2.0 / self.face.exponents.y);
+        if n == 0.0 {
+            return self.turn * DVec3::AXES[self.face.semi.min_position()];
+        }
+        let u = (v / n).abs();
+        let flat = u.x.max(u.y);
+        let inner = if flat > 0.0 { flat * ((u.x / flat).powf(q) + (u.y / flat).powf(q)).powf(1.0 / q) } else { 0.0 };
+        let part = |x: f64| if inner > 0.0 { (x / inner).powf(q - 1.0) * inner.powf(p - 1.0) } else { 0.0 };
+        let g = DVec3::new(part(u.x), part(u.y), u.z.powf(p - 1.0)) * DVec3::ONE.copysign(v);
+        self.turn * (g * self.size / self.face.semi)
+    }
+
+    /// How fast the gradient may turn at a point: 1/length.
+    pub fn turns(&self, x: DVec3) -> f64 {
+        (2.0 / self.face.exponents.min_element() - 1.0) / self.length(x).max(f64::MIN_POSITIVE)
+    }
 }
 
 /// A saddle by its numbers: psi = |P| − |N|, both of two parts along y = turnᵀ(x − origin).
@@ -347,6 +405,11 @@ fn moved(face: &Face, place: &Pose) -> Face {
         Face::Bowl(b) => {
             Face::Bowl(surface::Bowl { origin: point(b.origin), turn: quarter(place.rotation, b.turn), ..b })
         }
+        Face::Superellipsoid(s) => Face::Superellipsoid(surface::Superellipsoid {
+            origin: point(s.origin),
+            turn: quarter(place.rotation, s.turn),
+            ..s
+        }),
         Face::Saddle(s) => {
             Face::Saddle(surface::Saddle { origin: point(s.origin), turn: quarter(place.rotation, s.turn), ..s })
         }

@@ -11,6 +11,7 @@ use super::interval::{
     unit, vector,
 };
 use super::motion::{Motions, in_a};
+use super::norm;
 use super::tangent::{part_of, tangent};
 use contactd::solid::{Face, Solid, surface};
 use glam::DVec3;
@@ -314,6 +315,7 @@ impl Bounder<'_> {
                 let [p, n] = halves(saddle, y);
                 (p[0].square() + p[1].square()).sqrt() - (n[0].square() + n[1].square()).sqrt()
             }
+            Face::Superellipsoid(ref face) => norm::psi(face, y),
             Face::Torus(surface::Torus { origin, axis, major, minor }) => {
                 let (o, axis) = (offsets(y, origin), unit(vector(axis.to_array())));
                 let off = square_length(&across(&o, axis)).sqrt().plus(point(-major));
@@ -448,6 +450,10 @@ impl Bounder<'_> {
                 let longer = point((point(half) - point(half_q)).mag());
                 point(radius_q) - point(radius) - length(minus(place(o), place(u))) - longer - lean * point(half_q)
             }
+            // Of one pair of exponents their difference is no larger than that of the ellipsoids of these rows.
+            (Face::Superellipsoid(ref one), Face::Superellipsoid(ref other)) if one.exponents == other.exponents => {
+                walled((norm::rows(one), one.origin), (norm::rows(other), other.origin), far(other.origin))
+            }
             (Face::Bowl(ref one), Face::Bowl(ref other)) => {
                 walled((rows_of_bowl(one), one.origin), (rows_of_bowl(other), other.origin), far(other.origin))
             }
@@ -497,7 +503,15 @@ impl Bounder<'_> {
         if p.0.on_b == q.0.on_b {
             let wall = self.wall(p.1, q.1, if p.0.on_b { b } else { a })?;
             if wall.v.lo > 0.0
-                || matches!(p.1, Face::Cone(_) | Face::Elliptic(_) | Face::Capsule(_) | Face::Bowl(_) | Face::Saddle(_))
+                || matches!(
+                    p.1,
+                    Face::Cone(_)
+                        | Face::Elliptic(_)
+                        | Face::Capsule(_)
+                        | Face::Bowl(_)
+                        | Face::Saddle(_)
+                        | Face::Superellipsoid(_)
+                )
             {
                 return Some(wall);
             }

@@ -45,7 +45,7 @@ pub fn walled(((p, w, r), o): (Rows, DVec3), ((q, v, s), u): (Rows, DVec3), far:
 }
 
 /// The columns of a rotation that is told by a quarter of its angle, as of an elliptic face.
-fn columns(turn: DVec3) -> [Vector; 3] {
+pub fn columns(turn: DVec3) -> [Vector; 3] {
     let whole = 1.0 - 1.0 / (1u64 << 47) as f64;
     let like = surface::Elliptic { origin: DVec3::ZERO, turn, size: 1.0, second: whole, third: whole };
     image(&like).0.map(|row| times(point(whole).recip(), row))

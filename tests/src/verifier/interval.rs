@@ -1,7 +1,8 @@
 //! Intervals with outward rounding, and second-order jets of them in four variables (x, y, z, t).
 //!
 //! Every operation is right to half a unit in the last place, so its neighbours enclose it; only +, −, ×, / and sqrt of
-//! the hardware are used. A jet holds enclosures of a function's value, gradient and Hessian over a box.
+//! the hardware are used (`norm` has its powers, with room of its own). A jet holds enclosures of a function's value,
+//! gradient and Hessian over a box.
 //!
 //! Certificates cost as much as this arithmetic does: it is written in loops, and inlined, so that it is fast as the tests are
 //! compiled.

@@ -186,6 +186,7 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
             let [a, b, c] = std::array::from_fn(|k| (point(e.semi[k]) * n[k]).square());
             (a + b + c).sqrt()
         }
+        Shape::Superellipsoid(s) => super::norm::reach(s.semi, s.exponents, n),
         Shape::EllipticFrustum(c) => {
             let rim = ((point(c.semi.x) * n[0]).square() + (point(c.semi.y) * n[1]).square()).sqrt();
             let up = n[2] + point(c.lean.x) * n[0] + point(c.lean.y) * n[1];

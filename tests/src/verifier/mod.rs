@@ -14,6 +14,7 @@ pub mod form;
 pub mod interval;
 pub mod memory;
 pub mod motion;
+pub mod norm;
 pub mod tangent;
 
 use crate::formula::{Formula, formula_of};
@@ -22,7 +23,7 @@ use contactd::motion::Placed;
 use contactd::solid::primitive::{Geometry, HalfSpace};
 use contactd::solid::{Node, NodeId, Op, Shape, Solid};
 use glam::DVec3;
-use interval::Interval;
+use interval::{Interval, vector};
 use motion::Motions;
 
 /// What was checked.
@@ -555,6 +556,12 @@ fn primitive_box(solid: &Solid, p: u32, level: f64) -> [Interval; 3] {
         Shape::Ellipsoid(e) => {
             let k = scale(e.semi.min_element());
             around(&[DVec3::ZERO], &|i| (m.row(i) * e.semi).length() * k * (1.0 + 1e-12))
+        }
+        // s N = s + psi.
+        Shape::Superellipsoid(s) => {
+            let k = scale(s.semi.min_element());
+            let reach = |i: usize| norm::reach(s.semi, s.exponents, vector(m.row(i).to_array())).hi;
+            around(&[DVec3::ZERO], &|i| reach(i) * k * (1.0 + 1e-12))
         }
         // About the middle of its axis as a cone. With n and m the rows of what is a circle on its ends, psi of the side is there no
         // higher than −(mean of both sizes)/√(|n|² + |m|² + slope²).

@@ -4,6 +4,7 @@ use super::form::{along, halves, image, rows_of_bowl, touched};
 use super::interval::{
     Jet, ZERO, across, dot, linear, minus, offsets, point, short, square_length, times, unit, vector,
 };
+use super::norm;
 use contactd::solid::{Face, surface};
 use glam::DVec3;
 
@@ -76,6 +77,7 @@ pub fn tangent(face: &Face, at: DVec3, y: &[Jet; 3]) -> Jet {
         }
         Face::Elliptic(ref e) => touched(image(e), e.origin, at, y),
         Face::Bowl(ref bowl) => touched(rows_of_bowl(bowl), bowl.origin, at, y),
+        Face::Superellipsoid(ref face) => norm::touched(face, at, y),
         // |P| >= p·P for every |p| <= 1; −|N| is concave, and stays as it is.
         Face::Saddle(ref saddle) => {
             let ([p, n], along) = (halves(saddle, y), along(saddle, at, 0));

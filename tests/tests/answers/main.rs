@@ -22,6 +22,7 @@ mod quadrics;
 mod records;
 mod reference;
 mod separations;
+mod superellipsoids;
 mod tight;
 mod tori;
 mod unbounded;

@@ -15,7 +15,14 @@ use contactd_tests::certified::certify_all;
 use contactd_tests::engine::{ReportedPoint as _, question};
 use contactd_tests::random_solids::{Random, capsule, elliptic, shape, shape_or_torus, solid_of, torus};
 use contactd_tests::scenes::Recipe;
-use glam::{DQuat, DVec3, dvec3};
+use glam::{DQuat, DVec2, DVec3, dvec3};
+
+/// How far a superellipsoid reaches along a direction: the norm of the exponents 2/(2 − e) of its semi-axes' parts.
+pub fn reach_of_superellipsoid(semi: DVec3, exponents: DVec2, m: DVec3) -> f64 {
+    let [x, y, z] = (semi * m).abs().to_array();
+    let [p, q] = [2.0 / (2.0 - exponents.x), 2.0 / (2.0 - exponents.y)];
+    ((x.powf(q) + y.powf(q)).powf(p / q) + z.powf(p)).powf(1.0 / p)
+}
 
 /// How far a shape reaches along a direction of its frame.
 fn reach(shape: &Shape, m: DVec3) -> f64 {
@@ -28,6 +35,7 @@ fn reach(shape: &Shape, m: DVec3) -> f64 {
         Shape::Capsule(c) => c.half * m.z.abs() + c.radius,
         Shape::Torus(t) => t.major * across + t.minor,
         Shape::Ellipsoid(e) => (e.semi * m).length(),
+        Shape::Superellipsoid(s) => reach_of_superellipsoid(s.semi, s.exponents, m),
         Shape::EllipticFrustum(f) => {
             let rim = (f.semi.x * m.x).hypot(f.semi.y * m.y);
             let up = f.half_height * (m.z + f.lean.x * m.x + f.lean.y * m.y);

@@ -6,7 +6,7 @@ use contactd::math::Aabb;
 use contactd::solid::primitive::Shape;
 use contactd_client::solid::{
     Outline, Solid, capsule, circle, cone, cuboid, cylinder, half_space, hull, hyperbolic_dome, hyperboloid,
-    intersection, paraboloid, polygon, polyhedron, quadric, rectangle, sphere, torus, union,
+    intersection, paraboloid, polygon, polyhedron, quadric, rectangle, sphere, superellipsoid, torus, union,
 };
 use contactd_tests::random_solids::Random;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -48,7 +48,7 @@ fn primitive(random: &mut Random) -> (Solid, Inside) {
     let (r, q, h) = (random.within(0.5, 2.0), random.within(0.0, 1.5), random.within(0.5, 3.0));
     let sides = DVec3::new(random.within(0.5, 3.0), random.within(0.5, 3.0), random.within(0.5, 3.0));
     let along = |p: DVec3| DVec2::new(p.x.hypot(p.y), p.z);
-    match random.below(11) {
+    match random.below(12) {
         0 => (sphere(r), Box::new(move |p| p.length() < r)),
         1 => (cuboid(sides.x, sides.y, sides.z), Box::new(move |p| (p.abs() - sides * 0.5).max_element() < 0.0)),
         2 => (cylinder(r, h), Box::new(move |p| along(p).x < r && p.z.abs() < 0.5 * h)),
@@ -74,6 +74,15 @@ fn primitive(random: &mut Random) -> (Solid, Inside) {
             }
             let within = move |p: DVec3| (p.abs() - sides).max_element() < 0.0 && p.x * p.x - p.y * p.y + p.z < 0.0;
             (quadric(&form, -sides, sides), Box::new(within))
+        }
+        10 => {
+            let (e, f) = (random.within(0.1, 1.0), random.within(0.1, 1.0));
+            let within = move |p: DVec3| {
+                let u = (p / sides).abs();
+                let flat = u.x.powf(2.0 / f) + u.y.powf(2.0 / f);
+                flat.powf(f / e) + u.z.powf(2.0 / e) < 1.0
+            };
+            (superellipsoid(sides, [e, f]), Box::new(within))
         }
         7 => {
             let (flat, within) = outline(random);

@@ -30,7 +30,7 @@ fn every_model_of_the_project_loads_in_every_way() {
             let flat = |s: &Shape| match s {
                 Shape::Cuboid(_) | Shape::Polyhedron(_) | Shape::TriangleMesh(_) | Shape::HalfSpace(_) => true,
                 Shape::Sphere(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) | Shape::Capsule(_) => false,
-                Shape::Ellipsoid(_) | Shape::EllipticFrustum(_) | Shape::Quadric(_) => false,
+                Shape::Ellipsoid(_) | Shape::EllipticFrustum(_) | Shape::Superellipsoid(_) | Shape::Quadric(_) => false,
             };
             let curved = solid.primitives.iter().any(|p| !flat(&p.shape));
             assert!(!(curved && facets == Facets::AsWritten), "{}: a curved primitive is left", file.display());

@@ -169,6 +169,7 @@ fn psi(face: &Face, x: &Vector) -> Big {
         }
         Face::Elliptic(e) => stretched(&e.parts(), &x.minus(&Vector::of(e.origin))),
         Face::Bowl(b) => stretched(&b.parts(), &x.minus(&Vector::of(b.origin))),
+        Face::Superellipsoid(s) => norm(&s, &x.minus(&Vector::of(s.origin))),
         Face::Saddle(s) => {
             let (sides, y) = (s.sides(), x.minus(&Vector::of(s.origin)));
             let length = |rows: [surface::Row; 2]| {
@@ -178,6 +179,25 @@ fn psi(face: &Face, x: &Vector) -> Big {
             length(sides.plus) - length(sides.minus)
         }
     }
+}
+
+/// sN − s, from the rows that the engine makes of the stored numbers, with the exponents 2/e as they are.
+fn norm(face: &surface::Superellipsoid, y: &Vector) -> Big {
+    let parts = face.parts();
+    let [a, b, c] = parts.rows.map(|row| {
+        let v = Vector::of(row).dot(y);
+        if v < Big::ZERO { -v } else { v }
+    });
+    let [p, q] = face.exponents.to_array().map(|e| big(2.0) / big(e));
+    let joined = |a: Big, b: Big, p: &Big| {
+        let (large, small) = if a < b { (b, a) } else { (a, b) };
+        if small == Big::ZERO {
+            return large;
+        }
+        let power = ((&small / &large).ln() * p).exp();
+        large * ((big(1.0) + power).ln() / p).exp()
+    };
+    joined(joined(a, b, &q), c, &p) - big(parts.radius)
 }
 
 fn stretched(parts: &surface::Stretch, y: &Vector) -> Big {
@@ -204,6 +224,7 @@ fn exact_fit(p: (&Face, &Vector), q: (&Face, &Vector), delta: f64, mu: [f64; 2])
             | Face::Elliptic(_)
             | Face::Capsule(_)
             | Face::Bowl(_)
+            | Face::Superellipsoid(_)
             | Face::Saddle(_) => return None,
         };
         let o = x.minus(&origin);
@@ -337,6 +358,15 @@ fn nothing_that_is_computed_of_a_quadric_differs_by_more_than_the_budget() {
     let shapes: Vec<Shape> = (0..48).map(|_| quadrics::random(&mut r, 1.0)).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
     evaluate(&mut r, &models, evaluations(), "quadrics");
+}
+
+#[test]
+fn nothing_that_is_computed_of_a_superellipsoid_differs_by_more_than_the_budget() {
+    let mut r = Random::new(12);
+    let shapes: Vec<Shape> = (0..48).map(|_| random_solids::superellipsoid(&mut r, 1.0).into()).collect();
+    let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
+    // Logarithms of many digits take their time.
+    evaluate(&mut r, &models, evaluations().div_ceil(10), "superellipsoids");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.
@@ -534,6 +564,11 @@ fn axis_point(r: &mut Random, m: &Model) -> Option<(usize, DVec3)> {
                 (true, true) => s.origin + axes.z_axis * s.size + axes.y_axis * along,
                 (true, false) => s.origin - axes.z_axis * s.size + axes.x_axis * along,
             }
+        }
+        // Its centre, or on an axis or a plane of symmetry, where parts vanish.
+        Face::Superellipsoid(s) => {
+            let kept = DVec3::from_array([0, 1, 2].map(|_| if r.chance(0.5) { 1.0 } else { 0.0 }));
+            s.origin + s.axes() * (r.vector(1.5) * s.semi * kept)
         }
         Face::Plane(_) => return None,
     };

@@ -84,6 +84,7 @@ fn every_kind_is_there() {
         built(|o| unsafe { contactd_solid_cone(1.0, 0.0, 2.0, o) }),
         built(|o| unsafe { contactd_solid_torus(3.0, 1.0, o) }),
         built(|o| unsafe { contactd_solid_capsule(1.0, 1.0, o) }),
+        built(|o| unsafe { contactd_solid_superellipsoid([1.0, 2.0, 1.5].as_ptr(), [0.4, 1.0].as_ptr(), o) }),
         built(|o| unsafe { contactd_solid_polyhedron(points.as_ptr(), 4, corners.as_ptr(), sides.as_ptr(), 4, o) }),
     ];
     let heights = [1.0, 2.0, 1.0, 0.5, 1.0, 3.0];

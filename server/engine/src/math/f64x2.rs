@@ -13,6 +13,8 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     fn abs(self) -> Self;
     /// The larger ones.
     fn max(self, other: Self) -> Self;
+    /// What a function makes of three, one after the other.
+    fn each(of: [Self; 3], f: impl Fn([f64; 3]) -> f64) -> Self;
 }
 
 impl Lanes for f64 {
@@ -31,6 +33,10 @@ impl Lanes for f64 {
     #[inline]
     fn max(self, other: Self) -> Self {
         if self > other { self } else { other }
+    }
+    #[inline]
+    fn each(of: [Self; 3], f: impl Fn([f64; 3]) -> f64) -> Self {
+        f(of)
     }
 }
 
@@ -87,5 +93,9 @@ impl Lanes for F64x2 {
     #[inline]
     fn max(self, o: Self) -> Self {
         Self(from_fn(|i| Lanes::max(self.0[i], o.0[i])))
+    }
+    #[inline]
+    fn each(of: [Self; 3], f: impl Fn([f64; 3]) -> f64) -> Self {
+        Self(from_fn(|i| f(of.map(|x| x.0[i]))))
     }
 }

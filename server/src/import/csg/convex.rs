@@ -193,6 +193,10 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
             let off = e.semi.max_element() * sagitta(pieces);
             Some(points.into_iter().map(|p| Element::facet(frame.point(p * e.semi), off)).collect())
         }
+        Shape::Superellipsoid(s) => {
+            let (points, off) = s.tessellated(pieces);
+            Some(points.into_iter().map(|p| Element::facet(frame.point(p), off)).collect())
+        }
         Shape::EllipticFrustum(c) => {
             let off = c.semi.max_element() * sagitta(pieces);
             let rim = |(z, size): (f64, f64)| {

@@ -19,6 +19,7 @@ use super::polygon::Region;
 use super::quadrics;
 use super::revolve::{Lathe, Turn};
 use super::shapes::Shapes;
+use super::superellipsoid;
 use super::syntax::{Call, CallId, FLATTEN, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
 use super::{resize, shadow, text, twist};
@@ -266,7 +267,7 @@ impl<'a> Lowering<'a> {
                 return Ok(if context.plane.is_none() { id } else { self.within_a_plane(call) });
             }
             "sphere" | "cylinder" | "cube" | "polyhedron" | "half_space" | "height_field" | "paraboloid"
-            | "hyperboloid" | "quadric" => no_children(call)?,
+            | "hyperboloid" | "quadric" | "superellipsoid" => no_children(call)?,
             other => return Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
         if context.plane.is_some() {
@@ -279,6 +280,7 @@ impl<'a> Lowering<'a> {
             "half_space" => self.shapes.half_space(call, outer),
             "height_field" => imports::height_field(&mut self.shapes, call, hulled),
             "polyhedron" => self.shapes.polyhedron(call, outer, context.hull),
+            "superellipsoid" => superellipsoid::superellipsoid(&mut self.shapes, call, outer),
             _ => quadrics::quadric(&mut self.shapes, call, outer),
         }
     }

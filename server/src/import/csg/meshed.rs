@@ -236,7 +236,8 @@ impl Maker<'_, '_> {
             | Shape::Cuboid(_)
             | Shape::Polyhedron(_)
             | Shape::Ellipsoid(_)
-            | Shape::EllipticFrustum(_) => {
+            | Shape::EllipticFrustum(_)
+            | Shape::Superellipsoid(_) => {
                 let all = elements(shape, frame, pieces).unwrap_or_default();
                 self.off = all.iter().map(Element::deviation).fold(self.off, f64::max);
                 let points: Vec<DVec3> = all.iter().flat_map(Element::facets).collect();

@@ -37,6 +37,7 @@ mod revolve;
 mod shadow;
 mod shapes;
 mod slices;
+mod superellipsoid;
 mod syntax;
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,9 @@
 //! Primitives under affine transforms: which shape they become and where it stands.
 //!
 //! Similarities (rotation, mirror, uniform scale) keep every kind. A transform that scales along a primitive's own axes
-//! keeps a box a box, and a cylinder a cylinder when it scales its cross-section evenly. Any other regular transform
+//! keeps a box a box, a superellipsoid one, and a cylinder a cylinder when it scales its cross-section evenly. Any other regular transform
 //! keeps polyhedra (a sheared box becomes one) and half-spaces, makes an ellipsoid of a sphere and a frustum over an ellipse of a
-//! cylinder or cone, and is refused by name on a torus.
+//! cylinder or cone, and is refused by name on a torus and a superellipsoid.
 //!
 //! Files print six digits: a linear part within `SIMILARITY` of scale × orthogonal is replaced by that product
 //! (`snapped`), with the orthogonal polar factor from Newton's iteration Q ← (Q + Q⁻ᵀ)/2 (Higham 1986).
@@ -13,7 +13,7 @@ use crate::import::mesh::Polygons;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
     Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair,
-    Shape, Sphere, Torus, TriangleMesh,
+    Shape, Sphere, Superellipsoid, Torus, TriangleMesh,
 };
 use crate::solid::surface::elliptic::squared;
 use contactd_proto::Pose;
@@ -171,6 +171,13 @@ pub fn torus(a: &DAffine3, major: f64, minor: f64) -> Result<PlacedShape, Proble
     let s = similarity(a.matrix3).filter(|s| s.off <= SIMILARITY).ok_or_else(|| refusal(a.matrix3, "torus"))?;
     let frame = Pose::new(a.translation, proper(s.orthogonal).0);
     Ok(PlacedShape::new(Torus { major: major * s.scale, minor: minor * s.scale }, frame).off(s.off, "torus"))
+}
+
+/// A superellipsoid around the origin, with semi-axes along x, y and z.
+pub fn superellipsoid(a: &DAffine3, semi: DVec3, exponents: DVec2) -> Result<PlacedShape, Problem> {
+    let (lengths, turn, off) = along_axes(a.matrix3).ok_or_else(|| refusal(a.matrix3, "superellipsoid"))?;
+    let shape = Superellipsoid { semi: semi * lengths, exponents };
+    Ok(PlacedShape::new(shape, Pose::new(a.translation, turn)).off(off, "superellipsoid"))
 }
 
 /// A cylinder, cone or frustum around `center`, along z, with radii `bottom` (low z) and `top`.

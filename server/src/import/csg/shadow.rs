@@ -170,6 +170,7 @@ impl Cut {
             | Shape::Torus(_)
             | Shape::Ellipsoid(_)
             | Shape::EllipticFrustum(_)
+            | Shape::Superellipsoid(_)
             | Shape::Capsule(_)
             | Shape::Quadric(_) => None,
         }

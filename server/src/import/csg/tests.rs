@@ -171,6 +171,7 @@ fn kind_of(shape: &Shape) -> &'static str {
         Shape::Capsule(_) => "capsule",
         Shape::Quadric(_) => "quadric",
         Shape::EllipticFrustum(_) => "elliptic frustum",
+        Shape::Superellipsoid(_) => "superellipsoid",
     }
 }
 

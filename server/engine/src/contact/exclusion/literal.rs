@@ -110,8 +110,8 @@ struct Round {
     axis: Option<DVec3>,
     /// B, of the affine image of a face.
     stretch: Option<Stretch>,
-    /// Of a saddle instead of all these: the gradient of ρ, and what it bends along.
-    split: Option<[DVec3; 2]>,
+    /// Instead of all these the gradient of ρ, and what it bends along (`Surface::split`).
+    split: Option<[DVec3; 3]>,
     /// The face's gradient there, or any that leans against the axis on the same side.
     normal: DVec3,
 }
@@ -240,23 +240,35 @@ impl View<'_> {
 
     /// The same of P y, given by what it has along P(x − o) at the centre and across that.
     #[cold]
-    fn split(&self, split: [DVec3; 2]) -> (f64, f64, f64) {
-        let [radial, tangential] = split.map(|v| v.abs().dot(self.half) * MORE);
-        (radial.hypot(tangential).min(self.radius), radial, tangential.min(self.radius))
+    fn split(&self, split: [DVec3; 3]) -> (f64, f64, f64) {
+        let [radial, one, other] = split.map(|v| v.abs().dot(self.half) * MORE);
+        if other == 0.0 {
+            return (radial.hypot(one).min(self.radius), radial, one.min(self.radius));
+        }
+        (self.radius, radial, one.hypot(other))
+    }
+
+    /// By how much more than the cell itself what is along the curving tangents grows with it.
+    fn stretch_across(round: &Round) -> f64 {
+        match round.split {
+            Some([_, one, other]) if other != DVec3::ZERO => one.length().hypot(other.length()).max(1.0) * MORE,
+            Some(_) | None => 1.0,
+        }
     }
 
     /// How far a function that bends as k·ρ(x) does rises above its tangent over the cell.
     fn remainder(&self, side: Side, round: &Round) -> Remainder {
         // Extents and distance from the axis are each known to the rounding; R must not come out too small.
         let (d, radial, tangential) = self.extents(round);
-        let (d, tangential) = (d + self.rounding, tangential + self.rounding);
+        let more = Self::stretch_across(round);
+        let (d, tangential) = (d + self.rounding, tangential + more * self.rounding);
         let rho = (round.rho - self.rounding).max(0.0);
         let way = if side == Side::B { self.motion.speed * self.motion.h } else { 0.0 };
         let closest = rho - radial - way;
         // The smaller of two suprema: over the ball |x − c| <= d, or over the slab |x − c|·u <= radial.
         let slab = closest > 0.0 && closest >= SLAB * rho && tangential * tangential * rho < d * d * closest;
         let across = match (&round.stretch, round.axis, round.split) {
-            (_, _, Some([r, t])) => r * r + t * t,
+            (_, _, Some(rows)) => rows.iter().map(|row| *row * *row).sum(),
             (Some(b), ..) => b.rows.iter().map(|row| *row * *row).sum(),
             (None, Some(axis), None) => DVec3::ONE - axis * axis,
             (None, None, None) => DVec3::ONE,
@@ -268,11 +280,14 @@ impl View<'_> {
         } else {
             across * self.half * self.half * (k / (2.0 * round.rho.max(0.5 * d)))
         };
-        if slab || d <= 2.0 * rho {
+        // Beyond, 1-Lipschitz says more.
+        if slab || d * k.max(1.0) <= 2.0 * rho {
             let (d, rho) = if slab { (tangential, closest) } else { (d, rho) };
-            let (s, q) = (k * self.motion.speed * d / rho, k * self.motion.speed * self.motion.speed / rho);
+            let speed = if slab { self.motion.speed * more } else { self.motion.speed };
+            let (s, q) = (k * speed * d / rho, k * speed * speed / rho);
             return Remainder { most: k * d * d / (2.0 * rho), s, q, cost, far: false };
         }
+        let k = k.min(1.0);
         Remainder { most: k * d, s: k * self.motion.speed, q: 0.0, cost, far: true }
     }
 
@@ -357,7 +372,7 @@ impl View<'_> {
         let center = if side == Side::A { self.center } else { self.center_b };
         let under = face.under(point, center)?;
         let [axis, normal] = [under.axis, under.out].map(|v| self.turned(side, v));
-        let split = under.beside.map(|beside| [normal, self.turned(side, beside)]);
+        let split = under.beside.map(|beside| [normal, self.turned(side, beside), DVec3::ZERO]);
         let axis = if split.is_some() { None } else { Some(axis) };
         let rest = self.remainder(side, &Round { k: under.k, rho: under.rho, axis, stretch: None, split, normal });
         let normal = self.turned(side, if rest.far { under.far } else { under.normal });
@@ -431,7 +446,7 @@ impl View<'_> {
             return DVec3::ZERO;
         }
         let across = match (&round.stretch, round.axis, round.split) {
-            (_, _, Some([_, t])) => t * t,
+            (_, _, Some([_, one, other])) => one * one + other * other,
             (Some(b), ..) => {
                 let [s, t] = b.beside(b.along(round.normal)).map(|t| b.back(t));
                 s * s + t * t

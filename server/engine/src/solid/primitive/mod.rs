@@ -23,6 +23,7 @@ mod half_space;
 mod polyhedron;
 pub mod quadric;
 mod sphere;
+mod superellipsoid;
 mod torus;
 mod triangle_mesh;
 
@@ -37,6 +38,7 @@ pub use half_space::HalfSpace;
 pub use polyhedron::{Fit, MeshError, Polyhedron};
 pub use quadric::Quadric;
 pub use sphere::Sphere;
+pub use superellipsoid::Superellipsoid;
 pub use torus::Torus;
 pub use triangle_mesh::{MeshFault, Repair, TriangleMesh, WELD};
 
@@ -227,6 +229,7 @@ shapes!(
     EllipticFrustum = 9,
     Capsule = 10,
     Quadric = 11,
+    Superellipsoid = 12,
 );
 
 /// A primitive placed in a model.

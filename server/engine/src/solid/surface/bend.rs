@@ -42,7 +42,7 @@ pub enum Law {
     },
     /// A bowl's: as a cone's, along no line of its own.
     Focal,
-    /// A saddle's: above by |P|, below by |N|.
+    /// A saddle's: above by |P|, below by |N|. |N| is infinite, and κ⁻ 0, of what is bent outwards as a superellipsoid is, flat in places.
     Saddle {
         /// |N| at the middle of the box, or after `over` the least of it by its gradient there; a length.
         rho: f64,

@@ -217,6 +217,10 @@ impl Surface for Bowl {
         [o.x, o.y, o.z, t.x, t.y, t.z, s.x, s.y, s.z, self.fall, self.radius]
     }
 
+    fn quadric_name(&self) -> &'static str {
+        if self.is_parabolic() { "paraboloid" } else { "hyperboloid of two sheets" }
+    }
+
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
         self.parts().crossed(origin - self.origin, d).into_iter().collect()
     }

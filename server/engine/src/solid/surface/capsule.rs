@@ -6,8 +6,8 @@
 use super::roots::between_roots;
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Cylinder, Face, FaceAt, Law, NUMBERS, Section, Sphere, Stretches, Surface, Symmetry, around,
-    largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Cylinder, Drawn, Face, FaceAt, Law, NUMBERS, Section, Sphere, Stretches, Surface, Symmetry,
+    around, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -191,6 +191,11 @@ impl Surface for Capsule {
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
         [o.x, o.y, o.z, a.x, a.y, a.z, self.half, self.radius, 0.0, 0.0, 0.0]
+    }
+
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        Some(Drawn::Capsule(*self))
     }
 
     /// From the first to the last of the ball at either end and of the cylinder between them.

@@ -5,7 +5,7 @@
 
 use super::roots::between_roots_of_nappe;
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
     largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
@@ -192,6 +192,11 @@ impl Surface for Cone {
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.apex, self.axis);
         [o.x, o.y, o.z, a.x, a.y, a.z, self.sin, self.cos, 0.0, 0.0, 0.0]
+    }
+
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        Some(Drawn::Cone(*self))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

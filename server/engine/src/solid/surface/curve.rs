@@ -1,4 +1,6 @@
 //! Straight and circular curves of two faces: those that they have in common, and those along which they touch.
+//!
+//! A face that has such curves says what it is to this file ([`Drawn`], `Surface::drawn`). Of every other one none are looked for: it says nothing.
 
 use super::{Axis, Capsule, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Surface as _, Symmetry, Torus};
 use crate::math::any_perpendicular;
@@ -26,6 +28,40 @@ pub enum Curve {
     },
 }
 
+/// A face that may have lines or circles in common with another one.
+#[derive(Clone, Copy, Debug)]
+pub enum Drawn {
+    /// A plane.
+    Plane(Plane),
+    /// A sphere.
+    Sphere(Sphere),
+    /// A cylinder.
+    Cylinder(Cylinder),
+    /// A cone.
+    Cone(Cone),
+    /// A torus.
+    Torus(Torus),
+    /// An elliptic face: of an image of a cylinder or cone its straight lines.
+    Elliptic(Elliptic),
+    /// A capsule.
+    Capsule(Capsule),
+}
+
+impl Drawn {
+    /// The face.
+    fn face(&self) -> Face {
+        match *self {
+            Drawn::Plane(f) => f.into(),
+            Drawn::Sphere(f) => f.into(),
+            Drawn::Cylinder(f) => f.into(),
+            Drawn::Cone(f) => f.into(),
+            Drawn::Torus(f) => f.into(),
+            Drawn::Elliptic(f) => f.into(),
+            Drawn::Capsule(f) => f.into(),
+        }
+    }
+}
+
 /// Directions are parallel, and centres on an axis, nearer than this: an angle, and a part of the body's size.
 const PARALLEL: f64 = 1e-9;
 
@@ -37,13 +73,19 @@ fn circle_above(least: f64, center: DVec3, axis: DVec3, squared: f64) -> Option<
 /// The lines and circles that two faces have in common, for a body of the diameter `size`; circles with a radius above
 /// `least` alone. Both are lengths.
 pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(Curve)) {
+    if let (Some(p), Some(q)) = (p.drawn(), q.drawn()) {
+        shared(&p, &q, [size, least], found);
+    }
+}
+
+fn shared(p: &Drawn, q: &Drawn, [size, least]: [f64; 2], found: &mut impl FnMut(Curve)) {
     let mut circle =
         |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
     match (*p, *q) {
-        (Face::Plane(plane), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_)) => {
+        (Drawn::Plane(plane), Drawn::Plane(_) | Drawn::Sphere(_) | Drawn::Cylinder(_) | Drawn::Cone(_)) => {
             on_plane(&plane, q, least, found);
         }
-        (Face::Sphere(Sphere { center: o, radius: r }), Face::Sphere(Sphere { center: c, radius: s })) => {
+        (Drawn::Sphere(Sphere { center: o, radius: r }), Drawn::Sphere(Sphere { center: c, radius: s })) => {
             let d = (c - o).length();
             if d > PARALLEL * size {
                 let x = (d * d + (r - s) * (r + s)) / (2.0 * d);
@@ -51,8 +93,8 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
             }
         }
         (
-            Face::Cylinder(Cylinder { origin: o, axis: a, radius: r }),
-            Face::Cylinder(Cylinder { origin: c, axis: b, radius: s }),
+            Drawn::Cylinder(Cylinder { origin: o, axis: a, radius: r }),
+            Drawn::Cylinder(Cylinder { origin: c, axis: b, radius: s }),
         ) => {
             let w = (c - o) - a * (c - o).dot(a);
             let d = w.length();
@@ -66,7 +108,7 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
                 }
             }
         }
-        (Face::Sphere(Sphere { center, radius: s }), Face::Cylinder(Cylinder { origin, axis, radius })) => {
+        (Drawn::Sphere(Sphere { center, radius: s }), Drawn::Cylinder(Cylinder { origin, axis, radius })) => {
             let off = (center - origin) - axis * (center - origin).dot(axis);
             let h = (s - radius) * (s + radius);
             if off.length() <= PARALLEL * size && h > 0.0 {
@@ -74,44 +116,43 @@ pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(
                 circle(center - axis * h.sqrt(), axis, radius * radius);
             }
         }
-        (Face::Cylinder(Cylinder { origin, axis: a, radius }), Face::Cone(Cone { apex, axis, sin, cos })) => {
+        (Drawn::Cylinder(Cylinder { origin, axis: a, radius }), Drawn::Cone(Cone { apex, axis, sin, cos })) => {
             let off = (apex - origin) - a * (apex - origin).dot(a);
             if a.cross(axis).length() <= PARALLEL && off.length() <= PARALLEL * size {
                 circle(apex + axis * (radius * cos / sin), axis, radius * radius);
             }
         }
         // The same pairs the other way round.
-        (Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_), Face::Plane(_))
-        | (Face::Cylinder(_), Face::Sphere(_))
-        | (Face::Cone(_), Face::Cylinder(_)) => common(q, p, size, least, found),
+        (Drawn::Sphere(_) | Drawn::Cylinder(_) | Drawn::Cone(_), Drawn::Plane(_))
+        | (Drawn::Cylinder(_), Drawn::Sphere(_))
+        | (Drawn::Cone(_), Drawn::Cylinder(_)) => shared(q, p, [size, least], found),
         // Two cones, and a cone and a sphere, share no line or circle that is looked for.
-        (Face::Cone(_), Face::Cone(_) | Face::Sphere(_)) | (Face::Sphere(_), Face::Cone(_)) => {}
-        (Face::Elliptic(image), Face::Plane(plane)) => {
+        (Drawn::Cone(_), Drawn::Cone(_) | Drawn::Sphere(_)) | (Drawn::Sphere(_), Drawn::Cone(_)) => {}
+        (Drawn::Elliptic(image), Drawn::Plane(plane)) => {
             rulings(&image, &plane, PARALLEL).into_iter().flatten().for_each(found);
         }
-        (Face::Plane(_), Face::Elliptic(_)) => common(q, p, size, least, found),
+        (Drawn::Plane(_), Drawn::Elliptic(_)) => shared(q, p, [size, least], found),
         // Beside its segment it is a cylinder, at its ends a ball: what these have in common with another face, as far as it lies there.
-        (Face::Capsule(capsule), _) => {
+        (Drawn::Capsule(capsule), _) => {
             for own in parts_of(&capsule) {
-                let curves = all_common(&own, q, size, least);
+                let curves = all_shared(&own, q, [size, least]);
                 curves.into_iter().filter(|curve| lies_on(&capsule, curve, PARALLEL * size)).for_each(&mut *found);
             }
         }
-        (_, Face::Capsule(_)) => common(q, p, size, least, found),
-        // Other curves of elliptic faces and quadrics are no lines that are looked for, and circles by chance alone.
-        (Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_), _)
-        | (_, Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_)) => {}
-        (Face::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
-        (_, Face::Torus(_)) => common(q, p, size, least, found),
+        (_, Drawn::Capsule(_)) => shared(q, p, [size, least], found),
+        // Other curves of elliptic faces are no lines that are looked for, and circles by chance alone.
+        (Drawn::Elliptic(_), _) | (_, Drawn::Elliptic(_)) => {}
+        (Drawn::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
+        (_, Drawn::Torus(_)) => shared(q, p, [size, least], found),
     }
 }
 
 /// What a plane and a plane, a sphere, a cylinder or a cone have in common.
-fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut impl FnMut(Curve)) {
+fn on_plane(&Plane { normal, offset }: &Plane, q: &Drawn, least: f64, found: &mut impl FnMut(Curve)) {
     let mut circle =
         |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
     match *q {
-        Face::Plane(Plane { normal: n, offset: e }) => {
+        Drawn::Plane(Plane { normal: n, offset: e }) => {
             let (m, d) = (normal, offset);
             let w = m.cross(n);
             if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
@@ -119,11 +160,11 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut
                 found(Curve::Line { origin, along });
             }
         }
-        Face::Sphere(Sphere { center, radius }) => {
+        Drawn::Sphere(Sphere { center, radius }) => {
             let h = normal.dot(center) - offset;
             circle(center - normal * h, normal, (radius - h) * (radius + h));
         }
-        Face::Cylinder(Cylinder { origin, axis, radius }) => {
+        Drawn::Cylinder(Cylinder { origin, axis, radius }) => {
             let h = normal.dot(origin) - offset;
             if normal.cross(axis).length() <= PARALLEL {
                 circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
@@ -136,14 +177,14 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Face, least: f64, found: &mut
                 }
             }
         }
-        Face::Cone(Cone { apex, axis, sin, cos }) => {
+        Drawn::Cone(Cone { apex, axis, sin, cos }) => {
             let z = (offset - normal.dot(apex)) / normal.dot(axis);
             if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
                 circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
             }
         }
-        // Of these `common` knows more.
-        Face::Elliptic(_) | Face::Torus(_) | Face::Capsule(_) | Face::Bowl(_) | Face::Saddle(_) => {}
+        // Of these `shared` knows more.
+        Drawn::Elliptic(_) | Drawn::Torus(_) | Drawn::Capsule(_) => {}
     }
 }
 
@@ -176,18 +217,18 @@ fn rulings(image: &Elliptic, plane: &Plane, parallel: f64) -> [Option<Curve>; 2]
     [beside, -beside].map(|w| Some(Curve::Line { origin: image.origin + back(m * h + w), along: axis }))
 }
 
-/// All that `common` finds.
-fn all_common(p: &Face, q: &Face, size: f64, least: f64) -> Vec<Curve> {
+/// All that `shared` finds.
+fn all_shared(p: &Drawn, q: &Drawn, lengths: [f64; 2]) -> Vec<Curve> {
     let mut all = Vec::new();
-    common(p, q, size, least, &mut |curve| all.push(curve));
+    shared(p, q, lengths, &mut |curve| all.push(curve));
     all
 }
 
 /// The cylinder and the balls that a capsule is of.
-fn parts_of(capsule: &Capsule) -> [Face; 3] {
+fn parts_of(capsule: &Capsule) -> [Drawn; 3] {
     let Capsule { origin, axis, half, radius } = *capsule;
-    let ball = |end: f64| Face::from(Sphere { center: origin + axis * end, radius });
-    [Cylinder { origin, axis, radius }.into(), ball(half), ball(-half)]
+    let ball = |end: f64| Drawn::Sphere(Sphere { center: origin + axis * end, radius });
+    [Drawn::Cylinder(Cylinder { origin, axis, radius }), ball(half), ball(-half)]
 }
 
 /// True where part of a curve lies on a capsule, to within a length.
@@ -220,8 +261,8 @@ fn is_about(torus: &Torus, face: &Face, [sine, offset]: [f64; 2]) -> bool {
 
 /// The circles that a torus has in common with a face about its own axis: in a half-plane through the axis, (ρ, z) from the torus'
 /// centre, its tube is a circle and the other face a line or a circle.
-fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMut(DVec3, DVec3, f64)) {
-    if !is_about(torus, other, within) {
+fn coaxial(torus: &Torus, other: &Drawn, within: [f64; 2], circle: &mut impl FnMut(DVec3, DVec3, f64)) {
+    if !is_about(torus, &other.face(), within) {
         return;
     }
     let Torus { origin, axis, major, minor } = *torus;
@@ -231,15 +272,13 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         let x = origin + axis * p.y;
         // Of the line through a cone's apex a half belongs to its other nappe; a tube may go beyond the axis.
         let is_on = match other {
-            Face::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
-            Face::Plane(_)
-            | Face::Sphere(_)
-            | Face::Cylinder(_)
-            | Face::Torus(_)
-            | Face::Elliptic(_)
-            | Face::Capsule(_)
-            | Face::Bowl(_)
-            | Face::Saddle(_) => true,
+            Drawn::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
+            Drawn::Plane(_)
+            | Drawn::Sphere(_)
+            | Drawn::Cylinder(_)
+            | Drawn::Torus(_)
+            | Drawn::Elliptic(_)
+            | Drawn::Capsule(_) => true,
         };
         if is_on && p.x > 0.0 {
             circle(x, axis, p.x * p.x);
@@ -256,19 +295,19 @@ fn coaxial(torus: &Torus, other: &Face, within: [f64; 2], circle: &mut impl FnMu
         }
     };
     let (center, radius) = match *other {
-        Face::Plane(Plane { normal, offset }) => {
+        Drawn::Plane(Plane { normal, offset }) => {
             let up = normal.dot(axis).signum();
             return on_line(DVec2::Y, up * (offset - normal.dot(origin)));
         }
-        Face::Cylinder(Cylinder { radius, .. }) => return on_line(DVec2::X, radius),
-        Face::Cone(Cone { apex, axis: own, sin, cos }) => {
+        Drawn::Cylinder(Cylinder { radius, .. }) => return on_line(DVec2::X, radius),
+        Drawn::Cone(Cone { apex, axis: own, sin, cos }) => {
             let n = DVec2::new(cos, -sin * own.dot(axis).signum());
             return on_line(n, n.y * height(apex));
         }
-        Face::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
-        Face::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
+        Drawn::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
+        Drawn::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
         // About no axis, and of several pieces.
-        Face::Elliptic(_) | Face::Capsule(_) | Face::Bowl(_) | Face::Saddle(_) => return,
+        Drawn::Elliptic(_) | Drawn::Capsule(_) => return,
     };
     let way = center - tube;
     let d = way.length();
@@ -339,8 +378,8 @@ fn side_by_side(p: &Cylinder, q: &Cylinder, q_is_convex: bool, within: &Nearness
 pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within: &Nearness) -> Option<Curve> {
     let near = |d: f64| within.is_near(d);
     let parallel = |sine: f64| within.is_parallel(sine);
-    match (*p.face, *q.face) {
-        (Face::Cylinder(Cylinder { origin, axis, radius }), Face::Plane(_)) => {
+    match (p.face.drawn()?, q.face.drawn()?) {
+        (Drawn::Cylinder(Cylinder { origin, axis, radius }), Drawn::Plane(_)) => {
             if !p.is_convex {
                 return None;
             }
@@ -349,7 +388,7 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let line = Curve::Line { origin: origin + u * radius, along: axis };
             parallel(g.dot(axis)).then_some(line)
         }
-        (Face::Cone(Cone { apex, axis, sin, cos }), Face::Plane(_)) => {
+        (Drawn::Cone(Cone { apex, axis, sin, cos }), Drawn::Plane(_)) => {
             if !p.is_convex {
                 return None;
             }
@@ -357,21 +396,21 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let u = -(g - axis * g.dot(axis)).try_normalize()?;
             parallel(g.dot(axis) - sin).then_some(Curve::Line { origin: apex, along: axis * cos + u * sin })
         }
-        (Face::Cylinder(own), Face::Cylinder(other)) => {
+        (Drawn::Cylinder(own), Drawn::Cylinder(other)) => {
             if p.is_convex {
                 side_by_side(&own, &other, q.is_convex, within)
             } else {
                 None
             }
         }
-        (Face::Sphere(Sphere { center, radius }), Face::Cylinder(Cylinder { origin, axis, radius: s })) => {
+        (Drawn::Sphere(Sphere { center, radius }), Drawn::Cylinder(Cylinder { origin, axis, radius: s })) => {
             if !p.is_convex || q.is_convex {
                 return None;
             }
             let off = (center - origin) - axis * (center - origin).dot(axis);
             near(off.length() + (radius - s).abs()).then_some(Curve::Circle { center, axis, radius })
         }
-        (Face::Sphere(Sphere { center, radius }), Face::Cone(Cone { apex, axis, sin, cos })) => {
+        (Drawn::Sphere(Sphere { center, radius }), Drawn::Cone(Cone { apex, axis, sin, cos })) => {
             if !p.is_convex || q.is_convex {
                 return None;
             }
@@ -380,27 +419,29 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let circle = Curve::Circle { center: center - axis * (radius * sin), axis, radius: radius * cos };
             (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
         }
-        (Face::Elliptic(image), Face::Plane(_)) => {
+        (Drawn::Elliptic(image), Drawn::Plane(_)) => {
             if !p.is_convex {
                 return None;
             }
             let (origin, along, lean) = image.ruling(-out_of_q(image.origin))?;
             parallel(lean).then_some(Curve::Line { origin, along })
         }
-        (Face::Capsule(Capsule { origin, axis, radius, .. }), _) => {
+        (Drawn::Capsule(Capsule { origin, axis, radius, .. }), _) => {
             tangent(Outward { face: &Cylinder { origin, axis, radius }.into(), ..p }, q, out_of_q, within)
         }
-        (_, Face::Capsule(Capsule { origin, axis, radius, .. })) => {
+        (_, Drawn::Capsule(Capsule { origin, axis, radius, .. })) => {
             tangent(p, Outward { face: &Cylinder { origin, axis, radius }.into(), ..q }, out_of_q, within)
         }
         // Touching others, they do so at points, or along no line or circle that is looked for.
-        (Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_), _)
-        | (_, Face::Elliptic(_) | Face::Bowl(_) | Face::Saddle(_)) => None,
+        (Drawn::Elliptic(_), _) | (_, Drawn::Elliptic(_)) => None,
         // A plane touches what is round, and a hollow what is in it, the other way round.
-        (Face::Plane(_), Face::Plane(_) | Face::Sphere(_) | Face::Cylinder(_) | Face::Cone(_) | Face::Torus(_))
-        | (Face::Cylinder(_) | Face::Cone(_), Face::Sphere(_) | Face::Torus(_))
-        | (Face::Sphere(_), Face::Torus(_)) => None,
-        (Face::Torus(torus), _) => {
+        (
+            Drawn::Plane(_),
+            Drawn::Plane(_) | Drawn::Sphere(_) | Drawn::Cylinder(_) | Drawn::Cone(_) | Drawn::Torus(_),
+        )
+        | (Drawn::Cylinder(_) | Drawn::Cone(_), Drawn::Sphere(_) | Drawn::Torus(_))
+        | (Drawn::Sphere(_), Drawn::Torus(_)) => None,
+        (Drawn::Torus(torus), _) => {
             if p.is_convex {
                 under_tube(&torus, q, out_of_q, within)
             } else {
@@ -408,8 +449,8 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             }
         }
         // These touch at points, or along no line or circle that is looked for.
-        (Face::Sphere(_), Face::Plane(_) | Face::Sphere(_))
-        | (Face::Cylinder(_), Face::Cone(_))
-        | (Face::Cone(_), Face::Cylinder(_) | Face::Cone(_)) => None,
+        (Drawn::Sphere(_), Drawn::Plane(_) | Drawn::Sphere(_))
+        | (Drawn::Cylinder(_), Drawn::Cone(_))
+        | (Drawn::Cone(_), Drawn::Cylinder(_) | Drawn::Cone(_)) => None,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::roots::between_roots;
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
     largest_corner, radial, tangent,
 };
 use glam::DVec3;
@@ -127,6 +127,11 @@ impl Surface for Cylinder {
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
         [o.x, o.y, o.z, a.x, a.y, a.z, self.radius, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        Some(Drawn::Cylinder(*self))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

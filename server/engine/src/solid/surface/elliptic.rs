@@ -17,7 +17,9 @@
 //! that is at most a₃/a₁ times too small. All s and w are a hair smaller than that (`WHOLE`): 1-Lipschitz for certain.
 
 use super::roots::{between_roots, between_roots_of_nappe};
-use super::{Apex, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, largest_corner, tangent};
+use super::{
+    Apex, Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, largest_corner, tangent,
+};
 use crate::math::any_perpendicular;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -460,6 +462,11 @@ impl Surface for Elliptic {
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, t) = (self.origin, self.turn);
         [o.x, o.y, o.z, t.x, t.y, t.z, self.size, self.second, self.third, 0.0, 0.0]
+    }
+
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        Some(Drawn::Elliptic(*self))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

@@ -12,13 +12,14 @@
 //! | elliptic: the image of a sphere, cylinder or cone | \|B(x − o)\| − w·(x − o) − r |
 //! | bowl: another convex quadric, o its focus | the same |
 //! | saddle: a quadric that is not convex | \|P(x)\| − \|N(x)\|, P and N affine |
+//! | superellipsoid | s (N(x) − 1), N a norm, s its ball's inscribed radius |
 //!
 //! [`Surface`] is the contract: what every kind tells of itself. [`Face`] is any of them and dispatches without a table of
 //! functions. Nobody outside of this folder asks of what kind a face is, only what it can tell: whether it is flat, about what
 //! it is symmetric, whether it has an apex. A capability that a kind does not have is `None`, and whoever asks then takes
 //! the way that is right for every face.
 //!
-//! Adding a kind: a file here, a row of `faces!`, its pairs in `curve`. What is missing does not compile. docs/adding.md.
+//! Adding a kind: a file here, a row of `faces!`. What is missing does not compile. docs/adding.md.
 //!
 //! On an axis the radial direction is undefined: closer than `ON_AXIS` any exact perpendicular stands in, elsewhere the
 //! direction is re-orthogonalised against the axis. Where it stands in, the tangent plane lies above the face by up to the
@@ -35,6 +36,7 @@ mod plane;
 mod roots;
 mod saddle;
 mod sphere;
+pub mod superellipsoid;
 mod symmetry;
 #[cfg(test)]
 mod tests;
@@ -45,12 +47,13 @@ pub use bend::{Bend, Law};
 pub use bowl::Bowl;
 pub use capsule::Capsule;
 pub use cone::{Apex, Cone};
-pub use curve::Curve;
+pub use curve::{Curve, Drawn};
 pub use cylinder::Cylinder;
 pub use elliptic::{Elliptic, Stretch};
 pub use plane::Plane;
 pub use saddle::{Row, Saddle, Sides};
 pub use sphere::Sphere;
+pub use superellipsoid::Superellipsoid;
 pub use symmetry::{Axis, Symmetry};
 pub use torus::Torus;
 
@@ -69,10 +72,10 @@ pub struct FaceAt {
     pub normal: DVec3,
     /// Its length: 1 at most, and just that of all but these.
     pub slope: f64,
-    /// Curvature factor k: 0 plane, cos α cone, 1 any other. psi rises above its tangent by k D²/(2ρ) at most.
+    /// Curvature factor k: 0 plane, cos α cone, max(p, q) − 1 superellipsoid, 1 any other. psi rises above its tangent by k D²/(2ρ) at most.
     pub k: f64,
     /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0); of an elliptic face or a bowl
-    /// |B(x − o)|, of a saddle |P(x)|.
+    /// |B(x − o)|, of a saddle |P(x)|, of a superellipsoid sN.
     pub rho: f64,
 }
 
@@ -229,9 +232,11 @@ pub trait Surface: Copy {
         None
     }
 
-    /// Gradient of the length |P| by which psi bends at `x`, and what that bends along, where P is of two rows; 1 long at most.
+    /// Gradient of the length by which psi bends at `x`, 1 long at most, and what that bends along: psi is no more than k (√((ρ + a)² + τ²) − ρ − a) above its
+    /// tangent, a what an offset has along the first, τ along the others. One alone of these, of a length |P| where P has two rows, is 1 long
+    /// at most, and the length no more than what an offset has along both.
     #[inline]
-    fn split(&self, _x: DVec3) -> Option<[DVec3; 2]> {
+    fn split(&self, _x: DVec3) -> Option<[DVec3; 3]> {
         None
     }
 
@@ -370,6 +375,18 @@ pub trait Surface: Copy {
     /// All that tells it from others of its kind, the rest 0.
     fn numbers(&self) -> [f64; NUMBERS];
 
+    /// What it is to those who look for lines and circles that two faces have in common; `None` where none is looked for.
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        None
+    }
+
+    /// What a primitive of this face cut by planes is called.
+    #[inline]
+    fn quadric_name(&self) -> &'static str {
+        "quadric"
+    }
+
     /// Where psi <= 0 along the ray origin + t·direction (a unit vector), ends infinite where it never ends.
     fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches;
 }
@@ -429,6 +446,7 @@ faces! {$
     Capsule = 6: "All points within a radius of a segment.",
     Bowl = 7: "A convex open quadric: a paraboloid or one sheet of a hyperboloid.",
     Saddle = 8: "A quadric of two positive and two negative squares.",
+    Superellipsoid = 9: "The unit ball of a norm of two exponents, scaled along three axes.",
 }
 
 impl Face {
@@ -482,7 +500,7 @@ impl Face {
 
     /// See [`Surface::split`].
     #[inline]
-    pub fn split(&self, x: DVec3) -> Option<[DVec3; 2]> {
+    pub fn split(&self, x: DVec3) -> Option<[DVec3; 3]> {
         each!(self, f => f.split(x))
     }
 
@@ -652,6 +670,17 @@ impl Face {
     #[inline]
     pub fn numbers(&self) -> [f64; NUMBERS] {
         each!(self, f => f.numbers())
+    }
+
+    /// See [`Surface::drawn`].
+    #[inline]
+    pub fn drawn(&self) -> Option<Drawn> {
+        each!(self, f => f.drawn())
+    }
+
+    /// See [`Surface::quadric_name`].
+    pub fn quadric_name(&self) -> &'static str {
+        each!(self, f => f.quadric_name())
     }
 
     /// See [`Surface::inside`].

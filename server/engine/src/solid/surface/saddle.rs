@@ -198,9 +198,9 @@ impl Surface for Saddle {
         Some(-n.radial())
     }
 
-    fn split(&self, x: DVec3) -> Option<[DVec3; 2]> {
+    fn split(&self, x: DVec3) -> Option<[DVec3; 3]> {
         let [p, _] = self.halves(x);
-        Some([p.radial(), p.beside()])
+        Some([p.radial(), p.beside(), DVec3::ZERO])
     }
 
     fn under(&self, touched: DVec3, center: DVec3) -> Option<Under> {
@@ -330,6 +330,10 @@ impl Surface for Saddle {
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, t) = (self.origin, self.turn);
         [o.x, o.y, o.z, t.x, t.y, t.z, self.first, self.second, self.third, self.size, 0.0]
+    }
+
+    fn quadric_name(&self) -> &'static str {
+        if self.is_parabolic() { "hyperbolic paraboloid" } else { "hyperboloid of one sheet" }
     }
 
     /// Where |P₀ + t P₁|² <= |N₀ + t N₁|².

@@ -2,7 +2,7 @@
 
 use super::roots::between_roots;
 use super::{
-    Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, largest_corner,
+    Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, largest_corner,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -117,6 +117,11 @@ impl Surface for Sphere {
     fn numbers(&self) -> [f64; NUMBERS] {
         let o = self.center;
         [o.x, o.y, o.z, self.radius, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        Some(Drawn::Sphere(*self))
     }
 
     fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {

@@ -5,7 +5,7 @@ use crate::math::random::Random;
 use glam::{DMat3, DQuat, DVec2};
 
 /// One face of each kind, somewhere.
-fn faces(r: &mut Random) -> [Face; 18] {
+fn faces(r: &mut Random) -> [Face; 21] {
     let (o, n) = (r.vector(1.0), r.vector(1.0).normalize());
     let radius = r.within(0.2, 2.0);
     let (sin, cos) = r.within(0.1, 1.2).sin_cos();
@@ -28,6 +28,9 @@ fn faces(r: &mut Random) -> [Face; 18] {
         // A long ellipsoid, and a cylinder.
         bowl(r, -0.2).into(),
         Bowl { scale: DVec3::new(0.6, 0.0, 0.4), fall: 0.6, ..bowl(r, 0.0) }.into(),
+        superellipsoid(r, 0.3, 0.6).into(),
+        superellipsoid(r, 1.0, 0.2).into(),
+        superellipsoid(r, 0.1, 1.0).into(),
         hyperboloid(r, 0.7).into(),
         hyperboloid(r, f64::INFINITY).into(),
         Saddle::paraboloid(r.vector(1.0), turned(r), DVec2::new(r.within(0.3, 2.0), r.within(0.3, 2.0)), 2.0).into(),
@@ -47,6 +50,11 @@ fn bowl(r: &mut Random, kappa: f64) -> Bowl {
 fn hyperboloid(r: &mut Random, second: f64) -> Saddle {
     let semi = DVec3::new(r.within(0.2, 0.4), second * r.within(0.6, 1.4), r.within(0.3, 1.5));
     Saddle::hyperboloid(r.vector(1.0), turned(r), semi)
+}
+
+fn superellipsoid(r: &mut Random, e: f64, f: f64) -> Superellipsoid {
+    let semi = DVec3::new(r.within(0.3, 2.0), r.within(0.3, 2.0), r.within(0.3, 2.0));
+    Superellipsoid::new(r.vector(1.0), turned(r), semi, DVec2::new(e, f))
 }
 
 fn ellipsoid(r: &mut Random) -> Elliptic {
@@ -71,7 +79,7 @@ fn a_face_at_a_point_is_its_value_with_its_derivatives() {
             {
                 continue;
             }
-            let (h, d) = (1e-5, r.vector(1.0).normalize());
+            let (h, d) = (1e-6, r.vector(1.0).normalize());
             let slope = (face.value(x + d * h) - face.value(x - d * h)) / (2.0 * h);
             assert!((slope - at.normal.dot(d)).abs() < 1e-8, "{face:?}");
             let turn = (face.at(x + d * h).normal - face.at(x - d * h).normal) / (2.0 * h);
@@ -191,7 +199,7 @@ fn beneath(u: &Under, y: DVec3) -> f64 {
 #[test]
 fn what_bounds_psi_from_below_and_from_above_does_so_near_and_far() {
     let mut r = Random(13);
-    let (mut bent, mut close) = (0, 0);
+    let (mut bent, mut close, mut flat) = (0, 0, 0);
     for _ in 0..4000 {
         for face in faces(&mut r) {
             let (c, touched) = (r.vector(2.0), r.vector(2.0));
@@ -208,6 +216,13 @@ fn what_bounds_psi_from_below_and_from_above_does_so_near_and_far() {
                 // From above: a ball's or an axis' k D²/(2 rho).
                 if at.k > 0.0 {
                     assert!(psi <= at.value + at.normal.dot(y) + at.k * d * d / (2.0 * at.rho) + 1e-13, "{face:?}");
+                }
+                // As the length of a vector of three.
+                if let Some([radial, one, other]) = face.split(c) {
+                    let (p, tau) = (at.rho + radial.dot(y), one.dot(y).hypot(other.dot(y)));
+                    let rise = (p * p + at.k * tau * tau).sqrt() - p;
+                    assert!(psi <= at.value + at.normal.dot(y) + rise + 1e-13, "{face:?} {c} {y}");
+                    flat += usize::from(tau > 0.01 && rise > 0.0 && psi - at.value - at.normal.dot(y) > 0.1 * rise);
                 }
                 let turned = (face.at(c + y).normal - at.normal).length();
                 assert!(turned <= face.turn(c, &at, d) + 1e-9, "{face:?}");
@@ -226,7 +241,7 @@ fn what_bounds_psi_from_below_and_from_above_does_so_near_and_far() {
             }
         }
     }
-    assert!(bent > 700 && close > 1000, "{bent} {close}");
+    assert!(bent > 700 && close > 1000 && flat > 1000, "{bent} {close} {flat}");
 }
 
 #[test]

@@ -10,8 +10,8 @@
 
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Under, largest_corner,
-    radial,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Under,
+    largest_corner, radial,
 };
 use crate::math::any_perpendicular;
 use crate::solid::surface::Sphere;
@@ -205,6 +205,11 @@ impl Surface for Torus {
     fn numbers(&self) -> [f64; NUMBERS] {
         let (o, a) = (self.origin, self.axis);
         [o.x, o.y, o.z, a.x, a.y, a.z, self.major, self.minor, 0.0, 0.0, 0.0]
+    }
+
+    #[inline]
+    fn drawn(&self) -> Option<Drawn> {
+        Some(Drawn::Torus(*self))
     }
 
     /// With t from the ray's point next to the centre and w = |x|² + R² − r²: w² = 4 R² ρ², of degree four.

@@ -44,6 +44,7 @@ impl Convex<'_> {
             }
             Convex::Ellipsoid(_) => self.support(&DMat3::IDENTITY, DVec3::ZERO, m),
             Convex::Elliptic(f) => f.farthest(m, flat),
+            Convex::Superellipsoid(s) => s.middle(m, flat),
             Convex::Corners(corners) => {
                 let reach = self.extent([m.x, m.y, m.z]);
                 let slack = flat * corners.iter().fold(0.0, |far: f64, v| far.max(v.distance(corners[0])));
@@ -62,7 +63,7 @@ mod tests {
     use super::*;
     use crate::math::random::Random;
     use crate::solid::primitive::{
-        Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Torus,
+        Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Polyhedron, Sphere, Superellipsoid, Torus,
     };
     use crate::solid::{Label, Primitive, Shape};
     use contactd_proto::Pose;
@@ -74,7 +75,9 @@ mod tests {
         let elliptic = |bottom, top, lean| {
             EllipticFrustum { semi: DVec2::new(0.7, 0.3), bottom, top, half_height: 0.4, lean }.into()
         };
-        let shapes: [Shape; 12] = [
+        let superellipsoid =
+            |e: f64, f: f64| Superellipsoid { semi: DVec3::new(0.3, 0.8, 0.5), exponents: DVec2::new(e, f) }.into();
+        let shapes: [Shape; 15] = [
             Sphere { radius: 0.7 }.into(),
             Cuboid { half: DVec3::new(0.3, 0.5, 0.8) }.into(),
             Cylinder { radius: 0.4, half_height: 0.8 }.into(),
@@ -83,6 +86,9 @@ mod tests {
             Capsule { half: 0.5, radius: 0.3 }.into(),
             Torus { major: 0.6, minor: 0.2 }.into(),
             Ellipsoid { semi: DVec3::new(0.3, 0.8, 0.5) }.into(),
+            superellipsoid(0.6, 0.3),
+            superellipsoid(0.1, 0.1),
+            superellipsoid(1.0, 0.2),
             elliptic(1.0, 1.0, DVec2::new(0.3, -0.2)),
             elliptic(1.0, 0.4, DVec2::new(0.0, 0.2)),
             elliptic(0.0, 1.0, DVec2::ZERO),

@@ -50,7 +50,12 @@ impl Features {
                 if drop == 0.0 { 0.0 } else { drop / (drop * drop + 4.0 * half * half).sqrt() }
             }
             Convex::Ball(_) | Convex::Cuboid(_) | Convex::Capsule { .. } => 0.0,
-            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Corners(_) | Convex::HalfSpace | Convex::Other => {
+            Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => {
                 return None;
             }
         };
@@ -87,6 +92,7 @@ impl Features {
             Convex::Ball(_)
             | Convex::Ellipsoid(_)
             | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
             | Convex::Corners(_)
             | Convex::HalfSpace
             | Convex::Other => (0, false),
@@ -130,7 +136,12 @@ impl Features {
                 shown.bend = if rho > 0.0 { radii[upper] / rho } else { 0.0 };
                 shown.tangent = *axes * DVec3::new(-u.y, u.x, 0.0);
             }
-            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Corners(_) | Convex::HalfSpace | Convex::Other => {}
+            Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => {}
         }
         shown
     }
@@ -163,7 +174,12 @@ impl Features {
                     hold(Hold::Apex);
                 }
             }
-            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Corners(_) | Convex::HalfSpace | Convex::Other => {}
+            Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
+            | Convex::Corners(_)
+            | Convex::HalfSpace
+            | Convex::Other => {}
         }
     }
 }

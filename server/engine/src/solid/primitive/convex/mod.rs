@@ -8,6 +8,7 @@ mod feature;
 
 use super::elliptic_frustum::EllipticFrustum;
 use super::polyhedron::middle;
+use super::superellipsoid::Superellipsoid;
 use crate::math::Lanes;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -43,6 +44,8 @@ pub enum Convex<'a> {
     Ellipsoid(DVec3),
     /// What any affine map makes of a solid of revolution between two discs.
     Elliptic(&'a EllipticFrustum),
+    /// The unit ball of a norm of two exponents, scaled along the axes.
+    Superellipsoid(&'a Superellipsoid),
     /// The corners.
     Corners(&'a [DVec3]),
     /// All of z <= 0: it reaches 0 along z, and to infinity along any other direction.
@@ -76,6 +79,7 @@ impl Convex<'_> {
             | Convex::Capsule { .. }
             | Convex::Ellipsoid(_)
             | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
             | Convex::HalfSpace
             | Convex::Other => DVec3::ZERO,
         }
@@ -91,7 +95,7 @@ impl Convex<'_> {
             Convex::Ellipsoid(semi) => Some(Convex::Ellipsoid(semi)),
             Convex::HalfSpace => Some(Convex::HalfSpace),
             Convex::Other => Some(Convex::Other),
-            Convex::Elliptic(_) | Convex::Corners(_) => None,
+            Convex::Elliptic(_) | Convex::Superellipsoid(_) | Convex::Corners(_) => None,
         }
     }
 
@@ -114,6 +118,7 @@ impl Convex<'_> {
                 let [rim, up] = f.rim_and_up(m);
                 (rim * f.top + up).max(rim * f.bottom - up)
             }
+            Convex::Superellipsoid(s) => T::each(m, |m| s.reach(m)),
             Convex::Corners(corners) => {
                 corners.iter().fold(T::all(f64::NEG_INFINITY), |far, v| far.max(m[0] * v.x + m[1] * v.y + m[2] * v.z))
             }
@@ -141,6 +146,7 @@ impl Convex<'_> {
             | Convex::Round { .. }
             | Convex::Ellipsoid(_)
             | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
             | Convex::Corners(_)
             | Convex::HalfSpace
             | Convex::Other => self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)]),
@@ -165,6 +171,7 @@ impl Convex<'_> {
             | Convex::Round { .. }
             | Convex::Ellipsoid(_)
             | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
             | Convex::Corners(_)
             | Convex::HalfSpace
             | Convex::Other => 0.0,
@@ -193,6 +200,7 @@ impl Convex<'_> {
                 if length > 0.0 { semi * along / length } else { DVec3::ZERO }
             }
             Convex::Elliptic(f) => f.support(m),
+            Convex::Superellipsoid(s) => s.support(m),
             Convex::Corners(corners) => {
                 let mut best = (f64::NEG_INFINITY, corners[0]);
                 for v in corners {
@@ -267,7 +275,7 @@ impl Convex<'_> {
                 reported(length - radius, if length > 0.0 { out / length } else { axes.x_axis }, 0)
             }
             // Their faces' gradients are no unit vectors: a plane along one would not lie below f.
-            Convex::Ellipsoid(_) | Convex::Elliptic(_) => return None,
+            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::Superellipsoid(_) => return None,
             Convex::Corners(_) | Convex::HalfSpace | Convex::Other => return None,
         })
     }
@@ -293,6 +301,7 @@ impl Convex<'_> {
             | Convex::Capsule { .. }
             | Convex::Ellipsoid(_)
             | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
             | Convex::HalfSpace
             | Convex::Other => 0,
         }
@@ -308,6 +317,7 @@ impl Convex<'_> {
             Convex::Ball(_)
             | Convex::Ellipsoid(_)
             | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
             | Convex::Corners(_)
             | Convex::HalfSpace
             | Convex::Other => [DVec3::ZERO; 3],
@@ -333,7 +343,11 @@ impl Convex<'_> {
                 (0..8).map(corner).collect()
             }
             Convex::Corners(corners) => corners.iter().map(|v| (*v, 0.0)).collect(),
-            Convex::Ellipsoid(_) | Convex::Elliptic(_) | Convex::HalfSpace | Convex::Other => return None,
+            Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
+            | Convex::HalfSpace
+            | Convex::Other => return None,
         })
     }
 }

@@ -152,19 +152,7 @@ impl Geometry for Quadric {
         None
     }
     fn kind(&self) -> &'static str {
-        match self.0.side {
-            Face::Bowl(bowl) if bowl.is_parabolic() => "paraboloid",
-            Face::Bowl(_) => "hyperboloid of two sheets",
-            Face::Saddle(saddle) if saddle.is_parabolic() => "hyperbolic paraboloid",
-            Face::Saddle(_) => "hyperboloid of one sheet",
-            Face::Plane(_)
-            | Face::Sphere(_)
-            | Face::Cylinder(_)
-            | Face::Cone(_)
-            | Face::Torus(_)
-            | Face::Elliptic(_)
-            | Face::Capsule(_) => "quadric",
-        }
+        self.0.side.quadric_name()
     }
     fn dimensions(&self) -> String {
         let size = self.0.around.max - self.0.around.min;
