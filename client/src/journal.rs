@@ -5,8 +5,7 @@
 //! batch says, and only the last two have anything to tell. They are kept as they are, and worked out when somebody asks.
 
 use contactd_proto::control::{Command, Facets, ModelFile, ObjectSpec, WireRule, WireTrack};
-use contactd_proto::pose_record::PoseCommand;
-use contactd_proto::{MotionState, PoseRecord, Rule};
+use contactd_proto::{MotionState, PoseRecord, Rule, Tracks};
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug)]
@@ -15,21 +14,14 @@ struct ModelEntry {
     facets: Facets,
 }
 
-#[derive(Clone, Debug)]
-struct Entry {
-    spec: ObjectSpec,
-    motion_state: MotionState,
-}
-
 /// Everything that makes a session, in the order in which it can be replayed.
 #[derive(Clone, Debug, Default)]
 pub struct Journal {
     models: BTreeMap<u32, ModelEntry>,
-    objects: BTreeMap<u32, Entry>,
+    objects: BTreeMap<u32, ObjectSpec>,
+    tracks: Tracks,
     rules: Vec<Rule>,
     resolution: Option<f64>,
-    /// Objects whose track is not at rest; may name removed ones.
-    moving: Vec<u32>,
     /// The two batches accepted last.
     recent: [Vec<PoseRecord>; 2],
     /// How many of them, from the last one back, are not in the tracks yet.
@@ -46,13 +38,15 @@ impl Journal {
     pub fn object(&mut self, spec: ObjectSpec) {
         // The server accepted the pose, so it is one.
         if let Ok(pose) = spec.pose.checked() {
-            self.objects.insert(spec.id, Entry { spec, motion_state: MotionState::resting(pose) });
+            self.tracks.put(spec.id, MotionState::resting(pose));
+            self.objects.insert(spec.id, spec);
         }
     }
 
     /// An object was removed.
     pub fn removed(&mut self, id: u32) {
         self.objects.remove(&id);
+        self.tracks.removed(id);
     }
 
     /// Rules were set.
@@ -73,7 +67,7 @@ impl Journal {
         let follows = advance == 1.0 && records.len() == last.len() && records.iter().zip(last).all(is_alike);
         if !follows {
             self.settle();
-            self.take(records, advance);
+            self.tracks.take(records, advance);
         }
         self.unread = if follows { (self.unread + 1).min(2) } else { 0 };
         self.recent.swap(0, 1);
@@ -85,32 +79,9 @@ impl Journal {
     fn settle(&mut self) {
         let recent = std::mem::take(&mut self.recent);
         for batch in &recent[2 - self.unread..] {
-            self.take(batch, 1.0);
+            self.tracks.take(batch, 1.0);
         }
         (self.recent, self.unread) = (recent, 0);
-    }
-
-    /// Takes a batch into the tracks.
-    fn take(&mut self, records: &[PoseRecord], advance: f64) {
-        for id in self.moving.drain(..) {
-            if let Some(entry) = self.objects.get_mut(&id) {
-                entry.motion_state = MotionState::resting(entry.motion_state.at(advance));
-            }
-        }
-        // Starts come before motions, wherever they stand in the batch.
-        for starts in [true, false] {
-            for record in records {
-                let (Ok(command), Some(entry)) = (record.decode(), self.objects.get_mut(&record.object)) else {
-                    continue;
-                };
-                if matches!(command, PoseCommand::Start(_)) == starts {
-                    entry.motion_state = MotionState::ordered(entry.motion_state.end, command);
-                    if !entry.motion_state.is_rest() {
-                        self.moving.push(record.object);
-                    }
-                }
-            }
-        }
     }
 
     /// The commands that rebuild the session on a server that knows nothing of it.
@@ -118,8 +89,8 @@ impl Journal {
         self.settle();
         let models =
             self.models.iter().map(|(id, m)| Command::LoadModel { model: *id, file: m.file.clone(), facets: m.facets });
-        let objects = self.objects.values().map(|e| Command::AddObject(e.spec.clone()));
-        let motion_states = self.objects.iter().map(|(id, e)| WireTrack::of(*id, &e.motion_state)).collect();
+        let objects = self.objects.values().map(|spec| Command::AddObject(spec.clone()));
+        let motion_states = self.tracks.iter().map(|(id, track)| WireTrack::of(id, track)).collect();
         let rest = [
             Command::SetRules(self.rules.iter().map(WireRule::from).collect()),
             Command::SetResolution(self.resolution),
@@ -174,7 +145,7 @@ mod tests {
             late.object(spec.clone());
             at_once.object(spec);
         }
-        let motion_states = |j: &Journal| j.objects.iter().map(|(id, e)| (*id, e.motion_state)).collect::<Vec<_>>();
+        let motion_states = |j: &Journal| j.tracks.iter().map(|(id, track)| (id, *track)).collect::<Vec<_>>();
         let (mut alike, mut named) = ([0; 3], vec![1, 2, 3]);
         for step in 0..3000 {
             if r.below(6) == 0 {
@@ -194,7 +165,7 @@ mod tests {
                 _ => {}
             }
             late.accepted(&records, advance);
-            at_once.take(&records, advance);
+            at_once.tracks.take(&records, advance);
             alike[late.unread] += 1;
             if r.below(1500) == 0 {
                 let id = 1 + r.below(6) as u32;

@@ -3,6 +3,7 @@
 //! Ids are given here, counting up, so that they stay the same when the session is replayed on another server.
 
 mod options;
+mod recording;
 mod stage;
 mod step;
 
@@ -243,7 +244,12 @@ impl<T: Transport> Session<T> {
         for command in self.journal.replay() {
             match self.transport.command(command, self.command_timeout)? {
                 Answer::Refused { code, index, detail } => return Err(refused(code, index, detail)),
-                Answer::Opened { .. } | Answer::Loaded { .. } | Answer::Done | Answer::Mass(_) | Answer::Status(_) => {}
+                Answer::Opened { .. }
+                | Answer::Loaded { .. }
+                | Answer::Done
+                | Answer::Mass(_)
+                | Answer::Status(_)
+                | Answer::Recorded(_) => {}
             }
         }
         self.stage = Stage::Idle;

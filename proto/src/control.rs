@@ -251,6 +251,43 @@ pub enum Command {
     Status,
     /// Ends the session of this id, whoever's it is; asked of no session.
     EndSession(u64),
+    /// Records steps into a new file: those of the session that asks; asked of no session, those that it names.
+    Record(RecordingOrder),
+    /// What was recorded by what [`Record`](Self::Record) began that was asked in the same way; and that it is to end.
+    Recording {
+        /// Ends it: the answer comes when the file is complete.
+        stop: bool,
+    },
+    /// Writes the session's last step as a scene folder for `contactd check`. The folder is made; it does not exist before.
+    SaveStep(String),
+}
+
+/// What is to be recorded.
+#[derive(Clone, Debug, PartialEq, Eq, Encode, Decode)]
+pub struct RecordingOrder {
+    /// The file, by its whole path; it does not exist before.
+    pub path: String,
+    /// Of no session: the session to be recorded, or all of them, those to come too.
+    pub session: Option<u64>,
+    /// Of no session: the process that asks, as in [`Command::Open`]. The recording ends with it.
+    pub process: (u32, u64),
+}
+
+/// What was recorded so far.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Encode, Decode)]
+pub struct RecordingStatus {
+    /// The file.
+    pub path: String,
+    /// Steps that stand in it, or are on their way to it.
+    pub steps: u64,
+    /// Steps that were left out because the recorder could not keep up.
+    pub dropped: u64,
+    /// Steps that stand in it without a picture, for the same reason.
+    pub without_picture: u64,
+    /// Bytes written.
+    pub bytes: u64,
+    /// Why it has ended before its time; empty: it has not.
+    pub failure: String,
 }
 
 /// One session as its server counts it.
@@ -359,6 +396,8 @@ pub enum Answer {
     Mass(WireMass),
     /// What the server says of itself.
     Status(ServerStatus),
+    /// What was recorded.
+    Recorded(RecordingStatus),
 }
 
 /// A command with its session (0 for `Open`).

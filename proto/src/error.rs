@@ -56,6 +56,7 @@ codes! {
     25 BadNumber "an option of the request is out of its range",
     26 Unbounded "the model reaches to infinity",
     27 SessionEnded "the session was ended on its server, with `contactd sessions end`",
+    28 Recording "what was asked cannot be recorded or saved",
 }
 
 impl ErrorCode {

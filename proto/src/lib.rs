@@ -40,7 +40,7 @@ pub use error::ErrorCode;
 pub use glam;
 pub use mass::{MassOptions, MassProperties};
 pub use motion::Motion;
-pub use motion_state::MotionState;
+pub use motion_state::{MotionState, Tracks};
 pub use pose::Pose;
 pub use pose_record::PoseRecord;
 pub use rule::{Detect, Effects, InitialOverlap, Report, Rule};

@@ -4,7 +4,8 @@
 //! The end is kept as it was given: it is not recomputed from the motion, so that nothing creeps over many steps.
 
 use crate::pose_record::PoseCommand;
-use crate::{Motion, Pose};
+use crate::{Motion, Pose, PoseRecord};
+use std::collections::BTreeMap;
 
 /// An object's last accepted motion and where it ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +46,62 @@ impl MotionState {
     /// True when the object did not move, not even by a last bit of its pose: what did comes to rest at its end.
     pub fn is_rest(&self) -> bool {
         self.motion.is_rest() && same_bits(&self.motion.start, &self.end)
+    }
+}
+
+/// Where the objects of a session stand, followed from accepted step to accepted step by whoever does not search them.
+#[derive(Clone, Debug, Default)]
+pub struct Tracks {
+    objects: BTreeMap<u32, MotionState>,
+    /// Objects that are not at rest; may name removed ones.
+    moving: Vec<u32>,
+}
+
+impl Tracks {
+    /// An object that came, or that was put on another track.
+    pub fn put(&mut self, id: u32, motion_state: MotionState) {
+        if !motion_state.is_rest() {
+            self.moving.push(id);
+        }
+        self.objects.insert(id, motion_state);
+    }
+
+    /// An object that went.
+    pub fn removed(&mut self, id: u32) {
+        self.objects.remove(&id);
+    }
+
+    /// An object's last motion.
+    pub fn get(&self, id: u32) -> Option<&MotionState> {
+        self.objects.get(&id)
+    }
+
+    /// All objects by their ids.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, &MotionState)> {
+        self.objects.iter().map(|(id, motion_state)| (*id, motion_state))
+    }
+
+    /// Takes an accepted batch, `advance` of the step before it.
+    pub fn take(&mut self, records: &[PoseRecord], advance: f64) {
+        for id in self.moving.drain(..) {
+            if let Some(motion_state) = self.objects.get_mut(&id) {
+                *motion_state = MotionState::resting(motion_state.at(advance));
+            }
+        }
+        // Starts come before motions, wherever they stand in the batch.
+        for starts in [true, false] {
+            for record in records {
+                let (Ok(command), Some(motion_state)) = (record.decode(), self.objects.get_mut(&record.object)) else {
+                    continue;
+                };
+                if matches!(command, PoseCommand::Start(_)) == starts {
+                    *motion_state = MotionState::ordered(motion_state.end, command);
+                    if !motion_state.is_rest() {
+                        self.moving.push(record.object);
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -1,4 +1,5 @@
-//! The command line: arguments in, text out, exit status 0 done, 2 bad input, 3 some pair undecided.
+//! The command line: arguments in, text out, exit status 0 done, 1 a recording is not repeated, 2 bad
+//! input, 3 some pair undecided.
 //!
 //! It is a function of the library, so that a program of another language is the same command (the Python package's is).
 //!
@@ -64,6 +65,10 @@ enum Command {
         #[command(subcommand)]
         what: SessionsCommand,
     },
+    /// Records the steps of a running server into a file, until SIGINT or SIGTERM.
+    Record(RecordArguments),
+    /// Repeats a recording and compares every bit; the exit status is 1 where an answer differs.
+    Replay(ReplayArguments),
     /// A server process and a client process on real parts: steps, earliest contacts, latencies.
     Demo {
         /// The engine in this process instead of a server.
@@ -127,6 +132,35 @@ enum SessionsCommand {
 }
 
 #[derive(clap::Args)]
+struct RecordArguments {
+    /// The server.
+    #[arg(default_value = contactd_proto::names::DEFAULT_NAME)]
+    name: String,
+    /// The file; it does not exist before.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// One session, as `contactd status` numbers them; else all, those to come too.
+    #[arg(long, value_name = "N")]
+    session: Option<u64>,
+    /// Ends after this time.
+    #[arg(long, value_parser = seconds)]
+    seconds: Option<Duration>,
+}
+
+#[derive(clap::Args)]
+struct ReplayArguments {
+    /// The recording.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// One step, by its number in the recording, from 1: written as a scene, and not repeated.
+    #[arg(long, value_name = "N", requires = "scene")]
+    step: Option<u64>,
+    /// The folder for that scene; it does not exist before.
+    #[arg(long, value_name = "DIR", requires = "step")]
+    scene: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
 struct ServeArguments {
     /// Its name: clients connect to it by this.
     #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
@@ -140,6 +174,9 @@ struct ServeArguments {
     /// A folder of this machine: texts that clients send may import files of it and below. Else they import none.
     #[arg(long, value_name = "DIR")]
     import_root: Option<PathBuf>,
+    /// A folder in which this start of the server records all of its steps, into a new file.
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
     /// Tells models and refused commands too, on standard error; else as CONTACTD_LOG says (warn, info, debug), or sessions alone.
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
@@ -233,12 +270,14 @@ enum Done {
     Well,
     /// The work limit ran out for some pair.
     Undecided,
+    /// A recording was not repeated to the bit.
+    Differs,
 }
 
 /// The command `contactd`, whole: what it prints goes to standard output and standard error. `arguments` begin with the program's own
 /// name; `program` is how this program is started again, which the demo does for its server.
 ///
-/// Gives the exit status: 0 done, 2 bad input, 3 some pair undecided.
+/// Gives the exit status: 0 done, 1 a recording is not repeated, 2 bad input, 3 some pair undecided.
 pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> u8 {
     let Arguments { color, command } = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
@@ -269,6 +308,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
             inspect_file(&file, facets, picture.as_deref(), &access, &cache)
         }
         Command::Serve(arguments) => serve(arguments),
+        Command::Record(arguments) => record(&arguments),
+        Command::Replay(arguments) => replay(&arguments),
         Command::Status { name, json } => status(name.as_deref(), json, paint),
         Command::Sessions { what: SessionsCommand::End { session, name } } => end_session(session, &name),
         Command::Completions { shell } => completions(shell),
@@ -277,6 +318,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
     let status = match done {
         Ok(Done::Well) => 0,
         Ok(Done::Undecided) => 3,
+        Ok(Done::Differs) => 1,
         Err(sentence) => {
             say(&sentence.to_string());
             BAD_INPUT
@@ -302,7 +344,7 @@ fn man(folder: &Path) -> Result<Done, Box<dyn Error>> {
 }
 
 fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
-    let ServeArguments { name, config, deadline, import_root, verbose, quiet, cache } = arguments;
+    let ServeArguments { name, config, deadline, import_root, record, verbose, quiet, cache } = arguments;
     let mut config = config.as_deref().map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
     // The command line stands before the file, `off` too.
     config.cache = cache.cache.unwrap_or(config.cache);
@@ -311,6 +353,10 @@ fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
         return Err(format!("expected a folder as import root, found {}", root.display()).into());
     }
     config.import_root = import_root.or(config.import_root);
+    if let Some(folder) = record.as_ref().filter(|r| !r.is_dir()) {
+        return Err(format!("expected a folder for recordings, found {}", folder.display()).into());
+    }
+    config.record = record.or(config.record);
     config.log = match (verbose, quiet) {
         (true, _) => Level::Debug,
         (_, true) => Level::Warn,
@@ -352,6 +398,25 @@ fn end_session(session: u64, name: &str) -> Result<Done, Box<dyn Error>> {
         Err(e) => return Err(e.into()),
     }
     Ok(Done::Well)
+}
+
+fn record(arguments: &RecordArguments) -> Result<Done, Box<dyn Error>> {
+    let RecordArguments { name, output, session, seconds } = arguments;
+    let recording = operator::Recording::start(name, output, *session)?;
+    print(&format!("{}: the steps of \"{name}\" are recorded until SIGINT\n", output.display()))?;
+    print(&recording.run(*seconds)?)?;
+    Ok(Done::Well)
+}
+
+fn replay(arguments: &ReplayArguments) -> Result<Done, Box<dyn Error>> {
+    if let (Some(step), Some(folder)) = (arguments.step, &arguments.scene) {
+        crate::replay::scene_of(&arguments.file, step)?.write(folder)?;
+        print(&format!("{}\n", folder.join("scene.toml").display()))?;
+        return Ok(Done::Well);
+    }
+    let replayed = crate::replay::replay(&arguments.file, |_| {})?;
+    print(&replayed.text())?;
+    Ok(if replayed.difference.is_some() { Done::Differs } else { Done::Well })
 }
 
 fn run_demo(

@@ -53,9 +53,11 @@
 //! | 7 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
 //! | 8 | [`cache`], [`terminal`] | preprocessed models kept on disk; text of 80 columns |
 //! | 9 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
+//! | 9 | [`recording`] | steps in MCAP files, with all that it takes to repeat them |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`demo`] | the show |
+//! | 11 | [`replay`] | a recording, repeated and compared |
 //! | 12 | [`command_line`] | the command `contactd` |
 //!
 //! # In one's own process
@@ -95,6 +97,8 @@ pub mod inspect;
 pub mod ipc;
 pub mod operator;
 pub mod picture;
+pub mod recording;
+pub mod replay;
 pub mod report;
 pub mod terminal;
 

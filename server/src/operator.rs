@@ -7,11 +7,14 @@
 use crate::terminal::{Paint, Role, number, sentence};
 use contactd_client::Error;
 use contactd_client::shm::operator;
-use contactd_proto::control::{LatestSteps, ServerStatus, SessionStatus};
+use contactd_proto::control::{LatestSteps, RecordingStatus, ServerStatus, SessionStatus};
 use contactd_proto::names::{Address, start_of_process};
 use serde::Serialize;
 use std::fmt::Write as _;
-use std::time::Duration;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// How long a server may take to answer: its loop answers within milliseconds.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -109,6 +112,78 @@ pub fn servers(name: Option<&str>) -> Result<Servers, Error> {
 pub fn end_session(name: &str, session: u64) -> Result<(), Error> {
     operator::end_session(&Address::of(name).map_err(Error::Address)?, session, PATIENCE)
 }
+
+/// A recording that a server makes for this process, until it ends.
+#[derive(Debug)]
+pub struct Recording {
+    address: Address,
+    path: String,
+    stop: Arc<AtomicBool>,
+}
+
+/// How often a recording is looked at.
+const LOOK: Duration = Duration::from_millis(100);
+
+impl Recording {
+    /// Has the server of that name record into a new file, from one session or from all. From here on SIGINT and SIGTERM end it.
+    ///
+    /// # Errors
+    /// There is no such server or session; it records already, or refuses to.
+    pub fn start(name: &str, file: &Path, session: Option<u64>) -> Result<Self, Error> {
+        let address = Address::of(name).map_err(Error::Address)?;
+        let path = std::path::absolute(file).map_err(|e| Error::System(format!("{}: {e}", file.display())))?;
+        let path = path.display().to_string();
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            signal_hook::flag::register(signal, stop.clone())
+                .map_err(|e| Error::System(format!("signal handler: {e}")))?;
+        }
+        operator::record(&address, &path, session, PATIENCE)?;
+        Ok(Self { address, path, stop })
+    }
+
+    /// Waits until it is stopped, for so long, or until it cannot go on; what was recorded, as a line.
+    ///
+    /// # Errors
+    /// The server has gone, or the recording has failed.
+    pub fn run(self, longest: Option<Duration>) -> Result<String, Error> {
+        let began = Instant::now();
+        let is_over = || self.stop.load(Ordering::Relaxed) || longest.is_some_and(|longest| began.elapsed() >= longest);
+        let mut looked = Instant::now();
+        while !is_over() {
+            std::thread::sleep(LOOK.min(Duration::from_millis(10)));
+            if looked.elapsed() < LOOK {
+                continue;
+            }
+            looked = Instant::now();
+            let status = self.asked(false)?;
+            if !status.failure.is_empty() {
+                break;
+            }
+        }
+        let RecordingStatus { steps, dropped, without_picture, bytes, failure, .. } = self.asked(true)?;
+        if !failure.is_empty() {
+            return Err(Error::System(format!("{failure}; it can be read up to there")));
+        }
+        let mut out = format!("{}: {steps} steps, {dropped} left out, {bytes} bytes\n", self.path);
+        if without_picture > 0 {
+            let _ = writeln!(out, "{without_picture} of them without a picture");
+        }
+        Ok(out)
+    }
+
+    fn asked(&self, stop: bool) -> Result<RecordingStatus, Error> {
+        operator::recording(&self.address, stop, STOPPED).map_err(|e| match e {
+            Error::ServerLost | Error::NoServer(_) => {
+                Error::System(format!("the server has ended; {} can be read up to there", self.path))
+            }
+            other => other,
+        })
+    }
+}
+
+/// How long a file may take to be complete.
+const STOPPED: Duration = Duration::from_secs(60);
 
 fn look(address: &Address) -> Server {
     let name = address.name().to_owned();

@@ -102,6 +102,9 @@
 // the session was ended on its server, with `contactd sessions end`.
 #define CONTACTD_ERROR_SESSION_ENDED 27
 
+// what was asked cannot be recorded or saved.
+#define CONTACTD_ERROR_RECORDING 28
+
 // Done.
 #define CONTACTD_OK 0
 
@@ -343,6 +346,18 @@ typedef struct contactd_opened {
     // Zero.
     uint32_t reserved;
 } contactd_opened;
+
+// What was recorded.
+typedef struct contactd_recording {
+    // Steps that stand in the file, or are on their way to it.
+    uint64_t steps;
+    // Steps that were left out because the recorder could not keep up.
+    uint64_t dropped;
+    // Steps that stand in it without a picture, for the same reason.
+    uint64_t without_picture;
+    // Bytes written.
+    uint64_t bytes;
+} contactd_recording;
 
 // A face of a model. Its strings are valid until the session is closed.
 typedef struct contactd_face {
@@ -987,6 +1002,23 @@ int32_t contactd_get_region(struct contactd_session *session,
                             const struct contactd_patch_slot **patches,
                             size_t *patch_count);
 
+// Records the session's steps from now on into a new MCAP file, until contactd_stop_recording or the end of the session;
+// `contactd replay FILE` repeats it bit for bit. A recorder that cannot keep up leaves out whole steps and counts them: no step
+// waits for it. CONTACTD_ERROR_RECORDING: the file exists or cannot be made, the session is being recorded already, or the server
+// has a deadline, with which answers depend on time.
+int32_t contactd_start_recording(struct contactd_session *session, const char *path);
+
+// What was recorded so far. CONTACTD_ERROR_RECORDING: nothing is being recorded, or the recording has failed;
+// contactd_error_message says why.
+int32_t contactd_get_recording(struct contactd_session *session, struct contactd_recording *recording);
+
+// Ends the recording: its file is complete when this returns. Codes as of contactd_get_recording.
+int32_t contactd_stop_recording(struct contactd_session *session, struct contactd_recording *recording);
+
+// Writes the last step as a scene in a new folder, for `contactd check FOLDER/scene.toml`. CONTACTD_ERROR_RECORDING: the folder
+// exists or cannot be written.
+int32_t contactd_save_step(struct contactd_session *session, const char *folder);
+
 // Makes manifolds, without points. Not bound to a session or thread, but used by one thread at a time.
 int32_t contactd_manifolds_new(struct contactd_manifolds **manifolds);
 
@@ -1272,6 +1304,11 @@ CONTACTD_AT(contactd_opened, session, 0);
 CONTACTD_AT(contactd_opened, epoch, 8);
 CONTACTD_AT(contactd_opened, max_batch, 16);
 CONTACTD_AT(contactd_opened, reserved, 20);
+CONTACTD_SIZE(contactd_recording, 32);
+CONTACTD_AT(contactd_recording, steps, 0);
+CONTACTD_AT(contactd_recording, dropped, 8);
+CONTACTD_AT(contactd_recording, without_picture, 16);
+CONTACTD_AT(contactd_recording, bytes, 24);
 CONTACTD_SIZE(contactd_face, 24);
 CONTACTD_AT(contactd_face, primitive, 0);
 CONTACTD_AT(contactd_face, subtracted, 4);

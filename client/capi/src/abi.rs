@@ -46,6 +46,20 @@ impl From<Session> for Opened {
     }
 }
 
+/// What was recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Recording {
+    /// Steps that stand in the file, or are on their way to it.
+    pub steps: u64,
+    /// Steps that were left out because the recorder could not keep up.
+    pub dropped: u64,
+    /// Steps that stand in it without a picture, for the same reason.
+    pub without_picture: u64,
+    /// Bytes written.
+    pub bytes: u64,
+}
+
 /// A face of a model. Its strings are valid until the session is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]

@@ -3,7 +3,7 @@
 //! `CONTACTD_WRITE_HEADER=1 cargo test -p contactd-capi --test header` writes it anew after a change of the interface.
 
 use cbindgen::{Builder, Config};
-use contactd_capi::abi::{Face, Mass, Names, Object, Opened, Options, Pose, Reply, Rule};
+use contactd_capi::abi::{Face, Mass, Names, Object, Opened, Options, Pose, Recording, Reply, Rule};
 use contactd_capi::manifold::{Manifold, ManifoldPoint};
 use contactd_proto::effects::{self, EffectCounters};
 use contactd_proto::rule::{Effects, Field, RuleNumbers, Values};
@@ -18,7 +18,7 @@ use std::sync::OnceLock;
 const TABLES: &str = "tables";
 
 /// Sources of the header, in its order.
-const SOURCES: [&str; 15] = [
+const SOURCES: [&str; 16] = [
     "src/error.rs",
     "../../proto/src/pose_record.rs",
     "../../proto/src/contact_record.rs",
@@ -31,6 +31,7 @@ const SOURCES: [&str; 15] = [
     "src/solid.rs",
     "src/scene.rs",
     "src/step.rs",
+    "src/recording.rs",
     "src/manifold.rs",
     "src/convention/pose.rs",
     "src/convention/contact.rs",
@@ -95,6 +96,7 @@ fn offsets() -> String {
         }
         "contactd_pose" Pose { position, rotation }
         "contactd_opened" Opened { session, epoch, max_batch, reserved }
+        "contactd_recording" Recording { steps, dropped, without_picture, bytes }
         "contactd_face" Face { primitive, subtracted, name, face }
         "contactd_mass" Mass {
             volume, volume_error, center, center_error, density, inertia, inertia_error, boxes,

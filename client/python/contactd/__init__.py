@@ -48,7 +48,7 @@ from .records import (
     Valid,
 )
 from .rules import Effect, Rule
-from .session import Face, Model, Region, Reply, Session, connect, embedded
+from .session import Face, Model, Recording, Region, Reply, Session, connect, embedded
 from .solid import Outline, Solid
 from .view import View
 

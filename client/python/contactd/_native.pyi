@@ -1,6 +1,7 @@
 """The native part of contactd; use the package, not this module."""
 
 import os
+import pathlib
 from typing import Any, Callable, Self, Sequence, TypeAlias
 
 import numpy as np
@@ -139,6 +140,17 @@ class Session:
         poses: tuple[_Pose, _Pose],
     ) -> int: ...
     def _set_rules(self, rules: list) -> None: ...
+    def _recorded(self, stop: bool) -> tuple[str, int, int, int, int, str]: ...
+    def record(self, path: str | os.PathLike[str]) -> None:
+        """Records the session's steps from now on into a new MCAP file, until ``stop_recording`` or the end of the session.
+
+        ``contactd replay FILE`` repeats it bit for bit. A recorder that cannot keep up leaves out whole steps and counts them: no
+        step waits for it. ``Refused``: the file exists or cannot be made, the session is being recorded already, or the server has a
+        deadline, with which answers depend on time.
+        """
+    def save_step(self, folder: str | os.PathLike[str]) -> pathlib.Path:
+        """Writes the last step as a scene in a new folder, for ``contactd check``; returns the scene's path. ``Refused``: the folder
+        exists or cannot be written."""
     def remove_object(self, object: int) -> None:
         """Removes an object; its id is not used again."""
     def set_resolution(self, resolution: float | None) -> None:

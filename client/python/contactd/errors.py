@@ -35,6 +35,7 @@ class ErrorCode(enum.IntEnum):
     BAD_NUMBER = 25
     UNBOUNDED = 26
     SESSION_ENDED = 27
+    RECORDING = 28
 
 
 class Error(Exception):

@@ -41,6 +41,23 @@ class Model(NamedTuple):
     warnings: list[str]
 
 
+class Recording(NamedTuple):
+    """What was recorded."""
+
+    #: The file.
+    path: str
+    #: Steps that stand in it, or are on their way to it.
+    steps: int
+    #: Steps that were left out because the recorder could not keep up.
+    dropped: int
+    #: Steps that stand in it without a picture, for the same reason.
+    without_picture: int
+    #: Bytes written.
+    bytes: int
+    #: Why it has ended before its time; empty: it has not.
+    failure: str
+
+
 class Region(NamedTuple):
     """A contact region of a pair."""
 
@@ -190,6 +207,14 @@ class Session(_native.Session):
         frame. ``at``: where the object stands. Poses are a ``Pose``, a pair of position and quaternion x y z w, or a position.
         """
         return self._add_object(name, _id(model), group, (fixed, rotates, max_speed), (pose(place), pose(at)))
+
+    def recording(self) -> Recording:
+        """What was recorded so far, since ``record``."""
+        return Recording(*self._recorded(False))
+
+    def stop_recording(self) -> Recording:
+        """Ends the recording: its file is complete when this returns."""
+        return Recording(*self._recorded(True))
 
     def set_rules(self, rules: Iterable[Rule]) -> None:
         """Replaces the session's rules; ``Refused`` with the index of a bad one."""

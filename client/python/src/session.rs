@@ -27,6 +27,9 @@ type Inner = contactd_client::Session<Box<dyn Transport>>;
 /// A model: id, faces (primitive, name, face, subtracted), warnings.
 type Loaded = (u32, Vec<(u32, String, String, bool)>, Vec<String>);
 
+/// What was recorded: file, steps, left out, without a picture, bytes, why it failed.
+type Recorded = (String, u64, u64, u64, u64, String);
+
 /// Longest wait between two looks for signals (Ctrl-C).
 const SLICE: Duration = Duration::from_millis(100);
 
@@ -290,6 +293,21 @@ impl Session {
     /// Removes an object; its id is not used again.
     fn remove_object(slf: &Bound<'_, Self>, object: u32) -> PyResult<()> {
         Self::call(slf, move |s| s.remove_object(object))
+    }
+
+    /// Records the session's steps from now on into a new MCAP file, until ``stop_recording`` or the end of the session.
+    fn record(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
+        Self::call(slf, move |s| s.record(path))
+    }
+
+    fn _recorded(slf: &Bound<'_, Self>, stop: bool) -> PyResult<Recorded> {
+        let status = Self::call(slf, move |s| if stop { s.stop_recording() } else { s.recording() })?;
+        Ok((status.path, status.steps, status.dropped, status.without_picture, status.bytes, status.failure))
+    }
+
+    /// Writes the last step as a scene in a new folder, for ``contactd check``; returns the scene's path.
+    fn save_step(slf: &Bound<'_, Self>, folder: PathBuf) -> PyResult<PathBuf> {
+        Self::call(slf, move |s| s.save_step(folder))
     }
 
     fn _set_rules(slf: &Bound<'_, Self>, rules: Vec<Bound<'_, PyAny>>) -> PyResult<()> {

@@ -3,8 +3,8 @@
 use super::control::{self, Control};
 use crate::Error;
 use contactd_proto::ErrorCode;
-use contactd_proto::control::{Answer, Command, ServerStatus};
-use contactd_proto::names::Address;
+use contactd_proto::control::{Answer, Command, RecordingOrder, RecordingStatus, ServerStatus};
+use contactd_proto::names::{Address, start_of_process};
 use std::time::Duration;
 
 /// What the server at `address` says of its sessions and steps. It answers from what it has counted: no step waits for it.
@@ -26,6 +26,32 @@ pub fn status(address: &Address, timeout: Duration) -> Result<ServerStatus, Erro
 pub fn end_session(address: &Address, session: u64, timeout: Duration) -> Result<(), Error> {
     match ask(address, Command::EndSession(session), timeout)? {
         Answer::Done => Ok(()),
+        other => Err(unexpected(other)),
+    }
+}
+
+/// Has the server at `address` record steps into a new file (its whole path), of one session or of all, until this process ends or
+/// `recording` stops it.
+///
+/// # Errors
+/// As `status`; `Refused`: there is no such session (`SessionGone`); it records already, has a deadline, the file exists or cannot be
+/// made (`Recording`).
+pub fn record(address: &Address, path: &str, session: Option<u64>, timeout: Duration) -> Result<(), Error> {
+    let pid = std::process::id();
+    let process = (pid, start_of_process(pid).unwrap_or(0));
+    match ask(address, Command::Record(RecordingOrder { path: path.into(), session, process }), timeout)? {
+        Answer::Done => Ok(()),
+        other => Err(unexpected(other)),
+    }
+}
+
+/// What was recorded by what `record` began; with `stop` it ends, and its file is complete.
+///
+/// # Errors
+/// As `status`; `Refused` with `Recording` where nothing is recorded.
+pub fn recording(address: &Address, stop: bool, timeout: Duration) -> Result<RecordingStatus, Error> {
+    match ask(address, Command::Recording { stop }, timeout)? {
+        Answer::Recorded(status) => Ok(status),
         other => Err(unexpected(other)),
     }
 }

@@ -31,7 +31,7 @@ pub enum Named {
 }
 
 /// A file that another one names, in memory.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, bincode::Encode, bincode::Decode)]
 pub struct Attachment {
     /// As the other one names it; of a font what `of_font` says.
     pub name: String,

@@ -43,6 +43,9 @@ pub struct ServerConfig {
     /// A folder of this machine: texts that clients send may import files of it and below, by names relative to it. None: a text
     /// that is sent names no files.
     pub import_root: Option<PathBuf>,
+    /// A folder in which each start of the server records all of its steps, into a file of its own (docs/record.md). None: nothing is
+    /// recorded unless somebody asks for it.
+    pub record: Option<PathBuf>,
     /// How much a server tells on standard error.
     pub log: Level,
 }
@@ -91,6 +94,7 @@ impl Default for ServerConfig {
             cache: CacheFolder::default(),
             cache_mb: crate::cache::DEFAULT_BYTES >> 20,
             import_root: None,
+            record: None,
             log: Level::default(),
         }
     }

@@ -1,11 +1,11 @@
-//! Imports and mass properties: what takes too long for the loop, and too long for other sessions to wait for.
+//! Imports, mass properties and scenes that are written: what takes too long for the loop, and too long for other sessions to wait for.
 //!
 //! Each job has threads of its own, of low priority, so the system shares the cores between the jobs of all sessions
 //! whatever they cost, and gives them to steps first. A session has one job at a time. What nobody waits for any more ends at
 //! its next point (`math::halt`).
 
 use super::models::{Loaded, Models};
-use super::scene::{Import, Integration, refused};
+use super::scene::{Import, Integration, Save, refused};
 use crate::math::halt::{self, Halt};
 use crate::world::{Refusal, yield_to_others};
 use contactd_proto::ErrorCode;
@@ -19,6 +19,8 @@ pub enum JobKind {
     Import(Import),
     /// A model to be integrated over.
     Integrate(Integration),
+    /// A step to be written.
+    Save(Save),
 }
 
 /// What came of it.
@@ -26,14 +28,15 @@ pub enum Finished {
     /// The model's id, the bytes of its file, and the model.
     Imported(u32, usize, Result<Arc<Loaded>, Refusal>),
     /// The answer.
-    Integrated(Answer),
+    Answered(Answer),
 }
 
 impl JobKind {
     fn run(self, models: &Models) -> Finished {
         match self {
             JobKind::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
-            JobKind::Integrate(integration) => Finished::Integrated(integration.answer()),
+            JobKind::Integrate(integration) => Finished::Answered(integration.answer()),
+            JobKind::Save(save) => Finished::Answered(save.answer()),
         }
     }
 }
@@ -66,7 +69,7 @@ impl Job {
         threads.spawn(move || {
             // What a job's own handling of faults lets through must not end the server.
             let finished = halt::catch(|| work.run(&models))
-                .unwrap_or_else(|_| Finished::Integrated(refused(Refusal::new(ErrorCode::Internal, "the job failed"))));
+                .unwrap_or_else(|_| Finished::Answered(refused(Refusal::new(ErrorCode::Internal, "the job failed"))));
             done(finished);
         });
         Ok(Self { halt, _threads: threads })
@@ -115,7 +118,7 @@ mod tests {
         let mut answers: Vec<(u32, bool)> = (0..2)
             .map(|_| match from.recv_timeout(Duration::from_secs(60)).unwrap() {
                 (model, Finished::Imported(_, _, loaded)) => (model, loaded.is_ok()),
-                (model, Finished::Integrated(_)) => (model, false),
+                (model, Finished::Answered(_)) => (model, false),
             })
             .collect();
         answers.sort_unstable();

@@ -15,6 +15,7 @@ use super::log::Log;
 use super::manager::Manager;
 use super::models::Models;
 use super::port::{CommandCall, Port, StepCall, Wake};
+use super::recordings::Recordings;
 use super::relay::Relay;
 use super::scene::{CommandOutcome, Scene, refusal, refused};
 use super::session::{Over, Session, fresh_heed};
@@ -44,6 +45,8 @@ const CALM: u32 = 16;
 const DRAINED: Duration = Duration::from_secs(3);
 /// How long it waits for what it has cancelled.
 const CANCELLED: Duration = Duration::from_secs(2);
+/// How long it waits for the files of its recordings, which a thread completes that yields to all others.
+const COMPLETED: Duration = Duration::from_secs(20);
 /// How many sessions that were ended from outside are remembered.
 const REMEMBERED: usize = 1000;
 /// The part of a deadline that is left to the reply.
@@ -71,6 +74,7 @@ pub struct Lead<P: Port> {
     port: P,
     models: Arc<Models>,
     config: ServerConfig,
+    recordings: Recordings<P>,
     last_session: u64,
     steps: u64,
     tally: Tally,
@@ -200,6 +204,7 @@ impl<P: Port> Lead<P> {
             models: Arc::new(Models::new(&config)),
             log: Log::new(config.log),
             config,
+            recordings: Recordings::default(),
             last_session: 0,
             steps: 0,
             tally: Tally::new(Instant::now()),
@@ -264,6 +269,7 @@ impl<P: Port> Lead<P> {
             heard = true;
             match report {
                 Report::Job(finished) => self.finished(session, finished),
+                Report::Recorded(serial, status) => self.recorded(serial, status),
                 Report::Stepped { scene, did, took, short, thread } => {
                     self.count(session, &did, took);
                     self.stepped(session, short, thread);
@@ -338,6 +344,8 @@ impl<P: Port> Lead<P> {
             }
             return None;
         };
+        let mut scene = scene;
+        scene.record(self.recordings.number(), || self.recordings.tap(request.session));
         if self.config.deadline_ms > 0 {
             let has_left = session.thread.is_some();
             session.heed = session.heed.next(Some(deadline(&self.config)));
@@ -387,6 +395,11 @@ impl<P: Port> Lead<P> {
         match envelope.command {
             Command::Status if is_mine => return answer(call, &Answer::Status(self.status())),
             Command::EndSession(which) if is_mine => return answer(call, &self.end_from_outside(which)),
+            Command::Record(order) if is_mine => {
+                let begun = self.record(id, &order);
+                return answer(call, &begun.map_or_else(refused, |()| Answer::Done));
+            }
+            Command::Recording { stop } if is_mine => return self.tell_of_recording(id, stop, call),
             _ => {}
         }
         let session = if is_mine { self.sessions.get_mut(&id) } else { None };
@@ -406,6 +419,7 @@ impl<P: Port> Lead<P> {
             let detail = if session.waiting { "a model is being imported or integrated over" } else { "a step runs" };
             return answer(call, &refused(Refusal::new(ErrorCode::Busy, detail)));
         };
+        scene.record(self.recordings.number(), || self.recordings.tap(id));
         let outcome = scene.command(envelope.command);
         session.counts = scene.counts();
         let work = match outcome {
@@ -417,6 +431,7 @@ impl<P: Port> Lead<P> {
             }
             CommandOutcome::Import(import) => JobKind::Import(import),
             CommandOutcome::Integrate(integration) => JobKind::Integrate(integration),
+            CommandOutcome::Save(save) => JobKind::Save(save),
         };
         // A core is left to the loop; the others are shared between the jobs by the system.
         let threads = self.cores.saturating_sub(1) / (self.pending.len() + 1);
@@ -479,7 +494,7 @@ impl<P: Port> Lead<P> {
                 said
             }
             (Finished::Imported(..), None) => refused(Refusal::new(ErrorCode::Busy, "a step runs")),
-            (Finished::Integrated(said), _) => said,
+            (Finished::Answered(said), _) => said,
         };
         debug_refusal(&mut self.log, id, &said);
         answer(call, &said);
@@ -489,6 +504,7 @@ impl<P: Port> Lead<P> {
     /// Ends a session: what runs for it is cancelled, and its scene freed on another thread.
     fn remove(&mut self, id: u64, why: &str) {
         self.pending.remove(&id);
+        self.recordings.session_is_over(id);
         let Some(mut session) = self.sessions.remove(&id) else { return };
         let (process, steps) = (session.process, session.steps);
         self.log.info(|| format!("session {id} of process {process} is ended after {steps} steps: {why}"));
@@ -557,6 +573,9 @@ impl<P: Port> Lead<P> {
             self.port.sweep_dead();
         }
         self.tally.turn(Instant::now());
+        for file in self.recordings.bury() {
+            self.log.info(|| format!("{file}: the process that asked for the recording has ended"));
+        }
         if self.hangup.swap(false, Ordering::Relaxed) {
             self.log.warn("SIGHUP: there is nothing to read again, the server goes on");
         }
@@ -573,7 +592,8 @@ impl<P: Port> Lead<P> {
 
     /// Ends what runs for its sessions, and waits for it.
     fn end(&mut self) {
-        let until = Instant::now() + CANCELLED;
+        let recordings = self.recordings.end_all();
+        let until = Instant::now() + if recordings > 0 { COMPLETED } else { CANCELLED };
         for (id, session) in &mut self.sessions {
             session.heed.halt();
             session.thread = None;
@@ -581,12 +601,20 @@ impl<P: Port> Lead<P> {
             self.log
                 .info(|| format!("session {id} of process {process} is ended after {steps} steps: the server stops"));
         }
-        let mut left: usize = self.pending.len();
+        let mut left: usize = self.pending.len() + recordings;
         self.pending.clear();
         while left > 0
             && let Ok((_, report)) = self.reports.recv_timeout(until.saturating_duration_since(Instant::now()))
         {
-            left -= usize::from(matches!(report, Report::Job(_)));
+            match report {
+                Report::Job(_) => left -= 1,
+                Report::Recorded(serial, status) => {
+                    left -= 1;
+                    self.recorded(serial, status);
+                }
+                // Its scene is freed here.
+                Report::Stepped { .. } => {}
+            }
         }
     }
 
@@ -653,5 +681,6 @@ fn answer(call: impl CommandCall, answer: &Answer) {
     }
 }
 
+mod recorded;
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,9 @@
 
 use super::config::ServerConfig;
 use crate::cache::{self, Cache, Prepared};
-use crate::import::{self, Attachment, ImportError, Problem, Source};
+use crate::import::{self, ImportError, Problem, Source};
 use crate::math::halt;
+use crate::recording::{Content, Part};
 use crate::solid::Sense;
 use crate::world::{MeasuredModel, Refusal};
 use contactd_proto::ErrorCode;
@@ -21,14 +22,20 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 pub struct Loaded {
     /// The model and its measures.
     pub part: Arc<MeasuredModel>,
+    /// What it was made of.
+    pub content: Arc<Content>,
     /// Its faces by id.
     pub faces: Vec<FaceName>,
     /// What the import had to say.
     pub warnings: Vec<String>,
 }
 
-/// A file's content with that of the files that it names, and how it is taken.
-type Key = (Facets, &'static str, Arc<[u8]>, Vec<Attachment>);
+impl Loaded {
+    /// As recordings have it.
+    pub fn part(&self) -> Part {
+        Part { content: self.content.clone(), model: self.part.clone() }
+    }
+}
 
 /// The models in use.
 #[derive(Debug)]
@@ -37,7 +44,7 @@ pub struct Models {
     cache: Option<Cache>,
     /// Where texts may import files from.
     root: Option<PathBuf>,
-    loaded: Mutex<HashMap<Key, Weak<Loaded>>>,
+    loaded: Mutex<HashMap<Arc<Content>, Weak<Loaded>>>,
 }
 
 impl Models {
@@ -58,19 +65,24 @@ impl Models {
         let source = Source { name, format, bytes, attached: None };
         let format = source.format().map_err(|e| Refusal::new(ErrorCode::Model, e.to_string()))?;
         let attached = self.root.as_ref().map(|root| import::files_of(&source, root, &self.limits));
-        let source = Source { attached: attached.as_deref(), ..source };
-        let key = (facets, format.name, Arc::<[u8]>::from(bytes.as_slice()), attached.clone().unwrap_or_default());
-        let known = self.loaded.lock().unwrap_or_else(PoisonError::into_inner).get(&key).and_then(Weak::upgrade);
+        let (name, format) = (name.clone(), format.name.to_owned());
+        self.of_content(Arc::new(Content { name, format, facets, bytes: bytes.clone(), attached }))
+    }
+
+    /// The model of a content, imported if it is not in use already.
+    ///
+    /// # Errors
+    /// As `load`.
+    pub fn of_content(&self, content: Arc<Content>) -> Result<Arc<Loaded>, Refusal> {
+        let known = self.loaded.lock().unwrap_or_else(PoisonError::into_inner).get(&content).and_then(Weak::upgrade);
         if let Some(known) = known {
             return Ok(known);
         }
-        let made = halt::catch(|| self.make(&source, facets));
-        let loaded =
-            made.unwrap_or_else(|_| Err(Refusal::new(ErrorCode::Internal, format!("{name}: import failed"))))?;
-        let loaded = Arc::new(loaded);
+        let failed = || Refusal::new(ErrorCode::Internal, format!("{}: import failed", content.name));
+        let loaded = Arc::new(halt::catch(|| self.make(&content)).unwrap_or_else(|_| Err(failed()))?);
         let mut map = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
         map.retain(|_, model| model.strong_count() > 0);
-        map.insert(key, Arc::downgrade(&loaded));
+        map.insert(content, Arc::downgrade(&loaded));
         Ok(loaded)
     }
 
@@ -80,7 +92,9 @@ impl Models {
         map.values().filter(|model| model.strong_count() > 0).count()
     }
 
-    fn make(&self, source: &Source, facets: Facets) -> Result<Loaded, Refusal> {
+    fn make(&self, content: &Arc<Content>) -> Result<Loaded, Refusal> {
+        let Content { name, format, facets, bytes, attached } = &**content;
+        let source = &Source { name, format, bytes, attached: attached.as_deref() };
         let facets = match facets {
             Facets::Auto => import::Facets::Auto,
             Facets::Exact => import::Facets::Exact,
@@ -94,7 +108,7 @@ impl Models {
         if let Some(trouble) = &prepared.trouble {
             warn(trouble);
         }
-        Ok(loaded(prepared))
+        Ok(loaded(prepared, content.clone()))
     }
 }
 
@@ -103,7 +117,7 @@ pub fn warn(sentence: &str) {
     let _ = writeln!(std::io::stderr(), "contactd: {sentence}");
 }
 
-fn loaded(Prepared { model, notes, .. }: Prepared) -> Loaded {
+fn loaded(Prepared { model, notes, .. }: Prepared, content: Arc<Content>) -> Loaded {
     let solid = &model.solid;
     let faces = (0..solid.faces.len()).map(|id| {
         let primitive = solid.face_owner[id];
@@ -120,6 +134,7 @@ fn loaded(Prepared { model, notes, .. }: Prepared) -> Loaded {
         faces,
         warnings: notes.iter().map(ToString::to_string).collect(),
         part: Arc::new(MeasuredModel::new(model)),
+        content,
     }
 }
 

@@ -4,13 +4,17 @@ use super::config::ServerConfig;
 use super::models::Loaded;
 use crate::math::halt;
 use crate::octree::mass::mass_properties;
+use crate::recording::{Change, Opening, SceneFolder, Standing, Tap};
 use crate::world::{Heed, ObjectSpec, Refusal, StepOptions, World, record};
-use contactd_proto::control::{Answer, Command, Facets, ModelFile, ObjectSpec as WireObject, WireMass};
+use contactd_proto::control::{
+    Answer, Command, Facets, ModelFile, ObjectSpec as WireObject, WireMass, WireRule, WireTrack,
+};
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::step::{ASK_ALL, ASK_CLEAR, ASK_DETAILS, ASK_FIRST, NO_INDEX, STEP_REFUSED};
 use contactd_proto::{ContactRecord, ErrorCode, MassOptions, PoseRecord, StepReply, StepRequest};
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A session's world and models.
@@ -25,6 +29,11 @@ pub struct Scene {
     max_records: usize,
     /// Set for good when the engine failed within a step: its world can no longer be trusted.
     broken: bool,
+    /// Duration of its last step, seconds.
+    dt: f64,
+    /// Where its steps are recorded, if anywhere; and what made it so, by its number.
+    tap: Option<Box<Tap>>,
+    tapped: u64,
 }
 
 /// What becomes of a command.
@@ -36,6 +45,25 @@ pub enum CommandOutcome {
     Import(Import),
     /// A model has to be integrated over; `Integration::answer` is the answer.
     Integrate(Integration),
+    /// A step has to be written; `Save::answer` is the answer.
+    Save(Save),
+}
+
+/// A step that is to be written as a scene folder.
+#[derive(Debug)]
+pub struct Save {
+    folder: PathBuf,
+    scene: SceneFolder,
+}
+
+impl Save {
+    /// Writes it, and makes the answer.
+    pub fn answer(&self) -> Answer {
+        match self.scene.write(&self.folder) {
+            Ok(()) => Answer::Done,
+            Err(sentence) => refused(Refusal::new(ErrorCode::Recording, sentence)),
+        }
+    }
 }
 
 /// A model whose mass properties are asked for.
@@ -83,6 +111,16 @@ impl Scene {
             most: config.models_mb << 20,
             max_records: config.records,
             broken: false,
+            dt: 0.0,
+            tap: None,
+            tapped: 0,
+        }
+    }
+
+    /// Records its steps from now on, or no longer; nothing where `number` says what was said before.
+    pub fn record(&mut self, number: u64, tap: impl FnOnce() -> Option<Tap>) {
+        if self.tapped != number {
+            (self.tapped, self.tap) = (number, tap().map(Box::new));
         }
     }
 
@@ -94,7 +132,13 @@ impl Scene {
 
     /// Obeys a command that is not the server's own.
     pub fn command(&mut self, command: Command) -> CommandOutcome {
-        self.obey(command).unwrap_or_else(|refusal| CommandOutcome::Answered(refused(refusal)))
+        let recorded = self.tap.as_ref().filter(|tap| tap.is_open() && changes(&command)).map(|_| command.clone());
+        let outcome = self.obey(command).unwrap_or_else(|refusal| CommandOutcome::Answered(refused(refusal)));
+        if let (Some(tap), Some(command), CommandOutcome::Answered(Answer::Done)) = (&mut self.tap, recorded, &outcome)
+        {
+            tap.change(Change::Command(command), None);
+        }
+        outcome
     }
 
     /// Takes an imported model, of a text of so many bytes.
@@ -108,6 +152,9 @@ impl Scene {
                 let answer = Answer::Loaded { faces: loaded.faces.clone(), warnings: loaded.warnings.clone() };
                 self.last_model = self.last_model.max(model);
                 self.taken += more;
+                if let Some(tap) = &mut self.tap {
+                    tap.change(Change::Model(model, [0; 32]), Some(loaded.part()));
+                }
                 self.models.insert(model, loaded);
                 answer
             }
@@ -127,7 +174,12 @@ impl Scene {
 
     fn obey(&mut self, command: Command) -> Result<CommandOutcome, Refusal> {
         match command {
-            Command::Open { .. } | Command::Close | Command::Status | Command::EndSession(_) => {
+            Command::Open { .. }
+            | Command::Close
+            | Command::Status
+            | Command::EndSession(_)
+            | Command::Record(_)
+            | Command::Recording { .. } => {
                 return Err(Refusal::new(ErrorCode::BadCommand, "the command is the server's own"));
             }
             Command::LoadModel { model, file, facets } => {
@@ -163,6 +215,9 @@ impl Scene {
                 let options = options.map_err(|sentence| Refusal::new(ErrorCode::BadNumber, sentence))?;
                 return Ok(CommandOutcome::Integrate(Integration { model: loaded.clone(), options }));
             }
+            Command::SaveStep(folder) => {
+                return Ok(CommandOutcome::Save(Save { folder: folder.into(), scene: self.last_step() }));
+            }
         }
         Ok(CommandOutcome::Answered(Answer::Done))
     }
@@ -188,9 +243,100 @@ impl Scene {
         })
     }
 
+    /// The ids of its models, by where what was made of them lies in memory.
+    fn ids_of_models(&self) -> HashMap<usize, u32> {
+        self.models.iter().map(|(id, loaded)| (Arc::as_ptr(&loaded.part) as usize, *id)).collect()
+    }
+
+    /// Its objects as they were added, but for their poses: those are where their last motion began.
+    fn objects(&self) -> impl Iterator<Item = WireObject> {
+        let ids = self.ids_of_models();
+        self.world.bodies().iter().map(move |body| WireObject {
+            id: body.id,
+            // Models that are one have several ids: any of them says which.
+            model: ids.get(&(Arc::as_ptr(&body.part) as usize)).copied().unwrap_or_default(),
+            name: body.name.clone(),
+            group: self.world.group_of(body).to_owned(),
+            is_static: body.is_static,
+            rotates: body.rotates,
+            max_speed: body.max_speed,
+            place: body.place.into(),
+            pose: body.motion_state.motion.start.into(),
+        })
+    }
+
+    /// The session as it stands.
+    fn opening(&self) -> Opening {
+        let tracks = self.world.bodies().iter().map(|body| WireTrack::of(body.id, &body.motion_state));
+        Opening {
+            objects: self.objects().collect(),
+            tracks: tracks.collect(),
+            rules: self.world.rules().iter().map(WireRule::from).collect(),
+            resolution: self.world.resolution(),
+            ..Opening::default()
+        }
+    }
+
+    /// Its last step as a scene.
+    fn last_step(&self) -> SceneFolder {
+        let motion_states = self.world.bodies().iter().map(|body| body.motion_state);
+        let objects = self.objects().zip(motion_states).map(|(spec, motion_state)| Standing { spec, motion_state });
+        SceneFolder {
+            title: "The last step of a session.".into(),
+            models: self.models.iter().map(|(id, loaded)| (*id, loaded.content.clone())).collect(),
+            objects: objects.collect(),
+            rules: self.world.rules().to_vec(),
+            resolution: self.world.resolution(),
+            dt: self.dt,
+        }
+    }
+
     /// One step, which heeds what is said to it meanwhile. `request` is a copy of the header; `write` is called once with the number of slots (0 for a refusal),
     /// the header of the reply and the slots by index, and passes them on.
     pub fn step<R>(
+        &mut self,
+        request: &StepRequest,
+        records: &[PoseRecord],
+        heed: Option<&Heed>,
+        write: impl FnOnce(usize, StepReply, &dyn Fn(usize) -> ContactRecord) -> R,
+    ) -> R {
+        match self.tap.take() {
+            None => self.take_step(request, records, heed, write),
+            Some(tap) => self.record_step(tap, (request, records), heed, write),
+        }
+    }
+
+    /// The same, recorded.
+    fn record_step<R>(
+        &mut self,
+        mut tap: Box<Tap>,
+        (request, records): (&StepRequest, &[PoseRecord]),
+        heed: Option<&Heed>,
+        write: impl FnOnce(usize, StepReply, &dyn Fn(usize) -> ContactRecord) -> R,
+    ) -> R {
+        if tap.wants_opening() {
+            let parts = self.models.iter().map(|(id, loaded)| (*id, loaded.part())).collect();
+            if tap.open(self.opening(), parts) {
+                // What a limit of work leaves open depends on what is remembered: whoever repeats it remembers nothing.
+                self.world.renew();
+            }
+        }
+        let mut message = tap.batch(request, records);
+        let batch = std::mem::take(&mut message.records);
+        let told = self.take_step(request, &batch, heed, |n, reply, slot| {
+            message.answer(&reply, n, slot);
+            write(n, reply, &|i| message.slots[i])
+        });
+        message.records = batch;
+        match heed.is_some_and(Heed::is_over) {
+            true => tap.cut_short(message),
+            false => tap.answered(message),
+        }
+        self.tap = Some(tap);
+        told
+    }
+
+    fn take_step<R>(
         &mut self,
         request: &StepRequest,
         records: &[PoseRecord],
@@ -226,6 +372,7 @@ impl Scene {
             cell_limit: request.cell_limit.into(),
             batch_limit: request.batch_limit.into(),
         };
+        self.dt = request.dt;
         let world = &mut self.world;
         let stepped = catch_unwind(AssertUnwindSafe(|| world.step_heeding(&records[..n], &options, heed).map(|_| ())));
         match stepped {
@@ -242,6 +389,18 @@ impl Scene {
             }
         }
     }
+}
+
+/// True for a command that changes what steps answer.
+fn changes(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::AddObject(_)
+            | Command::RemoveObject(_)
+            | Command::SetRules(_)
+            | Command::SetResolution(_)
+            | Command::Restore(_)
+    )
 }
 
 /// The reply to a step that was refused.

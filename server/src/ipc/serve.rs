@@ -19,6 +19,9 @@ pub enum ServeError {
     /// A thread cannot be started.
     #[error("expected to start threads, found: {0}")]
     Threads(String),
+    /// Its steps cannot be recorded, as its settings ask for.
+    #[error("{0}")]
+    Recording(crate::world::Refusal),
     /// Shared memory failed.
     #[error("{0}")]
     System(Error),
@@ -47,14 +50,20 @@ impl Server {
     /// Takes the place, creates the services, and tells clients.
     ///
     /// # Errors
-    /// Another server of the name runs; folders are not private; shared memory fails; no threads can be started.
+    /// Another server of the name runs; folders are not private; shared memory fails; no threads can be started; its steps cannot be
+    /// recorded, as its settings ask for.
     pub fn start(address: &Address, config: ServerConfig) -> Result<Self, ServeError> {
         let root = Root::take(address)?;
+        let file = |folder: &std::path::PathBuf| folder.join(format!("{}-{:016x}.mcap", address.name(), root.epoch()));
+        let recording = config.record.as_ref().map(file);
         ready_threads().map_err(ServeError::Threads)?;
         let (services, bell) =
             Services::create(address, root.epoch(), &config, lead::status(root.epoch(), &config, 0, 0))?;
+        let mut lead = Lead::new(config, root.epoch(), services, bell);
+        if let Some(path) = recording {
+            lead.record_all(path.display().to_string()).map_err(ServeError::Recording)?;
+        }
         root.publish()?;
-        let lead = Lead::new(config, root.epoch(), services, bell);
         Ok(Self { lead: Some(Box::new(lead)), _root: root })
     }
 

@@ -4,6 +4,7 @@ use super::jobs::Finished;
 use super::port::{Bell, Port, StepCall, Wake};
 use super::scene::Scene;
 use crate::world::Heed;
+use contactd_proto::control::RecordingStatus;
 use contactd_proto::step::ASK_POLLING;
 use contactd_proto::{EffectCounters, StepRequest};
 use std::sync::Arc;
@@ -31,6 +32,8 @@ impl<P: Port> Mailbox<P> {
 pub enum Report<P: Port> {
     /// A job is done.
     Job(Finished),
+    /// A recording has ended; of no session.
+    Recorded(u64, RecordingStatus),
     /// A step is done, or as good as.
     Stepped {
         /// The scene comes back.

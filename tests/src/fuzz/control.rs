@@ -2,8 +2,8 @@
 
 use super::Target;
 use contactd_proto::control::{
-    Answer, Command, Envelope, Facets, ModelFile, ObjectSpec, ServerStatus, SessionStatus, WireMass, WireRule,
-    WireTrack, decode, encode,
+    Answer, Command, Envelope, Facets, ModelFile, ObjectSpec, RecordingOrder, RecordingStatus, ServerStatus,
+    SessionStatus, WireMass, WireRule, WireTrack, decode, encode,
 };
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, MotionState, Pose, Rule};
 use glam::DVec3;
@@ -43,13 +43,18 @@ fn seeds() -> Vec<Vec<u8>> {
         Command::MassProperties { model: 1, tolerance: 1e-6, boxes: 1_000_000 },
         Command::Status,
         Command::EndSession(3),
+        Command::Record(RecordingOrder { path: "/a".into(), session: Some(3), process: (300, 70_000) }),
+        Command::Recording { stop: true },
+        Command::SaveStep("/a".into()),
     ];
     let envelope = |command| encode(&Envelope { epoch: 9, session: 3, command });
     let refused = Answer::Refused { code: 3, index: u32::MAX, detail: "why".into() };
     let loaded = Answer::Loaded { faces: vec![], warnings: vec!["snapped".into()] };
     let sessions = vec![SessionStatus { id: 3, process: 300, ..SessionStatus::default() }];
     let status = Answer::Status(ServerStatus { pid: 200, sessions, ..ServerStatus::default() });
-    let answers = [Answer::Done, refused, loaded, Answer::Mass(WireMass::from(&MassProperties::NOTHING)), status];
+    let recorded = Answer::Recorded(RecordingStatus { path: "/a".into(), steps: 3, ..RecordingStatus::default() });
+    let mass = Answer::Mass(WireMass::from(&MassProperties::NOTHING));
+    let answers = [Answer::Done, refused, loaded, mass, status, recorded];
     let answers = answers.iter().map(encode);
     commands.into_iter().map(envelope).chain(answers).map(|bytes| bytes.expect("a small message")).collect()
 }
@@ -111,6 +116,9 @@ fn taken(command: Command) -> Result<String, String> {
         Command::Close => "close".into(),
         Command::Status => "status".into(),
         Command::EndSession(_) => "end".into(),
+        Command::Record(_) => "record".into(),
+        Command::Recording { .. } => "recording".into(),
+        Command::SaveStep(_) => "save".into(),
         Command::LoadModel { facets, .. } => format!("load {facets:?}"),
         Command::RemoveObject(_) => "remove".into(),
         Command::SetResolution(r) => format!("resolution {:?}", r.map(|r| r.is_finite())),

@@ -3,6 +3,7 @@
 use crate::support::*;
 use contactd_capi::abi::{Mass, Names, Options, Pose};
 use contactd_capi::model::*;
+use contactd_capi::recording::*;
 use contactd_capi::scene::*;
 use contactd_capi::session::*;
 use contactd_capi::step::*;
@@ -41,6 +42,26 @@ fn a_ball_meets_the_rim_of_a_hole() {
     assert_eq!(unsafe { contactd_embedded(null(), &mut again) }, 0);
     assert_eq!(unsafe { (contactd_close(&mut again), contactd_close(&mut again)) }, (0, 0));
     assert!(again.is_null());
+}
+
+#[test]
+fn a_session_is_recorded_and_its_step_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| std::ffi::CString::new(folder.path().join(name).to_str().unwrap()).unwrap();
+    let session = Open::embedded();
+    let (_, ball) = session.scene();
+    done(unsafe { contactd_start_recording(session.0, path("run.mcap").as_ptr()) });
+    assert_eq!(unsafe { contactd_start_recording(session.0, path("again.mcap").as_ptr()) }, 28);
+    session.begin(1)[0] = end(ball, [1.0, 0.0, 0.0]);
+    session.finish();
+    done(unsafe { contactd_save_step(session.0, path("saved").as_ptr()) });
+    assert!(folder.path().join("saved/scene.toml").is_file());
+    let so_far = out(|r| unsafe { contactd_get_recording(session.0, r) });
+    let told = out(|r| unsafe { contactd_stop_recording(session.0, r) });
+    assert_eq!((so_far.steps, told.steps, told.dropped, told.without_picture), (1, 1, 0, 0));
+    assert_eq!(std::fs::metadata(folder.path().join("run.mcap")).unwrap().len(), told.bytes);
+    let mut none = told;
+    assert_eq!(unsafe { contactd_stop_recording(session.0, &mut none) }, 28);
 }
 
 #[test]

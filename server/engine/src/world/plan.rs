@@ -80,6 +80,11 @@ impl Plans {
         g
     }
 
+    /// The name of a group; empty for an index that has none.
+    pub fn group_name(&self, group: u32) -> &str {
+        self.groups.get(group as usize).map_or("", String::as_str)
+    }
+
     /// Replaces the rules.
     pub fn set(&mut self, rules: Vec<Rule>) {
         self.plans.clear();

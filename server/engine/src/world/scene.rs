@@ -200,6 +200,26 @@ impl World {
     pub fn forget(&mut self) {
         self.state.forget(&self.roster.bodies);
     }
+
+    /// Forgets all that steps keep for each other. From here on the world is as one that was made now, of the same bodies on the same
+    /// tracks: its answers are that one's to the bit, also where a limit of work cuts them.
+    pub fn renew(&mut self) {
+        self.state.renew();
+        for body in &mut self.roster.bodies {
+            body.named = [0; 2];
+        }
+        self.forget();
+    }
+
+    /// The name of a body's group.
+    pub fn group_of(&self, body: &Body) -> &str {
+        self.roster.plans.group_name(body.group)
+    }
+
+    /// The resolution of every pair; `None`: each pair its default.
+    pub fn resolution(&self) -> Option<f64> {
+        self.roster.resolution
+    }
 }
 
 /// The pose as a record with a start would set it.

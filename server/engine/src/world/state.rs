@@ -64,6 +64,12 @@ impl StepState {
         }
     }
 
+    /// As of a world that has taken no step; whether notes are taken stays.
+    pub(super) fn renew(&mut self) {
+        let notes = self.notes.is_some().then(Box::default);
+        *self = Self { notes, ..Self::new(self.max_batch) };
+    }
+
     /// The list of neighbours.
     pub(super) fn neighbours(&self) -> &Neighbours {
         &self.neighbours

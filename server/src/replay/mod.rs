@@ -1,0 +1,322 @@
+//! A recording, repeated step by step on an embedded engine, and compared to the bit; and one of its steps as a scene.
+//!
+//! Each opening begins a session anew; what was recorded behind it is asked again in the same order. Answers are the same bits but for
+//! the counts of work: the first that differs is named. Where bodies stand follows from the batches alone, so a step that is only to
+//! be written as a scene needs no search.
+//!
+//! Floor 11: imports `ipc`, `recording` and below.
+
+mod compare;
+
+use crate::ipc::{Embedded, ServerConfig};
+use crate::recording::{About, Change, Entry, FileError, Key, Opening, Recording, SceneFolder, Standing, StepMessage};
+use contactd_client::{Error, Transport};
+use contactd_proto::control::{Answer, Command, ObjectSpec};
+use contactd_proto::step::{NO_INDEX, STEP_REFUSED};
+use contactd_proto::{ErrorCode, MotionState, Rule, Tracks};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+pub use compare::first_difference;
+
+/// Why a recording cannot be repeated.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// Its file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// What stands in it; the file's name, the entry's place.
+    #[error("{0}: {1}")]
+    Content(String, String),
+}
+
+/// The first answer that is not the recorded one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The step's number in the recording, from 1.
+    pub step: u64,
+    /// Its session.
+    pub session: u64,
+    /// Its number in that session.
+    pub own: u64,
+    /// What differs, recorded and repeated.
+    pub what: String,
+}
+
+/// What came of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Replayed {
+    /// Steps that were repeated.
+    pub steps: u64,
+    /// Sessions that they are of.
+    pub sessions: u64,
+    /// Steps that were left out when it was recorded, as far as the file tells.
+    pub dropped: u64,
+    /// The file was cut: it has no end.
+    pub is_cut: bool,
+    /// Version of contactd that has recorded it.
+    pub version: String,
+    /// The first difference, if there is one.
+    pub difference: Option<Difference>,
+}
+
+impl Replayed {
+    /// A few lines.
+    pub fn text(&self) -> String {
+        let many = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
+        let mut out = match &self.difference {
+            None => {
+                format!("{} of {} repeated, all bits equal\n", many(self.steps, "step"), many(self.sessions, "session"))
+            }
+            Some(d) => {
+                let Difference { step, session, own, what } = d;
+                format!(
+                    "step {step} differs (step {own} of session {session}): {what}\n{} before it are equal\n",
+                    step - 1
+                )
+            }
+        };
+        if self.version != env!("CARGO_PKG_VERSION") {
+            out += &format!("contactd {} has recorded, this is {}\n", self.version, env!("CARGO_PKG_VERSION"));
+        }
+        if self.dropped > 0 {
+            out += &format!("{} were left out when it was recorded\n", many(self.dropped, "step"));
+        }
+        if self.is_cut {
+            out += "the file has no end: it was cut, and read up to there\n";
+        }
+        out
+    }
+}
+
+/// Repeats a recording up to its end, to where it was cut, or to the first difference. `told` is called with every step's number.
+///
+/// # Errors
+/// A file that is no recording or is damaged; one that tells what no session has done.
+pub fn replay(path: &Path, mut told: impl FnMut(u64)) -> Result<Replayed, ReplayError> {
+    let mut recording = Recording::open(path)?;
+    let name = path.display().to_string();
+    let mut out = Replayed { version: recording.about.version.clone(), ..Replayed::default() };
+    let root = Embedded::new(&config(&recording.about));
+    let mut sessions: BTreeMap<u64, Embedded> = BTreeMap::new();
+    while let Some(entry) = recording.next_entry()? {
+        let refused = |what: String| ReplayError::Content(name.clone(), what);
+        match entry {
+            Entry::Opening(session, opening) => {
+                out.dropped += opening.dropped;
+                let engine = open(&root, &recording, &opening);
+                // The one before it has its models: those that are the same are not imported again.
+                sessions.insert(
+                    session,
+                    engine.map_err(|e| refused(format!("the opening after step {}: {e}", out.steps)))?,
+                );
+            }
+            Entry::Change(session, change) => {
+                let engine = of(&mut sessions, session).map_err(refused)?;
+                alter(engine, &recording, change)
+                    .map_err(|e| refused(format!("a change after step {}: {e}", out.steps)))?;
+            }
+            Entry::Step(step) => {
+                out.steps += 1;
+                told(out.steps);
+                let engine = of(&mut sessions, step.session).map_err(refused)?;
+                let what = again(engine, &step).map_err(|e| refused(format!("step {}: {e}", out.steps)))?;
+                if let Some(what) = what {
+                    let (session, own) = (step.session, step.request.step);
+                    out.difference = Some(Difference { step: out.steps, session, own, what });
+                    break;
+                }
+            }
+        }
+    }
+    out.sessions = sessions.len() as u64;
+    out.is_cut = recording.is_cut;
+    let said = recording.end.as_ref().and_then(|end| end.get("dropped")).and_then(|n| n.parse().ok());
+    out.dropped = said.unwrap_or(out.dropped);
+    Ok(out)
+}
+
+/// The settings of the engine that was recorded.
+fn config(about: &About) -> ServerConfig {
+    let About { objects, batch, records, text, nodes, depth, faces, models_mb, .. } = *about;
+    ServerConfig { objects, batch, records, text, nodes, depth, faces, models_mb, ..ServerConfig::default() }
+}
+
+fn of(sessions: &mut BTreeMap<u64, Embedded>, session: u64) -> Result<&mut Embedded, String> {
+    sessions.get_mut(&session).ok_or_else(|| format!("session {session} has no opening"))
+}
+
+/// A session as it stood.
+fn open(root: &Embedded, recording: &Recording, opening: &Opening) -> Result<Embedded, String> {
+    let mut engine = root.beside();
+    for (id, key) in &opening.models {
+        load(&mut engine, recording, *id, key)?;
+    }
+    // The resolution first: objects were taken under it.
+    ask(&mut engine, Command::SetResolution(opening.resolution))?;
+    for object in &opening.objects {
+        ask(&mut engine, Command::AddObject(object.clone()))?;
+    }
+    ask(&mut engine, Command::SetRules(opening.rules.clone()))?;
+    ask(&mut engine, Command::Restore(opening.tracks.clone()))?;
+    Ok(engine)
+}
+
+fn load(engine: &mut Embedded, recording: &Recording, id: u32, key: &Key) -> Result<(), String> {
+    let content = recording.content(key).ok_or_else(|| format!("model {id} is not in the file"))?;
+    match engine.load_content(id, content) {
+        Answer::Loaded { .. } => Ok(()),
+        other => Err(format!("model {id}: {}", sentence(other))),
+    }
+}
+
+fn alter(engine: &mut Embedded, recording: &Recording, change: Change) -> Result<(), String> {
+    match change {
+        Change::Model(id, key) => load(engine, recording, id, &key),
+        Change::Command(command) => ask(engine, command),
+    }
+}
+
+fn ask(engine: &mut Embedded, command: Command) -> Result<(), String> {
+    match engine.command(command, Duration::MAX).map_err(|e| e.to_string())? {
+        Answer::Done => Ok(()),
+        other => Err(sentence(other)),
+    }
+}
+
+fn sentence(answer: Answer) -> String {
+    match answer {
+        Answer::Refused { code, index, detail } => {
+            let code = ErrorCode::of_number(code).unwrap_or(ErrorCode::Internal);
+            let index = (index != NO_INDEX).then_some(index);
+            format!("it was accepted, and is refused now: {}", Error::Refused { code, index, detail })
+        }
+        other => format!("an answer that does not belong to it: {other:?}"),
+    }
+}
+
+/// Repeats a step; what differs first, if anything does.
+fn again(engine: &mut Embedded, step: &StepMessage) -> Result<Option<String>, String> {
+    let slots = engine.loan(step.records.len()).map_err(|e| e.to_string())?;
+    slots.copy_from_slice(&step.records);
+    engine.send(step.request).map_err(|e| e.to_string())?;
+    let (reply, slots) = engine.reply().ok_or("there is no reply")?;
+    Ok(first_difference((&step.reply, &step.slots), (reply, slots)))
+}
+
+/// A session whose steps are followed without a search.
+#[derive(Default)]
+struct Followed {
+    models: BTreeMap<u32, Key>,
+    objects: BTreeMap<u32, ObjectSpec>,
+    tracks: Tracks,
+    rules: Vec<Rule>,
+    resolution: Option<f64>,
+}
+
+/// Step `number` (from 1) of a recording as a scene folder.
+///
+/// # Errors
+/// As `replay`; there is no such step, or it was refused and moved nothing.
+pub fn scene_of(path: &Path, number: u64) -> Result<SceneFolder, ReplayError> {
+    let mut recording = Recording::open(path)?;
+    let refused = |what: String| ReplayError::Content(path.display().to_string(), what);
+    let mut sessions: BTreeMap<u64, Followed> = BTreeMap::new();
+    let mut steps = 0;
+    while let Some(entry) = recording.next_entry()? {
+        match entry {
+            Entry::Opening(session, opening) => {
+                let followed =
+                    Followed::open(opening).map_err(|e| refused(format!("the opening after step {steps}: {e}")))?;
+                sessions.insert(session, followed);
+            }
+            Entry::Change(session, change) => {
+                let followed =
+                    sessions.get_mut(&session).ok_or_else(|| refused(format!("session {session} has no opening")))?;
+                followed.alter(change).map_err(|e| refused(format!("a change after step {steps}: {e}")))?;
+            }
+            Entry::Step(step) => {
+                steps += 1;
+                let session = step.session;
+                let followed =
+                    sessions.get_mut(&session).ok_or_else(|| refused(format!("session {session} has no opening")))?;
+                if step.reply.status != STEP_REFUSED {
+                    followed.tracks.take(&step.records, step.request.advance);
+                }
+                if steps == number {
+                    return followed
+                        .scene(&recording, number, &step)
+                        .map_err(|e| refused(format!("step {number}: {e}")));
+                }
+            }
+        }
+    }
+    Err(refused(format!("expected a step from 1 to {steps}, found {number}")))
+}
+
+impl Followed {
+    fn open(opening: Opening) -> Result<Self, ErrorCode> {
+        let mut tracks = Tracks::default();
+        for track in &opening.tracks {
+            tracks.put(track.object, track.checked()?);
+        }
+        Ok(Self {
+            models: opening.models.into_iter().collect(),
+            objects: opening.objects.into_iter().map(|o| (o.id, o)).collect(),
+            tracks,
+            rules: opening.rules.into_iter().map(|rule| rule.checked()).collect::<Result<_, _>>()?,
+            resolution: opening.resolution,
+        })
+    }
+
+    fn alter(&mut self, change: Change) -> Result<(), ErrorCode> {
+        match change {
+            Change::Model(id, key) => {
+                self.models.insert(id, key);
+            }
+            Change::Command(Command::AddObject(spec)) => {
+                self.tracks.put(spec.id, MotionState::resting(spec.pose.checked()?));
+                self.objects.insert(spec.id, spec);
+            }
+            Change::Command(Command::RemoveObject(id)) => {
+                self.objects.remove(&id);
+                self.tracks.removed(id);
+            }
+            Change::Command(Command::SetRules(rules)) => {
+                self.rules = rules.into_iter().map(|rule| rule.checked()).collect::<Result<_, _>>()?;
+            }
+            Change::Command(Command::SetResolution(resolution)) => self.resolution = resolution,
+            Change::Command(Command::Restore(tracks)) => {
+                for track in tracks {
+                    self.tracks.put(track.object, track.checked()?);
+                }
+            }
+            Change::Command(_) => return Err(ErrorCode::BadCommand),
+        }
+        Ok(())
+    }
+
+    fn scene(&self, recording: &Recording, number: u64, step: &StepMessage) -> Result<SceneFolder, String> {
+        if step.reply.status == STEP_REFUSED {
+            let code = ErrorCode::of_number(step.reply.error).unwrap_or(ErrorCode::Internal);
+            return Err(format!("it was refused, and moved nothing: {code}"));
+        }
+        let content = |(id, key): (&u32, &Key)| {
+            let content = recording.content(key).ok_or_else(|| format!("model {id} is not in the file"))?;
+            Ok((*id, content.clone()))
+        };
+        let standing = |(id, motion_state): (u32, &MotionState)| {
+            let spec = self.objects.get(&id)?.clone();
+            Some(Standing { spec, motion_state: *motion_state })
+        };
+        Ok(SceneFolder {
+            title: format!("Step {number} of a recording: step {} of session {}.", step.request.step, step.session),
+            models: self.models.iter().map(content).collect::<Result<_, String>>()?,
+            objects: self.tracks.iter().filter_map(standing).collect(),
+            rules: self.rules.clone(),
+            resolution: self.resolution,
+            dt: step.request.dt,
+        })
+    }
+}
