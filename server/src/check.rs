@@ -104,8 +104,16 @@ impl Check {
     /// # Errors
     /// What the world refuses of a record.
     pub fn step(&mut self, first: bool) -> Result<&StepOutcome, CheckError> {
+        self.step_with(&StepOptions { first, clear: true, ..StepOptions::default() })
+    }
+
+    /// Takes the step and tells what `options` ask for; its duration is the scene's.
+    ///
+    /// # Errors
+    /// What the world refuses of a record.
+    pub fn step_with(&mut self, options: &StepOptions) -> Result<&StepOutcome, CheckError> {
         let Self { world, records, moving, dt, file } = self;
-        let options = StepOptions { first, clear: true, dt: *dt, ..StepOptions::default() };
+        let options = StepOptions { dt: *dt, ..*options };
         world.step(records, &options).map_err(|error| {
             let named = error.index.and_then(|i| moving.get(i as usize)).cloned();
             let (object, at) = named.unwrap_or((String::new(), Place::START));

@@ -3,7 +3,7 @@
 //!
 //! It is a function of the library, so that a program of another language is the same command (the Python package's is).
 //!
-//! Floor 12: may import everything else.
+//! Floor 13: may import everything else.
 
 mod pages;
 
@@ -23,6 +23,7 @@ use crate::picture::{
 };
 use crate::report::{self, Answer, PairReport, TableStyle};
 use crate::terminal::{Colour, Paint};
+use crate::view::show::Show;
 use crate::world::{PairOutcome, StepOutcome};
 use clap::{Parser, Subcommand};
 use contactd_proto::ErrorCode;
@@ -89,6 +90,8 @@ enum Command {
         #[command(flatten)]
         cache: CacheArguments,
     },
+    /// A scene in a browser: a page on this machine alone, until it is ended by SIGINT; prints the page's address.
+    View(ViewArguments),
     /// What is in a model or scene file, and how it was imported.
     Inspect {
         /// A model (.scad, .csg, .stl, .off, .obj) or a scene (.toml).
@@ -99,6 +102,9 @@ enum Command {
         /// Also draw it, into an .svg or .png file: a model's tree with its bounds and its octree, a scene's contacts.
         #[arg(long, value_name = "FILE")]
         picture: Option<PathBuf>,
+        /// Where the camera of a scene's picture stands, seen from the scene; else where it sees the contacts.
+        #[arg(long, value_name = "X,Y,Z", requires = "picture", value_parser = direction, allow_hyphen_values = true)]
+        camera: Option<glam::DVec3>,
         #[command(flatten)]
         access: AccessArguments,
         #[command(flatten)]
@@ -264,6 +270,26 @@ struct CheckArguments {
     cache: CacheArguments,
 }
 
+#[derive(clap::Args)]
+struct ViewArguments {
+    /// The scene's .toml file; or models, which are taken as they stand.
+    #[arg(required_unless_present = "demo")]
+    files: Vec<PathBuf>,
+    /// The acts of the demo instead.
+    #[arg(long, conflicts_with = "files")]
+    demo: bool,
+    /// The port of 127.0.0.1; 0: any that is free.
+    #[arg(long, default_value = "0")]
+    port: u16,
+    /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
+    #[arg(long, default_value = "auto", value_parser = facets)]
+    facets: Facets,
+    #[command(flatten)]
+    access: AccessArguments,
+    #[command(flatten)]
+    cache: CacheArguments,
+}
+
 /// What the process ends with.
 enum Done {
     /// Everything answered.
@@ -304,9 +330,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
             let server = (!embedded).then_some(program);
             run_demo(server, csv.as_deref(), cache, TableStyle { wide, paint, ..TableStyle::default() })
         }
-        Command::Inspect { file, facets, picture, access, cache } => {
-            inspect_file(&file, facets, picture.as_deref(), &access, &cache)
+        Command::Inspect { file, facets, picture, camera, access, cache } => {
+            inspect_file(&file, facets, (picture.as_deref(), camera), &access, &cache)
         }
+        Command::View(arguments) => view_scene(&arguments),
         Command::Serve(arguments) => serve(arguments),
         Command::Record(arguments) => record(&arguments),
         Command::Replay(arguments) => replay(&arguments),
@@ -445,6 +472,14 @@ fn length(word: &str) -> Result<f64, String> {
     positive.ok_or_else(|| "expected a positive finite length".into())
 }
 
+fn direction(word: &str) -> Result<glam::DVec3, String> {
+    let numbers: Result<Vec<f64>, _> = word.split(',').map(|w| w.trim().parse::<f64>()).collect();
+    let direction = numbers.ok().and_then(|n| <[f64; 3]>::try_from(n).ok()).map(glam::DVec3::from_array);
+    // Straight up or down there is no right and left.
+    let aside = |d: &glam::DVec3| d.is_finite() && d.truncate().length() > 1e-3 * d.length();
+    direction.filter(aside).ok_or_else(|| "expected three numbers, as in 1,-2,1, not straight up or down".into())
+}
+
 fn seconds(word: &str) -> Result<Duration, String> {
     let positive = word.parse::<f64>().ok().filter(|x| *x > 0.0);
     positive
@@ -457,8 +492,9 @@ fn is_scene(file: &Path) -> bool {
     file.extension().is_some_and(|e| e == "toml")
 }
 
-fn check_scene(arguments: &CheckArguments, paint: Paint) -> Result<Done, Box<dyn Error>> {
-    let scene = match arguments.files.as_slice() {
+/// The scene of a file, or of models as they stand.
+fn scene_of(files: &[PathBuf], access: &AccessArguments) -> Result<Scene, Box<dyn Error>> {
+    let scene = match files {
         [file] if is_scene(file) => import::read_scene(file)?,
         files => match files.iter().find(|f| is_scene(f)) {
             Some(scene) => {
@@ -467,7 +503,30 @@ fn check_scene(arguments: &CheckArguments, paint: Paint) -> Result<Done, Box<dyn
             None => Scene::of_models(files),
         },
     };
-    let scene = Scene { access: arguments.access.with(scene.access.clone())?, ..scene };
+    Ok(Scene { access: access.with(scene.access.clone())?, ..scene })
+}
+
+fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
+    let show = if arguments.demo {
+        crate::demo::show(arguments.cache.open().as_ref())?
+    } else {
+        let scene = scene_of(&arguments.files, &arguments.access)?;
+        let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
+        let names = arguments.files.iter().map(|f| f.file_name().unwrap_or_default().to_string_lossy());
+        let title = names.collect::<Vec<_>>().join(", ");
+        Show::of_scene(title, scene, &models_of(&prepared))?
+    };
+    show.drawn.notes().for_each(warn);
+    let ready = |address: &str| {
+        // A reader that has gone away does not stop it.
+        let _ = print(&format!("contactd view: open {address} in a browser; Ctrl+C ends it\n"));
+    };
+    crate::view::serve(show, arguments.port, ready)?;
+    Ok(Done::Well)
+}
+
+fn check_scene(arguments: &CheckArguments, paint: Paint) -> Result<Done, Box<dyn Error>> {
+    let scene = scene_of(&arguments.files, &arguments.access)?;
     let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
     if scene.file.is_empty() {
         for (source, p) in scene.models.iter().zip(&prepared) {
@@ -551,10 +610,15 @@ fn say(sentence: &str) {
 fn inspect_file(
     file: &Path,
     facets: Facets,
-    picture: Option<&Path>,
+    (picture, camera): (Option<&Path>, Option<glam::DVec3>),
     access: &AccessArguments,
     cache: &CacheArguments,
 ) -> Result<Done, Box<dyn Error>> {
+    if camera.is_some() && !is_scene(file) {
+        return Err(
+            format!("expected a scene beside --camera, found {}: a model's picture has none", file.display()).into()
+        );
+    }
     let text = if is_scene(file) {
         let scene = import::read_scene(file)?;
         let scene = Scene { access: access.with(scene.access.clone())?, ..scene };
@@ -564,7 +628,7 @@ fn inspect_file(
             text.push_str(&inspect::model(&source.path.display().to_string(), &p.model, &p.notes));
         }
         if let Some(to) = picture {
-            write_picture(to, &scene_picture(&scene, &models_of(&models))?)?;
+            write_picture(to, &scene_picture(&scene, &models_of(&models), camera)?)?;
         }
         text
     } else {
@@ -584,7 +648,7 @@ fn inspect_file(
 }
 
 /// The scene at its contacts, solved as `check` does.
-fn scene_picture(scene: &Scene, models: &[Arc<Model>]) -> Result<Drawing, Box<dyn Error>> {
+fn scene_picture(scene: &Scene, models: &[Arc<Model>], from: Option<glam::DVec3>) -> Result<Drawing, Box<dyn Error>> {
     let mut check = Check::new(scene, models, None)?;
     let outcome = check.step(false)?.clone();
     let bodies = check.world.bodies();
@@ -601,8 +665,10 @@ fn scene_picture(scene: &Scene, models: &[Arc<Model>]) -> Result<Drawing, Box<dy
         .collect();
     let meetings: Vec<Meeting<'_>> =
         outcome.pairs.iter().map(|p| Meeting { pair: [p.a as usize, p.b as usize], outcome: &p.outcome }).collect();
-    let note = format!("each object where it first meets another; t: fraction of the step; lengths in {}", scene.unit);
-    Ok(picture::scene::scene("", &note, &actors, &meetings, picture::scene::FINE))
+    let lengths = if scene.unit.is_empty() { String::new() } else { format!(" Lengths are in {}.", scene.unit) };
+    let note = format!("Each object stands where it first meets another one; t is a fraction of the step.{lengths}");
+    let quality = picture::scene::Quality { from, ..picture::scene::FINE };
+    Ok(picture::scene::scene("", &note, &actors, &meetings, quality))
 }
 
 /// Writes a drawing in the format that the file's name tells.

@@ -56,9 +56,10 @@
 //! | 9 | [`recording`] | steps in MCAP files, with all that it takes to repeat them |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
-//! | 11 | [`demo`] | the show |
 //! | 11 | [`replay`] | a recording, repeated and compared |
-//! | 12 | [`command_line`] | the command `contactd` |
+//! | 11 | [`view`] | a scene in a browser |
+//! | 12 | [`demo`] | the show |
+//! | 13 | [`command_line`] | the command `contactd` |
 //!
 //! # In one's own process
 //!
@@ -101,6 +102,7 @@ pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod terminal;
+pub mod view;
 
 pub use contactd_engine::{bound, contact, math, motion, octree, solid, world};
 pub use glam;

@@ -4,14 +4,16 @@
 //! back. Without a program the same script runs on an engine in this process, with the same bits. Whatever ends the demo,
 //! the server is stopped and waited for, so that nothing stays behind.
 //!
-//! Floor 11, below the command line only: may import everything else.
+//! Floor 12, below the command line only: may import everything else.
 
 mod play;
 pub mod scene;
 pub mod script;
+mod show;
 mod table;
 
 pub use play::{Row, Run, play};
+pub use show::show;
 pub use table::{chosen, csv};
 
 use crate::ipc::{CacheFolder, ServerConfig};

@@ -5,6 +5,7 @@
 //!
 //! Floor 9, beside the reports: imports everything down to `math`; nothing below imports it.
 
+pub mod camera;
 pub mod contacts;
 pub mod drawing;
 mod line;

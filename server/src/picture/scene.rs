@@ -1,8 +1,10 @@
 //! A scene at its contacts: every object where it first meets another one, the contacts drawn in and listed.
 //!
-//! When a contact lies hidden from the camera, the largest object is cut open: the quarter of it that faces the camera is
-//! taken away, down to planes through the middle of its box, and the section is hatched.
+//! The camera stands where it sees all contacts, on the usual side if it can (`camera`). When some are hidden from every side, or
+//! from the side that is asked for, the largest object is cut open: the quarter of it that faces the camera is taken away, down to
+//! planes through the middle of its box, and the section is hatched.
 
+use super::camera;
 use super::contacts::{Mark, annotated};
 use super::drawing::Drawing;
 use super::ray::Traced;
@@ -37,17 +39,19 @@ pub struct Meeting<'a> {
     pub outcome: &'a Outcome,
 }
 
-/// How large and how fine.
+/// How large, how fine, and from where.
 #[derive(Clone, Copy, Debug)]
 pub struct Quality {
     /// Image size, pixels.
     pub size: (usize, usize),
     /// Samples a pixel along each side.
     pub samples: usize,
+    /// Where the camera stands, towards it from what it sees; `None`: where contacts are seen.
+    pub from: Option<DVec3>,
 }
 
 /// For files: a few seconds.
-pub const FINE: Quality = Quality { size: (1280, 720), samples: 4 };
+pub const FINE: Quality = Quality { size: (1280, 720), samples: 4, from: None };
 
 /// Linear colours of the models of a scene, in their order.
 pub const COLORS: [Rgb; 8] = [
@@ -90,16 +94,29 @@ pub fn scene(title: &str, note: &str, actors: &[Actor], meetings: &[Meeting], qu
         return Drawing::new(quality.size.0, 64);
     }
     let marks: Vec<Mark> = met.iter().filter_map(|m| mark(actors, m)).collect();
-    let from = DVec3::new(0.5, -1.0, 0.95);
-    let camera = Camera::framing(&boxes, from, quality.size);
+    let camera = Camera::framing(&boxes, quality.from.unwrap_or(camera::USUAL), quality.size);
     let low = boxes.iter().map(|b| b.min.z).fold(f64::INFINITY, f64::min);
     let size = Aabb::of_points(boxes.iter().flat_map(|b| b.corners())).half().length();
     let largest = (0..boxes.len()).max_by(|i, j| boxes[*i].half().length().total_cmp(&boxes[*j].half().length()));
     let mut view = View { things: vec![], camera, ground: Some(low - 0.01 * size), samples: quality.samples };
     std::mem::swap(&mut view.things, &mut things);
-    if let (Some(i), true) = (largest, marks.iter().any(|m| !view.sees(m.point))) {
+    let points: Vec<DVec3> = marks.iter().map(|m| m.point).collect();
+    let hidden = match quality.from {
+        Some(_) => points.iter().filter(|x| !view.sees(**x)).count(),
+        None => camera::turn(&mut view, &points).1,
+    };
+    if let (Some(i), true) = (largest, hidden > 0) {
         let c = boxes[i].center();
-        view.things[i].cut = Some(vec![(DVec3::X, c.x), (-DVec3::Y, -c.y)]);
+        let cut = |view: &mut View<'_>, side: DVec3| {
+            let (x, y) = (DVec3::X.copysign(DVec3::splat(side.x)), DVec3::Y.copysign(DVec3::splat(side.y)));
+            view.things[i].cut = Some(vec![(x, x.dot(c)), (y, y.dot(c))]);
+        };
+        match quality.from {
+            Some(side) => cut(&mut view, side),
+            None => {
+                camera::turn_to_quarter(&mut view, &points, cut);
+            }
+        }
     }
     view.zoom_to_things();
     annotated(&view, title, &marks, note)

@@ -10,3 +10,4 @@ mod heights;
 mod import_models;
 mod mass;
 mod models;
+mod view;

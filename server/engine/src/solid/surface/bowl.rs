@@ -17,7 +17,7 @@
 
 use super::elliptic::{Seen, WHOLE, axes_of, moved_turn, turn_of};
 use super::{
-    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretch, Stretches, Surface, Symmetry, largest_corner,
+    Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretch, Stretches, Surface, Symmetry, Terms, largest_corner,
     tangent,
 };
 use glam::{DMat3, DVec2, DVec3};
@@ -219,6 +219,11 @@ impl Surface for Bowl {
 
     fn quadric_name(&self) -> &'static str {
         if self.is_parabolic() { "paraboloid" } else { "hyperboloid of two sheets" }
+    }
+
+    fn terms(&self) -> Option<Terms> {
+        let parts = self.parts();
+        Some(Terms::around(self.origin, &parts.rows, parts.fall, parts.radius))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

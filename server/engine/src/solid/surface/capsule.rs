@@ -6,8 +6,8 @@
 use super::roots::between_roots;
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Cylinder, Drawn, Face, FaceAt, Law, NUMBERS, Section, Sphere, Stretches, Surface, Symmetry,
-    around, largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Cylinder, Drawn, Face, FaceAt, Law, NUMBERS, Row, Section, Sphere, Stretches, Surface,
+    Symmetry, Terms, around, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -199,6 +199,11 @@ impl Surface for Capsule {
     }
 
     /// From the first to the last of the ball at either end and of the cylinder between them.
+    fn terms(&self) -> Option<Terms> {
+        let (across, along) = Row::of_axis(self.origin, self.axis);
+        Some(Terms::Segment { across, along, half: self.half, tube: self.radius })
+    }
+
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
         let (o, axis) = (origin - self.origin, self.axis);
         let square = self.radius * self.radius;

@@ -5,8 +5,8 @@
 
 use super::roots::between_roots_of_nappe;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
-    largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Stretches, Surface, Symmetry,
+    Terms, around, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -197,6 +197,12 @@ impl Surface for Cone {
     #[inline]
     fn drawn(&self) -> Option<Drawn> {
         Some(Drawn::Cone(*self))
+    }
+
+    fn terms(&self) -> Option<Terms> {
+        let (across, _) = Row::of_axis(self.apex, self.axis);
+        let rows = across.map(|row| row.slope * self.cos);
+        Some(Terms::around(self.apex, &rows, self.axis * self.sin, 0.0))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

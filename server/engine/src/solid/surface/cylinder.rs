@@ -2,8 +2,8 @@
 
 use super::roots::between_roots;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, around,
-    largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Stretches, Surface, Symmetry,
+    Terms, around, largest_corner, radial, tangent,
 };
 use glam::DVec3;
 
@@ -132,6 +132,11 @@ impl Surface for Cylinder {
     #[inline]
     fn drawn(&self) -> Option<Drawn> {
         Some(Drawn::Cylinder(*self))
+    }
+
+    fn terms(&self) -> Option<Terms> {
+        let (across, _) = Row::of_axis(self.origin, self.axis);
+        Some(Terms::around(self.origin, &across.map(|row| row.slope), DVec3::ZERO, self.radius))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

@@ -18,7 +18,8 @@
 
 use super::roots::{between_roots, between_roots_of_nappe};
 use super::{
-    Apex, Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, largest_corner, tangent,
+    Apex, Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, Terms, largest_corner,
+    tangent,
 };
 use crate::math::any_perpendicular;
 use glam::{DMat3, DQuat, DVec3};
@@ -467,6 +468,11 @@ impl Surface for Elliptic {
     #[inline]
     fn drawn(&self) -> Option<Drawn> {
         Some(Drawn::Elliptic(*self))
+    }
+
+    fn terms(&self) -> Option<Terms> {
+        let parts = self.parts();
+        Some(Terms::around(self.origin, &parts.rows, parts.fall, parts.radius))
     }
 
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {

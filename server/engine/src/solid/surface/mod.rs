@@ -38,6 +38,7 @@ mod saddle;
 mod sphere;
 pub mod superellipsoid;
 mod symmetry;
+mod terms;
 #[cfg(test)]
 mod tests;
 mod torus;
@@ -55,6 +56,7 @@ pub use saddle::{Row, Saddle, Sides};
 pub use sphere::Sphere;
 pub use superellipsoid::Superellipsoid;
 pub use symmetry::{Axis, Symmetry};
+pub use terms::Terms;
 pub use torus::Torus;
 
 use crate::math::{any_perpendicular, tolerance::ON_AXIS};
@@ -389,6 +391,12 @@ pub trait Surface: Copy {
 
     /// Where psi <= 0 along the ray origin + t·direction (a unit vector), ends infinite where it never ends.
     fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches;
+
+    /// What psi is a sum of, for whoever computes it without knowing the kind; `None` where there is no such sum.
+    #[inline]
+    fn terms(&self) -> Option<Terms> {
+        None
+    }
 }
 
 /// Most numbers that tell a face.
@@ -681,6 +689,11 @@ impl Face {
     /// See [`Surface::quadric_name`].
     pub fn quadric_name(&self) -> &'static str {
         each!(self, f => f.quadric_name())
+    }
+
+    /// See [`Surface::terms`].
+    pub fn terms(&self) -> Option<Terms> {
+        each!(self, f => f.terms())
     }
 
     /// See [`Surface::inside`].

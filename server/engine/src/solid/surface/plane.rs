@@ -1,7 +1,7 @@
 //! Plane: psi = n·x − d.
 
 use super::roots::half_line;
-use super::{Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry};
+use super::{Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Terms};
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -119,6 +119,10 @@ impl Surface for Plane {
     fn numbers(&self) -> [f64; NUMBERS] {
         let n = self.normal;
         [n.x, n.y, n.z, self.offset, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    fn terms(&self) -> Option<Terms> {
+        Some(Terms::around(DVec3::ZERO, &[], -self.normal, self.offset))
     }
 
     #[inline]

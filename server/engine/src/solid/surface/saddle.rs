@@ -20,7 +20,7 @@
 
 use super::elliptic::{WHOLE, axes_of, moved_turn, turn_of};
 use super::roots::{between_roots, half_line};
-use super::{Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, Under};
+use super::{Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, Terms, Under};
 use glam::{DMat3, DVec2, DVec3};
 
 /// A quadric of two positive and two negative squares.
@@ -337,6 +337,13 @@ impl Surface for Saddle {
     }
 
     /// Where |P₀ + t P₁|² <= |N₀ + t N₁|².
+    fn terms(&self) -> Option<Terms> {
+        let sides = self.sides();
+        let rows = |rows: [Row; 2]| rows.map(|row| Row::from_origin(row.slope, row.at, self.origin)).to_vec();
+        let rest = Row { slope: DVec3::ZERO, at: 0.0 };
+        Some(Terms::Lengths { plus: rows(sides.plus), minus: rows(sides.minus), rest })
+    }
+
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
         let squares = |half: &Half| {
             let way = DVec2::from_array(half.rows.map(|row| row.slope.dot(d)));

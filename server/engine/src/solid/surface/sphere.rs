@@ -2,7 +2,8 @@
 
 use super::roots::between_roots;
 use super::{
-    Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, largest_corner,
+    Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, Terms,
+    largest_corner,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -122,6 +123,10 @@ impl Surface for Sphere {
     #[inline]
     fn drawn(&self) -> Option<Drawn> {
         Some(Drawn::Sphere(*self))
+    }
+
+    fn terms(&self) -> Option<Terms> {
+        Some(Terms::around(self.center, &DVec3::AXES, DVec3::ZERO, self.radius))
     }
 
     fn inside(&self, origin: DVec3, direction: DVec3) -> Stretches {

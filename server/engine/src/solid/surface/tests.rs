@@ -298,3 +298,19 @@ fn a_bowl_and_a_saddle_are_the_quadrics_that_they_are_made_of() {
     }
     assert!(inside > 800, "{inside}");
 }
+
+#[test]
+fn the_terms_of_a_face_sum_up_to_its_psi() {
+    let (mut r, mut told) = (Random(11), 0);
+    for _ in 0..200 {
+        for face in faces(&mut r) {
+            let Some(terms) = face.terms() else { continue };
+            told += 1;
+            let x = r.vector(3.0);
+            let (psi, sum) = (face.value(x), terms.value(x));
+            let known = 1e-13 * (face.magnitude() + x.length());
+            assert!((psi - sum).abs() <= known, "{face:?} at {x}: {psi} {sum}");
+        }
+    }
+    assert!(told >= 18 * 200, "{told}");
+}

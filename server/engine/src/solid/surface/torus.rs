@@ -10,7 +10,7 @@
 
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Under,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Row, SKEW, Section, Stretches, Surface, Symmetry, Terms, Under,
     largest_corner, radial,
 };
 use crate::math::any_perpendicular;
@@ -213,6 +213,11 @@ impl Surface for Torus {
     }
 
     /// With t from the ray's point next to the centre and w = |x|² + R² − r²: w² = 4 R² ρ², of degree four.
+    fn terms(&self) -> Option<Terms> {
+        let (across, along) = Row::of_axis(self.origin, self.axis);
+        Some(Terms::Circle { across, along, radius: self.major, tube: self.minor })
+    }
+
     fn inside(&self, origin: DVec3, d: DVec3) -> Stretches {
         let o = origin - self.origin;
         let near = -o.dot(d);
