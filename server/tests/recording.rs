@@ -226,42 +226,6 @@ fn random_sessions_are_repeated_bit_for_bit() {
     }
 }
 
-/// A limit cuts a search and not what is known already: whoever repeats a recording knows nothing from before it.
-#[test]
-fn what_was_known_before_a_recording_is_forgotten() {
-    const UNDECIDED: u32 = 3;
-    let folder = tempfile::tempdir().unwrap();
-    let mut forgotten = 0;
-    for seed in 0..30 {
-        if forgotten > 2 {
-            break;
-        }
-        let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
-        let ids = harness::scene::build(&mut session, 1);
-        let mut question = vec![PoseRecord::default(); 2];
-        harness::scene::fill(&mut question[1..], &ids, 3, seed);
-        question[0] = PoseRecord::start(ids[0], &Pose::at(DVec3::new(8.0, 0.0, 9.0)));
-        let ask = |session: &mut Session<Embedded>, cell_limit| {
-            session.options.cell_limit = cell_limit;
-            session.begin_step(2).unwrap().copy_from_slice(&question);
-            session.finish(PATIENCE).unwrap().header().status
-        };
-        let known = ask(&mut session, 20_000);
-        let repeated = ask(&mut session, 1);
-        if known == UNDECIDED || repeated != known {
-            continue;
-        }
-        let path = folder.path().join(format!("{seed}.mcap"));
-        session.record(&path).unwrap();
-        let again = ask(&mut session, 1);
-        session.stop_recording().unwrap();
-        let replayed = replay(&path, |_| {}).unwrap();
-        assert_eq!((replayed.steps, replayed.difference), (1, None), "seed {seed}");
-        forgotten += u32::from(again == UNDECIDED);
-    }
-    assert!(forgotten > 2, "{forgotten} answers were cut");
-}
-
 /// A recording of a few steps, its bytes and the step messages in it: each with where it ends.
 fn recorded(folder: &Path) -> (Vec<u8>, Vec<(usize, Vec<u8>)>) {
     let path = folder.join("whole.mcap");

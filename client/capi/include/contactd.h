@@ -843,6 +843,10 @@ int32_t contactd_solid_hyperbolic_dome(double radius, double height, double cone
 // symmetric matrix. Planes alone are none.
 int32_t contactd_solid_quadric(const double *m, const double *min, const double *max, struct contactd_solid **out);
 
+// All points with (|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) <= 1. `radii`: a, b and c; `exponents`: e1 (north to south) and e2
+// (east to west), each from 0.1 to 1.
+int32_t contactd_solid_superellipsoid(const double *radii, const double *exponents, struct contactd_solid **out);
+
 // The half-space normal.x <= offset |normal|: a floor or a wall of its own, or to be cut with something. `normal`: 3
 // numbers.
 int32_t contactd_solid_half_space(const double *normal, double offset, struct contactd_solid **out);

@@ -14,8 +14,8 @@ use std::time::Duration;
 const PART: u32 = 4;
 /// How long the thread sleeps where no manager wants to hear of the loop.
 const LONG: Duration = Duration::from_secs(3600);
-/// How long the end of a server waits for what is being told.
-const LAST: Duration = Duration::from_millis(200);
+/// How long the end of a server waits for what is being told: on a busy machine the thread may get its turn late.
+const LAST: Duration = Duration::from_secs(2);
 
 /// A service manager that is told how the server is; or none.
 #[derive(Debug, Default)]

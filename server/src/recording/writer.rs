@@ -101,6 +101,8 @@ fn write(sink: Counted, from: &Receiver<Item>, load: &Load, about: BTreeMap<Stri
         .chunk_size(Some(CHUNK))
         .disable_seeking(true);
     let mut file = File::new(options.create(NoSeek::new(BufWriter::new(sink)))?, about)?;
+    // From the beginning it says what it is.
+    file.writer.flush()?;
     let mut flushed = Instant::now();
     let mut is_fresh = false;
     loop {

@@ -117,7 +117,12 @@ pub fn touched(face: &surface::Superellipsoid, at: DVec3, y: &[Jet; 3]) -> Jet {
     let length = joined(inner, v.z.abs(), p);
     let part = |x: f64, of: f64, p: f64| if of > 0.0 { (x.abs() / of).powf(p - 1.0) } else { 0.0 };
     let round = part(inner, length, p);
-    let g = DVec3::new(part(v.x, inner, q) * round, part(v.y, inner, q) * round, part(v.z, length, p));
+    // In the centre all of these are gradients: the one that is told there is that along the first axis.
+    let g = if length > 0.0 {
+        DVec3::new(part(v.x, inner, q) * round, part(v.y, inner, q) * round, part(v.z, length, p))
+    } else {
+        DVec3::X
+    };
     let g = g * DVec3::ONE.copysign(v) / (dual(face, g) * (1.0 + 1e-13)).max(1.0 + 1e-13);
     let o = offsets(y, face.origin);
     let along: [Jet; 3] = std::array::from_fn(|k| linear(rows[k], &o).scaled(point(g[k])));

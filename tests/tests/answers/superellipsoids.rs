@@ -17,7 +17,7 @@ use contactd::solid::Shape;
 use contactd::solid::primitive::{Cuboid, Ellipsoid, Geometry as _, HalfSpace, Superellipsoid};
 use contactd_proto::{MassOptions, Motion, Pose};
 use contactd_tests::certified::{certify_all, certify_trees};
-use contactd_tests::engine::{SEARCH_ALONE, ask_with, differences};
+use contactd_tests::engine::{ReportedPoint as _, SEARCH_ALONE, ask_with, differences};
 use contactd_tests::random_solids::{Random, shape, shape_or_superellipsoid, superellipsoid};
 use contactd_tests::scenes::Recipe;
 use glam::{DMat3, DVec2, DVec3, dvec3};
@@ -168,7 +168,7 @@ fn superellipsoids_meet_convex_bodies_in_front_of_the_search_as_in_it() {
     }
     println!(
         "{contacts} contacts, {clear} clear, {in_front} of {apart} without a cell; the search alone takes {} cells each, {most} at most",
-        cells / apart.max(1)
+        cells / apart.max(1) as u64
     );
     assert!(contacts * 3 > count && in_front * 100 >= apart * 95, "{in_front} of {apart}");
 }
