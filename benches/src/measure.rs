@@ -44,7 +44,10 @@ impl Setting {
 
     /// The search alone: nothing is answered in front of it.
     pub fn search_alone() -> Self {
-        Self { strategies: Strategies { convex: false, cavities: false, ..Strategies::default() }, ..Self::default() }
+        Self {
+            strategies: Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() },
+            ..Self::default()
+        }
     }
 
     /// False where the world would refuse the resolution: a primitive is hardly larger.

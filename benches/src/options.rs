@@ -21,6 +21,8 @@ pub enum Strategy {
     Convex,
     /// Convex primitives against solids with holes answered in front of the search.
     Cavities,
+    /// Meshes answered in front of the search.
+    Facets,
     /// A coarser resolution where a search takes too long.
     Coarser,
 }
@@ -52,6 +54,7 @@ impl Options {
                 Strategy::Hints => strategies.hints = false,
                 Strategy::Convex => strategies.convex = false,
                 Strategy::Cavities => strategies.cavities = false,
+                Strategy::Facets => strategies.facets = false,
                 Strategy::Coarser => strategies.coarser = false,
             }
         }

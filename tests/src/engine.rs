@@ -109,6 +109,7 @@ pub const SEARCH_ALONE: Strategies = Strategies {
     hints: true,
     convex: false,
     cavities: false,
+    facets: false,
     coarser: true,
 };
 

@@ -164,6 +164,18 @@ impl ModelBytes {
     pub fn source(&self) -> Source<'_> {
         Source { format: self.format, attached: Some(&self.attached), ..Source::named(&self.name, &self.bytes) }
     }
+
+    /// Reads it. The bytes of a mesh are given back before the solid is made of what was in them.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn import(self, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
+        let read = if self.format.is_empty() { mesh::of_file(&self.name, &self.bytes, limits) } else { None };
+        let Some(read) = read else { return self.source().import(facets, limits) };
+        let Self { name, bytes, .. } = self;
+        drop(bytes);
+        mesh::import(&name, read, limits)
+    }
 }
 
 /// The files that a text which was sent names, in a folder and below. Fonts are those that a text that is sent has anyway.
@@ -205,7 +217,7 @@ fn beside(folder: &Path, root: Option<&Path>, name: &str, limits: &Limits) -> Re
 /// # Errors
 /// What is wrong with the file.
 pub fn read_model(path: &Path, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
-    ModelBytes::read(path, &Access::default(), limits)?.source().import(facets, limits)
+    ModelBytes::read(path, &Access::default(), limits)?.import(facets, limits)
 }
 
 #[cfg(test)]

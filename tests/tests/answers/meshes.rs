@@ -5,7 +5,7 @@
 //! pairs.
 
 use super::kinds::{alone, pairs, past, placed, turning, values_and_volumes};
-use contactd::contact::{Outcome, QueryOptions, Scratch, Status, earliest_contact};
+use contactd::contact::{Outcome, PairQuery, QueryOptions, Scratch, Status, Strategies, earliest_contact};
 use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
@@ -139,6 +139,77 @@ fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_a
     certify_trees((count + 10, 0x3e_5105), |r, size| {
         if r.chance(0.5) { meshes::divided(&meshes::random(r, size)).into() } else { shape(r, size) }
     });
+}
+
+/// A random motion, in every other case along a line.
+fn moved(r: &mut Random, motion: Motion) -> Motion {
+    if r.chance(0.5) { Motion { spin: DVec3::ZERO, ..motion } } else { motion }
+}
+
+#[test]
+fn what_is_told_of_meshes_in_front_of_the_search_is_what_the_search_says() {
+    let count = pairs(40);
+    let (mut contacts, mut in_front, mut worst) = (0, 0, 0.0_f64);
+    for i in 0..count {
+        let mut r = Random::new(0xface_7000 + i as u64);
+        let mesh = |r: &mut Random| if r.chance(0.5) { fine(r) } else { meshes::random(r, 0.8) };
+        let solid = |r: &mut Random, mesh: &Mesh| {
+            alone(if r.chance(0.5) { meshes::divided(mesh) } else { meshes::solid(mesh) })
+        };
+        let first = mesh(&mut r);
+        let a = solid(&mut r, &first);
+        let b = if r.chance(0.35) {
+            let other = mesh(&mut r);
+            solid(&mut r, &other)
+        } else {
+            alone(shape(&mut r, 0.6))
+        };
+        let motions = [turning(&mut r), past(&mut r, 2.2)].map(|m| moved(&mut r, m));
+        let query = question((&a, placed(motions[0])), (&b, placed(motions[1])), QueryOptions::DEPTH);
+        let alone = PairQuery { strategies: Strategies { facets: false, ..query.strategies }, ..query };
+        let [o, p] = [query, alone].map(|q| earliest_contact(&q, &mut Scratch::default()));
+        in_front += usize::from(o.counters.cells == 0 && o.counters.closed_forms > 0);
+        if p.status() == Status::Undecided || (o.not_continued() || p.not_continued()) {
+            continue;
+        }
+        assert_eq!(o.status(), p.status(), "{i}: {o:?}, {p:?}");
+        assert!(o.time_lower() <= o.time() && o.time() <= o.time_upper(), "{i}: {o:?}");
+        if o.status() == Status::Contact {
+            contacts += 1;
+            let off = (o.time() - p.time()).abs() * o.at().normal_speed.abs().min(p.at().normal_speed.abs());
+            worst = worst.max(off);
+            assert!(off <= 1e-12, "{i}: {off:e}: {o:?}, {p:?}");
+        }
+    }
+    println!("{contacts} contacts of {count}, {in_front} told without a cell, the same to {worst:.1e}");
+    assert!(contacts * 4 > count && in_front * 3 > count, "{contacts} {in_front} of {count}");
+}
+
+#[test]
+fn a_body_within_a_mesh_overlaps_and_one_in_its_cavity_does_not() {
+    let mut r = Random::new(17);
+    let outer = bumps(&mut r, (24, 18), (0.9, 1.0));
+    // The same with a cavity: a smaller one inside out.
+    let inner = bumps(&mut r, (24, 18), (0.6, 0.7));
+    let mut hollow = outer.clone();
+    let first = hollow.0.len() as u32;
+    hollow.0.extend(&inner.0);
+    hollow.1.extend(inner.1.iter().map(|t| [t[0] + first, t[2] + first, t[1] + first]));
+    let [whole, hollow] = [&outer, &hollow].map(|mesh| alone(meshes::solid(mesh)));
+    let few = bumps(&mut r, (5, 4), (0.1, 0.2));
+    for body in [alone(contactd::solid::primitive::Sphere { radius: 0.2 }), alone(meshes::solid(&few))] {
+        let moving = Motion { velocity: DVec3::X * 0.05, ..Motion::resting(Pose::IDENTITY) };
+        let still = Motion::resting(Pose::IDENTITY);
+        assert_eq!(ask(&whole, &body, [still, moving]).status(), Status::Overlap);
+        assert_eq!(ask(&body, &whole, [moving, still]).status(), Status::Overlap);
+        assert_eq!(ask(&hollow, &body, [still, moving]).status(), Status::Clear);
+        // And from within onto the wall of the cavity.
+        let o = ask(&hollow, &body, [still, Motion { velocity: DVec3::X, ..moving }]);
+        assert!(o.status() == Status::Contact && o.counters.cells == 0, "{o:?}");
+        assert!(o.time() > 0.3 && o.time() < 0.65, "{o:?}");
+        let outward = Motion { start: Pose::at(DVec3::X * 0.8), ..moving };
+        assert_eq!(ask(&hollow, &body, [still, outward]).status(), Status::Overlap);
+    }
 }
 
 #[test]

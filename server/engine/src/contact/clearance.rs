@@ -67,7 +67,7 @@ fn nearing(mut task: Task, level: f64, scratch: &mut Scratch) -> (Option<Ending>
     let is_empty = task.a.is_empty() || task.b.is_empty();
     let mut search = Search::new(Contacts::new(task), std::mem::take(scratch));
     if !is_empty {
-        search.start();
+        search.start(0.0);
     }
     let ending = search.run(f64::INFINITY);
     let counters = *search.counters();

@@ -8,6 +8,7 @@ pub mod certificate;
 pub mod clearance;
 mod convex;
 pub mod exclusion;
+mod facets;
 pub mod instant;
 pub mod pair;
 pub mod query;

@@ -209,7 +209,7 @@ pub fn of_file(name: &str, bytes: &[u8], limits: &Limits) -> Option<Result<Bodie
 }
 
 /// A model that is the meshes of a file.
-fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Result<Import, ImportError> {
+pub(super) fn import(file: &str, read: Result<Bodies>, limits: &Limits) -> std::result::Result<Import, ImportError> {
     let of = |(at, problem)| ImportError::Content { file: file.to_owned(), at, problem };
     let Bodies { all, frame, left_out } = read.map_err(of)?;
     let at = Place::START;

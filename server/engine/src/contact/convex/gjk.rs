@@ -13,6 +13,25 @@ const ROUNDS: usize = 48;
 /// Relative gap between the distance and its lower bound at which a direction is good enough to solve for a contact.
 pub const GOOD: f64 = 1e-6;
 
+/// A convex body as a support mapping: the core, and what it is thicker than that all around.
+pub trait SupportMapping {
+    /// The core's farthest point along n, which may have any length.
+    fn support(&self, n: DVec3) -> DVec3;
+    /// What the body is thicker than its core.
+    fn margin(&self) -> f64;
+}
+
+impl SupportMapping for ConvexBody<'_> {
+    #[inline]
+    fn support(&self, n: DVec3) -> DVec3 {
+        ConvexBody::support(self, n)
+    }
+
+    fn margin(&self) -> f64 {
+        self.margin
+    }
+}
+
 /// The nearest points of two disjoint bodies.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
@@ -44,13 +63,13 @@ pub enum Meeting {
 }
 
 /// Distance of `a` and `b`, as `meeting` finds it; `None` if their cores overlap, or nearly so.
-pub fn nearest(a: &ConvexBody, b: &ConvexBody, start: DVec3, good: f64) -> Option<Nearest> {
+pub fn nearest(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, good: f64) -> Option<Nearest> {
     if let Meeting::Apart(found) = meeting(a, b, start, good) { Some(found) } else { None }
 }
 
 /// The nearest points of `a` and `b`, from a first direction, to a relative gap of `good` between their distance and its
 /// lower bound; or a common point.
-pub fn meeting(a: &ConvexBody, b: &ConvexBody, start: DVec3, good: f64) -> Meeting {
+pub fn meeting(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, good: f64) -> Meeting {
     let mut simplex = [Corner::default(); 4];
     let mut count = 0;
     let mut v = start;
@@ -78,8 +97,8 @@ pub fn meeting(a: &ConvexBody, b: &ConvexBody, start: DVec3, good: f64) -> Meeti
         return Meeting::Open;
     }
     let on_a: DVec3 = simplex[..count].iter().map(|c| c.a * c.weight).sum();
-    let distance = length - a.margin - b.margin;
-    let on_a = on_a + normal * a.margin;
+    let distance = length - a.margin() - b.margin();
+    let on_a = on_a + normal * a.margin();
     Meeting::Apart(Nearest { distance, normal, a: on_a, b: on_a + normal * distance })
 }
 

@@ -44,13 +44,17 @@ use crate::contact::query::question::PairQuery;
 use crate::solid::primitive::Convex;
 pub(super) use advance::{ConvexPair, answer};
 pub(super) use balls::quick as balls;
+pub(super) use gjk::{GOOD, Nearest, SupportMapping, nearest};
 use glam::DVec3;
 use overlap::{Look, Start};
 use plane::PlanePair;
+pub(super) use proof::{Gap, Pace};
 use straight::Straight;
+pub(super) use support::ConvexBody;
 pub use swept_shape::{AxisSearch, Hull, SeparatingAxisTest, SweptShape};
 use turning::Turning;
 use whole::PrimitivePair;
+pub(super) use whole::{APART, body_of, excluded};
 
 /// What is known of a pair of whole primitives from its start and from moving along.
 pub(super) enum Quick {

@@ -30,6 +30,16 @@ impl<'s> ConvexBody<'s> {
         Self { axes: *axes * self.axes, origin: *axes * self.origin + origin, ..*self }
     }
 
+    /// The same body in the frame of its primitive.
+    pub fn unplaced(&self) -> Self {
+        Self { axes: DMat3::IDENTITY, origin: DVec3::ZERO, ..*self }
+    }
+
+    /// Normals of its sides, as `Convex::sides` has them.
+    pub fn sides(&self, way: DVec3) -> [DVec3; 3] {
+        self.shape.sides([self.axes.x_axis, self.axes.y_axis, self.axes.z_axis], way)
+    }
+
     /// A point inside, mostly the centre of its frame.
     pub fn center(&self) -> DVec3 {
         self.origin + self.axes * self.shape.middle()

@@ -10,7 +10,7 @@ use crate::solid::Primitive;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Resolutions that the bodies must be apart at the start: what is nearer may be touching, which the search tells.
-pub(super) const APART: f64 = 4.0;
+pub const APART: f64 = 4.0;
 
 /// Two whole primitives at the start and as they move along; world axes.
 pub(super) struct PrimitivePair<'a> {
@@ -108,10 +108,10 @@ impl<'a> PrimitivePair<'a> {
 }
 
 /// φ above this excludes a contact of depth delta, rounding included.
-pub(super) fn excluded(delta: f64, rounding: f64) -> f64 {
+pub fn excluded(delta: f64, rounding: f64) -> f64 {
     -2.0 * delta + 4.0 * rounding
 }
 
-pub(super) fn body_of(p: &Primitive) -> Option<ConvexBody<'_>> {
+pub fn body_of(p: &Primitive) -> Option<ConvexBody<'_>> {
     ConvexBody::new(&p.shape, p.frame.matrix(), p.frame.position)
 }

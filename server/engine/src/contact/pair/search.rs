@@ -4,6 +4,7 @@ use super::report::{DEPTHS, NEAR_DEPTH, contact_of, fill_overlap};
 use super::unbounded;
 use crate::contact::cavity;
 use crate::contact::convex::{self, Quick};
+use crate::contact::facets::{self, Front};
 use crate::contact::instant::depth;
 use crate::contact::instant::separation;
 use crate::contact::instant::work::Work;
@@ -221,9 +222,17 @@ impl<'a> PairSearch<'a> {
         if ending.is_none() && overlap.is_none() && some && query.strategies.cavities {
             ending = cavity::answer(&mut contacts);
         }
+        let mut from = 0.0;
+        if ending.is_none() && overlap.is_none() && some && query.strategies.facets {
+            match facets::answer(&mut contacts) {
+                Front::Ended(told) => ending = Some(told),
+                Front::Free(until) => from = until,
+                Front::Open => {}
+            }
+        }
         let mut search = Search::new(contacts, scratch);
         if ending.is_none() && overlap.is_none() && some {
-            search.start();
+            search.start(from);
         }
         if query.strategies.coarser {
             search.patience = PATIENCE;
@@ -555,7 +564,7 @@ impl<'a> PairSearch<'a> {
         let ending = if again { cavity::answer(&mut contacts) } else { None };
         let mut search = Search::new(contacts, self.take_scratch());
         if ending.is_none() {
-            search.start();
+            search.start(0.0);
         }
         let tries = self.task.strategies.coarser && self.coarser < COARSENINGS && !self.insists;
         search.patience = if tries { PATIENCE } else { u64::MAX };

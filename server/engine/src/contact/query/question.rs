@@ -71,6 +71,8 @@ pub struct Strategies {
     pub convex: bool,
     /// Convex primitives against solids with holes are answered in front of the search, with the same proviso.
     pub cavities: bool,
+    /// Meshes against convex primitives and each other are answered in front of the search, with the same proviso.
+    pub facets: bool,
     /// A search that takes too long is begun anew at a coarser resolution, which the answer tells; otherwise it goes on to its limit.
     pub coarser: bool,
 }
@@ -85,6 +87,7 @@ impl Default for Strategies {
             hints: true,
             convex: true,
             cavities: true,
+            facets: true,
             coarser: true,
         }
     }

@@ -123,9 +123,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Queues the whole step.
-    pub fn start(&mut self) {
-        self.items.push(Cell::source(0.0, 1.0, Source::Slice));
+    /// Queues the step from a time on before which it is proven that no contact comes.
+    pub fn start(&mut self, from: f64) {
+        self.items.push(Cell::source(from, 1.0, Source::Slice));
     }
 
     /// Work done so far.

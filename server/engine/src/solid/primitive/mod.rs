@@ -40,7 +40,7 @@ pub use quadric::Quadric;
 pub use sphere::Sphere;
 pub use superellipsoid::Superellipsoid;
 pub use torus::Torus;
-pub use triangle_mesh::{MeshFault, Repair, TriangleMesh, WELD};
+pub use triangle_mesh::{Below, FacetTree, MeshFault, Repair, TriangleMesh, WELD};
 
 /// What every primitive answers about itself, in its own frame.
 pub trait Geometry {
@@ -70,6 +70,14 @@ pub trait Geometry {
     /// Of what has a formula: its surface as triangles, which rays of pictures meet.
     fn facets(&self) -> Option<Facets<'_>> {
         None
+    }
+    /// Of what has facets: boxes over them, made when somebody first asks; `None` where there are none, or none can be made.
+    fn facet_tree(&self) -> Option<&FacetTree> {
+        None
+    }
+    /// How far the planes of facets may lie off their corners, a length.
+    fn facet_tolerance(&self) -> f64 {
+        0.0
     }
     /// Name of face `index` of `faces`, in the field's words: "side", "top", "+x", "face 3".
     fn face_name(&self, index: usize) -> String;
@@ -128,6 +136,12 @@ pub struct Facets<'a> {
 }
 
 impl Facets<'_> {
+    /// The corners of a triangle.
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.vertices[v as usize])
+    }
+
     /// The number of a triangle's face among those of the primitive; `None` of one that is too thin to have a plane.
     pub fn face_of(&self, triangle: u32) -> Option<u32> {
         Some(self.faces[triangle as usize]).filter(|face| *face != u32::MAX)

@@ -56,6 +56,29 @@ impl Edges {
     }
 }
 
+/// Of each triangle the first one of the part of the surface that it is in, by the neighbours of each along its sides.
+pub fn leaders(opposite: &[[u32; 3]]) -> Vec<u32> {
+    let mut leader: Vec<u32> = (0..opposite.len() as u32).collect();
+    fn find(leader: &mut [u32], mut i: u32) -> u32 {
+        while leader[i as usize] != i {
+            leader[i as usize] = leader[leader[i as usize] as usize];
+            i = leader[i as usize];
+        }
+        i
+    }
+    for (i, others) in opposite.iter().enumerate() {
+        for j in others.iter().filter(|j| **j != NONE) {
+            let (p, q) = (find(&mut leader, i as u32), find(&mut leader, *j));
+            leader[p.max(q) as usize] = p.min(q);
+        }
+    }
+    for i in 0..leader.len() as u32 {
+        let first = find(&mut leader, i);
+        leader[i as usize] = first;
+    }
+    leader
+}
+
 /// True where a triangle runs along an edge from its smaller corner to the larger.
 fn runs_up(t: [u32; 3], edge: u64) -> bool {
     let (a, b) = ((edge >> 32) as u32, edge as u32);

@@ -16,6 +16,7 @@ mod apart;
 mod cells;
 mod division;
 mod edges;
+mod growth;
 mod local;
 mod moments;
 mod piece;
@@ -26,13 +27,15 @@ mod side;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 use cells::Cells;
 use division::Divided;
 use local::Expr;
 pub use shell::{Repair, WELD};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use surface::Surface;
+pub use tree::{Below, FacetTree};
 
 /// Triangles up to which the formula of a mesh is written out when it is made.
 const FEW_TRIANGLES: usize = 1000;
@@ -153,10 +156,13 @@ impl TriangleMesh {
         drop(edges);
         let (mut planes, face_of) = planes::of(&vertices, &triangles, &opposite, tolerance);
         planes.shrink_to_fit();
-        let mut surface = Surface { vertices, triangles, planes, face_of, around, tolerance };
+        let mut surface = Surface { vertices, triangles, planes, face_of, around, tolerance, tree: OnceLock::new() };
         let count = surface.triangles.len();
         if count > few {
-            let division = Arc::new(Divided::new(Arc::new(surface), &opposite)?);
+            // A third of what the neighbours take, which nothing else asks for.
+            let leaders = edges::leaders(&opposite);
+            drop(opposite);
+            let division = Arc::new(Divided::new(Arc::new(surface), &leaders)?);
             let formula = Formula::Divided(division.clone());
             return Ok(Self {
                 surface: division.surface().clone(),
@@ -238,6 +244,12 @@ impl Geometry for TriangleMesh {
     fn facets(&self) -> Option<Facets<'_>> {
         let surface = &*self.surface;
         Some(Facets { vertices: &surface.vertices, triangles: &surface.triangles, faces: &surface.face_of })
+    }
+    fn facet_tree(&self) -> Option<&FacetTree> {
+        self.surface.tree.get_or_init(|| FacetTree::of(&self.surface)).as_ref()
+    }
+    fn facet_tolerance(&self) -> f64 {
+        8.0 * self.surface.tolerance
     }
     fn face_name(&self, index: usize) -> String {
         let faces = self.bounding_faces();

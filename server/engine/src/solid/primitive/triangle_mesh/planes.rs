@@ -110,8 +110,11 @@ pub fn of(
             group[i as usize] = faces.of(i, before);
         }
     }
-    let planes = faces.first.iter().map(|seed| own[*seed as usize]).collect();
-    in_file_order(planes, group)
+    // Of a large mesh each of these takes as much as the planes do.
+    let Alike { first, table, .. } = faces;
+    drop((areas, table));
+    let first = in_file_order(first, &mut group);
+    (first.into_iter().map(|seed| own[seed as usize]).collect(), group)
 }
 
 /// Faces by their planes' bits.
@@ -158,17 +161,17 @@ impl<'p> Alike<'p> {
     }
 }
 
-/// Faces in the order of their first triangles.
-fn in_file_order(planes: Vec<(DVec3, f64)>, mut group: Vec<u32>) -> (Vec<(DVec3, f64)>, Vec<u32>) {
-    let mut place = vec![NONE; planes.len()];
-    let mut ordered = Vec::with_capacity(planes.len());
+/// What is said of faces in the order of their first triangles; of each triangle its face is named by that order.
+fn in_file_order(said: Vec<u32>, group: &mut [u32]) -> Vec<u32> {
+    let mut place = vec![NONE; said.len()];
+    let mut ordered = Vec::with_capacity(said.len());
     for g in group.iter_mut().filter(|g| **g != NONE) {
         let old = *g as usize;
         if place[old] == NONE {
             place[old] = ordered.len() as u32;
-            ordered.push(planes[old]);
+            ordered.push(said[old]);
         }
         *g = place[old];
     }
-    (ordered, group)
+    ordered
 }

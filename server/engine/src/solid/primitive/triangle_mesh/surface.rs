@@ -2,9 +2,11 @@
 
 use super::piece::{CUT, Corner, Piece};
 use super::planes::NONE;
+use super::tree::FacetTree;
 use crate::math::Aabb;
 use glam::DVec3;
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// The closed surface of a solid.
 #[derive(Debug)]
@@ -21,6 +23,8 @@ pub struct Surface {
     pub around: Aabb,
     /// How near a plane a point is on it, a length.
     pub tolerance: f64,
+    /// Boxes over its triangles, once somebody has asked for them.
+    pub tree: OnceLock<Option<FacetTree>>,
 }
 
 impl Surface {

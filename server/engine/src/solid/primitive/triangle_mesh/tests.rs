@@ -179,3 +179,34 @@ fn large() {
         judge(&format!("bumps {n}"), &bumps(&mut r, n, n, 0.02), &mut r, 100);
     }
 }
+
+#[test]
+fn boxes_hold_what_is_in_them_and_every_facet_is_in_one() {
+    let (points, triangles) = closed_grid(40, 30, |u, v| {
+        let r = 3.0 + (1.0 + 0.2 * (9.0 * u).sin()) * v.cos();
+        DVec3::new(100.0 + r * u.cos(), r * u.sin(), v.sin())
+    });
+    let (mesh, _) = TriangleMesh::new(&points, &triangles).expect("a closed mesh");
+    let (tree, facets) = (mesh.facet_tree().expect("boxes"), mesh.facets().expect("facets"));
+    let mut seen = vec![0; mesh.triangles().len()];
+    let mut stack = vec![(FacetTree::ROOT, (DVec3::ZERO, DVec3::INFINITY))];
+    while let Some((place, outer)) = stack.pop() {
+        let (center, half) = tree.around(place);
+        assert!(((center - outer.0).abs() + half).cmple(outer.1 + DVec3::splat(1e-12)).all(), "{place}");
+        match tree.below(place) {
+            Below::Halves(halves) => stack.extend(halves.map(|h| (h, (center, half)))),
+            Below::Facets(list) => {
+                for f in list {
+                    seen[*f as usize] += 1;
+                    let within = |x: DVec3| (x - center).abs().cmple(half + DVec3::splat(1e-13)).all();
+                    assert!(facets.corners(*f).into_iter().all(within), "{f}");
+                }
+            }
+        }
+    }
+    assert!(seen.iter().all(|count| *count == 1));
+    assert_eq!(tree.shells().len(), 1);
+    let mut near = Vec::new();
+    tree.near(points[7], 1e-9, |f| near.push(f));
+    assert!(mesh.triangles().iter().enumerate().all(|(i, t)| !t.contains(&7) || near.contains(&(i as u32))));
+}
