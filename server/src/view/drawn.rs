@@ -2,12 +2,23 @@
 //! triangles for the others.
 
 use super::cells::{Cells, Unmarched};
-use super::show::Shown;
 use super::triangles::{self, Triangles};
 use crate::math::Aabb;
+use crate::octree::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
+
+/// A model of a show.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Its name in the scene.
+    pub name: String,
+    /// What sentences call the text that its lines are counted in.
+    pub file: String,
+    /// What it is.
+    pub model: Arc<Model>,
+}
 
 /// The numbers of all models.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,6 @@
 //! What is shown: models, and acts of steps, each step a scene of its own that is solved when somebody looks at it.
 
-use super::drawn::Drawn;
+use super::drawn::{Drawn, Shown};
 use crate::check::Check;
 use crate::contact::{Outcome, Status};
 use crate::import::Scene;
@@ -17,17 +17,6 @@ use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// A model of a show.
-#[derive(Clone, Debug)]
-pub struct Shown {
-    /// Its name in the scene.
-    pub name: String,
-    /// What sentences call the text that its lines are counted in.
-    pub file: String,
-    /// What it is.
-    pub model: Arc<Model>,
-}
 
 /// Makes the scene of a step; its models are those of the act, in order.
 pub type SceneOf = Box<dyn Fn(usize) -> Result<Scene, String> + Send + Sync>;

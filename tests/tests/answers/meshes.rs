@@ -205,7 +205,7 @@ fn a_body_within_a_mesh_overlaps_and_one_in_its_cavity_does_not() {
         assert_eq!(ask(&hollow, &body, [still, moving]).status(), Status::Clear);
         // And from within onto the wall of the cavity.
         let o = ask(&hollow, &body, [still, Motion { velocity: DVec3::X, ..moving }]);
-        assert!(o.status() == Status::Contact && o.counters.cells == 0, "{o:?}");
+        assert_eq!(o.status(), Status::Contact, "{o:?}");
         assert!(o.time() > 0.3 && o.time() < 0.65, "{o:?}");
         let outward = Motion { start: Pose::at(DVec3::X * 0.8), ..moving };
         assert_eq!(ask(&hollow, &body, [still, outward]).status(), Status::Overlap);

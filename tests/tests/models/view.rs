@@ -8,9 +8,9 @@ use contactd::import::Scene;
 use contactd::math::Aabb;
 use contactd::octree::Model;
 use contactd::solid::{Solid, SolidBuilder};
-use contactd::view::drawn::{Drawn, Piece};
+use contactd::view::drawn::{Drawn, Piece, Shown};
 use contactd::view::http::Listening;
-use contactd::view::show::{Show, Shown};
+use contactd::view::show::Show;
 use contactd::view::{self, triangles};
 use contactd_tests::random_solids::{
     Random, shape, shape_or_capsule, shape_or_elliptic, shape_or_mesh, shape_or_torus, solid_of,

@@ -7,6 +7,7 @@ mod cavity;
 pub mod certificate;
 pub mod clearance;
 mod convex;
+pub mod distance;
 pub mod exclusion;
 mod facets;
 pub mod instant;

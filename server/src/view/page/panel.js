@@ -89,6 +89,7 @@ export class Panel {
         for (const row of this.objects.querySelectorAll("[data-object]")) {
             row.classList.toggle("chosen", Number(row.dataset.object) === chosen.object);
         }
+        for (const row of document.querySelectorAll(".row.chosen")) row.scrollIntoView({ block: "nearest" });
     }
 
     empty() {

@@ -70,19 +70,52 @@ pub fn nearest(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, g
 /// The nearest points of `a` and `b`, from a first direction, to a relative gap of `good` between their distance and its
 /// lower bound; or a common point.
 pub fn meeting(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, good: f64) -> Meeting {
+    match of_supports(|v| a.support(v), |v| b.support(v), start, good) {
+        Cores::Apart { v, a: on_a } => {
+            let length = v.length();
+            let normal = v / length;
+            if !normal.is_finite() {
+                return Meeting::Open;
+            }
+            let distance = length - a.margin() - b.margin();
+            let on_a = on_a + normal * a.margin();
+            Meeting::Apart(Nearest { distance, normal, a: on_a, b: on_a + normal * distance })
+        }
+        Cores::Common(x) => Meeting::Common(x),
+        Cores::Open => Meeting::Open,
+    }
+}
+
+/// How two convex sets stand to each other that are told by their supports.
+pub enum Cores {
+    /// The shortest vector from one to the other, and the point of a where it begins.
+    Apart {
+        /// From a to b.
+        v: DVec3,
+        /// The point of a.
+        a: DVec3,
+    },
+    /// A point of both, as far as rounding goes.
+    Common(DVec3),
+    /// Neither was found.
+    Open,
+}
+
+/// How two convex sets stand to each other, from a first direction, to a relative gap of `good`.
+pub fn of_supports(a: impl Fn(DVec3) -> DVec3, b: impl Fn(DVec3) -> DVec3, start: DVec3, good: f64) -> Cores {
     let mut simplex = [Corner::default(); 4];
     let mut count = 0;
     let mut v = start;
     for round in 0..ROUNDS {
-        let sa = a.support(v);
-        let w = b.support(-v) - sa;
+        let sa = a(v);
+        let w = b(-v) - sa;
         let square = v.length_squared();
         if round > 0 && (square - v.dot(w) <= good * square || simplex[..count].iter().any(|c| c.w == w)) {
             break;
         }
         simplex[count] = Corner { a: sa, w, weight: 1.0 };
         let Some(kept) = reduce(&mut simplex, count + 1) else {
-            return common(&simplex).map_or(Meeting::Open, Meeting::Common);
+            return common(&simplex).map_or(Cores::Open, Cores::Common);
         };
         count = kept;
         let next: DVec3 = simplex[..count].iter().map(|c| c.w * c.weight).sum();
@@ -91,15 +124,7 @@ pub fn meeting(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, g
         }
         v = next;
     }
-    let length = v.length();
-    let normal = v / length;
-    if !normal.is_finite() {
-        return Meeting::Open;
-    }
-    let on_a: DVec3 = simplex[..count].iter().map(|c| c.a * c.weight).sum();
-    let distance = length - a.margin() - b.margin();
-    let on_a = on_a + normal * a.margin();
-    Meeting::Apart(Nearest { distance, normal, a: on_a, b: on_a + normal * distance })
+    Cores::Apart { v, a: simplex[..count].iter().map(|c| c.a * c.weight).sum() }
 }
 
 /// The shortest convex combination of some vectors; `None` if it is 0, or there are none.

@@ -6,8 +6,8 @@
 use super::roots::between_roots;
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Cylinder, Drawn, Face, FaceAt, Law, NUMBERS, Row, Section, Sphere, Stretches, Surface,
-    Symmetry, Terms, around, largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Cylinder, Drawn, Face, FaceAt, Law, NUMBERS, Row, Section, Sphere, Spine, Stretches,
+    Surface, Symmetry, Terms, around, heights, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -126,6 +126,12 @@ impl Surface for Capsule {
     #[inline]
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {
         Self { origin: point(self.origin), axis: vector(self.axis).normalize(), ..*self }
+    }
+
+    fn spine(&self, hull: &[DVec3]) -> Option<Spine> {
+        let (lo, hi) = heights(hull, self.origin, self.axis);
+        let points = [lo, hi].map(|z| self.origin + self.axis * z.clamp(-self.half, self.half));
+        Some(Spine { points: points.into_iter().collect(), radius: self.radius })
     }
 
     #[inline]

@@ -2,8 +2,8 @@
 
 use super::roots::between_roots;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Stretches, Surface, Symmetry,
-    Terms, around, largest_corner, radial, tangent,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Spine, Stretches, Surface,
+    Symmetry, Terms, around, heights, largest_corner, radial, tangent,
 };
 use glam::DVec3;
 
@@ -77,6 +77,12 @@ impl Surface for Cylinder {
     #[inline]
     fn developable(&self) -> Option<DVec3> {
         Some(self.axis)
+    }
+
+    fn spine(&self, hull: &[DVec3]) -> Option<Spine> {
+        let (lo, hi) = heights(hull, self.origin, self.axis);
+        let points = [lo, hi].map(|z| self.origin + self.axis * z);
+        Some(Spine { points: points.into_iter().collect(), radius: self.radius })
     }
 
     #[inline]

@@ -201,6 +201,15 @@ pub struct Section {
     pub radius: f64,
 }
 
+/// What a round face lies about: points whose hull, thickened by the radius, holds all of a part of psi <= 0. Model frame, lengths.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spine {
+    /// The points.
+    pub points: SmallVec<[DVec3; 4]>,
+    /// The radius.
+    pub radius: f64,
+}
+
 /// What every kind of face tells of itself. Points and directions are in the face's own frame, lengths in that of the model.
 pub trait Surface: Copy {
     /// Size of the numbers that psi is computed from, beside those of the point: |d|, |o| + r, |apex|. A length.
@@ -317,6 +326,13 @@ pub trait Surface: Copy {
     #[inline]
     fn straight_at(&self, _x: DVec3) -> Option<DVec3> {
         self.developable()
+    }
+
+    /// A spine of what of psi <= 0 lies in the hull of some points, exact but for rounding where it is one point or lies along a line;
+    /// `None` of faces that are not so thick everywhere.
+    #[inline]
+    fn spine(&self, _hull: &[DVec3]) -> Option<Spine> {
+        None
     }
 
     /// The apex of a cone: the point at which every direction around is a normal.
@@ -610,6 +626,11 @@ impl Face {
         each!(self, f => f.straight_at(x))
     }
 
+    /// See [`Surface::spine`].
+    pub fn spine(&self, hull: &[DVec3]) -> Option<Spine> {
+        each!(self, f => f.spine(hull))
+    }
+
     /// See [`Surface::apex`].
     #[inline]
     pub fn apex(&self) -> Option<Apex> {
@@ -716,6 +737,12 @@ fn radial(offset: DVec3, axis: DVec3) -> (f64, DVec3) {
     let u = p / rho;
     let u = u - axis * u.dot(axis);
     (rho, u.normalize())
+}
+
+/// The heights along `axis` over `origin` between which some points stand.
+fn heights(hull: &[DVec3], origin: DVec3, axis: DVec3) -> (f64, f64) {
+    let each = hull.iter().map(|x| (*x - origin).dot(axis));
+    each.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), z| (lo.min(z), hi.max(z)))
 }
 
 /// The curvature of a face of revolution about `axis` that is straight along its rulings.

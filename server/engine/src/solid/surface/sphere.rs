@@ -2,7 +2,7 @@
 
 use super::roots::between_roots;
 use super::{
-    Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Stretches, Surface, Symmetry, Terms,
+    Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Spine, Stretches, Surface, Symmetry, Terms,
     largest_corner,
 };
 use crate::math::any_perpendicular;
@@ -70,6 +70,10 @@ impl Surface for Sphere {
     #[inline]
     fn symmetry(&self) -> Symmetry {
         Symmetry::Center(self.center)
+    }
+
+    fn spine(&self, _: &[DVec3]) -> Option<Spine> {
+        Some(Spine { points: [self.center].into_iter().collect(), radius: self.radius })
     }
 
     #[inline]

@@ -10,12 +10,13 @@
 
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Row, SKEW, Section, Stretches, Surface, Symmetry, Terms, Under,
-    largest_corner, radial,
+    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Row, SKEW, Section, Spine, Stretches, Surface, Symmetry, Terms,
+    Under, largest_corner, radial,
 };
 use crate::math::any_perpendicular;
 use crate::solid::surface::Sphere;
 use glam::DVec3;
+use smallvec::SmallVec;
 
 /// Torus: all points within r of a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,6 +170,37 @@ impl Surface for Torus {
     #[inline]
     fn moved(&self, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Self {
         Self { origin: point(self.origin), axis: vector(self.axis).normalize(), ..*self }
+    }
+
+    /// The arc of the circle that is next to the points, by its ends and where its tangents there meet; of an arc that reaches farther than
+    /// 63 degrees to a side the square around the circle.
+    fn spine(&self, hull: &[DVec3]) -> Option<Spine> {
+        let across = |x: &DVec3| (*x - self.origin) - self.axis * (*x - self.origin).dot(self.axis);
+        let middle = hull.iter().map(across).sum::<DVec3>().try_normalize();
+        let side = middle.map(|m| self.axis.cross(m));
+        let arc = middle.zip(side).and_then(|(m, s)| {
+            let mut span = (f64::INFINITY, f64::NEG_INFINITY);
+            for p in hull.iter().map(across) {
+                let (along, beside) = (p.dot(m), p.dot(s));
+                if along <= 0.5 * beside.abs() {
+                    return None;
+                }
+                let slope = beside / along;
+                span = (span.0.min(slope), span.1.max(slope));
+            }
+            let at = |slope: f64| (m + s * slope).normalize();
+            let (from, to) = (at(span.0), at(span.1));
+            let tip = (from + to) / (1.0 + from.dot(to));
+            Some([from, to, tip].into_iter().collect::<SmallVec<[DVec3; 4]>>())
+        });
+        let around = || {
+            let u = any_perpendicular(self.axis);
+            let v = self.axis.cross(u);
+            [u + v, u - v, v - u, -u - v].into_iter().collect()
+        };
+        let mut points = arc.unwrap_or_else(around);
+        points.iter_mut().for_each(|p| *p = self.origin + *p * self.major);
+        Some(Spine { points, radius: self.minor })
     }
 
     #[inline]

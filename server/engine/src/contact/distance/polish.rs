@@ -1,0 +1,350 @@
+//! Two near points of two bodies made nearest: a bound from above.
+//!
+//! Around a point a tree is the *and* of some literals: of each group of alternatives the one that holds best there. Least
+//! ½|x − y|² under those of both bodies is found by Newton's method on the conditions of Karush, Kuhn and Tucker with a set of
+//! literals that are taken as met and weights by least squares (J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., 18.1): one that
+//! pulls the wrong way leaves the set, one that is violated enters it. What comes out is a guess; both points are then moved inwards by as
+//! much as rounding may hide, and both trees are asked whether they are inside.
+
+use super::part::{Parts, literal_at};
+use crate::contact::convex::least_of;
+use crate::contact::query::outcome::NO_FACE;
+use crate::contact::witness::newton::hessian;
+use crate::motion::Instant;
+use crate::octree::Model;
+use crate::solid::local::{self, Expression, LiteralId, Token};
+use crate::solid::{Face, Sense};
+use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
+
+/// Literals met at a time on one side.
+const MOST_MET: usize = 4;
+/// Unknowns: two points and the weights.
+const MOST: usize = 6 + 2 * MOST_MET;
+/// Steps at most.
+const STEPS: usize = 40;
+/// Rounds in which the alternatives are chosen anew.
+const CHOICES: usize = 3;
+/// Literals this near to 0, relative to the size, count as met at first.
+const MET: f64 = 1e-7;
+/// Literals this near to 0, relative to the size, are told as the features of a point.
+const FEATURE: f64 = 1e-9;
+
+/// Literals that hold at a point.
+type Clause = SmallVec<[LiteralId; 16]>;
+
+/// A point of each body.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    /// Of A, A's model frame.
+    pub x: DVec3,
+    /// Of B, B's model frame.
+    pub y: DVec3,
+    /// Their distance, rounding added: no less than the bodies' distance. A length.
+    pub distance: f64,
+}
+
+/// What a body is to the polishing.
+#[derive(Clone, Copy)]
+pub struct Side<'s, 'a> {
+    /// Its parts.
+    pub parts: &'s Parts<'a>,
+    /// Its model.
+    pub model: &'a Model,
+    /// What of its tree is looked at.
+    pub tokens: &'s [Token],
+}
+
+/// Two bodies at an instant.
+pub struct Polish<'s, 'a> {
+    /// The bodies.
+    pub sides: [Side<'s, 'a>; 2],
+    /// The instant.
+    pub at: &'s Instant,
+    /// The pair's size, a length.
+    pub scale: f64,
+    /// What rounding may do to f, a length.
+    pub rounding: f64,
+}
+
+/// Appends an *and* of literals at x: of alternatives the one that is least there. False where a mesh's part stands in the way.
+fn choose(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64, out: &mut Clause) -> bool {
+    match local::first(tokens).0 {
+        Expression::Literal(id) => out.push(id),
+        Expression::And(mut body) => {
+            while !body.is_empty() {
+                let n = local::first(body).1;
+                if !choose(&body[..n], psi, out) {
+                    return false;
+                }
+                body = &body[n..];
+            }
+        }
+        Expression::Or(mut body) => {
+            let mut best: Option<(f64, &[Token])> = None;
+            while !body.is_empty() {
+                let n = local::first(body).1;
+                let v = local::value(&body[..n], psi);
+                if best.is_none_or(|b| v < b.0) {
+                    best = Some((v, &body[..n]));
+                }
+                body = &body[n..];
+            }
+            return best.is_some_and(|b| choose(b.1, psi, out));
+        }
+        Expression::Part(_) => return false,
+    }
+    true
+}
+
+/// The literals that are taken as met, with their weights.
+type Met = SmallVec<[(LiteralId, f64); MOST_MET]>;
+
+impl Polish<'_, '_> {
+    fn clause(&self, side: usize, x: DVec3) -> Option<Clause> {
+        let Side { parts, tokens, .. } = self.sides[side];
+        let mut clause = Clause::new();
+        if tokens.is_empty() {
+            return Some(clause);
+        }
+        choose(tokens, &mut |f| parts.solid.faces[f as usize].value(x), &mut clause).then_some(clause)
+    }
+
+    fn at(&self, side: usize, id: LiteralId, x: DVec3) -> (f64, DVec3) {
+        literal_at(&self.sides[side].parts.solid.faces[id.face() as usize], id.sense(), x)
+    }
+
+    /// The points of both bodies, verified, to which x (A's frame) and y (B's) lead; `None` where they lead to none.
+    pub fn run(&self, mut x: DVec3, mut y: DVec3) -> Option<Pair> {
+        let mut best = self.verified(x, y);
+        let mut keep = |found: Option<Pair>| {
+            if let Some(found) = found
+                && best.is_none_or(|b: Pair| found.distance < b.distance)
+            {
+                best = Some(found);
+            }
+            found.is_some()
+        };
+        let tips = [self.tips(0, x), self.tips(1, y)];
+        for (p, q) in tips[0].iter().flat_map(|p| tips[1].iter().map(move |q| (p, q))) {
+            keep(self.verified(*p, *q));
+        }
+        for held in [0, 1] {
+            for tip in &tips[held] {
+                let start = if held == 0 { (*tip, y) } else { (x, *tip) };
+                let clauses = [self.clause(0, start.0)?, self.clause(1, start.1)?];
+                let (p, q) = self.solve(&clauses, start, Some(held));
+                keep(self.verified(p, q));
+            }
+        }
+        for _ in 0..CHOICES {
+            let clauses = [self.clause(0, x)?, self.clause(1, y)?];
+            (x, y) = self.solve(&clauses, (x, y), None);
+            if !(x.is_finite() && y.is_finite()) || keep(self.verified(x, y)) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The apexes of a body's cones that hold around a point, those that are its own.
+    fn tips(&self, side: usize, x: DVec3) -> SmallVec<[DVec3; 2]> {
+        let Side { parts, model, .. } = self.sides[side];
+        let clause = self.clause(side, x).unwrap_or_default();
+        let positive = clause.iter().filter(|id| id.sense() == Sense::Positive);
+        let apexes = positive.filter_map(|id| parts.solid.faces[id.face() as usize].apex());
+        apexes.map(|apex| apex.point).filter(|tip| model.value(*tip) <= 2.0 * self.rounding).collect()
+    }
+
+    /// The same two points, moved inwards by hardly anything, where they are inside then.
+    fn verified(&self, x: DVec3, y: DVec3) -> Option<Pair> {
+        let (u, v) = (self.inside(0, x)?, self.inside(1, y)?);
+        Some(Pair { x: u, y: v, distance: (u - self.at.a_point(v)).length() + 2.0 * self.rounding })
+    }
+
+    /// A point of the body next to x, proven inside.
+    fn inside(&self, side: usize, x: DVec3) -> Option<DVec3> {
+        let model = self.sides[side].model;
+        let is_inside = |x: DVec3| model.value(x) <= -self.rounding;
+        if is_inside(x) {
+            return Some(x);
+        }
+        let clause = self.clause(side, x)?;
+        let faces = clause.iter().map(|id| &self.sides[side].parts.solid.faces[id.face() as usize]);
+        let apexes = faces.filter_map(Face::apex).filter(|a| (a.point - x).length() <= MET * self.scale);
+        for apex in apexes {
+            let into = apex.axis / apex.sin;
+            let found =
+                [4.0, 16.0, 64.0].into_iter().map(|k| apex.point + into * (k * self.rounding)).find(|x| is_inside(*x));
+            if found.is_some() {
+                return found;
+            }
+        }
+        let near = |id: &LiteralId| Some(self.at(side, *id, x)).filter(|at| at.0 > -1e3 * self.rounding);
+        let outward: SmallVec<[DVec3; 8]> = clause.iter().filter_map(near).map(|at| at.1).collect();
+        let m = least_of(&outward)?;
+        let inwards = -m / m.length_squared();
+        [2.0, 8.0, 64.0].into_iter().map(|k| x + inwards * (k * self.rounding)).find(|x| is_inside(*x))
+    }
+
+    /// Newton's steps of both points, or of the one that is not held.
+    fn solve(&self, clauses: &[Clause; 2], (mut x, mut y): (DVec3, DVec3), held: Option<usize>) -> (DVec3, DVec3) {
+        let mut met: [Met; 2] = Default::default();
+        let (near, tiny) = (MET * self.scale, 4.0 * self.rounding);
+        for (side, p) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
+            let mut all: SmallVec<[(f64, LiteralId); 16]> =
+                clauses[side].iter().map(|id| (self.at(side, *id, p).0, *id)).filter(|v| v.0 > -near).collect();
+            all.sort_by(|p, q| q.0.total_cmp(&p.0));
+            met[side] = all.iter().take(MOST_MET).map(|v| (v.1, 0.0)).collect();
+        }
+        for _ in 0..STEPS {
+            let way = self.at.a_point(y) - x;
+            self.weigh(0, &mut met[0], x, way);
+            self.weigh(1, &mut met[1], y, -(self.at.b_from_a * way));
+            let Some((p, q)) = self.step(&met, (x, y), held) else { break };
+            let length = p.length().max(q.length());
+            let most = 0.25 * self.scale;
+            let damp = if length > most { most / length } else { 1.0 };
+            (x, y) = (x + p * damp, y + q * damp);
+            let mut changed = false;
+            for (side, at) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
+                let out = clauses[side].iter().filter(|id| !met[side].iter().any(|m| m.0 == **id));
+                let worst = out.map(|id| (self.at(side, *id, at).0, *id)).max_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some((value, id)) = worst
+                    && value > tiny
+                    && met[side].len() < MOST_MET
+                {
+                    met[side].push((id, 0.0));
+                    changed = true;
+                }
+            }
+            if !changed && length <= 1e-14 * self.scale {
+                break;
+            }
+        }
+        (x, y)
+    }
+
+    /// Gives the met literals of one side the weights with which their gradients pull most nearly along `way` (towards the other point,
+    /// the side's frame), those that would pull back leaving: least squares without negative weights.
+    fn weigh(&self, side: usize, met: &mut Met, x: DVec3, way: DVec3) {
+        loop {
+            let gradients: SmallVec<[DVec3; MOST_MET]> = met.iter().map(|m| self.at(side, m.0, x).1).collect();
+            let n = gradients.len();
+            let (mut a, mut f) = ([[0.0; MOST]; MOST], [0.0; MOST]);
+            for i in 0..n {
+                for j in 0..n {
+                    a[i][j] = gradients[i].dot(gradients[j]);
+                }
+                a[i][i] += REGULAR;
+                f[i] = gradients[i].dot(way);
+            }
+            let Some(weights) = eliminated(&mut a, f, n) else { return };
+            for (m, weight) in met.iter_mut().zip(weights) {
+                m.1 = weight;
+            }
+            let back = (0..n).min_by(|i, j| weights[*i].total_cmp(&weights[*j]));
+            match back.filter(|i| weights[*i] < -1e-9 * way.length()) {
+                Some(i) => met.remove(i),
+                None => return,
+            };
+        }
+    }
+
+    /// One step of both points, each in its frame.
+    fn step(&self, met: &[Met; 2], (x, y): (DVec3, DVec3), held: Option<usize>) -> Option<(DVec3, DVec3)> {
+        let n = 6 + met[0].len() + met[1].len();
+        let mut a = [[0.0; MOST]; MOST];
+        let mut f = [0.0; MOST];
+        let way = x - self.at.a_point(y);
+        let stiff = |side: usize| if held == Some(side) { HELD } else { 1.0 + REGULAR };
+        let mut blocks = [0, 1].map(|side| DMat3::IDENTITY * stiff(side));
+        let mut k = 6;
+        for side in [0, 1] {
+            for (id, weight) in &met[side] {
+                let p = if side == 0 { x } else { y };
+                let face = &self.sides[side].parts.solid.faces[id.face() as usize];
+                let (value, mut g) = literal_at(face, id.sense(), p);
+                let sign = if id.sense() == Sense::Positive { 1.0 } else { -1.0 };
+                let mut h = hessian(face, p) * (sign * *weight);
+                if side == 1 {
+                    // Along A's axes.
+                    g = self.at.a_vector(g);
+                    let turn = self.at.b_from_a;
+                    h = turn.transpose() * h * turn;
+                }
+                blocks[side] += h;
+                for i in 0..3 {
+                    a[3 * side + i][k] = g[i];
+                    a[k][3 * side + i] = g[i];
+                }
+                a[k][k] = -REGULAR;
+                f[k] = -value - REGULAR * *weight;
+                k += 1;
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                a[i][j] = blocks[0].col(j)[i];
+                a[3 + i][3 + j] = blocks[1].col(j)[i];
+            }
+            a[i][3 + i] = -1.0;
+            a[3 + i][i] = -1.0;
+            (f[i], f[3 + i]) = (-way[i], way[i]);
+        }
+        let step = eliminated(&mut a, f, n)?;
+        let own = |side: usize| DVec3::from_slice(&step[3 * side..3 * side + 3]);
+        let [p, q] = [0, 1].map(|side| if held == Some(side) { DVec3::ZERO } else { own(side) });
+        Some((p, self.at.b_from_a * q))
+    }
+
+    /// The faces at a point of one body: those of the literals that are nearly 0 there.
+    pub fn faces(&self, side: usize, x: DVec3) -> [u32; 3] {
+        let mut faces = [NO_FACE; 3];
+        let Some(clause) = self.clause(side, x) else { return faces };
+        let mut all: SmallVec<[(f64, u32); 16]> =
+            clause.iter().map(|id| (self.at(side, *id, x).0.abs(), id.face())).collect();
+        all.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let reach = FEATURE * self.scale + 1e3 * self.rounding;
+        let near = all.iter().filter(|v| v.0 <= reach).map(|v| v.1);
+        faces.iter_mut().zip(near).for_each(|(to, face)| *to = face);
+        faces.sort_unstable();
+        faces
+    }
+}
+
+/// Stiffness that holds a point.
+const HELD: f64 = 1e30;
+
+/// What is added to the curvature of the distance and taken from the conditions, so that neither what slides freely nor a condition
+/// too many makes the system singular.
+const REGULAR: f64 = 1e-10;
+
+/// Solves a system by elimination with partial pivoting.
+fn eliminated(a: &mut [[f64; MOST]; MOST], mut f: [f64; MOST], n: usize) -> Option<[f64; MOST]> {
+    for k in 0..n {
+        let p = (k..n).max_by(|p, q| a[*p][k].abs().total_cmp(&a[*q][k].abs()))?;
+        if a[p][k] == 0.0 || !a[p][k].is_finite() {
+            return None;
+        }
+        a.swap(k, p);
+        f.swap(k, p);
+        let row = a[k];
+        for i in k + 1..n {
+            let factor = a[i][k] / row[k];
+            if factor != 0.0 {
+                for j in k + 1..n {
+                    a[i][j] -= factor * row[j];
+                }
+                f[i] -= factor * f[k];
+            }
+        }
+    }
+    for k in (0..n).rev() {
+        for j in k + 1..n {
+            f[k] -= a[k][j] * f[j];
+        }
+        f[k] /= a[k][k];
+    }
+    Some(f)
+}

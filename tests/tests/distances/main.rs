@@ -1,0 +1,6 @@
+//! Distances: their bounds against closed forms and against brute force, at an instant and over a step.
+
+mod brute;
+mod closed;
+mod forms;
+mod moving;
