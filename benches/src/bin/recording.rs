@@ -72,7 +72,7 @@ impl Scene {
         match self {
             Self::Balls => Pose::at(DVec3::new(4.0 * (i % 32) as f64 + t.cos(), 4.0 * (i / 32) as f64 + t.sin(), 9.0)),
             Self::Pegs | Self::Parts => {
-                let low = if k % 3 == 0 { -6.0 } else { 0.0 };
+                let low = if k.is_multiple_of(3) { -6.0 } else { 0.0 };
                 let at = DVec3::new(12.0 * x - 28.0 + t.cos(), t.sin(), 10.0 + low + t.sin());
                 Pose::new(at, quat_of_rotation_vector(DVec3::new(t.cos(), t.sin(), 0.0) * 0.2))
             }

@@ -347,18 +347,6 @@ typedef struct contactd_opened {
     uint32_t reserved;
 } contactd_opened;
 
-// What was recorded.
-typedef struct contactd_recording {
-    // Steps that stand in the file, or are on their way to it.
-    uint64_t steps;
-    // Steps that were left out because the recorder could not keep up.
-    uint64_t dropped;
-    // Steps that stand in it without a picture, for the same reason.
-    uint64_t without_picture;
-    // Bytes written.
-    uint64_t bytes;
-} contactd_recording;
-
 // A face of a model. Its strings are valid until the session is closed.
 typedef struct contactd_face {
     // Index of its primitive in file order.
@@ -690,6 +678,18 @@ typedef struct contactd_patch_slot {
     uint32_t region[2];
 } contactd_patch_slot;
 
+// What was recorded.
+typedef struct CONTACTD_Recording {
+    // Steps that stand in the file, or are on their way to it.
+    uint64_t steps;
+    // Steps that were left out because the recorder could not keep up.
+    uint64_t dropped;
+    // Steps that stand in it without a picture, for the same reason.
+    uint64_t without_picture;
+    // Bytes written.
+    uint64_t bytes;
+} CONTACTD_Recording;
+
 // A contact point of a pair.
 typedef struct contactd_manifold_point {
     // Names the point within its pair, for as long as it lasts.
@@ -845,7 +845,9 @@ int32_t contactd_solid_quadric(const double *m, const double *min, const double 
 
 // All points with (|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) <= 1. `radii`: a, b and c; `exponents`: e1 (north to south) and e2
 // (east to west), each from 0.1 to 1.
-int32_t contactd_solid_superellipsoid(const double *radii, const double *exponents, struct contactd_solid **out);
+int32_t contactd_solid_superellipsoid(const double *radii,
+                                      const double *exponents,
+                                      struct contactd_solid **out);
 
 // The half-space normal.x <= offset |normal|: a floor or a wall of its own, or to be cut with something. `normal`: 3
 // numbers.
@@ -1010,14 +1012,15 @@ int32_t contactd_get_region(struct contactd_session *session,
 // `contactd replay FILE` repeats it bit for bit. A recorder that cannot keep up leaves out whole steps and counts them: no step
 // waits for it. CONTACTD_ERROR_RECORDING: the file exists or cannot be made, the session is being recorded already, or the server
 // has a deadline, with which answers depend on time.
-int32_t contactd_start_recording(struct contactd_session *session, const char *path);
+int32_t contactd_start_recording(struct contactd_session *session,
+                                 const char *path);
 
 // What was recorded so far. CONTACTD_ERROR_RECORDING: nothing is being recorded, or the recording has failed;
 // contactd_error_message says why.
-int32_t contactd_get_recording(struct contactd_session *session, struct contactd_recording *recording);
+int32_t contactd_get_recording(struct contactd_session *session, struct CONTACTD_Recording *recording);
 
 // Ends the recording: its file is complete when this returns. Codes as of contactd_get_recording.
-int32_t contactd_stop_recording(struct contactd_session *session, struct contactd_recording *recording);
+int32_t contactd_stop_recording(struct contactd_session *session, struct CONTACTD_Recording *recording);
 
 // Writes the last step as a scene in a new folder, for `contactd check FOLDER/scene.toml`. CONTACTD_ERROR_RECORDING: the folder
 // exists or cannot be written.

@@ -91,7 +91,10 @@ mod tests {
         let period = Duration::from_millis(5);
         let heard = |patience: u64| said.recv_timeout(Duration::from_millis(patience)).ok();
         std::thread::scope(|scope| {
-            scope.spawn(|| tell(&beats, &asked, period, |word| say.send(word.to_string()).expect("the test hears")));
+            let beats = &beats;
+            scope.spawn(move || {
+                tell(beats, &asked, period, |word| say.send(word.to_string()).expect("the test hears"));
+            });
             assert_eq!(heard(50), None, "it has not gone round yet");
             for _ in 0..3 {
                 beats.fetch_add(1, Ordering::Relaxed);

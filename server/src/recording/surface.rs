@@ -32,7 +32,7 @@ pub fn surface(model: &Model, reach: f64) -> Surface {
     let aabb = model.solid.aabb();
     let aabb = Aabb { min: aabb.min.max(DVec3::splat(-reach)), max: aabb.max.min(DVec3::splat(reach)) };
     let size = aabb.max - aabb.min;
-    if model.solid.is_empty() || !(size.min_element() > 0.0) {
+    if model.solid.is_empty() || size.is_nan() || size.min_element() <= 0.0 {
         return Surface::default();
     }
     Grid::new(model, &aabb).surface()

@@ -14,7 +14,7 @@ const DEGREE: usize = 4;
 /// Coefficients of a polynomial in u, lowest first.
 type Poly = [f64; 2 * DEGREE + 1];
 
-/// Σ cos[k]·cos kθ + sin[k]·sin kθ; sin[0] is unused.
+/// `Σ cos[k]·cos kθ + sin[k]·sin kθ`; `sin[0]` is unused.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trig {
     /// Coefficients of the cosines.

@@ -33,7 +33,8 @@ pub fn published() -> Vec<(PathBuf, toml::Value)> {
 fn included(text: &str) -> Vec<&str> {
     let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
     let marks = ["include_str!(", "include_bytes!(", "include!(", "#[path = "];
-    code.filter(|line| marks.iter().any(|mark| line.contains(mark))).filter_map(|line| line.split('"').nth(1)).collect()
+    let behind = |line: &str| marks.iter().find_map(|mark| line.find(mark).map(|at| at + mark.len()));
+    code.filter_map(|line| behind(line).and_then(|at| line[at..].split('"').nth(1))).collect()
 }
 
 #[test]
@@ -79,7 +80,7 @@ fn every_published_package_is_whole_in_its_folder() {
     }
     assert!(read > 0, "no file is included: the reader of sources is broken");
     assert_eq!(
-        included("// include_str!(\"no\")\n  include_str!(\"../../yes\")\n#[path = \"x.rs\"]\n"),
+        included("// include_str!(\"no\")\n  (\"/\", include_str!(\"../../yes\")),\n#[path = \"x.rs\"]\n"),
         ["../../yes", "x.rs"]
     );
 }
@@ -111,7 +112,7 @@ fn what_is_depended_on_asks_for_no_newer_rust() {
     let known = metadata();
     let all = packages(&known);
     let own = |p: &Value| p["source"].is_null();
-    let ours = all.iter().find(|p| own(p)).and_then(|p| p["rust_version"].as_str()).expect("a rust-version");
+    let ours = all.iter().filter(|p| own(p)).find_map(|p| p["rust_version"].as_str()).expect("a rust-version");
     let mut told = 0;
     for p in all.iter().filter(|p| !own(p)) {
         let Some(theirs) = p["rust_version"].as_str() else { continue };

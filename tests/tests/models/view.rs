@@ -89,7 +89,8 @@ impl Reader<'_> {
                         continue;
                     }
                     let top = stack.last_mut().expect("a value");
-                    if if smaller { one.0 < top.0 } else { one.0 > top.0 } {
+                    let decides = if smaller { one.0 < top.0 } else { one.0 > top.0 };
+                    if decides {
                         *top = one;
                     }
                 }

@@ -32,7 +32,14 @@ fn tilt(v: DVec3) -> glam::DQuat {
 
 /// The answer of the search alone; a whole-primitive answer in front of it must say the same.
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
-    let o = ask_with(name, a, ma, b, mb, Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() });
+    let o = ask_with(
+        name,
+        a,
+        ma,
+        b,
+        mb,
+        Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() },
+    );
     let fronted = ask_with(name, a, ma, b, mb, Strategies::default());
     assert_eq!(o.status(), fronted.status(), "{name}");
     if o.status() != Status::Overlap {

@@ -322,7 +322,7 @@ impl<'a> Search<'a> {
             }
             self.heap.pop();
             looks += 1;
-            if looks <= FIRST || looks % EVERY == 0 {
+            if looks <= FIRST || looks.is_multiple_of(EVERY) {
                 let at = self.spans[cell.span as usize].middle;
                 let before = self.upper;
                 self.improve([cell.a, cell.b], &at, cell.x, cell.y);

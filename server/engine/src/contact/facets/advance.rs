@@ -73,6 +73,8 @@ impl Ord for Item {
 }
 
 /// What became of an item.
+// One at a time, on the stack.
+#[allow(clippy::large_enum_variant)]
 enum Step {
     /// Nothing of it is left.
     Done,

@@ -111,7 +111,6 @@ impl Cover<'_> {
 }
 
 /// What a body is made of.
-#[expect(clippy::large_enum_variant, reason = "two a question, on the stack")]
 enum Kind<'a> {
     /// One convex primitive, in its own frame.
     Convex(ConvexBody<'a>),

@@ -34,6 +34,8 @@ use advance::Advance;
 use body::Body;
 
 /// What is told in front of the search.
+// One a question, on the stack.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Front {
     /// The answer.
     Ended(Ending),

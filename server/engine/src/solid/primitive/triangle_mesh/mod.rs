@@ -246,7 +246,9 @@ impl Geometry for TriangleMesh {
         Some(Facets { vertices: &surface.vertices, triangles: &surface.triangles, faces: &surface.face_of })
     }
     fn facet_tree(&self) -> Option<&FacetTree> {
-        self.surface.tree.get_or_init(|| FacetTree::of(&self.surface)).as_ref()
+        let surface = &*self.surface;
+        let made = || FacetTree::of(&surface.vertices, &surface.triangles, &surface.around);
+        surface.tree.get_or_init(made).as_ref()
     }
     fn facet_tolerance(&self) -> f64 {
         8.0 * self.surface.tolerance

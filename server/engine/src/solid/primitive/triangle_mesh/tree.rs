@@ -3,7 +3,7 @@
 //! Boxes are kept in single precision about the middle of the mesh, rounded outwards. The tree is made when somebody first asks for
 //! it, and is the same whoever asks.
 
-use super::surface::Surface;
+use crate::math::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -72,20 +72,20 @@ fn above(x: f64) -> f32 {
 
 impl FacetTree {
     /// The tree of a mesh; `None` of one whose coordinates are too large for it.
-    pub(super) fn of(surface: &Surface) -> Option<Self> {
-        let middle = surface.around.center();
-        if surface.around.min.abs().max(surface.around.max.abs()).max_element() >= LARGEST {
+    pub(super) fn of(vertices: &[DVec3], triangles: &[[u32; 3]], around: &Aabb) -> Option<Self> {
+        let middle = around.center();
+        if around.min.abs().max(around.max.abs()).max_element() >= LARGEST {
             return None;
         }
         let boxed = |facet: u32| {
-            let corners = surface.corners(facet).map(|c| c - middle);
+            let corners = triangles[facet as usize].map(|v| vertices[v as usize] - middle);
             let low = corners[0].min(corners[1]).min(corners[2]).to_array().map(below);
             let high = corners[0].max(corners[1]).max(corners[2]).to_array().map(above);
             Boxed { low, high, facet }
         };
-        let count = surface.triangles.len() as u32;
+        let count = triangles.len() as u32;
         let mut all: Vec<Boxed> = (0..count).into_par_iter().map(boxed).collect();
-        let (nodes, shells) = rayon::join(|| grown(&mut all, 0), || shells(surface));
+        let (nodes, shells) = rayon::join(|| grown(&mut all, 0), || shells(vertices, triangles));
         Some(Self { middle, nodes, order: all.into_iter().map(|b| b.facet).collect(), shells })
     }
 
@@ -132,8 +132,8 @@ impl FacetTree {
 }
 
 /// The first corner of each part of the surface that facets connect.
-fn shells(surface: &Surface) -> Vec<DVec3> {
-    let mut leader: Vec<u32> = (0..surface.vertices.len() as u32).collect();
+fn shells(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
+    let mut leader: Vec<u32> = (0..vertices.len() as u32).collect();
     fn find(leader: &mut [u32], mut i: u32) -> u32 {
         while leader[i as usize] != i {
             leader[i as usize] = leader[leader[i as usize] as usize];
@@ -141,14 +141,14 @@ fn shells(surface: &Surface) -> Vec<DVec3> {
         }
         i
     }
-    for [a, b, c] in &surface.triangles {
+    for [a, b, c] in triangles {
         for (p, q) in [(*a, *b), (*b, *c)] {
             let (p, q) = (find(&mut leader, p), find(&mut leader, q));
             leader[p.max(q) as usize] = p.min(q);
         }
     }
     let first = leader.iter().enumerate().filter(|(i, l)| *i == **l as usize);
-    first.map(|(i, _)| surface.vertices[i]).collect()
+    first.map(|(i, _)| vertices[i]).collect()
 }
 
 /// The boxes over some facets, which are put in order; the first of them has the number `first` in the mesh's order.
