@@ -96,7 +96,13 @@ def test_another_command_ends_by_the_signal(command, tmp_path, number):
     """It waits for a model that nobody writes."""
     model = tmp_path / "endless.csg"
     os.mkfifo(model)
-    with subprocess.Popen([*command, "check", str(model)], stderr=subprocess.PIPE, text=True) as process:
+
+    def begin():
+        # A shell's background job begins with SIGINT ignored.
+        signal.signal(number, signal.SIG_DFL)
+
+    started = [*command, "check", str(model)]
+    with subprocess.Popen(started, stderr=subprocess.PIPE, text=True, preexec_fn=begin) as process:
         end = time.monotonic() + 20
         # The other end can be opened once the command reads, not before.
         while (writer := _open_for_writing(model)) is None:
