@@ -679,7 +679,7 @@ typedef struct contactd_patch_slot {
 } contactd_patch_slot;
 
 // What was recorded.
-typedef struct CONTACTD_Recording {
+typedef struct contactd_recording {
     // Steps that stand in the file, or are on their way to it.
     uint64_t steps;
     // Steps that were left out because the recorder could not keep up.
@@ -688,7 +688,7 @@ typedef struct CONTACTD_Recording {
     uint64_t without_picture;
     // Bytes written.
     uint64_t bytes;
-} CONTACTD_Recording;
+} contactd_recording;
 
 // A contact point of a pair.
 typedef struct contactd_manifold_point {
@@ -1017,10 +1017,10 @@ int32_t contactd_start_recording(struct contactd_session *session,
 
 // What was recorded so far. CONTACTD_ERROR_RECORDING: nothing is being recorded, or the recording has failed;
 // contactd_error_message says why.
-int32_t contactd_get_recording(struct contactd_session *session, struct CONTACTD_Recording *recording);
+int32_t contactd_get_recording(struct contactd_session *session, struct contactd_recording *recording);
 
 // Ends the recording: its file is complete when this returns. Codes as of contactd_get_recording.
-int32_t contactd_stop_recording(struct contactd_session *session, struct CONTACTD_Recording *recording);
+int32_t contactd_stop_recording(struct contactd_session *session, struct contactd_recording *recording);
 
 // Writes the last step as a scene in a new folder, for `contactd check FOLDER/scene.toml`. CONTACTD_ERROR_RECORDING: the folder
 // exists or cannot be written.
