@@ -516,7 +516,7 @@ fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
         let title = names.collect::<Vec<_>>().join(", ");
         Show::of_scene(title, scene, &models_of(&prepared))?
     };
-    show.drawn.notes().for_each(warn);
+    show.buffers.notes().for_each(warn);
     let ready = |address: &str| {
         // A reader that has gone away does not stop it.
         let _ = print(&format!("contactd view: open {address} in a browser; Ctrl+C ends it\n"));

@@ -52,6 +52,7 @@
 //! | 6 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
 //! | 7 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
 //! | 8 | [`cache`], [`terminal`] | preprocessed models kept on disk; text of 80 columns |
+//! | 8 | [`tessellation`] | triangles of solids, for viewers |
 //! | 9 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
 //! | 9 | [`recording`] | steps in MCAP files, with all that it takes to repeat them |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
@@ -102,6 +103,7 @@ pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod terminal;
+pub mod tessellation;
 pub mod view;
 
 pub use contactd_engine::{bound, contact, math, motion, octree, solid, world};

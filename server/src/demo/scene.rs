@@ -1,7 +1,7 @@
 //! A step of the demo as a scene file, so that `contactd check` can solve it on its own.
 
 use super::script::{Act, acts};
-use contactd_proto::Pose;
+use crate::import::pose_text;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -32,17 +32,12 @@ pub fn text(act: &Act, i: usize) -> String {
         if body.fixed {
             out.push_str("motion = \"static\"\n");
         }
-        let _ = writeln!(out, "start = {}", pose(&leg.start));
+        let _ = writeln!(out, "start = {}", pose_text(&leg.start));
         if leg.end != leg.start {
-            let _ = writeln!(out, "end = {}", pose(&leg.end));
+            let _ = writeln!(out, "end = {}", pose_text(&leg.end));
         }
     }
     out
-}
-
-/// `{:?}` of a double is the shortest text that reads back to the same bits.
-fn pose(p: &Pose) -> String {
-    format!("{{ position = {:?}, rotation = {:?} }}", p.position.to_array(), p.rotation.to_array())
 }
 
 /// Writes the scene of a step, and the models that it names, into `folder`; returns the scene's path.

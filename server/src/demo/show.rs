@@ -4,7 +4,7 @@ use super::scene::text;
 use super::script::{PARTS, acts};
 use crate::cache::{self, Cache};
 use crate::import::{Facets, Limits, Scene, Source};
-use crate::view::drawn::Shown;
+use crate::view::buffers::Shown;
 use crate::view::show::{Act, Show};
 use std::path::Path;
 use std::sync::Arc;

@@ -23,7 +23,7 @@ pub use csg::import_csg;
 pub use format::{Attachment, FORMATS, Format, ModelBytes, Named, Source, files_of, read_bytes, read_model};
 pub use openscad::{Access, Openscad};
 pub use problem::Problem;
-pub use scene::{ModelSource, Scene, SceneError, SceneObject, read_scene};
+pub use scene::{ModelSource, Scene, SceneError, SceneObject, pose_text, read_scene};
 
 use crate::solid::Solid;
 

@@ -92,6 +92,11 @@ pub struct SceneObject {
     pub max_speed: Option<f64>,
 }
 
+/// A pose as a scene file tells it: `{:?}` of a double is the shortest text that reads back to the same bits.
+pub fn pose_text(pose: &Pose) -> String {
+    format!("{{ position = {:?}, rotation = {:?} }}", pose.position.to_array(), pose.rotation.to_array())
+}
+
 /// Why a scene was not read.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {

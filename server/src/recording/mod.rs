@@ -13,7 +13,6 @@ mod file;
 mod message;
 mod queue;
 mod scene;
-mod surface;
 mod view;
 mod writer;
 

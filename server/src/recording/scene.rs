@@ -5,12 +5,11 @@
 //! rotation vector of which the reader makes it. What a scene cannot say is refused, or told in a comment at its head.
 
 use super::content::Content;
-use crate::import::FORMATS;
+use crate::import::{FORMATS, pose_text};
 use contactd_proto::control::{Facets, ObjectSpec};
 use contactd_proto::pose_record::PoseCommand;
 use contactd_proto::rule::Setting;
 use contactd_proto::{Effects, Motion, MotionState, Pose, Rule};
-use glam::DQuat;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
 use std::path::{Component, Path};
@@ -195,17 +194,17 @@ fn write_object(out: &mut String, object: &Standing, name: &str, has_speed: bool
     }
     let place = spec.place.checked().map_err(|code| format!("object {}: place: {code}", spec.id))?;
     if place != Pose::IDENTITY {
-        let _ = writeln!(out, "place = {}", pose(&place));
+        let _ = writeln!(out, "place = {}", pose_text(&place));
     }
     let MotionState { motion, end } = motion_state;
-    let _ = writeln!(out, "start = {}", pose(&motion.start));
+    let _ = writeln!(out, "start = {}", pose_text(&motion.start));
     if motion_state.is_rest() {
         return Ok(());
     }
     // As the reader makes a motion of them.
     let is_it = |command| same(&MotionState::ordered(motion.start, command).motion, motion);
     if is_it(PoseCommand::End(*end)) {
-        let _ = writeln!(out, "end = {}", pose(end));
+        let _ = writeln!(out, "end = {}", pose_text(end));
     } else if is_it(PoseCommand::Turn(end.position, motion.spin)) {
         let _ = writeln!(out, "end = {{ position = {:?} }}", end.position.to_array());
         let _ = writeln!(out, "rotation_vector = {:?}", motion.spin.to_array());
@@ -253,12 +252,6 @@ fn write_rule(out: &mut String, rule: &Rule, of_name: &HashMap<&str, Vec<&str>>)
             Setting::Length(length) => writeln!(out, "{} = {length:?}", field.name),
         };
     }
-}
-
-/// `{:?}` of a double is the shortest text that reads back to the same bits.
-fn pose(p: &Pose) -> String {
-    let q: DQuat = p.rotation;
-    format!("{{ position = {:?}, rotation = {:?} }}", p.position.to_array(), q.to_array())
 }
 
 /// A string of TOML.

@@ -5,7 +5,9 @@
 
 use super::content::Part;
 use super::message::{Opening, StepMessage};
-use super::surface::{Surface, surface};
+use crate::math::Aabb;
+use crate::octree::Model;
+use crate::tessellation::{self, Triangles};
 use contactd_proto::contact_record::{CONTACT, OVERLAP, VALID_NORMAL, VALID_POINT};
 use contactd_proto::control::{Command, ObjectSpec};
 use contactd_proto::step::STEP_REFUSED;
@@ -25,10 +27,29 @@ const CONTACTS: usize = 200;
 /// The frame that all others stand in.
 const WORLD: &str = "world";
 
+/// Of a solid that is no mesh: 2 to this power cells along each side.
+const LEVELS: u32 = 5;
+/// Facets of a mesh that is told as it is, at most.
+const FACETS: usize = 20_000;
+
+/// The surface of a model; what reaches to infinity is cut off at `reach`.
+fn surface(model: &Model, reach: f64) -> Triangles {
+    if let Some(own) = tessellation::of_mesh(&model.solid).filter(|own| own.indices.len() <= FACETS) {
+        return own;
+    }
+    let own = model.solid.aabb();
+    let near = Aabb::around(DVec3::ZERO, DVec3::splat(reach));
+    let around = if own.is_finite() { own } else { own.intersection(&near) };
+    if model.solid.is_empty() || around.is_empty() {
+        return Triangles::default();
+    }
+    tessellation::of_solid(&model.solid, &around, LEVELS)
+}
+
 /// A session's objects as they are drawn.
 pub struct Stage {
     session: u64,
-    models: BTreeMap<u32, Arc<Surface>>,
+    models: BTreeMap<u32, Arc<Triangles>>,
     /// Radius of each model; 0 of one that reaches to infinity.
     radii: BTreeMap<u32, f64>,
     objects: BTreeMap<u32, ObjectSpec>,
@@ -237,7 +258,7 @@ impl Stage {
             "points": points,
             "color": color([shade(0.0), shade(1.0 / 3.0), shade(2.0 / 3.0)], if object.is_static { 0.6 } else { 1.0 }),
             "colors": [],
-            "indices": surface.indices,
+            "indices": surface.indices.as_flattened(),
         }]);
         entity
     }

@@ -1,16 +1,15 @@
 //! `contactd view`: a scene in a browser, its exact solids marched through on the page, with its contacts and its time line.
 //!
 //! One page, embedded in the program, is served on this machine alone ([`http`]). It gets the solids as numbers ([`cells`]; meshes as
-//! [`triangles`]), the objects, their motions and the answers as JSON ([`show`]), and draws them by WebGL 2 (`page/`). Nothing is
+//! triangles), the objects, their motions and the answers as JSON ([`show`]), and draws them by WebGL 2 (`page/`). Nothing is
 //! tessellated that has a closed form, and what is drawn otherwise is told so.
 //!
 //! Floor 11: imports `check` and everything below.
 
+pub mod buffers;
 pub mod cells;
-pub mod drawn;
 pub mod http;
 pub mod show;
-pub mod triangles;
 
 use http::{Answer, Answers, Listening};
 use show::Show;
@@ -53,12 +52,12 @@ pub fn answer(show: &Show, path: &str) -> Answer {
     if let Some((_, content, text)) = PAGE.iter().find(|(name, ..)| *name == route) {
         return Answer::of(content, *text);
     }
-    let drawn = &show.drawn;
+    let buffers = &show.buffers;
     match route {
         "/show.json" => return told(Some(show.told()), path),
-        "/words.bin" => return Answer::of(BYTES, drawn.words_bytes()),
-        "/rows.bin" => return Answer::of(BYTES, drawn.rows_bytes()),
-        "/triangles.bin" => return Answer::of(BYTES, drawn.triangles_bytes()),
+        "/words.bin" => return Answer::of(BYTES, buffers.words_bytes()),
+        "/rows.bin" => return Answer::of(BYTES, buffers.rows_bytes()),
+        "/triangles.bin" => return Answer::of(BYTES, buffers.triangles_bytes()),
         _ => {}
     }
     let mut words = route.split('/').skip(1);

@@ -1,6 +1,6 @@
 //! What is shown: models, and acts of steps, each step a scene of its own that is solved when somebody looks at it.
 
-use super::drawn::{Drawn, Shown};
+use super::buffers::{Buffers, Shown};
 use crate::check::Check;
 use crate::contact::{Outcome, Status};
 use crate::import::Scene;
@@ -49,7 +49,7 @@ pub struct Show {
     /// Its acts, one at least.
     pub acts: Vec<Act>,
     /// The models as numbers.
-    pub drawn: Drawn,
+    pub buffers: Buffers,
     /// Steps that were solved, as JSON.
     solved: Mutex<HashMap<(usize, usize), String>>,
 }
@@ -72,7 +72,7 @@ struct ModelTold<'a> {
     name: &'a str,
     file: &'a str,
     #[serde(flatten)]
-    drawn: &'a super::drawn::Piece,
+    drawn: &'a super::buffers::Piece,
 }
 
 #[derive(Serialize)]
@@ -176,8 +176,8 @@ impl Show {
         if acts.is_empty() {
             return Err(format!("{title}: expected something to show, found nothing"));
         }
-        let drawn = Drawn::new(&models, &extents);
-        let show = Self { title, models, acts, drawn, solved: Mutex::default() };
+        let buffers = Buffers::new(&models, &extents);
+        let show = Self { title, models, acts, buffers, solved: Mutex::default() };
         for act in 0..show.acts.len() {
             show.solved(act, 0)?;
         }
@@ -189,7 +189,7 @@ impl Show {
     /// # Errors
     /// A first step that is refused.
     pub fn told(&self) -> Result<String, String> {
-        let models = self.models.iter().zip(&self.drawn.pieces);
+        let models = self.models.iter().zip(&self.buffers.pieces);
         let act = |act: &Act| {
             let scene = (act.scene)(0)?;
             let object = |o: &crate::import::SceneObject| ObjectTold {
@@ -206,9 +206,9 @@ impl Show {
             title: &self.title,
             models: models.map(|(m, drawn)| ModelTold { name: &m.name, file: &m.file, drawn }).collect(),
             acts: self.acts.iter().map(act).collect::<Result<_, String>>()?,
-            rows: self.drawn.rows.len(),
-            words: self.drawn.words.len(),
-            triangles: self.drawn.triangles.len() / 3,
+            rows: self.buffers.rows.len(),
+            words: self.buffers.words.len(),
+            triangles: self.buffers.triangles.len() / 3,
         })
     }
 

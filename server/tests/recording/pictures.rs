@@ -143,7 +143,7 @@ fn pictures_have_all_that_their_schemas_require() {
             for list in entity["triangles"].as_array().unwrap() {
                 let points = list["points"].as_array().unwrap().len() as u64;
                 let indices = list["indices"].as_array().unwrap();
-                assert!(indices.len() >= 12 && indices.len() % 3 == 0);
+                assert!(indices.len() >= 12 && indices.len() % 3 == 0, "{}: {} indices", entity["id"], indices.len());
                 assert!(indices.iter().all(|i| i.as_u64().unwrap() < points));
                 drawn.insert(entity["frame_id"].as_str().unwrap().to_owned());
             }

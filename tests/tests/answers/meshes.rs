@@ -212,6 +212,48 @@ fn a_body_within_a_mesh_overlaps_and_one_in_its_cavity_does_not() {
     }
 }
 
+/// A bar along x from the origin in `pieces`, of half the width and height that are told.
+fn bar(long: f64, [width, height]: [f64; 2], pieces: u32) -> Mesh {
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let ring = |i: u32| corners.map(|(y, z)| DVec3::new(long * f64::from(i) / f64::from(pieces), y * width, z * height));
+    let mut triangles = vec![[0, 2, 1], [0, 3, 2]];
+    for i in 0..pieces {
+        for k in 0..4 {
+            let [a, b] = [4 * i + k, 4 * i + (k + 1) % 4];
+            triangles.extend([[a, b, b + 4], [a, b + 4, a + 4]]);
+        }
+    }
+    let last = 4 * pieces;
+    triangles.extend([[last, last + 1, last + 2], [last, last + 2, last + 3]]);
+    ((0..=pieces).flat_map(ring).collect(), triangles)
+}
+
+/// A bar turns about z by an angle; a ball of radius q stands off the axis by d, at the angle α: the bar's side, w off its middle,
+/// meets it at the angle α − asin((w + q)/d).
+#[test]
+fn a_bar_that_swings_meets_what_stands_in_its_way_when_its_side_has_come_there() {
+    let mut r = Random::new(41);
+    for i in 0..pairs(60) {
+        let (long, w, q) = (r.within(2.0, 4.0), r.within(0.02, 0.2), r.within(0.02, 0.2));
+        let whole = r.within(1.5, 3.0);
+        let d = r.within(0.3, 0.9) * long;
+        let lag = ((w + q) / d).asin();
+        let angle = lag + (whole - lag) * r.within(0.1, 0.9);
+        let frame = Pose::new(r.vector(1.0), r.rotation());
+        let swing = Motion { spin: frame.vector(DVec3::Z * whole), ..Motion::resting(frame) };
+        let at = frame.point(DVec3::new(d * angle.cos(), d * angle.sin(), 0.0));
+        let height = r.within(0.05, 0.3);
+        let bar = alone(meshes::solid(&bar(long, [w, height], 1 + r.below(40) as u32)));
+        let ball = alone(contactd::solid::primitive::Sphere { radius: q });
+        let still = Motion::resting(Pose::at(at));
+        for o in [ask(&bar, &ball, [swing, still]), ask(&ball, &bar, [still, swing])] {
+            let expected = (angle - lag) / whole;
+            assert_eq!(o.status(), Status::Contact, "{i}: {expected}, {o:?}");
+            assert!((o.time() - expected).abs() < 1e-11, "{i}: {expected}, {o:?}");
+        }
+    }
+}
+
 #[test]
 fn a_convex_mesh_meets_when_the_polyhedron_of_its_points_does() {
     let mut r = Random::new(3);

@@ -3,7 +3,7 @@
 //! `CONTACTD_DISTANCES=1000 cargo test --release -p contactd-tests --test distances closed:: -- --nocapture` sets the number of pairs of
 //! each of the families (12 by default).
 
-use crate::forms::{Box3, boxes, point_box, point_cylinder, point_turned, segments};
+use crate::forms::{Box3, Tally, boxes, point_box, point_cylinder, point_turned, segments};
 use contactd::contact::PlacedModel;
 use contactd::contact::distance::{DEFAULT_LIMIT, Distance, DistanceQuery, at_instant};
 use contactd::motion::Placed;
@@ -222,34 +222,17 @@ fn distances_are_those_of_closed_forms() {
     let count = sized("CONTACTD_DISTANCES", 12usize);
     let mut failures = Vec::new();
     for (name, family) in FAMILIES {
-        let (mut worst, mut width, mut cells, mut most) = (0.0_f64, 0.0_f64, 0, 0);
+        let mut tally = Tally::new(name);
         for i in 0..count {
             let mut r = Random::new(i as u64 + 1);
             let family_case = family(&mut r);
             let known = moved(family_case, &mut r);
             let d = ask(&known);
-            let truth = known.distance;
-            worst = worst.max(d.lower - truth).max(truth - d.upper);
-            width = width.max(d.upper - d.lower);
-            cells += d.cells;
-            most = most.max(d.cells);
             let inside = |recipe: &Recipe, pose: Pose, x: DVec3| is_inside(recipe, pose.inverse().point(x), 1e-12);
-            let points = (d.a.point - d.b.point).length();
-            let right = d.lower <= truth + 1e-12
-                && truth <= d.upper + 1e-12
-                && d.is_settled
-                && d.upper - d.lower <= 1e-9
-                && (truth == 0.0 || (points - d.upper).abs() < 1e-11)
-                && inside(&known.a, known.at_a, d.a.point)
-                && inside(&known.b, known.at_b, d.b.point);
-            if !right {
-                failures.push(format!("{name} {i}: {truth} in [{}, {}], {} cells: {d:?}", d.lower, d.upper, d.cells));
-            }
+            let in_both = inside(&known.a, known.at_a, d.a.point) && inside(&known.b, known.at_b, d.b.point);
+            tally.take(i, known.distance, 1e-9, &d, in_both);
         }
-        println!(
-            "{name:18} {count} pairs, bounds {worst:9.1e} on the wrong side, {width:8.1e} apart, {:7.1} cells, {most} at most",
-            cells as f64 / count as f64
-        );
+        tally.tell(&mut failures);
     }
     assert!(failures.is_empty(), "{} wrong, such as {:#?}", failures.len(), &failures[..failures.len().min(6)]);
 }

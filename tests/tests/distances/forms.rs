@@ -1,5 +1,6 @@
-//! Closed forms of distances, from textbooks and nothing of the engine.
+//! Closed forms of distances, from textbooks and nothing of the engine, and how answers are held to them.
 
+use contactd::contact::distance::Distance;
 use glam::DVec3;
 
 /// Distance of a point from the box of these half extents around the origin, negative inside.
@@ -76,4 +77,55 @@ pub fn boxes(a: &Box3, b: &Box3) -> f64 {
         }
     }
     least
+}
+
+/// What a family's answers were against what is known.
+pub struct Tally {
+    name: &'static str,
+    answers: usize,
+    /// By how much a bound is on the wrong side of the truth, at most.
+    worst: f64,
+    /// How far apart the bounds are, at most.
+    width: f64,
+    cells: u64,
+    most: u64,
+    failures: Vec<String>,
+}
+
+impl Tally {
+    /// Of a family of that name.
+    pub fn new(name: &'static str) -> Self {
+        Self { name, answers: 0, worst: 0.0, width: 0.0, cells: 0, most: 0, failures: Vec::new() }
+    }
+
+    /// Takes an answer: right where its bounds hold the truth, are no more than `apart` from each other, its points are as far from
+    /// each other as it says, and `and` holds.
+    pub fn take(&mut self, i: usize, truth: f64, apart: f64, d: &Distance, and: bool) {
+        self.answers += 1;
+        self.worst = self.worst.max(d.lower - truth).max(truth - d.upper);
+        self.width = self.width.max(d.upper - d.lower);
+        self.cells += d.cells;
+        self.most = self.most.max(d.cells);
+        let points = (d.a.point - d.b.point).length();
+        let right = d.lower <= truth + 1e-12
+            && truth <= d.upper + 1e-12
+            && d.is_settled
+            && d.upper - d.lower <= apart
+            && (truth == 0.0 || (points - d.upper).abs() < 1e-11)
+            && and;
+        if !right {
+            let Distance { lower, upper, cells, .. } = d;
+            self.failures.push(format!("{} {i}: {truth} in [{lower}, {upper}], {cells} cells: {d:?}", self.name));
+        }
+    }
+
+    /// Prints a row; what was wrong is added to `failures`.
+    pub fn tell(mut self, failures: &mut Vec<String>) {
+        let (name, answers, worst, width) = (self.name, self.answers, self.worst, self.width);
+        let (mean, most) = (self.cells as f64 / answers as f64, self.most);
+        println!(
+            "{name:18} {answers} answers, bounds {worst:9.1e} on the wrong side, {width:8.1e} apart, {mean:7.1} cells, {most} at most"
+        );
+        failures.append(&mut self.failures);
+    }
 }

@@ -8,10 +8,10 @@ use contactd::import::Scene;
 use contactd::math::Aabb;
 use contactd::octree::Model;
 use contactd::solid::{Solid, SolidBuilder};
-use contactd::view::drawn::{Drawn, Piece, Shown};
+use contactd::view::buffers::{Buffers, Piece, Shown};
 use contactd::view::http::Listening;
 use contactd::view::show::Show;
-use contactd::view::{self, triangles};
+use contactd::{tessellation, view};
 use contactd_tests::random_solids::{
     Random, shape, shape_or_capsule, shape_or_elliptic, shape_or_mesh, shape_or_torus, solid_of,
 };
@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// A machine that reads the numbers.
 struct Reader<'a> {
-    drawn: &'a Drawn,
+    buffers: &'a Buffers,
     piece: &'a Piece,
 }
 
@@ -39,14 +39,14 @@ enum Place {
 
 impl Reader<'_> {
     fn row(&self, at: u32, x: Vec3) -> f32 {
-        let [a, b, c, d] = self.drawn.rows[at as usize];
+        let [a, b, c, d] = self.buffers.rows[at as usize];
         a * x.x + b * x.y + c * x.z + d
     }
 
     fn psi(&self, token: u32, x: Vec3) -> f32 {
         let (form, at) = (token >> 26 & 7, token & 0x3ff_ffff);
         let row = |k: u32| self.row(at + k, x);
-        let [first, second, ..] = self.drawn.rows[at as usize];
+        let [first, second, ..] = self.buffers.rows[at as usize];
         let psi = match form {
             0 => row(0),
             1 => row(1).hypot(row(2)) + row(0),
@@ -67,16 +67,16 @@ impl Reader<'_> {
             side *= 0.5;
             let upper = [0, 1, 2].map(|k| u32::from(x[k] >= low[k] + side));
             low += Vec3::from(upper.map(|u| u as f32)) * side;
-            node = self.drawn.words[((node >> 2) + upper[0] + 2 * upper[1] + 4 * upper[2]) as usize];
+            node = self.buffers.words[((node >> 2) + upper[0] + 2 * upper[1] + 4 * upper[2]) as usize];
         }
         match node & 3 {
             0 => Place::Empty,
             1 => Place::Full,
             _ => {
                 let list = (node >> 2) as usize;
-                let count = self.drawn.words[list] as usize;
+                let count = self.buffers.words[list] as usize;
                 let mut stack: Vec<(f32, u32)> = Vec::new();
-                for token in &self.drawn.words[list + 1..list + 1 + count] {
+                for token in &self.buffers.words[list + 1..list + 1 + count] {
                     let one = if token >> 30 == 3 {
                         stack.pop().expect("two values")
                     } else {
@@ -127,15 +127,15 @@ struct Tally {
 fn hold(solid: Solid, r: &mut Random, tally: &mut Tally) {
     let around = solid.aabb();
     let shown = shown(solid);
-    let drawn = Drawn::new(std::slice::from_ref(&shown), &[around]);
+    let buffers = Buffers::new(std::slice::from_ref(&shown), &[around]);
     let solid = &shown.model.solid;
-    let piece = &drawn.pieces[0];
+    let piece = &buffers.pieces[0];
     assert_eq!(piece.note, "", "marched through");
     if piece.triangles[1] > 0 || solid.is_empty() {
         return;
     }
     tally.solids += 1;
-    let reader = Reader { drawn: &drawn, piece };
+    let reader = Reader { buffers: &buffers, piece };
     let size = around.half().max_element() + around.center().abs().max_element();
     let rounding = 3e-5 * size;
     for _ in 0..400 {
@@ -230,23 +230,23 @@ fn triangles_of_a_solid_lie_on_it_and_are_closed() {
     let mut r = Random::new(37);
     for _ in 0..2 {
         let solid = solid_of(&mut r, 2, shape_or_torus);
-        let made = triangles::of_solid(&solid, &solid.aabb());
-        assert!(made.corners.len() > 100 && made.corners.len() == made.faces.len());
+        let made = tessellation::of_solid(&solid, &solid.aabb(), 6);
+        assert!(made.indices.len() > 100 && made.indices.len() == made.faces.len());
         let mut ends = std::collections::BTreeMap::<[[u64; 3]; 2], i32>::new();
         let bits = |x: DVec3| x.to_array().map(f64::to_bits);
         let mut near = 0;
-        for (corners, face) in made.corners.iter().zip(&made.faces) {
+        for (corners, face) in made.corners().zip(&made.faces) {
             assert!((*face as usize) < solid.faces.len());
             for k in 0..3 {
                 let (a, b) = (bits(corners[k]), bits(corners[(k + 1) % 3]));
                 *ends.entry(if a < b { [a, b] } else { [b, a] }).or_default() += if a < b { 1 } else { -1 };
                 let f = solid.value(corners[k]);
-                assert!(f.abs() < 1.75 * made.off, "a corner is {f} off, in cubes of {}", made.off);
+                assert!(f.abs() < 1.75 * made.off, "a corner is {f} off, in cells of {}", made.off);
                 near += usize::from(f.abs() < 0.05 * made.off);
             }
         }
         assert!(ends.values().all(|n| *n == 0), "every edge is passed as often one way as the other");
-        assert!(near * 10 > made.corners.len() * 3 * 8, "{near} of {} corners are near", made.corners.len() * 3);
+        assert!(near * 10 > made.indices.len() * 3 * 8, "{near} of {} corners are near", made.indices.len() * 3);
     }
 }
 
@@ -367,9 +367,9 @@ fn what_is_endless_is_cut_off_around_the_scene() {
     let root = b.primitive(ground, contactd_proto::Pose::IDENTITY, Default::default());
     let shown = shown(b.finish(root));
     let extent = Aabb::around(DVec3::ZERO, DVec3::splat(50.0));
-    let drawn = Drawn::new(&[shown], &[extent]);
-    assert!(drawn.pieces[0].endless && drawn.pieces[0].note.is_empty());
-    let reader = Reader { drawn: &drawn, piece: &drawn.pieces[0] };
+    let buffers = Buffers::new(&[shown], &[extent]);
+    assert!(buffers.pieces[0].endless && buffers.pieces[0].note.is_empty());
+    let reader = Reader { buffers: &buffers, piece: &buffers.pieces[0] };
     assert!(matches!(reader.at(DVec3::new(1.0, 2.0, -30.0)), Place::Full | Place::Open(-40.0..-20.0, ..)));
     assert!(matches!(reader.at(DVec3::new(1.0, 2.0, 30.0)), Place::Empty | Place::Open(20.0..40.0, ..)));
 }

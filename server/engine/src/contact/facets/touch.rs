@@ -8,11 +8,11 @@ use super::body::{Body, Moment};
 use crate::contact::convex::Nearest;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
-use crate::contact::witness::faces::faces_at;
+use crate::contact::witness::faces::{faces_at, for_sets, weights};
 use crate::contact::witness::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
 use crate::solid::Sense;
 use crate::solid::local::LiteralId;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use smallvec::SmallVec;
 
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
@@ -23,6 +23,8 @@ const MOST_PLANES: usize = 16;
 const OFF: f64 = 0.05;
 /// By how much a larger set of faces must hold it better.
 const BETTER: f64 = 1e-7;
+/// Determinant of three planes' normals from which on they are independent: a fine mesh of something round has them close to each other.
+const INDEPENDENT: f64 = 1e-12;
 
 /// Faces with the weights of their normals.
 type Held = SmallVec<[(Constraint, f64); 8]>;
@@ -91,8 +93,8 @@ fn is_near(y: DVec3, [a, b, c]: [DVec3; 3], tol: f64) -> bool {
 /// The least set of planes whose normals hold n between them, with their weights: one, two, then three.
 fn least_set(planes: &[(u32, DVec3)], n: DVec3) -> Option<SmallVec<[(usize, f64); 3]>> {
     let mut best: (f64, f64, SmallVec<[(usize, f64); 3]>) = (OFF, 0.0, SmallVec::new());
-    let mut offer = |set: &[usize]| {
-        let Some(weights) = weights(set, planes, n) else { return };
+    for_sets(planes.len(), |set| {
+        let Some(weights) = weights(set, |i| planes[i].1, n, INDEPENDENT) else { return };
         let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| planes[*i].1 * *w).sum();
         let off = (sum - n).length();
         let total: f64 = weights.iter().sum();
@@ -104,43 +106,6 @@ fn least_set(planes: &[(u32, DVec3)], n: DVec3) -> Option<SmallVec<[(usize, f64)
         if is_better {
             best = (off, total, set.iter().copied().zip(weights).collect());
         }
-    };
-    for i in 0..planes.len() {
-        offer(&[i]);
-    }
-    for i in 0..planes.len() {
-        for j in i + 1..planes.len() {
-            offer(&[i, j]);
-        }
-    }
-    for i in 0..planes.len() {
-        for j in i + 1..planes.len() {
-            for k in j + 1..planes.len() {
-                offer(&[i, j, k]);
-            }
-        }
-    }
+    });
     (!best.2.is_empty()).then_some(best.2)
-}
-
-/// Least-squares weights of some unit vectors for n; `None` if one is negative or they are dependent.
-fn weights(set: &[usize], planes: &[(u32, DVec3)], n: DVec3) -> Option<SmallVec<[f64; 3]>> {
-    let g = |i: usize| planes[set[i]].1;
-    let w: SmallVec<[f64; 3]> = match set.len() {
-        1 => SmallVec::from_slice(&[g(0).dot(n)]),
-        2 => {
-            let c = g(0).dot(g(1));
-            let det = 1.0 - c * c;
-            let (p, q) = (g(0).dot(n), g(1).dot(n));
-            SmallVec::from_slice(&[(p - c * q) / det, (q - c * p) / det])
-        }
-        _ => {
-            let m = DMat3::from_cols(g(0), g(1), g(2));
-            if m.determinant().abs() < 1e-12 {
-                return None;
-            }
-            SmallVec::from_slice(&(m.inverse() * n).to_array())
-        }
-    };
-    w.iter().all(|w| w.is_finite() && *w > 0.0).then_some(w)
 }

@@ -4,8 +4,11 @@ use super::newton::Constraint;
 use crate::contact::exclusion::literal::Side;
 use crate::solid::local::LiteralId;
 use crate::solid::{Primitive, Sense};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
+
+/// Determinant of three faces' normals from which on they are independent.
+const INDEPENDENT: f64 = 1e-9;
 
 /// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
 pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
@@ -27,36 +30,41 @@ pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &m
     }
     // The least set of them whose normals hold n between them: one, two, then three.
     let mut best: (f64, SmallVec<[(usize, f64); 3]>) = (f64::INFINITY, SmallVec::new());
-    let mut offer = |set: &[usize]| {
-        let Some(weights) = weights(set, &near, n) else { return };
+    for_sets(near.len(), |set| {
+        let Some(weights) = weights(set, |i| near[i].1, n, INDEPENDENT) else { return };
         let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| near[*i].1 * *w).sum();
         // A larger set must be better by more than rounding.
         let off = (sum - n).length() + 1e-7 * set.len() as f64;
         if off < 0.5 * best.0 || (off < best.0 && set.len() == best.1.len()) {
             best = (off, set.iter().copied().zip(weights).collect());
         }
-    };
-    for i in 0..near.len() {
+    });
+    out.extend(best.1.iter().map(|(i, w)| (Constraint::Literal(side, near[*i].0), *w)));
+}
+
+/// Calls `offer` with all sets of one, then of two, then of three of `count` indices.
+pub fn for_sets(count: usize, mut offer: impl FnMut(&[usize])) {
+    for i in 0..count {
         offer(&[i]);
     }
-    for i in 0..near.len() {
-        for j in i + 1..near.len() {
+    for i in 0..count {
+        for j in i + 1..count {
             offer(&[i, j]);
         }
     }
-    for i in 0..near.len() {
-        for j in i + 1..near.len() {
-            for k in j + 1..near.len() {
+    for i in 0..count {
+        for j in i + 1..count {
+            for k in j + 1..count {
                 offer(&[i, j, k]);
             }
         }
     }
-    out.extend(best.1.iter().map(|(i, w)| (Constraint::Literal(side, near[*i].0), *w)));
 }
 
-/// Least-squares weights of some unit vectors for n; `None` if one is negative or they are dependent.
-fn weights(set: &[usize], near: &[(LiteralId, DVec3)], n: DVec3) -> Option<SmallVec<[f64; 3]>> {
-    let g = |i: usize| near[set[i]].1;
+/// Least-squares weights of the unit vectors `of` a set for n; `None` if one is not positive, or if they are dependent: three of
+/// which the determinant is below `least`.
+pub fn weights(set: &[usize], of: impl Fn(usize) -> DVec3, n: DVec3, least: f64) -> Option<SmallVec<[f64; 3]>> {
+    let g = |i: usize| of(set[i]);
     let w: SmallVec<[f64; 3]> = match set.len() {
         1 => SmallVec::from_slice(&[g(0).dot(n)]),
         2 => {
@@ -66,9 +74,8 @@ fn weights(set: &[usize], near: &[(LiteralId, DVec3)], n: DVec3) -> Option<Small
             SmallVec::from_slice(&[(p - c * q) / det, (q - c * p) / det])
         }
         _ => {
-            let m = glam::DMat3::from_cols(g(0), g(1), g(2));
-            let det = m.determinant();
-            if det.abs() < 1e-9 {
+            let m = DMat3::from_cols(g(0), g(1), g(2));
+            if m.determinant().abs() < least {
                 return None;
             }
             SmallVec::from_slice(&(m.inverse() * n).to_array())

@@ -6,7 +6,7 @@
 use super::roots::between_roots;
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Cylinder, Drawn, Face, FaceAt, Law, NUMBERS, Row, Section, Sphere, Spine, Stretches,
+    Analytic, Axis, Bend, Curvature, Cylinder, Face, FaceAt, Law, NUMBERS, Row, Section, Sphere, Spine, Stretches,
     Surface, Symmetry, Terms, around, heights, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
@@ -200,8 +200,8 @@ impl Surface for Capsule {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Capsule(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Capsule(*self))
     }
 
     /// From the first to the last of the ball at either end and of the cylinder between them.

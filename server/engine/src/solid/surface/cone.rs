@@ -5,7 +5,7 @@
 
 use super::roots::between_roots_of_nappe;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Stretches, Surface, Symmetry,
+    Analytic, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Stretches, Surface, Symmetry,
     Terms, around, largest_corner, radial, tangent,
 };
 use crate::math::any_perpendicular;
@@ -195,8 +195,8 @@ impl Surface for Cone {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Cone(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Cone(*self))
     }
 
     fn terms(&self) -> Option<Terms> {

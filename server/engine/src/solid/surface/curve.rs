@@ -1,6 +1,6 @@
 //! Straight and circular curves of two faces: those that they have in common, and those along which they touch.
 //!
-//! A face that has such curves says what it is to this file ([`Drawn`], `Surface::drawn`). Of every other one none are looked for: it says nothing.
+//! A face that has such curves says what it is to this file ([`Analytic`], `Surface::analytic`). Of every other one none are looked for: it says nothing.
 
 use super::{Axis, Capsule, Cone, Cylinder, Elliptic, Face, Plane, Sphere, Surface as _, Symmetry, Torus};
 use crate::math::any_perpendicular;
@@ -30,7 +30,7 @@ pub enum Curve {
 
 /// A face that may have lines or circles in common with another one.
 #[derive(Clone, Copy, Debug)]
-pub enum Drawn {
+pub enum Analytic {
     /// A plane.
     Plane(Plane),
     /// A sphere.
@@ -47,17 +47,17 @@ pub enum Drawn {
     Capsule(Capsule),
 }
 
-impl Drawn {
+impl Analytic {
     /// The face.
     fn face(&self) -> Face {
         match *self {
-            Drawn::Plane(f) => f.into(),
-            Drawn::Sphere(f) => f.into(),
-            Drawn::Cylinder(f) => f.into(),
-            Drawn::Cone(f) => f.into(),
-            Drawn::Torus(f) => f.into(),
-            Drawn::Elliptic(f) => f.into(),
-            Drawn::Capsule(f) => f.into(),
+            Analytic::Plane(f) => f.into(),
+            Analytic::Sphere(f) => f.into(),
+            Analytic::Cylinder(f) => f.into(),
+            Analytic::Cone(f) => f.into(),
+            Analytic::Torus(f) => f.into(),
+            Analytic::Elliptic(f) => f.into(),
+            Analytic::Capsule(f) => f.into(),
         }
     }
 }
@@ -73,19 +73,22 @@ fn circle_above(least: f64, center: DVec3, axis: DVec3, squared: f64) -> Option<
 /// The lines and circles that two faces have in common, for a body of the diameter `size`; circles with a radius above
 /// `least` alone. Both are lengths.
 pub fn common(p: &Face, q: &Face, size: f64, least: f64, found: &mut impl FnMut(Curve)) {
-    if let (Some(p), Some(q)) = (p.drawn(), q.drawn()) {
+    if let (Some(p), Some(q)) = (p.analytic(), q.analytic()) {
         shared(&p, &q, [size, least], found);
     }
 }
 
-fn shared(p: &Drawn, q: &Drawn, [size, least]: [f64; 2], found: &mut impl FnMut(Curve)) {
+fn shared(p: &Analytic, q: &Analytic, [size, least]: [f64; 2], found: &mut impl FnMut(Curve)) {
     let mut circle =
         |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
     match (*p, *q) {
-        (Drawn::Plane(plane), Drawn::Plane(_) | Drawn::Sphere(_) | Drawn::Cylinder(_) | Drawn::Cone(_)) => {
+        (
+            Analytic::Plane(plane),
+            Analytic::Plane(_) | Analytic::Sphere(_) | Analytic::Cylinder(_) | Analytic::Cone(_),
+        ) => {
             on_plane(&plane, q, least, found);
         }
-        (Drawn::Sphere(Sphere { center: o, radius: r }), Drawn::Sphere(Sphere { center: c, radius: s })) => {
+        (Analytic::Sphere(Sphere { center: o, radius: r }), Analytic::Sphere(Sphere { center: c, radius: s })) => {
             let d = (c - o).length();
             if d > PARALLEL * size {
                 let x = (d * d + (r - s) * (r + s)) / (2.0 * d);
@@ -93,8 +96,8 @@ fn shared(p: &Drawn, q: &Drawn, [size, least]: [f64; 2], found: &mut impl FnMut(
             }
         }
         (
-            Drawn::Cylinder(Cylinder { origin: o, axis: a, radius: r }),
-            Drawn::Cylinder(Cylinder { origin: c, axis: b, radius: s }),
+            Analytic::Cylinder(Cylinder { origin: o, axis: a, radius: r }),
+            Analytic::Cylinder(Cylinder { origin: c, axis: b, radius: s }),
         ) => {
             let w = (c - o) - a * (c - o).dot(a);
             let d = w.length();
@@ -108,7 +111,7 @@ fn shared(p: &Drawn, q: &Drawn, [size, least]: [f64; 2], found: &mut impl FnMut(
                 }
             }
         }
-        (Drawn::Sphere(Sphere { center, radius: s }), Drawn::Cylinder(Cylinder { origin, axis, radius })) => {
+        (Analytic::Sphere(Sphere { center, radius: s }), Analytic::Cylinder(Cylinder { origin, axis, radius })) => {
             let off = (center - origin) - axis * (center - origin).dot(axis);
             let h = (s - radius) * (s + radius);
             if off.length() <= PARALLEL * size && h > 0.0 {
@@ -116,43 +119,43 @@ fn shared(p: &Drawn, q: &Drawn, [size, least]: [f64; 2], found: &mut impl FnMut(
                 circle(center - axis * h.sqrt(), axis, radius * radius);
             }
         }
-        (Drawn::Cylinder(Cylinder { origin, axis: a, radius }), Drawn::Cone(Cone { apex, axis, sin, cos })) => {
+        (Analytic::Cylinder(Cylinder { origin, axis: a, radius }), Analytic::Cone(Cone { apex, axis, sin, cos })) => {
             let off = (apex - origin) - a * (apex - origin).dot(a);
             if a.cross(axis).length() <= PARALLEL && off.length() <= PARALLEL * size {
                 circle(apex + axis * (radius * cos / sin), axis, radius * radius);
             }
         }
         // The same pairs the other way round.
-        (Drawn::Sphere(_) | Drawn::Cylinder(_) | Drawn::Cone(_), Drawn::Plane(_))
-        | (Drawn::Cylinder(_), Drawn::Sphere(_))
-        | (Drawn::Cone(_), Drawn::Cylinder(_)) => shared(q, p, [size, least], found),
+        (Analytic::Sphere(_) | Analytic::Cylinder(_) | Analytic::Cone(_), Analytic::Plane(_))
+        | (Analytic::Cylinder(_), Analytic::Sphere(_))
+        | (Analytic::Cone(_), Analytic::Cylinder(_)) => shared(q, p, [size, least], found),
         // Two cones, and a cone and a sphere, share no line or circle that is looked for.
-        (Drawn::Cone(_), Drawn::Cone(_) | Drawn::Sphere(_)) | (Drawn::Sphere(_), Drawn::Cone(_)) => {}
-        (Drawn::Elliptic(image), Drawn::Plane(plane)) => {
+        (Analytic::Cone(_), Analytic::Cone(_) | Analytic::Sphere(_)) | (Analytic::Sphere(_), Analytic::Cone(_)) => {}
+        (Analytic::Elliptic(image), Analytic::Plane(plane)) => {
             rulings(&image, &plane, PARALLEL).into_iter().flatten().for_each(found);
         }
-        (Drawn::Plane(_), Drawn::Elliptic(_)) => shared(q, p, [size, least], found),
+        (Analytic::Plane(_), Analytic::Elliptic(_)) => shared(q, p, [size, least], found),
         // Beside its segment it is a cylinder, at its ends a ball: what these have in common with another face, as far as it lies there.
-        (Drawn::Capsule(capsule), _) => {
+        (Analytic::Capsule(capsule), _) => {
             for own in parts_of(&capsule) {
                 let curves = all_shared(&own, q, [size, least]);
                 curves.into_iter().filter(|curve| lies_on(&capsule, curve, PARALLEL * size)).for_each(&mut *found);
             }
         }
-        (_, Drawn::Capsule(_)) => shared(q, p, [size, least], found),
+        (_, Analytic::Capsule(_)) => shared(q, p, [size, least], found),
         // Other curves of elliptic faces are no lines that are looked for, and circles by chance alone.
-        (Drawn::Elliptic(_), _) | (_, Drawn::Elliptic(_)) => {}
-        (Drawn::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
-        (_, Drawn::Torus(_)) => shared(q, p, [size, least], found),
+        (Analytic::Elliptic(_), _) | (_, Analytic::Elliptic(_)) => {}
+        (Analytic::Torus(torus), _) => coaxial(&torus, q, [PARALLEL, PARALLEL * size], &mut circle),
+        (_, Analytic::Torus(_)) => shared(q, p, [size, least], found),
     }
 }
 
 /// What a plane and a plane, a sphere, a cylinder or a cone have in common.
-fn on_plane(&Plane { normal, offset }: &Plane, q: &Drawn, least: f64, found: &mut impl FnMut(Curve)) {
+fn on_plane(&Plane { normal, offset }: &Plane, q: &Analytic, least: f64, found: &mut impl FnMut(Curve)) {
     let mut circle =
         |center, axis, squared| circle_above(least, center, axis, squared).into_iter().for_each(&mut *found);
     match *q {
-        Drawn::Plane(Plane { normal: n, offset: e }) => {
+        Analytic::Plane(Plane { normal: n, offset: e }) => {
             let (m, d) = (normal, offset);
             let w = m.cross(n);
             if let Some(along) = w.try_normalize().filter(|_| w.length() > PARALLEL) {
@@ -160,11 +163,11 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Drawn, least: f64, found: &mu
                 found(Curve::Line { origin, along });
             }
         }
-        Drawn::Sphere(Sphere { center, radius }) => {
+        Analytic::Sphere(Sphere { center, radius }) => {
             let h = normal.dot(center) - offset;
             circle(center - normal * h, normal, (radius - h) * (radius + h));
         }
-        Drawn::Cylinder(Cylinder { origin, axis, radius }) => {
+        Analytic::Cylinder(Cylinder { origin, axis, radius }) => {
             let h = normal.dot(origin) - offset;
             if normal.cross(axis).length() <= PARALLEL {
                 circle(origin - axis * (h / normal.dot(axis)), axis, radius * radius);
@@ -177,14 +180,14 @@ fn on_plane(&Plane { normal, offset }: &Plane, q: &Drawn, least: f64, found: &mu
                 }
             }
         }
-        Drawn::Cone(Cone { apex, axis, sin, cos }) => {
+        Analytic::Cone(Cone { apex, axis, sin, cos }) => {
             let z = (offset - normal.dot(apex)) / normal.dot(axis);
             if normal.cross(axis).length() <= PARALLEL && z > 0.0 {
                 circle(apex + axis * z, axis, (z * sin / cos) * (z * sin / cos));
             }
         }
         // Of these `shared` knows more.
-        Drawn::Elliptic(_) | Drawn::Torus(_) | Drawn::Capsule(_) => {}
+        Analytic::Elliptic(_) | Analytic::Torus(_) | Analytic::Capsule(_) => {}
     }
 }
 
@@ -218,17 +221,17 @@ fn rulings(image: &Elliptic, plane: &Plane, parallel: f64) -> [Option<Curve>; 2]
 }
 
 /// All that `shared` finds.
-fn all_shared(p: &Drawn, q: &Drawn, lengths: [f64; 2]) -> Vec<Curve> {
+fn all_shared(p: &Analytic, q: &Analytic, lengths: [f64; 2]) -> Vec<Curve> {
     let mut all = Vec::new();
     shared(p, q, lengths, &mut |curve| all.push(curve));
     all
 }
 
 /// The cylinder and the balls that a capsule is of.
-fn parts_of(capsule: &Capsule) -> [Drawn; 3] {
+fn parts_of(capsule: &Capsule) -> [Analytic; 3] {
     let Capsule { origin, axis, half, radius } = *capsule;
-    let ball = |end: f64| Drawn::Sphere(Sphere { center: origin + axis * end, radius });
-    [Drawn::Cylinder(Cylinder { origin, axis, radius }), ball(half), ball(-half)]
+    let ball = |end: f64| Analytic::Sphere(Sphere { center: origin + axis * end, radius });
+    [Analytic::Cylinder(Cylinder { origin, axis, radius }), ball(half), ball(-half)]
 }
 
 /// True where part of a curve lies on a capsule, to within a length.
@@ -261,7 +264,7 @@ fn is_about(torus: &Torus, face: &Face, [sine, offset]: [f64; 2]) -> bool {
 
 /// The circles that a torus has in common with a face about its own axis: in a half-plane through the axis, (ρ, z) from the torus'
 /// centre, its tube is a circle and the other face a line or a circle.
-fn coaxial(torus: &Torus, other: &Drawn, within: [f64; 2], circle: &mut impl FnMut(DVec3, DVec3, f64)) {
+fn coaxial(torus: &Torus, other: &Analytic, within: [f64; 2], circle: &mut impl FnMut(DVec3, DVec3, f64)) {
     if !is_about(torus, &other.face(), within) {
         return;
     }
@@ -272,13 +275,13 @@ fn coaxial(torus: &Torus, other: &Drawn, within: [f64; 2], circle: &mut impl FnM
         let x = origin + axis * p.y;
         // Of the line through a cone's apex a half belongs to its other nappe; a tube may go beyond the axis.
         let is_on = match other {
-            Drawn::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
-            Drawn::Plane(_)
-            | Drawn::Sphere(_)
-            | Drawn::Cylinder(_)
-            | Drawn::Torus(_)
-            | Drawn::Elliptic(_)
-            | Drawn::Capsule(_) => true,
+            Analytic::Cone(cone) => (x - cone.apex).dot(cone.axis) >= 0.0,
+            Analytic::Plane(_)
+            | Analytic::Sphere(_)
+            | Analytic::Cylinder(_)
+            | Analytic::Torus(_)
+            | Analytic::Elliptic(_)
+            | Analytic::Capsule(_) => true,
         };
         if is_on && p.x > 0.0 {
             circle(x, axis, p.x * p.x);
@@ -295,19 +298,19 @@ fn coaxial(torus: &Torus, other: &Drawn, within: [f64; 2], circle: &mut impl FnM
         }
     };
     let (center, radius) = match *other {
-        Drawn::Plane(Plane { normal, offset }) => {
+        Analytic::Plane(Plane { normal, offset }) => {
             let up = normal.dot(axis).signum();
             return on_line(DVec2::Y, up * (offset - normal.dot(origin)));
         }
-        Drawn::Cylinder(Cylinder { radius, .. }) => return on_line(DVec2::X, radius),
-        Drawn::Cone(Cone { apex, axis: own, sin, cos }) => {
+        Analytic::Cylinder(Cylinder { radius, .. }) => return on_line(DVec2::X, radius),
+        Analytic::Cone(Cone { apex, axis: own, sin, cos }) => {
             let n = DVec2::new(cos, -sin * own.dot(axis).signum());
             return on_line(n, n.y * height(apex));
         }
-        Drawn::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
-        Drawn::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
+        Analytic::Sphere(Sphere { center, radius }) => (DVec2::new(0.0, height(center)), radius),
+        Analytic::Torus(Torus { origin: o, major, minor, .. }) => (DVec2::new(major, height(o)), minor),
         // About no axis, and of several pieces.
-        Drawn::Elliptic(_) | Drawn::Capsule(_) => return,
+        Analytic::Elliptic(_) | Analytic::Capsule(_) => return,
     };
     let way = center - tube;
     let d = way.length();
@@ -378,8 +381,8 @@ fn side_by_side(p: &Cylinder, q: &Cylinder, q_is_convex: bool, within: &Nearness
 pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within: &Nearness) -> Option<Curve> {
     let near = |d: f64| within.is_near(d);
     let parallel = |sine: f64| within.is_parallel(sine);
-    match (p.face.drawn()?, q.face.drawn()?) {
-        (Drawn::Cylinder(Cylinder { origin, axis, radius }), Drawn::Plane(_)) => {
+    match (p.face.analytic()?, q.face.analytic()?) {
+        (Analytic::Cylinder(Cylinder { origin, axis, radius }), Analytic::Plane(_)) => {
             if !p.is_convex {
                 return None;
             }
@@ -388,7 +391,7 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let line = Curve::Line { origin: origin + u * radius, along: axis };
             parallel(g.dot(axis)).then_some(line)
         }
-        (Drawn::Cone(Cone { apex, axis, sin, cos }), Drawn::Plane(_)) => {
+        (Analytic::Cone(Cone { apex, axis, sin, cos }), Analytic::Plane(_)) => {
             if !p.is_convex {
                 return None;
             }
@@ -396,21 +399,21 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let u = -(g - axis * g.dot(axis)).try_normalize()?;
             parallel(g.dot(axis) - sin).then_some(Curve::Line { origin: apex, along: axis * cos + u * sin })
         }
-        (Drawn::Cylinder(own), Drawn::Cylinder(other)) => {
+        (Analytic::Cylinder(own), Analytic::Cylinder(other)) => {
             if p.is_convex {
                 side_by_side(&own, &other, q.is_convex, within)
             } else {
                 None
             }
         }
-        (Drawn::Sphere(Sphere { center, radius }), Drawn::Cylinder(Cylinder { origin, axis, radius: s })) => {
+        (Analytic::Sphere(Sphere { center, radius }), Analytic::Cylinder(Cylinder { origin, axis, radius: s })) => {
             if !p.is_convex || q.is_convex {
                 return None;
             }
             let off = (center - origin) - axis * (center - origin).dot(axis);
             near(off.length() + (radius - s).abs()).then_some(Curve::Circle { center, axis, radius })
         }
-        (Drawn::Sphere(Sphere { center, radius }), Drawn::Cone(Cone { apex, axis, sin, cos })) => {
+        (Analytic::Sphere(Sphere { center, radius }), Analytic::Cone(Cone { apex, axis, sin, cos })) => {
             if !p.is_convex || q.is_convex {
                 return None;
             }
@@ -419,29 +422,29 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             let circle = Curve::Circle { center: center - axis * (radius * sin), axis, radius: radius * cos };
             (z > 0.0 && near(off.length()) && near(z * sin - radius)).then_some(circle)
         }
-        (Drawn::Elliptic(image), Drawn::Plane(_)) => {
+        (Analytic::Elliptic(image), Analytic::Plane(_)) => {
             if !p.is_convex {
                 return None;
             }
             let (origin, along, lean) = image.ruling(-out_of_q(image.origin))?;
             parallel(lean).then_some(Curve::Line { origin, along })
         }
-        (Drawn::Capsule(Capsule { origin, axis, radius, .. }), _) => {
+        (Analytic::Capsule(Capsule { origin, axis, radius, .. }), _) => {
             tangent(Outward { face: &Cylinder { origin, axis, radius }.into(), ..p }, q, out_of_q, within)
         }
-        (_, Drawn::Capsule(Capsule { origin, axis, radius, .. })) => {
+        (_, Analytic::Capsule(Capsule { origin, axis, radius, .. })) => {
             tangent(p, Outward { face: &Cylinder { origin, axis, radius }.into(), ..q }, out_of_q, within)
         }
         // Touching others, they do so at points, or along no line or circle that is looked for.
-        (Drawn::Elliptic(_), _) | (_, Drawn::Elliptic(_)) => None,
+        (Analytic::Elliptic(_), _) | (_, Analytic::Elliptic(_)) => None,
         // A plane touches what is round, and a hollow what is in it, the other way round.
         (
-            Drawn::Plane(_),
-            Drawn::Plane(_) | Drawn::Sphere(_) | Drawn::Cylinder(_) | Drawn::Cone(_) | Drawn::Torus(_),
+            Analytic::Plane(_),
+            Analytic::Plane(_) | Analytic::Sphere(_) | Analytic::Cylinder(_) | Analytic::Cone(_) | Analytic::Torus(_),
         )
-        | (Drawn::Cylinder(_) | Drawn::Cone(_), Drawn::Sphere(_) | Drawn::Torus(_))
-        | (Drawn::Sphere(_), Drawn::Torus(_)) => None,
-        (Drawn::Torus(torus), _) => {
+        | (Analytic::Cylinder(_) | Analytic::Cone(_), Analytic::Sphere(_) | Analytic::Torus(_))
+        | (Analytic::Sphere(_), Analytic::Torus(_)) => None,
+        (Analytic::Torus(torus), _) => {
             if p.is_convex {
                 under_tube(&torus, q, out_of_q, within)
             } else {
@@ -449,8 +452,8 @@ pub fn tangent(p: Outward, q: Outward, out_of_q: impl Fn(DVec3) -> DVec3, within
             }
         }
         // These touch at points, or along no line or circle that is looked for.
-        (Drawn::Sphere(_), Drawn::Plane(_) | Drawn::Sphere(_))
-        | (Drawn::Cylinder(_), Drawn::Cone(_))
-        | (Drawn::Cone(_), Drawn::Cylinder(_) | Drawn::Cone(_)) => None,
+        (Analytic::Sphere(_), Analytic::Plane(_) | Analytic::Sphere(_))
+        | (Analytic::Cylinder(_), Analytic::Cone(_))
+        | (Analytic::Cone(_), Analytic::Cylinder(_) | Analytic::Cone(_)) => None,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::roots::between_roots;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Spine, Stretches, Surface,
+    Analytic, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, Row, SKEW, Section, Spine, Stretches, Surface,
     Symmetry, Terms, around, heights, largest_corner, radial, tangent,
 };
 use glam::DVec3;
@@ -136,8 +136,8 @@ impl Surface for Cylinder {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Cylinder(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Cylinder(*self))
     }
 
     fn terms(&self) -> Option<Terms> {

@@ -18,7 +18,7 @@
 
 use super::roots::{between_roots, between_roots_of_nappe};
 use super::{
-    Apex, Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, Terms, largest_corner,
+    Analytic, Apex, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Stretches, Surface, Symmetry, Terms, largest_corner,
     tangent,
 };
 use crate::math::any_perpendicular;
@@ -466,8 +466,8 @@ impl Surface for Elliptic {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Elliptic(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Elliptic(*self))
     }
 
     fn terms(&self) -> Option<Terms> {

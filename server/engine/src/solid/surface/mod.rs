@@ -48,7 +48,7 @@ pub use bend::{Bend, Law};
 pub use bowl::Bowl;
 pub use capsule::Capsule;
 pub use cone::{Apex, Cone};
-pub use curve::{Curve, Drawn};
+pub use curve::{Analytic, Curve};
 pub use cylinder::Cylinder;
 pub use elliptic::{Elliptic, Stretch};
 pub use plane::Plane;
@@ -395,7 +395,7 @@ pub trait Surface: Copy {
 
     /// What it is to those who look for lines and circles that two faces have in common; `None` where none is looked for.
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
+    fn analytic(&self) -> Option<Analytic> {
         None
     }
 
@@ -701,10 +701,10 @@ impl Face {
         each!(self, f => f.numbers())
     }
 
-    /// See [`Surface::drawn`].
+    /// See [`Surface::analytic`].
     #[inline]
-    pub fn drawn(&self) -> Option<Drawn> {
-        each!(self, f => f.drawn())
+    pub fn analytic(&self) -> Option<Analytic> {
+        each!(self, f => f.analytic())
     }
 
     /// See [`Surface::quadric_name`].

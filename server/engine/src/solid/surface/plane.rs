@@ -1,7 +1,7 @@
 //! Plane: psi = n·x − d.
 
 use super::roots::half_line;
-use super::{Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Terms};
+use super::{Analytic, Bend, Curvature, FaceAt, Law, NUMBERS, SKEW, Section, Stretches, Surface, Symmetry, Terms};
 use contactd_proto::Pose;
 use glam::DVec3;
 
@@ -126,8 +126,8 @@ impl Surface for Plane {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Plane(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Plane(*self))
     }
 
     #[inline]

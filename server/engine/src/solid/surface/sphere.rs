@@ -2,8 +2,8 @@
 
 use super::roots::between_roots;
 use super::{
-    Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Spine, Stretches, Surface, Symmetry, Terms,
-    largest_corner,
+    Analytic, Bend, Curvature, FaceAt, Law, NUMBERS, Quadric, SKEW, Section, Spine, Stretches, Surface, Symmetry,
+    Terms, largest_corner,
 };
 use crate::math::any_perpendicular;
 use glam::DVec3;
@@ -125,8 +125,8 @@ impl Surface for Sphere {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Sphere(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Sphere(*self))
     }
 
     fn terms(&self) -> Option<Terms> {

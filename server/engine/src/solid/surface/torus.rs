@@ -10,8 +10,8 @@
 
 use super::tube::Tube;
 use super::{
-    Axis, Bend, Curvature, Drawn, FaceAt, Law, NUMBERS, Row, SKEW, Section, Spine, Stretches, Surface, Symmetry, Terms,
-    Under, largest_corner, radial,
+    Analytic, Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Row, SKEW, Section, Spine, Stretches, Surface, Symmetry,
+    Terms, Under, largest_corner, radial,
 };
 use crate::math::any_perpendicular;
 use crate::solid::surface::Sphere;
@@ -240,8 +240,8 @@ impl Surface for Torus {
     }
 
     #[inline]
-    fn drawn(&self) -> Option<Drawn> {
-        Some(Drawn::Torus(*self))
+    fn analytic(&self) -> Option<Analytic> {
+        Some(Analytic::Torus(*self))
     }
 
     /// With t from the ray's point next to the centre and w = |x|² + R² − r²: w² = 4 R² ρ², of degree four.

@@ -2,12 +2,15 @@
 //! triangles for the others.
 
 use super::cells::{Cells, Unmarched};
-use super::triangles::{self, Triangles};
 use crate::math::Aabb;
 use crate::octree::Model;
+use crate::tessellation::{self, Triangles};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
+
+/// Of a solid that is drawn as triangles: 2 to this power cells along each side.
+const LEVELS: u32 = 6;
 
 /// A model of a show.
 #[derive(Clone, Debug)]
@@ -22,7 +25,7 @@ pub struct Shown {
 
 /// The numbers of all models.
 #[derive(Clone, Debug, Default)]
-pub struct Drawn {
+pub struct Buffers {
     /// Nodes and tokens ([`super::cells`]), all indices counted from the front.
     pub words: Vec<u32>,
     /// Rows of faces.
@@ -60,7 +63,7 @@ enum Made {
     Triangles(Triangles, String),
 }
 
-impl Drawn {
+impl Buffers {
     /// The numbers of `models`; what is endless is cut off at its box of `extents`, model frame.
     pub fn new(models: &[Shown], extents: &[Aabb]) -> Self {
         let first = |i: usize| models[..i].iter().position(|m| Arc::ptr_eq(&m.model, &models[i].model)).unwrap_or(i);
@@ -127,13 +130,13 @@ impl Drawn {
 
     fn add_triangles(&mut self, triangles: &Triangles, around: &Aabb) -> Piece {
         let first = self.triangles.len() / 3;
-        for (corners, face) in triangles.corners.iter().zip(&triangles.faces) {
+        for (corners, face) in triangles.corners().zip(&triangles.faces) {
             self.triangles.extend(corners.iter().map(|x| (x.as_vec3().to_array(), *face)));
         }
         Piece {
             low: around.min.to_array(),
             high: around.max.to_array(),
-            triangles: [first, triangles.corners.len()],
+            triangles: [first, triangles.indices.len()],
             ..Piece::default()
         }
     }
@@ -178,13 +181,13 @@ fn make(shown: &Shown, extent: &Aabb) -> (Made, Aabb, bool) {
             false,
         );
     }
-    if let Some(triangles) = triangles::of_mesh(solid) {
+    if let Some(triangles) = tessellation::of_mesh(solid) {
         return (Made::Triangles(triangles, String::new()), around, endless);
     }
     match Cells::new(solid, &around) {
         Ok(cells) => (Made::Cells(Box::new(cells)), around, endless),
         Err(why) => {
-            let made = triangles::of_solid(solid, &around);
+            let made = tessellation::of_solid(solid, &around, LEVELS);
             let note = sentence(&shown.file, why, &made);
             (Made::Triangles(made, note), around, endless)
         }
@@ -192,7 +195,7 @@ fn make(shown: &Shown, extent: &Aabb) -> (Made, Aabb, bool) {
 }
 
 fn sentence(file: &str, why: Unmarched, made: &Triangles) -> String {
-    let count = made.corners.len();
+    let count = made.indices.len();
     let off = crate::terminal::number(made.off, 0.0, 2);
-    format!("{file} is drawn as {count} triangles with corners on it, in cubes of {off}: {why}.")
+    format!("{file} is drawn as {count} triangles with corners on it, in cells of {off}: {why}.")
 }
