@@ -281,6 +281,9 @@ struct ViewArguments {
     /// The port of 127.0.0.1; 0: any that is free.
     #[arg(long, default_value = "0")]
     port: u16,
+    /// Writes it as one binary glTF file, moving objects and contacts as an animation, and serves no page.
+    #[arg(long, value_name = "FILE.glb", conflicts_with = "port")]
+    gltf: Option<PathBuf>,
     /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
     #[arg(long, default_value = "auto", value_parser = facets)]
     facets: Facets,
@@ -516,6 +519,11 @@ fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
         let title = names.collect::<Vec<_>>().join(", ");
         Show::of_scene(title, scene, &models_of(&prepared))?
     };
+    if let Some(to) = &arguments.gltf {
+        let bytes = crate::view::gltf::glb(&show)?;
+        std::fs::write(to, bytes).map_err(|e| format!("{}: expected to write, found {e}", to.display()))?;
+        return Ok(Done::Well);
+    }
     show.buffers.notes().for_each(warn);
     let ready = |address: &str| {
         // A reader that has gone away does not stop it.

@@ -8,6 +8,7 @@
 
 pub mod buffers;
 pub mod cells;
+pub mod gltf;
 pub mod http;
 pub mod show;
 

@@ -3,7 +3,7 @@
 use super::buffers::{Buffers, Shown};
 use crate::check::Check;
 use crate::contact::{Outcome, Status};
-use crate::import::Scene;
+use crate::import::{Scene, SceneObject};
 use crate::math::Aabb;
 use crate::octree::Model;
 use crate::picture::camera::{self, USUAL};
@@ -11,8 +11,8 @@ use crate::picture::ray::Traced;
 use crate::picture::view::{Camera, Thing, View};
 use crate::report::{Answer, Feature, PairAnswer, PairReport, faces};
 use crate::terminal::{number, time};
-use crate::world::StepOptions;
-use contactd_proto::{Pose, Report, Rule};
+use crate::world::{StepOptions, StepOutcome};
+use contactd_proto::{Motion, Pose, Report, Rule};
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
@@ -50,12 +50,51 @@ pub struct Show {
     pub acts: Vec<Act>,
     /// The models as numbers.
     pub buffers: Buffers,
+    /// Where what is endless is cut off, a box in the frame of each model.
+    pub extents: Vec<Aabb>,
     /// Steps that were solved, as JSON.
     solved: Mutex<HashMap<(usize, usize), String>>,
 }
 
 /// Solved steps that are kept.
 const KEPT: usize = 64;
+
+/// A step without a page: what moves how, and what meets.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// The label of the scene's unit; may be empty.
+    pub unit: String,
+    /// In the scene's order.
+    pub objects: Vec<Moved>,
+    /// Pairs that meet.
+    pub contacts: Vec<Met>,
+}
+
+/// An object over a step.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    /// Its name.
+    pub name: String,
+    /// Which of the show's models it has.
+    pub model: usize,
+    /// The model in the object's frame.
+    pub place: Pose,
+    /// The object's frame over the step.
+    pub motion: Motion,
+}
+
+/// Where two objects meet.
+#[derive(Clone, Debug)]
+pub struct Met {
+    /// When, fraction of the step.
+    pub time: f64,
+    /// Where, world frame.
+    pub point: DVec3,
+    /// Unit normal, world frame.
+    pub normal: DVec3,
+    /// What became of the pair.
+    pub sentence: String,
+}
 
 #[derive(Serialize)]
 struct Told<'a> {
@@ -177,7 +216,7 @@ impl Show {
             return Err(format!("{title}: expected something to show, found nothing"));
         }
         let buffers = Buffers::new(&models, &extents);
-        let show = Self { title, models, acts, buffers, solved: Mutex::default() };
+        let show = Self { title, models, acts, buffers, extents, solved: Mutex::default() };
         for act in 0..show.acts.len() {
             show.solved(act, 0)?;
         }
@@ -192,7 +231,7 @@ impl Show {
         let models = self.models.iter().zip(&self.buffers.pieces);
         let act = |act: &Act| {
             let scene = (act.scene)(0)?;
-            let object = |o: &crate::import::SceneObject| ObjectTold {
+            let object = |o: &SceneObject| ObjectTold {
                 name: o.name.clone(),
                 model: act.models[o.model],
                 fixed: o.is_static,
@@ -229,6 +268,38 @@ impl Show {
         let act = self.acts.get(act).filter(|a| step < a.steps)?;
         let poses = |scene: Scene| scene.objects.iter().map(|o| seven(&o.motion.at(t).compose(&o.place))).collect();
         Some((act.scene)(step).and_then(|scene| json::<Vec<[f64; 7]>>(&poses(scene))))
+    }
+
+    /// A step with its contacts.
+    ///
+    /// # Errors
+    /// What the world refuses.
+    pub(super) fn moved(&self, act: usize, step: usize) -> Result<Step, String> {
+        let scene = with_report((self.acts[act].scene)(step)?, Report::Contact);
+        let mut check = self.check(act, &scene)?;
+        let outcome = check.step_with(&StepOptions::default()).map_err(|e| e.to_string())?.clone();
+        let met = |pair: PairTold| {
+            let (point, normal) = (pair.answer.point?, pair.answer.normal?);
+            let (time, sentence) = (pair.answer.time?, pair.sentence);
+            Some(Met { time, point: point.into(), normal: normal.into(), sentence })
+        };
+        let contacts = self.pairs(act, &scene, &outcome).into_iter().filter_map(met).collect();
+        let object = |o: SceneObject| Moved {
+            name: o.name,
+            model: self.acts[act].models[o.model],
+            place: o.place,
+            motion: o.motion,
+        };
+        Ok(Step { unit: scene.unit, objects: scene.objects.into_iter().map(object).collect(), contacts })
+    }
+
+    /// The size of what is bounded in a step, at both of its ends: half the diagonal of a box around it; 1 where nothing is.
+    pub(super) fn size(&self, step: &Step) -> f64 {
+        let mut whole = Aabb::EMPTY;
+        for o in &step.objects {
+            whole = whole.union(&swept(&self.models[o.model].model.solid.aabb(), &o.motion, &o.place));
+        }
+        if whole.is_empty() { 1.0 } else { whole.half().length() }
     }
 
     /// When something meets in each step of an act, as JSON.
@@ -284,9 +355,31 @@ impl Show {
     }
 
     fn solve(&self, act: usize, step: usize) -> Result<StepTold, String> {
-        let scene = with_regions((self.acts[act].scene)(step)?);
+        let scene = with_report((self.acts[act].scene)(step)?, Report::Patch);
         let mut check = self.check(act, &scene)?;
         let outcome = check.step_with(&StepOptions::default()).map_err(|e| e.to_string())?.clone();
+        let pairs = self.pairs(act, &scene, &outcome);
+        let (from, hidden) = self.best_view(&scene, &self.acts[act].models, &pairs);
+        let motion = |o: &SceneObject| {
+            let mut all = [0.0; 13];
+            all[..7].copy_from_slice(&seven(&o.motion.start));
+            all[7..10].copy_from_slice(&o.motion.velocity.to_array());
+            all[10..].copy_from_slice(&o.motion.spin.to_array());
+            all
+        };
+        Ok(StepTold {
+            motions: scene.objects.iter().map(motion).collect(),
+            summary: summary(&pairs, outcome.safe_time),
+            safe_time: outcome.safe_time,
+            undecided: outcome.undecided,
+            pairs,
+            from: from.to_array(),
+            hidden,
+        })
+    }
+
+    /// The answers of a step.
+    fn pairs(&self, act: usize, scene: &Scene, outcome: &StepOutcome) -> Vec<PairTold> {
         let models = &self.acts[act].models;
         let shown = |id: u32| &self.models[models[scene.objects[id as usize].model]];
         let mut pairs = Vec::with_capacity(outcome.pairs.len());
@@ -303,23 +396,7 @@ impl Show {
             };
             pairs.push(PairTold::new([p.a, p.b], &report));
         }
-        let (from, hidden) = self.best_view(&scene, models, &pairs);
-        let motion = |o: &crate::import::SceneObject| {
-            let mut all = [0.0; 13];
-            all[..7].copy_from_slice(&seven(&o.motion.start));
-            all[7..10].copy_from_slice(&o.motion.velocity.to_array());
-            all[10..].copy_from_slice(&o.motion.spin.to_array());
-            all
-        };
-        Ok(StepTold {
-            motions: scene.objects.iter().map(motion).collect(),
-            summary: summary(&pairs, outcome.safe_time),
-            safe_time: outcome.safe_time,
-            undecided: outcome.undecided,
-            pairs,
-            from: from.to_array(),
-            hidden,
-        })
+        pairs
     }
 
     /// Where the camera best stands to see the contacts of a step, each with its two objects where they meet.
@@ -431,8 +508,8 @@ fn words(features: &[Feature]) -> Vec<String> {
     faces(features).into_iter().map(|(_, text)| text).collect()
 }
 
-/// The scene with all that a rule may tell told of the pairs that it searches.
-fn with_regions(scene: Scene) -> Scene {
+/// The scene with so much told of all pairs that its rules search.
+fn with_report(scene: Scene, report: Report) -> Scene {
     let mut rules = scene.rules.clone();
     if rules.is_empty() {
         let mut groups: Vec<&String> = scene.objects.iter().map(|o| &o.group).collect();
@@ -442,7 +519,7 @@ fn with_regions(scene: Scene) -> Scene {
             rules.extend(groups[i..].iter().map(|b| Rule::new([(*a).clone(), (*b).clone()])));
         }
     }
-    rules.iter_mut().for_each(|rule| rule.report = Report::Patch);
+    rules.iter_mut().for_each(|rule| rule.report = report);
     Scene { rules, ..scene }
 }
 
@@ -450,16 +527,21 @@ fn with_regions(scene: Scene) -> Scene {
 fn extent(scene: &Scene, act: &Act, models: &[Shown]) -> Aabb {
     let mut whole = Aabb::EMPTY;
     for o in &scene.objects {
-        let own = models[act.models[o.model]].model.solid.aabb();
-        if own.is_empty() || !own.is_finite() {
-            continue;
-        }
-        for t in [0.0, 1.0] {
-            let pose = o.motion.at(t).compose(&o.place);
-            whole = whole.union(&Aabb::of_points(own.corners().into_iter().map(|c| pose.point(c))));
-        }
+        whole = whole.union(&swept(&models[act.models[o.model]].model.solid.aabb(), &o.motion, &o.place));
     }
     if whole.is_empty() { Aabb::around(DVec3::ZERO, DVec3::ONE) } else { whole.grown(2.0 * whole.half().length()) }
+}
+
+/// A box around a model at both ends of a step; empty of one that is endless.
+fn swept(own: &Aabb, motion: &Motion, place: &Pose) -> Aabb {
+    if !own.is_finite() {
+        return Aabb::EMPTY;
+    }
+    let at = |t: f64| {
+        let pose = motion.at(t).compose(place);
+        Aabb::of_points(own.corners().into_iter().map(|c| pose.point(c)))
+    };
+    at(0.0).union(&at(1.0))
 }
 
 fn seven(pose: &Pose) -> [f64; 7] {

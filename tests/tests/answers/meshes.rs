@@ -215,7 +215,8 @@ fn a_body_within_a_mesh_overlaps_and_one_in_its_cavity_does_not() {
 /// A bar along x from the origin in `pieces`, of half the width and height that are told.
 fn bar(long: f64, [width, height]: [f64; 2], pieces: u32) -> Mesh {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let ring = |i: u32| corners.map(|(y, z)| DVec3::new(long * f64::from(i) / f64::from(pieces), y * width, z * height));
+    let ring =
+        |i: u32| corners.map(|(y, z)| DVec3::new(long * f64::from(i) / f64::from(pieces), y * width, z * height));
     let mut triangles = vec![[0, 2, 1], [0, 3, 2]];
     for i in 0..pieces {
         for k in 0..4 {

@@ -6,6 +6,7 @@ mod builder;
 mod cache;
 mod corpus;
 mod files;
+mod gltf;
 mod heights;
 mod import_models;
 mod mass;
