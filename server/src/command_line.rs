@@ -183,6 +183,9 @@ struct ServeArguments {
     /// A folder in which this start of the server records all of its steps, into a new file.
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
+    /// A port of 127.0.0.1 on which OpenMetrics are told; 0: any that is free. Else none are.
+    #[arg(long, value_name = "PORT")]
+    metrics: Option<u16>,
     /// Tells models and refused commands too, on standard error; else as CONTACTD_LOG says (warn, info, debug), or sessions alone.
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
@@ -374,7 +377,7 @@ fn man(folder: &Path) -> Result<Done, Box<dyn Error>> {
 }
 
 fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
-    let ServeArguments { name, config, deadline, import_root, record, verbose, quiet, cache } = arguments;
+    let ServeArguments { name, config, deadline, import_root, record, metrics, verbose, quiet, cache } = arguments;
     let mut config = config.as_deref().map_or_else(|| Ok(ServerConfig::default()), ServerConfig::read)?;
     // The command line stands before the file, `off` too.
     config.cache = cache.cache.unwrap_or(config.cache);
@@ -387,15 +390,20 @@ fn serve(arguments: ServeArguments) -> Result<Done, Box<dyn Error>> {
         return Err(format!("expected a folder for recordings, found {}", folder.display()).into());
     }
     config.record = record.or(config.record);
+    config.metrics = metrics.or(config.metrics);
     config.log = match (verbose, quiet) {
         (true, _) => Level::Debug,
         (_, true) => Level::Warn,
         _ => log_of_environment()?.unwrap_or(config.log),
     };
-    let ready = || {
+    let ready = |server: &crate::ipc::Server| {
         let pid = std::process::id();
+        let mut text = format!("contactd serve: \"{name}\" is ready (protocol {PROTOCOL_VERSION}, process {pid})\n");
+        if let Some(at) = server.metrics() {
+            text.push_str(&format!("contactd serve: metrics at http://{at}/metrics\n"));
+        }
         // A reader that has gone away does not stop a server.
-        let _ = print(&format!("contactd serve: \"{name}\" is ready (protocol {PROTOCOL_VERSION}, process {pid})\n"));
+        let _ = print(&text);
     };
     crate::ipc::serve(&Address::of(&name)?, config, ready)?;
     Ok(Done::Well)

@@ -53,8 +53,10 @@
 //! | 7 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
 //! | 8 | [`cache`], [`terminal`] | preprocessed models kept on disk; text of 80 columns |
 //! | 8 | [`tessellation`] | triangles of solids, for viewers |
+//! | 8 | [`http`] | a small HTTP server for this machine alone |
 //! | 9 | [`inspect`], [`report`], [`picture`] | models and answers as text, JSON and drawings |
 //! | 9 | [`recording`] | steps in MCAP files, with all that it takes to repeat them |
+//! | 9 | [`metrics`] | what a server counts, as OpenMetrics |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`replay`] | a recording, repeated and compared |
@@ -94,9 +96,11 @@ pub mod cache;
 pub mod check;
 pub mod command_line;
 pub mod demo;
+pub mod http;
 pub mod import;
 pub mod inspect;
 pub mod ipc;
+pub mod metrics;
 pub mod operator;
 pub mod picture;
 pub mod recording;

@@ -4,11 +4,12 @@
 //!
 //! Floor 10: imports `terminal`.
 
+use crate::metrics::memory;
 use crate::terminal::{Paint, Role, number, sentence};
 use contactd_client::Error;
 use contactd_client::shm::operator;
 use contactd_proto::control::{LatestSteps, RecordingStatus, ServerStatus, SessionStatus};
-use contactd_proto::names::{Address, start_of_process};
+use contactd_proto::names::Address;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -249,14 +250,6 @@ impl Session {
             busy: s.is_busy,
         }
     }
-}
-
-/// Bytes in memory of a process, as the system says.
-fn memory(pid: u32) -> Option<u64> {
-    start_of_process(pid)?;
-    let text = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| kb << 10)
 }
 
 impl Servers {

@@ -2,6 +2,8 @@
 
 #[allow(dead_code, reason = "other tests use the rest of it")]
 mod harness;
+#[path = "operator/metrics.rs"]
+mod metrics;
 #[path = "operator/service.rs"]
 mod service;
 

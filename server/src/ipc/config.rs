@@ -46,6 +46,8 @@ pub struct ServerConfig {
     /// A folder in which each start of the server records all of its steps, into a file of its own (docs/record.md). None: nothing is
     /// recorded unless somebody asks for it.
     pub record: Option<PathBuf>,
+    /// A port of 127.0.0.1 on which OpenMetrics are told ([`crate::metrics`]); 0: any that is free. None: none are.
+    pub metrics: Option<u16>,
     /// How much a server tells on standard error.
     pub log: Level,
 }
@@ -95,6 +97,7 @@ impl Default for ServerConfig {
             cache_mb: crate::cache::DEFAULT_BYTES >> 20,
             import_root: None,
             record: None,
+            metrics: None,
             log: Level::default(),
         }
     }
@@ -186,6 +189,7 @@ mod tests {
             ("sessions = ", "c.toml:1:"),
             ("cache_mb = 0", "cache_mb = 0: expected 1 to 1048576"),
             ("cache = 1", "c.toml:1:9: invalid type"),
+            ("metrics = 65536", "c.toml:1:11: invalid value"),
             ("log = \"loud\"", "c.toml:1:7: unknown variant `loud`, expected one of `warn`, `info`, `debug`"),
         ] {
             let sentence = ServerConfig::parse("c.toml", text).unwrap_err();

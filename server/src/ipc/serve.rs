@@ -4,9 +4,12 @@ use super::config::ServerConfig;
 use super::lead::{self, Lead};
 use super::root::{Root, RootError};
 use super::services::Services;
+use crate::http::Listening;
+use crate::metrics;
 use contactd_client::Error;
 use contactd_proto::names::Address;
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -22,6 +25,9 @@ pub enum ServeError {
     /// Its steps cannot be recorded, as its settings ask for.
     #[error("{0}")]
     Recording(crate::world::Refusal),
+    /// Its metrics cannot be told where its settings say.
+    #[error("metrics: {0}")]
+    Metrics(String),
     /// Shared memory failed.
     #[error("{0}")]
     System(Error),
@@ -42,6 +48,7 @@ impl From<Error> for ServeError {
 /// A server that holds its place and has created its services.
 pub struct Server {
     lead: Option<Box<Lead<Services>>>,
+    metrics: Option<SocketAddr>,
     /// Its place, given back last.
     _root: Root,
 }
@@ -51,9 +58,10 @@ impl Server {
     ///
     /// # Errors
     /// Another server of the name runs; folders are not private; shared memory fails; no threads can be started; its steps cannot be
-    /// recorded, as its settings ask for.
+    /// recorded or its metrics told, as its settings ask for.
     pub fn start(address: &Address, config: ServerConfig) -> Result<Self, ServeError> {
         let root = Root::take(address)?;
+        let metrics = config.metrics.map(Listening::on).transpose().map_err(ServeError::Metrics)?;
         let file = |folder: &std::path::PathBuf| folder.join(format!("{}-{:016x}.mcap", address.name(), root.epoch()));
         let recording = config.record.as_ref().map(file);
         ready_threads().map_err(ServeError::Threads)?;
@@ -64,7 +72,16 @@ impl Server {
             lead.record_all(path.display().to_string()).map_err(ServeError::Recording)?;
         }
         root.publish()?;
-        Ok(Self { lead: Some(Box::new(lead)), _root: root })
+        let told = metrics.as_ref().map(Listening::address);
+        if let Some(listening) = metrics {
+            metrics::tell(address, listening);
+        }
+        Ok(Self { lead: Some(Box::new(lead)), metrics: told, _root: root })
+    }
+
+    /// Where its metrics are told, if its settings ask for them.
+    pub fn metrics(&self) -> Option<SocketAddr> {
+        self.metrics
     }
 
     /// Tells, in a line on standard error, when `hangup` was set.
@@ -110,7 +127,7 @@ pub fn ready_threads() -> Result<(), String> {
 ///
 /// # Errors
 /// As `Server::start`.
-pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce()) -> Result<(), ServeError> {
+pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce(&Server)) -> Result<(), ServeError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register(signal, stop.clone())
@@ -121,7 +138,7 @@ pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce()) -> R
         .map_err(|e| ServeError::System(Error::System(format!("signal handler: {e}"))))?;
     let mut server = Server::start(address, config)?;
     server.hears(hangup);
-    ready();
+    ready(&server);
     server.tells_manager();
     server.run(&stop);
     Ok(())

@@ -1,6 +1,6 @@
 //! `contactd view`: a scene in a browser, its exact solids marched through on the page, with its contacts and its time line.
 //!
-//! One page, embedded in the program, is served on this machine alone ([`http`]). It gets the solids as numbers ([`cells`]; meshes as
+//! One page, embedded in the program, is served on this machine alone ([`crate::http`]). It gets the solids as numbers ([`cells`]; meshes as
 //! triangles), the objects, their motions and the answers as JSON ([`show`]), and draws them by WebGL 2 (`page/`). Nothing is
 //! tessellated that has a closed form, and what is drawn otherwise is told so.
 //!
@@ -9,10 +9,9 @@
 pub mod buffers;
 pub mod cells;
 pub mod gltf;
-pub mod http;
 pub mod show;
 
-use http::{Answer, Answers, Listening};
+use crate::http::{Answer, Answers, Listening};
 use show::Show;
 use std::sync::Arc;
 

@@ -4,12 +4,12 @@
 //! wrote them. `CONTACTD_VIEW_SOLIDS=N` for another number of solids a kind than the short one:
 //! `CONTACTD_VIEW_SOLIDS=200 cargo test --release -p contactd-tests --test models view:: -- --nocapture`
 
+use contactd::http::Listening;
 use contactd::import::Scene;
 use contactd::math::Aabb;
 use contactd::octree::Model;
 use contactd::solid::{Solid, SolidBuilder};
 use contactd::view::buffers::{Buffers, Piece, Shown};
-use contactd::view::http::Listening;
 use contactd::view::show::Show;
 use contactd::{tessellation, view};
 use contactd_tests::random_solids::{
@@ -298,7 +298,7 @@ fn the_server_of_the_page_answers_its_own_address_alone_and_each_route() {
     let address = listening.address();
     assert!(address.ip().is_loopback());
     let show = show();
-    let answers: Arc<view::http::Answers> = Arc::new(move |path: &str| view::answer(&show, path));
+    let answers: Arc<contactd::http::Answers> = Arc::new(move |path: &str| view::answer(&show, path));
     std::thread::spawn(move || listening.answer(&answers));
     let get = |path: &str| asked(address, &format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n\r\n"));
     for path in

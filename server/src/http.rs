@@ -1,4 +1,4 @@
-//! A small HTTP server for one page: it listens on this machine alone, answers GET and nothing else, and closes after each answer.
+//! A small HTTP server: it listens on this machine alone, answers GET and nothing else, and closes after each answer.
 //!
 //! A page of another site may make a browser send requests here, but not under this server's name: the Host of a request must be
 //! the address that was printed, so a name that somebody points at this machine (DNS rebinding) is refused. What is answered carries
@@ -58,7 +58,7 @@ impl Listening {
     /// # Errors
     /// One sentence why it cannot.
     pub fn on(port: u16) -> Result<Self, String> {
-        let failed = |e: io::Error| format!("expected to listen on 127.0.0.1:{port}, found {e}; choose another --port");
+        let failed = |e: io::Error| format!("expected to listen on 127.0.0.1:{port}, found {e}; choose another port");
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         Ok(Self { listener, address })
