@@ -5,13 +5,15 @@
 //!
 //! Floor 13: may import everything else.
 
+mod joints;
 mod pages;
 
+use self::joints::{ClearanceArguments, JointArguments, is_scene, read_scene, without_touching};
 use crate::cache::{self, Cache, Prepared};
 use crate::check::Check;
 use crate::contact::Status;
 use crate::demo::Program;
-use crate::import::{self, Access, Facets, Limits, ModelBytes, Openscad, Scene};
+use crate::import::{Access, Facets, Limits, ModelBytes, Openscad, Scene};
 use crate::inspect;
 use crate::ipc::{CacheFolder, Level, ServerConfig};
 use crate::octree::Model;
@@ -50,6 +52,8 @@ struct Arguments {
 enum Command {
     /// One step of a scene in this process, without a server: the earliest contact of every pair. Of models: whether they overlap.
     Check(CheckArguments),
+    /// The least clearance of a robot over ranges of its joints, proven, or a clash: exit status 1 where there is one.
+    Clearance(ClearanceArguments),
     /// The server, until SIGINT or SIGTERM; prints one line when ready.
     Serve(ServeArguments),
     /// The servers of this user: their sessions, steps a second, how long steps took in the last minute, memory.
@@ -94,7 +98,7 @@ enum Command {
     View(ViewArguments),
     /// What is in a model or scene file, and how it was imported.
     Inspect {
-        /// A model (.scad, .csg, .stl, .off, .obj) or a scene (.toml).
+        /// A model (.scad, .csg, .stl, .off, .obj), a scene (.toml) or a robot (.urdf, .sdf, MJCF's .xml).
         file: PathBuf,
         /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
         #[arg(long, default_value = "auto", value_parser = facets)]
@@ -105,6 +109,8 @@ enum Command {
         /// Where the camera of a scene's picture stands, seen from the scene; else where it sees the contacts.
         #[arg(long, value_name = "X,Y,Z", requires = "picture", value_parser = direction, allow_hyphen_values = true)]
         camera: Option<glam::DVec3>,
+        #[command(flatten)]
+        joints: JointArguments,
         #[command(flatten)]
         access: AccessArguments,
         #[command(flatten)]
@@ -239,7 +245,7 @@ impl CacheArguments {
 
 #[derive(clap::Args)]
 struct CheckArguments {
-    /// The scene's .toml file; or models, which are taken as they stand.
+    /// The scene's .toml file, or a robot's (.urdf, .sdf, MJCF's .xml); or models, which are taken as they stand.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// One JSON object instead of a table: every pair, every digit.
@@ -268,6 +274,8 @@ struct CheckArguments {
     #[arg(long, default_value = "auto", value_parser = facets)]
     facets: Facets,
     #[command(flatten)]
+    joints: JointArguments,
+    #[command(flatten)]
     access: AccessArguments,
     #[command(flatten)]
     cache: CacheArguments,
@@ -275,7 +283,7 @@ struct CheckArguments {
 
 #[derive(clap::Args)]
 struct ViewArguments {
-    /// The scene's .toml file; or models, which are taken as they stand.
+    /// The scene's .toml file, or a robot's (.urdf, .sdf, MJCF's .xml); or models, which are taken as they stand.
     #[arg(required_unless_present = "demo")]
     files: Vec<PathBuf>,
     /// The acts of the demo instead.
@@ -291,6 +299,8 @@ struct ViewArguments {
     #[arg(long, default_value = "auto", value_parser = facets)]
     facets: Facets,
     #[command(flatten)]
+    joints: JointArguments,
+    #[command(flatten)]
     access: AccessArguments,
     #[command(flatten)]
     cache: CacheArguments,
@@ -304,6 +314,8 @@ enum Done {
     Undecided,
     /// A recording was not repeated to the bit.
     Differs,
+    /// Links clash, or are nearer than was asked.
+    Clashes,
 }
 
 /// The command `contactd`, whole: what it prints goes to standard output and standard error. `arguments` begin with the program's own
@@ -336,9 +348,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
             let server = (!embedded).then_some(program);
             run_demo(server, csv.as_deref(), cache, TableStyle { wide, paint, ..TableStyle::default() })
         }
-        Command::Inspect { file, facets, picture, camera, access, cache } => {
-            inspect_file(&file, facets, (picture.as_deref(), camera), &access, &cache)
+        Command::Inspect { file, facets, picture, camera, joints, access, cache } => {
+            inspect_file(&file, facets, (picture.as_deref(), camera), (&joints, &access), &cache)
         }
+        Command::Clearance(arguments) => joints::clearance(&arguments),
         Command::View(arguments) => view_scene(&arguments),
         Command::Serve(arguments) => serve(arguments),
         Command::Record(arguments) => record(&arguments),
@@ -351,7 +364,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
     let status = match done {
         Ok(Done::Well) => 0,
         Ok(Done::Undecided) => 3,
-        Ok(Done::Differs) => 1,
+        Ok(Done::Differs | Done::Clashes) => 1,
         Err(sentence) => {
             say(&sentence.to_string());
             BAD_INPUT
@@ -498,20 +511,18 @@ fn seconds(word: &str) -> Result<Duration, String> {
         .ok_or_else(|| "expected a positive number of seconds".into())
 }
 
-/// Is it a scene? Anything else is a model.
-fn is_scene(file: &Path) -> bool {
-    file.extension().is_some_and(|e| e == "toml")
-}
-
 /// The scene of a file, or of models as they stand.
-fn scene_of(files: &[PathBuf], access: &AccessArguments) -> Result<Scene, Box<dyn Error>> {
+fn scene_of(files: &[PathBuf], access: &AccessArguments, joints: &JointArguments) -> Result<Scene, Box<dyn Error>> {
     let scene = match files {
-        [file] if is_scene(file) => import::read_scene(file)?,
+        [file] if is_scene(file) => read_scene(file, joints)?,
         files => match files.iter().find(|f| is_scene(f)) {
             Some(scene) => {
                 return Err(format!("expected one scene, or models, found {} among them", scene.display()).into());
             }
-            None => Scene::of_models(files),
+            None => {
+                joints.none(&files[0])?;
+                Scene::of_models(files)
+            }
         },
     };
     Ok(Scene { access: access.with(scene.access.clone())?, ..scene })
@@ -521,11 +532,12 @@ fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
     let show = if arguments.demo {
         crate::demo::show(arguments.cache.open().as_ref())?
     } else {
-        let scene = scene_of(&arguments.files, &arguments.access)?;
+        let scene = scene_of(&arguments.files, &arguments.access, &arguments.joints)?;
         let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
         let names = arguments.files.iter().map(|f| f.file_name().unwrap_or_default().to_string_lossy());
         let title = names.collect::<Vec<_>>().join(", ");
-        Show::of_scene(title, scene, &models_of(&prepared))?
+        let models = models_of(&prepared);
+        Show::of_scene(title, without_touching(scene, &models, &arguments.joints)?, &models)?
     };
     if let Some(to) = &arguments.gltf {
         let bytes = crate::view::gltf::glb(&show)?;
@@ -542,14 +554,16 @@ fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
 }
 
 fn check_scene(arguments: &CheckArguments, paint: Paint) -> Result<Done, Box<dyn Error>> {
-    let scene = scene_of(&arguments.files, &arguments.access)?;
+    let scene = scene_of(&arguments.files, &arguments.access, &arguments.joints)?;
     let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;
     if scene.file.is_empty() {
         for (source, p) in scene.models.iter().zip(&prepared) {
             inspect::grouped(&p.notes).iter().for_each(|n| warn(&format!("{}:{n}", source.text_name())));
         }
     }
-    let mut check = Check::new(&scene, &models_of(&prepared), arguments.resolution)?;
+    let models = models_of(&prepared);
+    let scene = without_touching(scene, &models, &arguments.joints)?;
+    let mut check = Check::new(&scene, &models, arguments.resolution)?;
     let outcome = check.step(arguments.first)?.clone();
     if let Some(to) = &arguments.certificate {
         let (text, without) = check.certificates(&outcome);
@@ -627,7 +641,7 @@ fn inspect_file(
     file: &Path,
     facets: Facets,
     (picture, camera): (Option<&Path>, Option<glam::DVec3>),
-    access: &AccessArguments,
+    (joints, access): (&JointArguments, &AccessArguments),
     cache: &CacheArguments,
 ) -> Result<Done, Box<dyn Error>> {
     if camera.is_some() && !is_scene(file) {
@@ -636,10 +650,11 @@ fn inspect_file(
         );
     }
     let text = if is_scene(file) {
-        let scene = import::read_scene(file)?;
+        let scene = read_scene(file, joints)?;
         let scene = Scene { access: access.with(scene.access.clone())?, ..scene };
         let models = prepare_scene(&scene, facets, cache)?;
-        let mut text = inspect::scene(&scene) + &inspect::effects(&scene);
+        let scene = without_touching(scene, &models_of(&models), joints)?;
+        let mut text = joints::told(file, joints)? + &inspect::scene(&scene) + &inspect::effects(&scene);
         for (source, p) in scene.models.iter().zip(&models) {
             text.push_str(&inspect::model(&source.path.display().to_string(), &p.model, &p.notes));
         }
@@ -648,6 +663,7 @@ fn inspect_file(
         }
         text
     } else {
+        joints.none(file)?;
         let (limits, name) = (Limits::default(), file.display().to_string());
         let read = ModelBytes::read(file, &access.with(Access::default())?, &limits)?;
         let prepared = cache::prepare(cache.open().as_ref(), &read.source(), facets, &limits)?;

@@ -50,7 +50,7 @@
 //! | 4 | [`octree`] | stage 2: extended CSG octrees and their walk |
 //! | 5 | [`contact`] | stage 3 and the queue: the answer for a pair |
 //! | 6 | [`world`] | a session's objects, rules, broad phase: the answers of a step |
-//! | 7 | [`import`] | OpenSCAD's trees and scene files; the only floor that knows file formats |
+//! | 7 | [`import`] | OpenSCAD's trees, scene files and robots; the only floor that knows file formats |
 //! | 8 | [`cache`], [`terminal`] | preprocessed models kept on disk; text of 80 columns |
 //! | 8 | [`tessellation`] | triangles of solids, for viewers |
 //! | 8 | [`http`] | a small HTTP server for this machine alone |
@@ -58,6 +58,7 @@
 //! | 9 | [`recording`] | steps in MCAP files, with all that it takes to repeat them |
 //! | 9 | [`metrics`] | what a server counts, as OpenMetrics |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
+//! | 10 | [`clearance`] | the least clearance of a robot over ranges of its joints |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`replay`] | a recording, repeated and compared |
 //! | 11 | [`view`] | a scene in a browser |
@@ -94,6 +95,7 @@
 
 pub mod cache;
 pub mod check;
+pub mod clearance;
 pub mod command_line;
 pub mod demo;
 pub mod http;

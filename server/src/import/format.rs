@@ -145,19 +145,20 @@ impl ModelBytes {
         } else {
             (read_bytes(path, limits)?, "")
         };
-        let names = (Source { format, ..Source::named(&name, &bytes) }.format()?.names)(&bytes, limits);
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let root = access.root.as_deref();
-        let attach = |named| match named {
-            Named::File(name) => Attachment { bytes: beside(folder, root, &name, limits), name },
-            Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: Attachment::of_font(&pattern) },
-        };
-        let mut attached: Vec<Attachment> = names.into_iter().map(attach).collect();
+        let mut attached = attached(&Source { format, ..Source::named(&name, &bytes) }, path, access, limits)?;
         if !warnings.is_empty() {
             let bytes = Ok(warnings.join("\n").into_bytes());
             attached.push(Attachment { name: Attachment::WARNINGS.to_owned(), bytes });
         }
         Ok(Self { name, format, bytes, attached })
+    }
+
+    /// A flattened OpenSCAD text that another file gave rise to, and the files that it names, relative to the folder of `path`.
+    pub fn of_text(name: String, text: &str, path: &Path, access: &Access, limits: &Limits) -> Self {
+        let bytes = text.as_bytes().to_vec();
+        let source = Source { format: csg::FORMAT.name, ..Source::named(&name, &bytes) };
+        let attached = attached(&source, path, access, limits).unwrap_or_default();
+        Self { name, format: csg::FORMAT.name, bytes, attached }
     }
 
     /// What is read of it.
@@ -176,6 +177,17 @@ impl ModelBytes {
         drop(bytes);
         mesh::import(&name, read, limits)
     }
+}
+
+/// The files that a text at `path` names: from its own folder and below, or from the root that `access` names.
+fn attached(source: &Source, path: &Path, access: &Access, limits: &Limits) -> Result<Vec<Attachment>, ImportError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let root = access.root.as_deref();
+    let attach = |named| match named {
+        Named::File(name) => Attachment { bytes: beside(folder, root, &name, limits), name },
+        Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: Attachment::of_font(&pattern) },
+    };
+    Ok((source.format()?.names)(source.bytes, limits).into_iter().map(attach).collect())
 }
 
 /// The files that a text which was sent names, in a folder and below. Fonts are those that a text that is sent has anyway.

@@ -1,4 +1,5 @@
-//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; what flattens them: `openscad`; meshes: `mesh`) and scene files (`scene`).
+//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; what flattens them: `openscad`; meshes: `mesh`), scene files (`scene`) and
+//! robots (`robot`).
 //!
 //! A file is read completely or refused with one sentence that names the file, the line, the column, what was expected
 //! and what stands there. Real files are rough; whatever is snapped, flipped, merged or taken in another way than
@@ -14,6 +15,7 @@ pub mod format;
 pub mod mesh;
 pub mod openscad;
 pub mod problem;
+pub mod robot;
 pub mod scene;
 mod surface;
 mod xml;

@@ -56,11 +56,17 @@ pub struct ModelSource {
     pub path: PathBuf,
     /// Where the scene names that file.
     pub at: Place,
+    /// What stands for its content where the scene's file tells the solid itself, as robots' files do: a flattened OpenSCAD text, in
+    /// which names of files are relative to the folder of `path`.
+    pub text: Option<String>,
 }
 
 impl ModelSource {
-    /// What sentences call the text that lines are counted in: the file, or what OpenSCAD makes of it.
+    /// What sentences call the text that lines are counted in: the file, or what OpenSCAD makes of it, or what is made of a link.
     pub fn text_name(&self) -> String {
+        if self.text.is_some() {
+            return format!("{}, {}", self.path.display(), self.name);
+        }
         let flattened = if super::openscad::is_source(&self.path) { ", flattened" } else { "" };
         format!("{}{flattened}", self.path.display())
     }
@@ -164,7 +170,7 @@ impl Scene {
         for m in &raw.model {
             checker.new_name("model", &m.name, &mut model_of)?;
             let path = folder.join(m.file.as_ref());
-            models.push(ModelSource { name: m.name.as_ref().clone(), path, at: checker.place(&m.file) });
+            models.push(ModelSource { name: m.name.as_ref().clone(), path, at: checker.place(&m.file), text: None });
         }
         let mut objects = Vec::with_capacity(raw.object.len());
         let mut object_of: HashMap<String, usize> = HashMap::new();
@@ -205,6 +211,7 @@ impl Scene {
             name: name.clone(),
             path: file.clone(),
             at: Place::START,
+            text: None,
         };
         let object = |(model, name): (usize, &String)| SceneObject {
             name: name.clone(),
@@ -248,12 +255,22 @@ impl Scene {
         mut read: impl FnMut(&Source) -> Result<T, ImportError>,
     ) -> Result<Vec<T>, SceneError> {
         let each = self.models.iter().map(|m| {
-            ModelBytes::read(&m.path, &self.access, limits).and_then(|file| read(&file.source())).map_err(|e| match e {
+            let bytes = match &m.text {
+                None => ModelBytes::read(&m.path, &self.access, limits),
+                Some(text) => Ok(ModelBytes::of_text(m.text_name(), text, &m.path, &self.access, limits)),
+            };
+            bytes.and_then(|file| read(&file.source())).map_err(|e| match e {
                 ImportError::Read { file, reason } if !self.file.is_empty() => SceneError::Value {
                     file: self.file.clone(),
                     at: m.at,
                     expected: "a model file".into(),
                     found: format!("{file}: {reason}"),
+                },
+                // Places in a text that nobody has written help nobody.
+                ImportError::Content { problem, .. } if m.text.is_some() => SceneError::Format {
+                    file: self.file.clone(),
+                    at: m.at,
+                    message: format!("the geometry of {:?}: {problem}", m.name),
                 },
                 other => other.into(),
             })

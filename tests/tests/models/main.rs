@@ -4,6 +4,7 @@
 
 mod builder;
 mod cache;
+mod clearance;
 mod corpus;
 mod files;
 mod gltf;
@@ -11,4 +12,5 @@ mod heights;
 mod import_models;
 mod mass;
 mod models;
+mod robots;
 mod view;

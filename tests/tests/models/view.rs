@@ -353,7 +353,7 @@ fn the_server_of_the_page_answers_its_own_address_alone_and_each_route() {
 fn the_program_refuses_what_it_cannot_show_in_one_sentence() {
     let taken = Listening::on(0).expect("a port");
     let again = Listening::on(taken.address().port()).expect_err("the port is taken");
-    assert!(again.contains("--port") && again.lines().count() == 1, "{again}");
+    assert!(again.contains("choose another port") && again.lines().count() == 1, "{again}");
     let none = Show::new("nothing".into(), Vec::new(), Vec::new()).expect_err("nothing to show");
     assert!(none.contains("nothing") && none.lines().count() == 1, "{none}");
     let text = "[[model]]\nname = \"a\"\nfile = \"a.csg\"\n[[object]]\nname = \"a\"\nmodel = \"a\"\nmax_speed = 1\n";

@@ -1,0 +1,289 @@
+//! What is said of robots on the command line: joint values, packages; and the scene that they make of a file.
+
+use super::{AccessArguments, CacheArguments, Done, models_of, prepare_scene, print, warn};
+use crate::check::Check;
+use crate::clearance::{self, Least, Question};
+use crate::import::{self, Scene, robot};
+use crate::import::{Facets, SceneObject};
+use crate::octree::Model;
+use crate::terminal::number;
+use crate::world::PairOutcome;
+use contactd_proto::Motion;
+use serde_json::json;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// How a robot (URDF, SDFormat, MJCF) stands and moves.
+#[derive(clap::Args)]
+pub(super) struct JointArguments {
+    /// Joint values of a robot at the start of the step, in radians and metres, or with a unit: shoulder=30deg,slide=5mm.
+    #[arg(long, value_name = "JOINT=VALUE,…", value_delimiter = ',', value_parser = joint)]
+    joints: Vec<(String, f64)>,
+    /// Joint values at its end; the others stay.
+    #[arg(long, value_name = "JOINT=VALUE,…", value_delimiter = ',', value_parser = joint)]
+    to: Vec<(String, f64)>,
+    /// Takes a robot's meshes as their convex hulls, as MuJoCo does.
+    #[arg(long)]
+    hulls: bool,
+    /// A folder in which a robot's packages are (package://NAME/…, model://NAME/…).
+    #[arg(long, value_name = "DIR")]
+    packages: Vec<PathBuf>,
+    /// An SRDF file with pairs of links that are not to be tested.
+    #[arg(long, value_name = "FILE")]
+    srdf: Option<PathBuf>,
+    /// Pairs of links that touch or overlap at the start are not tested; they are told.
+    #[arg(long)]
+    ignore_touching: bool,
+}
+
+impl JointArguments {
+    pub fn ask(&self) -> Result<robot::Ask, String> {
+        let (from, to) = (values(&self.joints)?, values(&self.to)?);
+        Ok(robot::Ask { from, to, hulls: self.hulls, packages: self.packages.clone(), srdf: self.srdf.clone() })
+    }
+
+    /// They say nothing of other files.
+    pub fn none(&self, file: &Path) -> Result<(), String> {
+        let Self { joints, to, hulls, packages, srdf, ignore_touching } = self;
+        let stated = [
+            ("--joints", !joints.is_empty()),
+            ("--to", !to.is_empty()),
+            ("--hulls", *hulls),
+            ("--packages", !packages.is_empty()),
+            ("--srdf", srdf.is_some()),
+            ("--ignore-touching", *ignore_touching),
+        ];
+        match stated.iter().find(|(_, is_stated)| *is_stated) {
+            None => Ok(()),
+            Some((name, _)) => {
+                Err(format!("expected a robot (URDF, SDFormat, MJCF) beside {name}, found {}", file.display()))
+            }
+        }
+    }
+}
+
+/// The scene without the pairs that touch at its start, where that was asked for; they are told on standard error.
+pub(super) fn without_touching(
+    scene: Scene,
+    models: &[Arc<Model>],
+    joints: &JointArguments,
+) -> Result<Scene, Box<dyn Error>> {
+    if !joints.ignore_touching {
+        return Ok(scene);
+    }
+    let at_rest = |o: &SceneObject| SceneObject { motion: Motion::resting(o.motion.start), record: None, ..o.clone() };
+    let rest = Scene { objects: scene.objects.iter().map(at_rest).collect(), ..scene.clone() };
+    let mut check = Check::new(&rest, models, None)?;
+    let outcome = check.step(false)?;
+    let touch = |p: &&PairOutcome| p.outcome.meets() || p.outcome.touching;
+    let mut scene = scene;
+    for p in outcome.pairs.iter().filter(touch) {
+        let names = [p.a, p.b].map(|id| scene.objects[id as usize].name.clone());
+        warn(&format!("{} and {} touch at the start and are not tested", names[0], names[1]));
+        scene.rules[0].except.push(names);
+    }
+    Ok(scene)
+}
+
+/// Values by joint, each told once.
+fn values(told: &[(String, f64)]) -> Result<robot::Values, String> {
+    let mut values = robot::Values::new();
+    for (name, value) in told {
+        if values.insert(name.clone(), *value).is_some() {
+            return Err(format!("expected one value of the joint {name}, found two"));
+        }
+    }
+    Ok(values)
+}
+
+/// A joint and its value.
+fn joint(word: &str) -> Result<(String, f64), String> {
+    let expected = || "expected JOINT=VALUE, as in shoulder=30deg or slide=5mm".to_owned();
+    let (name, value) = word.rsplit_once('=').ok_or_else(expected)?;
+    if name.is_empty() {
+        return Err(expected());
+    }
+    Ok((name.to_owned(), joint_value(value).ok_or_else(expected)?))
+}
+
+/// A joint's value in radians or metres.
+pub(super) fn joint_value(word: &str) -> Option<f64> {
+    const DEGREE: f64 = std::f64::consts::PI / 180.0;
+    let units = [("deg", DEGREE), ("rad", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+    let known = units.into_iter().find_map(|(unit, factor)| Some((word.strip_suffix(unit)?, factor)));
+    let (number, factor) = known.unwrap_or((word, 1.0));
+    // A quotient is the nearer one of the two where units divide: 5 mm is the double 0.005.
+    let value = number.trim().parse::<f64>().ok()?;
+    let value = match factor {
+        1e-3 => value / 1e3,
+        1e-2 => value / 1e2,
+        other => value * other,
+    };
+    value.is_finite().then_some(value)
+}
+
+/// Is it a scene? Anything else is a model.
+pub(super) fn is_scene(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e == "toml") || robot::is_robot(file)
+}
+
+/// The scene of a file.
+pub(super) fn read_scene(file: &Path, joints: &JointArguments) -> Result<Scene, Box<dyn Error>> {
+    if robot::is_robot(file) {
+        let ask = joints.ask()?;
+        return Ok(robot::scene_of(file, &robot::read_robot(file, &ask)?, &ask)?);
+    }
+    joints.none(file)?;
+    Ok(import::read_scene(file)?)
+}
+
+/// A robot's joints, with their limits and where they stand; nothing of another scene.
+pub(super) fn told(file: &Path, joints: &JointArguments) -> Result<String, Box<dyn Error>> {
+    if !robot::is_robot(file) {
+        return Ok(String::new());
+    }
+    let ask = joints.ask()?;
+    let robot = robot::read_robot(file, &ask)?;
+    let values = ask.from;
+    let mut out = format!("{} links, {} joints with values\n", robot.links.len(), robot.free().count());
+    for dof in robot.free() {
+        let unit = match dof.kind {
+            robot::DofKind::Hinge { .. } => "rad",
+            robot::DofKind::Slide { .. } => "m",
+        };
+        let at = number(robot.value(dof, &values), 1e-9, 6);
+        let limits = match dof.range {
+            [low, high] if low.is_infinite() && high.is_infinite() => "without limits".to_owned(),
+            [low, high] => format!("{} to {}", number(low, 1e-9, 6), number(high, 1e-9, 6)),
+        };
+        let _ = writeln!(out, "  {:<32} {at:>12} {unit:<3}  {limits}", dof.name);
+    }
+    Ok(out)
+}
+
+#[derive(clap::Args)]
+pub(super) struct ClearanceArguments {
+    /// The robot's file: .urdf, .sdf, MJCF's .xml.
+    file: PathBuf,
+    /// A joint and the range that it goes through: shoulder=0..70deg, slide=0..120mm; in radians and metres without a unit.
+    #[arg(long, value_name = "JOINT=LOW..HIGH", value_parser = range, required = true, allow_hyphen_values = true)]
+    range: Vec<(String, [f64; 2])>,
+    /// How far apart the bounds may be, metres.
+    #[arg(long, value_name = "LENGTH", default_value = "0.001", value_parser = length)]
+    tolerance: f64,
+    /// It is enough to know whether the clearance is at least this, metres: exit status 1 where it is not.
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    least: Option<f64>,
+    /// Boxes of joint values that may be looked at; then the bounds stay as they are, exit status 3.
+    #[arg(long, default_value = "200000")]
+    boxes: u64,
+    /// One JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    joints: JointArguments,
+    #[command(flatten)]
+    access: AccessArguments,
+    #[command(flatten)]
+    cache: CacheArguments,
+}
+
+/// A length in metres, or with a unit.
+fn length(word: &str) -> Result<f64, String> {
+    let length = joint_value(word).filter(|x| *x > 0.0 && !word.ends_with("deg") && !word.ends_with("rad"));
+    length.ok_or_else(|| "expected a positive length in metres, or with a unit, as in 20mm".into())
+}
+
+/// A joint and its range.
+fn range(word: &str) -> Result<(String, [f64; 2]), String> {
+    let expected = || "expected JOINT=LOW..HIGH, as in shoulder=0..70deg".to_owned();
+    let (name, both) = word.rsplit_once('=').ok_or_else(expected)?;
+    let (low, high) = both.split_once("..").ok_or_else(expected)?;
+    // A unit behind both stands for both.
+    let unit: String =
+        high.chars().rev().take_while(|c| c.is_alphabetic()).collect::<Vec<_>>().into_iter().rev().collect();
+    let has_own = low.chars().last().is_some_and(char::is_alphabetic);
+    let low = if has_own { joint_value(low) } else { joint_value(&format!("{low}{unit}")) };
+    match (name.is_empty(), low, joint_value(high)) {
+        (false, Some(low), Some(high)) => Ok((name.to_owned(), [low, high])),
+        _ => Err(expected()),
+    }
+}
+
+/// The least clearance over ranges.
+pub(super) fn clearance(arguments: &ClearanceArguments) -> Result<Done, Box<dyn Error>> {
+    let file = &arguments.file;
+    if !robot::is_robot(file) {
+        return Err(format!("expected a robot (URDF, SDFormat, MJCF), found {}", file.display()).into());
+    }
+    let ask = arguments.joints.ask()?;
+    if !ask.to.is_empty() {
+        return Err("expected --range in place of --to: a clearance is over ranges, not over a step".into());
+    }
+    let read = robot::read_robot(file, &ask)?;
+    let scene = robot::scene_of(file, &read, &ask)?;
+    let scene = Scene { access: arguments.access.with(scene.access.clone())?, ..scene };
+    let prepared = prepare_scene(&scene, Facets::Auto, &arguments.cache)?;
+    let models = models_of(&prepared);
+    let scene = without_touching(scene, &models, &arguments.joints)?;
+    let question = Question {
+        ranges: arguments.range.clone(),
+        values: ask.from,
+        tolerance: arguments.tolerance,
+        least: arguments.least,
+        boxes: arguments.boxes,
+    };
+    let least = clearance::least(&read, &scene, &models, &question)?;
+    print(&if arguments.json { least_json(&least) } else { least_text(&least, &question) })?;
+    Ok(match question.least {
+        _ if least.pairs == 0 => Done::Well,
+        _ if least.upper == 0.0 || question.least.is_some_and(|least_asked| least.upper < least_asked) => Done::Clashes,
+        Some(asked) if least.lower >= asked => Done::Well,
+        None if least.is_settled => Done::Well,
+        _ => Done::Undecided,
+    })
+}
+
+fn least_json(least: &Least) -> String {
+    let point = |x: glam::DVec3| json!(x.is_finite().then(|| x.to_array()));
+    let finite = |x: f64| json!(x.is_finite().then_some(x));
+    json!({
+        "lower": finite(least.lower), "upper": finite(least.upper), "clash": least.upper == 0.0, "settled": least.is_settled,
+        "joints": least.values, "links": least.names, "points": least.points.map(point),
+        "pairs": least.pairs, "boxes": least.boxes, "distances": least.distances,
+    })
+    .to_string()
+        + "\n"
+}
+
+fn least_text(least: &Least, question: &Question) -> String {
+    if least.pairs == 0 {
+        return "no pair of links is tested\n".to_owned();
+    }
+    let fine = 0.1 * question.tolerance;
+    let (lower, upper) = (number(least.lower, fine, 9), number(least.upper, fine, 9));
+    let mut out = match question.least {
+        _ if least.upper == 0.0 => format!("a clash: {} and {} touch\n", least.names[0], least.names[1]),
+        Some(asked) if least.upper < asked => format!("nearer than {asked}: {upper}\n"),
+        Some(asked) if least.lower >= asked => format!("at least {asked}, proven: {lower} or more\n"),
+        _ => format!("least clearance {upper}; proven: {lower} or more\n"),
+    };
+    if !least.is_settled {
+        out.push_str("not to the tolerance: the boxes that it may look at are spent (--boxes)\n");
+    }
+    if least.upper > 0.0 {
+        let _ = writeln!(out, "  {} - {}", least.names[0], least.names[1]);
+    }
+    for (name, value) in &least.values {
+        let _ = writeln!(out, "  {name} = {}", number(*value, 1e-9, 9));
+    }
+    if least.points.iter().all(|x| x.is_finite()) {
+        let point = |x: glam::DVec3| x.to_array().map(|c| number(c, fine, 6)).join(", ");
+        let _ = writeln!(out, "  at ({}) and ({})", point(least.points[0]), point(least.points[1]));
+    }
+    let Least { pairs, boxes, distances, .. } = least;
+    let _ = writeln!(out, "{pairs} pairs of links, {boxes} boxes of joint values, {distances} distances");
+    out
+}

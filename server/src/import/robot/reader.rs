@@ -1,0 +1,67 @@
+//! What is asked of a robot's file, and where the files are that it names.
+
+use super::kinematics::Values;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+/// What is asked of a robot's file.
+#[derive(Clone, Debug, Default)]
+pub struct Ask {
+    /// Joint values at the start of the step; of others what the file says, else 0, or the nearest that their limits have.
+    pub from: Values,
+    /// Joint values at its end; of others those of the start.
+    pub to: Values,
+    /// Meshes are taken as their convex hulls, as MuJoCo does anyway.
+    pub hulls: bool,
+    /// Folders in which packages are looked for (`package://NAME/…`, `model://NAME/…`), before the file's own and those above it.
+    pub packages: Vec<PathBuf>,
+    /// An SRDF file with pairs that are not to be tested.
+    pub srdf: Option<PathBuf>,
+}
+
+/// What a reader knows beside the text.
+pub(super) struct Reader<'a> {
+    /// The file.
+    pub path: &'a Path,
+    pub ask: &'a Ask,
+    /// The folder that holds the text and all packages that were found elsewhere.
+    pub root: &'a RefCell<Option<PathBuf>>,
+}
+
+impl Reader<'_> {
+    /// The folder that names are relative to.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    }
+
+    /// The file that a mesh's name means: of `package://NAME/PATH`, `model://NAME/PATH` the folder NAME among the packages, or beside
+    /// or above the text; of `file://PATH` the path; else relative to the text.
+    pub fn file(&self, uri: &str) -> String {
+        let named = uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://"));
+        if let Some(path) = named {
+            let own = std::path::absolute(self.folder()).unwrap_or_else(|_| self.folder().to_owned());
+            let above = own.ancestors().map(Path::to_owned);
+            let name = path.split('/').next().unwrap_or_default();
+            let found = self.ask.packages.iter().cloned().chain(above).find_map(|folder| {
+                let is_package = folder.file_name().is_some_and(|own| own == name);
+                let base = if is_package { folder.parent()?.to_owned() } else { folder };
+                let at = base.join(path);
+                at.is_file().then_some(at)
+            });
+            if let Some(found) = found.as_ref().and_then(|f| f.canonicalize().ok())
+                && let Ok(own) = self.folder().canonicalize()
+                && !found.starts_with(&own)
+            {
+                let mut root = self.root.borrow_mut();
+                *root = Some(common(root.as_ref().unwrap_or(&own), &found));
+            }
+            return found.unwrap_or_else(|| path.into()).display().to_string();
+        }
+        uri.strip_prefix("file://").unwrap_or(uri).to_owned()
+    }
+}
+
+/// The folder that holds two of them.
+fn common(a: &Path, b: &Path) -> PathBuf {
+    a.components().zip(b.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
+}

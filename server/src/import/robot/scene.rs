@@ -1,0 +1,194 @@
+//! A robot where its joints have it, as a scene.
+
+use super::super::openscad::Access;
+use super::super::problem::Problem;
+use super::super::scene::{ModelSource, Scene, SceneError, SceneObject};
+use super::super::{Limits, Note, Place, read_bytes, xml};
+use super::kinematics::{Part, Robot, Values};
+use super::reader::{Ask, Reader};
+use super::{mjcf, sdf, urdf};
+use contactd_proto::{MotionState, PoseRecord, Rule};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Reads a robot or a world, by what its root element is.
+///
+/// # Errors
+/// One sentence with file, line and column.
+pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
+    let file = path.display().to_string();
+    let bytes = read_bytes(path, &Limits::default())?;
+    let wrong = |(at, problem): (Place, Problem)| of_problem(&file, at, problem);
+    let document = xml::parse(&bytes).map_err(wrong)?;
+    let found = RefCell::new(None);
+    let reader = Reader { path, ask, root: &found };
+    let root = document.root_element();
+    let robot = match root.tag_name().name() {
+        "robot" => urdf::read(root, &reader),
+        "sdf" => sdf::read(root, &reader),
+        "mujoco" => mjcf::read(root, &reader),
+        other => Err(xml::wrong(root, "a robot (URDF), an sdf or a mujoco as the root element", Some(other))),
+    };
+    let mut robot = robot.map_err(wrong)?;
+    robot.root = found.into_inner();
+    if let Some(path) = &ask.srdf {
+        let file = path.display().to_string();
+        let bytes = read_bytes(path, &Limits::default())?;
+        let wrong = |(at, problem): (Place, Problem)| of_problem(&file, at, problem);
+        let document = xml::parse(&bytes).map_err(wrong)?;
+        urdf::disabled(document.root_element(), &mut robot).map_err(wrong)?;
+    }
+    Ok(robot)
+}
+
+pub(super) fn of_problem(file: &str, at: Place, problem: Problem) -> SceneError {
+    match problem {
+        Problem::Syntax { expected, found } => SceneError::Value { file: file.to_owned(), at, expected, found },
+        other => SceneError::Format { file: file.to_owned(), at, message: other.to_string() },
+    }
+}
+
+/// A robot as a scene, over a step from joint values to others.
+///
+/// # Errors
+/// A joint that is not there or has no value of its own; a value beyond a limit; a link whose path is no straight one with a constant
+/// rate of turn.
+pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneError> {
+    let file = path.display().to_string();
+    let from = checked(&file, robot, &ask.from)?;
+    let mut to = from.clone();
+    to.extend(checked(&file, robot, &ask.to)?);
+    let motions = robot.motions(&from, &to).map_err(|(link, joints)| {
+        let link = &robot.links[link];
+        let (last, others) = joints.split_last().expect("two joints at least");
+        SceneError::Value {
+            file: file.clone(),
+            at: link.at,
+            expected: format!("joints of which one turns the link {:?} in a step: move one after the other", link.name),
+            found: format!("{} and {last} moving at once, on a path that is no arc", others.join(", ")),
+        }
+    })?;
+    let mut models: Vec<ModelSource> = Vec::new();
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    let mut objects = Vec::new();
+    // Which link and part each object is.
+    let mut owners: Vec<(usize, &Part)> = Vec::new();
+    let mut names = HashMap::new();
+    for (i, link) in robot.links.iter().enumerate() {
+        for part in &link.parts {
+            let whole = if part.name.is_empty() { link.name.clone() } else { format!("{}/{}", link.name, part.name) };
+            let name = unique(whole, &mut names);
+            let model = *known.entry(&part.text).or_insert_with(|| {
+                models.push(ModelSource {
+                    name: name.clone(),
+                    path: path.to_owned(),
+                    at: link.at,
+                    text: Some(part.text.clone()),
+                });
+                models.len() - 1
+            });
+            let (place, motion) = motions[i];
+            let state = MotionState { motion, end: motion.at(1.0) };
+            let record =
+                (!state.is_rest()).then(|| PoseRecord::turn(0, motion.start.position + motion.velocity, motion.spin));
+            objects.push(SceneObject {
+                name,
+                at: link.at,
+                model,
+                group: "default".into(),
+                is_static: link.is_static,
+                place,
+                motion,
+                record,
+                rotates: true,
+                max_speed: None,
+            });
+            owners.push((i, part));
+        }
+    }
+    let mut rule = Rule::new(["default".into(), "default".into()]);
+    for (a, (i, part)) in owners.iter().enumerate() {
+        for (b, (j, other)) in owners.iter().enumerate().skip(a + 1) {
+            let meets = |p: &Part, q: &Part| p.masks[0] & q.masks[1] != 0;
+            if i == j || robot.is_excepted(*i, *j) || !(meets(part, other) || meets(other, part)) {
+                rule.except.push([objects[a].name.clone(), objects[b].name.clone()]);
+            }
+        }
+    }
+    Ok(Scene {
+        unit: "m".into(),
+        resolution: None,
+        resolution_at: None,
+        dt: None,
+        models,
+        objects,
+        rules: vec![rule],
+        notes: robot.notes.clone(),
+        file,
+        access: Access { root: robot.root.clone(), ..Access::default() },
+    })
+}
+
+/// A name that no other object has.
+fn unique(name: String, known: &mut HashMap<String, usize>) -> String {
+    let count = known.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
+    if *count == 1 { name } else { format!("{name} {count}") }
+}
+
+/// Values that the robot has, within limits.
+fn checked(file: &str, robot: &Robot, values: &Values) -> Result<Values, SceneError> {
+    let wrong = |at, expected: String, found: String| SceneError::Value { file: file.to_owned(), at, expected, found };
+    for (name, value) in values {
+        let link = robot.links.iter().find(|l| l.dofs.iter().any(|d| d.name == *name));
+        let dof = link.and_then(|l| l.dofs.iter().find(|d| d.name == *name));
+        let (Some(link), Some(dof)) = (link, dof) else {
+            let names: Vec<&str> = robot.free().map(|d| d.name.as_str()).collect();
+            return Err(wrong(Place::START, format!("one of the joints {}", names.join(", ")), format!("{name:?}")));
+        };
+        if let Some((leader, ..)) = &dof.mimic {
+            return Err(wrong(link.at, format!("a value of {leader}, which {name} follows"), format!("one of {name}")));
+        }
+        let [low, high] = dof.range;
+        if !(*value >= low && *value <= high) {
+            return Err(wrong(link.at, format!("{low} to {high} as {name}"), value.to_string()));
+        }
+    }
+    Ok(values.clone())
+}
+
+impl Robot {
+    /// Pairs of links that are not tested: those that do not move against each other, and those that the file excepts.
+    pub fn is_excepted(&self, i: usize, j: usize) -> bool {
+        let pair = [i.min(j), i.max(j)];
+        self.welded_to(i) == self.welded_to(j) || self.excepted.contains(&pair)
+    }
+
+    /// The link of each object of its scene.
+    pub fn owners(&self) -> Vec<usize> {
+        self.links.iter().enumerate().flat_map(|(i, link)| std::iter::repeat_n(i, link.parts.len())).collect()
+    }
+
+    /// The link nearest to the root that a link does not move against; `None`: it does not move against the world.
+    pub fn welded_to(&self, link: usize) -> Option<usize> {
+        let mut at = link;
+        while self.links[at].dofs.is_empty() && !self.links[at].is_free {
+            at = self.links[at].parent?;
+        }
+        Some(at)
+    }
+
+    /// Links that a joint connects are not tested against each other.
+    pub(super) fn except_neighbours(&mut self) {
+        for i in 0..self.links.len() {
+            if let Some(parent) = self.links[i].parent {
+                self.excepted.push([parent.min(i), parent.max(i)]);
+            }
+        }
+    }
+
+    /// What was left out, as a note.
+    pub(super) fn note(&mut self, at: Place, text: impl Into<String>) {
+        self.notes.push(Note { at, text: text.into(), amount: None });
+    }
+}

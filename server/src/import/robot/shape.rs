@@ -1,0 +1,109 @@
+//! Collision geometry as flattened OpenSCAD texts.
+
+use contactd_proto::Pose;
+use glam::DVec3;
+use std::fmt::Write as _;
+
+/// A geometry about its own origin, lengths in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Shape {
+    /// A box of these sides.
+    Box(DVec3),
+    /// A ball of this radius.
+    Sphere(f64),
+    /// A cylinder about z: radius, length.
+    Cylinder(f64, f64),
+    /// A cone about z whose apex is up: radius at the bottom, length.
+    Cone(f64, f64),
+    /// A capsule about z: radius, length between the centres of its ends.
+    Capsule(f64, f64),
+    /// An ellipsoid of these semi-axes.
+    Ellipsoid(DVec3),
+    /// All z <= 0.
+    Plane,
+    /// A mesh's file, scaled; as it is or its convex hull.
+    Mesh(String, DVec3, bool),
+}
+
+impl Shape {
+    /// True where it has no inside: a size that is 0.
+    pub fn is_nothing(&self) -> bool {
+        match self {
+            Self::Box(v) | Self::Ellipsoid(v) | Self::Mesh(_, v, _) => v.abs().min_element() == 0.0,
+            Self::Sphere(r) => *r == 0.0,
+            Self::Cylinder(r, l) | Self::Cone(r, l) => *r == 0.0 || *l == 0.0,
+            Self::Capsule(r, _) => *r == 0.0,
+            Self::Plane => false,
+        }
+    }
+
+    /// A length that cannot be one: negative.
+    pub fn negative(&self) -> Option<f64> {
+        let lengths = match self {
+            Self::Box(v) | Self::Ellipsoid(v) => v.to_array(),
+            Self::Sphere(r) => [*r; 3],
+            Self::Cylinder(r, l) | Self::Cone(r, l) | Self::Capsule(r, l) => [*r, *l, 0.0],
+            Self::Plane | Self::Mesh(..) => [0.0; 3],
+        };
+        lengths.into_iter().find(|l| *l < 0.0)
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Box(v) => format!("cube(size = {:?}, center = true);", v.to_array()),
+            Self::Sphere(r) => format!("sphere($fn = 0, r = {r:?});"),
+            Self::Cylinder(r, l) => format!("cylinder($fn = 0, h = {l:?}, r1 = {r:?}, r2 = {r:?}, center = true);"),
+            Self::Cone(r, l) => format!("cylinder($fn = 0, h = {l:?}, r1 = {r:?}, r2 = 0, center = true);"),
+            Self::Capsule(r, 0.0) => Self::Sphere(*r).text(),
+            Self::Capsule(r, l) => {
+                let end = |z: f64| placed(&Pose::at(DVec3::Z * z), &Self::Sphere(*r).text());
+                format!("hull() {{ {} {} }}", end(0.5 * l), end(-0.5 * l))
+            }
+            Self::Ellipsoid(v) => scaled(*v, &Self::Sphere(1.0).text()),
+            Self::Plane => "half_space(normal = [0, 0, 1], offset = 0);".into(),
+            Self::Mesh(file, scale, is_hull) => {
+                let file = file.replace('\\', "\\\\").replace('"', "\\\"");
+                let import = scaled(*scale, &format!("import(file = \"{file}\");"));
+                if *is_hull { format!("hull() {{ {import} }}") } else { import }
+            }
+        }
+    }
+
+    /// Where it stands in its link.
+    pub fn at(&self, pose: &Pose) -> String {
+        placed(pose, &self.text())
+    }
+}
+
+/// A text that stands somewhere; `{:?}` of a double is the shortest text that reads back to the same bits.
+fn placed(pose: &Pose, text: &str) -> String {
+    if *pose == Pose::IDENTITY {
+        return text.to_owned();
+    }
+    let axes = pose.matrix();
+    let row = |k: usize| {
+        let [x, y, z] = [axes.x_axis[k], axes.y_axis[k], axes.z_axis[k]];
+        format!("[{x:?}, {y:?}, {z:?}, {:?}]", pose.position[k])
+    };
+    format!("multmatrix([{}, {}, {}, [0, 0, 0, 1]]) {{ {text} }}", row(0), row(1), row(2))
+}
+
+fn scaled(by: DVec3, text: &str) -> String {
+    if by == DVec3::ONE {
+        return text.to_owned();
+    }
+    let [x, y, z] = by.to_array();
+    format!("multmatrix([[{x:?}, 0, 0, 0], [0, {y:?}, 0, 0], [0, 0, {z:?}, 0], [0, 0, 0, 1]]) {{ {text} }}")
+}
+
+/// Several texts as one solid.
+pub(super) fn union(texts: &[String]) -> String {
+    match texts {
+        [one] => format!("{one}\n"),
+        many => {
+            let mut out = "union() {\n".to_owned();
+            many.iter().for_each(|text| _ = writeln!(out, "    {text}"));
+            out + "}\n"
+        }
+    }
+}

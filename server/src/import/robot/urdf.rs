@@ -1,0 +1,246 @@
+//! URDF: links and joints by name, collision geometry, limits, mimics; SRDF's disabled pairs.
+//!
+//! Source: wiki.ros.org/urdf/XML. Fixed axes roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll). Links that a joint connects are
+//! not tested against each other.
+
+use super::super::problem::Problem;
+use super::super::{Place, xml};
+use super::kinematics::{Dof, DofKind, Link, Part, Robot};
+use super::reader::Reader;
+use super::shape::{Shape, union};
+use contactd_proto::Pose;
+use glam::{DQuat, DVec3};
+use roxmltree::Node;
+use std::collections::HashMap;
+
+pub(super) type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// A joint as it is written.
+struct Joint<'a, 'i> {
+    node: Node<'a, 'i>,
+    parent: usize,
+    child: usize,
+}
+
+pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
+    let mut robot = Robot { name: root.attribute("name").unwrap_or_default().to_owned(), ..Robot::default() };
+    let mut index = HashMap::new();
+    let mut written = Vec::new();
+    for node in xml::inside(root, "link") {
+        let name = needed(node, "name")?;
+        if index.insert(name, written.len()).is_some() {
+            return Err(xml::wrong(node, "a name that no other link has", Some(name)));
+        }
+        written.push(node);
+    }
+    let mut joints: Vec<Option<Joint<'_, '_>>> = written.iter().map(|_| None).collect();
+    for node in xml::inside(root, "joint") {
+        let end = |tag: &'static str| {
+            let at =
+                xml::inside(node, tag).next().ok_or_else(|| xml::wrong(node, format!("a {tag} of the joint"), None))?;
+            let name = needed(at, "link")?;
+            index.get(name).copied().ok_or_else(|| xml::wrong(at, "the name of a link", Some(name)))
+        };
+        let (parent, child) = (end("parent")?, end("child")?);
+        if joints[child].is_some() {
+            return Err(xml::wrong(node, "one joint above each link", Some("a second one")));
+        }
+        joints[child] = Some(Joint { node, parent, child });
+    }
+    // Parents first: a link comes when its parent has come.
+    let mut place: Vec<Option<usize>> = vec![None; written.len()];
+    for _ in 0..written.len() {
+        let before = robot.links.len();
+        for (i, node) in written.iter().enumerate() {
+            let parent = joints[i].as_ref().map(|j| place[j.parent]);
+            if place[i].is_some() || parent == Some(None) {
+                continue;
+            }
+            place[i] = Some(robot.links.len());
+            let link = link(*node, joints[i].as_ref(), parent.flatten(), reader, &mut robot)?;
+            robot.links.push(link);
+        }
+        if robot.links.len() == before {
+            break;
+        }
+    }
+    if let Some(joint) = joints.iter().flatten().find(|j| place[j.child].is_none()) {
+        return Err(xml::wrong(joint.node, "a tree of links", Some("joints in a circle")));
+    }
+    mimics(&robot, root)?;
+    robot.except_neighbours();
+    Ok(robot)
+}
+
+/// Joints that others follow are there.
+fn mimics(robot: &Robot, root: Node<'_, '_>) -> Result<()> {
+    for node in xml::inside(root, "joint").flat_map(|j| xml::inside(j, "mimic")) {
+        let leader = needed(node, "joint")?;
+        let known = robot.free().any(|d| d.name == leader);
+        if !known {
+            return Err(xml::wrong(node, "a joint that moves by itself and can be followed", Some(leader)));
+        }
+    }
+    Ok(())
+}
+
+fn link(
+    node: Node<'_, '_>,
+    joint: Option<&Joint<'_, '_>>,
+    parent: Option<usize>,
+    reader: &Reader<'_>,
+    robot: &mut Robot,
+) -> Result<Link> {
+    let name = needed(node, "name")?.to_owned();
+    let mut texts = Vec::new();
+    for collision in xml::inside(node, "collision") {
+        let Some(geometry) = xml::inside(collision, "geometry").next() else {
+            return Err(xml::wrong(collision, "a geometry of the collision", None));
+        };
+        let shape = geometry_of(geometry, reader)?;
+        if shape.is_nothing() {
+            robot.note(xml::place(geometry), format!("a collision of {name} has no inside and is left out"));
+            continue;
+        }
+        texts.push(shape.at(&origin(collision)?));
+    }
+    let parts =
+        if texts.is_empty() { vec![] } else { vec![Part { name: String::new(), text: union(&texts), masks: [1, 1] }] };
+    let (origin, dofs) = match joint {
+        None => (Pose::IDENTITY, vec![]),
+        Some(joint) => (origin(joint.node)?, dofs_of(joint.node, robot)?),
+    };
+    let is_free = joint.is_some_and(|j| ["floating", "planar"].contains(&j.node.attribute("type").unwrap_or_default()));
+    Ok(Link { name, at: xml::place(node), parent, origin, dofs, parts, is_free, is_static: false })
+}
+
+/// The degrees of freedom of a joint.
+fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
+    let name = needed(node, "name")?.to_owned();
+    let axis = match xml::inside(node, "axis").next() {
+        None => DVec3::X,
+        Some(axis) => vector(axis, "xyz", DVec3::X)?,
+    };
+    let limit = xml::inside(node, "limit").next();
+    let bound = |key, none: f64| Ok(limit.map_or(Ok(None), |l| xml::number(l, key))?.unwrap_or(none));
+    let endless = [f64::NEG_INFINITY, f64::INFINITY];
+    let anchor = DVec3::ZERO;
+    let along =
+        || axis.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some(&axis.to_string())));
+    let (kind, range) = match needed(node, "type")? {
+        "fixed" => return Ok(vec![]),
+        "revolute" => (DofKind::Hinge { anchor, axis: along()? }, [bound("lower", 0.0)?, bound("upper", 0.0)?]),
+        "continuous" => (DofKind::Hinge { anchor, axis: along()? }, endless),
+        "prismatic" => (DofKind::Slide { axis: along()? }, [bound("lower", 0.0)?, bound("upper", 0.0)?]),
+        "floating" | "planar" => {
+            robot.note(xml::place(node), format!("the joint {name} is taken as fixed where it stands"));
+            return Ok(vec![]);
+        }
+        other => {
+            let kinds = "one of fixed, revolute, continuous, prismatic, floating, planar as the joint's type";
+            return Err(xml::wrong(node, kinds, Some(other)));
+        }
+    };
+    if range[0] > range[1] {
+        return Err(xml::wrong(
+            node,
+            "a lower limit below the upper one",
+            Some(&format!("{} and {}", range[0], range[1])),
+        ));
+    }
+    let mimic = match xml::inside(node, "mimic").next() {
+        None => None,
+        Some(m) => {
+            let factor = xml::number(m, "multiplier")?.unwrap_or(1.0);
+            Some((needed(m, "joint")?.to_owned(), factor, xml::number(m, "offset")?.unwrap_or(0.0)))
+        }
+    };
+    Ok(vec![Dof { name, kind, start: 0f64.clamp(range[0], range[1]), zero: 0.0, range, mimic }])
+}
+
+fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Shape> {
+    let kinds = "one of box, cylinder, sphere, capsule, mesh as the geometry";
+    let Some(shape) = node.children().find(|n| n.is_element()) else { return Err(xml::wrong(node, kinds, None)) };
+    let length = |key: &str| {
+        xml::number(shape, key)?
+            .ok_or_else(|| xml::wrong(shape, format!("{key} of the {}", shape.tag_name().name()), None))
+    };
+    let made = match shape.tag_name().name() {
+        "box" => Shape::Box(vector(shape, "size", DVec3::NAN)?),
+        "sphere" => Shape::Sphere(length("radius")?),
+        "cylinder" => Shape::Cylinder(length("radius")?, length("length")?),
+        "capsule" => Shape::Capsule(length("radius")?, length("length")?),
+        "mesh" => {
+            let file = reader.file(needed(shape, "filename")?);
+            Shape::Mesh(file, vector(shape, "scale", DVec3::ONE)?, reader.ask.hulls)
+        }
+        other => return Err(xml::wrong(shape, kinds, Some(other))),
+    };
+    not_negative(shape, made)
+}
+
+/// A shape whose lengths can be some.
+pub(super) fn not_negative(node: Node<'_, '_>, shape: Shape) -> Result<Shape> {
+    match shape.negative() {
+        None => Ok(shape),
+        Some(length) => {
+            let expected = format!("lengths of the {} that are not negative", node.tag_name().name());
+            Err(xml::wrong(node, expected, Some(&length.to_string())))
+        }
+    }
+}
+
+/// The pose of an element's `origin`.
+fn origin(node: Node<'_, '_>) -> Result<Pose> {
+    let Some(origin) = xml::inside(node, "origin").next() else { return Ok(Pose::IDENTITY) };
+    Ok(Pose::new(vector(origin, "xyz", DVec3::ZERO)?, roll_pitch_yaw(vector(origin, "rpy", DVec3::ZERO)?)))
+}
+
+/// Rz(yaw) Ry(pitch) Rx(roll).
+pub(super) fn roll_pitch_yaw(v: DVec3) -> DQuat {
+    (DQuat::from_rotation_z(v.z) * DQuat::from_rotation_y(v.y) * DQuat::from_rotation_x(v.x)).normalize()
+}
+
+/// Three numbers that an attribute gives; `default` where there is none, which is refused if it is NaN.
+fn vector(node: Node<'_, '_>, attribute: &str, default: DVec3) -> Result<DVec3> {
+    match node.attribute(attribute) {
+        Some(text) => vector_of(node, text, attribute),
+        None if default.is_nan() => {
+            Err(xml::wrong(node, format!("{attribute} of the {}", node.tag_name().name()), None))
+        }
+        None => Ok(default),
+    }
+}
+
+/// The three numbers of a text.
+pub(super) fn vector_of(node: Node<'_, '_>, text: &str, what: &str) -> Result<DVec3> {
+    let numbers = numbers_of(node, text, what)?;
+    let three = <[f64; 3]>::try_from(numbers).ok().map(DVec3::from_array);
+    three.ok_or_else(|| xml::wrong(node, format!("three numbers as {what} of {}", node.tag_name().name()), Some(text)))
+}
+
+/// The numbers of a text.
+pub(super) fn numbers_of(node: Node<'_, '_>, text: &str, what: &str) -> Result<Vec<f64>> {
+    text.split_whitespace().map(|word| xml::finite(node, word, what)).collect()
+}
+
+/// An attribute that has to be there.
+pub(super) fn needed<'a>(node: Node<'a, '_>, attribute: &str) -> Result<&'a str> {
+    node.attribute(attribute)
+        .ok_or_else(|| xml::wrong(node, format!("{attribute} of the {}", node.tag_name().name()), None))
+}
+
+/// The pairs of an SRDF text that are not to be tested.
+pub(super) fn disabled(root: Node<'_, '_>, robot: &mut Robot) -> Result<()> {
+    for node in xml::inside(root, "disable_collisions") {
+        let mut pair = [0; 2];
+        for (k, key) in ["link1", "link2"].into_iter().enumerate() {
+            let name = needed(node, key)?;
+            let found = robot.links.iter().position(|l| l.name == name);
+            pair[k] = found.ok_or_else(|| xml::wrong(node, "the name of a link", Some(name)))?;
+        }
+        pair.sort_unstable();
+        robot.excepted.push(pair);
+    }
+    Ok(())
+}

@@ -1,0 +1,164 @@
+//! The least clearance over ranges of joints against arms of capsules, whose distances are closed forms.
+//!
+//! `CONTACTD_ROBOTS=2000 cargo test --release -p contactd-tests --test models clearance::` sets the number of random arms (40 by default).
+
+use super::robots::{Arm, Joint, frame, models, read};
+use contactd::clearance::{Least, Question, least};
+use contactd::import::robot::{Ask, Values};
+use contactd_tests::random_solids::Random;
+use contactd_tests::sweep::sized;
+use glam::{DMat4, DVec3};
+
+/// Distance of two segments. Source: C. Ericson, "Real-Time Collision Detection", 5.1.9.
+fn segments([p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> f64 {
+    let (d, e, w) = (q - p, s - r, p - r);
+    let (a, b, c, f, g) = (d.dot(d), d.dot(e), d.dot(w), e.dot(w), e.dot(e));
+    let det = a * g - b * b;
+    let mut u = if det > 1e-14 * a * g { ((b * f - c * g) / det).clamp(0.0, 1.0) } else { 0.0 };
+    let v = ((b * u + f) / g).clamp(0.0, 1.0);
+    u = ((b * v - c) / a).clamp(0.0, 1.0);
+    (p + d * u).distance(r + e * v)
+}
+
+/// An arm whose links are capsules, in the air.
+fn arm(r: &mut Random) -> Arm {
+    let mut arm = Arm::random(r);
+    for link in &mut arm.links {
+        (link.kind, link.size) = ("capsule", DVec3::new(r.within(0.03, 0.1), r.within(0.2, 0.6), 0.0));
+    }
+    for joint in &mut arm.joints {
+        joint.kind = ["revolute", "revolute", "prismatic"][r.below(3)];
+        let low = r.within(-1.0, 0.5);
+        joint.range = [low, low + r.within(0.1, if joint.kind == "prismatic" { 0.5 } else { 1.2 })];
+        joint.xyz = r.direction() * r.within(0.6, 1.4);
+    }
+    arm
+}
+
+/// The least distance of two links that are no neighbours, with values of the joints by their numbers.
+fn distance(arm: &Arm, values: &Values) -> f64 {
+    let stands = arm.stands(values);
+    let ends = |i: usize| {
+        let (g, at): (_, DMat4) = (&arm.links[i], stands[i]);
+        let at = at * frame(g.xyz, g.rpy);
+        [-1.0, 1.0].map(|s| at.transform_point3(DVec3::Z * (s * g.size.y)))
+    };
+    let mut least = f64::INFINITY;
+    for i in 0..arm.links.len() {
+        for j in i + 2..arm.links.len() {
+            least = least.min(segments(ends(i), ends(j)) - arm.links[i].size.x - arm.links[j].size.x);
+        }
+    }
+    least.max(0.0)
+}
+
+fn ask(folder: &std::path::Path, arm: &Arm, question: &Question) -> Least {
+    let (robot, scene) = read(folder, "arm.urdf", &arm.urdf(), &Ask::default());
+    least(&robot, &scene, &models(&scene), question).expect("an answer")
+}
+
+#[test]
+fn no_sample_is_nearer_than_is_proven_and_what_is_told_is_so_near() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut r = Random::new(5);
+    let (mut clear, mut clashes, mut boxes, mut widest) = (0, 0, 0, 0.0_f64);
+    for k in 0..sized("CONTACTD_ROBOTS", 40usize) {
+        let arm = arm(&mut r);
+        if arm.links.len() < 3 {
+            continue;
+        }
+        // Two or three joints move; the others stand somewhere.
+        let moving = 1 + r.below(3.min(arm.joints.len()));
+        let inside = |r: &mut Random, joint: &Joint| r.within(joint.range[0], joint.range[1]);
+        let (mut ranges, mut values) = (Vec::new(), Values::new());
+        for (i, joint) in arm.joints.iter().enumerate() {
+            if i < moving {
+                let (a, b) = (inside(&mut r, joint), inside(&mut r, joint));
+                ranges.push((format!("j{i}"), [a.min(b), a.max(b)]));
+            } else {
+                values.insert(format!("j{i}"), inside(&mut r, joint));
+            }
+        }
+        let question =
+            Question { ranges: ranges.clone(), values: values.clone(), tolerance: 0.01, least: None, boxes: 20_000 };
+        let found = ask(folder.path(), &arm, &question);
+        boxes += found.boxes;
+        let with = |of: &dyn Fn(usize, [f64; 2]) -> f64| {
+            let mut all = values.clone();
+            all.extend(ranges.iter().enumerate().map(|(i, (name, range))| (name.clone(), of(i, *range))));
+            all
+        };
+        for _ in 0..400 {
+            let at: Vec<f64> = ranges.iter().map(|(_, [low, high])| low + (high - low) * r.within(0.0, 1.0)).collect();
+            let sample = distance(&arm, &with(&|i, _| at[i]));
+            assert!(sample >= found.lower - 1e-12, "{k}: {sample} where {} is proven", found.lower);
+        }
+        for corner in 0..1 << ranges.len() {
+            let sample = distance(&arm, &with(&|i, range| range[corner >> i & 1]));
+            assert!(sample >= found.lower - 1e-12, "{k}: {sample} in a corner where {} is proven", found.lower);
+        }
+        // So near it is at the values that are told, to the part of the tolerance that a distance may be off.
+        let mut at = values.clone();
+        at.extend(found.values.clone());
+        assert!((distance(&arm, &at) - found.upper).abs() <= 0.0026, "{k}: {} {}", distance(&arm, &at), found.upper);
+        if found.upper == 0.0 {
+            clashes += 1;
+            continue;
+        }
+        clear += 1;
+        if found.is_settled {
+            assert!(found.upper - found.lower <= 0.01 + 1e-12, "{k}: {found:?}");
+            widest = widest.max(found.upper - found.lower);
+        }
+        // What is asked with a least length is decided rightly.
+        let least = found.upper + if r.chance(0.5) { -0.5 } else { 0.5 } * found.upper;
+        let decided = ask(folder.path(), &arm, &Question { least: Some(least), ..question });
+        assert!(decided.lower <= found.upper + 1e-12 && decided.upper >= found.lower - 1e-12, "{k}");
+        if decided.is_settled && (least - found.upper).abs() > 0.011 {
+            assert_eq!(decided.lower >= least, least < found.lower, "{k}: {least} of {found:?}: {decided:?}");
+        }
+    }
+    println!("{clear} clear, {clashes} clash, {boxes} boxes, bounds {widest:.1e} apart at most");
+    assert!(clear > 5 && clashes > 1, "{clear} {clashes}");
+}
+
+/// A ball at the end of an arm goes along an arc: how near it comes to another one that stands is a closed form.
+#[test]
+fn a_ball_on_an_arm_comes_as_near_as_its_arc_does() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut r = Random::new(21);
+    for k in 0..20 {
+        let (p, q, arm) = (r.within(0.05, 0.2), r.within(0.05, 0.2), r.within(0.5, 1.5));
+        let (from, whole) = (r.within(-1.0, 1.0), r.within(0.3, 3.0));
+        let x = r.direction() * r.within(2.2, 3.5);
+        let to = (x.y.atan2(x.x) - from).rem_euclid(std::f64::consts::TAU);
+        let at = |t: f64| (x - DVec3::new(arm * (from + t).cos(), arm * (from + t).sin(), 0.0)).length();
+        let expected = if to <= whole { at(to) } else { at(0.0).min(at(whole)) } - p - q;
+        let ball = |name: &str, at: DVec3, radius: f64| {
+            format!(
+                "<link name=\"{name}\"><collision><origin xyz=\"{:?} {:?} {:?}\"/><geometry><sphere radius=\"{radius:?}\"/></geometry></collision></link>",
+                at.x, at.y, at.z
+            )
+        };
+        // The other ball is in the world; a link without geometry is between, for neighbours are not tested.
+        let text = format!(
+            "<robot>{}<link name=\"hub\"/>{}<joint name=\"lift\" type=\"prismatic\"><parent link=\"base\"/><child link=\"hub\"/>\
+             <axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"1\"/></joint><joint name=\"turn\" type=\"continuous\">\
+             <parent link=\"hub\"/><child link=\"end\"/><axis xyz=\"0 0 1\"/></joint></robot>",
+            ball("base", x, q),
+            ball("end", DVec3::X * arm, p)
+        );
+        let (robot, scene) = read(folder.path(), "arc.urdf", &text, &Ask::default());
+        let question = Question {
+            ranges: vec![("turn".into(), [from, from + whole])],
+            values: Values::new(),
+            tolerance: 1e-6,
+            least: None,
+            boxes: 1_000_000,
+        };
+        let found = least(&robot, &scene, &models(&scene), &question).expect("an answer");
+        assert!(found.is_settled && found.pairs == 1, "{k}: {found:?}");
+        let right = found.lower <= expected + 1e-12 && expected <= found.upper + 1e-12;
+        assert!(right && found.upper - found.lower <= 1e-6, "{k}: {expected} in {found:?}");
+    }
+}
