@@ -6,9 +6,11 @@
 //! Floor 13: may import everything else.
 
 mod joints;
+mod overlaps;
 mod pages;
 
 use self::joints::{ClearanceArguments, JointArguments, is_scene, read_scene, without_touching};
+use self::overlaps::OverlapsArguments;
 use crate::cache::{self, Cache, Prepared};
 use crate::check::Check;
 use crate::contact::Status;
@@ -54,6 +56,8 @@ enum Command {
     Check(CheckArguments),
     /// The least clearance of a robot over ranges of its joints, proven, or a clash: exit status 1 where there is one.
     Clearance(ClearanceArguments),
+    /// What is in each other of a geometry (GDML) or a scene, each pair proven: exit status 1 where something is.
+    Overlaps(OverlapsArguments),
     /// The server, until SIGINT or SIGTERM; prints one line when ready.
     Serve(ServeArguments),
     /// The servers of this user: their sessions, steps a second, how long steps took in the last minute, memory.
@@ -352,6 +356,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
             inspect_file(&file, facets, (picture.as_deref(), camera), (&joints, &access), &cache)
         }
         Command::Clearance(arguments) => joints::clearance(&arguments),
+        Command::Overlaps(arguments) => overlaps::overlaps(&arguments),
         Command::View(arguments) => view_scene(&arguments),
         Command::Serve(arguments) => serve(arguments),
         Command::Record(arguments) => record(&arguments),

@@ -59,6 +59,7 @@
 //! | 9 | [`metrics`] | what a server counts, as OpenMetrics |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 10 | [`clearance`] | the least clearance of a robot over ranges of its joints |
+//! | 10 | [`overlaps`] | what is in each other of volumes or of a scene |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`replay`] | a recording, repeated and compared |
 //! | 11 | [`view`] | a scene in a browser |
@@ -104,6 +105,7 @@ pub mod inspect;
 pub mod ipc;
 pub mod metrics;
 pub mod operator;
+pub mod overlaps;
 pub mod picture;
 pub mod recording;
 pub mod replay;

@@ -12,12 +12,14 @@ pub mod csg;
 pub mod drawing;
 pub mod font;
 pub mod format;
+pub mod gdml;
 pub mod mesh;
 pub mod openscad;
 pub mod problem;
 pub mod robot;
 pub mod scene;
 mod surface;
+mod written;
 mod xml;
 mod zip;
 

@@ -7,6 +7,7 @@ mod cache;
 mod clearance;
 mod corpus;
 mod files;
+mod gdml;
 mod gltf;
 mod heights;
 mod import_models;

@@ -1,5 +1,6 @@
 //! Collision geometry as flattened OpenSCAD texts.
 
+use crate::import::written::placed;
 use contactd_proto::Pose;
 use glam::DVec3;
 use std::fmt::Write as _;
@@ -73,19 +74,6 @@ impl Shape {
     pub fn at(&self, pose: &Pose) -> String {
         placed(pose, &self.text())
     }
-}
-
-/// A text that stands somewhere; `{:?}` of a double is the shortest text that reads back to the same bits.
-fn placed(pose: &Pose, text: &str) -> String {
-    if *pose == Pose::IDENTITY {
-        return text.to_owned();
-    }
-    let axes = pose.matrix();
-    let row = |k: usize| {
-        let [x, y, z] = [axes.x_axis[k], axes.y_axis[k], axes.z_axis[k]];
-        format!("[{x:?}, {y:?}, {z:?}, {:?}]", pose.position[k])
-    };
-    format!("multmatrix([{}, {}, {}, [0, 0, 0, 1]]) {{ {text} }}", row(0), row(1), row(2))
 }
 
 fn scaled(by: DVec3, text: &str) -> String {

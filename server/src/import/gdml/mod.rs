@@ -1,0 +1,323 @@
+//! GDML: detector geometries as volumes placed within volumes.
+//!
+//! Source: GDML User's Guide 2.8 and Geant4's reader. A solid becomes a flattened OpenSCAD text; a logical volume has a solid, and the
+//! volumes that are placed in it. Lengths are millimetres. A rotation of a placement takes the mother's axes to the daughter's, as
+//! Geant4 has it: what is placed is turned the other way; in solids that are made of others it is turned as told.
+
+mod expression;
+mod solids;
+
+use super::problem::Problem;
+use super::scene::SceneError;
+use super::{Limits, Note, Place, read_bytes, xml};
+use contactd_proto::Pose;
+use expression::Names;
+use glam::{DMat3, DQuat, DVec3};
+use roxmltree::Node;
+use std::collections::HashMap;
+use std::path::Path;
+
+type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// Copies of one replica at most.
+const MOST_COPIES: f64 = 1e6;
+
+/// A logical volume.
+#[derive(Clone, Debug)]
+pub struct Volume {
+    /// Its name.
+    pub name: String,
+    /// Where the file has it.
+    pub at: Place,
+    /// Its solid, a flattened OpenSCAD text in its own frame; empty of an assembly.
+    pub text: String,
+    /// What is placed in it.
+    pub daughters: Vec<Daughter>,
+}
+
+/// A volume that is placed in another one.
+#[derive(Clone, Debug)]
+pub struct Daughter {
+    /// The placement's name, with its copy number where it has one.
+    pub name: String,
+    /// Where the file has it.
+    pub at: Place,
+    /// Which volume, by index.
+    pub volume: usize,
+    /// Its frame in the mother's.
+    pub pose: Pose,
+}
+
+/// All volumes, those that are placed before those that they are placed in.
+#[derive(Clone, Debug, Default)]
+pub struct Volumes {
+    /// The volumes.
+    pub volumes: Vec<Volume>,
+    /// What was left out.
+    pub notes: Vec<Note>,
+}
+
+/// What is defined, and the solids by name.
+struct Geometry<'a, 'i> {
+    names: Names,
+    positions: HashMap<&'a str, DVec3>,
+    rotations: HashMap<&'a str, DVec3>,
+    scales: HashMap<&'a str, DVec3>,
+    solids: HashMap<&'a str, Node<'a, 'i>>,
+}
+
+/// Reads a GDML file.
+///
+/// # Errors
+/// One sentence with file, line and column.
+pub fn read_gdml(path: &Path) -> std::result::Result<Volumes, SceneError> {
+    let file = path.display().to_string();
+    let bytes = read_bytes(path, &Limits::default())?;
+    read(&bytes).map_err(|(at, problem)| match problem {
+        Problem::Syntax { expected, found } => SceneError::Value { file, at, expected, found },
+        other => SceneError::Format { file, at, message: other.to_string() },
+    })
+}
+
+fn read(bytes: &[u8]) -> Result<Volumes> {
+    let document = xml::parse(bytes)?;
+    let root = document.root_element();
+    if root.tag_name().name() != "gdml" {
+        return Err(xml::wrong(root, "gdml as the root element", Some(root.tag_name().name())));
+    }
+    let mut geometry = Geometry {
+        names: Names::new(),
+        positions: HashMap::new(),
+        rotations: HashMap::new(),
+        scales: HashMap::new(),
+        solids: HashMap::new(),
+    };
+    for define in xml::inside(root, "define") {
+        geometry.define(define)?;
+    }
+    for solids in xml::inside(root, "solids") {
+        for solid in solids.children().filter(Node::is_element) {
+            if solid.tag_name().name() == "loop" {
+                return Err((xml::place(solid), Problem::unsupported("<loop>")));
+            }
+            // Optical surfaces stand there, too.
+            if let Some(name) = solid.attribute("name") {
+                geometry.solids.insert(name, solid);
+            }
+        }
+    }
+    let mut out = Volumes::default();
+    let mut index: HashMap<&str, usize> = HashMap::new();
+    for structure in xml::inside(root, "structure") {
+        for node in structure.children().filter(Node::is_element) {
+            let is_assembly = match node.tag_name().name() {
+                "volume" => false,
+                "assembly" => true,
+                "loop" => return Err((xml::place(node), Problem::unsupported("<loop>"))),
+                // Surfaces of optics.
+                _ => continue,
+            };
+            let name = needed(node, "name")?;
+            let volume = geometry.volume(node, is_assembly, &index, &mut out)?;
+            index.insert(name, out.volumes.len());
+            out.volumes.push(volume);
+        }
+    }
+    Ok(out)
+}
+
+impl<'a, 'i> Geometry<'a, 'i> {
+    fn define(&mut self, define: Node<'a, 'i>) -> Result<()> {
+        for node in define.children().filter(Node::is_element) {
+            let kind = node.tag_name().name();
+            match kind {
+                "constant" | "variable" | "quantity" => {
+                    let value = self.number(node, "value")?;
+                    let value = value.ok_or_else(|| xml::wrong(node, format!("a value of the {kind}"), None))?;
+                    let unit = node.attribute("unit").map_or(Ok(1.0), |unit| self.unit(node, unit))?;
+                    self.names.set(needed(node, "name")?, value * unit);
+                }
+                "matrix" => {
+                    let columns = self.number(node, "coldim")?.unwrap_or(1.0);
+                    let words = needed(node, "values")?.split_whitespace();
+                    let values = words.map(|word| self.value(node, word)).collect::<Result<Vec<_>>>()?;
+                    self.names.set_matrix(needed(node, "name")?, (columns as usize).max(1), values);
+                }
+                "position" => _ = self.positions.insert(needed(node, "name")?, self.three(node, "mm", 0.0)?),
+                "rotation" => _ = self.rotations.insert(needed(node, "name")?, self.three(node, "rad", 0.0)?),
+                "scale" => _ = self.scales.insert(needed(node, "name")?, self.three(node, "rad", 1.0)?),
+                "loop" => return Err((xml::place(node), Problem::unsupported("<loop>"))),
+                // Expressions for programs.
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn value(&self, node: Node<'_, '_>, text: &str) -> Result<f64> {
+        self.names.value(text).map_err(|(expected, found)| (xml::place(node), Problem::Syntax { expected, found }))
+    }
+
+    /// The value of an attribute, if it is there.
+    fn number(&self, node: Node<'_, '_>, key: &str) -> Result<Option<f64>> {
+        node.attribute(key).map(|text| self.value(node, text)).transpose()
+    }
+
+    fn unit(&self, node: Node<'_, '_>, unit: &str) -> Result<f64> {
+        self.names.value(unit).map_err(|_| xml::wrong(node, "a unit of length or angle", Some(unit)))
+    }
+
+    fn three(&self, node: Node<'_, '_>, unit: &str, none: f64) -> Result<DVec3> {
+        let unit = self.unit(node, node.attribute("unit").unwrap_or(unit))?;
+        let of = |key: &str| Ok(self.number(node, key)?.map_or(none, |x| x * unit));
+        Ok(DVec3::new(of("x")?, of("y")?, of("z")?))
+    }
+
+    /// A defined position that an attribute names.
+    fn position(&self, node: Node<'_, '_>, key: &str) -> Result<DVec3> {
+        let name = needed(node, key)?;
+        let known = self.positions.get(name).copied();
+        known.ok_or_else(|| xml::wrong(node, "the name of a position", Some(name)))
+    }
+
+    /// A vector inside a node, or one that it refers to.
+    fn vector(&self, node: Node<'_, '_>, key: &'static str, none: DVec3) -> Result<DVec3> {
+        let unit = if key.ends_with("position") { "mm" } else { "rad" };
+        if let Some(own) = xml::inside(node, key).next() {
+            return self.three(own, unit, none.x);
+        }
+        let (reference, known) = match key {
+            "position" => ("positionref", &self.positions),
+            "rotation" => ("rotationref", &self.rotations),
+            "firstposition" => ("firstpositionref", &self.positions),
+            "firstrotation" => ("firstrotationref", &self.rotations),
+            _ => ("scaleref", &self.scales),
+        };
+        let Some(reference) = xml::inside(node, reference).next() else { return Ok(none) };
+        let name = needed(reference, "ref")?;
+        match known.get(name) {
+            Some(v) => Ok(*v),
+            None if ["identity", "center"].contains(&name) => Ok(none),
+            None => Err(xml::wrong(reference, "a name that is defined", Some(name))),
+        }
+    }
+
+    /// Where something is placed; `is_frame`: the rotation is of the axes.
+    fn pose(&self, node: Node<'_, '_>, keys: [&'static str; 2], is_frame: bool) -> Result<Pose> {
+        let position = self.vector(node, keys[0], DVec3::ZERO)?;
+        let angles = self.vector(node, keys[1], DVec3::ZERO)?;
+        // About fixed axes, x first.
+        let turn =
+            DMat3::from_rotation_z(angles.z) * DMat3::from_rotation_y(angles.y) * DMat3::from_rotation_x(angles.x);
+        let turn = DQuat::from_mat3(&turn).normalize();
+        Ok(Pose::new(position, if is_frame { turn.conjugate() } else { turn }))
+    }
+
+    fn volume(
+        &self,
+        node: Node<'a, 'i>,
+        is_assembly: bool,
+        index: &HashMap<&str, usize>,
+        out: &mut Volumes,
+    ) -> Result<Volume> {
+        let name = needed(node, "name")?.to_owned();
+        let text = if is_assembly {
+            String::new()
+        } else {
+            let solid = xml::inside(node, "solidref").next();
+            let solid = solid.ok_or_else(|| xml::wrong(node, "a solidref of the volume", None))?;
+            solids::text(self, needed(solid, "ref")?, solid, 0)?
+        };
+        let of = |node: Node<'_, '_>| {
+            if let Some(file) = xml::inside(node, "file").next() {
+                return Err((xml::place(file), Problem::unsupported("a volume of another file")));
+            }
+            let reference = xml::inside(node, "volumeref").next();
+            let reference = reference.ok_or_else(|| xml::wrong(node, "a volumeref", None))?;
+            let name = needed(reference, "ref")?;
+            index.get(name).copied().ok_or_else(|| {
+                xml::wrong(reference, "the name of a volume that is defined before it is placed", Some(name))
+            })
+        };
+        let mut daughters = Vec::new();
+        for child in node.children().filter(Node::is_element) {
+            match child.tag_name().name() {
+                "physvol" => {
+                    let volume = of(child)?;
+                    let own = child.attribute("name").map_or_else(|| out.volumes[volume].name.clone(), str::to_owned);
+                    let name = child.attribute("copynumber").map_or(own.clone(), |copy| format!("{own} {copy}"));
+                    let scale = self.vector(child, "scale", DVec3::ONE)?;
+                    if scale != DVec3::ONE {
+                        return Err((
+                            xml::place(child),
+                            Problem::unsupported("a placement that is scaled or mirrored"),
+                        ));
+                    }
+                    let pose = self.pose(child, ["position", "rotation"], true)?;
+                    self.place(out, &mut daughters, Daughter { name, at: xml::place(child), volume, pose });
+                }
+                "replicavol" => self.replicas(child, of(child)?, out, &mut daughters)?,
+                kind @ ("divisionvol" | "paramvol" | "loop") => {
+                    return Err((xml::place(child), Problem::unsupported(format!("<{kind}>"))));
+                }
+                _ => {}
+            }
+        }
+        Ok(Volume { name, at: xml::place(node), text, daughters })
+    }
+
+    /// Places a volume; of an assembly what is in it.
+    fn place(&self, out: &Volumes, daughters: &mut Vec<Daughter>, placed: Daughter) {
+        let volume = &out.volumes[placed.volume];
+        if !volume.text.is_empty() {
+            daughters.push(placed);
+            return;
+        }
+        for inner in &volume.daughters {
+            let name = format!("{}/{}", placed.name, inner.name);
+            daughters.push(Daughter {
+                name,
+                at: inner.at,
+                volume: inner.volume,
+                pose: placed.pose.compose(&inner.pose),
+            });
+        }
+    }
+
+    /// Copies along an axis, side by side.
+    fn replicas(&self, node: Node<'_, '_>, volume: usize, out: &Volumes, daughters: &mut Vec<Daughter>) -> Result<()> {
+        let count = self.number(node, "number")?.unwrap_or(0.0);
+        if !(1.0..=MOST_COPIES).contains(&count) || count.fract() != 0.0 {
+            return Err(xml::wrong(node, "a whole number of replicas", node.attribute("number")));
+        }
+        let along = xml::inside(node, "replicate_along_axis").next();
+        let along = along.ok_or_else(|| xml::wrong(node, "replicate_along_axis", None))?;
+        let part = |name: &'static str| xml::inside(along, name).next();
+        let direction = part("direction").ok_or_else(|| xml::wrong(along, "a direction", None))?;
+        if direction.attributes().any(|a| ["phi", "rho"].contains(&a.name())) {
+            return Err((xml::place(direction), Problem::unsupported("replicas around or away from an axis")));
+        }
+        let axis = self.three(direction, "rad", 0.0)?;
+        let length = |name: &'static str| match part(name) {
+            None => Ok(0.0),
+            Some(node) => {
+                let unit = self.unit(node, node.attribute("unit").unwrap_or("mm"))?;
+                Ok(self.number(node, "value")?.unwrap_or(0.0) * unit)
+            }
+        };
+        let (width, offset) = (length("width")?, length("offset")?);
+        for k in 0..count as usize {
+            let at = (k as f64 - 0.5 * (count - 1.0)) * width + offset;
+            let name = format!("{} {k}", out.volumes[volume].name);
+            let pose = Pose::at(axis * at);
+            self.place(out, daughters, Daughter { name, at: xml::place(node), volume, pose });
+        }
+        Ok(())
+    }
+}
+
+/// An attribute that has to be there.
+fn needed<'a>(node: Node<'a, '_>, attribute: &str) -> Result<&'a str> {
+    node.attribute(attribute)
+        .ok_or_else(|| xml::wrong(node, format!("{attribute} of the {}", node.tag_name().name()), None))
+}

@@ -1,0 +1,242 @@
+//! Overlaps of what stands still: volumes placed within volumes, or the objects of a scene; each pair proven apart, or with a point
+//! that lies deep in both.
+//!
+//! A pair is asked at rest ([`crate::contact::earliest_contact`]) with half the tolerance as its resolution: that is clear where no
+//! point lies deeper than so in both, and an overlap where one lies deeper than the tolerance. What touches is no overlap. A daughter
+//! sticks out of its mother where it overlaps what is around the mother: a block less the mother's solid.
+//!
+//! Floor 10: imports `import`, `contact`, `cache`.
+
+use crate::contact::{
+    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+};
+use crate::import::gdml::Volumes;
+use crate::import::{ModelSource, Scene};
+use crate::math::Aabb;
+use crate::motion::Placed;
+use crate::octree::Model;
+use contactd_proto::{Motion, Pose};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Work for a pair: what needs more is told as not proven.
+const CELL_LIMIT: u64 = 60_000;
+
+/// What became of a pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// No point lies deeper than this in both.
+    Separate(f64),
+    /// This point, in the frame of what both are in, lies at least so deep in both.
+    Overlap(DVec3, f64),
+    /// Neither is proven; no point lies deeper than this in both, if that is known.
+    NotProven(Option<f64>),
+}
+
+/// Two volumes, or a volume and the one that it is in.
+#[derive(Clone, Debug)]
+pub struct Pair {
+    /// What both are in; empty of a scene.
+    pub within: String,
+    /// The first one.
+    pub a: String,
+    /// The second one; `None`: what is around the volume that the first one is in.
+    pub b: Option<String>,
+    /// What became of them.
+    pub verdict: Verdict,
+}
+
+/// All pairs that were asked of.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Those that are not separate, deepest first.
+    pub pairs: Vec<Pair>,
+    /// How many are proven separate: by their boxes, and by a search.
+    pub separate: [u64; 2],
+}
+
+/// Something that stands.
+struct Standing<'a> {
+    name: String,
+    model: &'a Model,
+    pose: Pose,
+    around: Aabb,
+}
+
+impl<'a> Standing<'a> {
+    fn new(name: String, model: &'a Model, pose: Pose) -> Self {
+        let own = model.solid.aabb();
+        let around = if own.is_finite() {
+            Aabb::of_points(own.corners().into_iter().map(|c| pose.point(c))).grown(1e-9 * own.half().length())
+        } else {
+            own
+        };
+        Self { name, model, pose, around }
+    }
+}
+
+/// The objects of a scene at its start, with the scene's models in order.
+pub fn of_scene(scene: &Scene, models: &[Arc<Model>], tolerance: Option<f64>) -> Found {
+    let standing: Vec<Standing<'_>> = scene
+        .objects
+        .iter()
+        .map(|o| Standing::new(o.name.clone(), &models[o.model], o.motion.start.compose(&o.place)))
+        .collect();
+    let mut found = Found::default();
+    siblings("", &standing, tolerance, &mut found);
+    found.order();
+    found
+}
+
+/// The volumes of a GDML file as a scene of models without objects: one for each, in order.
+pub fn scene_of(path: &Path, volumes: &Volumes) -> Scene {
+    let texts = volumes.volumes.iter().map(|v| (v.name.clone(), v.text.clone(), v.at));
+    models_of(path, texts.collect())
+}
+
+/// What is around each volume in which others are, as a scene of models; and which volume each is around.
+pub fn around(path: &Path, volumes: &Volumes, models: &[Arc<Model>]) -> (Scene, Vec<usize>) {
+    let (mut texts, mut of) = (Vec::new(), Vec::new());
+    for (i, volume) in volumes.volumes.iter().enumerate() {
+        if volume.daughters.is_empty() || volume.text.is_empty() {
+            continue;
+        }
+        let mut whole = models[i].solid.aabb();
+        for d in &volume.daughters {
+            whole = whole.union(&Standing::new(String::new(), &models[d.volume], d.pose).around);
+        }
+        if !whole.is_finite() {
+            continue;
+        }
+        let (center, size) = (whole.center().to_array(), (3.0 * (whole.max - whole.min)).to_array());
+        let block = format!(
+            "multmatrix([[1, 0, 0, {:?}], [0, 1, 0, {:?}], [0, 0, 1, {:?}], [0, 0, 0, 1]]) {{ cube(size = {size:?}, center = true); }}",
+            center[0], center[1], center[2]
+        );
+        texts.push((
+            format!("around {}", volume.name),
+            format!("difference() {{ {block} {} }}", volume.text),
+            volume.at,
+        ));
+        of.push(i);
+    }
+    (models_of(path, texts), of)
+}
+
+fn models_of(path: &Path, texts: Vec<(String, String, crate::import::Place)>) -> Scene {
+    let model = |(name, text, at)| ModelSource { name, path: path.to_owned(), at, text: Some(text) };
+    let file = path.display().to_string();
+    Scene { models: texts.into_iter().map(model).collect(), objects: Vec::new(), file, ..Scene::of_models(&[]) }
+}
+
+/// All placements of a GDML file: siblings against each other, daughters against what is around their mothers.
+pub fn of_volumes(
+    volumes: &Volumes,
+    models: &[Arc<Model>],
+    (outsides, of): (&[Arc<Model>], &[usize]),
+    tolerance: Option<f64>,
+) -> Found {
+    let mut found = Found::default();
+    for (i, volume) in volumes.volumes.iter().enumerate().filter(|(_, v)| !v.text.is_empty()) {
+        let standing: Vec<Standing<'_>> =
+            volume.daughters.iter().map(|d| Standing::new(d.name.clone(), &models[d.volume], d.pose)).collect();
+        siblings(&volume.name, &standing, tolerance, &mut found);
+        let Some(outside) = of.iter().position(|o| *o == i) else { continue };
+        let outside = Standing::new(String::new(), &outsides[outside], Pose::IDENTITY);
+        let verdicts: Vec<Verdict> =
+            standing.par_iter().map_init(Scratch::default, |s, d| ask([d, &outside], tolerance, s)).collect();
+        for (d, verdict) in standing.iter().zip(verdicts) {
+            found.add(Pair { within: volume.name.clone(), a: d.name.clone(), b: None, verdict });
+        }
+    }
+    found.order();
+    found
+}
+
+/// All pairs of what stands in the same place: those whose boxes meet are asked of.
+fn siblings(within: &str, standing: &[Standing<'_>], tolerance: Option<f64>, found: &mut Found) {
+    let mut order: Vec<usize> = (0..standing.len()).filter(|i| !standing[*i].model.solid.is_empty()).collect();
+    order.sort_by(|i, j| standing[*i].around.min.x.total_cmp(&standing[*j].around.min.x));
+    let mut near = Vec::new();
+    for (k, i) in order.iter().enumerate() {
+        for j in &order[k + 1..] {
+            let (a, b) = (&standing[*i].around, &standing[*j].around);
+            if b.min.x > a.max.x {
+                break;
+            }
+            if !a.intersection(b).is_empty() {
+                near.push([*i.min(j), *i.max(j)]);
+            }
+        }
+    }
+    near.sort_unstable();
+    let all = order.len() as u64 * (order.len() as u64).saturating_sub(1) / 2;
+    found.separate[0] += all - near.len() as u64;
+    let verdicts: Vec<Verdict> = near
+        .par_iter()
+        .map_init(Scratch::default, |scratch, [i, j]| ask([&standing[*i], &standing[*j]], tolerance, scratch))
+        .collect();
+    for ([i, j], verdict) in near.iter().zip(verdicts) {
+        let [a, b] = [i, j].map(|k| standing[*k].name.clone());
+        found.add(Pair { within: within.to_owned(), a, b: Some(b), verdict });
+    }
+}
+
+fn ask(pair: [&Standing<'_>; 2], tolerance: Option<f64>, scratch: &mut Scratch) -> Verdict {
+    let [a, b] = pair.map(|s| PlacedModel {
+        model: s.model,
+        placed: Placed { place: Pose::IDENTITY, motion: Motion::resting(s.pose) },
+    });
+    let resolution = tolerance.map_or_else(|| default_resolution(a.model, b.model), |tolerance| 0.5 * tolerance);
+    let query = PairQuery {
+        a,
+        b,
+        resolution,
+        cell_limit: CELL_LIMIT,
+        strategies: Strategies::default(),
+        query_options: QueryOptions::DEPTH,
+    };
+    let outcome = earliest_contact(&query, scratch);
+    verdict(pair, &outcome, 2.0 * resolution)
+}
+
+fn verdict(pair: [&Standing<'_>; 2], outcome: &Outcome, tolerance: f64) -> Verdict {
+    // f is at most the distance from the surface: a ball of that radius around the point is in both.
+    let deep = |x: DVec3| {
+        pair.map(|s| -s.model.solid.value(s.pose.inverse().point(x))).into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let points = outcome.penetration().map(|p| p.point).into_iter().chain(outcome.point().map(|p| p.point));
+    let deepest = points.map(|x| (x, deep(x))).max_by(|a, b| a.1.total_cmp(&b.1));
+    match (outcome.status(), deepest) {
+        (Status::Overlap | Status::Contact, Some((point, depth))) if depth > 0.0 => Verdict::Overlap(point, depth),
+        // A search that took too long may have gone on at a coarser resolution.
+        (Status::Clear, _) if outcome.depth <= tolerance => Verdict::Separate(outcome.depth),
+        (Status::Clear, _) => Verdict::NotProven(Some(outcome.depth)),
+        _ => Verdict::NotProven(None),
+    }
+}
+
+impl Found {
+    fn add(&mut self, pair: Pair) {
+        match pair.verdict {
+            Verdict::Separate(_) => self.separate[1] += 1,
+            Verdict::Overlap(..) | Verdict::NotProven(_) => self.pairs.push(pair),
+        }
+    }
+
+    /// Deepest first; what is not proven comes last.
+    fn order(&mut self) {
+        let depth = |p: &Pair| if let Verdict::Overlap(_, depth) = p.verdict { depth } else { -1.0 };
+        self.pairs.sort_by(|p, q| {
+            depth(q).total_cmp(&depth(p)).then_with(|| (&p.within, &p.a, &p.b).cmp(&(&q.within, &q.a, &q.b)))
+        });
+    }
+
+    /// How many overlap, and of how many neither is proven.
+    pub fn counts(&self) -> [usize; 2] {
+        let overlaps = self.pairs.iter().filter(|p| matches!(p.verdict, Verdict::Overlap(..))).count();
+        [overlaps, self.pairs.len() - overlaps]
+    }
+}
