@@ -8,6 +8,7 @@
 mod joints;
 mod overlaps;
 mod pages;
+mod recorded;
 
 use self::joints::{ClearanceArguments, JointArguments, is_scene, read_scene, without_touching};
 use self::overlaps::OverlapsArguments;
@@ -287,7 +288,7 @@ struct CheckArguments {
 
 #[derive(clap::Args)]
 struct ViewArguments {
-    /// The scene's .toml file, or a robot's (.urdf, .sdf, MJCF's .xml); or models, which are taken as they stand.
+    /// The scene's .toml file, a robot's (.urdf, .sdf, MJCF's .xml), a recording (.mcap); or models, which are taken as they stand.
     #[arg(required_unless_present = "demo")]
     files: Vec<PathBuf>,
     /// The acts of the demo instead.
@@ -536,6 +537,12 @@ fn scene_of(files: &[PathBuf], access: &AccessArguments, joints: &JointArguments
 fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
     let show = if arguments.demo {
         crate::demo::show(arguments.cache.open().as_ref())?
+    } else if let Some(file) = arguments.files.iter().find(|f| recorded::is_recording(f)) {
+        arguments.joints.none(file)?;
+        if arguments.files.len() > 1 {
+            return Err(format!("expected one recording alone, found {} among others", file.display()).into());
+        }
+        recorded::show(file, arguments.cache.open().as_ref())?
     } else {
         let scene = scene_of(&arguments.files, &arguments.access, &arguments.joints)?;
         let prepared = prepare_scene(&scene, arguments.facets, &arguments.cache)?;

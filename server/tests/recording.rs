@@ -531,3 +531,56 @@ fn what_cannot_be_recorded_is_refused_with_one_sentence() {
     let said = replay(&folder.path().join("none.mcap"), |_| {}).unwrap_err().to_string();
     assert!(said.contains("none.mcap: expected a readable file"), "{said}");
 }
+
+/// A recording in a browser: each run of steps with the same objects is an act, and its steps have the recorded contacts.
+#[test]
+fn a_recording_is_shown_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shown.mcap");
+    let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
+    session.record(&path).unwrap();
+    let ball = session.load_model("ball.csg", "sphere($fn = 0, r = 1);").unwrap().id;
+    let ids = [0.0, 10.0].map(|x| session.add_object(Object::new("", ball).at(Pose::at(DVec3::X * x))).unwrap());
+    let mut expected = Vec::new();
+    for k in 0..4 {
+        if k == 2 {
+            session.add_object(Object::new("third", ball).at(Pose::at(DVec3::Y * 30.0)).fixed()).unwrap();
+        }
+        let to = [6.0, 1.0, 9.0, 0.5][k];
+        session.begin_step(1).unwrap()[0] = PoseRecord::end(ids[1], &Pose::at(DVec3::X * to));
+        let reply = session.finish(PATIENCE).unwrap();
+        expected.push(reply.records().iter().filter(|r| r.status != 2).map(|r| r.time).collect::<Vec<_>>());
+    }
+    session.stop_recording().unwrap();
+    let (runs, are_more) = contactd::replay::runs(&path, 100).unwrap();
+    assert!(!are_more && runs.iter().map(|run| run.scenes.len()).collect::<Vec<_>>() == [2, 2]);
+    assert_eq!((runs[0].first, runs[1].first), (1, 3));
+    let scenes: Vec<&String> = runs.iter().flat_map(|run| &run.scenes).collect();
+    for (scene, times) in scenes.iter().zip(&expected) {
+        let scene = contactd::import::Scene::parse("recorded", scene, Path::new("")).unwrap();
+        let solid = contactd::import::import_csg(
+            "ball.csg",
+            "sphere($fn = 0, r = 1);",
+            Default::default(),
+            &Default::default(),
+        );
+        let model = std::sync::Arc::new(contactd::octree::Model::new(solid.unwrap().solid));
+        let models = vec![model; scene.models.len()];
+        let mut check = contactd::check::Check::new(&scene, &models, None).unwrap();
+        let outcome = check.step(false).unwrap();
+        let found: Vec<f64> = outcome.pairs.iter().filter(|p| p.outcome.meets()).map(|p| p.outcome.time()).collect();
+        assert_eq!(
+            found.iter().map(|t| t.to_bits()).collect::<Vec<_>>(),
+            times.iter().map(|t| t.to_bits()).collect::<Vec<_>>()
+        );
+    }
+    assert_eq!(contactd::replay::runs(&path, 3).unwrap().0.iter().map(|run| run.scenes.len()).sum::<usize>(), 3);
+    assert!(contactd::replay::runs(&path, 3).unwrap().1);
+    // The program has it, too: as one file for programs that draw.
+    let glb = folder.path().join("shown.glb");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_contactd"));
+    let out = command.arg("view").arg(&path).arg("--gltf").arg(&glb).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let text = String::from_utf8_lossy(&std::fs::read(&glb).unwrap()).into_owned();
+    assert!(text.contains("session 1, 2 steps from 3 on") && text.contains("first meets"), "an act for each run");
+}

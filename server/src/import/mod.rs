@@ -117,6 +117,16 @@ impl Facets {
     }
 }
 
+impl From<contactd_proto::control::Facets> for Facets {
+    fn from(told: contactd_proto::control::Facets) -> Self {
+        match told {
+            contactd_proto::control::Facets::Auto => Self::Auto,
+            contactd_proto::control::Facets::Exact => Self::Exact,
+            contactd_proto::control::Facets::AsWritten => Self::AsWritten,
+        }
+    }
+}
+
 /// The most that a model file may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {

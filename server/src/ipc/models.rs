@@ -95,11 +95,7 @@ impl Models {
     fn make(&self, content: &Arc<Content>) -> Result<Loaded, Refusal> {
         let Content { name, format, facets, bytes, attached } = &**content;
         let source = &Source { name, format, bytes, attached: attached.as_deref() };
-        let facets = match facets {
-            Facets::Auto => import::Facets::Auto,
-            Facets::Exact => import::Facets::Exact,
-            Facets::AsWritten => import::Facets::AsWritten,
-        };
+        let facets = import::Facets::from(*facets);
         if source.bytes.len() > self.limits.bytes {
             return Err(Refusal::new(ErrorCode::LimitText, format!("{}: {} bytes", source.name, source.bytes.len())));
         }

@@ -66,6 +66,11 @@ impl SceneFolder {
         std::fs::write(&path, text).map_err(|e| failed(&path, e))
     }
 
+    /// What the models of its text were made of, in that order.
+    pub fn contents(&self) -> Vec<Arc<Content>> {
+        self.used().map(|(_, content)| content.clone()).collect()
+    }
+
     /// The models that objects are of.
     fn used(&self) -> impl Iterator<Item = (u32, &Arc<Content>)> {
         let used: BTreeSet<u32> = self.objects.iter().map(|o| o.spec.model).collect();
@@ -92,7 +97,10 @@ impl SceneFolder {
     }
 
     /// The scene's file.
-    fn text(&self) -> Result<String, String> {
+    ///
+    /// # Errors
+    /// What a scene cannot say. One sentence.
+    pub fn text(&self) -> Result<String, String> {
         let mut out = String::new();
         self.head(&mut out);
         if let Some(resolution) = self.resolution {

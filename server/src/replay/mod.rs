@@ -9,13 +9,16 @@
 mod compare;
 
 use crate::ipc::{Embedded, ServerConfig};
-use crate::recording::{About, Change, Entry, FileError, Key, Opening, Recording, SceneFolder, Standing, StepMessage};
+use crate::recording::{
+    About, Change, Content, Entry, FileError, Key, Opening, Recording, SceneFolder, Standing, StepMessage,
+};
 use contactd_client::{Error, Transport};
 use contactd_proto::control::{Answer, Command, ObjectSpec};
 use contactd_proto::step::{NO_INDEX, STEP_REFUSED};
 use contactd_proto::{ErrorCode, MotionState, Rule, Tracks};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 pub use compare::first_difference;
@@ -213,6 +216,72 @@ struct Followed {
     tracks: Tracks,
     rules: Vec<Rule>,
     resolution: Option<f64>,
+}
+
+/// Steps of a session, one after the other, with the same objects of the same models.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The session.
+    pub session: u64,
+    /// The number of the first one in the recording, from 1.
+    pub first: u64,
+    /// What the models of the scenes were made of, in order.
+    pub contents: Vec<Arc<Content>>,
+    /// The steps as texts of scene files. Steps that were refused moved nothing, and are none.
+    pub scenes: Vec<String>,
+}
+
+/// The steps of a recording as scenes, the first `most` of them; and whether there are more.
+///
+/// # Errors
+/// As `replay`.
+pub fn runs(path: &Path, most: usize) -> Result<(Vec<Run>, bool), ReplayError> {
+    let mut recording = Recording::open(path)?;
+    let refused = |what: String| ReplayError::Content(path.display().to_string(), what);
+    let mut sessions: BTreeMap<u64, Followed> = BTreeMap::new();
+    let mut runs: Vec<Run> = Vec::new();
+    // Of each session the run that its next step belongs to, unless something has changed.
+    let mut current: BTreeMap<u64, usize> = BTreeMap::new();
+    let (mut steps, mut kept) = (0, 0);
+    while let Some(entry) = recording.next_entry()? {
+        match entry {
+            Entry::Opening(session, opening) => {
+                let followed =
+                    Followed::open(opening).map_err(|e| refused(format!("the opening after step {steps}: {e}")))?;
+                sessions.insert(session, followed);
+                current.remove(&session);
+            }
+            Entry::Change(session, change) => {
+                let followed =
+                    sessions.get_mut(&session).ok_or_else(|| refused(format!("session {session} has no opening")))?;
+                followed.alter(change).map_err(|e| refused(format!("a change after step {steps}: {e}")))?;
+                current.remove(&session);
+            }
+            Entry::Step(step) => {
+                steps += 1;
+                let session = step.session;
+                let followed =
+                    sessions.get_mut(&session).ok_or_else(|| refused(format!("session {session} has no opening")))?;
+                if step.reply.status == STEP_REFUSED {
+                    continue;
+                }
+                if kept == most {
+                    return Ok((runs, true));
+                }
+                kept += 1;
+                followed.tracks.take(&step.records, step.request.advance);
+                let scene = followed.scene(&recording, steps, &step);
+                let scene = scene.map_err(|e| refused(format!("step {steps}: {e}")))?;
+                let text = scene.text().map_err(|e| refused(format!("step {steps}: {e}")))?;
+                let at = *current.entry(session).or_insert_with(|| {
+                    runs.push(Run { session, first: steps, contents: scene.contents(), scenes: Vec::new() });
+                    runs.len() - 1
+                });
+                runs[at].scenes.push(text);
+            }
+        }
+    }
+    Ok((runs, false))
 }
 
 /// Step `number` (from 1) of a recording as a scene folder.

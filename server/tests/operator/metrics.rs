@@ -1,7 +1,7 @@
 //! What is scraped from a server, read by a reader of its own: as `status` tells it, in the form that OpenMetrics 1.0 asks for.
 
+use super::harness::runtime_folder;
 use super::harness::scene::build;
-use super::harness::{PATIENCE, runtime_folder};
 use super::{play, printed};
 use contactd_client::Session;
 use contactd_client::proto::names::Address;
@@ -9,8 +9,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
-use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::process::{Child, Command, Stdio};
 
 /// What is answered to a request: status, kind, body.
 fn get(address: &str, path: &str) -> (u16, String, String) {
@@ -60,8 +59,8 @@ fn metrics_are_what_status_tells() {
     let serve = ["serve", "--name", "scraped", "--metrics", "0", "--quiet"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_contactd"));
     command.args(serve).env("XDG_RUNTIME_DIR", runtime.path()).stdout(Stdio::piped());
-    let mut server = command.spawn().expect("a server");
-    let mut lines = BufReader::new(server.stdout.take().expect("a pipe")).lines().map_while(Result::ok);
+    let mut server = Running(command.spawn().expect("a server"));
+    let mut lines = BufReader::new(server.0.stdout.take().expect("a pipe")).lines().map_while(Result::ok);
     let url = lines.find_map(|l| Some(l.split_once("metrics at http://")?.1.to_owned())).expect("where they are");
     let address = url.strip_suffix("/metrics").expect("a path").to_owned();
     let (code, kind, empty) = get(&address, "/metrics");
@@ -114,10 +113,15 @@ fn metrics_are_what_status_tells() {
     assert!(other.status.code() == Some(2) && sentence.contains(&format!("127.0.0.1:{taken}")), "{sentence}");
     assert!(!place_of_other(runtime.path()).exists(), "nothing of it stays");
     drop(session);
-    server.kill().expect("a server");
-    let until = Instant::now() + PATIENCE;
-    while server.try_wait().expect("a child").is_none() {
-        assert!(Instant::now() < until);
+}
+
+/// A server that ends with the test, however that does.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
