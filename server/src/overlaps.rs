@@ -2,7 +2,8 @@
 //! that lies deep in both.
 //!
 //! A pair is asked at rest ([`crate::contact::earliest_contact`]) with half the tolerance as its resolution: that is clear where no
-//! point lies deeper than so in both, and an overlap where one lies deeper than the tolerance. What touches is no overlap. A daughter
+//! point lies deeper than the tolerance in both, and else an overlap. How deep a point lies is told by f, which is at most its distance
+//! from the surface, and in a union of parts that touch at most that from the surface of a part. What touches is no overlap. A daughter
 //! sticks out of its mother where it overlaps what is around the mother: a block less the mother's solid.
 //!
 //! Floor 10: imports `import`, `contact`, `cache`.
@@ -90,10 +91,18 @@ pub fn of_scene(scene: &Scene, models: &[Arc<Model>], tolerance: Option<f64>) ->
     found
 }
 
-/// The volumes of a GDML file as a scene of models without objects: one for each, in order.
+/// The volumes of a GDML file as a scene of models without objects: one for each that has a solid, in order.
 pub fn scene_of(path: &Path, volumes: &Volumes) -> Scene {
-    let texts = volumes.volumes.iter().map(|v| (v.name.clone(), v.text.clone(), v.at));
-    models_of(path, texts.collect())
+    let solid = volumes.volumes.iter().filter(|v| !v.text.is_empty());
+    models_of(path, solid.map(|v| (v.name.clone(), v.text.clone(), v.at)).collect())
+}
+
+/// The models of all volumes, from those of `scene_of`'s scene; an assembly, which is in none of them, has any.
+pub fn spread(volumes: &Volumes, models: &[Arc<Model>]) -> Vec<Arc<Model>> {
+    let mut solid = models.iter();
+    let Some(any) = models.first() else { return Vec::new() };
+    let each = volumes.volumes.iter().map(|v| if v.text.is_empty() { None } else { solid.next() });
+    each.map(|model| model.unwrap_or(any).clone()).collect()
 }
 
 /// What is around each volume in which others are, as a scene of models; and which volume each is around.
@@ -139,7 +148,9 @@ pub fn of_volumes(
     tolerance: Option<f64>,
 ) -> Found {
     let mut found = Found::default();
-    for (i, volume) in volumes.volumes.iter().enumerate().filter(|(_, v)| !v.text.is_empty()) {
+    // What is in an assembly is asked of where that is placed; in one that is nowhere, here.
+    let is_asked = |v: &crate::import::gdml::Volume| !v.text.is_empty() || !v.is_placed;
+    for (i, volume) in volumes.volumes.iter().enumerate().filter(|(_, v)| is_asked(v)) {
         let standing: Vec<Standing<'_>> =
             volume.daughters.iter().map(|d| Standing::new(d.name.clone(), &models[d.volume], d.pose)).collect();
         siblings(&volume.name, &standing, tolerance, &mut found);
@@ -210,7 +221,9 @@ fn verdict(pair: [&Standing<'_>; 2], outcome: &Outcome, tolerance: f64) -> Verdi
     let points = outcome.penetration().map(|p| p.point).into_iter().chain(outcome.point().map(|p| p.point));
     let deepest = points.map(|x| (x, deep(x))).max_by(|a, b| a.1.total_cmp(&b.1));
     match (outcome.status(), deepest) {
-        (Status::Overlap | Status::Contact, Some((point, depth))) if depth > 0.0 => Verdict::Overlap(point, depth),
+        (Status::Overlap | Status::Contact, Some((point, depth))) if depth > tolerance => {
+            Verdict::Overlap(point, depth)
+        }
         // A search that took too long may have gone on at a coarser resolution.
         (Status::Clear, _) if outcome.depth <= tolerance => Verdict::Separate(outcome.depth),
         (Status::Clear, _) => Verdict::NotProven(Some(outcome.depth)),

@@ -215,6 +215,7 @@ fn random_sessions_are_repeated_bit_for_bit() {
         let taken = (0..each).filter(|_| play.step(&mut session)).count() as u64;
         assert_eq!(session.recording().unwrap().failure, "");
         let status = session.stop_recording().unwrap();
+        assert_eq!(status.failure, "");
         assert_eq!((status.steps, status.dropped), (each, 0), "those that were refused stand in it, too");
         all += taken;
         // Files that models name are in the recording: they may go.

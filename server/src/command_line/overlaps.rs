@@ -4,7 +4,7 @@ use super::joints::JointArguments;
 use super::{AccessArguments, CacheArguments, Done, models_of, prepare_scene, print, scene_of};
 use crate::import::{Facets, gdml};
 use crate::overlaps::{self, Found, Pair, Verdict};
-use crate::terminal::{number, sentence};
+use crate::terminal::{clean, number, sentence};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::PathBuf;
@@ -35,8 +35,8 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
         [file] if is_gdml(file) => {
             arguments.joints.none(file)?;
             let volumes = gdml::read_gdml(file)?;
-            let models =
-                models_of(&prepare_scene(&overlaps::scene_of(file, &volumes), Facets::Auto, &arguments.cache)?);
+            let prepared = prepare_scene(&overlaps::scene_of(file, &volumes), Facets::Auto, &arguments.cache)?;
+            let models = overlaps::spread(&volumes, &models_of(&prepared));
             let (outside, of) = overlaps::around(file, &volumes, &models);
             let outsides = models_of(&prepare_scene(&outside, Facets::Auto, &arguments.cache)?);
             (overlaps::of_volumes(&volumes, &models, (&outsides, &of), arguments.tolerance), "mm".to_owned())
@@ -68,12 +68,13 @@ fn text(found: &Found, unit: &str) -> String {
         by_boxes + searched
     );
     for pair in &found.pairs {
+        let (a, mother) = (clean(&pair.a), clean(&pair.within));
         let two = match &pair.b {
-            Some(b) => format!("{} and {b}", pair.a),
-            None => format!("{} sticks out of {}", pair.a, pair.within),
+            Some(b) => format!("{a} and {}", clean(b)),
+            None => format!("{a} sticks out of {mother}"),
         };
-        let within =
-            if pair.within.is_empty() || pair.b.is_none() { String::new() } else { format!(", in {}", pair.within) };
+        let is_told = !mother.is_empty() && pair.b.is_some();
+        let within = if is_told { format!(", in {mother}") } else { String::new() };
         let what = match pair.verdict {
             Verdict::Overlap(x, depth) => {
                 let at = x.to_array().map(|c| number(c, 0.01 * depth, 9)).join(", ");

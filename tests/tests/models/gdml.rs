@@ -6,7 +6,7 @@
 use contactd::import::gdml::{Volumes, read_gdml};
 use contactd::import::{Facets, Limits, Scene};
 use contactd::octree::Model;
-use contactd::overlaps::{Found, Verdict, around, of_volumes, scene_of};
+use contactd::overlaps::{Found, Verdict, around, of_volumes, scene_of, spread};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
 use glam::DVec3;
@@ -20,7 +20,7 @@ fn models(scene: &Scene) -> Vec<Arc<Model>> {
 
 fn read(path: &Path) -> (Volumes, Vec<Arc<Model>>) {
     let volumes = read_gdml(path).unwrap_or_else(|e| panic!("{e}"));
-    let models = models(&scene_of(path, &volumes));
+    let models = spread(&volumes, &models(&scene_of(path, &volumes)));
     (volumes, models)
 }
 
@@ -80,12 +80,9 @@ impl Packed {
             let name = format!("V{cell}");
             if at[0] % 2 == 1 && r.chance(0.5) {
                 let depth = 10.0 * 10f64.powf(r.within(-9.0, -1.0));
-                let axis = if at[0] + 1 == n[0] && r.chance(0.3) { 1 } else { 0 };
-                if axis == 0 {
-                    center.x += depth;
-                    let other = (at[0] + 1 < n[0]).then(|| format!("PV{}", cell + 1));
-                    planted.push((format!("P{name}"), other, depth));
-                }
+                center.x += depth;
+                let other = (at[0] + 1 < n[0]).then(|| format!("PV{}", cell + 1));
+                planted.push((format!("P{name}"), other, depth));
             }
             let is_bored = r.chance(0.3);
             let radius = 0.3 * size.x.min(size.y);
@@ -224,7 +221,7 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
             "expected a unit of length or angle, found \"furlong\"",
         ),
         ("", "<orb name=\"s\" r=\"x\"/>", volume, "expected a name that is defined before it is used, found \"x\""),
-        ("", "<orb name=\"s\" r=\"-1\"/>", volume, "expected r of the orb that is not negative, found \"-1\""),
+        ("", "<orb name=\"s\" r=\"-1\"/>", volume, "expected r of the orb that is positive, found \"-1\""),
         (
             "",
             "<orb name=\"s\" r=\"1\"/>",
@@ -237,6 +234,19 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
             "<volume name=\"v\"><solidref ref=\"s\"/></volume><volume name=\"w\"><solidref ref=\"s\"/><paramvol><volumeref ref=\"v\"/></paramvol></volume>",
             "<paramvol>, which is not supported",
         ),
+        (
+            "",
+            "<tube name=\"s\" rmax=\"1\" z=\"1\" deltaphi=\"0\"/>",
+            volume,
+            "expected deltaphi of the tube that is positive",
+        ),
+        (
+            "",
+            "<tube name=\"s\" rmin=\"2\" rmax=\"1\" z=\"1\"/>",
+            volume,
+            "expected rmin of the tube below 1, found \"2\"",
+        ),
+        ("<constant name=\"cm\" value=\"1\"/>", "", "", "a name that is no unit or number of its own, found \"cm\""),
         (
             "",
             "<subtraction name=\"s\"><first ref=\"s\"/><second ref=\"s\"/></subtraction>",

@@ -400,6 +400,16 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
             &none,
             "not negative, found \"-1\"",
         ),
+        ("a.xml", "<mujoco><contact><pair/></contact></mujoco>", &none, "a <pair> of geoms, which is not supported"),
+        ("a.urdf", "<robot xmlns:x=\"http://ros.org/wiki/xacro\"><x:arm/></robot>", &none, "run xacro first"),
+        ("a.urdf", "<robot/>", &none, "expected links of the robot"),
+        ("a.urdf", "<robot><link name=\"a\"/><link name=\"b\"/></robot>", &none, "found a second one, \"b\""),
+        (
+            "a.sdf",
+            "<sdf version=\"1.9\"><model name=\"m\"><pose relative_to=\"f\">1 0 0 0 0 0</pose></model></sdf>",
+            &none,
+            "a pose of a model relative to \"f\"",
+        ),
         (
             "a.xml",
             "<mujoco><worldbody><geom type=\"sdf\"/></worldbody></mujoco>",

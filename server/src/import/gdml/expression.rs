@@ -9,45 +9,58 @@ use std::f64::consts::{E, PI};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
     values: HashMap<String, f64>,
+    /// Those of them that are always known: nothing else may be called so.
+    known: Vec<&'static str>,
     /// Matrices: columns, and the values row by row.
     matrices: HashMap<String, (usize, Vec<f64>)>,
 }
 
-/// Parentheses within parentheses.
+/// Parentheses within parentheses, signs before signs, powers of powers.
 const DEEPEST: usize = 100;
+
+/// Units of length and angle.
+const UNITS: [(&str, f64); 17] = [
+    ("mm", 1.0),
+    ("millimeter", 1.0),
+    ("cm", 10.0),
+    ("centimeter", 10.0),
+    ("m", 1e3),
+    ("meter", 1e3),
+    ("km", 1e6),
+    ("um", 1e-3),
+    ("micrometer", 1e-3),
+    ("nm", 1e-6),
+    ("in", 25.4),
+    ("rad", 1.0),
+    ("radian", 1.0),
+    ("mrad", 1e-3),
+    ("milliradian", 1e-3),
+    ("deg", PI / 180.0),
+    ("degree", PI / 180.0),
+];
+
+/// A unit of length in millimetres, or of angle in radians.
+pub(super) fn unit(word: &str) -> Option<f64> {
+    UNITS.iter().find(|(name, _)| *name == word).map(|(_, unit)| *unit)
+}
 
 impl Names {
     /// The names that are always known.
     pub fn new() -> Self {
-        let known = [
-            ("pi", PI),
-            ("twopi", 2.0 * PI),
-            ("halfpi", 0.5 * PI),
-            ("e", E),
-            ("mm", 1.0),
-            ("millimeter", 1.0),
-            ("cm", 10.0),
-            ("centimeter", 10.0),
-            ("m", 1e3),
-            ("meter", 1e3),
-            ("km", 1e6),
-            ("um", 1e-3),
-            ("micrometer", 1e-3),
-            ("nm", 1e-6),
-            ("in", 25.4),
-            ("rad", 1.0),
-            ("radian", 1.0),
-            ("mrad", 1e-3),
-            ("milliradian", 1e-3),
-            ("deg", PI / 180.0),
-            ("degree", PI / 180.0),
-        ];
-        let values = known.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-        Self { values, matrices: HashMap::new() }
+        let numbers = [("pi", PI), ("twopi", 2.0 * PI), ("halfpi", 0.5 * PI), ("e", E)];
+        let known = numbers.into_iter().chain(UNITS);
+        let values = known.clone().map(|(name, value)| (name.to_owned(), value)).collect();
+        Self { values, known: known.map(|(name, _)| name).collect(), matrices: HashMap::new() }
     }
 
-    pub fn set(&mut self, name: &str, value: f64) {
-        self.values.insert(name.to_owned(), value);
+    /// Says what a name stands for; false for one that has a meaning of its own.
+    #[must_use]
+    pub fn set(&mut self, name: &str, value: f64) -> bool {
+        let is_free = !self.known.contains(&name);
+        if is_free {
+            self.values.insert(name.to_owned(), value);
+        }
+        is_free
     }
 
     pub fn set_matrix(&mut self, name: &str, columns: usize, values: Vec<f64>) {
@@ -127,29 +140,39 @@ impl Reader<'_> {
         }
     }
 
-    fn signed(&mut self) -> Value {
-        if self.is("-") {
-            return Ok(-self.signed()?);
+    /// One step further in.
+    fn deeper(&mut self) -> Result<(), (String, String)> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err((format!("at most {DEEPEST} parentheses and signs within each other"), "more".into()));
         }
-        if self.is("+") {
-            return self.signed();
+        Ok(())
+    }
+
+    fn signed(&mut self) -> Value {
+        let is_minus = self.is("-");
+        if is_minus || self.is("+") {
+            self.deeper()?;
+            let value = self.signed()?;
+            self.depth -= 1;
+            return Ok(if is_minus { -value } else { value });
         }
         self.power()
     }
 
+    /// From the left, as CLHEP has it.
     fn power(&mut self) -> Value {
-        let base = self.atom()?;
-        if self.is("^") || self.is("**") {
-            return Ok(base.powf(self.signed()?));
+        let mut value = self.atom()?;
+        while self.is("^") || self.is("**") {
+            let is_minus = self.is("-");
+            let exponent = self.atom()?;
+            value = value.powf(if is_minus { -exponent } else { exponent });
         }
-        Ok(base)
+        Ok(value)
     }
 
     fn arguments(&mut self) -> Result<Vec<f64>, (String, String)> {
-        self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err((format!("at most {DEEPEST} parentheses within each other"), "more".into()));
-        }
+        self.deeper()?;
         let mut all = vec![self.sum()?];
         while self.is(",") {
             all.push(self.sum()?);
@@ -256,13 +279,13 @@ mod tests {
     #[test]
     fn expressions_have_the_values_of_arithmetic() {
         let mut names = Names::new();
-        names.set("a", 3.0);
-        names.set("b_1", -2.0);
+        assert!(names.set("a", 3.0) && names.set("b_1", -2.0) && !names.set("rad", 5.0));
         names.set_matrix("m", 2, vec![1.0, 2.0, 3.0, 4.0]);
         for (text, value) in [
             ("1+2*3", 7.0),
             ("-(1+2)*3", -9.0),
-            ("2^3^1", 8.0),
+            ("2^3^2", 64.0),
+            ("2^-1", 0.5),
             ("-2^2", -4.0),
             ("2**3", 8.0),
             ("10./4 - .5", 2.0),
@@ -291,6 +314,8 @@ mod tests {
             ("m[1,3]", "indices"),
             ("n[1]", "the name of a matrix"),
             (&"(".repeat(1000), "at most"),
+            (&("-".repeat(100_000) + "1"), "at most"),
+            (&"1^".repeat(100_000), "a number"),
         ] {
             let (expected, _) = names.value(text).expect_err(text);
             assert!(expected.contains(word), "{text}: {expected}");

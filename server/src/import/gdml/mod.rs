@@ -9,7 +9,7 @@ mod solids;
 
 use super::problem::Problem;
 use super::scene::SceneError;
-use super::{Limits, Note, Place, read_bytes, xml};
+use super::{Limits, Place, read_bytes, xml};
 use contactd_proto::Pose;
 use expression::Names;
 use glam::{DMat3, DQuat, DVec3};
@@ -19,8 +19,8 @@ use std::path::Path;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
-/// Copies of one replica at most.
-const MOST_COPIES: f64 = 1e6;
+/// Volumes that are placed in one at most.
+const MOST_DAUGHTERS: usize = 1_000_000;
 
 /// A logical volume.
 #[derive(Clone, Debug)]
@@ -33,6 +33,8 @@ pub struct Volume {
     pub text: String,
     /// What is placed in it.
     pub daughters: Vec<Daughter>,
+    /// It is placed somewhere.
+    pub is_placed: bool,
 }
 
 /// A volume that is placed in another one.
@@ -53,8 +55,6 @@ pub struct Daughter {
 pub struct Volumes {
     /// The volumes.
     pub volumes: Vec<Volume>,
-    /// What was left out.
-    pub notes: Vec<Note>,
 }
 
 /// What is defined, and the solids by name.
@@ -100,7 +100,10 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
             if solid.tag_name().name() == "loop" {
                 return Err((xml::place(solid), Problem::unsupported("<loop>")));
             }
-            // Optical surfaces stand there, too.
+            // Surfaces of optics stand there, too.
+            if solid.tag_name().name().ends_with("surface") {
+                continue;
+            }
             if let Some(name) = solid.attribute("name") {
                 geometry.solids.insert(name, solid);
             }
@@ -123,6 +126,9 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
             out.volumes.push(volume);
         }
     }
+    if out.volumes.is_empty() {
+        return Err(xml::wrong(root, "volumes in a structure", None));
+    }
     Ok(out)
 }
 
@@ -131,17 +137,31 @@ impl<'a, 'i> Geometry<'a, 'i> {
         for node in define.children().filter(Node::is_element) {
             let kind = node.tag_name().name();
             match kind {
+                // What is no length and no angle is a material's; whoever uses its name is told that it is none.
+                "quantity" if node.attribute("unit").is_some_and(|unit| expression::unit(unit).is_none()) => {
+                    let is_geometry = ["length", "angle", "coordinate", "area", "volume"]
+                        .contains(&node.attribute("type").unwrap_or("length"));
+                    if is_geometry {
+                        return Err(xml::wrong(node, "a unit of length or angle", node.attribute("unit")));
+                    }
+                }
                 "constant" | "variable" | "quantity" => {
                     let value = self.number(node, "value")?;
                     let value = value.ok_or_else(|| xml::wrong(node, format!("a value of the {kind}"), None))?;
                     let unit = node.attribute("unit").map_or(Ok(1.0), |unit| self.unit(node, unit))?;
-                    self.names.set(needed(node, "name")?, value * unit);
+                    let name = needed(node, "name")?;
+                    if !self.names.set(name, value * unit) {
+                        return Err(xml::wrong(node, "a name that is no unit or number of its own", Some(name)));
+                    }
                 }
                 "matrix" => {
                     let columns = self.number(node, "coldim")?.unwrap_or(1.0);
                     let words = needed(node, "values")?.split_whitespace();
-                    let values = words.map(|word| self.value(node, word)).collect::<Result<Vec<_>>>()?;
-                    self.names.set_matrix(needed(node, "name")?, (columns as usize).max(1), values);
+                    // Energies of optics, as a rule: whoever uses one that has other units is told that it is none.
+                    let values: Result<Vec<f64>> = words.map(|word| self.value(node, word)).collect();
+                    if let Ok(values) = values {
+                        self.names.set_matrix(needed(node, "name")?, (columns as usize).max(1), values);
+                    }
                 }
                 "position" => _ = self.positions.insert(needed(node, "name")?, self.three(node, "mm", 0.0)?),
                 "rotation" => _ = self.rotations.insert(needed(node, "name")?, self.three(node, "rad", 0.0)?),
@@ -164,11 +184,15 @@ impl<'a, 'i> Geometry<'a, 'i> {
     }
 
     fn unit(&self, node: Node<'_, '_>, unit: &str) -> Result<f64> {
-        self.names.value(unit).map_err(|_| xml::wrong(node, "a unit of length or angle", Some(unit)))
+        expression::unit(unit).ok_or_else(|| xml::wrong(node, "a unit of length or angle", Some(unit)))
     }
 
     fn three(&self, node: Node<'_, '_>, unit: &str, none: f64) -> Result<DVec3> {
         let unit = self.unit(node, node.attribute("unit").unwrap_or(unit))?;
+        let known = ["x", "y", "z", "unit", "name", "type"];
+        if let Some(other) = node.attributes().find(|a| !known.contains(&a.name())) {
+            return Err(xml::wrong(node, format!("one of {}", known.join(", ")), Some(other.name())));
+        }
         let of = |key: &str| Ok(self.number(node, key)?.map_or(none, |x| x * unit));
         Ok(DVec3::new(of("x")?, of("y")?, of("z")?))
     }
@@ -243,6 +267,26 @@ impl<'a, 'i> Geometry<'a, 'i> {
         for child in node.children().filter(Node::is_element) {
             match child.tag_name().name() {
                 "physvol" => {
+                    let known = [
+                        "volumeref",
+                        "file",
+                        "position",
+                        "positionref",
+                        "rotation",
+                        "rotationref",
+                        "scale",
+                        "scaleref",
+                        "auxiliary",
+                    ];
+                    let others = child.children().filter(Node::is_element);
+                    if let Some(other) = others.into_iter().find(|n| !known.contains(&n.tag_name().name())) {
+                        let name = other.tag_name().name();
+                        return Err(xml::wrong(
+                            other,
+                            format!("one of {} in a placement", known.join(", ")),
+                            Some(name),
+                        ));
+                    }
                     let volume = of(child)?;
                     let own = child.attribute("name").map_or_else(|| out.volumes[volume].name.clone(), str::to_owned);
                     let name = child.attribute("copynumber").map_or(own.clone(), |copy| format!("{own} {copy}"));
@@ -254,7 +298,7 @@ impl<'a, 'i> Geometry<'a, 'i> {
                         ));
                     }
                     let pose = self.pose(child, ["position", "rotation"], true)?;
-                    self.place(out, &mut daughters, Daughter { name, at: xml::place(child), volume, pose });
+                    place(out, &mut daughters, Daughter { name, at: xml::place(child), volume, pose })?;
                 }
                 "replicavol" => self.replicas(child, of(child)?, out, &mut daughters)?,
                 kind @ ("divisionvol" | "paramvol" | "loop") => {
@@ -263,31 +307,19 @@ impl<'a, 'i> Geometry<'a, 'i> {
                 _ => {}
             }
         }
-        Ok(Volume { name, at: xml::place(node), text, daughters })
-    }
-
-    /// Places a volume; of an assembly what is in it.
-    fn place(&self, out: &Volumes, daughters: &mut Vec<Daughter>, placed: Daughter) {
-        let volume = &out.volumes[placed.volume];
-        if !volume.text.is_empty() {
-            daughters.push(placed);
-            return;
-        }
-        for inner in &volume.daughters {
-            let name = format!("{}/{}", placed.name, inner.name);
-            daughters.push(Daughter {
-                name,
-                at: inner.at,
-                volume: inner.volume,
-                pose: placed.pose.compose(&inner.pose),
-            });
-        }
+        Ok(Volume { name, at: xml::place(node), text, daughters, is_placed: false })
     }
 
     /// Copies along an axis, side by side.
-    fn replicas(&self, node: Node<'_, '_>, volume: usize, out: &Volumes, daughters: &mut Vec<Daughter>) -> Result<()> {
+    fn replicas(
+        &self,
+        node: Node<'_, '_>,
+        volume: usize,
+        out: &mut Volumes,
+        daughters: &mut Vec<Daughter>,
+    ) -> Result<()> {
         let count = self.number(node, "number")?.unwrap_or(0.0);
-        if !(1.0..=MOST_COPIES).contains(&count) || count.fract() != 0.0 {
+        if !(1.0..=MOST_DAUGHTERS as f64).contains(&count) || count.fract() != 0.0 {
             return Err(xml::wrong(node, "a whole number of replicas", node.attribute("number")));
         }
         let along = xml::inside(node, "replicate_along_axis").next();
@@ -306,14 +338,40 @@ impl<'a, 'i> Geometry<'a, 'i> {
             }
         };
         let (width, offset) = (length("width")?, length("offset")?);
+        if width <= 0.0 {
+            return Err(xml::wrong(along, "a width of the replicas", Some(&width.to_string())));
+        }
+        if offset != 0.0 {
+            // Geant4 takes none along x, y and z.
+            return Err((xml::place(along), Problem::unsupported("an offset of replicas along an axis")));
+        }
         for k in 0..count as usize {
-            let at = (k as f64 - 0.5 * (count - 1.0)) * width + offset;
+            let at = (k as f64 - 0.5 * (count - 1.0)) * width;
             let name = format!("{} {k}", out.volumes[volume].name);
             let pose = Pose::at(axis * at);
-            self.place(out, daughters, Daughter { name, at: xml::place(node), volume, pose });
+            place(out, daughters, Daughter { name, at: xml::place(node), volume, pose })?;
         }
         Ok(())
     }
+}
+
+/// Places a volume; of an assembly what is in it.
+fn place(out: &mut Volumes, daughters: &mut Vec<Daughter>, placed: Daughter) -> Result<()> {
+    let volume = &mut out.volumes[placed.volume];
+    volume.is_placed = true;
+    let count = if volume.text.is_empty() { volume.daughters.len() } else { 1 };
+    if daughters.len() + count > MOST_DAUGHTERS {
+        return Err((placed.at, Problem::Limit { what: "volumes placed in one", limit: MOST_DAUGHTERS }));
+    }
+    if !volume.text.is_empty() {
+        daughters.push(placed);
+        return Ok(());
+    }
+    for inner in &volume.daughters {
+        let name = format!("{}/{}", placed.name, inner.name);
+        daughters.push(Daughter { name, at: inner.at, volume: inner.volume, pose: placed.pose.compose(&inner.pose) });
+    }
+    Ok(())
 }
 
 /// An attribute that has to be there.

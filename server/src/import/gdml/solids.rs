@@ -4,7 +4,7 @@
 
 use super::super::problem::Problem;
 use super::super::written::placed;
-use super::super::xml;
+use super::super::{Place, xml};
 use super::{Geometry, Result, needed};
 use contactd_proto::Pose;
 use glam::{DVec2, DVec3};
@@ -40,15 +40,41 @@ impl<'g, 'a, 'i> Read<'g, 'a, 'i> {
         Ok(value * self.length)
     }
 
-    /// A length that is not negative.
+    /// A length that is positive.
     fn size(&self, key: &str) -> Result<f64> {
         match self.len(key)? {
-            size if size >= 0.0 => Ok(size),
-            size => {
-                let expected = format!("{key} of the {} that is not negative", self.kind());
-                Err(xml::wrong(self.node, expected, Some(&size.to_string())))
-            }
+            size if size > 0.0 => Ok(size),
+            size => Err(self.refused(format!("{key} of the {} that is positive", self.kind()), size)),
         }
+    }
+
+    /// A length that is positive or 0, which it is where it is left out.
+    fn rest(&self, key: &str) -> Result<f64> {
+        match self.len_or(key, 0.0)? {
+            size if size >= 0.0 => Ok(size),
+            size => Err(self.refused(format!("{key} of the {} that is not negative", self.kind()), size)),
+        }
+    }
+
+    /// An inner radius: less than the outer one.
+    fn inner(&self, key: &str, outer: f64) -> Result<f64> {
+        match self.rest(key)? {
+            inner if inner < outer || (inner == 0.0 && outer == 0.0) => Ok(inner),
+            inner => Err(self.refused(format!("{key} of the {} below {outer}", self.kind()), inner)),
+        }
+    }
+
+    fn refused(&self, expected: String, found: f64) -> (Place, Problem) {
+        xml::wrong(self.node, expected, Some(&found.to_string()))
+    }
+
+    /// Where a part of a turn begins, and how far it goes.
+    fn span(&self) -> Result<(f64, f64)> {
+        let turn = self.angle_or("deltaphi", TAU)?;
+        if turn <= 0.0 {
+            return Err(self.refused(format!("deltaphi of the {} that is positive", self.kind()), turn));
+        }
+        Ok((self.angle_or("startphi", 0.0)?, turn))
     }
 
     fn len_or(&self, key: &str, none: f64) -> Result<f64> {
@@ -194,7 +220,7 @@ pub(super) fn text(geometry: &Geometry<'_, '_>, name: &str, asker: Node<'_, '_>,
 }
 
 fn round(read: &Read<'_, '_, '_>) -> Result<String> {
-    let span = || Ok((read.angle_or("startphi", 0.0)?, read.angle_or("deltaphi", TAU)?));
+    let span = || read.span();
     Ok(match read.kind() {
         "box" => {
             format!(
@@ -205,23 +231,33 @@ fn round(read: &Read<'_, '_, '_>) -> Result<String> {
             )
         }
         "orb" => format!("sphere($fn = 0, r = {:?});", read.size("r")?),
-        "tube" => tube(read.len_or("rmin", 0.0)?, read.size("rmax")?, read.size("z")?, span()?),
+        "tube" => {
+            let rmax = read.size("rmax")?;
+            tube(read.inner("rmin", rmax)?, rmax, read.size("z")?, span()?)
+        }
         "cutTube" => {
-            let (rmin, rmax, z) = (read.len_or("rmin", 0.0)?, read.size("rmax")?, read.size("z")?);
-            let mut text = tube(rmin, rmax, 2.0 * z + 4.0 * rmax, span()?);
+            let (rmax, z) = (read.size("rmax")?, read.size("z")?);
+            let rmin = read.inner("rmin", rmax)?;
+            let mut planes = Vec::new();
             for (keys, at) in [(["lowX", "lowY", "lowZ"], -0.5 * z), (["highX", "highY", "highZ"], 0.5 * z)] {
                 let part = |k: usize| Ok(read.raw(keys[k])?.unwrap_or(0.0));
                 let n = DVec3::new(part(0)?, part(1)?, part(2)?);
-                let unit = n.try_normalize().filter(|u| u.z != 0.0);
-                let n = unit.ok_or_else(|| xml::wrong(read.node, "planes across the tube", Some(&n.to_string())))?;
+                let unit = n.try_normalize().filter(|u| u.z * at > 0.0);
+                let outward = "normals of the planes that look out of the tube: lowZ below 0, highZ above";
+                planes.push((unit.ok_or_else(|| xml::wrong(read.node, outward, Some(&n.to_string())))?, at));
+            }
+            // As long as the steeper plane asks for.
+            let reach = planes.iter().map(|(n, _)| rmax * n.truncate().length() / n.z.abs()).fold(0.0, f64::max);
+            let mut text = tube(rmin, rmax, 1.1 * z + 2.2 * reach, span()?);
+            for (n, at) in planes {
                 let half = format!("half_space(normal = {:?}, offset = {:?});", n.to_array(), n.z * at);
                 text = both(&text, &half);
             }
             text
         }
         "cone" => {
-            let (a, b) = (read.len_or("rmin1", 0.0)?, read.size("rmax1")?);
-            let (c, d, z) = (read.len_or("rmin2", 0.0)?, read.size("rmax2")?, read.size("z")?);
+            let (b, d, z) = (read.rest("rmax1")?, read.rest("rmax2")?, read.size("z")?);
+            let (a, c) = (read.inner("rmin1", b)?, read.inner("rmin2", d)?);
             let (from, turn) = span()?;
             if a == 0.0 && c == 0.0 && is_whole(turn) {
                 return Ok(cone(b, d, z));
@@ -238,8 +274,9 @@ fn round(read: &Read<'_, '_, '_>) -> Result<String> {
                 ))
             };
             let (from, turn) = span()?;
-            let outer = sweep(&ring(read.size("rmax")?)?, from, turn);
-            match read.len_or("rmin", 0.0)? {
+            let rmax = read.size("rmax")?;
+            let outer = sweep(&ring(rmax)?, from, turn);
+            match read.inner("rmin", rmax)? {
                 0.0 => outer,
                 // The hole goes on through the ends.
                 inner => minus(&outer, &sweep(&ring(inner)?, from, TAU)),
@@ -251,6 +288,9 @@ fn round(read: &Read<'_, '_, '_>) -> Result<String> {
             let (low, high) = (read.len_or("zcut1", 0.0)?, read.len_or("zcut2", 0.0)?);
             if low == 0.0 && high == 0.0 {
                 return Ok(text);
+            }
+            if low >= high {
+                return Err(read.refused("zcut2 of the ellipsoid above zcut1".into(), high));
             }
             let (low, high) = (low.max(-1.5 * axes.z), high.min(1.5 * axes.z));
             let slab =
@@ -265,10 +305,12 @@ fn round(read: &Read<'_, '_, '_>) -> Result<String> {
             // Semi-axes a length of height: dx and dy have no unit.
             let (x, y) = (read.raw("dx")?.unwrap_or(1.0), read.raw("dy")?.unwrap_or(1.0));
             let (tip, cut) = (read.size("zmax")?, read.size("zcut")?);
-            scaled(DVec3::new(x, y, 1.0), &cone(tip + cut, (tip - cut).max(0.0), 2.0 * cut))
+            let cut = cut.min(tip);
+            scaled(DVec3::new(x, y, 1.0), &cone(tip + cut, tip - cut, 2.0 * cut))
         }
         "paraboloid" => {
-            let (low, high, half) = (read.len_or("rlo", 0.0)?, read.size("rhi")?, read.size("dz")?);
+            let (high, half) = (read.size("rhi")?, read.size("dz")?);
+            let low = read.inner("rlo", high)?;
             // ρ² = k (z − tip): a dome upside down, cut where it is to begin.
             let k = (high * high - low * low) / (2.0 * half);
             let h = high * high / k;
@@ -278,7 +320,9 @@ fn round(read: &Read<'_, '_, '_>) -> Result<String> {
             both(&placed(&down, &dome), &slab)
         }
         _ => {
-            let (inner, outer, z) = (read.len_or("rmin", 0.0)?, read.size("rmax")?, read.size("z")?);
+            let (outer, z) = (read.size("rmax")?, read.size("z")?);
+            let inner = read.inner("rmin", outer)?;
+            let steep = read.angle_or("inst", 0.0)?.tan().abs();
             let waist = |r: f64, stereo: f64, h: f64| {
                 let rim = (r * r + (stereo.tan() * 0.5 * h).powi(2)).sqrt();
                 if rim == r {
@@ -289,7 +333,14 @@ fn round(read: &Read<'_, '_, '_>) -> Result<String> {
             };
             let whole = waist(outer, read.angle_or("outst", 0.0)?, z);
             match inner {
-                0.0 => whole,
+                0.0 if steep == 0.0 => whole,
+                // Two cones, tip to tip.
+                0.0 => {
+                    let h = 0.75 * z;
+                    let at = |z: f64, text: &str| placed(&Pose::at(DVec3::Z * z), text);
+                    let below = at(-0.5 * h, &cone(steep * h, 0.0, h));
+                    minus(&whole, &format!("union() {{ {below} {} }}", at(0.5 * h, &cone(0.0, steep * h, h))))
+                }
                 inner => minus(&whole, &waist(inner, read.angle_or("inst", 0.0)?, 1.5 * z)),
             }
         }
@@ -308,7 +359,8 @@ fn tube(rmin: f64, rmax: f64, z: f64, (from, turn): (f64, f64)) -> String {
 }
 
 fn sphere(read: &Read<'_, '_, '_>, (from, turn): (f64, f64)) -> Result<String> {
-    let (rmin, rmax) = (read.len_or("rmin", 0.0)?, read.size("rmax")?);
+    let rmax = read.size("rmax")?;
+    let rmin = read.inner("rmin", rmax)?;
     let (low, delta) = (read.angle_or("starttheta", 0.0)?, read.angle_or("deltatheta", std::f64::consts::PI)?);
     let ball = |r: f64| format!("sphere($fn = 0, r = {r:?});");
     let mut text = if rmin == 0.0 { ball(rmax) } else { minus(&ball(rmax), &ball(rmin)) };
@@ -333,6 +385,8 @@ fn sphere(read: &Read<'_, '_, '_>, (from, turn): (f64, f64)) -> Result<String> {
 /// What has an outline of planes z, or of points.
 fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
     let (from, turn) = (read.angle_or("startphi", 0.0)?, read.angle_or("deltaphi", TAU)?);
+    // Geant4 takes it so.
+    let turn = if turn <= 0.0 { TAU } else { turn };
     if read.kind() == "genericPolycone" {
         let points = read.all("rzpoint");
         let outline = points.iter().map(|p| Ok(DVec2::new(p.len("r")?, p.len("z")?))).collect::<Result<Vec<_>>>()?;
@@ -352,6 +406,9 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
     let sides = read.raw("numsides")?.unwrap_or(0.0);
     if !(1.0..=10_000.0).contains(&sides) || sides.fract() != 0.0 {
         return Err(xml::wrong(read.node, "a whole number of sides", read.node.attribute("numsides")));
+    }
+    if turn.min(TAU) / sides > std::f64::consts::PI - 1e-6 {
+        return Err(xml::wrong(read.node, "sides of less than half a turn each", read.node.attribute("numsides")));
     }
     let whole = rings(&outer, sides as usize, (from, turn));
     Ok(match inner.iter().all(|p| p.x == 0.0) {
@@ -425,8 +482,8 @@ fn flat(read: &Read<'_, '_, '_>) -> Result<String> {
     };
     match read.kind() {
         "trd" => {
-            let half = |key: &str| Ok(0.5 * read.size(key)?);
-            let (x1, x2, y1, y2, z) = (half("x1")?, half("x2")?, half("y1")?, half("y2")?, half("z")?);
+            let half = |key: &str| Ok(0.5 * read.rest(key)?);
+            let (x1, x2, y1, y2, z) = (half("x1")?, half("x2")?, half("y1")?, half("y2")?, 0.5 * read.size("z")?);
             eight(read, two(base(-z, [x1, x1, y1], DVec2::ZERO, 0.0), base(z, [x2, x2, y2], DVec2::ZERO, 0.0)))
         }
         "trap" => {
@@ -466,7 +523,7 @@ fn flat(read: &Read<'_, '_, '_>) -> Result<String> {
         "tet" => {
             let mut points = [DVec3::ZERO; 4];
             for (k, point) in points.iter_mut().enumerate() {
-                *point = read.geometry.position(read.node, &format!("vertex{}", k + 1))?;
+                *point = read.geometry.position(read.node, &format!("vertex{}", k + 1))? * read.length;
             }
             let [a, b, c, d] = points;
             if (b - a).cross(c - a).dot(d - a) < 0.0 {

@@ -67,14 +67,20 @@ fn sections<'a, 'i>(roots: &'a [Node<'a, 'i>], name: &'static str) -> impl Itera
 fn included(node: Node<'_, '_>, folder: &Path, texts: &mut Vec<(PathBuf, String)>, depth: usize) -> Result<()> {
     for include in node.descendants().filter(|n| n.is_element() && n.tag_name().name() == "include") {
         let path = folder.join(needed(include, "file")?);
-        if texts.iter().any(|(known, _)| *known == path) {
-            continue;
-        }
         let wrong = |e: String| xml::wrong(include, format!("the included file {}", path.display()), Some(&e));
+        if texts.iter().any(|(known, _)| *known == path) {
+            return Err(wrong("a file that is included twice".into()));
+        }
+        let within = include.parent().map(|p| p.tag_name().name().to_owned()).unwrap_or_default();
+        if !["mujoco", "mujocoinclude", "worldbody", "body", "frame"].contains(&within.as_str()) {
+            return Err((xml::place(include), Problem::unsupported(format!("<include> within <{within}>"))));
+        }
         if depth > 16 {
             return Err(wrong("files that include each other".into()));
         }
-        let text = std::fs::read_to_string(&path).map_err(|e| wrong(e.to_string()))?;
+        let bytes = super::super::read_bytes(&path, &super::super::Limits::default());
+        let bytes = bytes.map_err(|e| wrong(e.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| wrong("text that is not UTF-8".into()))?;
         let at = texts.len();
         texts.push((path.clone(), text));
         let text = texts[at].1.clone();
@@ -203,6 +209,11 @@ impl<'a, 'i> Model<'a, 'i> {
         if class != "main" && !self.classes.contains(class) {
             return Err(xml::wrong(node, "the name of a default class", Some(class)));
         }
+        // An element that is turned in a way of its own is not turned as its class, too.
+        const TURNS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
+        if TURNS.iter().any(|turn| node.has_attribute(*turn)) {
+            TURNS.iter().for_each(|turn| _ = all.remove(*turn));
+        }
         all.extend(node.attributes().map(|a| (a.name().to_owned(), a.value().to_owned())));
         Ok(all)
     }
@@ -216,19 +227,13 @@ impl<'a, 'i> Model<'a, 'i> {
         if at.depth > DEEPEST {
             return Err((xml::place(node), Problem::Limit { what: "bodies within bodies", limit: DEEPEST }));
         }
-        // What moves a body stands before what is in it is placed.
-        for child in node.children().filter(Node::is_element) {
-            match child.tag_name().name() {
-                "joint" => self.joint(child, at)?,
-                "freejoint" => self.robot.links[at.link].is_free = true,
-                _ => {}
-            }
-        }
         let mut geoms: Vec<([u32; 2], String)> = Vec::new();
         for child in node.children().filter(Node::is_element) {
             let inner = || At { depth: at.depth + 1, ..at.clone() };
             match child.tag_name().name() {
                 "body" => self.body(child, &inner())?,
+                "joint" => self.joint(child, at)?,
+                "freejoint" => self.robot.links[at.link].is_free = true,
                 "geom" => self.geom(child, at, &mut geoms)?,
                 "frame" => {
                     let pose = at.frame.compose(&self.pose(child, &self.own(child))?);
@@ -318,7 +323,9 @@ impl<'a, 'i> Model<'a, 'i> {
             _ => self.autolimits && range.is_some(),
         };
         let range = match range.as_deref() {
-            Some([low, high]) if is_limited => [unit(*low), unit(*high)],
+            Some([low, high]) if is_limited && (low != high || of("limited") == Some("true")) => {
+                [unit(*low), unit(*high)]
+            }
             Some([_, _]) | None => [f64::NEG_INFINITY, f64::INFINITY],
             Some(_) => return Err(xml::wrong(node, "two numbers as range of the joint", of("range"))),
         };
@@ -363,7 +370,7 @@ impl<'a, 'i> Model<'a, 'i> {
             half = Some(0.5 * (to - from).length());
         }
         let long = |k: usize| half.map_or_else(|| size(k), Ok);
-        let kind = of("type").unwrap_or(if of("mesh").is_some() { "mesh" } else { "sphere" });
+        let kind = of("type").unwrap_or("sphere");
         if kind != "mesh" && of("mesh").is_some() {
             return Err((xml::place(node), Problem::unsupported(format!("a {kind} fitted to a mesh"))));
         }
@@ -476,7 +483,10 @@ impl<'a, 'i> Model<'a, 'i> {
                 }
             }
         }
-        robot.excepted.extend(excepted);
+        let flags = sections(roots, "option").flat_map(|o| xml::inside(o, "flag"));
+        if !flags.into_iter().any(|flag| flag.attribute("filterparent") == Some("disable")) {
+            robot.excepted.extend(excepted);
+        }
         for node in sections(roots, "contact").flat_map(|c| xml::inside(c, "exclude")) {
             let mut pair = [0; 2];
             for (k, key) in ["body1", "body2"].into_iter().enumerate() {
@@ -488,7 +498,15 @@ impl<'a, 'i> Model<'a, 'i> {
             robot.excepted.push(pair);
         }
         if let Some(node) = sections(roots, "contact").flat_map(|c| xml::inside(c, "pair")).next() {
-            robot.note(xml::place(node), "pairs of geoms that are named are tested where their masks say so");
+            return Err((xml::place(node), Problem::unsupported("a <pair> of geoms")));
+        }
+        for (section, what) in [
+            ("equality", "constraints are not kept: what they couple moves freely"),
+            ("keyframe", "keyframes are not read"),
+        ] {
+            if let Some(node) = sections(roots, section).find(|s| s.has_children()) {
+                robot.note(xml::place(node), what);
+            }
         }
         Ok(self.robot)
     }

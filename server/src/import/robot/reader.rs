@@ -38,7 +38,7 @@ impl Reader<'_> {
     /// or above the text; of `file://PATH` the path; else relative to the text.
     pub fn file(&self, uri: &str) -> String {
         let named = uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://"));
-        if let Some(path) = named {
+        if let Some(path) = named.filter(|path| path.split('/').all(|part| part != "..")) {
             let own = std::path::absolute(self.folder()).unwrap_or_else(|_| self.folder().to_owned());
             let above = own.ancestors().map(Path::to_owned);
             let name = path.split('/').next().unwrap_or_default();
@@ -46,7 +46,7 @@ impl Reader<'_> {
                 let is_package = folder.file_name().is_some_and(|own| own == name);
                 let base = if is_package { folder.parent()?.to_owned() } else { folder };
                 let at = base.join(path);
-                at.is_file().then_some(at)
+                at.exists().then_some(at)
             });
             if let Some(found) = found.as_ref().and_then(|f| f.canonicalize().ok())
                 && let Ok(own) = self.folder().canonicalize()

@@ -9,7 +9,7 @@ use super::reader::{Ask, Reader};
 use super::{mjcf, sdf, urdf};
 use contactd_proto::{MotionState, PoseRecord, Rule};
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// Reads a robot or a world, by what its root element is.
@@ -32,6 +32,16 @@ pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
     };
     let mut robot = robot.map_err(wrong)?;
     robot.root = found.into_inner();
+    let mut joints = HashSet::new();
+    for link in &robot.links {
+        if let Some(dof) = link.dofs.iter().find(|d| !joints.insert(d.name.as_str())) {
+            return Err(of_problem(
+                &file,
+                link.at,
+                Problem::syntax("joints of different names", format!("two {:?}", dof.name)),
+            ));
+        }
+    }
     if let Some(path) = &ask.srdf {
         let file = path.display().to_string();
         let bytes = read_bytes(path, &Limits::default())?;
@@ -132,8 +142,13 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
 
 /// A name that no other object has.
 fn unique(name: String, known: &mut HashMap<String, usize>) -> String {
-    let count = known.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
-    if *count == 1 { name } else { format!("{name} {count}") }
+    let mut own = name.clone();
+    while known.contains_key(&own) {
+        let count = known.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
+        own = format!("{name} {count}");
+    }
+    known.insert(own.clone(), 1);
+    own
 }
 
 /// Values that the robot has, within limits.

@@ -20,7 +20,7 @@ const DEEPEST: usize = 32;
 
 pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     let mut robot = Robot::default();
-    let version = root.attribute("version").and_then(|v| v.parse().ok()).unwrap_or(1.7);
+    let version = version_of(root).unwrap_or([1, 7]);
     let mut all = World { robot: &mut robot, reader, version, links: Vec::new(), depth: 0, count: 0 };
     let worlds: Vec<Node<'_, '_>> = xml::inside(root, "world").collect();
     for node in if worlds.is_empty() { vec![root] } else { worlds } {
@@ -29,6 +29,12 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     let links = std::mem::take(&mut all.links);
     order(&mut robot, links);
     Ok(robot)
+}
+
+/// Major and minor: 1.10 comes after 1.9.
+fn version_of(root: Node<'_, '_>) -> Option<[u32; 2]> {
+    let (major, minor) = root.attribute("version")?.split_once('.')?;
+    Some([major.trim().parse().ok()?, minor.trim().parse().ok()?])
 }
 
 /// What is known where something stands.
@@ -66,7 +72,7 @@ struct Found {
 struct World<'a> {
     robot: &'a mut Robot,
     reader: &'a Reader<'a>,
-    version: f64,
+    version: [u32; 2],
     links: Vec<Found>,
     depth: usize,
     /// Models so far.
@@ -81,6 +87,11 @@ impl World<'_> {
         }
         for include in xml::inside(node, "include") {
             self.include(include, scope)?;
+        }
+        if node.tag_name().name() == "world"
+            && let Some(joint) = xml::inside(node, "joint").next()
+        {
+            return Err((xml::place(joint), Problem::unsupported("a joint of a world")));
         }
         for kind in ["actor", "road", "population", "heightmap"] {
             if let Some(left) = xml::inside(node, kind).next() {
@@ -102,18 +113,26 @@ impl World<'_> {
         if self.depth > DEEPEST {
             return Err((xml::place(node), Problem::Limit { what: "models within models", limit: DEEPEST }));
         }
-        let bytes = std::fs::read(&path).map_err(|e| found(e.to_string()))?;
+        let bytes =
+            super::super::read_bytes(&path, &super::super::Limits::default()).map_err(|e| found(e.to_string()))?;
         let document: Document<'_> = xml::parse(&bytes).map_err(|(at, e)| found(format!("{at}: {e}")))?;
         let inner = Reader { path: &path, ask: self.reader.ask, root: self.reader.root };
         let root = document.root_element();
-        let version = root.attribute("version").and_then(|v| v.parse().ok()).unwrap_or(self.version);
+        let version = version_of(root).unwrap_or(self.version);
         let (links, count) = (Vec::new(), self.count);
         let mut all = World { robot: self.robot, reader: &inner, version, links, depth: self.depth, count };
         let model = xml::inside(root, "model").next();
         let model = model.ok_or_else(|| found("no model in it".into()))?;
         let own = model.attribute("name").unwrap_or("model");
         let name = text(node, "name").unwrap_or(own).to_owned();
-        let pose = xml::inside(node, "pose").next().map(pose_of).transpose()?;
+        if let Some(frame) = xml::inside(node, "placement_frame").next() {
+            return Err((xml::place(frame), Problem::unsupported("<placement_frame>")));
+        }
+        let pose = match xml::inside(node, "pose").next() {
+            None => None,
+            Some(_) => Some(own_pose(node, &[])?),
+        };
+        let scope = &Scope { is_static: scope.is_static || is_true(node, "static"), ..scope.clone() };
         all.model(model, &name, pose, scope).map_err(|(at, e)| found(format!("{at}: {e}")))?;
         let (base, count, mut links) = (self.links.len(), all.count, all.links);
         self.count = count;
@@ -125,7 +144,10 @@ impl World<'_> {
 
     fn model(&mut self, node: Node<'_, '_>, name: &str, placed: Option<Pose>, outer: &Scope) -> Result<()> {
         self.count += 1;
-        let own = xml::inside(node, "pose").next().map(pose_of).transpose()?.unwrap_or(Pose::IDENTITY);
+        if node.attribute("placement_frame").is_some() {
+            return Err((xml::place(node), Problem::unsupported("placement_frame of a model")));
+        }
+        let own = own_pose(node, &[])?;
         let scope = Scope {
             pose: outer.pose.compose(&placed.unwrap_or(own)),
             prefix: if outer.prefix.is_empty() { name.to_owned() } else { format!("{}::{name}", outer.prefix) },
@@ -176,7 +198,7 @@ impl World<'_> {
                 self.robot.note(xml::place(geometry), format!("a collision of {name} has no inside and is left out"));
                 continue;
             }
-            let own = xml::inside(collision, "pose").next().map(pose_of).transpose()?.unwrap_or(Pose::IDENTITY);
+            let own = own_pose(collision, &[name])?;
             let text = shape.at(&own.compose(&Pose::new(DVec3::ZERO, turn)));
             if shape == Shape::Plane {
                 let name = collision.attribute("name").unwrap_or("plane").to_owned();
@@ -220,9 +242,9 @@ impl World<'_> {
             self.robot.note(xml::place(node), format!("the joint {name} closes a loop and is left out"));
             return Ok(());
         }
-        let own = xml::inside(node, "pose").next().map(pose_of).transpose()?.unwrap_or(Pose::IDENTITY);
+        let own = own_pose(node, &[text(node, "child").unwrap_or_default().trim()])?;
         let at = self.links[child].pose;
-        let is_of_model = self.version < 1.45;
+        let is_of_model = self.version < [1, 5];
         let mut dofs = Vec::new();
         let axes: &[&'static str] = match needed(node, "type")? {
             "fixed" => &[],
@@ -252,6 +274,9 @@ impl World<'_> {
             }
             // In the child's frame.
             let way = if of_model { at.rotation.conjugate() * (scope.pose.rotation * way) } else { own.rotation * way };
+            if let Some(mimic) = axis.and_then(|a| xml::inside(a, "mimic").next()) {
+                return Err((xml::place(mimic), Problem::unsupported("<mimic> of a joint of SDFormat")));
+            }
             let limit = axis.and_then(|a| xml::inside(a, "limit").next());
             let bound = |key, none| match limit.and_then(|l| text(l, key)) {
                 None => Ok(none),
@@ -279,6 +304,10 @@ impl World<'_> {
                 zero: 0.0,
                 mimic: None,
             });
+        }
+        if self.links[child].scope.is_static && !dofs.is_empty() {
+            self.robot.note(xml::place(node), format!("the joint {name} is of a static model and does not move"));
+            dofs.clear();
         }
         let found = &mut self.links[child];
         (found.parent, found.link.dofs, found.link.is_free) = (parent, dofs, false);
@@ -318,7 +347,10 @@ impl<'a, 'i> Frames<'a, 'i> {
             let is_frame = ["link", "frame", "joint"].contains(&n.tag_name().name());
             n.attribute("name").filter(|_| is_frame).map(|name| (name, n))
         };
-        Self { model: pose, nodes: model.children().filter_map(named).collect() }
+        // Of a link and a joint of one name, which old files have, the link is meant.
+        let mut all: Vec<(&'a str, Node<'a, 'i>)> = model.children().filter_map(named).collect();
+        all.sort_by_key(|(_, n)| n.tag_name().name() == "link");
+        Self { model: pose, nodes: all.into_iter().collect() }
     }
 
     /// The pose in the world of a frame.
@@ -390,6 +422,18 @@ fn text<'a>(node: Node<'a, '_>, name: &'static str) -> Option<&'a str> {
 
 fn is_true(node: Node<'_, '_>, name: &'static str) -> bool {
     text(node, name).is_some_and(|word| ["1", "true"].contains(&word.trim()))
+}
+
+/// The pose of what stands in its parent element's frame, which may be called by one of some names.
+fn own_pose(node: Node<'_, '_>, names: &[&str]) -> Result<Pose> {
+    let Some(pose) = xml::inside(node, "pose").next() else { return Ok(Pose::IDENTITY) };
+    match pose.attribute("relative_to") {
+        Some(frame) if !frame.is_empty() && !names.contains(&frame) => {
+            let what = format!("a pose of a {} relative to {frame:?}", node.tag_name().name());
+            Err((xml::place(pose), Problem::unsupported(what)))
+        }
+        _ => pose_of(pose),
+    }
 }
 
 /// A pose: a position, and roll, pitch, yaw or a quaternion.

@@ -33,6 +33,18 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
         }
         written.push(node);
     }
+    // Values that macros would have are no geometry; what a macro stands for may be.
+    let is_macro = |n: &Node<'_, '_>| {
+        let is_xacro = n.tag_name().namespace().is_some_and(|space| space.contains("xacro"));
+        n.is_element() && is_xacro && !["arg", "property"].contains(&n.tag_name().name())
+    };
+    let macros = root.descendants().find(is_macro);
+    if let Some(node) = macros {
+        return Err(xml::wrong(node, "URDF without macros: run xacro first", Some(node.tag_name().name())));
+    }
+    if written.is_empty() {
+        return Err(xml::wrong(root, "links of the robot", None));
+    }
     let mut joints: Vec<Option<Joint<'_, '_>>> = written.iter().map(|_| None).collect();
     for node in xml::inside(root, "joint") {
         let end = |tag: &'static str| {
@@ -66,6 +78,9 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     }
     if let Some(joint) = joints.iter().flatten().find(|j| place[j.child].is_none()) {
         return Err(xml::wrong(joint.node, "a tree of links", Some("joints in a circle")));
+    }
+    if let Some(second) = robot.links.iter().filter(|l| l.parent.is_none()).nth(1) {
+        return Err((second.at, Problem::syntax("one root of the tree", format!("a second one, {:?}", second.name))));
     }
     mimics(&robot, root)?;
     robot.except_neighbours();
@@ -122,6 +137,9 @@ fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
         Some(axis) => vector(axis, "xyz", DVec3::X)?,
     };
     let limit = xml::inside(node, "limit").next();
+    if limit.is_none() && matches!(node.attribute("type"), Some("revolute" | "prismatic")) {
+        return Err(xml::wrong(node, "a limit of the joint, which may be continuous", None));
+    }
     let bound = |key, none: f64| Ok(limit.map_or(Ok(None), |l| xml::number(l, key))?.unwrap_or(none));
     let endless = [f64::NEG_INFINITY, f64::INFINITY];
     let anchor = DVec3::ZERO;
@@ -193,6 +211,9 @@ pub(super) fn not_negative(node: Node<'_, '_>, shape: Shape) -> Result<Shape> {
 /// The pose of an element's `origin`.
 fn origin(node: Node<'_, '_>) -> Result<Pose> {
     let Some(origin) = xml::inside(node, "origin").next() else { return Ok(Pose::IDENTITY) };
+    if origin.has_attribute("quat_xyzw") {
+        return Err((xml::place(origin), Problem::unsupported("quat_xyzw of an origin")));
+    }
     Ok(Pose::new(vector(origin, "xyz", DVec3::ZERO)?, roll_pitch_yaw(vector(origin, "rpy", DVec3::ZERO)?)))
 }
 
