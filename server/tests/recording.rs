@@ -16,7 +16,7 @@ use contactd_client::proto::control::{Facets, ModelFile};
 use contactd_client::proto::{Detect, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule, StepRequest};
 use contactd_client::{Object, Session, StepOptions, Transport};
 use glam::DVec3;
-use harness::PATIENCE;
+use harness::{PATIENCE, runtime_folder};
 use numbers::Numbers;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -193,7 +193,7 @@ fn steps() -> u64 {
 
 #[test]
 fn random_sessions_are_repeated_bit_for_bit() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let config = with_root(folder.path());
     // Short and many: what an opening leaves out is seen by the first steps behind it, if at all.
     let (each, sessions) = (steps() / 8, 8);
@@ -262,7 +262,7 @@ fn recorded(folder: &Path) -> (Vec<u8>, Vec<(usize, Vec<u8>)>) {
 
 #[test]
 fn a_file_that_is_cut_anywhere_is_read_up_to_the_cut() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let (bytes, steps) = recorded(folder.path());
     let mut r = Numbers::new(3);
     let cuts = (0..60).map(|_| r.below(bytes.len() as u64) as usize);
@@ -291,7 +291,7 @@ fn a_file_that_is_cut_anywhere_is_read_up_to_the_cut() {
 
 #[test]
 fn a_changed_bit_is_found_and_its_step_named() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let (bytes, steps) = recorded(folder.path());
     let path = folder.path().join("changed.mcap");
     let told = |bytes: &[u8]| {
@@ -392,7 +392,7 @@ fn a_slow_disk_costs_whole_steps_which_are_counted_and_no_step_waits_for_it() {
     let status = session.stop_recording().unwrap();
     assert_eq!(status.steps + status.dropped, k, "{status:?}");
     assert!(status.dropped >= 20 && status.without_picture > 0 && status.failure.is_empty(), "{status:?}");
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let path = folder.path().join("slow.mcap");
     std::fs::write(&path, &*disk.bytes.lock().unwrap()).unwrap();
     let mut recording = Recording::open(&path).unwrap();
@@ -413,6 +413,68 @@ fn a_slow_disk_costs_whole_steps_which_are_counted_and_no_step_waits_for_it() {
     assert_eq!((replayed.difference, replayed.steps, replayed.dropped), (None, status.steps, status.dropped));
 }
 
+/// A disk that has room for some bytes and then refuses so many times.
+#[derive(Clone)]
+struct FullDisk {
+    refusals: usize,
+    bytes: Arc<Mutex<Vec<u8>>>,
+}
+
+impl std::io::Write for FullDisk {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let mut taken = self.bytes.lock().unwrap();
+        let n = if self.refusals > 0 { bytes.len().min(40_000 - taken.len()) } else { bytes.len() };
+        if n == 0 {
+            self.refusals -= 1;
+            return Err(std::io::Error::new(std::io::ErrorKind::StorageFull, "there is no room"));
+        }
+        taken.extend_from_slice(&bytes[..n]);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_disk_without_room_is_asked_again_and_then_ends_the_recording_and_no_step() {
+    // Refuses five times, and for ever.
+    for refusals in [5, usize::MAX] {
+        let disk = FullDisk { refusals, bytes: Arc::default() };
+        let mut session: Session<Embedded> = contactd::embedded(&ServerConfig::default()).unwrap();
+        let ball = session.load_model("ball.csg", "sphere($fn = 0, r = 1);").unwrap();
+        let id = session.add_object(Object::new("", ball.id)).unwrap();
+        session.transport_mut().record_over("a full disk", Box::new(disk.clone())).unwrap();
+        let mut k = 0;
+        loop {
+            session.begin_step(1).unwrap()[0] = PoseRecord::end(id, &Pose::at(DVec3::X * f64::from(k % 8)));
+            session.finish(PATIENCE).map(|_| ()).unwrap();
+            k += 1;
+            let status = session.recording().unwrap();
+            if !status.failure.is_empty() || refusals == 5 && status.bytes > 80_000 {
+                break;
+            }
+            assert!(k < 100_000, "the disk was never full");
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let status = session.stop_recording().unwrap();
+        let folder = runtime_folder();
+        let path = folder.path().join("full.mcap");
+        std::fs::write(&path, &*disk.bytes.lock().unwrap()).unwrap();
+        let replayed = replay(&path, |_| {}).unwrap();
+        assert_eq!(replayed.difference, None);
+        if refusals == 5 {
+            assert_eq!((&*status.failure, status.steps, status.dropped), ("", k as u64, 0));
+            assert!(!replayed.is_cut && replayed.steps == k as u64, "{}", replayed.text());
+        } else {
+            let said = &status.failure;
+            assert!(said.starts_with("a full disk: ") && said.ends_with("there is no room"), "{said}");
+            assert!(replayed.is_cut, "{}", replayed.text());
+        }
+    }
+}
+
 /// The answer of `contactd check` to a scene: ids from 0, times and points.
 fn checked(scene: &Path) -> Vec<(u32, u32, [u64; 5])> {
     use contactd::import::{Facets, Limits, read_scene};
@@ -431,7 +493,7 @@ fn checked(scene: &Path) -> Vec<(u32, u32, [u64; 5])> {
 
 #[test]
 fn a_step_that_was_saved_is_checked_to_the_answer_that_was_given() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let root = folder.path().join("root");
     let mut session = contactd::embedded(&with_root(&root)).unwrap();
     let path = folder.path().join("steps.mcap");
@@ -505,7 +567,7 @@ fn a_step_that_was_saved_is_checked_to_the_answer_that_was_given() {
 
 #[test]
 fn what_cannot_be_recorded_is_refused_with_one_sentence() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let path = folder.path().join("a.mcap");
     let mut session = contactd::embedded(&ServerConfig { deadline_ms: 5, ..ServerConfig::default() }).unwrap();
     let said = session.record(&path).unwrap_err();
@@ -536,7 +598,7 @@ fn what_cannot_be_recorded_is_refused_with_one_sentence() {
 /// A recording in a browser: each run of steps with the same objects is an act, and its steps have the recorded contacts.
 #[test]
 fn a_recording_is_shown_as_it_was() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let path = folder.path().join("shown.mcap");
     let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
     session.record(&path).unwrap();

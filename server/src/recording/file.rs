@@ -32,7 +32,7 @@ pub enum FileError {
     #[error("{0}: expected a readable file, found {1}")]
     Read(String, std::io::Error),
     /// It is no MCAP file, or is none from some place on.
-    #[error("{0}: expected an MCAP file, found damage after {1} entries: {2}")]
+    #[error("{0}: expected an MCAP file, found damage after {1} entries: {cause}", cause = super::with_cause(.2))]
     Damaged(String, u64, McapError),
     /// It holds no recording of contactd.
     #[error("{0}: expected a recording of contactd, found {1}")]

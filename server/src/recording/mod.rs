@@ -22,3 +22,11 @@ pub use message::{About, Change, FORMAT, Opening, StepMessage, topic};
 pub use queue::{LIMIT, Recorder, Tap};
 pub use scene::{SceneFolder, Standing};
 pub use view::schemas;
+
+/// An error of the library's, with its cause: of a disk that is full its own sentence says "I/O error" alone.
+fn with_cause(error: &mcap::McapError) -> String {
+    match std::error::Error::source(error) {
+        Some(cause) => format!("{error}: {cause}"),
+        None => error.to_string(),
+    }
+}

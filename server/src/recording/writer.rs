@@ -14,6 +14,7 @@ use mcap::records::MessageHeader;
 use mcap::write::{Metadata, NoSeek};
 use mcap::{McapResult, WriteOptions, Writer};
 use std::collections::{BTreeMap, HashMap};
+use std::io::ErrorKind::{QuotaExceeded, StorageFull};
 use std::io::{BufWriter, Write};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -25,6 +26,10 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(2);
 /// How often what is written is made sure to be readable.
 const FLUSH: Duration = Duration::from_millis(200);
+/// For how long a disk without room is asked again: somebody may make room, or a file system give back what it holds in reserve.
+const ROOM: Duration = Duration::from_secs(3);
+/// How often it is asked.
+const RETRY: Duration = Duration::from_millis(20);
 /// Bytes of a chunk, about.
 const CHUNK: u64 = 1 << 20;
 /// Steps get no picture while more than one of so many parts of the queue is taken.
@@ -62,7 +67,8 @@ impl Recorder {
             yield_to_others();
             let sink = Counted { sink, load: load.clone() };
             if let Err(e) = write(sink, &from, &load, words) {
-                *load.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = format!("{path}: {e}");
+                *load.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
+                    format!("{path}: {}", super::with_cause(&e));
             }
             ended(load.status(&path));
         };
@@ -74,15 +80,29 @@ impl Recorder {
     }
 }
 
-/// A sink that counts.
+/// A sink that counts, and that asks a disk without room again for a while: meanwhile steps wait in the queue.
 struct Counted {
     sink: Box<dyn Write + Send>,
     load: Arc<Load>,
 }
 
+impl Counted {
+    fn insist(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let begun = Instant::now();
+        loop {
+            match self.sink.write(bytes) {
+                Err(e) if matches!(e.kind(), StorageFull | QuotaExceeded) && begun.elapsed() < ROOM => {
+                    std::thread::sleep(RETRY);
+                }
+                done => return done,
+            }
+        }
+    }
+}
+
 impl Write for Counted {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let n = self.sink.write(bytes)?;
+        let n = self.insist(bytes)?;
         self.load.written.fetch_add(n as u64, Relaxed);
         Ok(n)
     }

@@ -1,6 +1,6 @@
 //! What viewers draw: held against what their schemas require, by a table of its own.
 
-use super::{MODELS, PATIENCE};
+use super::{MODELS, PATIENCE, runtime_folder};
 use contactd::ipc::ServerConfig;
 use contactd_client::Object;
 use contactd_client::proto::{Pose, PoseRecord};
@@ -97,7 +97,7 @@ fn hold(message: &str, value: &Value) {
 
 #[test]
 fn pictures_have_all_that_their_schemas_require() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let path = folder.path().join("seen.mcap");
     let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
     let mut ids = Vec::new();

@@ -1,7 +1,7 @@
 //! Recordings of a server: by an operator, by a session, by its settings; and deaths on either side.
 
 use super::harness::scene::{build, fill};
-use super::harness::{PATIENCE, ServerProcess};
+use super::harness::{PATIENCE, ServerProcess, runtime_folder};
 use contactd::replay::{Replayed, replay};
 use contactd_client::proto::ErrorCode;
 use contactd_client::{Session, SharedMemory};
@@ -64,7 +64,7 @@ fn completed(file: &Path) -> Replayed {
 #[test]
 fn an_operator_records_a_server_and_replays_what_came_of_it() {
     let mut server = ServerProcess::start("taped", "");
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let file = folder.path().join("run.mcap");
     let mut early = Session::connect_to(server.address.clone()).unwrap();
     let ids = build(&mut early, 3);
@@ -127,7 +127,7 @@ fn an_operator_records_a_server_and_replays_what_came_of_it() {
 #[test]
 fn a_server_that_is_killed_leaves_a_file_that_reads_up_to_there() {
     let mut server = ServerProcess::start("fallen", "");
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let file = folder.path().join("run.mcap");
     let (mut child, _out) = recorder(&server, &file);
     let mut session = Session::connect_to(server.address.clone()).unwrap();
@@ -150,7 +150,7 @@ fn a_server_that_is_killed_leaves_a_file_that_reads_up_to_there() {
 #[test]
 fn a_recorder_that_is_killed_ends_its_recording_and_nothing_else() {
     let mut server = ServerProcess::start("orphan", "");
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let file = folder.path().join("run.mcap");
     let (mut child, _out) = recorder(&server, &file);
     let mut session = Session::connect_to(server.address.clone()).unwrap();
@@ -167,7 +167,7 @@ fn a_recorder_that_is_killed_ends_its_recording_and_nothing_else() {
 
 #[test]
 fn settings_record_each_start_into_a_file_of_its_own() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = runtime_folder();
     let path = folder.path().to_str().unwrap().to_owned();
     let mut server = ServerProcess::start_as("always", "", |command| _ = command.args(["--record", &path]));
     let mut session = Session::connect_to(server.address.clone()).unwrap();
