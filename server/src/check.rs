@@ -70,7 +70,8 @@ impl Check {
             parts.push(same.unwrap_or_else(|| Arc::new(MeasuredModel::new(model.clone()))));
         }
         let count = scene.objects.len();
-        let mut world = World::new(count, count);
+        // Of any number of records: an object that is named twice is told as such.
+        let mut world = World::new(count, usize::MAX);
         if let Some(given) = resolution {
             world.set_resolution(Some(given)).map_err(CheckError::Resolution)?;
         } else {

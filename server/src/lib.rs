@@ -61,6 +61,7 @@
 //! | 10 | [`clearance`] | the least clearance of a robot over ranges of its joints |
 //! | 10 | [`overlaps`] | what is in each other of volumes or of a scene |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
+//! | 11 | [`batch`] | many steps of one scene that know nothing of each other |
 //! | 11 | [`replay`] | a recording, repeated and compared |
 //! | 11 | [`view`] | a scene in a browser |
 //! | 12 | [`demo`] | the show |
@@ -94,6 +95,7 @@
 //! The algorithm with its figures, formulas and sources: `docs/algorithm.md`.
 #![forbid(unsafe_code)]
 
+pub mod batch;
 pub mod cache;
 pub mod check;
 pub mod clearance;

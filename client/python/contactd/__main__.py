@@ -8,6 +8,17 @@ from ._native import _command_line
 
 def main() -> None:
     """Runs the command with this process's arguments, and ends the process with its exit status."""
+    if sys.argv[1:2] == ["batch"]:
+        # Tables are read and written by Python's libraries, which come with `contactd[batch]`.
+        try:
+            from .shards import main as batch
+        except ModuleNotFoundError as error:
+            print(f'contactd batch: {error}: pip install "contactd[batch]"', file=sys.stderr)
+            sys.exit(2)
+        try:
+            sys.exit(batch(sys.argv[2:]))
+        except KeyboardInterrupt:
+            sys.exit(130)
     # Python's own answers to signals are for Python programs: Ctrl-C ends a command, and where it serves, it is the server's.
     for number in (signal.SIGINT, signal.SIGXFSZ):
         signal.signal(number, signal.SIG_DFL)

@@ -38,6 +38,11 @@ pub fn of(py: Python<'_>, error: &Error) -> PyErr {
     make(py, kind, &error.to_string(), error.code().map(ErrorCode::number), index)
 }
 
+/// What an engine in this process refuses.
+pub fn refused(py: Python<'_>, sentence: &str, code: ErrorCode) -> PyErr {
+    make(py, "Refused", sentence, Some(code.number()), None)
+}
+
 /// A call that makes no sense now.
 pub fn misuse(py: Python<'_>, sentence: &str) -> PyErr {
     make(py, "Misuse", sentence, None, None)

@@ -7,6 +7,7 @@
 //! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`, `bench.rs`) and where the interpreter's lock is released
 //! around a session that belongs to one thread (`confined.rs`).
 
+mod batch;
 mod bench;
 mod command;
 mod confined;
@@ -29,6 +30,8 @@ use pyo3::prelude::*;
 // References are counted to see what nobody else has (`session.rs`); without the interpreter's lock their number is no proof.
 #[pymodule(gil_used = true)]
 mod _native {
+    #[pymodule_export]
+    use crate::batch::{Batch, batch_key};
     #[pymodule_export]
     use crate::bench::{fields_in_rust, whole_in_rust};
     #[pymodule_export]

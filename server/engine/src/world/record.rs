@@ -157,7 +157,8 @@ fn record(p: &PairOutcome) -> ContactRecord {
     r
 }
 
-fn detail(world: &World, p: &PairOutcome) -> DetailSlot {
+/// The detail slot of a pair of the world's last step.
+pub fn detail(world: &World, p: &PairOutcome) -> DetailSlot {
     let o = &p.outcome;
     // The point that is told: of an overlap the deepest one, where it was asked for.
     let of_contact = o.point().filter(|_| o.meets() && p.plan.report >= Report::Contact);
