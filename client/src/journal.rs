@@ -24,6 +24,8 @@ pub struct Journal {
     resolution: Option<f64>,
     /// The two batches accepted last.
     recent: [Vec<PoseRecord>; 2],
+    /// The batch that was sent last, whether it is like the one accepted last, and how much of the step before it takes.
+    sent: (Vec<PoseRecord>, bool, f64),
     /// How many of them, from the last one back, are not in the tracks yet.
     unread: usize,
 }
@@ -59,20 +61,29 @@ impl Journal {
         self.resolution = resolution;
     }
 
-    /// The server accepted a batch.
-    pub fn accepted(&mut self, records: &[PoseRecord], advance: f64) {
+    /// A batch was sent. It is copied here and compared, while the server works on it; nothing is known of it yet.
+    pub fn sent(&mut self, records: &[PoseRecord], advance: f64) {
         let [_, last] = &self.recent;
         let is_alike = |(r, l): (&PoseRecord, &PoseRecord)| r.object == l.object && r.is_end() && l.is_end();
         // A batch like the last one: of what was before that nothing is left to tell.
         let follows = advance == 1.0 && records.len() == last.len() && records.iter().zip(last).all(is_alike);
+        let (batch, is_like_last, part) = &mut self.sent;
+        batch.clear();
+        batch.extend_from_slice(records);
+        (*is_like_last, *part) = (follows, advance);
+    }
+
+    /// The server accepted the batch that was sent last.
+    pub fn accepted(&mut self) {
+        let (batch, follows, advance) = std::mem::take(&mut self.sent);
         if !follows {
             self.settle();
-            self.tracks.take(records, advance);
+            self.tracks.take(&batch, advance);
         }
         self.unread = if follows { (self.unread + 1).min(2) } else { 0 };
-        self.recent.swap(0, 1);
-        self.recent[1].clear();
-        self.recent[1].extend_from_slice(records);
+        let [older, last] = &mut self.recent;
+        let spare = std::mem::replace(older, std::mem::replace(last, batch));
+        self.sent.0 = spare;
     }
 
     /// Works out the tracks.
@@ -164,7 +175,13 @@ mod tests {
                 (4, _) => records.reverse(),
                 _ => {}
             }
-            late.accepted(&records, advance);
+            // A batch that is refused leaves nothing behind.
+            if r.below(5) == 0 {
+                let other: Vec<PoseRecord> = named.iter().map(|id| PoseRecord::end(*id, &r.pose())).collect();
+                late.sent(&other[..r.below(other.len() as u64 + 1) as usize], 1.0);
+            }
+            late.sent(&records, advance);
+            late.accepted();
             at_once.tracks.take(&records, advance);
             alike[late.unread] += 1;
             if r.below(1500) == 0 {

@@ -219,7 +219,7 @@ impl<T: Transport> Session<T> {
     /// `ServerLost`, `ReplyLost`, `Timeout`, `System`; the session is over in any case.
     pub fn close(mut self) -> Result<(), Error> {
         // Commands wait for steps. A server that does not answer its step has gone, or ends the session when it is done with it.
-        let is_in_flight = matches!(self.stage, Stage::Sent { .. });
+        let is_in_flight = matches!(self.stage, Stage::Sent);
         if is_in_flight && matches!(self.finish(PATIENCE), Err(Error::Timeout | Error::ServerLost | Error::ReplyLost)) {
             return Ok(());
         }

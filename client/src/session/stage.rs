@@ -8,10 +8,7 @@ pub enum Stage {
     /// Its slots are lent to the caller.
     Loaned,
     /// It was sent, and its answer was not received yet.
-    Sent {
-        /// Fraction of the step before it that it takes.
-        advance: f64,
-    },
+    Sent,
     /// The server is gone, or does not have the session that this client knows: reconnect first.
     Lost,
 }

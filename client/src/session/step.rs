@@ -25,7 +25,7 @@ impl<T: Transport> Session<T> {
     /// Whether something else may begin.
     pub(super) fn check_idle(&self) -> Result<(), Error> {
         match self.stage {
-            Stage::Sent { .. } => Err(Error::Misuse("a step is in flight: finish it first")),
+            Stage::Sent => Err(Error::Misuse("a step is in flight: finish it first")),
             Stage::Lost => Err(Error::ServerLost),
             Stage::Idle | Stage::Loaned => Ok(()),
         }
@@ -47,7 +47,7 @@ impl<T: Transport> Session<T> {
         match self.stage {
             Stage::Loaned => {}
             Stage::Lost => return Err(Error::ServerLost),
-            Stage::Idle | Stage::Sent { .. } => return Err(Error::Misuse("no step was begun")),
+            Stage::Idle | Stage::Sent => return Err(Error::Misuse("no step was begun")),
         }
         let o = &self.options;
         let asked = [(o.first, ASK_FIRST), (o.details, ASK_DETAILS), (o.clear, ASK_CLEAR), (o.polling, ASK_POLLING)];
@@ -67,7 +67,11 @@ impl<T: Transport> Session<T> {
         match self.transport.send(request) {
             Ok(()) => {
                 self.step += 1;
-                self.stage = Stage::Sent { advance: o.advance };
+                self.stage = Stage::Sent;
+                if self.transport.may_lose_server() {
+                    // While the server works on it.
+                    self.journal.sent(self.transport.loaned(), o.advance);
+                }
                 Ok(())
             }
             Err(e) => Err(self.failed(e)),
@@ -84,11 +88,11 @@ impl<T: Transport> Session<T> {
         if self.stage == Stage::Loaned {
             self.send()?;
         }
-        let advance = match self.stage {
-            Stage::Sent { advance } => advance,
+        match self.stage {
+            Stage::Sent => {}
             Stage::Lost => return Err(Error::ServerLost),
             _ => return Err(Error::Misuse("no step was begun")),
-        };
+        }
         match self.transport.receive(timeout) {
             Ok(()) => {}
             Err(Error::Timeout) => return Err(Error::Timeout),
@@ -107,7 +111,7 @@ impl<T: Transport> Session<T> {
         }
         (self.stage, self.unanswered) = (Stage::Idle, None);
         if self.transport.may_lose_server() {
-            self.journal.accepted(self.transport.loaned(), advance);
+            self.journal.accepted();
         }
         self.options.advance = 1.0;
         match self.transport.reply() {
@@ -143,7 +147,7 @@ impl<T: Transport> Session<T> {
         let lost = matches!(error, Error::ServerLost | Error::ReplyLost);
         if lost || matches!(error.code(), Some(ErrorCode::SessionGone | ErrorCode::SessionEnded)) {
             self.lose();
-        } else if matches!(self.stage, Stage::Sent { .. }) {
+        } else if matches!(self.stage, Stage::Sent) {
             self.stage = Stage::Idle;
         }
         error
@@ -152,7 +156,7 @@ impl<T: Transport> Session<T> {
     /// The session is no longer what the server has. The journal stands before a batch that has no answer: it is kept. One that
     /// was kept before still has none, unless another is under way.
     pub(super) fn lose(&mut self) {
-        if matches!(self.stage, Stage::Loaned | Stage::Sent { .. }) {
+        if matches!(self.stage, Stage::Loaned | Stage::Sent) {
             self.unanswered = Some(self.transport.loaned().to_vec());
         }
         self.stage = Stage::Lost;
