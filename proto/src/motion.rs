@@ -18,6 +18,7 @@ pub struct Motion {
 
 impl Motion {
     /// An object that stays where it is.
+    #[inline]
     pub fn resting(pose: Pose) -> Self {
         Self { start: pose, velocity: DVec3::ZERO, spin: DVec3::ZERO }
     }
@@ -25,16 +26,18 @@ impl Motion {
     /// The shortest way from `start` to `end`. At exactly 180° the axis is the one the relative quaternion
     /// `end · start⁻¹` carries; of its two signs the one whose first non-zero component is positive.
     pub fn between(start: Pose, end: Pose) -> Self {
-        let q = end.rotation * start.rotation.conjugate();
-        Self { start, velocity: end.position - start.position, spin: rotation_vector(q) }
+        let spin = spin_between(start.rotation, end.rotation);
+        Self { start, velocity: end.position - start.position, spin }
     }
 
     /// From `start` to `end_position`, turning by `rotation_vector` (world axes, radians over the step).
+    #[inline]
     pub fn turning(start: Pose, end_position: DVec3, rotation_vector: DVec3) -> Self {
         Self { start, velocity: end_position - start.position, spin: rotation_vector }
     }
 
     /// The pose at time `t` (fraction of the step).
+    #[inline]
     pub fn at(&self, t: f64) -> Pose {
         let turn = self.spin * t;
         // What does not turn keeps its rotation to the bit: a product with the identity is normalised once more.
@@ -55,6 +58,7 @@ impl Motion {
     }
 
     /// True when neither position nor rotation changes over the step.
+    #[inline]
     pub fn is_rest(&self) -> bool {
         self.velocity == DVec3::ZERO && self.spin == DVec3::ZERO
     }
@@ -70,6 +74,11 @@ pub fn quat_of_rotation_vector(v: DVec3) -> DQuat {
     // sin(a/2)/a without cancellation: s/angle is smooth down to the smallest normal angle.
     let k = s / angle;
     DQuat::from_xyzw(v.x * k, v.y * k, v.z * k, c)
+}
+
+/// The rotation vector of the shortest way between two rotations, world axes.
+pub(crate) fn spin_between(start: DQuat, end: DQuat) -> DVec3 {
+    rotation_vector(end * start.conjugate())
 }
 
 /// The rotation vector of `q` with an angle in [0, π]; `q` need not be exactly unit.

@@ -3,8 +3,10 @@
 //! The server and the client's journal run the same arithmetic on it, so a replayed session continues bit for bit.
 //! The end is kept as it was given: it is not recomputed from the motion, so that nothing creeps over many steps.
 
+use crate::motion::spin_between;
 use crate::pose_record::PoseCommand;
 use crate::{Motion, Pose, PoseRecord};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// An object's last accepted motion and where it ended.
@@ -18,32 +20,53 @@ pub struct MotionState {
 
 impl MotionState {
     /// An object that was put at `pose`.
+    #[inline]
     pub fn resting(pose: Pose) -> Self {
         Self { motion: Motion::resting(pose), end: pose }
     }
 
     /// The pose from which the next step starts when `advance` (0..1) of the last one is taken.
+    #[inline]
     pub fn at(&self, advance: f64) -> Pose {
         if advance == 1.0 { self.end } else { self.motion.at(advance) }
     }
 
     /// The track of the next step, of an object that stands at `start`.
     pub fn ordered(start: Pose, command: PoseCommand) -> Self {
+        let mut state = Self::resting(start);
         match command {
-            PoseCommand::Start(pose) => Self::resting(pose),
-            // Equal rotations mean no rotation, whatever the last bit of their product says.
-            PoseCommand::End(end) if end.rotation == start.rotation => {
-                Self { motion: Motion::turning(start, end.position, glam::DVec3::ZERO), end }
-            }
-            PoseCommand::End(end) => Self { motion: Motion::between(start, end), end },
-            PoseCommand::Turn(position, vector) => {
-                let motion = Motion::turning(start, position, vector);
-                Self { motion, end: Pose::new(position, motion.at(1.0).rotation) }
-            }
+            PoseCommand::Start(pose) => state.put(pose),
+            PoseCommand::End(end) => state.go(start, end),
+            PoseCommand::Turn(position, vector) => state.turn(start, position, vector),
         }
+        state
+    }
+
+    /// In place: the object rests at `pose`.
+    #[inline]
+    pub fn put(&mut self, pose: Pose) {
+        (self.motion.start, self.end) = (pose, pose);
+        (self.motion.velocity, self.motion.spin) = (DVec3::ZERO, DVec3::ZERO);
+    }
+
+    /// In place: the object goes from `start` to `end` the shortest way.
+    #[inline]
+    pub fn go(&mut self, start: Pose, end: Pose) {
+        (self.motion.start, self.end) = (start, end);
+        self.motion.velocity = end.position - start.position;
+        // Equal rotations mean no rotation, whatever the last bit of their product says.
+        let turns = end.rotation != start.rotation;
+        self.motion.spin = if turns { spin_between(start.rotation, end.rotation) } else { DVec3::ZERO };
+    }
+
+    /// In place: the object's origin goes from `start` to `position` while it turns by a rotation vector.
+    pub fn turn(&mut self, start: Pose, position: DVec3, vector: DVec3) {
+        self.motion = Motion::turning(start, position, vector);
+        self.end = Pose::new(position, self.motion.at(1.0).rotation);
     }
 
     /// True when the object did not move, not even by a last bit of its pose: what did comes to rest at its end.
+    #[inline]
     pub fn is_rest(&self) -> bool {
         self.motion.is_rest() && same_bits(&self.motion.start, &self.end)
     }
@@ -106,6 +129,7 @@ impl Tracks {
 }
 
 /// True for poses that are one to the bit; zeros of either sign are two.
+#[inline]
 fn same_bits(a: &Pose, b: &Pose) -> bool {
     let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
     same(&a.position.to_array(), &b.position.to_array()) && same(&a.rotation.to_array(), &b.rotation.to_array())
@@ -115,7 +139,6 @@ fn same_bits(a: &Pose, b: &Pose) -> bool {
 mod tests {
     use super::*;
     use crate::motion::quat_of_rotation_vector;
-    use glam::DVec3;
 
     #[test]
     fn an_end_is_kept_to_the_last_bit() {

@@ -19,6 +19,7 @@ pub const FARTHEST: f64 = 1e150;
 ///
 /// # Errors
 /// `NotFinite` for what is no finite number, or farther from the origin than [`FARTHEST`].
+#[inline]
 pub fn check_position(position: DVec3) -> Result<(), ErrorCode> {
     // Also false for what is not a number.
     let within = position.length_squared() <= FARTHEST * FARTHEST;
@@ -30,6 +31,7 @@ impl Pose {
     pub const IDENTITY: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
 
     /// A placement from its two parts; `rotation` must be a unit quaternion.
+    #[inline]
     pub fn new(position: DVec3, rotation: DQuat) -> Self {
         Self { position, rotation }
     }
@@ -45,11 +47,13 @@ impl Pose {
     }
 
     /// A point of the frame in the parent's coordinates.
+    #[inline]
     pub fn point(&self, local: DVec3) -> DVec3 {
         self.rotation * local + self.position
     }
 
     /// A direction of the frame in the parent's coordinates.
+    #[inline]
     pub fn vector(&self, local: DVec3) -> DVec3 {
         self.rotation * local
     }

@@ -78,35 +78,86 @@ impl PoseRecord {
         Self { object, flags, position: pose.position.to_array(), rotation: pose.rotation.to_array() }
     }
 
-    /// Checks the numbers of a record (pass a copy when it lies in shared memory).
+    /// True for a record that puts its object somewhere before the step.
+    #[inline]
+    pub fn is_start(&self) -> bool {
+        self.flags == START
+    }
+
+    /// Its position.
+    #[inline]
+    pub fn position(&self) -> DVec3 {
+        DVec3::from_array(self.position)
+    }
+
+    /// Its pose; of a [`TURN`] no pose.
+    #[inline]
+    pub fn pose(&self) -> Pose {
+        Pose::new(self.position(), DQuat::from_array(self.rotation))
+    }
+
+    /// The rotation vector of a [`TURN`].
+    #[inline]
+    pub fn rotation_vector(&self) -> DVec3 {
+        let [x, y, z, _] = self.rotation;
+        DVec3::new(x, y, z)
+    }
+
+    /// Checks the numbers of a record, a copy where it lies in shared memory, and makes its quaternion unit.
     ///
     /// # Errors
-    /// `BadCount` for flags out of the protocol and for a [`TURN`] whose last number is not 0, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
-    /// `BadQuaternion`.
-    pub fn decode(&self) -> Result<PoseCommand, ErrorCode> {
-        let position = DVec3::from_array(self.position);
-        check_position(position)?;
+    /// As `decode`; the record is as it was.
+    #[inline]
+    pub fn check(&mut self) -> Result<(), ErrorCode> {
+        // Most records, checked once: numbers whose squares add up to 1 are finite, and such a quaternion is kept as it is.
+        let pose = self.pose();
+        let is_kept = is_unit(pose.rotation, UNIT_TOLERANCE) && check_position(pose.position).is_ok();
+        if is_kept && (self.flags == END || self.flags == START) { Ok(()) } else { self.check_any() }
+    }
+
+    /// Checks any record, in the order in which its errors are told.
+    #[inline(never)]
+    fn check_any(&mut self) -> Result<(), ErrorCode> {
+        check_position(self.position())?;
         if self.rotation.iter().any(|c| !c.is_finite()) {
             return Err(ErrorCode::NotFinite);
         }
         match self.flags {
             TURN => {
-                let [x, y, z, w] = self.rotation;
-                let vector = DVec3::new(x, y, z);
-                if !vector.length_squared().is_finite() {
+                if !self.rotation_vector().length_squared().is_finite() {
                     return Err(ErrorCode::NotFinite);
                 }
                 // A quaternion by mistake: its w would be dropped in silence.
-                if w != 0.0 {
+                if self.rotation[3] != 0.0 {
                     return Err(ErrorCode::BadCount);
                 }
-                Ok(PoseCommand::Turn(position, vector))
             }
-            END => Ok(PoseCommand::End(Pose::new(position, unit_quaternion(self.rotation)?))),
-            START => Ok(PoseCommand::Start(Pose::new(position, unit_quaternion(self.rotation)?))),
-            _ => Err(ErrorCode::BadCount),
+            END | START => self.rotation = unit_quaternion(self.rotation)?.to_array(),
+            _ => return Err(ErrorCode::BadCount),
         }
+        Ok(())
     }
+
+    /// What a record asks for (pass a copy when it lies in shared memory), once its numbers are checked.
+    ///
+    /// # Errors
+    /// `BadCount` for flags out of the protocol and for a [`TURN`] whose last number is not 0, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
+    /// `BadQuaternion`.
+    pub fn decode(&self) -> Result<PoseCommand, ErrorCode> {
+        let mut checked = *self;
+        checked.check()?;
+        Ok(match self.flags {
+            END => PoseCommand::End(checked.pose()),
+            START => PoseCommand::Start(checked.pose()),
+            _ => PoseCommand::Turn(checked.position(), checked.rotation_vector()),
+        })
+    }
+}
+
+/// True when the squared norm of a quaternion is this near to 1; false for what is not finite.
+#[inline]
+fn is_unit(q: DQuat, tolerance: f64) -> bool {
+    (q.length_squared() - 1.0).abs() <= tolerance
 }
 
 /// A quaternion x, y, z, w normalised, if its squared norm is within [`QUATERNION_TOLERANCE`] of 1; to the bit as it is, if that
@@ -119,7 +170,6 @@ pub fn unit_quaternion(q: [f64; 4]) -> Result<DQuat, ErrorCode> {
     if !q.is_finite() {
         return Err(ErrorCode::NotFinite);
     }
-    let is_unit = |q: DQuat, tolerance: f64| (q.length_squared() - 1.0).abs() <= tolerance;
     if !is_unit(q, QUATERNION_TOLERANCE) {
         return Err(ErrorCode::BadQuaternion);
     }

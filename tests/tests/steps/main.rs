@@ -2,6 +2,7 @@
 //! One program for all of them links once; `--test steps NAME::` runs those of one file.
 #![allow(missing_docs)]
 
+mod bodies;
 mod coherence;
 mod dynamics;
 mod effect_costs;

@@ -90,9 +90,10 @@ impl ObjectSpec {
     }
 }
 
-/// An object of the world. What every step looks at comes first and stays together: there are many bodies.
+/// An object of the world. What every step of it reads or writes is here, three lines of a cache: there are many bodies. The rest is
+/// read as if it were here too.
 #[derive(Clone, Debug)]
-#[repr(C)]
+#[repr(C, align(64))]
 pub struct Body {
     /// Its id.
     pub id: u32,
@@ -102,14 +103,20 @@ pub struct Body {
     pub is_static: bool,
     /// It may turn.
     pub rotates: bool,
-    /// Step in which a record named it with a start, and with a motion.
-    pub(super) named: [u64; 2],
-    /// Largest declared speed.
-    pub max_speed: f64,
     /// Largest distance of a corner from the object's origin.
     reach: f64,
     /// Where it stands and how it came there.
     pub motion_state: MotionState,
+    fixed: Box<Fixed>,
+}
+
+const _: () = assert!(size_of::<Body>() == 192);
+
+/// What no step changes of a body, and most steps do not look at.
+#[derive(Clone, Debug)]
+pub struct Fixed {
+    /// Largest declared speed.
+    pub max_speed: f64,
     /// The body as one convex primitive, or one around it; `None` for a body without bounds.
     pub(super) hull: Option<Hull>,
     /// Its model.
@@ -120,6 +127,15 @@ pub struct Body {
     corners: Vec<DVec3>,
     /// Its name.
     pub name: String,
+}
+
+impl std::ops::Deref for Body {
+    type Target = Fixed;
+
+    #[inline]
+    fn deref(&self) -> &Fixed {
+        &self.fixed
+    }
 }
 
 impl Body {
@@ -141,18 +157,19 @@ impl Body {
         let reach = if aabb.is_finite() || aabb.is_empty() { reach } else { f64::INFINITY };
         Self {
             id: spec.id,
-            name: spec.name,
             group,
-            part: spec.part,
             is_static: spec.is_static,
             rotates: spec.rotates,
-            max_speed: spec.max_speed,
-            place: spec.place,
-            motion_state: MotionState::resting(spec.pose),
-            hull,
-            corners,
             reach,
-            named: [0; 2],
+            motion_state: MotionState::resting(spec.pose),
+            fixed: Box::new(Fixed {
+                max_speed: spec.max_speed,
+                hull,
+                part: spec.part,
+                place: spec.place,
+                corners,
+                name: spec.name,
+            }),
         }
     }
 
@@ -182,19 +199,21 @@ impl Body {
 
     /// How far the farthest of its points gets in the first part `s` of its motion, at most: |v|·s along, and the chord of
     /// the angle around, 2 sin(θ/2) <= min(θ, 2).
+    #[inline]
     pub fn travel(&self, s: f64) -> f64 {
         let m = &self.motion_state.motion;
-        let angle = m.spin.length() * s;
+        let angle = if m.spin == DVec3::ZERO { 0.0 } else { m.spin.length() * s };
         let turning = if angle == 0.0 { 0.0 } else { angle.min(2.0) * self.reach };
         (m.velocity.length() * s + turning) * (1.0 + 1e-15)
     }
 
     /// How much farther than `travel` tells the farthest of its points may be from where it was, once the first part `s` of its
-    /// motion is taken: what rounding does to the pose in which that is kept. An end that is taken whole is kept as it was given.
-    pub fn rounding_at(&self, s: f64) -> f64 {
+    /// motion is taken and it stands at `taken`: what rounding does to that pose. An end that is taken whole is kept as it was given.
+    #[inline]
+    pub fn rounding_at(&self, s: f64, taken: &Pose) -> f64 {
         let start = &self.motion_state.motion.start;
         if s < 1.0 {
-            self.rounding(start, &self.motion_state.at(s))
+            self.rounding(start, taken)
         } else if self.motion_state.end.rotation == start.rotation {
             0.0
         } else {
@@ -217,12 +236,14 @@ impl Body {
     }
 
     /// A box that holds the body at the start of its motion.
+    #[inline]
     pub fn still(&self) -> Aabb {
         let start = self.motion_state.motion.start;
         self.around(Aabb::of_points(self.corners.iter().map(|c| start.point(*c))))
     }
 
     /// A box of some of its points, right for unbounded and empty bodies too and rounded outwards.
+    #[inline]
     fn around(&self, of_points: Aabb) -> Aabb {
         if self.reach.is_infinite() {
             return Aabb::ALL;

@@ -95,11 +95,15 @@ pub struct Neighbours {
     sorted: Vec<(u32, u32)>,
     counts: Vec<u32>,
     stale: bool,
+    /// Bodies that move in this step and whose path lengths do not tell that they stay in their grown boxes, in the order in which
+    /// they were moved.
+    beyond: Vec<u32>,
     /// Pairs of boxes compared in this step.
     pub box_tests: u64,
 }
 
 /// The sum, rounded up.
+#[inline]
 fn up(x: f64, y: f64) -> f64 {
     if y == 0.0 { x } else { (x + y).next_up() }
 }
@@ -152,27 +156,36 @@ impl Neighbours {
     }
 
     /// A body was displaced by as much between two steps, and goes as far in this one.
+    #[inline]
     pub fn moved(&mut self, body: u32, before: f64, now: f64) {
         let o = &mut self.path_lengths[body as usize];
         o.start = up(o.start, before);
         o.end = up(o.start, now);
+        // Where the boxes are to be taken anew there may be none of this body: then nobody asks.
+        let fence = self.fences.get(body as usize).copied().unwrap_or(f64::NEG_INFINITY);
+        if !(o.end.is_finite() && o.end <= fence) {
+            self.beyond.push(body);
+        }
     }
 
-    /// A part of a body's last motion is taken.
-    pub fn taken(&mut self, index: u32, body: &Body, part: f64) {
+    /// A part of a body's last motion is taken: it stands at `taken`.
+    #[inline]
+    pub fn taken(&mut self, index: u32, body: &Body, part: f64, taken: &Pose) {
+        let o = &mut self.path_lengths[index as usize];
         let way = if part == 1.0 {
             // All of it, which the path length shows already.
-            let o = &mut self.path_lengths[index as usize];
             o.start = o.end;
-            body.rounding_at(part)
+            body.rounding_at(part, taken)
         } else {
-            body.travel(part) + body.rounding_at(part)
+            body.travel(part) + body.rounding_at(part, taken)
         };
-        self.moved(index, way, 0.0);
+        o.start = up(o.start, way);
+        o.end = o.start;
     }
 
     /// Readies the path lengths for as many bodies.
     pub fn count(&mut self, bodies: usize) {
+        self.beyond.clear();
         self.path_lengths.resize(bodies, PathLength::default());
         self.box_tests = 0;
     }
@@ -182,11 +195,10 @@ impl Neighbours {
     pub fn update(
         &mut self,
         bodies: &[Body],
-        moving: &[u32],
         reach: impl Fn(&Body, f64) -> f64,
         plan: impl Fn(u32, u32) -> Option<(u32, PairPlan, f64)>,
     ) {
-        if !self.stale && moving.iter().all(|i| self.stays(*i as usize, &bodies[*i as usize])) {
+        if !self.stale && self.all_stay(bodies) {
             return;
         }
         self.stale = false;
@@ -266,6 +278,14 @@ impl Neighbours {
             self.homes.push((body.motion_state.motion.start, clearance));
         }
         anew
+    }
+
+    /// True when all bodies stay in their grown boxes over this step.
+    fn all_stay(&mut self, bodies: &[Body]) -> bool {
+        let beyond = std::mem::take(&mut self.beyond);
+        let stay = beyond.iter().all(|i| self.stays(*i as usize, &bodies[*i as usize]));
+        self.beyond = beyond;
+        stay
     }
 
     /// True when a body stays in its grown box over this step: as its path length tells, or because it has come back.

@@ -13,11 +13,11 @@ use crate::solid::Shape;
 
 /// Fills the jobs: the pairs to ask about, plan by plan in the order of their ids; every pair when all are to be told.
 pub(super) fn find(roster: &Roster, state: &mut StepState, options: &StepOptions) {
-    let StepState { neighbours, boxes, swept_shapes, near, jobs, notes, moving, serial, glanced, .. } = state;
+    let StepState { neighbours, boxes, swept_shapes, near, jobs, notes, serial, glanced, .. } = state;
     if let Some(notes) = notes {
         notes.begin(*options);
     }
-    neighbours.update(&roster.bodies, moving, |body, way| roster.reach(body, way), |i, j| roster.pair(i, j));
+    neighbours.update(&roster.bodies, |body, way| roster.reach(body, way), |i, j| roster.pair(i, j));
     boxes.begin(*serial, roster.bodies.len());
     jobs.clear();
     let mut sieve = Sieve { roster, neighbours, boxes, swept_shapes, notes: notes.as_deref_mut(), glanced: 0 };

@@ -4,17 +4,52 @@ use super::body::Body;
 use super::plan::{PairPlan, Plans};
 use crate::math::tolerance;
 use contactd_proto::Detect;
+use contactd_proto::MotionState;
+use contactd_proto::pose::FARTHEST;
 use std::collections::HashMap;
+
+/// What the check of a batch reads and notes of a body: little, so that of many bodies it stays near.
+#[derive(Clone, Copy, Debug)]
+pub struct Head {
+    /// Its id.
+    pub(super) id: u32,
+    pub(super) is_static: bool,
+    /// Something is declared of its motions.
+    pub(super) is_declared: bool,
+    /// It is in the list of those that moved in the last step.
+    pub(super) is_moving: bool,
+    /// Step in which a record named it with a start, and with a motion.
+    pub(super) named: [u64; 2],
+}
+
+impl Head {
+    /// That of a body which no step has named.
+    pub fn of(body: &Body) -> Self {
+        let is_declared = body.is_declared();
+        Self { id: body.id, is_static: body.is_static, is_declared, is_moving: false, named: [0; 2] }
+    }
+}
 
 /// The bodies of a world and what is asked of their pairs.
 #[derive(Debug, Default)]
 pub struct Roster {
     /// In the order of their ids.
     pub(super) bodies: Vec<Body>,
+    /// One for each of them.
+    pub(super) heads: Vec<Head>,
+    /// Some body was put on a track that may lead farther than records lead one.
+    pub(super) is_astray: bool,
     pub(super) by_id: HashMap<u32, u32>,
     pub(super) plans: Plans,
     /// Of every pair; `None`: each pair its default.
     pub(super) resolution: Option<f64>,
+}
+
+/// True for a track that stays within the distances that records keep, all along. Records start and end within `FARTHEST` of the
+/// origin; so do the poses of a track that is restored, and of its velocity this asks no more than that of theirs. Then no body
+/// ever stands beyond three times `FARTHEST`, and the square of every way is a number.
+pub fn is_within(motion_state: &MotionState) -> bool {
+    motion_state.motion.velocity.length_squared() <= 4.1 * FARTHEST * FARTHEST
 }
 
 impl Roster {

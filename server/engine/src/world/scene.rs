@@ -2,7 +2,7 @@
 
 use super::body::{Body, ObjectSpec};
 use super::plan::PairPlan;
-use super::roster::Roster;
+use super::roster::{Head, Roster, is_within};
 use super::state::StepState;
 use contactd_proto::{ErrorCode, MotionState, Pose, Rule};
 use std::fmt;
@@ -119,7 +119,9 @@ impl World {
         self.last_id = Some(spec.id);
         let group = self.roster.plans.group(&spec.group);
         self.roster.by_id.insert(spec.id, self.roster.bodies.len() as u32);
-        self.roster.bodies.push(Body::new(spec, group));
+        let body = Body::new(spec, group);
+        self.roster.heads.push(Head::of(&body));
+        self.roster.bodies.push(body);
         self.state.extend();
         Ok(())
     }
@@ -133,6 +135,7 @@ impl World {
             return Err(Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")));
         };
         self.roster.bodies.remove(index as usize);
+        self.roster.heads.remove(index as usize);
         for (i, body) in self.roster.bodies.iter().enumerate().skip(index as usize) {
             self.roster.by_id.insert(body.id, i as u32);
         }
@@ -191,6 +194,7 @@ impl World {
         }
         for (index, (_, motion_state)) in places.into_iter().zip(motion_states) {
             self.roster.bodies[index as usize].motion_state = *motion_state;
+            self.roster.is_astray |= !is_within(motion_state);
         }
         self.forget();
         Ok(())
@@ -198,15 +202,15 @@ impl World {
 
     /// Forgets what was proven in earlier steps. It changes no answer, only the work of the next ones.
     pub fn forget(&mut self) {
-        self.state.forget(&self.roster.bodies);
+        self.state.forget(&self.roster.bodies, &mut self.roster.heads);
     }
 
     /// Forgets all that steps keep for each other. From here on the world is as one that was made now, of the same bodies on the same
     /// tracks: its answers are that one's to the bit, also where a limit of work cuts them.
     pub fn renew(&mut self) {
         self.state.renew();
-        for body in &mut self.roster.bodies {
-            body.named = [0; 2];
+        for head in &mut self.roster.heads {
+            head.named = [0; 2];
         }
         self.forget();
     }

@@ -5,22 +5,24 @@ use super::boxes::SweptBoxes;
 use super::neighbours::Neighbours;
 use super::notes::Notes;
 use super::outcome::StepOutcome;
+use super::roster::Head;
 use super::search::{self, PairJob};
 use super::swept_shapes::SweptShapes;
 use crate::contact::Scratch;
-use contactd_proto::Pose;
-use contactd_proto::pose_record::PoseCommand;
+use contactd_proto::{Pose, PoseRecord};
 
 /// Memory of the steps.
 #[derive(Debug)]
 pub struct StepState {
     pub(super) max_batch: usize,
     pub(super) serial: u64,
-    pub(super) commands: Vec<(u32, PoseCommand)>,
+    /// The records of the batch, checked, each with the index of its body in place of the id.
+    pub(super) commands: Vec<PoseRecord>,
     /// Where bodies are put at the start of the step, by their indices.
     pub(super) put: Vec<(u32, Pose)>,
-    /// Bodies that moved in the last step.
+    /// Bodies that moved in the last step; and how many of them the batch names.
     pub(super) moving: Vec<u32>,
+    pub(super) named: usize,
     /// When the step begins, in steps taken.
     pub(super) clock: f64,
     pub(super) neighbours: Neighbours,
@@ -49,6 +51,7 @@ impl StepState {
             commands: Vec::new(),
             put: Vec::new(),
             moving: Vec::new(),
+            named: 0,
             clock: 0.0,
             neighbours: Neighbours::default(),
             boxes: SweptBoxes::default(),
@@ -91,9 +94,12 @@ impl StepState {
     }
 
     /// Bodies, their places or the rules have changed: nothing is known any more.
-    pub(super) fn forget(&mut self, bodies: &[Body]) {
+    pub(super) fn forget(&mut self, bodies: &[Body], heads: &mut [Head]) {
         self.neighbours.forget();
         self.moving.clear();
-        self.moving.extend((0..bodies.len()).filter(|i| !bodies[*i].motion_state.is_rest()).map(|i| i as u32));
+        for (i, (body, head)) in bodies.iter().zip(heads).enumerate() {
+            head.is_moving = !body.motion_state.is_rest();
+            self.moving.extend(head.is_moving.then_some(i as u32));
+        }
     }
 }

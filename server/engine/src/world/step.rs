@@ -10,14 +10,15 @@ use super::options::{StepError, StepOptions};
 use super::outcome::{PairOutcome, StepOutcome};
 use super::pairs;
 use super::plan::PairPlan;
-use super::roster::Roster;
+use super::roster::{Head, Roster};
 use super::scene::World;
 use super::search::{self, PairJob};
 use super::state::StepState;
 use super::touch;
 use crate::contact::{Outcome, Status};
-use contactd_proto::pose_record::PoseCommand;
+use contactd_proto::pose_record::{END, START};
 use contactd_proto::{Detect, EffectCounters, ErrorCode, MotionState, Pose, PoseRecord, Report};
+use std::collections::HashMap;
 
 impl World {
     /// One step: `records` name the objects that move (or are put somewhere), all others stay.
@@ -39,7 +40,6 @@ impl World {
         heed: Option<&Heed>,
     ) -> Result<&StepOutcome, StepError> {
         self.check(records, options)?;
-        self.stage(options)?;
         self.take(options);
         pairs::find(&self.roster, &mut self.state, options);
         self.search(options, heed);
@@ -61,55 +61,68 @@ impl World {
         if !fits {
             return refuse(ErrorCode::BadNumber);
         }
-        self.state.serial += 1;
-        self.state.commands.clear();
-        let mut expected = 0;
+        let Self { roster: Roster { heads, by_id, is_astray, .. }, state, .. } = self;
+        let StepState { commands, put, named, serial, .. } = state;
+        *serial += 1;
+        commands.clear();
+        put.clear();
+        *named = 0;
+        // Whether no motion can break what `stage` holds it to.
+        let mut is_sure = !*is_astray;
+        let mut expected = 0usize;
         for (i, record) in records.iter().enumerate() {
             // One copy: another process may write to the slot while it is read.
-            let record = *record;
+            let mut record = *record;
             let refuse = |code| StepError { code, index: Some(i as u32) };
             // Batches mostly name the objects in their order.
-            let next = self.roster.bodies.get(expected as usize).filter(|body| body.id == record.object);
-            let Some(index) = next.map(|_| expected).or_else(|| self.roster.by_id.get(&record.object).copied()) else {
-                return Err(refuse(ErrorCode::UnknownObject));
+            let index = match heads.get(expected) {
+                Some(head) if head.id == record.object => expected,
+                _ => find(heads, by_id, expected, record.object).ok_or(refuse(ErrorCode::UnknownObject))?,
             };
             expected = index + 1;
-            let command = record.decode().map_err(refuse)?;
-            let body = &mut self.roster.bodies[index as usize];
-            if body.is_static {
+            record.check().map_err(refuse)?;
+            let head = &mut heads[index];
+            if head.is_static {
                 return Err(refuse(ErrorCode::StaticObject));
             }
-            let slot = usize::from(!matches!(command, PoseCommand::Start(_)));
-            if body.named[slot] == self.state.serial {
+            let slot = usize::from(!record.is_start());
+            if head.named[slot] == *serial {
                 return Err(refuse(ErrorCode::DuplicateObject));
             }
-            body.named[slot] = self.state.serial;
-            self.state.commands.push((index, command));
+            *named += usize::from(head.is_moving && head.named[1 - slot] != *serial);
+            head.named[slot] = *serial;
+            if record.is_start() {
+                put.push((index as u32, record.pose()));
+            } else {
+                is_sure &= !head.is_declared;
+            }
+            record.object = index as u32;
+            commands.push(record);
         }
-        Ok(())
+        put.sort_unstable_by_key(|(index, _)| *index);
+        if is_sure { Ok(()) } else { self.stage(options) }
     }
 
     /// Checks the motions of the named objects, from where they start.
-    fn stage(&mut self, options: &StepOptions) -> Result<(), StepError> {
-        let Self { roster: Roster { bodies, .. }, state, .. } = self;
-        state.put.clear();
-        for (index, command) in &state.commands {
-            if let PoseCommand::Start(pose) = command {
-                state.put.push((*index, *pose));
-            }
-        }
-        state.put.sort_unstable_by_key(|(index, _)| *index);
-        for (i, (index, command)) in state.commands.iter().enumerate() {
-            let body = &bodies[*index as usize];
-            let (PoseCommand::End(Pose { position, .. }) | PoseCommand::Turn(position, _)) = command else { continue };
-            let start = place_of(&state.put, *index).unwrap_or_else(|| body.motion_state.at(options.advance));
+    #[cold]
+    fn stage(&self, options: &StepOptions) -> Result<(), StepError> {
+        let (bodies, state) = (&self.roster.bodies, &self.state);
+        let mut next = 0;
+        for (i, record) in state.commands.iter().enumerate().filter(|(_, record)| !record.is_start()) {
+            let body = &bodies[record.object as usize];
+            let start = place_of(&state.put, &mut next, record.object);
+            let start = start.unwrap_or_else(|| body.motion_state.at(options.advance));
             let refuse = |code| Err(StepError { code, index: Some(i as u32) });
-            if !(*position - start.position).length_squared().is_finite() {
+            if !(record.position() - start.position).length_squared().is_finite() {
                 return refuse(ErrorCode::NotFinite);
             }
             // Of most bodies nothing is declared, and their motion is worked out once.
-            if body.is_declared() && !body.keeps(&MotionState::ordered(start, *command).motion, options.dt) {
-                return refuse(ErrorCode::Declaration);
+            if body.is_declared() {
+                let mut state = MotionState::resting(start);
+                order(&mut state, start, record);
+                if !body.keeps(&state.motion, options.dt) {
+                    return refuse(ErrorCode::Declaration);
+                }
             }
         }
         Ok(())
@@ -117,35 +130,44 @@ impl World {
 
     /// Takes the batch: from here on nothing is refused.
     fn take(&mut self, options: &StepOptions) {
-        let Self { roster: Roster { bodies, .. }, state, .. } = self;
-        let StepState { neighbours, moving, commands, put, serial, swept_shapes, .. } = state;
+        let Self { roster: Roster { bodies, heads, .. }, state, .. } = self;
+        let StepState { neighbours, moving, named, commands, put, serial, swept_shapes, .. } = state;
         state.clock += options.advance;
         neighbours.count(bodies.len());
         swept_shapes.begin(*serial, bodies.len());
         // What moved and is not named comes to rest.
-        moving.retain(|index| {
-            let body = &mut bodies[*index as usize];
-            if !body.named.contains(serial) && !body.motion_state.is_rest() {
-                neighbours.taken(*index, body, options.advance);
-                body.motion_state = MotionState::resting(body.motion_state.at(options.advance));
+        if *named < moving.len() {
+            for index in moving.iter() {
+                let (body, head) = (&mut bodies[*index as usize], &mut heads[*index as usize]);
+                if head.named.contains(serial) {
+                    continue;
+                }
+                head.is_moving = false;
+                if !body.motion_state.is_rest() {
+                    let was = body.motion_state.at(options.advance);
+                    neighbours.taken(*index, body, options.advance, &was);
+                    body.motion_state.put(was);
+                }
             }
-            false
-        });
-        for (index, command) in commands.iter() {
-            let index = *index;
-            let body = &mut bodies[index as usize];
-            if matches!(command, PoseCommand::Start(_)) && body.named[1] == *serial {
+        }
+        moving.clear();
+        let mut next = 0;
+        for record in commands.iter() {
+            let index = record.object;
+            let (body, head) = (&mut bodies[index as usize], &mut heads[index as usize]);
+            if record.is_start() && head.named[1] == *serial {
                 // Its motion begins there.
                 continue;
             }
             let was = body.motion_state.at(options.advance);
             if !body.motion_state.is_rest() {
-                neighbours.taken(index, body, options.advance);
+                neighbours.taken(index, body, options.advance, &was);
             }
-            let start = place_of(put, index);
-            body.motion_state = MotionState::ordered(start.unwrap_or(was), *command);
+            let start = if head.named[0] == *serial { place_of(put, &mut next, index) } else { None };
+            order(&mut body.motion_state, start.unwrap_or(was), record);
             let jump = start.map_or(0.0, |start| if was == start { 0.0 } else { body.displacement(&was, &start) });
             neighbours.moved(index, jump, body.travel(1.0));
+            head.is_moving = true;
             moving.push(index);
             swept_shapes.moved(index as usize, body);
         }
@@ -247,12 +269,37 @@ fn learn(bodies: &[Body], state: &mut StepState, options: &StepOptions) {
     }
 }
 
-/// Where a body is put at the start of the step: binary search over those that are.
-fn place_of(put: &[(u32, Pose)], index: u32) -> Option<Pose> {
+/// Index of the body of an id that is not where it was expected: of the one before where a batch names its start and then its
+/// motion.
+#[inline(never)]
+fn find(heads: &[Head], by_id: &HashMap<u32, u32>, expected: usize, id: u32) -> Option<usize> {
+    let before = expected.checked_sub(1).filter(|index| heads.get(*index).is_some_and(|head| head.id == id));
+    before.or_else(|| by_id.get(&id).map(|index| *index as usize))
+}
+
+/// A body's track in the step, by a checked record that names it, where it stands at `start`; in place, since it is large.
+#[inline]
+fn order(state: &mut MotionState, start: Pose, record: &PoseRecord) {
+    match record.flags {
+        END => state.go(start, record.pose()),
+        START => state.put(record.pose()),
+        _ => state.turn(start, record.position(), record.rotation_vector()),
+    }
+}
+
+/// Where a body is put at the start of the step. Those that are stand in the order of bodies, and mostly are asked for in it: `next`
+/// is the place of the one that is asked for next.
+#[inline]
+fn place_of(put: &[(u32, Pose)], next: &mut usize, index: u32) -> Option<Pose> {
     if put.is_empty() {
         return None;
     }
-    put.binary_search_by_key(&index, |(k, _)| *k).ok().map(|k| put[k].1)
+    let place = match put.get(*next) {
+        Some((k, _)) if *k == index => *next,
+        _ => put.binary_search_by_key(&index, |(k, _)| *k).ok()?,
+    };
+    *next = place + 1;
+    Some(put[place].1)
 }
 
 /// Counts what was worked out for a pair in this step; what was known of it costs nothing.

@@ -11,6 +11,9 @@ use crate::contact::SweptShape;
 pub struct SweptShapes {
     swept_shapes: Vec<SweptShape>,
     uses: Vec<Use>,
+    /// The last step in which any was looked at; and that it was the one before this.
+    looked: u64,
+    looked_before: bool,
     /// The step that they are of.
     serial: u64,
 }
@@ -25,7 +28,7 @@ struct Use {
 impl SweptShapes {
     /// A step of so many bodies begins; serials go up by one and begin with 1.
     pub fn begin(&mut self, serial: u64, bodies: usize) {
-        self.serial = serial;
+        (self.serial, self.looked_before) = (serial, self.looked + 1 == serial);
         self.swept_shapes.resize(bodies, SweptShape::default());
         self.uses.resize(bodies, Use::default());
     }
@@ -33,7 +36,7 @@ impl SweptShapes {
     /// A body has got its track for this step.
     #[inline]
     pub fn moved(&mut self, index: usize, body: &Body) {
-        if self.uses[index].looked + 1 == self.serial {
+        if self.looked_before && self.uses[index].looked + 1 == self.serial {
             self.take(index, body);
         }
     }
@@ -46,6 +49,7 @@ impl SweptShapes {
                 self.take(i, &bodies[i])?;
             }
             self.uses[i].looked = self.serial;
+            self.looked = self.serial;
         }
         Some(indices.map(|i| &self.swept_shapes[i]))
     }

@@ -187,6 +187,21 @@ fn steps_continue_where_the_last_one_ended_or_was_stopped() {
 }
 
 #[test]
+fn from_where_a_restored_track_has_led_beyond_all_numbers_no_way_is_taken() {
+    let mut world = World::new(1, 1);
+    world.add_object(object(1, &ball(1.0), DVec3::ZERO)).unwrap();
+    let velocity = DVec3::X * 1e200;
+    let motion = contactd_proto::Motion { velocity, ..contactd_proto::Motion::resting(Pose::IDENTITY) };
+    world.restore(&[(1, contactd_proto::MotionState { motion, end: Pose::IDENTITY })]).unwrap();
+    let half = StepOptions { advance: 0.5, ..StepOptions::default() };
+    let error = world.step(&[to(1, 0.0, 0.0)], &half).unwrap_err();
+    assert_eq!(error, StepError { code: ErrorCode::NotFinite, index: Some(0) });
+    // Taken whole it ends where it was said to.
+    world.step(&[to(1, 1.0, 0.0)], &StepOptions::default()).unwrap();
+    assert_eq!(world.body(1).unwrap().motion_state.end.position, DVec3::X);
+}
+
+#[test]
 fn a_turn_is_kept_whole() {
     let mut world = World::new(10, 10);
     let bar = slab(DVec3::new(3.0, 0.1, 0.1));
