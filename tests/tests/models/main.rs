@@ -8,6 +8,7 @@ mod cache;
 mod clearance;
 mod corpus;
 mod files;
+mod frames;
 mod gdml;
 mod gltf;
 mod heights;

@@ -40,7 +40,7 @@ pub(super) struct Arm {
     pub links: Vec<Geometry>,
 }
 
-fn turn(axis: DVec3, angle: f64) -> DMat4 {
+pub(super) fn turn(axis: DVec3, angle: f64) -> DMat4 {
     // Rodrigues' formula, entry by entry.
     let (s, c) = angle.sin_cos();
     let (x, y, z) = (axis.x, axis.y, axis.z);
@@ -205,7 +205,7 @@ impl Arm {
     }
 }
 
-fn words(v: DVec3) -> String {
+pub(super) fn words(v: DVec3) -> String {
     format!("{:?} {:?} {:?}", v.x, v.y, v.z)
 }
 
@@ -408,7 +408,7 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
             "a.sdf",
             "<sdf version=\"1.9\"><model name=\"m\"><pose relative_to=\"f\">1 0 0 0 0 0</pose></model></sdf>",
             &none,
-            "a pose of a model relative to \"f\"",
+            "a.sdf:1:20: expected frames that are there and lead to the scope's own, found \"f\", which is no frame of the scope",
         ),
         (
             "a.xml",

@@ -1,10 +1,11 @@
 //! The tree of links, and where they stand.
 
+use super::super::problem::Problem;
 use super::super::{Note, Place};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use glam::{DQuat, DVec3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::PathBuf;
 
 /// Joint values by name: radians of a hinge, metres of a slide.
@@ -84,7 +85,7 @@ pub struct Robot {
     /// Its links, parents first.
     pub links: Vec<Link>,
     /// Pairs of links, by index, that are not tested.
-    pub excepted: Vec<[usize; 2]>,
+    pub excepted: HashSet<[usize; 2]>,
     /// What was left out or taken in another way.
     pub notes: Vec<Note>,
     /// The folder that holds the file and all packages that its meshes are in, where these are not in its own folder.
@@ -95,6 +96,36 @@ impl Robot {
     /// The degrees of freedom that have values of their own.
     pub fn free(&self) -> impl Iterator<Item = &Dof> {
         self.links.iter().flat_map(|l| &l.dofs).filter(|d| d.mimic.is_none())
+    }
+
+    /// What was left out, as a note.
+    pub(super) fn note(&mut self, at: Place, text: impl Into<String>) {
+        self.notes.push(Note { at, text: text.into(), amount: None });
+    }
+
+    /// Lets each joint that follows one that follows another one follow the last of them.
+    ///
+    /// # Errors
+    /// Joints that follow each other in a circle.
+    pub(super) fn follow(&mut self) -> Result<(), (Place, Problem)> {
+        let told: HashMap<String, (String, f64, f64)> =
+            self.links.iter().flat_map(|l| &l.dofs).filter_map(|d| Some((d.name.clone(), d.mimic.clone()?))).collect();
+        for link in &mut self.links {
+            for dof in &mut link.dofs {
+                let Some((leader, factor, offset)) = &mut dof.mimic else { continue };
+                let mut left = told.len();
+                while let Some((next, f, o)) = told.get(leader) {
+                    if left == 0 {
+                        let found = format!("joints that follow each other in a circle, {:?} among them", dof.name);
+                        return Err((link.at, Problem::syntax("a joint that moves by itself and is followed", found)));
+                    }
+                    left -= 1;
+                    // factor (f x + o) + offset
+                    (*leader, *offset, *factor) = (next.clone(), *offset + *factor * o, *factor * f);
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The value of a degree of freedom.

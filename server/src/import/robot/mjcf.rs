@@ -495,7 +495,7 @@ impl<'a, 'i> Model<'a, 'i> {
                 pair[k] = found.ok_or_else(|| xml::wrong(node, "the name of a body", Some(name)))?;
             }
             pair.sort_unstable();
-            robot.excepted.push(pair);
+            robot.excepted.insert(pair);
         }
         if let Some(node) = sections(roots, "contact").flat_map(|c| xml::inside(c, "pair")).next() {
             return Err((xml::place(node), Problem::unsupported("a <pair> of geoms")));

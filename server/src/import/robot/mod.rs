@@ -7,11 +7,13 @@
 //! A step leads from joint values to others at constant rates. What a link does then is told exactly, or refused: links of which one
 //! hinge moves, and slides before it, and slides along its axis after it, go straight and turn at a constant rate.
 
+mod frames;
 mod kinematics;
 mod mjcf;
 mod reader;
 mod scene;
 mod sdf;
+mod sdf_elements;
 mod shape;
 mod urdf;
 

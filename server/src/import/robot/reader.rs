@@ -1,6 +1,8 @@
 //! What is asked of a robot's file, and where the files are that it names.
 
-use super::kinematics::Values;
+use super::super::{Place, xml};
+use super::kinematics::{Robot, Values};
+use roxmltree::Node;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -23,15 +25,21 @@ pub struct Ask {
 pub(super) struct Reader<'a> {
     /// The file.
     pub path: &'a Path,
+    /// Its folder, as the first file's texts name it: relative to that one's folder, or from the machine's root.
+    pub base: PathBuf,
+    /// What includes it: the place in the first file.
+    pub within: Option<Place>,
     pub ask: &'a Ask,
+    /// The folder of the first file.
+    pub main: &'a Path,
     /// The folder that holds the text and all packages that were found elsewhere.
     pub root: &'a RefCell<Option<PathBuf>>,
 }
 
 impl Reader<'_> {
-    /// The folder that names are relative to.
+    /// The folder that the file is in.
     pub fn folder(&self) -> &Path {
-        self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+        folder_of(self.path)
     }
 
     /// The file that a mesh's name means: of `package://NAME/PATH`, `model://NAME/PATH` the folder NAME among the packages, or beside
@@ -57,8 +65,35 @@ impl Reader<'_> {
             }
             return found.unwrap_or_else(|| path.into()).display().to_string();
         }
-        uri.strip_prefix("file://").unwrap_or(uri).to_owned()
+        match uri.strip_prefix("file://") {
+            Some(path) => path.to_owned(),
+            None => self.base.join(uri).display().to_string(),
+        }
     }
+
+    /// The folder of the first file, which texts are relative to.
+    pub fn main_folder(&self) -> &Path {
+        self.main
+    }
+
+    /// Where a node stands; of an included file where that is included.
+    pub fn place(&self, node: Node<'_, '_>) -> Place {
+        self.within.unwrap_or_else(|| xml::place(node))
+    }
+
+    /// What was left out, as a note; of an included file with its name.
+    pub fn note(&self, robot: &mut Robot, node: Node<'_, '_>, text: String) {
+        let text = match self.within {
+            None => text,
+            Some(_) => format!("{}:{}: {text}", self.path.display(), xml::place(node)),
+        };
+        robot.note(self.place(node), text);
+    }
+}
+
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The folder that holds two of them.

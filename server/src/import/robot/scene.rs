@@ -3,14 +3,14 @@
 use super::super::openscad::Access;
 use super::super::problem::Problem;
 use super::super::scene::{ModelSource, Scene, SceneError, SceneObject};
-use super::super::{Limits, Note, Place, read_bytes, xml};
+use super::super::{Limits, Place, read_bytes, xml};
 use super::kinematics::{Part, Robot, Values};
-use super::reader::{Ask, Reader};
+use super::reader::{self, Ask, Reader};
 use super::{mjcf, sdf, urdf};
 use contactd_proto::{MotionState, PoseRecord, Rule};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads a robot or a world, by what its root element is.
 ///
@@ -22,7 +22,8 @@ pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
     let wrong = |(at, problem): (Place, Problem)| of_problem(&file, at, problem);
     let document = xml::parse(&bytes).map_err(wrong)?;
     let found = RefCell::new(None);
-    let reader = Reader { path, ask, root: &found };
+    let main = reader::folder_of(path);
+    let reader = Reader { path, base: PathBuf::new(), within: None, ask, main, root: &found };
     let root = document.root_element();
     let robot = match root.tag_name().name() {
         "robot" => urdf::read(root, &reader),
@@ -197,13 +198,8 @@ impl Robot {
     pub(super) fn except_neighbours(&mut self) {
         for i in 0..self.links.len() {
             if let Some(parent) = self.links[i].parent {
-                self.excepted.push([parent.min(i), parent.max(i)]);
+                self.excepted.insert([parent.min(i), parent.max(i)]);
             }
         }
-    }
-
-    /// What was left out, as a note.
-    pub(super) fn note(&mut self, at: Place, text: impl Into<String>) {
-        self.notes.push(Note { at, text: text.into(), amount: None });
     }
 }

@@ -1,47 +1,55 @@
 //! SDFormat: worlds and models with their links, joints and frames.
 //!
 //! Source: sdformat.org/spec. A pose is relative to the frame that it names, else to its parent element's; a joint's to its child.
-//! Links of a model are tested against each other where `self_collide` says so; static models against all others.
+//! Links of a model are tested against each other where `self_collide` says so; static models against all others. What is in a model
+//! is called `MODEL::NAME`, joints too; those of a file that has one model are called by their own names.
 
 use super::super::problem::Problem;
-use super::super::xml;
+use super::super::{Place, xml};
+use super::frames::{Attached, Frames, Lost};
 use super::kinematics::{Dof, DofKind, Link, Part, Robot};
 use super::reader::Reader;
+use super::sdf_elements::{geometry_of, is_true, placed, text, version_of};
 use super::shape::{Shape, union};
-use super::urdf::{Result, needed, not_negative, numbers_of, roll_pitch_yaw, vector_of};
+use super::urdf::{Result, needed, vector_of};
 use contactd_proto::Pose;
-use contactd_proto::pose_record::unit_quaternion;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 /// Models within models.
 const DEEPEST: usize = 32;
 
 pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
-    let mut robot = Robot::default();
-    let version = version_of(root).unwrap_or([1, 7]);
-    let mut all = World { robot: &mut robot, reader, version, links: Vec::new(), depth: 0, count: 0 };
+    let file = File { reader, version: version_of(root).unwrap_or([1, 7]) };
+    let mut all = World { robot: Robot::default(), links: Vec::new(), short: HashMap::new(), depth: 0, count: 0 };
     let worlds: Vec<Node<'_, '_>> = xml::inside(root, "world").collect();
     for node in if worlds.is_empty() { vec![root] } else { worlds } {
-        all.models(node, &Scope::WORLD)?;
+        all.scope(node, &file, &Scope::WORLD)?;
     }
-    let links = std::mem::take(&mut all.links);
+    let World { mut robot, links, short, .. } = all;
+    let is_one_model = links.iter().all(|l| l.scope.model == Some(1));
     order(&mut robot, links);
+    let own = |name: &str| short.get(name).cloned().filter(|_| is_one_model).unwrap_or_else(|| name.to_owned());
+    for dof in robot.links.iter_mut().flat_map(|l| &mut l.dofs) {
+        dof.name = own(&dof.name);
+        dof.mimic.iter_mut().for_each(|(leader, ..)| *leader = own(leader));
+    }
+    robot.follow()?;
     Ok(robot)
 }
 
-/// Major and minor: 1.10 comes after 1.9.
-fn version_of(root: Node<'_, '_>) -> Option<[u32; 2]> {
-    let (major, minor) = root.attribute("version")?.split_once('.')?;
-    Some([major.trim().parse().ok()?, minor.trim().parse().ok()?])
+/// A file, and how it is to be read.
+struct File<'a> {
+    reader: &'a Reader<'a>,
+    version: [u32; 2],
 }
 
 /// What is known where something stands.
 #[derive(Clone, Debug)]
 struct Scope {
-    /// Its frame in the world.
-    pose: Pose,
     /// What its links are called before their own names.
     prefix: String,
     is_static: bool,
@@ -51,13 +59,11 @@ struct Scope {
 }
 
 impl Scope {
-    const WORLD: Self = Self {
-        pose: Pose::IDENTITY,
-        prefix: String::new(),
-        is_static: false,
-        model: None,
-        collides_with_itself: false,
-    };
+    const WORLD: Self = Self { prefix: String::new(), is_static: false, model: None, collides_with_itself: false };
+
+    fn whole(&self, name: &str) -> String {
+        if self.prefix.is_empty() { name.to_owned() } else { format!("{}::{name}", self.prefix) }
+    }
 }
 
 /// A link before its parents are known to come first.
@@ -65,140 +71,227 @@ struct Found {
     link: Link,
     /// The link above, by its index among those found.
     parent: Option<usize>,
+    /// In the scope that is being read, in the end in the world.
     pose: Pose,
     scope: Scope,
 }
 
-struct World<'a> {
-    robot: &'a mut Robot,
-    reader: &'a Reader<'a>,
-    version: [u32; 2],
+/// A model within: what its frame is called, where it stands, and its links.
+struct Inner {
+    at: Place,
+    frame: String,
+    links: Range<usize>,
+}
+
+struct World {
+    robot: Robot,
     links: Vec<Found>,
+    /// Own names of joints that stand in the first model itself, by their whole ones.
+    short: HashMap<String, String>,
     depth: usize,
     /// Models so far.
     count: usize,
 }
 
-impl World<'_> {
-    /// The models in a node, and those that it includes.
-    fn models(&mut self, node: Node<'_, '_>, scope: &Scope) -> Result<()> {
+impl World {
+    /// What is in a world or a model, with its frames. Its links stand in its frame then.
+    fn scope(&mut self, node: Node<'_, '_>, file: &File<'_>, scope: &Scope) -> Result<Frames> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err((xml::place(node), Problem::Limit { what: "models within models", limit: DEEPEST }));
+        }
+        let is_model = scope.model.is_some();
+        let mut frames =
+            if is_model { Frames::new("__model__", Attached::Nothing) } else { Frames::new("world", Attached::World) };
+        let mut links = Vec::new();
+        for link in xml::inside(node, "link").filter(|_| is_model) {
+            let name = needed(link, "name")?;
+            let index = self.links.len();
+            links.push((link, name, index));
+            self.links.push(Found::new(name, link, file, scope));
+            add(&mut frames, link, name, placed(link)?, Attached::Link(index), file)?;
+        }
+        let mut inner = Vec::new();
         for model in xml::inside(node, "model") {
-            self.model(model, model.attribute("name").unwrap_or("model"), None, scope)?;
+            let name = model.attribute("name").unwrap_or("model");
+            inner.push(self.model(model, file, &Placement::of(model, name, file)?, (scope, &mut frames))?);
         }
         for include in xml::inside(node, "include") {
-            self.include(include, scope)?;
+            inner.push(self.include(include, file, scope, &mut frames)?);
         }
-        if node.tag_name().name() == "world"
-            && let Some(joint) = xml::inside(node, "joint").next()
-        {
-            return Err((xml::place(joint), Problem::unsupported("a joint of a world")));
+        if is_model {
+            let first = links.first().map(|l| l.1.to_owned()).or_else(|| inner.first().map(|i| i.frame.clone()));
+            let chosen = node.attribute("canonical_link").filter(|name| !name.is_empty()).map(str::to_owned);
+            frames.set_root(chosen.or(first).map_or(Attached::Nothing, Attached::Frame));
         }
+        self.named(node, file, &mut frames)?;
+        for Inner { at: asker, frame, links } in &inner {
+            let at = frames.pose(frame, frames.root()).map_err(|e| (*asker, lost(&e)))?;
+            self.links[links.clone()].iter_mut().for_each(|l| l.pose = at.compose(&l.pose));
+        }
+        for (node, name, index) in &links {
+            self.links[*index].pose = frames.pose(name, frames.root()).map_err(|e| (xml::place(*node), lost(&e)))?;
+            self.link(*node, file, &frames, (name, *index))?;
+        }
+        let first = links.first().map(|l| l.2).into_iter().chain(inner.first().map(|i| i.links.start)).min();
+        for joint in xml::inside(node, "joint") {
+            self.joint(joint, file, &frames, scope)?;
+        }
+        self.leaders(node, scope, first.unwrap_or(self.links.len()))?;
         for kind in ["actor", "road", "population", "heightmap"] {
             if let Some(left) = xml::inside(node, kind).next() {
-                self.robot.note(xml::place(left), format!("{kind} is left out: it is not read"));
+                file.reader.note(&mut self.robot, left, format!("{kind} is left out: it is not read"));
             }
+        }
+        self.depth -= 1;
+        Ok(frames)
+    }
+
+    /// Adds the frames that have names of their own, and those of joints.
+    fn named(&self, node: Node<'_, '_>, file: &File<'_>, frames: &mut Frames) -> Result<()> {
+        for frame in xml::inside(node, "frame") {
+            let to = frame.attribute("attached_to").map(str::trim).filter(|to| !to.is_empty());
+            let to = to.unwrap_or(frames.root()).to_owned();
+            let (pose, of) = placed(frame)?;
+            let of = of.unwrap_or_else(|| to.clone());
+            add(frames, frame, needed(frame, "name")?, (pose, Some(of)), Attached::Frame(to), file)?;
+        }
+        for joint in xml::inside(node, "joint") {
+            let child = text(joint, "child").unwrap_or_default().trim().to_owned();
+            let (pose, of) = placed(joint)?;
+            let of = of.unwrap_or_else(|| child.clone());
+            add(frames, joint, needed(joint, "name")?, (pose, Some(of)), Attached::Frame(child), file)?;
         }
         Ok(())
     }
 
     /// A model of another file.
-    fn include(&mut self, node: Node<'_, '_>, scope: &Scope) -> Result<()> {
-        let uri = text(node, "uri").ok_or_else(|| xml::wrong(node, "the uri of what is included", None))?;
-        let file = self.reader.file(uri.trim());
-        let folder = self.reader.folder().join(&file);
-        // A model's folder, whose file is model.sdf; or the file itself.
-        let path = if folder.is_dir() { folder.join("model.sdf") } else { folder };
-        let found = |e: String| xml::wrong(node, format!("the model {uri}, as {}", path.display()), Some(&e));
-        self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err((xml::place(node), Problem::Limit { what: "models within models", limit: DEEPEST }));
-        }
+    fn include(&mut self, node: Node<'_, '_>, file: &File<'_>, scope: &Scope, frames: &mut Frames) -> Result<Inner> {
+        let uri = text(node, "uri").ok_or_else(|| xml::wrong(node, "the uri of what is included", None))?.trim();
+        let named = file.reader.file(uri);
+        let path = file.reader.main_folder().join(&named);
+        // A model's folder, or the file itself.
+        let (path, base) = if path.is_dir() {
+            (model_file(&path), PathBuf::from(&named))
+        } else {
+            (path, Path::new(&named).parent().map(Path::to_owned).unwrap_or_default())
+        };
+        let found = |e: String| {
+            let sentence = Problem::syntax(format!("the model {uri}, as {}", path.display()), e);
+            (xml::place(node), sentence)
+        };
         let bytes =
             super::super::read_bytes(&path, &super::super::Limits::default()).map_err(|e| found(e.to_string()))?;
-        let document: Document<'_> = xml::parse(&bytes).map_err(|(at, e)| found(format!("{at}: {e}")))?;
-        let inner = Reader { path: &path, ask: self.reader.ask, root: self.reader.root };
-        let root = document.root_element();
-        let version = version_of(root).unwrap_or(self.version);
-        let (links, count) = (Vec::new(), self.count);
-        let mut all = World { robot: self.robot, reader: &inner, version, links, depth: self.depth, count };
-        let model = xml::inside(root, "model").next();
-        let model = model.ok_or_else(|| found("no model in it".into()))?;
-        let own = model.attribute("name").unwrap_or("model");
-        let name = text(node, "name").unwrap_or(own).to_owned();
-        if let Some(frame) = xml::inside(node, "placement_frame").next() {
-            return Err((xml::place(frame), Problem::unsupported("<placement_frame>")));
-        }
-        let pose = match xml::inside(node, "pose").next() {
-            None => None,
-            Some(_) => Some(own_pose(node, &[])?),
+        let told = |(at, problem): (Place, Problem)| {
+            let named = Problem::Named { file: path.display().to_string(), at, problem: Box::new(problem) };
+            (xml::place(node), named)
         };
+        let document: Document<'_> = xml::parse(&bytes).map_err(told)?;
+        let root = document.root_element();
+        let within = Some(file.reader.place(node));
+        let reader = Reader { path: &path, base, within, ..*file.reader };
+        let inner = File { reader: &reader, version: version_of(root).unwrap_or(file.version) };
+        let model = xml::inside(root, "model").next().ok_or_else(|| found("no model in it".into()))?;
+        let name = text(node, "name").map(str::trim).unwrap_or(model.attribute("name").unwrap_or("model"));
+        let mut place = Placement::of(model, name, file).map_err(told)?;
+        let frame = text(node, "placement_frame").map(|frame| frame.trim().to_owned());
+        if xml::inside(node, "pose").next().is_some() {
+            (place.pose, place.of) = placed(node)?;
+        } else if frame.is_some() {
+            return Err(xml::wrong(node, "a pose beside the placement_frame", None));
+        }
+        place.frame = frame.or(place.frame);
+        place.is_merged = node.attribute("merge").is_some_and(|word| ["1", "true"].contains(&word));
+        if place.is_merged && scope.model.is_none() {
+            return Err(xml::wrong(node, "an include that is merged within a model", Some("one within a world")));
+        }
         let scope = &Scope { is_static: scope.is_static || is_true(node, "static"), ..scope.clone() };
-        all.model(model, &name, pose, scope).map_err(|(at, e)| found(format!("{at}: {e}")))?;
-        let (base, count, mut links) = (self.links.len(), all.count, all.links);
-        self.count = count;
-        links.iter_mut().for_each(|l| l.parent = l.parent.map(|p| p + base));
-        self.links.append(&mut links);
-        self.depth -= 1;
-        Ok(())
+        place.asker = Some(file.reader.place(node));
+        self.model(model, &inner, &place, (scope, frames)).map_err(|(at, e)| match place.asker {
+            // What is wrong with the name or the place of the include itself.
+            Some(asker) if asker == at && matches!(e, Problem::Syntax { .. }) => (at, e),
+            _ => told((at, e)),
+        })
     }
 
-    fn model(&mut self, node: Node<'_, '_>, name: &str, placed: Option<Pose>, outer: &Scope) -> Result<()> {
+    /// A model, whose frames are added to those around it.
+    fn model(
+        &mut self,
+        node: Node<'_, '_>,
+        file: &File<'_>,
+        place: &Placement,
+        (outer, around): (&Scope, &mut Frames),
+    ) -> Result<Inner> {
+        let at = place.asker.unwrap_or(xml::place(node));
         self.count += 1;
-        if node.attribute("placement_frame").is_some() {
-            return Err((xml::place(node), Problem::unsupported("placement_frame of a model")));
-        }
-        let own = own_pose(node, &[])?;
+        let name = self.own_name(place, around, at)?;
         let scope = Scope {
-            pose: outer.pose.compose(&placed.unwrap_or(own)),
-            prefix: if outer.prefix.is_empty() { name.to_owned() } else { format!("{}::{name}", outer.prefix) },
+            prefix: if place.is_merged { outer.prefix.clone() } else { outer.whole(&name) },
             is_static: outer.is_static || is_true(node, "static"),
             model: outer.model.or(Some(self.count)),
             collides_with_itself: outer.collides_with_itself || is_true(node, "self_collide"),
         };
         let first = self.links.len();
-        let frames = Frames::of(node, scope.pose);
-        let mut index = HashMap::new();
-        for link in xml::inside(node, "link") {
-            let name = needed(link, "name")?;
-            index.insert(name.to_owned(), self.links.len());
-            let found = self.link(link, name, frames.pose(name, link)?, &scope)?;
-            self.links.push(found);
-        }
-        self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err((xml::place(node), Problem::Limit { what: "models within models", limit: DEEPEST }));
-        }
-        let before = self.links.len();
-        self.models(node, &scope)?;
-        self.depth -= 1;
-        // Links of models within are called by the names of both.
-        for i in before..self.links.len() {
-            let inner = self.links[i].link.name.strip_prefix(&format!("{}::", scope.prefix)).map(str::to_owned);
-            index.extend(inner.map(|name| (name, i)));
-        }
-        let lone = self.links.len() == first + 1;
-        if lone && outer.prefix.is_empty() {
+        let frames = self.scope(node, file, &scope)?;
+        if self.links.len() == first + 1 && outer.prefix.is_empty() {
             // A model that is one link is called as the model is.
-            self.links[first].link.name = scope.prefix.clone();
+            self.links[first].link.name = scope.prefix;
         }
-        for joint in xml::inside(node, "joint") {
-            self.joint(joint, &index, &scope)?;
+        let back = match place.frame.as_deref() {
+            None => Pose::IDENTITY,
+            Some(frame) => frames.pose("__model__", frame).map_err(|e| (at, lost(&e)))?,
+        };
+        let frame = if place.is_merged { format!("_merged__{name}__model__") } else { name };
+        let pose = if place.frame.is_none() { place.pose } else { place.pose.compose(&back) };
+        let of = place.of.clone().unwrap_or_else(|| around.root().to_owned());
+        let with = match frames.root_frame() {
+            Some(link) if place.is_merged => Attached::Frame(link.to_owned()),
+            Some(link) => Attached::Frame(format!("{frame}::{link}")),
+            None => Attached::Nothing,
+        };
+        if !(around.add(&frame, pose, &of, with) && around.adopt(frames, &frame, place.is_merged)) {
+            let found = Problem::syntax("names that nothing else in the model has", format!("those of {frame:?}"));
+            return Err((at, found));
         }
-        Ok(())
+        Ok(Inner { at, frame, links: first..self.links.len() })
     }
 
-    fn link(&mut self, node: Node<'_, '_>, name: &str, pose: Pose, scope: &Scope) -> Result<Found> {
+    /// The name of a model: another one where the name is taken, as files before 1.7 may have it.
+    fn own_name(&mut self, place: &Placement, around: &Frames, at: Place) -> Result<String> {
+        let mut name = place.name.clone();
+        for k in 1.. {
+            if !around.has(&name) {
+                break;
+            }
+            if place.version >= [1, 7] {
+                let problem = Problem::syntax("a name that nothing else beside it has", format!("a second {name:?}"));
+                return Err((at, problem));
+            }
+            name = format!("{}_{k}", place.name);
+        }
+        if name != place.name {
+            self.robot.note(at, format!("a second {:?} is called {name}", place.name));
+        }
+        Ok(name)
+    }
+
+    fn link(&mut self, node: Node<'_, '_>, file: &File<'_>, frames: &Frames, (name, at): (&str, usize)) -> Result<()> {
         let (mut texts, mut parts) = (Vec::new(), Vec::new());
         for collision in xml::inside(node, "collision") {
             let Some(geometry) = xml::inside(collision, "geometry").next() else {
                 return Err(xml::wrong(collision, "a geometry of the collision", None));
             };
-            let Some((shape, turn)) = geometry_of(geometry, self.reader)? else { continue };
+            let Some((shape, turn)) = geometry_of(geometry, file.reader)? else { continue };
             if shape.is_nothing() {
-                self.robot.note(xml::place(geometry), format!("a collision of {name} has no inside and is left out"));
+                let sentence = format!("a collision of {name} has no inside and is left out");
+                file.reader.note(&mut self.robot, geometry, sentence);
                 continue;
             }
-            let own = own_pose(collision, &[name])?;
+            let (own, of) = placed(collision)?;
+            let own = match of.filter(|of| of != name) {
+                None => own,
+                Some(of) => frames.pose(&of, name).map_err(|e| (xml::place(collision), lost(&e)))?.compose(&own),
+            };
             let text = shape.at(&own.compose(&Pose::new(DVec3::ZERO, turn)));
             if shape == Shape::Plane {
                 let name = collision.attribute("name").unwrap_or("plane").to_owned();
@@ -210,103 +303,61 @@ impl World<'_> {
         if !texts.is_empty() {
             parts.insert(0, Part { name: String::new(), text: union(&texts), masks: [1, 1] });
         }
-        let mut scope = scope.clone();
-        scope.collides_with_itself |= is_true(node, "self_collide");
-        let link = Link {
-            name: format!("{}::{name}", scope.prefix),
-            at: xml::place(node),
-            parent: None,
-            origin: pose,
-            dofs: Vec::new(),
-            parts,
-            is_free: !scope.is_static,
-            is_static: scope.is_static,
-        };
-        Ok(Found { link, parent: None, pose, scope })
+        self.links[at].link.parts = parts;
+        Ok(())
     }
 
-    fn joint(&mut self, node: Node<'_, '_>, index: &HashMap<String, usize>, scope: &Scope) -> Result<()> {
+    fn joint(&mut self, node: Node<'_, '_>, file: &File<'_>, frames: &Frames, scope: &Scope) -> Result<()> {
         let name = needed(node, "name")?;
         let end = |tag: &'static str| {
             let word = text(node, tag).ok_or_else(|| xml::wrong(node, format!("a {tag} of the joint"), None))?.trim();
-            match index.get(word) {
-                Some(i) => Ok(Some(*i)),
-                None if word == "world" => Ok(None),
-                None => Err(xml::wrong(node, format!("the name of a link as {tag}"), Some(word))),
+            if word == "world" {
+                return Ok(None);
             }
+            let sentence = |(found, what): Lost| {
+                let expected = format!("the name of a link or of a frame that goes with one as {tag}");
+                (xml::place(node), Problem::syntax(expected, format!("{found:?}, {what}")))
+            };
+            frames.link(word).map_err(sentence)
         };
-        let (parent, child) = (end("parent")?, end("child")?);
-        let Some(child) = child else { return Err(xml::wrong(node, "a link as child", Some("world"))) };
+        let (parent, child) = (end("parent")?.map(|p| p.0), end("child")?);
+        let Some((child, child_frame)) = child else { return Err(xml::wrong(node, "a link as child", Some("world"))) };
         let circle = self.circle(parent, child);
         if self.links[child].parent.is_some() || !self.links[child].link.dofs.is_empty() || circle {
-            self.robot.note(xml::place(node), format!("the joint {name} closes a loop and is left out"));
+            file.reader.note(&mut self.robot, node, format!("the joint {name} closes a loop and is left out"));
             return Ok(());
         }
-        let own = own_pose(node, &[text(node, "child").unwrap_or_default().trim()])?;
-        let at = self.links[child].pose;
-        let is_of_model = self.version < [1, 5];
-        let mut dofs = Vec::new();
-        let axes: &[&'static str] = match needed(node, "type")? {
+        let (pose, of) = placed(node)?;
+        let of = of.unwrap_or_else(|| text(node, "child").unwrap_or_default().trim().to_owned());
+        // In the child link's frame.
+        let own = frames.pose(&of, child_frame).map_err(|e| (xml::place(node), lost(&e)))?.compose(&pose);
+        let kind = needed(node, "type")?;
+        let axes: &[&'static str] = match kind {
             "fixed" => &[],
             "revolute" | "continuous" | "prismatic" => &["axis"],
             "revolute2" | "universal" => &["axis", "axis2"],
             other => {
-                let sentence = format!("the joint {name} ({other}) is taken as it stands");
-                self.robot.note(xml::place(node), sentence);
+                file.reader.note(&mut self.robot, node, format!("the joint {name} ({other}) is taken as it stands"));
                 self.links[child].parent = parent;
                 self.links[child].link.is_free = true;
                 return Ok(());
             }
         };
+        let mut dofs = Vec::new();
         for tag in axes {
-            let axis = xml::inside(node, tag).next();
-            let xyz = axis.and_then(|a| xml::inside(a, "xyz").next());
-            let way = match xyz {
-                None => DVec3::Z,
-                Some(xyz) => vector_of(xyz, xyz.text().unwrap_or_default(), "axis")?,
-            };
-            let way = way.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some("0 0 0")))?;
-            let of_model = is_of_model
-                || axis.is_some_and(|a| is_true(a, "use_parent_model_frame"))
-                || xyz.is_some_and(|x| x.attribute("expressed_in") == Some("__model__"));
-            if let Some(frame) = xyz.and_then(|x| x.attribute("expressed_in")).filter(|f| *f != "__model__") {
-                return Err(xml::wrong(node, "an axis in the joint's frame or the model's", Some(frame)));
-            }
-            // In the child's frame.
-            let way = if of_model { at.rotation.conjugate() * (scope.pose.rotation * way) } else { own.rotation * way };
-            if let Some(mimic) = axis.and_then(|a| xml::inside(a, "mimic").next()) {
-                return Err((xml::place(mimic), Problem::unsupported("<mimic> of a joint of SDFormat")));
-            }
-            let limit = axis.and_then(|a| xml::inside(a, "limit").next());
-            let bound = |key, none| match limit.and_then(|l| text(l, key)) {
-                None => Ok(none),
-                // Some write an endless limit as inf, or as a number that stands for it.
-                Some(word) => match word.trim().parse::<f64>() {
-                    Ok(x) if x.abs() >= 1e16 || x.is_infinite() => Ok(f64::INFINITY.copysign(x)),
-                    _ => xml::finite(node, word, key),
-                },
-            };
-            let range = [bound("lower", f64::NEG_INFINITY)?, bound("upper", f64::INFINITY)?];
-            if range[0] > range[1] {
-                let found = format!("{} and {}", range[0], range[1]);
-                return Err(xml::wrong(node, "a lower limit below the upper one", Some(&found)));
-            }
-            let is_slide = needed(node, "type")? == "prismatic";
-            let anchor = own.position;
-            let kind = if is_slide { DofKind::Slide { axis: way } } else { DofKind::Hinge { anchor, axis: way } };
+            let asked = Axis { node, tag, is_slide: kind == "prismatic", of_model: file.version < [1, 5] };
             let name = if *tag == "axis" { name.to_owned() } else { format!("{name}/2") };
-            let whole = format!("{}::{name}", scope.prefix);
-            dofs.push(Dof {
-                name: if self.is_one_model(scope) { name } else { whole },
-                kind,
-                range,
-                start: 0f64.clamp(range[0], range[1]),
-                zero: 0.0,
-                mimic: None,
-            });
+            let mut dof = asked.dof(frames, child_frame, &own)?;
+            dof.name = scope.whole(&name);
+            dof.mimic.iter_mut().for_each(|(leader, ..)| *leader = scope.whole(leader));
+            let is_own = scope.model == Some(1) && !scope.prefix.contains("::");
+            if is_own {
+                self.short.insert(dof.name.clone(), name);
+            }
+            dofs.push(dof);
         }
         if self.links[child].scope.is_static && !dofs.is_empty() {
-            self.robot.note(xml::place(node), format!("the joint {name} is of a static model and does not move"));
+            file.reader.note(&mut self.robot, node, format!("the joint {name} is of a static model and does not move"));
             dofs.clear();
         }
         let found = &mut self.links[child];
@@ -317,9 +368,20 @@ impl World<'_> {
         Ok(())
     }
 
-    /// A file of one model has joints by their own names.
-    fn is_one_model(&self, scope: &Scope) -> bool {
-        self.links.iter().all(|l| l.scope.model == scope.model) && !scope.prefix.contains("::")
+    /// Joints that others follow are there.
+    fn leaders(&self, node: Node<'_, '_>, scope: &Scope, first: usize) -> Result<()> {
+        let dofs = || self.links[first..].iter().flat_map(|l| &l.link.dofs);
+        for joint in xml::inside(node, "joint") {
+            for mimic in
+                ["axis", "axis2"].iter().flat_map(|a| xml::inside(joint, a)).flat_map(|a| xml::inside(a, "mimic"))
+            {
+                let leader = leader(mimic)?;
+                if !dofs().any(|d| d.name == scope.whole(&leader)) {
+                    return Err(xml::wrong(mimic, "a joint that moves and can be followed", Some(&leader)));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// True where a link hangs on itself.
@@ -335,48 +397,143 @@ impl World<'_> {
     }
 }
 
-/// Frames of a model by name, and what they are relative to.
-struct Frames<'a, 'i> {
-    model: Pose,
-    nodes: HashMap<&'a str, Node<'a, 'i>>,
+impl Found {
+    fn new(name: &str, node: Node<'_, '_>, file: &File<'_>, scope: &Scope) -> Self {
+        let mut scope = scope.clone();
+        scope.collides_with_itself |= is_true(node, "self_collide");
+        let link = Link {
+            name: scope.whole(name),
+            at: file.reader.place(node),
+            parent: None,
+            origin: Pose::IDENTITY,
+            dofs: Vec::new(),
+            parts: Vec::new(),
+            is_free: !scope.is_static,
+            is_static: scope.is_static,
+        };
+        Self { link, parent: None, pose: Pose::IDENTITY, scope }
+    }
 }
 
-impl<'a, 'i> Frames<'a, 'i> {
-    fn of(model: Node<'a, 'i>, pose: Pose) -> Self {
-        let named = |n: Node<'a, 'i>| {
-            let is_frame = ["link", "frame", "joint"].contains(&n.tag_name().name());
-            n.attribute("name").filter(|_| is_frame).map(|name| (name, n))
+/// Where a model is put.
+struct Placement {
+    name: String,
+    pose: Pose,
+    of: Option<String>,
+    /// The frame of the model that the pose is of.
+    frame: Option<String>,
+    is_merged: bool,
+    /// The include that asks for it.
+    asker: Option<Place>,
+    /// Of the file that has it.
+    version: [u32; 2],
+}
+
+impl Placement {
+    fn of(model: Node<'_, '_>, name: &str, file: &File<'_>) -> Result<Self> {
+        let (pose, of) = placed(model)?;
+        let frame = model.attribute("placement_frame").filter(|frame| !frame.is_empty()).map(str::to_owned);
+        let version = file.version;
+        Ok(Self { name: name.to_owned(), pose, of, frame, is_merged: false, asker: None, version })
+    }
+}
+
+/// An axis of a joint.
+struct Axis<'a, 'i> {
+    node: Node<'a, 'i>,
+    tag: &'static str,
+    is_slide: bool,
+    /// Its direction is of the model's frame, as old files have it.
+    of_model: bool,
+}
+
+impl Axis<'_, '_> {
+    /// What it lets move, in the child link's frame; `own` is the joint's frame there. It has its own name yet.
+    fn dof(&self, frames: &Frames, child: &str, own: &Pose) -> Result<Dof> {
+        let node = self.node;
+        let axis = xml::inside(node, self.tag).next();
+        let xyz = axis.and_then(|a| xml::inside(a, "xyz").next());
+        let way = match xyz {
+            None => DVec3::Z,
+            Some(xyz) => vector_of(xyz, xyz.text().unwrap_or_default(), "axis")?,
         };
-        // Of a link and a joint of one name, which old files have, the link is meant.
-        let mut all: Vec<(&'a str, Node<'a, 'i>)> = model.children().filter_map(named).collect();
-        all.sort_by_key(|(_, n)| n.tag_name().name() == "link");
-        Self { model: pose, nodes: all.into_iter().collect() }
-    }
-
-    /// The pose in the world of a frame.
-    fn pose(&self, name: &str, asker: Node<'_, '_>) -> Result<Pose> {
-        self.within(name, asker, self.nodes.len() + 2)
-    }
-
-    fn within(&self, name: &str, asker: Node<'_, '_>, left: usize) -> Result<Pose> {
-        if name == "__model__" || name == "world" {
-            return Ok(self.model);
+        let way = way.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some("0 0 0")))?;
+        let of_model = self.of_model || axis.is_some_and(|a| is_true(a, "use_parent_model_frame"));
+        let of = xyz.and_then(|x| x.attribute("expressed_in")).filter(|of| !of.is_empty());
+        let way = match of.or(of_model.then_some(frames.root())) {
+            None => own.rotation * way,
+            Some(of) => frames.pose(of, child).map_err(|e| (xml::place(node), lost(&e)))?.rotation * way,
+        };
+        let limit = axis.and_then(|a| xml::inside(a, "limit").next());
+        let bound = |key, none| match limit.and_then(|l| text(l, key)) {
+            None => Ok(none),
+            // Some write an endless limit as inf, or as a number that stands for it.
+            Some(word) => match word.trim().parse::<f64>() {
+                Ok(x) if x.abs() >= 1e16 || x.is_infinite() => Ok(f64::INFINITY.copysign(x)),
+                _ => xml::finite(node, word, key),
+            },
+        };
+        let range = [bound("lower", f64::NEG_INFINITY)?, bound("upper", f64::INFINITY)?];
+        if range[0] > range[1] {
+            let found = format!("{} and {}", range[0], range[1]);
+            return Err(xml::wrong(node, "a lower limit below the upper one", Some(&found)));
         }
-        let Some(node) = self.nodes.get(name).filter(|_| left > 0) else {
-            return Err(xml::wrong(asker, "frames that are there and lead to the model's", Some(name)));
-        };
-        let pose = xml::inside(*node, "pose").next();
-        let own = pose.map(pose_of).transpose()?.unwrap_or(Pose::IDENTITY);
-        let of = pose.and_then(|p| p.attribute("relative_to")).filter(|of| !of.is_empty());
-        let of = of.or_else(|| node.attribute("attached_to")).map(str::to_owned);
-        let of = of
-            .or_else(|| (node.tag_name().name() == "joint").then(|| text(*node, "child")).flatten().map(str::to_owned));
-        let base = match of {
-            None => self.model,
-            Some(of) => self.within(of.trim(), asker, left - 1)?,
-        };
-        Ok(base.compose(&own))
+        let anchor = own.position;
+        let kind = if self.is_slide { DofKind::Slide { axis: way } } else { DofKind::Hinge { anchor, axis: way } };
+        let mimic = axis.and_then(|a| xml::inside(a, "mimic").next()).map(mimic).transpose()?;
+        Ok(Dof { name: String::new(), kind, range, start: 0f64.clamp(range[0], range[1]), zero: 0.0, mimic })
     }
+}
+
+/// Which joint is followed, in its own scope.
+fn leader(mimic: Node<'_, '_>) -> Result<String> {
+    let joint = needed(mimic, "joint")?;
+    match mimic.attribute("axis").unwrap_or("axis") {
+        "axis" => Ok(joint.to_owned()),
+        "axis2" => Ok(format!("{joint}/2")),
+        other => Err(xml::wrong(mimic, "axis or axis2 as the axis that is followed", Some(other))),
+    }
+}
+
+/// How a joint follows another one: factor (that one − reference) + offset.
+fn mimic(node: Node<'_, '_>) -> Result<(String, f64, f64)> {
+    let number = |key: &'static str| text(node, key).map(|word| xml::finite(node, word, key)).transpose();
+    let factor = number("multiplier")?.ok_or_else(|| xml::wrong(node, "a multiplier of the mimic", None))?;
+    let (offset, reference) = (number("offset")?.unwrap_or(0.0), number("reference")?.unwrap_or(0.0));
+    Ok((leader(node)?, factor, offset - factor * reference))
+}
+
+/// The file of a model's folder: what `model.config` says for the newest version, else `model.sdf`.
+fn model_file(folder: &Path) -> PathBuf {
+    let limits = super::super::Limits::default();
+    let stated = super::super::read_bytes(&folder.join("model.config"), &limits).ok().and_then(|bytes| {
+        let document = xml::parse(&bytes).ok()?;
+        let files = xml::inside(document.root_element(), "sdf");
+        let newest = files.filter(|n| n.text().is_some()).max_by_key(|n| version_of(*n))?;
+        newest.text().map(|name| folder.join(name.trim()))
+    });
+    stated.filter(|path| path.starts_with(folder)).unwrap_or_else(|| folder.join("model.sdf"))
+}
+
+/// Adds a frame. Of names that several have, which files before 1.7 may, the first one counts: of a link and a joint the link's.
+fn add(
+    frames: &mut Frames,
+    node: Node<'_, '_>,
+    name: &str,
+    (pose, of): (Pose, Option<String>),
+    attached: Attached,
+    file: &File<'_>,
+) -> Result<()> {
+    let of = of.unwrap_or_else(|| frames.root().to_owned());
+    if !frames.add(name, pose, &of, attached) && file.version >= [1, 7] {
+        return Err(xml::wrong(node, "a name that nothing else beside it has", Some(name)));
+    }
+    Ok(())
+}
+
+/// A frame that is not found.
+fn lost((name, what): &Lost) -> Problem {
+    Problem::syntax("frames that are there and lead to the scope's own", format!("{name:?}, {what}"))
 }
 
 /// Puts links into the robot, parents first, and says which pairs are not tested.
@@ -409,95 +566,8 @@ fn order(robot: &mut Robot, mut found: Vec<Found>) {
             let are_joined = p.parent == Some(*j) || q.parent == Some(*i);
             let never_move = p.scope.is_static && q.scope.is_static;
             if (are_one && !collide) || are_joined || never_move {
-                robot.excepted.push([a, b]);
+                robot.excepted.insert([a, b]);
             }
         }
     }
-}
-
-/// The text of an element inside.
-fn text<'a>(node: Node<'a, '_>, name: &'static str) -> Option<&'a str> {
-    xml::inside(node, name).next().and_then(|n| n.text())
-}
-
-fn is_true(node: Node<'_, '_>, name: &'static str) -> bool {
-    text(node, name).is_some_and(|word| ["1", "true"].contains(&word.trim()))
-}
-
-/// The pose of what stands in its parent element's frame, which may be called by one of some names.
-fn own_pose(node: Node<'_, '_>, names: &[&str]) -> Result<Pose> {
-    let Some(pose) = xml::inside(node, "pose").next() else { return Ok(Pose::IDENTITY) };
-    match pose.attribute("relative_to") {
-        Some(frame) if !frame.is_empty() && !names.contains(&frame) => {
-            let what = format!("a pose of a {} relative to {frame:?}", node.tag_name().name());
-            Err((xml::place(pose), Problem::unsupported(what)))
-        }
-        _ => pose_of(pose),
-    }
-}
-
-/// A pose: a position, and roll, pitch, yaw or a quaternion.
-fn pose_of(node: Node<'_, '_>) -> Result<Pose> {
-    let words = node.text().unwrap_or_default();
-    let numbers = numbers_of(node, words, "pose")?;
-    let is_degrees = node.attribute("degrees").is_some_and(|d| ["1", "true"].contains(&d));
-    let position = |n: &[f64]| DVec3::from_slice(n);
-    match (numbers.as_slice(), node.attribute("rotation_format").unwrap_or("euler_rpy")) {
-        ([], _) => Ok(Pose::IDENTITY),
-        (all, "quat_xyzw") if all.len() == 7 => {
-            let q = [all[3], all[4], all[5], all[6]];
-            let q = unit_quaternion(q).or_else(|_| {
-                DQuat::from_array(q).length().recip().is_finite().then(|| DQuat::from_array(q).normalize()).ok_or(())
-            });
-            let q = q.map_err(|()| xml::wrong(node, "a quaternion that is not 0", Some(words)))?;
-            Ok(Pose::new(position(all), q))
-        }
-        (all, "euler_rpy") if all.len() == 6 => {
-            let angles = DVec3::new(all[3], all[4], all[5]);
-            let angles = if is_degrees { angles * (std::f64::consts::PI / 180.0) } else { angles };
-            Ok(Pose::new(position(all), roll_pitch_yaw(angles)))
-        }
-        _ => Err(xml::wrong(node, "x y z roll pitch yaw as the pose", Some(words))),
-    }
-}
-
-/// A geometry, with how it is turned; `None` for one that is empty on purpose.
-fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Option<(Shape, DQuat)>> {
-    let kinds = "one of box, sphere, cylinder, capsule, cone, ellipsoid, plane, mesh as the geometry";
-    let Some(shape) = node.children().find(|n| n.is_element()) else { return Ok(None) };
-    let length = |key: &'static str, none: f64| match text(shape, key) {
-        None => Ok(none),
-        Some(word) => xml::finite(shape, word, key),
-    };
-    let vector = |key: &'static str, none: DVec3| match text(shape, key) {
-        None => Ok(none),
-        Some(word) => vector_of(shape, word, key),
-    };
-    let mut turn = DQuat::IDENTITY;
-    // What is left out has the specification's default.
-    let made = match shape.tag_name().name() {
-        "empty" => return Ok(None),
-        "box" => Shape::Box(vector("size", DVec3::ONE)?),
-        "sphere" => Shape::Sphere(length("radius", 1.0)?),
-        "cylinder" => Shape::Cylinder(length("radius", 1.0)?, length("length", 1.0)?),
-        "capsule" => Shape::Capsule(length("radius", 0.5)?, length("length", 1.0)?),
-        "cone" => Shape::Cone(length("radius", 0.5)?, length("length", 1.0)?),
-        "ellipsoid" => Shape::Ellipsoid(vector("radii", DVec3::ONE)?),
-        "plane" => {
-            let normal = vector("normal", DVec3::Z)?;
-            let unit =
-                normal.try_normalize().ok_or_else(|| xml::wrong(shape, "a normal that is not 0", Some("0 0 0")))?;
-            turn = DQuat::from_rotation_arc(DVec3::Z, unit);
-            Shape::Plane
-        }
-        "mesh" => {
-            if let Some(part) = xml::inside(shape, "submesh").next() {
-                return Err(xml::wrong(part, "a whole mesh: parts of a file are not read", Some("submesh")));
-            }
-            let uri = text(shape, "uri").ok_or_else(|| xml::wrong(shape, "the uri of the mesh", None))?;
-            Shape::Mesh(reader.file(uri.trim()), vector("scale", DVec3::ONE)?, reader.ask.hulls)
-        }
-        other => return Err(xml::wrong(shape, kinds, Some(other))),
-    };
-    Ok(Some((not_negative(shape, made)?, turn)))
 }

@@ -261,7 +261,7 @@ pub(super) fn disabled(root: Node<'_, '_>, robot: &mut Robot) -> Result<()> {
             pair[k] = found.ok_or_else(|| xml::wrong(node, "the name of a link", Some(name)))?;
         }
         pair.sort_unstable();
-        robot.excepted.push(pair);
+        robot.excepted.insert(pair);
     }
     Ok(())
 }
