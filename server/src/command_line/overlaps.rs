@@ -1,7 +1,7 @@
 //! `contactd overlaps`: what is in each other of a GDML geometry or a scene.
 
 use super::joints::JointArguments;
-use super::{AccessArguments, CacheArguments, Done, models_of, prepare_scene, print, scene_of};
+use super::{AccessArguments, CacheArguments, Done, models_of, prepare_scene, print, scene_of, warn};
 use crate::import::{Facets, gdml};
 use crate::overlaps::{self, Found, Pair, Verdict};
 use crate::terminal::{clean, number, sentence};
@@ -35,6 +35,7 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
         [file] if is_gdml(file) => {
             arguments.joints.none(file)?;
             let volumes = gdml::read_gdml(file)?;
+            volumes.notes.iter().for_each(|n| warn(&format!("{}:{}", file.display(), clean(&n.to_string()))));
             let prepared = prepare_scene(&overlaps::scene_of(file, &volumes), Facets::Auto, &arguments.cache)?;
             let models = overlaps::spread(&volumes, &models_of(&prepared));
             let (outside, of) = overlaps::around(file, &volumes, &models);

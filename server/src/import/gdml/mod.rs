@@ -9,7 +9,7 @@ mod solids;
 
 use super::problem::Problem;
 use super::scene::SceneError;
-use super::{Limits, Place, read_bytes, xml};
+use super::{Limits, Note, Place, read_bytes, xml};
 use contactd_proto::Pose;
 use expression::Names;
 use glam::{DMat3, DQuat, DVec3};
@@ -50,11 +50,13 @@ pub struct Daughter {
     pub pose: Pose,
 }
 
-/// All volumes, those that are placed before those that they are placed in.
+/// All volumes of the world, those that are placed before those that they are placed in.
 #[derive(Clone, Debug, Default)]
 pub struct Volumes {
     /// The volumes.
     pub volumes: Vec<Volume>,
+    /// What of the file is not in the world that its setup names.
+    pub notes: Vec<Note>,
 }
 
 /// What is defined, and the solids by name.
@@ -85,6 +87,7 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
     if root.tag_name().name() != "gdml" {
         return Err(xml::wrong(root, "gdml as the root element", Some(root.tag_name().name())));
     }
+    only(root, &["define", "materials", "solids", "structure", "setup", "userinfo"])?;
     let mut geometry = Geometry {
         names: Names::new(),
         positions: HashMap::new(),
@@ -104,8 +107,9 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
             if solid.tag_name().name().ends_with("surface") {
                 continue;
             }
-            if let Some(name) = solid.attribute("name") {
-                geometry.solids.insert(name, solid);
+            let name = needed(solid, "name")?;
+            if geometry.solids.insert(name, solid).is_some() {
+                return Err(xml::wrong(solid, "a name that no other solid has", Some(name)));
             }
         }
     }
@@ -116,20 +120,86 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
             let is_assembly = match node.tag_name().name() {
                 "volume" => false,
                 "assembly" => true,
-                "loop" => return Err((xml::place(node), Problem::unsupported("<loop>"))),
                 // Surfaces of optics.
-                _ => continue,
+                "skinsurface" | "bordersurface" => continue,
+                "loop" => return Err((xml::place(node), Problem::unsupported("<loop>"))),
+                other => return Err(xml::wrong(node, "volumes and assemblies in the structure", Some(other))),
             };
             let name = needed(node, "name")?;
             let volume = geometry.volume(node, is_assembly, &index, &mut out)?;
-            index.insert(name, out.volumes.len());
+            if index.insert(name, out.volumes.len()).is_some() {
+                return Err(xml::wrong(node, "a name that no other volume has", Some(name)));
+            }
             out.volumes.push(volume);
         }
     }
     if out.volumes.is_empty() {
         return Err(xml::wrong(root, "volumes in a structure", None));
     }
+    if let Some(setup) = setup(root, &mut out)? {
+        let world = xml::inside(setup, "world").next();
+        let world = world.ok_or_else(|| xml::wrong(setup, "a world of the setup", None))?;
+        let name = needed(world, "ref")?;
+        let found = index.get(name).copied();
+        out.keep(found.ok_or_else(|| xml::wrong(world, "the name of a volume", Some(name)))?);
+    }
     Ok(out)
+}
+
+/// The setup that counts: the one called Default, as Geant4 takes it, else the first one.
+fn setup<'a, 'i>(root: Node<'a, 'i>, out: &mut Volumes) -> Result<Option<Node<'a, 'i>>> {
+    let all: Vec<Node<'a, 'i>> = xml::inside(root, "setup").collect();
+    let chosen = all.iter().find(|s| s.attribute("name") == Some("Default")).or(all.first()).copied();
+    for other in all.iter().filter(|s| Some(**s) != chosen) {
+        let name = needed(*other, "name")?;
+        out.note(xml::place(*other), format!("the setup {name:?} is left out: another one is taken"));
+    }
+    Ok(chosen)
+}
+
+/// Elements of other names than these would be lost: they are refused.
+fn only(node: Node<'_, '_>, known: &[&str]) -> Result<()> {
+    match node.children().find(|n| n.is_element() && !known.contains(&n.tag_name().name())) {
+        None => Ok(()),
+        Some(other) => {
+            let known = if known.is_empty() { "nothing".to_owned() } else { format!("one of {}", known.join(", ")) };
+            let expected = format!("{known} in the {}", node.tag_name().name());
+            Err(xml::wrong(other, expected, Some(other.tag_name().name())))
+        }
+    }
+}
+
+impl Volumes {
+    fn note(&mut self, at: Place, text: String) {
+        self.notes.push(Note { at, text, amount: None });
+    }
+
+    /// Keeps a volume and what is placed in it, however deep. Of the others those that are placed nowhere are told.
+    fn keep(&mut self, world: usize) {
+        let mut is_kept = vec![false; self.volumes.len()];
+        is_kept[world] = true;
+        let mut open = vec![world];
+        while let Some(i) = open.pop() {
+            for d in &self.volumes[i].daughters {
+                if !std::mem::replace(&mut is_kept[d.volume], true) {
+                    open.push(d.volume);
+                }
+            }
+        }
+        let name = self.volumes[world].name.clone();
+        let left: Vec<usize> = (0..is_kept.len()).filter(|i| !is_kept[*i] && !self.volumes[*i].is_placed).collect();
+        for i in left {
+            let volume = &self.volumes[i];
+            let text = format!("{:?} is left out: it is not in the world {name:?}", volume.name);
+            self.note(volume.at, text);
+        }
+        let mut place = vec![0; is_kept.len()];
+        let kept: Vec<usize> = (0..is_kept.len()).filter(|i| is_kept[*i]).collect();
+        kept.iter().enumerate().for_each(|(to, from)| place[*from] = to);
+        let all = std::mem::take(&mut self.volumes);
+        self.volumes = all.into_iter().zip(is_kept).filter(|(_, is_kept)| *is_kept).map(|(volume, _)| volume).collect();
+        self.volumes.iter_mut().flat_map(|v| &mut v.daughters).for_each(|d| d.volume = place[d.volume]);
+    }
 }
 
 impl<'a, 'i> Geometry<'a, 'i> {
@@ -167,8 +237,17 @@ impl<'a, 'i> Geometry<'a, 'i> {
                 "rotation" => _ = self.rotations.insert(needed(node, "name")?, self.three(node, "rad", 0.0)?),
                 "scale" => _ = self.scales.insert(needed(node, "name")?, self.three(node, "rad", 1.0)?),
                 "loop" => return Err((xml::place(node), Problem::unsupported("<loop>"))),
-                // Expressions for programs.
-                _ => {}
+                "expression" => {
+                    let value = self.value(node, node.text().unwrap_or_default())?;
+                    let name = needed(node, "name")?;
+                    if !self.names.set(name, value) {
+                        return Err(xml::wrong(node, "a name that is no unit or number of its own", Some(name)));
+                    }
+                }
+                other => {
+                    let known = "one of constant, quantity, variable, expression, matrix, position, rotation, scale in the define";
+                    return Err(xml::wrong(node, known, Some(other)));
+                }
             }
         }
         Ok(())
@@ -304,7 +383,10 @@ impl<'a, 'i> Geometry<'a, 'i> {
                 kind @ ("divisionvol" | "paramvol" | "loop") => {
                     return Err((xml::place(child), Problem::unsupported(format!("<{kind}>"))));
                 }
-                _ => {}
+                "solidref" if !is_assembly => {}
+                // What a volume is made of, and what is said to programs.
+                "materialref" | "auxiliary" | "colorref" => {}
+                other => return Err(xml::wrong(child, "placements and the solid of a volume", Some(other))),
             }
         }
         Ok(Volume { name, at: xml::place(node), text, daughters, is_placed: false })
@@ -322,6 +404,7 @@ impl<'a, 'i> Geometry<'a, 'i> {
         if !(1.0..=MOST_DAUGHTERS as f64).contains(&count) || count.fract() != 0.0 {
             return Err(xml::wrong(node, "a whole number of replicas", node.attribute("number")));
         }
+        only(node, &["volumeref", "replicate_along_axis"])?;
         let along = xml::inside(node, "replicate_along_axis").next();
         let along = along.ok_or_else(|| xml::wrong(node, "replicate_along_axis", None))?;
         let part = |name: &'static str| xml::inside(along, name).next();

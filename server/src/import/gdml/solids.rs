@@ -5,7 +5,7 @@
 use super::super::problem::Problem;
 use super::super::written::placed;
 use super::super::{Place, xml};
-use super::{Geometry, Result, needed};
+use super::{Geometry, Result, needed, only};
 use contactd_proto::Pose;
 use glam::{DVec2, DVec3};
 use roxmltree::Node;
@@ -195,6 +195,31 @@ fn clean(points: &[DVec3], faces: &[Vec<usize>]) -> String {
     polyhedron(&used, &kept)
 }
 
+/// What stands inside of a solid of a kind.
+fn inside(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "polycone" | "polyhedra" => &["zplane"],
+        "genericPolycone" => &["rzpoint"],
+        "xtru" => &["twoDimVertex", "section"],
+        "tessellated" => &["triangular", "quadrangular"],
+        "multiUnion" => &["multiUnionNode"],
+        "scaledSolid" => &["solidref", "scale", "scaleref"],
+        "union" | "subtraction" | "intersection" => &[
+            "first",
+            "second",
+            "position",
+            "positionref",
+            "rotation",
+            "rotationref",
+            "firstposition",
+            "firstpositionref",
+            "firstrotation",
+            "firstrotationref",
+        ],
+        _ => &[],
+    }
+}
+
 /// The text of a solid.
 pub(super) fn text(geometry: &Geometry<'_, '_>, name: &str, asker: Node<'_, '_>, depth: usize) -> Result<String> {
     let Some(node) = geometry.solids.get(name).copied() else {
@@ -213,6 +238,7 @@ pub(super) fn text(geometry: &Geometry<'_, '_>, name: &str, asker: Node<'_, '_>,
         "union" | "subtraction" | "intersection" | "multiUnion" | "scaledSolid" => combined(&read, depth)?,
         other => return Err((xml::place(node), Problem::unsupported(format!("the solid {other}")))),
     };
+    only(node, inside(read.kind()))?;
     if text.len() > LONGEST {
         return Err((xml::place(node), Problem::Limit { what: "bytes of a solid's text", limit: LONGEST }));
     }
@@ -607,6 +633,7 @@ fn combined(read: &Read<'_, '_, '_>, depth: usize) -> Result<String> {
     if read.kind() == "multiUnion" {
         let mut parts = Vec::new();
         for node in xml::inside(read.node, "multiUnionNode") {
+            only(node, &["solid", "position", "positionref", "rotation", "rotationref"])?;
             let solid = xml::inside(node, "solid").next();
             let solid = solid.ok_or_else(|| xml::wrong(node, "a solid of the node", None))?;
             parts.push(placed(&read.geometry.pose(node, ["position", "rotation"], false)?, &of(solid)?));
