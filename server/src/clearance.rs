@@ -231,6 +231,17 @@ fn cell(robot: &Robot, question: &Question) -> Result<Cell, String> {
         if !seen.insert(name) || question.values.contains_key(name) {
             return Err(format!("expected one range or one value of {name}, found two"));
         }
+        for follower in robot.links.iter().flat_map(|l| &l.dofs) {
+            let Some((_, factor, offset)) = follower.mimic.as_ref().filter(|m| m.0 == *name) else { continue };
+            let ends = range.map(|value| factor * value + offset);
+            if ends.iter().any(|end| follower.is_beyond(*end)) {
+                let ([from, to], follows) = (follower.range, &follower.name);
+                return Err(format!(
+                    "expected a range of {name} that keeps {follows}, which follows it, within {from} to {to}, found {} to {}",
+                    ends[0], ends[1]
+                ));
+            }
+        }
         low.push(range[0]);
         high.push(range[1]);
     }

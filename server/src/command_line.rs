@@ -27,7 +27,7 @@ use crate::picture::{
     scene::{Actor, Meeting},
 };
 use crate::report::{self, Answer, PairReport, TableStyle};
-use crate::terminal::{Colour, Paint};
+use crate::terminal::{Colour, Paint, clean};
 use crate::view::show::Show;
 use crate::world::{PairOutcome, StepOutcome};
 use clap::{Parser, Subcommand};
@@ -229,7 +229,7 @@ impl AccessArguments {
             return Err(format!("expected a folder as import root, found {}", root.display()));
         }
         let program = self.openscad.as_ref().map_or(scene.openscad.program, |p| p.clone().into_os_string());
-        Ok(Access { root, openscad: Openscad { program, time: self.openscad_timeout } })
+        Ok(Access { root, packages: scene.packages, openscad: Openscad { program, time: self.openscad_timeout } })
     }
 }
 
@@ -628,7 +628,7 @@ fn pairs_of<'a>(scene: &Scene, files: &'a [String], check: &'a Check, outcome: &
 fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
     let prepared = cache::prepare_scene(cache.open().as_ref(), scene, facets, &Limits::default())?;
     prepared.iter().filter_map(|p| p.trouble.as_deref()).for_each(warn);
-    scene.notes.iter().for_each(|n| warn(&format!("{}:{n}", scene.file)));
+    scene.notes.iter().for_each(|n| warn(&format!("{}:{}", scene.file, clean(&n.to_string()))));
     for (source, _) in scene.models.iter().zip(&prepared).filter(|(_, p)| p.model.solid.is_empty()) {
         let at = if scene.file.is_empty() { String::new() } else { format!("{}:{}: ", scene.file, source.at) };
         warn(&format!("{at}the model \"{}\" is empty: nothing can touch it", source.name));

@@ -1,6 +1,8 @@
-//! The binary as users call it: output, sentences, exit status. `command_line/table.rs` looks at the table.
+//! The binary as users call it: output, sentences, exit status. `command_line/table.rs` looks at the table, `robots.rs` at joints.
 #![allow(missing_docs)]
 
+#[path = "command_line/robots.rs"]
+mod robots;
 #[path = "command_line/table.rs"]
 mod table;
 

@@ -6,7 +6,7 @@ use crate::clearance::{self, Least, Question};
 use crate::import::{self, Scene, robot};
 use crate::import::{Facets, SceneObject};
 use crate::octree::Model;
-use crate::terminal::number;
+use crate::terminal::{clean, number};
 use crate::world::PairOutcome;
 use contactd_proto::Motion;
 use serde_json::json;
@@ -19,11 +19,11 @@ use std::sync::Arc;
 #[derive(clap::Args)]
 pub(super) struct JointArguments {
     /// Joint values of a robot at the start of the step, in radians and metres, or with a unit: shoulder=30deg,slide=5mm.
-    #[arg(long, value_name = "JOINT=VALUE,…", value_delimiter = ',', value_parser = joint)]
-    joints: Vec<(String, f64)>,
+    #[arg(long, value_name = "JOINT=VALUE,…", value_parser = stated)]
+    joints: Vec<Stated>,
     /// Joint values at its end; the others stay.
-    #[arg(long, value_name = "JOINT=VALUE,…", value_delimiter = ',', value_parser = joint)]
-    to: Vec<(String, f64)>,
+    #[arg(long, value_name = "JOINT=VALUE,…", value_parser = stated)]
+    to: Vec<Stated>,
     /// Takes a robot's meshes as their convex hulls, as MuJoCo does.
     #[arg(long)]
     hulls: bool,
@@ -42,6 +42,12 @@ impl JointArguments {
     pub fn ask(&self) -> Result<robot::Ask, String> {
         let (from, to) = (values(&self.joints)?, values(&self.to)?);
         Ok(robot::Ask { from, to, hulls: self.hulls, packages: self.packages.clone(), srdf: self.srdf.clone() })
+    }
+
+    /// Values are in units that the robot's joints take.
+    fn fit(&self, file: &Path, robot: &robot::Robot) -> Result<(), String> {
+        let mut stated = self.joints.iter().chain(&self.to).flatten();
+        stated.try_for_each(|(name, told)| told.fits(robot, name)).map_err(|e| of_file(file, &e))
     }
 
     /// They say nothing of other files.
@@ -87,41 +93,99 @@ pub(super) fn without_touching(
     Ok(scene)
 }
 
+/// Joints and their values, as they were told together.
+type Stated = Vec<(String, Told)>;
+
+/// A value of a joint in radians or metres, and the unit that it was told in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Told {
+    pub value: f64,
+    unit: Option<&'static Unit>,
+}
+
+/// A unit of angle or of length.
+#[derive(Debug, PartialEq)]
+struct Unit {
+    name: &'static str,
+    factor: f64,
+    is_angle: bool,
+}
+
+const UNITS: [Unit; 7] = [
+    Unit { name: "deg", factor: std::f64::consts::PI / 180.0, is_angle: true },
+    Unit { name: "rad", factor: 1.0, is_angle: true },
+    Unit { name: "turns", factor: std::f64::consts::TAU, is_angle: true },
+    Unit { name: "turn", factor: std::f64::consts::TAU, is_angle: true },
+    Unit { name: "mm", factor: 1e-3, is_angle: false },
+    Unit { name: "cm", factor: 1e-2, is_angle: false },
+    Unit { name: "m", factor: 1.0, is_angle: false },
+];
+
+impl Told {
+    /// It is of a kind that the joint takes.
+    fn fits(&self, robot: &robot::Robot, name: &str) -> Result<(), String> {
+        let (Some(unit), Some(dof)) = (self.unit, robot.free().find(|d| d.name == name)) else { return Ok(()) };
+        let name = clean(name);
+        match (dof.kind, unit.is_angle) {
+            (robot::DofKind::Hinge { .. }, false) => Err(format!(
+                "expected an angle (rad, deg, turns) for {name}, which turns, found a length in {}",
+                unit.name
+            )),
+            (robot::DofKind::Slide { .. }, true) => {
+                Err(format!("expected a length (m, cm, mm) for {name}, which slides, found an angle in {}", unit.name))
+            }
+            (robot::DofKind::Hinge { .. }, true) | (robot::DofKind::Slide { .. }, false) => Ok(()),
+        }
+    }
+}
+
 /// Values by joint, each told once.
-fn values(told: &[(String, f64)]) -> Result<robot::Values, String> {
+fn values(told: &[Stated]) -> Result<robot::Values, String> {
     let mut values = robot::Values::new();
-    for (name, value) in told {
-        if values.insert(name.clone(), *value).is_some() {
-            return Err(format!("expected one value of the joint {name}, found two"));
+    for (name, told) in told.iter().flatten() {
+        if values.insert(name.clone(), told.value).is_some() {
+            return Err(format!("expected one value of the joint {}, found two", clean(name)));
         }
     }
     Ok(values)
 }
 
-/// A joint and its value.
-fn joint(word: &str) -> Result<(String, f64), String> {
+/// Joints and their values, with commas between them. A name may have commas, too: what has no value goes with what follows.
+fn stated(word: &str) -> Result<Stated, String> {
     let expected = || "expected JOINT=VALUE, as in shoulder=30deg or slide=5mm".to_owned();
-    let (name, value) = word.rsplit_once('=').ok_or_else(expected)?;
-    if name.is_empty() {
-        return Err(expected());
+    let (mut all, mut name) = (Vec::new(), String::new());
+    for piece in word.split(',') {
+        name.push_str(piece);
+        let Some((own, value)) = name.rsplit_once('=') else {
+            name.push(',');
+            continue;
+        };
+        if own.is_empty() {
+            return Err(expected());
+        }
+        all.push((own.to_owned(), joint_value(value).ok_or_else(expected)?));
+        name.clear();
     }
-    Ok((name.to_owned(), joint_value(value).ok_or_else(expected)?))
+    if all.is_empty() || !name.is_empty() { Err(expected()) } else { Ok(all) }
 }
 
-/// A joint's value in radians or metres.
-pub(super) fn joint_value(word: &str) -> Option<f64> {
-    const DEGREE: f64 = std::f64::consts::PI / 180.0;
-    let units = [("deg", DEGREE), ("rad", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
-    let known = units.into_iter().find_map(|(unit, factor)| Some((word.strip_suffix(unit)?, factor)));
-    let (number, factor) = known.unwrap_or((word, 1.0));
-    // A quotient is the nearer one of the two where units divide: 5 mm is the double 0.005.
+/// A joint's value, in radians or metres where it has no unit.
+fn joint_value(word: &str) -> Option<Told> {
+    let known = UNITS.iter().find_map(|unit| Some((word.strip_suffix(unit.name)?, unit)));
+    let (number, unit) = known.map_or((word, None), |(number, unit)| (number, Some(unit)));
     let value = number.trim().parse::<f64>().ok()?;
-    let value = match factor {
+    // A quotient is the nearer one of the two where units divide: 5 mm is the double 0.005.
+    let value = match unit.map_or(1.0, |unit| unit.factor) {
         1e-3 => value / 1e3,
         1e-2 => value / 1e2,
         other => value * other,
     };
-    value.is_finite().then_some(value)
+    value.is_finite().then_some(Told { value, unit })
+}
+
+/// A sentence about a file.
+fn of_file(file: &Path, sentence: &str) -> String {
+    format!("{}: {sentence}", file.display())
 }
 
 /// Is it a scene? Anything else is a model.
@@ -133,7 +197,9 @@ pub(super) fn is_scene(file: &Path) -> bool {
 pub(super) fn read_scene(file: &Path, joints: &JointArguments) -> Result<Scene, Box<dyn Error>> {
     if robot::is_robot(file) {
         let ask = joints.ask()?;
-        return Ok(robot::scene_of(file, &robot::read_robot(file, &ask)?, &ask)?);
+        let robot = robot::read_robot(file, &ask)?;
+        joints.fit(file, &robot)?;
+        return Ok(robot::scene_of(file, &robot, &ask)?);
     }
     joints.none(file)?;
     Ok(import::read_scene(file)?)
@@ -158,7 +224,7 @@ pub(super) fn told(file: &Path, joints: &JointArguments) -> Result<String, Box<d
             [low, high] if low.is_infinite() && high.is_infinite() => "without limits".to_owned(),
             [low, high] => format!("{} to {}", number(low, 1e-9, 6), number(high, 1e-9, 6)),
         };
-        let _ = writeln!(out, "  {:<32} {at:>12} {unit:<3}  {limits}", dof.name);
+        let _ = writeln!(out, "  {:<32} {at:>12} {unit:<3}  {limits}", clean(&dof.name));
     }
     Ok(out)
 }
@@ -169,7 +235,7 @@ pub(super) struct ClearanceArguments {
     file: PathBuf,
     /// A joint and the range that it goes through: shoulder=0..70deg, slide=0..120mm; in radians and metres without a unit.
     #[arg(long, value_name = "JOINT=LOW..HIGH", value_parser = range, required = true, allow_hyphen_values = true)]
-    range: Vec<(String, [f64; 2])>,
+    range: Vec<(String, [Told; 2])>,
     /// How far apart the bounds may be, metres.
     #[arg(long, value_name = "LENGTH", default_value = "0.001", value_parser = length)]
     tolerance: f64,
@@ -192,12 +258,14 @@ pub(super) struct ClearanceArguments {
 
 /// A length in metres, or with a unit.
 fn length(word: &str) -> Result<f64, String> {
-    let length = joint_value(word).filter(|x| *x > 0.0 && !word.ends_with("deg") && !word.ends_with("rad"));
-    length.ok_or_else(|| "expected a positive length in metres, or with a unit, as in 20mm".into())
+    let length = joint_value(word).filter(|told| told.value > 0.0 && told.unit.is_none_or(|unit| !unit.is_angle));
+    length
+        .map(|told| told.value)
+        .ok_or_else(|| "expected a positive length in metres, or with a unit, as in 20mm".into())
 }
 
 /// A joint and its range.
-fn range(word: &str) -> Result<(String, [f64; 2]), String> {
+fn range(word: &str) -> Result<(String, [Told; 2]), String> {
     let expected = || "expected JOINT=LOW..HIGH, as in shoulder=0..70deg".to_owned();
     let (name, both) = word.rsplit_once('=').ok_or_else(expected)?;
     let (low, high) = both.split_once("..").ok_or_else(expected)?;
@@ -223,19 +291,23 @@ pub(super) fn clearance(arguments: &ClearanceArguments) -> Result<Done, Box<dyn 
         return Err("expected --range in place of --to: a clearance is over ranges, not over a step".into());
     }
     let read = robot::read_robot(file, &ask)?;
+    arguments.joints.fit(file, &read)?;
+    for (name, told) in arguments.range.iter().flat_map(|(name, both)| both.iter().map(move |told| (name, told))) {
+        told.fits(&read, name).map_err(|e| of_file(file, &e))?;
+    }
     let scene = robot::scene_of(file, &read, &ask)?;
     let scene = Scene { access: arguments.access.with(scene.access.clone())?, ..scene };
     let prepared = prepare_scene(&scene, Facets::Auto, &arguments.cache)?;
     let models = models_of(&prepared);
     let scene = without_touching(scene, &models, &arguments.joints)?;
     let question = Question {
-        ranges: arguments.range.clone(),
+        ranges: arguments.range.iter().map(|(name, both)| (name.clone(), both.map(|told| told.value))).collect(),
         values: ask.from,
         tolerance: arguments.tolerance,
         least: arguments.least,
         boxes: arguments.boxes,
     };
-    let least = clearance::least(&read, &scene, &models, &question)?;
+    let least = clearance::least(&read, &scene, &models, &question).map_err(|e| of_file(file, &e))?;
     print(&if arguments.json { least_json(&least) } else { least_text(&least, &question) })?;
     Ok(match question.least {
         _ if least.pairs == 0 => Done::Well,
@@ -263,9 +335,10 @@ fn least_text(least: &Least, question: &Question) -> String {
         return "no pair of links is tested\n".to_owned();
     }
     let fine = 0.1 * question.tolerance;
+    let names = [clean(&least.names[0]), clean(&least.names[1])];
     let (lower, upper) = (number(least.lower, fine, 9), number(least.upper, fine, 9));
     let mut out = match question.least {
-        _ if least.upper == 0.0 => format!("a clash: {} and {} touch\n", least.names[0], least.names[1]),
+        _ if least.upper == 0.0 => format!("a clash: {} and {} touch\n", names[0], names[1]),
         Some(asked) if least.upper < asked => format!("nearer than {asked}: {upper}\n"),
         Some(asked) if least.lower >= asked => format!("at least {asked}, proven: {lower} or more\n"),
         _ => format!("least clearance {upper}; proven: {lower} or more\n"),
@@ -274,10 +347,10 @@ fn least_text(least: &Least, question: &Question) -> String {
         out.push_str("not to the tolerance: the boxes that it may look at are spent (--boxes)\n");
     }
     if least.upper > 0.0 {
-        let _ = writeln!(out, "  {} - {}", least.names[0], least.names[1]);
+        let _ = writeln!(out, "  {} - {}", names[0], names[1]);
     }
     for (name, value) in &least.values {
-        let _ = writeln!(out, "  {name} = {}", number(*value, 1e-9, 9));
+        let _ = writeln!(out, "  {} = {}", clean(name), number(*value, 1e-9, 9));
     }
     if least.points.iter().all(|x| x.is_finite()) {
         let point = |x: glam::DVec3| x.to_array().map(|c| number(c, fine, 6)).join(", ");

@@ -6,7 +6,7 @@
 use super::font::{Pattern, machine};
 use super::openscad::{self, Access};
 use super::{Facets, Import, ImportError, Limits, csg, mesh};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A file format.
 #[derive(Clone, Copy, Debug)]
@@ -182,9 +182,9 @@ impl ModelBytes {
 /// The files that a text at `path` names: from its own folder and below, or from the root that `access` names.
 fn attached(source: &Source, path: &Path, access: &Access, limits: &Limits) -> Result<Vec<Attachment>, ImportError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let root = access.root.as_deref();
+    let roots = (access.root.as_deref(), access.packages.as_slice());
     let attach = |named| match named {
-        Named::File(name) => Attachment { bytes: beside(folder, root, &name, limits), name },
+        Named::File(name) => Attachment { bytes: beside(folder, roots, &name, limits), name },
         Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: Attachment::of_font(&pattern) },
     };
     Ok((source.format()?.names)(source.bytes, limits).into_iter().map(attach).collect())
@@ -194,14 +194,20 @@ fn attached(source: &Source, path: &Path, access: &Access, limits: &Limits) -> R
 pub fn files_of(source: &Source, root: &Path, limits: &Limits) -> Vec<Attachment> {
     let names = source.format().map(|format| (format.names)(source.bytes, limits)).unwrap_or_default();
     let files = names.into_iter().filter_map(|named| match named {
-        Named::File(name) => Some(Attachment { bytes: beside(root, Some(root), &name, limits), name }),
+        Named::File(name) => Some(Attachment { bytes: beside(root, (Some(root), &[]), &name, limits), name }),
         Named::Font(_) => None,
     });
     files.collect()
 }
 
-/// The bytes of a file that a text in `folder` names; it is in `root` or below, which is `folder` unless another one is given.
-fn beside(folder: &Path, root: Option<&Path>, name: &str, limits: &Limits) -> Result<Vec<u8>, String> {
+/// The bytes of a file that a text in `folder` names; it is in `root` or below, which is `folder` unless another one is given, or in
+/// one of some packages. Links count as what they lead to.
+fn beside(
+    folder: &Path,
+    (root, packages): (Option<&Path>, &[PathBuf]),
+    name: &str,
+    limits: &Limits,
+) -> Result<Vec<u8>, String> {
     let of = |path: &Path| path.canonicalize().map_err(|e| format!("{name:?}: {e}"));
     let top = match root {
         None => of(folder)?,
@@ -210,7 +216,8 @@ fn beside(folder: &Path, root: Option<&Path>, name: &str, limits: &Limits) -> Re
         }
     };
     let path = of(&folder.join(name))?;
-    if !path.starts_with(&top) {
+    let is_of_package = || packages.iter().any(|p| p.canonicalize().is_ok_and(|p| path.starts_with(p)));
+    if !path.starts_with(&top) && !is_of_package() {
         return Err(match root {
             None => {
                 format!("{name:?}, which is not in the folder of the text that names it (--import-root gives another)")

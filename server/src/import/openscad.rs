@@ -150,6 +150,8 @@ fn heard(said: &mut File) -> (Vec<String>, Vec<String>) {
 pub struct Access {
     /// The folder, with all below it, that texts may import files from; `None`: each text from its own.
     pub root: Option<PathBuf>,
+    /// Folders beside it that they may import files from, too: a robot's packages.
+    pub packages: Vec<PathBuf>,
     /// What flattens OpenSCAD's own texts.
     pub openscad: Openscad,
 }

@@ -9,7 +9,7 @@ use crate::math::Aabb;
 use crate::octree::Model;
 use crate::octree::mass::mass_properties;
 use crate::solid::{Node, NodeId, Op, Sense, Solid};
-use crate::terminal::{Paint, fold, number, sentence};
+use crate::terminal::{Paint, clean, fold, number, sentence};
 use contactd_proto::MassOptions;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -70,7 +70,13 @@ pub fn scene(scene: &Scene) -> String {
             (false, false) if o.motion.spin == DVec3::ZERO => "translating",
             _ => "turning",
         };
-        let _ = writeln!(out, "  object {}: model {}, group {}, {how}", o.name, scene.models[o.model].name, o.group);
+        let _ = writeln!(
+            out,
+            "  object {}: model {}, group {}, {how}",
+            clean(&o.name),
+            clean(&scene.models[o.model].name),
+            o.group
+        );
     }
     for r in &scene.rules {
         let _ = writeln!(out, "  rule {} - {}: {}", r.between[0], r.between[1], r.effects());

@@ -15,5 +15,6 @@ mod heights;
 mod import_models;
 mod mass;
 mod models;
+mod robot_files;
 mod robots;
 mod view;

@@ -88,8 +88,8 @@ pub struct Robot {
     pub excepted: HashSet<[usize; 2]>,
     /// What was left out or taken in another way.
     pub notes: Vec<Note>,
-    /// The folder that holds the file and all packages that its meshes are in, where these are not in its own folder.
-    pub root: Option<PathBuf>,
+    /// The packages that its meshes are in, folders that are not in the file's own: what they hold may be read, and nothing around it.
+    pub packages: Vec<PathBuf>,
 }
 
 impl Robot {
@@ -191,6 +191,13 @@ impl Robot {
 }
 
 impl Dof {
+    /// True of a value that is beyond a limit, by more than rounding's.
+    pub fn is_beyond(&self, value: f64) -> bool {
+        let [low, high] = self.range;
+        let slack = 1e-9 * value.abs().max(1.0);
+        value < low - slack || value > high + slack
+    }
+
     /// Its transform at a value.
     pub fn pose(&self, value: f64) -> Pose {
         let value = value - self.zero;

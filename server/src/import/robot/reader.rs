@@ -32,8 +32,8 @@ pub(super) struct Reader<'a> {
     pub ask: &'a Ask,
     /// The folder of the first file.
     pub main: &'a Path,
-    /// The folder that holds the text and all packages that were found elsewhere.
-    pub root: &'a RefCell<Option<PathBuf>>,
+    /// The packages that were found elsewhere than in the first file's folder.
+    pub packages: &'a RefCell<Vec<PathBuf>>,
 }
 
 impl Reader<'_> {
@@ -46,29 +46,38 @@ impl Reader<'_> {
     /// or above the text; of `file://PATH` the path; else relative to the text.
     pub fn file(&self, uri: &str) -> String {
         let named = uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://"));
-        if let Some(path) = named.filter(|path| path.split('/').all(|part| part != "..")) {
-            let own = std::path::absolute(self.folder()).unwrap_or_else(|_| self.folder().to_owned());
-            let above = own.ancestors().map(Path::to_owned);
-            let name = path.split('/').next().unwrap_or_default();
-            let found = self.ask.packages.iter().cloned().chain(above).find_map(|folder| {
-                let is_package = folder.file_name().is_some_and(|own| own == name);
-                let base = if is_package { folder.parent()?.to_owned() } else { folder };
-                let at = base.join(path);
-                at.exists().then_some(at)
+        if let Some(path) = named {
+            let found = self.package(path).map(|(package, file)| {
+                let own = self.main.canonicalize().unwrap_or_else(|_| self.main.to_owned());
+                let mut packages = self.packages.borrow_mut();
+                if !package.starts_with(&own) && !packages.contains(&package) {
+                    packages.push(package);
+                }
+                file
             });
-            if let Some(found) = found.as_ref().and_then(|f| f.canonicalize().ok())
-                && let Ok(own) = self.folder().canonicalize()
-                && !found.starts_with(&own)
-            {
-                let mut root = self.root.borrow_mut();
-                *root = Some(common(root.as_ref().unwrap_or(&own), &found));
-            }
-            return found.unwrap_or_else(|| path.into()).display().to_string();
+            return found.unwrap_or_else(|| path.trim_start_matches('/').into()).display().to_string();
         }
         match uri.strip_prefix("file://") {
             Some(path) => path.to_owned(),
             None => self.base.join(uri).display().to_string(),
         }
+    }
+
+    /// A package's folder and a file in it, by `NAME/PATH`; links in the package count as what they lead to.
+    fn package(&self, path: &str) -> Option<(PathBuf, PathBuf)> {
+        let (name, rest) = path.split_once('/').unwrap_or((path, ""));
+        if name.is_empty() || name == "." || rest.starts_with('/') || path.split('/').any(|part| part == "..") {
+            return None;
+        }
+        let own = std::path::absolute(self.folder()).unwrap_or_else(|_| self.folder().to_owned());
+        // What lies in the machine's root is no package.
+        let above = own.ancestors().filter(|folder| folder.parent().is_some()).map(Path::to_owned);
+        self.ask.packages.iter().cloned().chain(above).find_map(|folder| {
+            let is_package = folder.file_name().is_some_and(|own| own == name);
+            let package = if is_package { folder } else { folder.join(name) };
+            let file = package.join(rest).canonicalize().ok()?;
+            Some((package.canonicalize().ok()?, file))
+        })
     }
 
     /// The folder of the first file, which texts are relative to.
@@ -94,9 +103,4 @@ impl Reader<'_> {
 /// The folder that a file is in.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// The folder that holds two of them.
-fn common(a: &Path, b: &Path) -> PathBuf {
-    a.components().zip(b.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
 }

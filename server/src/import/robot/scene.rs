@@ -3,7 +3,7 @@
 use super::super::openscad::Access;
 use super::super::problem::Problem;
 use super::super::scene::{ModelSource, Scene, SceneError, SceneObject};
-use super::super::{Limits, Place, read_bytes, xml};
+use super::super::{Limits, Note, Place, read_bytes, xml};
 use super::kinematics::{Part, Robot, Values};
 use super::reader::{self, Ask, Reader};
 use super::{mjcf, sdf, urdf};
@@ -21,9 +21,9 @@ pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
     let bytes = read_bytes(path, &Limits::default())?;
     let wrong = |(at, problem): (Place, Problem)| of_problem(&file, at, problem);
     let document = xml::parse(&bytes).map_err(wrong)?;
-    let found = RefCell::new(None);
+    let found = RefCell::new(Vec::new());
     let main = reader::folder_of(path);
-    let reader = Reader { path, base: PathBuf::new(), within: None, ask, main, root: &found };
+    let reader = Reader { path, base: PathBuf::new(), within: None, ask, main, packages: &found };
     let root = document.root_element();
     let robot = match root.tag_name().name() {
         "robot" => urdf::read(root, &reader),
@@ -32,7 +32,7 @@ pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
         other => Err(xml::wrong(root, "a robot (URDF), an sdf or a mujoco as the root element", Some(other))),
     };
     let mut robot = robot.map_err(wrong)?;
-    robot.root = found.into_inner();
+    robot.packages = found.into_inner();
     let mut joints = HashSet::new();
     for link in &robot.links {
         if let Some(dof) = link.dofs.iter().find(|d| !joints.insert(d.name.as_str())) {
@@ -70,6 +70,8 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
     let from = checked(&file, robot, &ask.from)?;
     let mut to = from.clone();
     to.extend(checked(&file, robot, &ask.to)?);
+    let mut notes = robot.notes.clone();
+    notes.extend(followers(&file, robot, [&from, &to])?);
     let motions = robot.motions(&from, &to).map_err(|(link, joints)| {
         let link = &robot.links[link];
         let (last, others) = joints.split_last().expect("two joints at least");
@@ -77,7 +79,11 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
             file: file.clone(),
             at: link.at,
             expected: format!("joints of which one turns the link {:?} in a step: move one after the other", link.name),
-            found: format!("{} and {last} moving at once, on a path that is no arc", others.join(", ")),
+            found: format!(
+                "{} and {} moving at once, on a path that is no arc",
+                shown(&others.join(", ")),
+                shown(last)
+            ),
         }
     })?;
     let mut models: Vec<ModelSource> = Vec::new();
@@ -135,10 +141,15 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
         models,
         objects,
         rules: vec![rule],
-        notes: robot.notes.clone(),
+        notes,
         file,
-        access: Access { root: robot.root.clone(), ..Access::default() },
+        access: Access { packages: robot.packages.clone(), ..Access::default() },
     })
+}
+
+/// A name within a sentence: characters that would break its line are written as escapes.
+fn shown(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() }).collect()
 }
 
 /// A name that no other object has.
@@ -156,21 +167,43 @@ fn unique(name: String, known: &mut HashMap<String, usize>) -> String {
 fn checked(file: &str, robot: &Robot, values: &Values) -> Result<Values, SceneError> {
     let wrong = |at, expected: String, found: String| SceneError::Value { file: file.to_owned(), at, expected, found };
     for (name, value) in values {
+        let told = shown(name);
         let link = robot.links.iter().find(|l| l.dofs.iter().any(|d| d.name == *name));
         let dof = link.and_then(|l| l.dofs.iter().find(|d| d.name == *name));
         let (Some(link), Some(dof)) = (link, dof) else {
-            let names: Vec<&str> = robot.free().map(|d| d.name.as_str()).collect();
+            let names: Vec<String> = robot.free().map(|d| shown(&d.name)).collect();
             return Err(wrong(Place::START, format!("one of the joints {}", names.join(", ")), format!("{name:?}")));
         };
         if let Some((leader, ..)) = &dof.mimic {
-            return Err(wrong(link.at, format!("a value of {leader}, which {name} follows"), format!("one of {name}")));
+            return Err(wrong(
+                link.at,
+                format!("a value of {}, which {told} follows", shown(leader)),
+                format!("one of {told}"),
+            ));
         }
         let [low, high] = dof.range;
         if !(*value >= low && *value <= high) {
-            return Err(wrong(link.at, format!("{low} to {high} as {name}"), value.to_string()));
+            return Err(wrong(link.at, format!("{low} to {high} as {told}"), value.to_string()));
         }
     }
     Ok(values.clone())
+}
+
+/// Joints that follow others stay within their own limits; where they do not as the file stands, that is a note.
+fn followers(file: &str, robot: &Robot, values: [&Values; 2]) -> Result<Vec<Note>, SceneError> {
+    let mut notes = Vec::new();
+    for (link, dof) in robot.links.iter().flat_map(|l| l.dofs.iter().map(move |d| (l, d))) {
+        let Some((leader, ..)) = &dof.mimic else { continue };
+        let beyond = values.iter().map(|v| robot.value(dof, v)).find(|value| dof.is_beyond(*value));
+        let Some(value) = beyond else { continue };
+        let [low, high] = dof.range;
+        let expected = format!("{low} to {high} as {}, which follows {}", shown(&dof.name), shown(leader));
+        if values.iter().any(|v| v.contains_key(leader)) {
+            return Err(SceneError::Value { file: file.to_owned(), at: link.at, expected, found: value.to_string() });
+        }
+        notes.push(Note { at: link.at, text: format!("expected {expected}, and it stands at {value}"), amount: None });
+    }
+    Ok(notes)
 }
 
 impl Robot {

@@ -251,9 +251,34 @@ pub(super) fn needed<'a>(node: Node<'a, '_>, attribute: &str) -> Result<&'a str>
         .ok_or_else(|| xml::wrong(node, format!("{attribute} of the {}", node.tag_name().name()), None))
 }
 
-/// The pairs of an SRDF text that are not to be tested.
+/// The pairs of an SRDF text that are not to be tested: those of links that are tested against none by default, but for pairs that are
+/// enabled, which are tested although a joint connects them; then those that are disabled.
 pub(super) fn disabled(root: Node<'_, '_>, robot: &mut Robot) -> Result<()> {
-    for node in xml::inside(root, "disable_collisions") {
+    let kind = root.tag_name().name();
+    if kind != "robot" {
+        return Err(xml::wrong(root, "a robot (SRDF) as the root element", Some(kind)));
+    }
+    if let Some(node) = root.children().find(|n| ["link", "joint", "material"].contains(&n.tag_name().name())) {
+        return Err(xml::wrong(node, "SRDF, which names links and joints of a URDF", Some(node.tag_name().name())));
+    }
+    for node in xml::inside(root, "disable_default_collisions") {
+        let name = needed(node, "link")?;
+        let found = robot.links.iter().position(|l| l.name == name);
+        let link = found.ok_or_else(|| xml::wrong(node, "the name of a link", Some(name)))?;
+        robot.excepted.extend((0..robot.links.len()).map(|other| [link.min(other), link.max(other)]));
+    }
+    for pair in pairs(root, "enable_collisions", robot)? {
+        robot.excepted.remove(&pair);
+    }
+    let disabled = pairs(root, "disable_collisions", robot)?;
+    robot.excepted.extend(disabled);
+    Ok(())
+}
+
+/// Pairs of links by the elements of a name.
+fn pairs(root: Node<'_, '_>, element: &'static str, robot: &Robot) -> Result<Vec<[usize; 2]>> {
+    let mut all = Vec::new();
+    for node in xml::inside(root, element) {
         let mut pair = [0; 2];
         for (k, key) in ["link1", "link2"].into_iter().enumerate() {
             let name = needed(node, key)?;
@@ -261,7 +286,7 @@ pub(super) fn disabled(root: Node<'_, '_>, robot: &mut Robot) -> Result<()> {
             pair[k] = found.ok_or_else(|| xml::wrong(node, "the name of a link", Some(name)))?;
         }
         pair.sort_unstable();
-        robot.excepted.insert(pair);
+        all.push(pair);
     }
-    Ok(())
+    Ok(all)
 }

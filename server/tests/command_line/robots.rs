@@ -1,0 +1,88 @@
+//! What is said of joints, of files that robots name, and of worlds, as users say it.
+
+use super::{folder, run, text};
+
+/// A hinge and a slide, whose names have what names may have; a slide that follows the other one.
+const ROBOT: &str = "<robot name=\"r\"><link name=\"base\"><collision><geometry><sphere radius=\"0.1\"/></geometry></collision></link>\n\
+    <link name=\"arm\"/><link name=\"t&#10;ip\"><collision><origin xyz=\"2 0 0\"/><geometry><sphere radius=\"0.1\"/></geometry></collision></link>\n\
+    <link name=\"f\"/><joint name=\"a, b\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/></joint>\
+    <joint name=\"s&#10;lide\" type=\"prismatic\"><parent link=\"arm\"/><child link=\"t&#10;ip\"/><limit lower=\"-1\" upper=\"1\"/></joint>\
+    <joint name=\"finger\" type=\"prismatic\"><parent link=\"base\"/><child link=\"f\"/><limit lower=\"-1\" upper=\"1\"/>\
+    <mimic joint=\"s&#10;lide\" multiplier=\"2\"/></joint></robot>";
+
+#[test]
+fn values_have_units_that_their_joints_take() {
+    let folder = folder(&[("r.urdf", ROBOT)]);
+    let check = |joints: &str| {
+        let out = run(folder.path(), &["check", "r.urdf", "--joints", joints]);
+        (out.status.code(), text(&out.stderr).to_owned())
+    };
+    for joints in ["a, b=0.25turns", "a, b=3deg,s\nlide=5mm", "s\nlide=0.1,a, b=1rad", "a, b=1", "s\nlide=2cm"] {
+        assert_eq!(check(joints), (Some(0), String::new()), "{joints}");
+    }
+    for (joints, words) in [
+        ("a, b=3mm", "r.urdf: expected an angle (rad, deg, turns) for a, b, which turns, found a length in mm"),
+        ("s\nlide=3deg", "which slides, found an angle in deg"),
+        ("s\nlide=3", "expected -1 to 1 as s\\nlide, found 3"),
+        ("s\nlide=0.8", "expected -1 to 1 as finger, which follows s\\nlide, found 1.6"),
+        ("finger=0", "expected a value of s\\nlide, which finger follows"),
+        ("c=0", "expected one of the joints a, b, s\\nlide, found \"c\""),
+        ("a, b", "expected JOINT=VALUE"),
+        ("a, b=1,", "expected JOINT=VALUE"),
+    ] {
+        let (status, said) = check(joints);
+        assert_eq!(status, Some(2), "{joints}: {said}");
+        assert!(said.contains(words), "{joints}: {said}");
+    }
+    let clearance = |range: &str| {
+        let out = run(folder.path(), &["clearance", "r.urdf", "--range", range]);
+        (out.status.code(), text(&out.stderr).to_owned())
+    };
+    assert_eq!(clearance("a, b=0..1turns"), (Some(0), String::new()));
+    for (range, words) in [
+        ("s\nlide=0..1deg", "r.urdf: expected a length (m, cm, mm) for"),
+        ("a, b=0mm..1", "r.urdf: expected an angle"),
+        ("q=0..1", "r.urdf: expected a range of one of the joints"),
+        ("s\nlide=0..2", "r.urdf: expected a range within -1 to 1"),
+        ("s\nlide=0..0.8", "which follows it, within -1 to 1, found 0 to 1.6"),
+    ] {
+        let (status, said) = clearance(range);
+        assert!(status == Some(2) && said.contains(words), "{range}: {said}");
+    }
+}
+
+#[test]
+fn names_break_no_line() {
+    let folder = folder(&[("r.urdf", ROBOT)]);
+    let out = run(folder.path(), &["inspect", "r.urdf"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let said = text(&out.stdout);
+    assert!(said.contains("s\u{fffd}lide") && said.contains("t\u{fffd}ip"), "{said}");
+    assert!(!said.lines().any(|l| l.trim_start().starts_with("lide") || l.trim_start().starts_with("ip")), "{said}");
+    let floating = ROBOT.replace("continuous", "floating").replace("a, b", "a&#10;b");
+    std::fs::write(folder.path().join("f.urdf"), floating).expect("written");
+    let out = run(folder.path(), &["check", "f.urdf"]);
+    assert_eq!(text(&out.stderr).lines().count(), 1, "{}", text(&out.stderr));
+}
+
+#[test]
+fn what_a_setup_leaves_out_is_told() {
+    let volumes = "<volume name=\"v\"><solidref ref=\"s\"/></volume><volume name=\"w\"><solidref ref=\"b\"/><physvol name=\"p\"><volumeref ref=\"v\"/>\
+                   </physvol></volume><volume name=\"other\"><solidref ref=\"s\"/><physvol name=\"q\"><volumeref ref=\"w\"/></physvol></volume>";
+    let whole = format!(
+        "<gdml><solids><orb name=\"s\" r=\"1\"/><box name=\"b\" x=\"3\" y=\"3\" z=\"3\"/></solids><structure>{volumes}</structure>\n\
+         <setup name=\"Second\"><world ref=\"other\"/></setup>\n<setup name=\"Default\"><world ref=\"w\"/></setup></gdml>"
+    );
+    let folder = folder(&[("g.gdml", &whole), ("o.gdml", &whole.replace("\"Default\"", "\"Third\""))]);
+    let out = run(folder.path(), &["overlaps", "g.gdml"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stdout));
+    let said = text(&out.stderr);
+    assert!(said.contains("g.gdml:2:1: the setup \"Second\" is left out"), "{said}");
+    assert!(
+        said.contains("\"other\" is left out: it is not in the world \"w\"") && said.lines().count() == 2,
+        "{said}"
+    );
+    // Without one called Default the first one counts: the box of 3 sticks out of the ball.
+    let out = run(folder.path(), &["overlaps", "o.gdml"]);
+    assert_eq!(out.status.code(), Some(1), "{}", text(&out.stdout));
+}
