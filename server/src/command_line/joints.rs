@@ -18,7 +18,8 @@ use std::sync::Arc;
 /// How a robot (URDF, SDFormat, MJCF) stands and moves.
 #[derive(clap::Args)]
 pub(super) struct JointArguments {
-    /// Joint values of a robot at the start of the step, in radians and metres, or with a unit: shoulder=30deg,slide=5mm.
+    /// Joint values of a robot at the start of the step, in radians and metres, or with a unit: shoulder=30deg,slide=5mm;
+    /// key:NAME begins at a keyframe of MJCF.
     #[arg(long, value_name = "JOINT=VALUE,…", value_parser = stated)]
     joints: Vec<Stated>,
     /// Joint values at its end; the others stay.
@@ -41,12 +42,20 @@ pub(super) struct JointArguments {
 impl JointArguments {
     pub fn ask(&self) -> Result<robot::Ask, String> {
         let (from, to) = (values(&self.joints)?, values(&self.to)?);
-        Ok(robot::Ask { from, to, hulls: self.hulls, packages: self.packages.clone(), srdf: self.srdf.clone() })
+        if self.to.iter().any(|s| !s.keys.is_empty()) {
+            return Err("expected a keyframe in --joints, where the step begins, found one in --to".into());
+        }
+        let mut keys = self.joints.iter().flat_map(|s| &s.keys).cloned();
+        let key = keys.next();
+        if keys.next().is_some() {
+            return Err("expected one keyframe in --joints, found two".into());
+        }
+        Ok(robot::Ask { from, to, key, hulls: self.hulls, packages: self.packages.clone(), srdf: self.srdf.clone() })
     }
 
     /// Values are in units that the robot's joints take.
     fn fit(&self, file: &Path, robot: &robot::Robot) -> Result<(), String> {
-        let mut stated = self.joints.iter().chain(&self.to).flatten();
+        let mut stated = self.joints.iter().chain(&self.to).flat_map(|s| &s.values);
         stated.try_for_each(|(name, told)| told.fits(robot, name)).map_err(|e| of_file(file, &e))
     }
 
@@ -93,8 +102,12 @@ pub(super) fn without_touching(
     Ok(scene)
 }
 
-/// Joints and their values, as they were told together.
-type Stated = Vec<(String, Told)>;
+/// Joints and their values, and keyframes, as they were told together.
+#[derive(Clone, Debug, Default)]
+struct Stated {
+    values: Vec<(String, Told)>,
+    keys: Vec<String>,
+}
 
 /// A value of a joint in radians or metres, and the unit that it was told in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,7 +155,7 @@ impl Told {
 /// Values by joint, each told once.
 fn values(told: &[Stated]) -> Result<robot::Values, String> {
     let mut values = robot::Values::new();
-    for (name, told) in told.iter().flatten() {
+    for (name, told) in told.iter().flat_map(|s| &s.values) {
         if values.insert(name.clone(), told.value).is_some() {
             return Err(format!("expected one value of the joint {}, found two", clean(name)));
         }
@@ -153,8 +166,12 @@ fn values(told: &[Stated]) -> Result<robot::Values, String> {
 /// Joints and their values, with commas between them. A name may have commas, too: what has no value goes with what follows.
 fn stated(word: &str) -> Result<Stated, String> {
     let expected = || "expected JOINT=VALUE, as in shoulder=30deg or slide=5mm".to_owned();
-    let (mut all, mut name) = (Vec::new(), String::new());
+    let (mut all, mut name) = (Stated::default(), String::new());
     for piece in word.split(',') {
+        if let Some(key) = piece.strip_prefix("key:").filter(|key| name.is_empty() && !key.contains('=')) {
+            all.keys.push(key.to_owned());
+            continue;
+        }
         name.push_str(piece);
         let Some((own, value)) = name.rsplit_once('=') else {
             name.push(',');
@@ -163,10 +180,11 @@ fn stated(word: &str) -> Result<Stated, String> {
         if own.is_empty() {
             return Err(expected());
         }
-        all.push((own.to_owned(), joint_value(value).ok_or_else(expected)?));
+        all.values.push((own.to_owned(), joint_value(value).ok_or_else(expected)?));
         name.clear();
     }
-    if all.is_empty() || !name.is_empty() { Err(expected()) } else { Ok(all) }
+    let is_nothing = all.values.is_empty() && all.keys.is_empty();
+    if is_nothing || !name.is_empty() { Err(expected()) } else { Ok(all) }
 }
 
 /// A joint's value, in radians or metres where it has no unit.

@@ -86,3 +86,34 @@ fn what_a_setup_leaves_out_is_told() {
     let out = run(folder.path(), &["overlaps", "o.gdml"]);
     assert_eq!(out.status.code(), Some(1), "{}", text(&out.stdout));
 }
+
+#[test]
+fn a_step_begins_at_a_keyframe() {
+    let model = "<mujoco><worldbody><geom size=\"0.5\"/><body name=\"a\" pos=\"3 0 0\"><joint name=\"p\" type=\"slide\" axis=\"1 0 0\" \
+                 range=\"-3 3\"/><geom size=\"0.5\"/></body></worldbody><keyframe><key name=\"near\" qpos=\"-1.5\"/><key name=\"far\" \
+                 qpos=\"4\"/></keyframe></mujoco>";
+    let folder = folder(&[("m.xml", model), ("r.urdf", ROBOT)]);
+    let check = |file: &str, joints: &str, to: &str| {
+        let out = run(folder.path(), &["check", file, "--json", "--joints", joints, "--to", to]);
+        (out.status.code(), text(&out.stdout).to_owned(), text(&out.stderr).to_owned())
+    };
+    // From 1.5 apart, with 1 of it the balls' radii, to 0.5: they touch in the middle.
+    let (status, said, wrong) = check("m.xml", "key:near", "p=-2.5");
+    assert_eq!(status, Some(0), "{wrong}");
+    let answer: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    assert!((answer["pairs"][0]["time"].as_f64().expect("a time") - 0.5).abs() < 1e-12, "{said}");
+    // A value that is told counts more than the keyframe's.
+    let (_, said, _) = check("m.xml", "key:near,p=-1", "p=-3");
+    let answer: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    assert!((answer["pairs"][0]["time"].as_f64().expect("a time") - 0.5).abs() < 1e-12, "{said}");
+    for (file, joints, to, words) in [
+        ("m.xml", "key:none", "p=0", "m.xml:1:1: expected one of the keyframes near, far, found key:none"),
+        ("m.xml", "key:far", "p=0", "expected -3 to 3 as p of the keyframe, found \"4\""),
+        ("m.xml", "key:near,key:far", "p=0", "expected one keyframe in --joints, found two"),
+        ("m.xml", "p=0", "key:near", "expected a keyframe in --joints, where the step begins, found one in --to"),
+        ("r.urdf", "key:near", "a, b=0", "r.urdf:1:1: expected MJCF, which has keyframes, found key:near"),
+    ] {
+        let (status, _, said) = check(file, joints, to);
+        assert!(status == Some(2) && said.contains(words), "{joints}: {said}");
+    }
+}

@@ -14,6 +14,7 @@ mod gltf;
 mod heights;
 mod import_models;
 mod mass;
+mod mjcf;
 mod models;
 mod robot_files;
 mod robots;

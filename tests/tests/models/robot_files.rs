@@ -82,7 +82,7 @@ fn srdf_says_which_pairs_are_tested() {
     let (path, srdf) = (folder.path().join("r.urdf"), folder.path().join("r.srdf"));
     let mut r = Random::new(8);
     for k in 0..60 {
-        let n = 3 + r.below(4);
+        let n = 3 + r.below(3);
         let mut urdf = "<robot name=\"r\">".to_owned();
         let mut tested = vec![vec![true; n]; n];
         for i in 0..n {
@@ -99,7 +99,7 @@ fn srdf_says_which_pairs_are_tested() {
         }
         // By default first, then what is enabled, then what is disabled; in the file they stand in any order.
         let (mut elements, mut steps) = (vec![], [vec![], vec![], vec![]]);
-        for _ in 0..r.below(6) {
+        for _ in 0..r.below(12) {
             let (kind, i, j) = (r.below(3), r.below(n), r.below(n));
             if i == j {
                 continue;

@@ -5,8 +5,10 @@
 //! both masks are 0 are seen and do not collide: they are not read.
 
 use super::super::problem::Problem;
-use super::super::xml;
+use super::super::{Place, xml};
 use super::kinematics::{Dof, DofKind, Link, Part, Robot};
+use super::mjcf_couplings::{Slot, begin_at, equalities, filters};
+use super::mjcf_files::{Files, included};
 use super::reader::Reader;
 use super::shape::{Shape, union};
 use super::urdf::{Result, needed, not_negative, numbers_of, vector_of};
@@ -19,75 +21,32 @@ use std::path::{Path, PathBuf};
 
 /// Bodies within bodies.
 const DEEPEST: usize = 200;
+/// Copies of one element.
+const MOST_COPIES: f64 = 10_000.0;
 
 pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     // Other files are put in first: defaults and meshes may stand in any of them.
-    let mut texts: Vec<(PathBuf, String)> = Vec::new();
-    included(root, reader.folder(), &mut texts, 0)?;
-    let documents: Vec<Document<'_>> = texts
-        .iter()
-        .map(|(path, text)| {
-            xml::parse(text.as_bytes()).map_err(|(at, e)| {
-                let file = path.display().to_string();
-                (xml::place(root), Problem::Named { file, at, problem: Box::new(e) })
-            })
-        })
-        .collect::<Result<_>>()?;
-    let files: HashMap<&Path, Node<'_, '_>> =
-        texts.iter().zip(&documents).map(|((path, _), document)| (path.as_path(), document.root_element())).collect();
-    let roots: Vec<Node<'_, '_>> = std::iter::once(root).chain(documents.iter().map(Document::root_element)).collect();
-    let mut model = Model::new(&roots, reader)?;
-    model.files = files;
+    let texts = included(root, reader.folder())?;
+    let documents: Vec<Document<'_>> = texts.iter().map(|t| xml::parse(t.text.as_bytes())).collect::<Result<_>>()?;
+    let files = Files::new(root, reader.folder(), &texts, &documents);
+    let mut model = Model::new(&files, reader)?;
     model.robot.name = root.attribute("model").unwrap_or_default().to_owned();
-    let world = Link {
-        name: "world".into(),
-        at: xml::place(root),
-        parent: None,
-        origin: Pose::IDENTITY,
-        dofs: vec![],
-        parts: vec![],
-        is_free: false,
-        is_static: true,
-    };
-    model.robot.links.push(world);
-    let top: Vec<Node<'_, '_>> = sections(&roots, "worldbody").collect();
-    for worldbody in top {
-        let folder = reader.folder().to_owned();
-        model.content(worldbody, &At { link: 0, frame: Pose::IDENTITY, class: None, folder, depth: 0 })?;
+    model.add("world".into(), None, (xml::place(root), Pose::IDENTITY));
+    model.robot.links[0].is_static = true;
+    for worldbody in files.sections("worldbody") {
+        let at = At { link: 0, frame: Pose::IDENTITY, class: None, suffix: String::new(), depth: 0 };
+        model.body_content(worldbody, &at)?;
     }
-    model.finish(&roots)
-}
-
-/// The sections of a name, in all files.
-fn sections<'a, 'i>(roots: &'a [Node<'a, 'i>], name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
-    roots.iter().flat_map(move |root| xml::inside(*root, name))
-}
-
-/// The texts that are included, each once. Names are relative to the main file's folder.
-fn included(node: Node<'_, '_>, folder: &Path, texts: &mut Vec<(PathBuf, String)>, depth: usize) -> Result<()> {
-    for include in node.descendants().filter(|n| n.is_element() && n.tag_name().name() == "include") {
-        let path = folder.join(needed(include, "file")?);
-        let wrong = |e: String| xml::wrong(include, format!("the included file {}", path.display()), Some(&e));
-        if texts.iter().any(|(known, _)| *known == path) {
-            return Err(wrong("a file that is included twice".into()));
-        }
-        let within = include.parent().map(|p| p.tag_name().name().to_owned()).unwrap_or_default();
-        if !["mujoco", "mujocoinclude", "worldbody", "body", "frame"].contains(&within.as_str()) {
-            return Err((xml::place(include), Problem::unsupported(format!("<include> within <{within}>"))));
-        }
-        if depth > 16 {
-            return Err(wrong("files that include each other".into()));
-        }
-        let bytes = super::super::read_bytes(&path, &super::super::Limits::default());
-        let bytes = bytes.map_err(|e| wrong(e.to_string()))?;
-        let text = String::from_utf8(bytes).map_err(|_| wrong("text that is not UTF-8".into()))?;
-        let at = texts.len();
-        texts.push((path.clone(), text));
-        let text = texts[at].1.clone();
-        let document = xml::parse(text.as_bytes()).map_err(|(at, e)| wrong(format!("{at}: {e}")))?;
-        included(document.root_element(), folder, texts, depth + 1)?;
+    let is_active = model.defaults.get(&("main".to_owned(), "equality".to_owned()));
+    let is_active = is_active.and_then(|all| all.get("active")).is_none_or(|word| word == "true");
+    let Model { mut robot, mocap, slots, .. } = model;
+    filters(&mut robot, &files, &mocap)?;
+    if let Some(key) = &reader.ask.key {
+        begin_at(&mut robot, &files, &slots, key)?;
     }
-    Ok(())
+    // What is held or follows stands where that has it, whatever the keyframe says.
+    equalities(&mut robot, &files, is_active)?;
+    Ok(robot)
 }
 
 /// Where something stands.
@@ -97,7 +56,8 @@ struct At {
     /// A frame within the link.
     frame: Pose,
     class: Option<String>,
-    folder: PathBuf,
+    /// What copies have behind their names.
+    suffix: String,
     depth: usize,
 }
 
@@ -107,7 +67,7 @@ type Attributes = HashMap<String, String>;
 struct Model<'a, 'i> {
     robot: Robot,
     reader: &'a Reader<'a>,
-    files: HashMap<&'a Path, Node<'a, 'i>>,
+    files: &'a Files<'a, 'i>,
     /// Attributes of elements by class and name of the element.
     defaults: HashMap<(String, String), Attributes>,
     classes: HashSet<String>,
@@ -117,15 +77,21 @@ struct Model<'a, 'i> {
     autolimits: bool,
     euler: Vec<char>,
     meshdir: PathBuf,
+    /// Names of files lose their folders.
+    strips: bool,
     names: usize,
+    /// Bodies that are moved by hand.
+    mocap: HashSet<usize>,
+    /// The joints of each body, as keyframes have them.
+    slots: Vec<Vec<Slot>>,
 }
 
 impl<'a, 'i> Model<'a, 'i> {
-    fn new(roots: &[Node<'a, 'i>], reader: &'a Reader<'a>) -> Result<Self> {
+    fn new(files: &'a Files<'a, 'i>, reader: &'a Reader<'a>) -> Result<Self> {
         let mut this = Self {
             robot: Robot::default(),
             reader,
-            files: HashMap::new(),
+            files,
             defaults: HashMap::new(),
             classes: HashSet::new(),
             meshes: HashMap::new(),
@@ -133,47 +99,59 @@ impl<'a, 'i> Model<'a, 'i> {
             autolimits: true,
             euler: "xyz".chars().collect(),
             meshdir: PathBuf::new(),
+            strips: false,
             names: 0,
+            mocap: HashSet::new(),
+            slots: Vec::new(),
         };
-        for compiler in roots.iter().flat_map(|r| xml::inside(*r, "compiler")) {
-            if let Some(angle) = compiler.attribute("angle") {
-                this.is_radian = match angle {
-                    "radian" => true,
-                    "degree" => false,
-                    other => return Err(xml::wrong(compiler, "radian or degree as the angle", Some(other))),
-                };
-            }
-            if compiler.attribute("coordinate") == Some("global") {
-                return Err(xml::wrong(compiler, "local coordinates", Some("global")));
-            }
-            if let Some(word) = compiler.attribute("eulerseq") {
-                let is_sequence = word.chars().count() == 3 && word.chars().all(|c| "xyzXYZ".contains(c));
-                if !is_sequence {
-                    return Err(xml::wrong(compiler, "three of x, y, z, X, Y, Z as eulerseq", Some(word)));
-                }
-                this.euler = word.chars().collect();
-            }
-            this.autolimits = compiler.attribute("autolimits").map_or(this.autolimits, |w| w == "true");
-            let folder = compiler.attribute("meshdir").or_else(|| compiler.attribute("assetdir"));
-            this.meshdir = folder.map_or(this.meshdir, PathBuf::from);
+        for compiler in files.sections("compiler") {
+            this.compiler(compiler).map_err(|e| files.told(compiler, e))?;
         }
-        for default in roots.iter().flat_map(|r| xml::inside(*r, "default")) {
-            this.class(default, None, 0)?;
+        for default in files.sections("default") {
+            this.class(default, None, 0).map_err(|e| files.told(default, e))?;
         }
-        for asset in roots.iter().flat_map(|r| xml::inside(*r, "asset")) {
-            for mesh in xml::inside(asset, "mesh") {
-                let attributes = this.merged(mesh, None)?;
-                let stem = |file: &String| Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned());
-                let name = attributes.get("name").cloned().or_else(|| attributes.get("file").and_then(stem));
-                let Some(name) = name else { return Err(xml::wrong(mesh, "a name or a file of the mesh", None)) };
-                this.meshes.insert(name, (attributes, mesh));
-            }
+        for mesh in files.within("asset").into_iter().filter(|n| n.tag_name().name() == "mesh") {
+            this.asset(mesh).map_err(|e| files.told(mesh, e))?;
         }
         Ok(this)
     }
 
+    fn asset(&mut self, mesh: Node<'a, 'i>) -> Result<()> {
+        let attributes = self.merged(mesh, None)?;
+        let stem = |file: &String| Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned());
+        let name = attributes.get("name").cloned().or_else(|| attributes.get("file").and_then(stem));
+        let Some(name) = name else { return Err(xml::wrong(mesh, "a name or a file of the mesh", None)) };
+        self.meshes.insert(name, (attributes, mesh));
+        Ok(())
+    }
+
+    fn compiler(&mut self, compiler: Node<'_, '_>) -> Result<()> {
+        if let Some(angle) = compiler.attribute("angle") {
+            self.is_radian = match angle {
+                "radian" => true,
+                "degree" => false,
+                other => return Err(xml::wrong(compiler, "radian or degree as the angle", Some(other))),
+            };
+        }
+        if compiler.attribute("coordinate") == Some("global") {
+            return Err(xml::wrong(compiler, "local coordinates", Some("global")));
+        }
+        if let Some(word) = compiler.attribute("eulerseq") {
+            let is_sequence = word.chars().count() == 3 && word.chars().all(|c| "xyzXYZ".contains(c));
+            if !is_sequence {
+                return Err(xml::wrong(compiler, "three of x, y, z, X, Y, Z as eulerseq", Some(word)));
+            }
+            self.euler = word.chars().collect();
+        }
+        self.autolimits = compiler.attribute("autolimits").map_or(self.autolimits, |w| w == "true");
+        let folder = compiler.attribute("meshdir").or_else(|| compiler.attribute("assetdir"));
+        self.meshdir = folder.map_or_else(|| std::mem::take(&mut self.meshdir), PathBuf::from);
+        self.strips = compiler.attribute("strippath").map_or(self.strips, |w| w == "true");
+        Ok(())
+    }
+
     /// A class of defaults, which begins with those of its parent.
-    fn class(&mut self, node: Node<'_, '_>, parent: Option<&str>, depth: usize) -> Result<()> {
+    fn class(&mut self, node: Node<'a, 'i>, parent: Option<&str>, depth: usize) -> Result<()> {
         let name = node.attribute("class").unwrap_or("main").to_owned();
         if depth > DEEPEST {
             return Err((xml::place(node), Problem::Limit { what: "classes within classes", limit: DEEPEST }));
@@ -190,13 +168,16 @@ impl<'a, 'i> Model<'a, 'i> {
                 self.defaults.insert((name.clone(), element), all);
             }
         }
-        for element in node.children().filter(|n| n.is_element() && n.tag_name().name() != "default") {
+        let (inner, elements): (Vec<_>, Vec<_>) =
+            self.files.children(node).into_iter().partition(|n| n.tag_name().name() == "default");
+        for element in elements {
             let all = self.defaults.entry((name.clone(), element.tag_name().name().to_owned())).or_default();
-            all.extend(element.attributes().map(|a| (a.name().to_owned(), a.value().to_owned())));
+            overlay(all, element);
         }
-        for inner in xml::inside(node, "default") {
-            needed(inner, "class")?;
-            self.class(inner, Some(&name), depth + 1)?;
+        for inner in inner {
+            let told = |e| self.files.told(inner, e);
+            needed(inner, "class").map_err(told)?;
+            self.class(inner, Some(&name), depth + 1).map_err(|e| self.files.told(inner, e))?;
         }
         Ok(())
     }
@@ -214,7 +195,7 @@ impl<'a, 'i> Model<'a, 'i> {
         if TURNS.iter().any(|turn| node.has_attribute(*turn)) {
             TURNS.iter().for_each(|turn| _ = all.remove(*turn));
         }
-        all.extend(node.attributes().map(|a| (a.name().to_owned(), a.value().to_owned())));
+        overlay(&mut all, node);
         Ok(all)
     }
 
@@ -222,80 +203,123 @@ impl<'a, 'i> Model<'a, 'i> {
         if self.is_radian { value } else { value.to_radians() }
     }
 
-    /// What stands in a body, a frame or the world.
-    fn content(&mut self, node: Node<'_, '_>, at: &At) -> Result<()> {
-        if at.depth > DEEPEST {
-            return Err((xml::place(node), Problem::Limit { what: "bodies within bodies", limit: DEEPEST }));
-        }
+    /// What stands in a body or the world: geoms that collide alike are one part.
+    fn body_content(&mut self, node: Node<'a, 'i>, at: &At) -> Result<()> {
         let mut geoms: Vec<([u32; 2], String)> = Vec::new();
-        for child in node.children().filter(Node::is_element) {
-            let inner = || At { depth: at.depth + 1, ..at.clone() };
-            match child.tag_name().name() {
-                "body" => self.body(child, &inner())?,
-                "joint" => self.joint(child, at)?,
-                "freejoint" => self.robot.links[at.link].is_free = true,
-                "geom" => self.geom(child, at, &mut geoms)?,
-                "frame" => {
-                    let pose = at.frame.compose(&self.pose(child, &self.own(child))?);
-                    let class = child.attribute("childclass").map(str::to_owned).or_else(|| at.class.clone());
-                    self.content(child, &At { frame: pose, class, ..inner() })?;
-                }
-                "include" => {
-                    let path = at.folder.join(needed(child, "file")?);
-                    if let Some(root) = self.files.get(path.as_path()).copied() {
-                        self.content(root, &inner())?;
-                    }
-                }
-                name @ ("replicate" | "composite" | "flexcomp" | "attach") => {
-                    return Err((xml::place(child), Problem::unsupported(format!("<{name}>"))));
-                }
-                _ => {}
+        self.content(node, at, &mut geoms)?;
+        let mut masks: Vec<[u32; 2]> = Vec::new();
+        for (mask, _) in &geoms {
+            if !masks.contains(mask) {
+                masks.push(*mask);
             }
         }
-        // Geoms that collide alike are one part.
-        let mut masks: Vec<[u32; 2]> = geoms.iter().map(|g| g.0).collect();
-        masks.dedup();
         for mask in masks {
             let texts: Vec<String> = geoms.iter().filter(|g| g.0 == mask).map(|g| g.1.clone()).collect();
             let parts = &mut self.robot.links[at.link].parts;
-            if parts.iter().any(|p| p.masks == mask && p.text == union(&texts)) {
-                continue;
-            }
             let name = if parts.is_empty() { String::new() } else { format!("part {}", parts.len() + 1) };
             parts.push(Part { name, text: union(&texts), masks: mask });
         }
         Ok(())
     }
 
+    /// What stands in a body, a frame or the world.
+    fn content(&mut self, node: Node<'a, 'i>, at: &At, geoms: &mut Vec<([u32; 2], String)>) -> Result<()> {
+        if at.depth > DEEPEST {
+            return Err((xml::place(node), Problem::Limit { what: "bodies within bodies", limit: DEEPEST }));
+        }
+        for child in self.files.children(node) {
+            self.element(child, at, geoms).map_err(|e| self.files.told(child, e))?;
+        }
+        Ok(())
+    }
+
+    fn element(&mut self, child: Node<'a, 'i>, at: &At, geoms: &mut Vec<([u32; 2], String)>) -> Result<()> {
+        let inner = || At { depth: at.depth + 1, ..at.clone() };
+        match child.tag_name().name() {
+            "body" => self.body(child, &inner()),
+            "joint" => self.joint(child, at),
+            "freejoint" => {
+                self.robot.links[at.link].is_free = true;
+                self.slots[at.link].push(Slot::Free);
+                Ok(())
+            }
+            "geom" => self.geom(child, at, geoms),
+            "frame" => {
+                let pose = at.frame.compose(&self.pose(child, &self.own(child))?);
+                let class = child.attribute("childclass").map(str::to_owned).or_else(|| at.class.clone());
+                self.content(child, &At { frame: pose, class, ..inner() }, geoms)
+            }
+            "replicate" => self.replicate(child, &inner(), geoms),
+            name @ ("composite" | "flexcomp" | "attach") => {
+                Err((xml::place(child), Problem::unsupported(format!("<{name}>"))))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Copies, each moved against the one before; their names end with their numbers.
+    fn replicate(&mut self, node: Node<'a, 'i>, at: &At, geoms: &mut Vec<([u32; 2], String)>) -> Result<()> {
+        let count = xml::number(node, "count")?.ok_or_else(|| xml::wrong(node, "a count of the replicate", None))?;
+        if !(1.0..=MOST_COPIES).contains(&count) || count.fract() != 0.0 {
+            return Err(xml::wrong(
+                node,
+                format!("a whole number of copies up to {MOST_COPIES}"),
+                node.attribute("count"),
+            ));
+        }
+        let numbers = |key: &str| match node.attribute(key) {
+            None => Ok(DVec3::ZERO),
+            Some(text) => vector_of(node, text, key),
+        };
+        let (offset, angles) = (numbers("offset")?, numbers("euler")?);
+        let digits = (count as usize).to_string().len();
+        let sep = node.attribute("sep").unwrap_or_default();
+        let mut position = DVec3::ZERO;
+        for k in 0..count as usize {
+            let suffix = format!("{sep}{k:0digits$}{}", at.suffix);
+            // The angles are those of the first copy, times its number; the offset goes along what was turned so far.
+            let turn = self.of_euler(&(angles * k as f64).to_array());
+            let frame = at.frame.compose(&Pose::new(position, turn));
+            self.content(node, &At { frame, suffix, ..at.clone() }, geoms)?;
+            position += turn * offset;
+        }
+        Ok(())
+    }
+
+    /// A name that is told, or one of its own.
+    fn name(&mut self, told: Option<&str>, kind: &str, at: &At) -> String {
+        self.names += 1;
+        told.map_or_else(|| format!("{kind} {}", self.names), |name| format!("{name}{}", at.suffix))
+    }
+
+    /// Adds a link; its number.
+    fn add(&mut self, name: String, parent: Option<usize>, (at, origin): (Place, Pose)) -> usize {
+        let (dofs, parts) = (vec![], vec![]);
+        self.robot.links.push(Link { name, at, parent, origin, dofs, parts, is_free: false, is_static: false });
+        self.slots.push(Vec::new());
+        self.robot.links.len() - 1
+    }
+
     fn own(&self, node: Node<'_, '_>) -> Attributes {
         node.attributes().map(|a| (a.name().to_owned(), a.value().to_owned())).collect()
     }
 
-    fn body(&mut self, node: Node<'_, '_>, at: &At) -> Result<()> {
-        self.names += 1;
-        let name = node.attribute("name").map_or_else(|| format!("body {}", self.names), str::to_owned);
+    fn body(&mut self, node: Node<'a, 'i>, at: &At) -> Result<()> {
+        let name = self.name(node.attribute("name"), "body", at);
         let origin = at.frame.compose(&self.pose(node, &self.own(node))?);
         let class = node.attribute("childclass").map(str::to_owned).or_else(|| at.class.clone());
-        let is_free = node.attribute("mocap") == Some("true");
-        self.robot.links.push(Link {
-            name,
-            at: xml::place(node),
-            parent: Some(at.link),
-            origin,
-            dofs: vec![],
-            parts: vec![],
-            is_free,
-            is_static: false,
-        });
-        let link = self.robot.links.len() - 1;
-        self.content(node, &At { link, frame: Pose::IDENTITY, class, ..at.clone() })
+        let link = self.add(name, Some(at.link), (self.files.place(node), origin));
+        if node.attribute("mocap") == Some("true") {
+            self.robot.links[link].is_free = true;
+            self.mocap.insert(link);
+        }
+        self.body_content(node, &At { link, frame: Pose::IDENTITY, class, ..at.clone() })
     }
 
     fn joint(&mut self, node: Node<'_, '_>, at: &At) -> Result<()> {
         let all = self.merged(node, at.class.as_deref())?;
         let of = |key: &str| all.get(key).map(String::as_str);
-        self.names += 1;
-        let name = of("name").map_or_else(|| format!("joint {}", self.names), str::to_owned);
+        let name = self.name(of("name"), "joint", at);
         let axis = of("axis").map_or(Ok(DVec3::Z), |text| vector_of(node, text, "axis"))?;
         let axis = axis.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", of("axis")))?;
         let pos = of("pos").map_or(Ok(DVec3::ZERO), |text| vector_of(node, text, "pos"))?;
@@ -304,10 +328,12 @@ impl<'a, 'i> Model<'a, 'i> {
             "hinge" => true,
             "slide" => false,
             "free" | "ball" => {
-                if of("type") == Some("ball") {
-                    self.robot.note(xml::place(node), format!("the ball joint {name} is taken as it stands"));
+                let is_ball = of("type") == Some("ball");
+                if is_ball {
+                    self.files.note(&mut self.robot, node, &format!("the ball joint {name} is taken as it stands"));
                 }
                 self.robot.links[at.link].is_free = true;
+                self.slots[at.link].push(if is_ball { Slot::Ball } else { Slot::Free });
                 return Ok(());
             }
             other => return Err(xml::wrong(node, "one of free, ball, slide, hinge as the joint's type", Some(other))),
@@ -335,6 +361,8 @@ impl<'a, 'i> Model<'a, 'i> {
         let zero = unit(of("ref").map_or(Ok(0.0), |word| xml::finite(node, word, "ref"))?);
         let kind = if is_hinge { DofKind::Hinge { anchor, axis } } else { DofKind::Slide { axis } };
         let start = zero.clamp(range[0], range[1]);
+        let own = self.robot.links[at.link].dofs.len();
+        self.slots[at.link].push(Slot::Dof(own));
         self.robot.links[at.link].dofs.push(Dof { name, kind, range, start, zero, mimic: None });
         Ok(())
     }
@@ -388,13 +416,12 @@ impl<'a, 'i> Model<'a, 'i> {
         };
         let shape = not_negative(node, shape)?;
         if shape.is_nothing() {
-            self.robot.note(xml::place(node), "a geom has no inside and is left out");
+            self.files.note(&mut self.robot, node, "a geom has no inside and is left out");
             return Ok(());
         }
         let text = shape.at(&at.frame.compose(&pose));
         if shape == Shape::Plane {
-            self.names += 1;
-            let name = of("name").map_or_else(|| format!("plane {}", self.names), str::to_owned);
+            let name = self.name(of("name"), "plane", at);
             self.robot.links[at.link].parts.push(Part { name, text: union(&[text]), masks });
         } else {
             geoms.push((masks, text));
@@ -414,7 +441,8 @@ impl<'a, 'i> Model<'a, 'i> {
             return Err((xml::place(*asset), Problem::unsupported(format!("refpos and refquat of the mesh {name}"))));
         }
         let scale = all.get("scale").map_or(Ok(DVec3::ONE), |text| vector_of(*asset, text, "scale"))?;
-        let path = self.meshdir.join(file);
+        let own = Path::new(file).file_name().filter(|_| self.strips);
+        let path = self.meshdir.join(own.map_or_else(|| Path::new(file), Path::new));
         Ok(Shape::Mesh(self.reader.file(&path.display().to_string()), scale, true))
     }
 
@@ -465,50 +493,17 @@ impl<'a, 'i> Model<'a, 'i> {
         }
         q.normalize()
     }
+}
 
-    /// Which pairs are not tested.
-    fn finish(mut self, roots: &[Node<'_, '_>]) -> Result<Robot> {
-        let robot = &mut self.robot;
-        for i in 0..robot.links.len() {
-            robot.links[i].is_static = robot.welded_to(i).is_none();
+/// An element's attributes over others. Of sizes the first ones may be told, and the others stay.
+fn overlay(all: &mut Attributes, node: Node<'_, '_>) {
+    for attribute in node.attributes() {
+        let (name, mut value) = (attribute.name().to_owned(), attribute.value().to_owned());
+        if let Some(old) = all.get(&name).filter(|_| name == "size") {
+            let rest = old.split_whitespace().skip(value.split_whitespace().count());
+            rest.for_each(|word| value = format!("{value} {word}"));
         }
-        let welded: Vec<Option<usize>> = (0..robot.links.len()).map(|i| robot.welded_to(i)).collect();
-        let above = |i: usize| welded[i].and_then(|w| robot.links[w].parent).and_then(|p| welded[p]);
-        let mut excepted = Vec::new();
-        for i in 0..welded.len() {
-            for j in i + 1..welded.len() {
-                let of = |i: usize, j: usize| above(i).is_some() && above(i) == welded[j];
-                if of(i, j) || of(j, i) {
-                    excepted.push([i, j]);
-                }
-            }
-        }
-        let flags = sections(roots, "option").flat_map(|o| xml::inside(o, "flag"));
-        if !flags.into_iter().any(|flag| flag.attribute("filterparent") == Some("disable")) {
-            robot.excepted.extend(excepted);
-        }
-        for node in sections(roots, "contact").flat_map(|c| xml::inside(c, "exclude")) {
-            let mut pair = [0; 2];
-            for (k, key) in ["body1", "body2"].into_iter().enumerate() {
-                let name = needed(node, key)?;
-                let found = robot.links.iter().position(|l| l.name == name);
-                pair[k] = found.ok_or_else(|| xml::wrong(node, "the name of a body", Some(name)))?;
-            }
-            pair.sort_unstable();
-            robot.excepted.insert(pair);
-        }
-        if let Some(node) = sections(roots, "contact").flat_map(|c| xml::inside(c, "pair")).next() {
-            return Err((xml::place(node), Problem::unsupported("a <pair> of geoms")));
-        }
-        for (section, what) in [
-            ("equality", "constraints are not kept: what they couple moves freely"),
-            ("keyframe", "keyframes are not read"),
-        ] {
-            if let Some(node) = sections(roots, section).find(|s| s.has_children()) {
-                robot.note(xml::place(node), what);
-            }
-        }
-        Ok(self.robot)
+        all.insert(name, value);
     }
 }
 

@@ -10,6 +10,8 @@
 mod frames;
 mod kinematics;
 mod mjcf;
+mod mjcf_couplings;
+mod mjcf_files;
 mod reader;
 mod scene;
 mod sdf;

@@ -17,6 +17,8 @@ pub struct Ask {
     pub hulls: bool,
     /// Folders in which packages are looked for (`package://NAME/…`, `model://NAME/…`), before the file's own and those above it.
     pub packages: Vec<PathBuf>,
+    /// The keyframe that joints begin at, of MJCF.
+    pub key: Option<String>,
     /// An SRDF file with pairs that are not to be tested.
     pub srdf: Option<PathBuf>,
 }

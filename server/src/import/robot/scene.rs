@@ -32,6 +32,10 @@ pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
         other => Err(xml::wrong(root, "a robot (URDF), an sdf or a mujoco as the root element", Some(other))),
     };
     let mut robot = robot.map_err(wrong)?;
+    if let Some(key) = ask.key.as_ref().filter(|_| root.tag_name().name() != "mujoco") {
+        let problem = Problem::syntax("MJCF, which has keyframes", format!("key:{key}"));
+        return Err(of_problem(&file, Place::START, problem));
+    }
     robot.packages = found.into_inner();
     let mut joints = HashSet::new();
     for link in &robot.links {
