@@ -10,6 +10,7 @@ mod corpus;
 mod files;
 mod frames;
 mod gdml;
+mod gdml_contacts;
 mod gltf;
 mod heights;
 mod import_models;
