@@ -277,6 +277,44 @@ fn defined(r: &mut Random, kind: &str) -> (String, Box<dyn Fn(DVec3) -> bool>) {
                 }),
             )
         }
+        "genericPolyhedra" => {
+            // An outline around a middle that it sees all of, or one along the axis.
+            let corners = 3 + r.below(5);
+            let mut outline: Vec<DVec2> = (0..corners)
+                .map(|k| {
+                    let turn = (k as f64 + r.within(0.1, 0.9)) * std::f64::consts::TAU / corners as f64;
+                    DVec2::new(5.0, 0.0) + DVec2::from_angle(turn) * r.within(1.5, 4.5)
+                })
+                .collect();
+            if r.chance(0.3) {
+                outline = vec![DVec2::new(0.0, -a), DVec2::new(b, -a), DVec2::new(c, a), DVec2::new(0.0, a)];
+            }
+            if r.chance(0.5) {
+                outline.reverse();
+            }
+            let wide = if r.chance(0.5) { std::f64::consts::TAU } else { wide };
+            let sides = 3 + r.below(6);
+            let points: String =
+                outline.iter().map(|p| format!("<rzpoint r=\"{:?}\" z=\"{:?}\"/>", p.x, p.y)).collect();
+            let text =
+                format!("startphi=\"{from:?}\" deltaphi=\"{wide:?}\" aunit=\"rad\" numsides=\"{sides}\">{points}");
+            let step = wide / sides as f64;
+            let inside = move |x: DVec3| {
+                let phi = (x.y.atan2(x.x) - from).rem_euclid(std::f64::consts::TAU);
+                let side = (phi / step).floor();
+                if side >= sides as f64 {
+                    return false;
+                }
+                // As far from the axis as the corners of the same section are.
+                let p = DVec2::new(rho(x) * (phi - (side + 0.5) * step).cos() / (0.5 * step).cos(), x.z);
+                let crosses = |k: usize| {
+                    let (u, v) = (outline[k], outline[(k + 1) % outline.len()]);
+                    (u.y > p.y) != (v.y > p.y) && p.x < u.x + (v.x - u.x) * (p.y - u.y) / (v.y - u.y)
+                };
+                (0..outline.len()).filter(|k| crosses(*k)).count() % 2 == 1
+            };
+            (text, Box::new(inside))
+        }
         other => unreachable!("{other}"),
     }
 }
@@ -288,10 +326,23 @@ fn points_of_solids_are_where_their_definitions_have_them() {
     let mut r = Random::new(41);
     let (mut points, mut within) = (0, 0);
     for k in 0..sized("CONTACTD_GEOMETRIES", 6usize) {
-        for kind in ["tube", "cone", "sphere", "torus", "ellipsoid", "eltube", "paraboloid", "hype", "trd", "para"] {
+        for kind in [
+            "tube",
+            "cone",
+            "sphere",
+            "torus",
+            "ellipsoid",
+            "eltube",
+            "paraboloid",
+            "hype",
+            "trd",
+            "para",
+            "genericPolyhedra",
+        ] {
             let (text, is_inside) = defined(&mut r, kind);
+            let end = if text.contains('<') { format!("</{kind}>") } else { "/>".to_owned() };
             let whole = format!(
-                "<gdml><solids><{kind} name=\"s\" {text}/></solids><structure><volume name=\"v\"><solidref ref=\"s\"/></volume></structure></gdml>"
+                "<gdml><solids><{kind} name=\"s\" {text}{end}</solids><structure><volume name=\"v\"><solidref ref=\"s\"/></volume></structure></gdml>"
             );
             std::fs::write(&path, &whole).expect("written");
             let (_, models) = read(&path);

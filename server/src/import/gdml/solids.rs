@@ -199,7 +199,7 @@ fn clean(points: &[DVec3], faces: &[Vec<usize>]) -> String {
 fn inside(kind: &str) -> &'static [&'static str] {
     match kind {
         "polycone" | "polyhedra" => &["zplane"],
-        "genericPolycone" => &["rzpoint"],
+        "genericPolycone" | "genericPolyhedra" => &["rzpoint"],
         "xtru" => &["twoDimVertex", "section"],
         "tessellated" => &["triangular", "quadrangular"],
         "multiUnion" => &["multiUnionNode"],
@@ -233,7 +233,7 @@ pub(super) fn text(geometry: &Geometry<'_, '_>, name: &str, asker: Node<'_, '_>,
     let text = match read.kind() {
         "box" | "orb" | "tube" | "cone" | "sphere" | "torus" | "ellipsoid" | "eltube" | "elcone" | "paraboloid"
         | "hype" | "cutTube" => round(&read)?,
-        "polycone" | "genericPolycone" | "polyhedra" => revolved(&read)?,
+        "polycone" | "genericPolycone" | "polyhedra" | "genericPolyhedra" => revolved(&read)?,
         "trd" | "trap" | "para" | "arb8" | "tet" | "xtru" | "tessellated" => flat(&read)?,
         "union" | "subtraction" | "intersection" | "multiUnion" | "scaledSolid" => combined(&read, depth)?,
         other => return Err((xml::place(node), Problem::unsupported(format!("the solid {other}")))),
@@ -413,10 +413,16 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
     let (from, turn) = (read.angle_or("startphi", 0.0)?, read.angle_or("deltaphi", TAU)?);
     // Geant4 takes it so.
     let turn = if turn <= 0.0 { TAU } else { turn };
-    if read.kind() == "genericPolycone" {
+    if read.kind().starts_with("generic") {
         let points = read.all("rzpoint");
-        let outline = points.iter().map(|p| Ok(DVec2::new(p.len("r")?, p.len("z")?))).collect::<Result<Vec<_>>>()?;
-        return Ok(turned(&outline, from, turn));
+        let outline = points.iter().map(|p| Ok(DVec2::new(p.rest("r")?, p.len("z")?))).collect::<Result<Vec<_>>>()?;
+        if outline.len() < 3 {
+            return Err(xml::wrong(read.node, "three rzpoints at least", Some(&outline.len().to_string())));
+        }
+        return match read.kind() {
+            "genericPolycone" => Ok(turned(&outline, from, turn)),
+            _ => Ok(around(outline, sides(read, turn)?, (from, turn))),
+        };
     }
     let planes = read.all("zplane");
     if planes.len() < 2 {
@@ -429,6 +435,17 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
         let outline: Vec<DVec2> = outer.iter().chain(inner.iter().rev()).copied().collect();
         return Ok(turned(&outline, from, turn));
     }
+    let sides = sides(read, turn)?;
+    let whole = rings(&outer, sides, (from, turn));
+    Ok(match inner.iter().all(|p| p.x == 0.0) {
+        true => whole,
+        // What is taken away goes on beyond the ends of the other.
+        false => minus(&whole, &rings(&beyond(&inner), sides, (from, turn))),
+    })
+}
+
+/// How many sides a polyhedra has over its turn.
+fn sides(read: &Read<'_, '_, '_>, turn: f64) -> Result<usize> {
     let sides = read.raw("numsides")?.unwrap_or(0.0);
     if !(1.0..=10_000.0).contains(&sides) || sides.fract() != 0.0 {
         return Err(xml::wrong(read.node, "a whole number of sides", read.node.attribute("numsides")));
@@ -436,12 +453,34 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
     if turn.min(TAU) / sides > std::f64::consts::PI - 1e-6 {
         return Err(xml::wrong(read.node, "sides of less than half a turn each", read.node.attribute("numsides")));
     }
-    let whole = rings(&outer, sides as usize, (from, turn));
-    Ok(match inner.iter().all(|p| p.x == 0.0) {
-        true => whole,
-        // What is taken away goes on beyond the ends of the other.
-        false => minus(&whole, &rings(&beyond(&inner), sides as usize, (from, turn))),
-    })
+    Ok(sides as usize)
+}
+
+/// An outline of (r, z), r the distance of corners from the axis, in plane steps around z.
+fn around(mut outline: Vec<DVec2>, sides: usize, (from, turn): (f64, f64)) -> String {
+    let n = outline.len();
+    let area: f64 = (0..n).map(|i| outline[i].perp_dot(outline[(i + 1) % n])).sum();
+    if area < 0.0 {
+        outline.reverse();
+    }
+    let is_closed = is_whole(turn);
+    let step = if is_closed { TAU } else { turn } / sides as f64;
+    let count = if is_closed { sides } else { sides + 1 };
+    let mut points = Vec::new();
+    for k in 0..count {
+        let (s, c) = (from + k as f64 * step).sin_cos();
+        points.extend(outline.iter().map(|p| DVec3::new(p.x * c, p.x * s, p.y)));
+    }
+    let mut faces = Vec::new();
+    for k in 0..sides {
+        let next = (k + 1) % count;
+        faces.extend((0..n).map(|i| vec![k * n + i, next * n + i, next * n + (i + 1) % n, k * n + (i + 1) % n]));
+    }
+    if !is_closed {
+        faces.push((0..n).collect());
+        faces.push((sides * n..(sides + 1) * n).rev().collect());
+    }
+    clean(&points, &faces)
 }
 
 /// An outline whose ends go on straight up and down.
