@@ -12,6 +12,7 @@ pub mod exclusion;
 mod facets;
 pub mod instant;
 pub mod pair;
+pub mod probe;
 pub mod query;
 pub mod queue;
 pub mod region;

@@ -90,6 +90,13 @@ pub fn operands(mut body: &[Token]) -> impl Iterator<Item = Expression<'_>> {
     })
 }
 
+/// The complement of an expression, by De Morgan's laws.
+pub fn complement(tokens: &[Token]) -> Vec<Token> {
+    // The bits of "and" and "or" are each other's.
+    let flip = |t: &Token| if matches!(t & KIND, AND | OR) { t ^ (AND | OR) } else { t ^ NEGATED };
+    tokens.iter().map(flip).collect()
+}
+
 /// All literals of an expression, in order; what its parts hold is not among them.
 pub fn literals(tokens: &[Token]) -> impl Iterator<Item = LiteralId> + '_ {
     tokens.iter().filter(|t| **t & KIND == 0).map(|t| LiteralId(*t))

@@ -7,9 +7,9 @@
 //!
 //! f of a tree is at most the distance and less at sharp features; these bounds are of the distance itself.
 
-mod part;
-mod polish;
-mod polytope;
+pub(in crate::contact) mod part;
+pub(in crate::contact) mod polish;
+pub(in crate::contact) mod polytope;
 mod search;
 mod span;
 #[cfg(test)]

@@ -23,6 +23,8 @@ use std::collections::HashMap;
 const TANGENTS: usize = 10;
 /// Where no corner is farther outside of a face than this part of the hull's size, no more of its tangents are taken at first.
 const CLOSE: f64 = 0.02;
+/// A plane of a face that is flatter than this is not taken: what rounding may do to it is divided by its slope.
+const LEAST_SLOPE: f64 = 1e-3;
 /// Planes kept free for what candidates ask for.
 const SPARE_PLANES: u32 = 24;
 
@@ -80,17 +82,22 @@ impl std::ops::Index<u32> for Parts<'_> {
 impl<'a> Parts<'a> {
     /// The body as one part in a finite box that holds it, or that holds of it what matters; `None` where nothing is in the box.
     pub fn new(solid: &'a Solid, aabb: &Aabb, rounding: f64) -> Option<Self> {
-        let mut parts = Self { solid, rounding, all: Vec::new() };
+        let mut parts = Self::none(solid, rounding);
         let whole = solid.normal_form.clone();
         parts.add(&whole, *aabb).map(|_| parts)
+    }
+
+    /// No parts yet of what is told by literals of a solid.
+    pub fn none(solid: &'a Solid, rounding: f64) -> Self {
+        Self { solid, rounding, all: Vec::new() }
     }
 
     fn face(&self, id: LiteralId) -> &'a Face {
         &self.solid.faces[id.face() as usize]
     }
 
-    /// A new part of what of `tokens` is in the box.
-    fn add(&mut self, tokens: &[Token], aabb: Aabb) -> Option<u32> {
+    /// A new part of what of `tokens` is in the finite box; `None` where nothing is.
+    pub fn add(&mut self, tokens: &[Token], aabb: Aabb) -> Option<u32> {
         let (mut left, (c, e)) = (Vec::new(), (aabb.center(), aabb.half()));
         if !tokens.is_empty() {
             let truth = |id: LiteralId| local::truth_of(id.sense(), face_span(self.face(id), c, e), 0.0, 0.0);
@@ -168,7 +175,7 @@ impl<'a> Parts<'a> {
             }
         };
         let slope = normal.length();
-        if slope > 0.5 && value.is_finite() {
+        if slope > LEAST_SLOPE && value.is_finite() {
             let n = normal / slope;
             hull.cut(n, n.dot(x) - (value - self.rounding) / slope);
         }

@@ -31,7 +31,7 @@ const MET: f64 = 1e-7;
 const FEATURE: f64 = 1e-9;
 
 /// Literals that hold at a point.
-type Clause = SmallVec<[LiteralId; 16]>;
+pub(in crate::contact) type Clause = SmallVec<[LiteralId; 16]>;
 
 /// A point of each body.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +68,7 @@ pub struct Polish<'s, 'a> {
 }
 
 /// Appends an *and* of literals at x: of alternatives the one that is least there. False where a mesh's part stands in the way.
-fn choose(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64, out: &mut Clause) -> bool {
+pub(in crate::contact) fn choose(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64, out: &mut Clause) -> bool {
     match local::first(tokens).0 {
         Expression::Literal(id) => out.push(id),
         Expression::And(mut body) => {
@@ -321,7 +321,11 @@ const HELD: f64 = 1e30;
 const REGULAR: f64 = 1e-10;
 
 /// Solves a system by elimination with partial pivoting.
-fn eliminated(a: &mut [[f64; MOST]; MOST], mut f: [f64; MOST], n: usize) -> Option<[f64; MOST]> {
+pub(in crate::contact) fn eliminated<const N: usize>(
+    a: &mut [[f64; N]; N],
+    mut f: [f64; N],
+    n: usize,
+) -> Option<[f64; N]> {
     for k in 0..n {
         let p = (k..n).max_by(|p, q| a[*p][k].abs().total_cmp(&a[*q][k].abs()))?;
         if a[p][k] == 0.0 || !a[p][k].is_finite() {
