@@ -130,6 +130,17 @@ impl Scene {
         (count(self.world.bodies().len()), count(self.models.len()))
     }
 
+    /// The world, to be asked.
+    ///
+    /// # Errors
+    /// `Internal` where the engine has failed within a step.
+    pub fn world(&self) -> Result<&World, Refusal> {
+        if self.broken {
+            return Err(Refusal::new(ErrorCode::Internal, "the engine failed in an earlier step of this session"));
+        }
+        Ok(&self.world)
+    }
+
     /// Obeys a command that is not the server's own.
     pub fn command(&mut self, command: Command) -> CommandOutcome {
         let recorded = self.tap.as_ref().filter(|tap| tap.is_open() && changes(&command)).map(|_| command.clone());

@@ -4,3 +4,4 @@ mod closed;
 mod judge;
 mod points;
 mod rays;
+mod worlds;

@@ -242,6 +242,12 @@ impl Body {
         self.around(Aabb::of_points(self.corners.iter().map(|c| start.point(*c))))
     }
 
+    /// A box that holds the body at the end of its motion.
+    pub fn standing(&self) -> Aabb {
+        let end = self.motion_state.end;
+        self.around(Aabb::of_points(self.corners.iter().map(|c| end.point(*c))))
+    }
+
     /// A box of some of its points, right for unbounded and empty bodies too and rounded outwards.
     #[inline]
     fn around(&self, of_points: Aabb) -> Aabb {

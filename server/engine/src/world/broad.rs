@@ -64,6 +64,30 @@ impl BroadPhase {
         }
     }
 
+    /// A tree of boxes that are asked about one by one.
+    pub fn of(boxes: &[Aabb]) -> Self {
+        let mut tree = Self::default();
+        tree.build(boxes, &|_| false);
+        tree
+    }
+
+    /// Calls `found(i)` for the boxes below the branches whose box `meets` says yes to, and for those without end.
+    pub fn each(&self, meets: impl Fn(&Aabb) -> bool, mut found: impl FnMut(u32)) {
+        self.endless.iter().for_each(|i| found(*i));
+        let mut open = if self.order.is_empty() { Vec::new() } else { vec![0u32] };
+        while let Some(at) = open.pop() {
+            let branch = &self.branches[at as usize];
+            if !meets(&branch.aabb) {
+                continue;
+            }
+            if branch.second == 0 {
+                self.order[branch.start as usize..branch.end as usize].iter().for_each(|i| found(*i));
+            } else {
+                open.extend([at + 1, branch.second]);
+            }
+        }
+    }
+
     /// A new tree.
     fn build(&mut self, boxes: &[Aabb], is_static: &impl Fn(usize) -> bool) {
         let Self { order, branches, endless, centers, keys, .. } = self;

@@ -11,6 +11,7 @@
 //!
 //! Floor 6: imports `contact`, `octree`, `motion`, `solid`, `math`, `proto`.
 
+pub mod ask;
 pub mod body;
 mod boxes;
 pub mod broad;
@@ -34,6 +35,7 @@ mod swept_shapes;
 mod tests;
 mod touch;
 
+pub use ask::{BodyPoint, BodyRay};
 pub use body::{MeasuredModel, ObjectSpec};
 pub use heed::{Crew, Heed, LONG_PRIORITY, yield_to_others};
 pub use options::{StepError, StepOptions};
