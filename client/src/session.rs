@@ -3,6 +3,7 @@
 //! Ids are given here, counting up, so that they stay the same when the session is replayed on another server.
 
 mod options;
+mod query;
 mod recording;
 mod stage;
 mod step;
@@ -249,7 +250,8 @@ impl<T: Transport> Session<T> {
                 | Answer::Done
                 | Answer::Mass(_)
                 | Answer::Status(_)
-                | Answer::Recorded(_) => {}
+                | Answer::Recorded(_)
+                | Answer::Told(_) => {}
             }
         }
         self.stage = Stage::Idle;
@@ -258,7 +260,7 @@ impl<T: Transport> Session<T> {
 
     fn command(&mut self, command: Command) -> Result<Answer, Error> {
         self.check_idle()?;
-        let only_asks = matches!(command, Command::MassProperties { .. });
+        let only_asks = matches!(command, Command::MassProperties { .. } | Command::Ask(_));
         match self.transport.command(command, self.command_timeout) {
             Ok(Answer::Refused { code, index, detail }) => Err(self.failed(refused(code, index, detail))),
             Ok(answer) => Ok(answer),

@@ -2,6 +2,7 @@
 //!
 //! Both sides bound what they decode by [`DECODE_LIMIT`], so a forged length cannot make them allocate.
 
+use crate::query::{Query, QueryAnswer};
 use crate::rule::{Effects, Setting};
 use crate::{ErrorCode, MassProperties, Motion, MotionState, Pose, Rule};
 use bincode::{Decode, Encode, config};
@@ -260,6 +261,8 @@ pub enum Command {
     },
     /// Writes the session's last step as a scene folder for `contactd check`. The folder is made; it does not exist before.
     SaveStep(String),
+    /// Asks about objects where the last step has left them; other sessions' steps go on meanwhile.
+    Ask(Query),
 }
 
 /// What is to be recorded.
@@ -398,6 +401,8 @@ pub enum Answer {
     Status(ServerStatus),
     /// What was recorded.
     Recorded(RecordingStatus),
+    /// What was asked.
+    Told(QueryAnswer),
 }
 
 /// A command with its session (0 for `Open`).

@@ -30,6 +30,7 @@ pub mod motion_state;
 pub mod names;
 pub mod pose;
 pub mod pose_record;
+pub mod query;
 pub mod rule;
 pub mod status;
 pub mod step;

@@ -118,4 +118,4 @@ pub mod view;
 
 pub use contactd_engine::{bound, contact, math, motion, octree, solid, world};
 pub use glam;
-pub use ipc::{Queries, embedded};
+pub use ipc::embedded;

@@ -4,8 +4,9 @@
 mod harness;
 
 use contactd::ipc::ServerConfig;
-use contactd_client::proto::control::{Answer, Command};
+use contactd_client::proto::control::{Answer, Command, encode};
 use contactd_client::proto::names::{self, Address};
+use contactd_client::proto::query::{ObjectRay, PointOptions, QueryAnswer, RayOptions, RayOutcome, Side};
 use contactd_client::proto::status::StatusRecord;
 use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
 use contactd_client::proto::{Detect, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule, StepRequest};
@@ -529,6 +530,66 @@ fn mass_properties_are_the_embedded_bits_and_other_sessions_step_meanwhile() {
     ] {
         assert_eq!(session.mass_properties(model, &options).unwrap_err().code(), Some(code));
     }
+    session.close().unwrap();
+    assert!(server.stop().success());
+    assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+/// Everything that can be asked of objects, as bytes: NaN is what it is.
+fn asked<T: Transport>(session: &mut Session<T>, ids: &[u32]) -> Vec<u8> {
+    let mut seed = 5u64;
+    let mut number = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let points: Vec<[f64; 3]> = (0..200).map(|_| [30.0 * number(), 15.0 * number(), 15.0 * number()]).collect();
+    let rays: Vec<ObjectRay> = points
+        .iter()
+        .map(|origin| ObjectRay { origin: *origin, direction: [number(), number(), number()], length: 60.0 })
+        .collect();
+    let told = session.points(&points, &PointOptions::default(), None).unwrap();
+    assert!(told.iter().all(|t| t.is_settled && t.lower <= t.upper), "{told:?}");
+    assert!(told.iter().any(|t| t.side == Side::Inside) && told.iter().any(|t| t.side == Side::Outside));
+    let hit = session.rays(&rays, &RayOptions::default(), Some(ids)).unwrap();
+    assert!(hit.iter().any(|h| matches!(h.outcome, RayOutcome::Hit(_))), "{hit:?}");
+    let apart = session.distance(ids[0], ids[1], 1e-6).unwrap();
+    let answers = [QueryAnswer::Points(told), QueryAnswer::Rays(hit), QueryAnswer::Distance(apart)];
+    answers.iter().flat_map(|a| encode(a).unwrap()).collect()
+}
+
+#[test]
+fn queries_have_the_embedded_bits_and_follow_the_objects_also_to_a_successor() {
+    let mut server = ServerProcess::start("asked", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ids = build(&mut session, PEGS);
+    assert_eq!(build(&mut own, PEGS), ids);
+    let mut before = Vec::new();
+    for k in 0..3 {
+        step(&mut session, &ids, k, 3).unwrap();
+        step(&mut own, &ids, k, 3).unwrap();
+        let told = asked(&mut session, &ids);
+        assert!(told == asked(&mut own, &ids), "step {k}");
+        assert_ne!(told, before, "step {k}: they have moved");
+        before = told;
+    }
+    server.kill();
+    server.restart();
+    assert!(matches!(session.distance(ids[0], ids[1], 1e-6), Err(Error::ServerLost)));
+    session.reconnect(PATIENCE).unwrap();
+    assert!(asked(&mut session, &ids) == before, "asked of the successor");
+    let nan = session.points(&[[0.0; 3], [f64::NAN, 0.0, 0.0]], &PointOptions::default(), None).unwrap_err();
+    assert!(matches!(nan, Error::Refused { code: ErrorCode::NotFinite, index: Some(1), .. }), "{nan:?}");
+    for (objects, tolerance, code) in
+        [([ids[0], 77], 1e-6, ErrorCode::UnknownObject), ([ids[0], ids[1]], -1.0, ErrorCode::BadNumber)]
+    {
+        assert_eq!(session.distance(objects[0], objects[1], tolerance).unwrap_err().code(), Some(code));
+    }
+    // A step that is in flight is finished first.
+    session.begin_step(1).unwrap()[0] = PoseRecord::end(ids[0], &Pose::IDENTITY);
+    session.send().unwrap();
+    assert!(matches!(session.distance(ids[0], ids[1], 1e-6), Err(Error::Misuse(_))));
+    session.finish(PATIENCE).unwrap();
     session.close().unwrap();
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new());

@@ -233,6 +233,21 @@
 // "No record in particular" in `index`.
 #define CONTACTD_NO_INDEX UINT32_MAX
 
+// Parts that a point, and stretches that a ray may cost by default.
+#define CONTACTD_DEFAULT_QUERY_LIMIT 200000
+
+// "No object" in a contactd_point_record or contactd_ray_record.
+#define CONTACTD_NO_OBJECT UINT32_MAX
+
+// `outcome` of a contactd_ray_record: it crosses a surface.
+#define CONTACTD_RAY_HIT 0
+
+// `outcome` of a contactd_ray_record: proven that it crosses none.
+#define CONTACTD_RAY_MISS 1
+
+// `outcome` of a contactd_ray_record: the limit of work was met.
+#define CONTACTD_RAY_UNDECIDED 2
+
 // `effects`: pairs searched over the whole step.
 #define CONTACTD_EFFECT_CONTINUOUS 1
 
@@ -678,6 +693,112 @@ typedef struct contactd_patch_slot {
     uint32_t region[2];
 } contactd_patch_slot;
 
+// How far apart two objects are.
+typedef struct contactd_distance {
+    // Proven: no two points of them are nearer to each other.
+    double lower;
+    // Proven: two points of them are no farther apart; 0 where they share one, infinite where none were found.
+    double upper;
+    // A point of the first object, as far from that of the second one as `upper` but for rounding; NaN where none was found.
+    double point_a[3];
+    // A point of the second object.
+    double point_b[3];
+    // Pairs of parts that were looked at.
+    uint64_t cells;
+    // 1 when the bounds are as near to each other as was asked, or as rounding lets them be.
+    uint32_t settled;
+    // Zero.
+    uint32_t reserved;
+} contactd_distance;
+
+// What is asked of points; contactd_point_query_new sets the defaults.
+typedef struct contactd_point_query {
+    // Points no farther from the surface than this are on it, a length >= 0; 1e-9.
+    double surface;
+    // How far apart the bounds may be, a length; infinite: the side is enough; 1e-6.
+    double tolerance;
+    // Most parts of a solid that may be looked at for a point; 200,000.
+    uint64_t limit;
+    // Ids of the objects that are asked, NULL for all.
+    const uint32_t *objects;
+    // How many.
+    size_t object_count;
+} contactd_point_query;
+
+// What is asked of rays; contactd_ray_query_new sets the defaults.
+typedef struct contactd_ray_query {
+    // A ray that comes no deeper than this into a solid passes it: a length >= 0; 0, which is raised to what rounding needs.
+    double depth;
+    // Most stretches that may be looked at for a ray and an object; 200,000.
+    uint64_t limit;
+    // Ids of the objects that are asked, NULL for all.
+    const uint32_t *objects;
+    // How many.
+    size_t object_count;
+} contactd_ray_query;
+
+// The answer about a point, as it lies in memory in C and Python.
+typedef struct contactd_point_record {
+    // The object with the least signed distance, or CONTACTD_NO_OBJECT.
+    uint32_t object;
+    // On which side of its surface: 0 inside, 1 outside, 2 on it, 3 undecided.
+    uint8_t side;
+    // 1 when the bounds are as near to each other as was asked, or as rounding lets them be.
+    uint8_t settled;
+    // Zero.
+    uint8_t reserved[2];
+    // Proven: the least signed distance is no less.
+    double lower;
+    // Proven: it is no more.
+    double upper;
+    // The point of the object's surface that was found nearest; NaN where none was found.
+    double nearest[3];
+    // Faces there, by face id of the object's model; `NO_FACE` fills.
+    uint32_t faces[3];
+    // Zero.
+    uint32_t spare;
+    // Parts that were looked at.
+    uint64_t cells;
+} contactd_point_record;
+
+// A ray: origin + t · direction, 0 <= t <= length, with the direction made a unit vector.
+typedef struct contactd_ray {
+    // Where it begins.
+    double origin[3];
+    // Where it goes; of any length but 0.
+    double direction[3];
+    // How far it goes: a length >= 0; infinite only where all objects have bounds.
+    double length;
+} contactd_ray;
+
+// The answer about a ray, as it lies in memory in C and Python.
+typedef struct contactd_ray_record {
+    // The object that is hit, or the one in which the whole ray lies, or CONTACTD_NO_OBJECT.
+    uint32_t object;
+    // 0 hit, 1 miss, 2 undecided.
+    uint8_t outcome;
+    // 1 when it begins in the object: it leaves it at the hit, or lies in it.
+    uint8_t inside;
+    // Zero.
+    uint8_t reserved[2];
+    // Proven: nothing is crossed before; of a miss infinite.
+    double lower;
+    // Where it meets the surface: lower <= t <= upper, lengths along the ray; NaN without a hit.
+    double t;
+    // Proven: here it is in the object, or, of a ray that leaves, out of it; infinite without a hit.
+    double upper;
+    // The point at `t`; NaN without a hit.
+    double point[3];
+    // Unit normal of the surface there, out of the object; NaN without a hit.
+    double normal[3];
+    // The face that is crossed, by its id within the object's model; `NO_FACE` without a hit.
+    uint32_t face;
+    // All faces that meet there, three at most; `NO_FACE` fills.
+    uint32_t faces[3];
+    // Stretches that were looked at.
+    uint64_t cells;
+} contactd_ray_record;
+
 // What was recorded.
 typedef struct contactd_recording {
     // Steps that stand in the file, or are on their way to it.
@@ -1008,6 +1129,34 @@ int32_t contactd_get_region(struct contactd_session *session,
                             const struct contactd_patch_slot **patches,
                             size_t *patch_count);
 
+// How far two objects are apart: certified bounds to a tolerance (a length), and a point of each. Queries change nothing, and no
+// step's answer.
+int32_t contactd_get_distance(struct contactd_session *session,
+                              uint32_t a,
+                              uint32_t b,
+                              double tolerance,
+                              struct contactd_distance *distance);
+
+// A query of points with defaults.
+struct contactd_point_query contactd_point_query_new(void);
+
+// A query of rays with defaults.
+struct contactd_ray_query contactd_ray_query_new(void);
+
+// The least signed distance of `n` points from the objects that are asked, certified: `answers` has room for as many.
+int32_t contactd_get_points(struct contactd_session *session,
+                            const double (*points)[3],
+                            size_t n,
+                            const struct contactd_point_query *query,
+                            struct contactd_point_record *answers);
+
+// What `n` rays meet first of the objects that are asked, certified: `answers` has room for as many.
+int32_t contactd_cast_rays(struct contactd_session *session,
+                           const struct contactd_ray *rays,
+                           size_t n,
+                           const struct contactd_ray_query *query,
+                           struct contactd_ray_record *answers);
+
 // Records the session's steps from now on into a new MCAP file, until contactd_stop_recording or the end of the session;
 // `contactd replay FILE` repeats it bit for bit. A recorder that cannot keep up leaves out whole steps and counts them: no step
 // waits for it. CONTACTD_ERROR_RECORDING: the file exists or cannot be made, the session is being recorded already, or the server
@@ -1330,6 +1479,53 @@ CONTACTD_AT(contactd_mass, density, 64);
 CONTACTD_AT(contactd_mass, inertia, 72);
 CONTACTD_AT(contactd_mass, inertia_error, 120);
 CONTACTD_AT(contactd_mass, boxes, 168);
+CONTACTD_SIZE(contactd_ray, 56);
+CONTACTD_AT(contactd_ray, origin, 0);
+CONTACTD_AT(contactd_ray, direction, 24);
+CONTACTD_AT(contactd_ray, length, 48);
+CONTACTD_SIZE(contactd_point_query, 40);
+CONTACTD_AT(contactd_point_query, surface, 0);
+CONTACTD_AT(contactd_point_query, tolerance, 8);
+CONTACTD_AT(contactd_point_query, limit, 16);
+CONTACTD_AT(contactd_point_query, objects, 24);
+CONTACTD_AT(contactd_point_query, object_count, 32);
+CONTACTD_SIZE(contactd_ray_query, 32);
+CONTACTD_AT(contactd_ray_query, depth, 0);
+CONTACTD_AT(contactd_ray_query, limit, 8);
+CONTACTD_AT(contactd_ray_query, objects, 16);
+CONTACTD_AT(contactd_ray_query, object_count, 24);
+CONTACTD_SIZE(contactd_point_record, 72);
+CONTACTD_AT(contactd_point_record, object, 0);
+CONTACTD_AT(contactd_point_record, side, 4);
+CONTACTD_AT(contactd_point_record, settled, 5);
+CONTACTD_AT(contactd_point_record, reserved, 6);
+CONTACTD_AT(contactd_point_record, lower, 8);
+CONTACTD_AT(contactd_point_record, upper, 16);
+CONTACTD_AT(contactd_point_record, nearest, 24);
+CONTACTD_AT(contactd_point_record, faces, 48);
+CONTACTD_AT(contactd_point_record, spare, 60);
+CONTACTD_AT(contactd_point_record, cells, 64);
+CONTACTD_SIZE(contactd_ray_record, 104);
+CONTACTD_AT(contactd_ray_record, object, 0);
+CONTACTD_AT(contactd_ray_record, outcome, 4);
+CONTACTD_AT(contactd_ray_record, inside, 5);
+CONTACTD_AT(contactd_ray_record, reserved, 6);
+CONTACTD_AT(contactd_ray_record, lower, 8);
+CONTACTD_AT(contactd_ray_record, t, 16);
+CONTACTD_AT(contactd_ray_record, upper, 24);
+CONTACTD_AT(contactd_ray_record, point, 32);
+CONTACTD_AT(contactd_ray_record, normal, 56);
+CONTACTD_AT(contactd_ray_record, face, 80);
+CONTACTD_AT(contactd_ray_record, faces, 84);
+CONTACTD_AT(contactd_ray_record, cells, 96);
+CONTACTD_SIZE(contactd_distance, 80);
+CONTACTD_AT(contactd_distance, lower, 0);
+CONTACTD_AT(contactd_distance, upper, 8);
+CONTACTD_AT(contactd_distance, point_a, 16);
+CONTACTD_AT(contactd_distance, point_b, 40);
+CONTACTD_AT(contactd_distance, cells, 64);
+CONTACTD_AT(contactd_distance, settled, 72);
+CONTACTD_AT(contactd_distance, reserved, 76);
 CONTACTD_SIZE(contactd_names, 16);
 CONTACTD_AT(contactd_names, a, 0);
 CONTACTD_AT(contactd_names, b, 8);

@@ -96,6 +96,56 @@ pub struct Mass {
     pub boxes: u64,
 }
 
+/// What is asked of points; contactd_point_query_new sets the defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct PointQuery {
+    /// Points no farther from the surface than this are on it, a length >= 0; 1e-9.
+    pub surface: f64,
+    /// How far apart the bounds may be, a length; infinite: the side is enough; 1e-6.
+    pub tolerance: f64,
+    /// Most parts of a solid that may be looked at for a point; 200,000.
+    pub limit: u64,
+    /// Ids of the objects that are asked, NULL for all.
+    pub objects: *const u32,
+    /// How many.
+    pub object_count: usize,
+}
+
+/// What is asked of rays; contactd_ray_query_new sets the defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct RayQuery {
+    /// A ray that comes no deeper than this into a solid passes it: a length >= 0; 0, which is raised to what rounding needs.
+    pub depth: f64,
+    /// Most stretches that may be looked at for a ray and an object; 200,000.
+    pub limit: u64,
+    /// Ids of the objects that are asked, NULL for all.
+    pub objects: *const u32,
+    /// How many.
+    pub object_count: usize,
+}
+
+/// How far apart two objects are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Distance {
+    /// Proven: no two points of them are nearer to each other.
+    pub lower: f64,
+    /// Proven: two points of them are no farther apart; 0 where they share one, infinite where none were found.
+    pub upper: f64,
+    /// A point of the first object, as far from that of the second one as `upper` but for rounding; NaN where none was found.
+    pub point_a: [f64; 3],
+    /// A point of the second object.
+    pub point_b: [f64; 3],
+    /// Pairs of parts that were looked at.
+    pub cells: u64,
+    /// 1 when the bounds are as near to each other as was asked, or as rounding lets them be.
+    pub settled: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
 /// Two names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]

@@ -27,6 +27,7 @@ pub mod error;
 pub mod handle;
 pub mod manifold;
 pub mod model;
+pub mod query;
 pub mod recording;
 pub mod scene;
 pub mod session;

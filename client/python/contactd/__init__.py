@@ -36,9 +36,14 @@ from .records import (
     EXTENT_NAMES,
     KIND_NAMES,
     NO_FACE,
+    NO_OBJECT,
+    OUTCOME_NAMES,
     PATCH,
+    POINT,
     POSE,
+    RAY,
     REGION,
+    SIDE_NAMES,
     STATUS_NAMES,
     Flag,
     Order,
@@ -48,7 +53,7 @@ from .records import (
     Valid,
 )
 from .rules import Effect, Rule
-from .session import Face, Model, Recording, Region, Reply, Session, connect, embedded
+from .session import Distance, Face, Model, Recording, Region, Reply, Session, connect, embedded
 from .solid import Outline, Solid
 from .view import View
 

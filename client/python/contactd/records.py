@@ -31,6 +31,15 @@ REGION: np.dtype = _LAYOUTS["REGION"]
 #: A further slot: up to four points of a region.
 PATCH: np.dtype = _LAYOUTS["PATCH"]
 
+#: The answer about a point: object (or ``NO_OBJECT``), side (into ``SIDE_NAMES``), certified bounds of its signed distance from the surface,
+#: the nearest point found, faces there, work.
+POINT: np.dtype = _LAYOUTS["POINT"]
+#: The answer about a ray: object, outcome (into ``OUTCOME_NAMES``), whether it begins in the object; a hit's bracket lower <= t <= upper
+#: (of a miss infinite, of what is undecided ``lower`` is where it is free until), point, normal, face, all faces there, work.
+RAY: np.dtype = _LAYOUTS["RAY"]
+
+#: "No object" in ``object`` of a point or ray.
+NO_OBJECT = 0xFFFF_FFFF
 #: "No face" in ``faces_a`` and ``faces_b``.
 NO_FACE = 0xFFFF_FFFF
 
@@ -96,3 +105,6 @@ class Tag(enum.IntEnum):
 STATUS_NAMES: list[str] = _WORDS["status"]
 KIND_NAMES: list[str] = _WORDS["kind"]
 EXTENT_NAMES: list[str] = _WORDS["extent"]
+#: Words for ``side`` of a point and ``outcome`` of a ray, by number.
+SIDE_NAMES: list[str] = _WORDS["side"]
+OUTCOME_NAMES: list[str] = _WORDS["outcome"]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Any, Iterable, Iterator, NamedTuple
+from typing import Any, Iterable, Iterator, NamedTuple, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _native
 from ._native import MassProperties, Solid
 from .errors import Error
 from .pose import PoseLike, pose
-from .records import DETAIL, PATCH, REGION, StepStatus, Tag
+from .records import DETAIL, PATCH, POINT, RAY, REGION, StepStatus, Tag
 from .rules import Effect, Rule
 from .view import Part, View
 
@@ -56,6 +57,21 @@ class Recording(NamedTuple):
     bytes: int
     #: Why it has ended before its time; empty: it has not.
     failure: str
+
+
+class Distance(NamedTuple):
+    """How far two objects are apart."""
+
+    #: Proven: no two points of them are nearer to each other.
+    lower: float
+    #: Proven: two points of them are no farther apart; 0 where they share one.
+    upper: float
+    #: A point of each, world frame: an array of (2, 3).
+    points: np.ndarray
+    #: The bounds are as near to each other as was asked, or as rounding lets them be.
+    settled: bool
+    #: Pairs of parts that were looked at.
+    cells: int
 
 
 class Region(NamedTuple):
@@ -188,6 +204,55 @@ class Session(_native.Session):
         """Volume, centre of mass and inertia of a model, in its own frame and unit, density 1, each with a proven bound."""
         return self._mass_properties(_id(model), tolerance, boxes)
 
+    def distance(self, a: int, b: int, tolerance: float = 1e-9) -> Distance:
+        """How far two objects are apart where the last step has left them: certified bounds to a tolerance (a length)."""
+        lower, upper, points, settled, cells = self._distance(a, b, tolerance)
+        return Distance(lower, upper, np.array(points), settled, cells)
+
+    def points(
+        self,
+        points: ArrayLike,
+        *,
+        surface: float = 1e-9,
+        tolerance: float = 1e-6,
+        limit: int = 200_000,
+        objects: Sequence[int] | None = None,
+    ) -> np.ndarray:
+        """On which side of the surface points are, and certified bounds of how far: an array of dtype ``POINT``, one for each.
+
+        ``points``: an array of (n, 3), world frame. ``surface``: what is no farther from it is on it. ``tolerance``: how far apart the bounds
+        may be; infinite: the side is enough. ``limit``: most parts that are looked at for one. ``objects``: of these alone.
+        """
+        given = np.ascontiguousarray(points, dtype=float)
+        if given.ndim != 2 or given.shape[1] != 3:
+            raise ValueError(f"expected points as an array of (n, 3), found one of {given.shape}")
+        told = self._points(given.tobytes(), (surface, tolerance, limit), _ids(objects))
+        return np.frombuffer(told, POINT)
+
+    def rays(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        length: ArrayLike = math.inf,
+        *,
+        depth: float = 0.0,
+        limit: int = 200_000,
+        objects: Sequence[int] | None = None,
+    ) -> np.ndarray:
+        """What rays meet first, certified: an array of dtype ``RAY``, one for each.
+
+        ``origins``, ``directions``: arrays of (n, 3), world frame; a direction may have any length but 0. ``length``: how far they go,
+        one for all or one each; infinite only where all objects have bounds. ``depth``: a ray that comes no deeper passes. ``limit``: most stretches
+        that are looked at for one and an object. ``objects``: these alone.
+        """
+        given = [np.asarray(a, dtype=float) for a in (origins, directions)]
+        if any(a.ndim != 2 or a.shape[1] != 3 for a in given) or len(given[0]) != len(given[1]):
+            shapes = " and ".join(str(a.shape) for a in given)
+            raise ValueError(f"expected origins and directions as arrays of (n, 3), found {shapes}")
+        lengths = np.broadcast_to(np.asarray(length, dtype=float), len(given[0]))
+        told = self._rays(np.column_stack([*given, lengths]).tobytes(), (depth, limit), _ids(objects))
+        return np.frombuffer(told, RAY)
+
     def add_object(
         self,
         name: str,
@@ -225,6 +290,10 @@ class Session(_native.Session):
                 if any(isinstance(pair, str) for pair in pairs):
                     raise TypeError(f"rule {i}: expected pairs of names as {field}, found {getattr(rule, field)!r}")
         self._set_rules(rules)
+
+
+def _ids(objects: Sequence[int] | None) -> list[int] | None:
+    return None if objects is None else [int(id) for id in objects]
 
 
 def _id(model: Model | int) -> int:

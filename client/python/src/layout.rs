@@ -1,6 +1,7 @@
 //! Layouts of the records, constants and words, told by the types themselves: Python's dtypes cannot drift from them.
 
 use contactd_proto::contact_record as wire;
+use contactd_proto::query::{NO_OBJECT, OUTCOME_NAMES, PointRecord, RayRecord, Side};
 use contactd_proto::rule::Values;
 use contactd_proto::{ContactRecord, DetailSlot, Effects, PatchSlot, PoseRecord, RegionSlot};
 use contactd_proto::{effects, pose_record, step};
@@ -20,6 +21,35 @@ macro_rules! layout {
 #[pyfunction]
 pub fn layouts() -> Vec<(&'static str, Layout)> {
     vec![
+        (
+            "POINT",
+            layout!(PointRecord {
+                object: "<u4",
+                side: "u1",
+                settled: "?",
+                lower: "<f8",
+                upper: "<f8",
+                nearest: "(3,)<f8",
+                faces: "(3,)<u4",
+                cells: "<u8",
+            }),
+        ),
+        (
+            "RAY",
+            layout!(RayRecord {
+                object: "<u4",
+                outcome: "u1",
+                inside: "?",
+                lower: "<f8",
+                t: "<f8",
+                upper: "<f8",
+                point: "(3,)<f8",
+                normal: "(3,)<f8",
+                face: "<u4",
+                faces: "(3,)<u4",
+                cells: "<u8",
+            }),
+        ),
         ("POSE", layout!(PoseRecord { object: "<u4", flags: "<u4", position: "(3,)<f8", rotation: "(4,)<f8" })),
         (
             "CONTACT",
@@ -119,6 +149,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, u32)> {
         ("Tag", "PATCH", wire::PATCH_SLOT),
         ("Tag", "REGION", wire::REGION_SLOT),
         ("", "NO_FACE", wire::NO_FACE),
+        ("", "NO_OBJECT", NO_OBJECT),
     ];
     // `EFFECT_TIME` is `Effect.TIME`.
     all.extend(effects::ALL.iter().map(|e| ("Effect", e.bit.trim_start_matches("EFFECT_"), e.value)));
@@ -134,6 +165,8 @@ pub fn words() -> Vec<(&'static str, Vec<&'static str>)> {
         ("kind", wire::KIND_NAMES.to_vec()),
         ("extent", wire::EXTENT_NAMES.to_vec()),
         ("status", wire::STATUS_NAMES.to_vec()),
+        ("side", Side::NAMES.to_vec()),
+        ("outcome", OUTCOME_NAMES.to_vec()),
     ]);
     all
 }

@@ -18,6 +18,7 @@ mod manifold;
 mod mass;
 mod options;
 mod pose;
+mod queries;
 mod reply;
 mod rules;
 mod session;

@@ -6,6 +6,7 @@ use crate::lease::{Lease, What};
 use crate::mass::MassProperties;
 use crate::options::Options;
 use crate::pose::{PoseFields, pose};
+use crate::queries;
 use crate::reply::Reply;
 use crate::rules;
 use crate::slots::{Batch, Slots, references};
@@ -14,10 +15,11 @@ use contactd_client::proto::control::{Facets, ModelFile};
 use contactd_client::transport::Opened;
 use contactd_client::{Error, MassOptions, Object, SharedMemory, StepOptions, Transport};
 use contactd_proto::names::Address;
+use contactd_proto::query::{PointOptions, PointRecord, RayOptions, RayRecord};
 use contactd_proto::{ContactRecord, PoseRecord, StepReply};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PySlice;
+use pyo3::types::{PyBytes, PySlice};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -26,6 +28,9 @@ type Inner = contactd_client::Session<Box<dyn Transport>>;
 
 /// A model: id, faces (primitive, name, face, subtracted), warnings.
 type Loaded = (u32, Vec<(u32, String, String, bool)>, Vec<String>);
+
+/// Bounds of a distance, the points, settled, cells.
+type Apart = (f64, f64, [[f64; 3]; 2], bool, u64);
 
 /// What was recorded: file, steps, left out, without a picture, bytes, why it failed.
 type Recorded = (String, u64, u64, u64, u64, String);
@@ -293,6 +298,38 @@ impl Session {
     /// Removes an object; its id is not used again.
     fn remove_object(slf: &Bound<'_, Self>, object: u32) -> PyResult<()> {
         Self::call(slf, move |s| s.remove_object(object))
+    }
+
+    /// Bounds of the distance of two objects, a point of each, whether they are settled, parts that were looked at.
+    fn _distance(slf: &Bound<'_, Self>, a: u32, b: u32, tolerance: f64) -> PyResult<Apart> {
+        let d = Self::call(slf, move |s| s.distance(a, b, tolerance))?;
+        Ok((d.lower, d.upper, d.points, d.is_settled, d.cells))
+    }
+
+    /// Records of dtype ``POINT`` about points, three doubles each.
+    fn _points<'py>(
+        slf: &Bound<'py, Self>,
+        points: &[u8],
+        options: (f64, f64, u64),
+        objects: Option<Vec<u32>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let (points, (surface, tolerance, limit)) = (queries::points(points), options);
+        let options = PointOptions { surface, tolerance, limit };
+        let told = Self::call(slf, move |s| s.points(&points, &options, objects.as_deref()))?;
+        Ok(queries::records::<_, PointRecord>(slf.py(), &told))
+    }
+
+    /// Records of dtype ``RAY`` about rays, seven doubles each.
+    fn _rays<'py>(
+        slf: &Bound<'py, Self>,
+        rays: &[u8],
+        options: (f64, u64),
+        objects: Option<Vec<u32>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let (rays, (depth, limit)) = (queries::rays(rays), options);
+        let options = RayOptions { depth, limit };
+        let told = Self::call(slf, move |s| s.rays(&rays, &options, objects.as_deref()))?;
+        Ok(queries::records::<_, RayRecord>(slf.py(), &told))
     }
 
     /// Records the session's steps from now on into a new MCAP file, until ``stop_recording`` or the end of the session.

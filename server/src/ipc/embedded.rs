@@ -5,7 +5,7 @@ use super::models::Models;
 use super::recordings;
 use super::scene::{CommandOutcome, Import, Scene, refused};
 use crate::recording::{Content, Recorder, Tap};
-use crate::world::{Refusal, World};
+use crate::world::Refusal;
 use contactd_client::transport::{Opened, Transport};
 use contactd_client::{Error, Session};
 use contactd_proto::control::{Answer, Command, RecordingOrder, RecordingStatus};
@@ -79,11 +79,6 @@ impl Embedded {
             slots: Vec::new(),
             reply: None,
         }
-    }
-
-    /// The session's world, to be asked; a refusal where the engine has failed in a step.
-    pub(super) fn world(&self) -> Result<&World, Refusal> {
-        self.scene.world()
     }
 
     /// Loads a model from its content, as a recording has it.
@@ -165,6 +160,7 @@ impl Transport for Embedded {
                 CommandOutcome::Import(import) => self.import(import),
                 CommandOutcome::Integrate(integration) => integration.answer(),
                 CommandOutcome::Save(save) => save.answer(),
+                CommandOutcome::Ask(inquiry) => inquiry.answer(),
             },
         })
     }

@@ -1,10 +1,11 @@
-//! Imports, mass properties and scenes that are written: what takes too long for the loop, and too long for other sessions to wait for.
+//! Imports, mass properties, queries and scenes that are written: what takes too long for the loop, and too long for other sessions to wait for.
 //!
 //! Each job has threads of its own, of low priority, so the system shares the cores between the jobs of all sessions
 //! whatever they cost, and gives them to steps first. A session has one job at a time. What nobody waits for any more ends at
 //! its next point (`math::halt`).
 
 use super::models::{Loaded, Models};
+use super::queries::Inquiry;
 use super::scene::{Import, Integration, Save, refused};
 use crate::math::halt::{self, Halt};
 use crate::world::{Refusal, yield_to_others};
@@ -21,6 +22,8 @@ pub enum JobKind {
     Integrate(Integration),
     /// A step to be written.
     Save(Save),
+    /// Objects that are asked about.
+    Ask(Inquiry),
 }
 
 /// What came of it.
@@ -37,6 +40,7 @@ impl JobKind {
             JobKind::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
             JobKind::Integrate(integration) => Finished::Answered(integration.answer()),
             JobKind::Save(save) => Finished::Answered(save.answer()),
+            JobKind::Ask(inquiry) => Finished::Answered(inquiry.answer()),
         }
     }
 }

@@ -416,7 +416,11 @@ impl<P: Port> Lead<P> {
         }
         let scene = if session.waiting { None } else { session.scene.as_mut() };
         let Some(scene) = scene else {
-            let detail = if session.waiting { "a model is being imported or integrated over" } else { "a step runs" };
+            let detail = if session.waiting {
+                "a model is being imported or integrated over, or a query answered"
+            } else {
+                "a step runs"
+            };
             return answer(call, &refused(Refusal::new(ErrorCode::Busy, detail)));
         };
         scene.record(self.recordings.number(), || self.recordings.tap(id));
@@ -432,6 +436,7 @@ impl<P: Port> Lead<P> {
             CommandOutcome::Import(import) => JobKind::Import(import),
             CommandOutcome::Integrate(integration) => JobKind::Integrate(integration),
             CommandOutcome::Save(save) => JobKind::Save(save),
+            CommandOutcome::Ask(inquiry) => JobKind::Ask(inquiry),
         };
         // A core is left to the loop; the others are shared between the jobs by the system.
         let threads = self.cores.saturating_sub(1) / (self.pending.len() + 1);

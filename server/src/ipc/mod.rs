@@ -33,5 +33,4 @@ mod task;
 pub use config::{CacheFolder, ServerConfig};
 pub use embedded::{Embedded, embedded};
 pub use log::Level;
-pub use queries::Queries;
 pub use serve::{ServeError, Server, ready_threads, serve};

@@ -1,60 +1,89 @@
-//! What an embedded session can be asked beside its steps: distances of bodies, points, rays (docs/queries.md).
+//! What a session is asked beside its steps: distances of objects, points, rays (docs/queries.md). The answers are the world's own,
+//! in the protocol's types.
 
-use super::embedded::Embedded;
-use crate::contact::distance::Distance;
-use crate::contact::probe::{PointOptions, Ray, RayOptions};
-use crate::world::{BodyPoint, BodyRay, Refusal};
-use contactd_client::{Error, Session};
+use super::scene::refused;
+use crate::contact::probe::{self, Ray};
+use crate::math::halt;
+use crate::world::{BodyPoint, BodyRay, Refusal, Standing, World};
+use contactd_proto::ErrorCode;
+use contactd_proto::control::Answer;
+use contactd_proto::query::{
+    ObjectDistance, ObjectRay, PointAnswer, Query, QueryAnswer, RayAnswer, RayHit, RayOutcome,
+};
 use glam::DVec3;
 
-/// Queries of a session's bodies where its last step has left them. They change nothing, and no step's answer.
-pub trait Queries {
-    /// How far two objects are apart: certified bounds to a tolerance (a length), and a point of each.
-    ///
-    /// # Errors
-    /// `Refused`: an object is unknown (`UnknownObject`), or the tolerance is no length (`BadNumber`).
-    fn distance(&mut self, a: u32, b: u32, tolerance: f64) -> Result<Distance, Error>;
-
-    /// The least signed distance of points from all objects, or from those named, in the order of the points.
-    ///
-    /// # Errors
-    /// `Refused`: an object is unknown (`UnknownObject`), a point is not finite (`NotFinite`, with its index), a length is none
-    /// (`BadNumber`).
-    fn points(
-        &mut self,
-        points: &[DVec3],
-        options: &PointOptions,
-        objects: Option<&[u32]>,
-    ) -> Result<Vec<BodyPoint>, Error>;
-
-    /// What rays meet first of all objects, or of those named, in the order of the rays. A direction may have any length but 0.
-    ///
-    /// # Errors
-    /// `Refused`: an object is unknown (`UnknownObject`), a ray is not finite (`NotFinite`) or goes nowhere (`BadNumber`), each with
-    /// its index; a depth is none (`BadNumber`).
-    fn rays(&mut self, rays: &[Ray], options: &RayOptions, objects: Option<&[u32]>) -> Result<Vec<BodyRay>, Error>;
+/// A question, with the objects as they stood when it was asked.
+#[derive(Debug)]
+pub struct Inquiry {
+    standing: Standing<'static>,
+    query: Query,
 }
 
-impl Queries for Session<Embedded> {
-    fn distance(&mut self, a: u32, b: u32, tolerance: f64) -> Result<Distance, Error> {
-        self.transport_mut().world().and_then(|world| world.distance(a, b, tolerance)).map_err(refused)
+impl Inquiry {
+    /// A question to a world; what it needs of it is copied.
+    pub fn new(world: &World, query: Query) -> Self {
+        let standing = match &query {
+            Query::Distance { a, b, .. } => world.standing().kept(Some(&[*a, *b])),
+            Query::Points { objects, .. } | Query::Rays { objects, .. } => world.standing().kept(objects.as_deref()),
+        };
+        Self { standing, query }
     }
 
-    fn points(
-        &mut self,
-        points: &[DVec3],
-        options: &PointOptions,
-        objects: Option<&[u32]>,
-    ) -> Result<Vec<BodyPoint>, Error> {
-        self.transport_mut().world().and_then(|world| world.points(points, options, objects)).map_err(refused)
+    /// Works the answer out; may take seconds.
+    pub fn answer(&self) -> Answer {
+        match halt::catch(|| self.told()) {
+            Ok(Ok(told)) => Answer::Told(told),
+            Ok(Err(refusal)) => refused(refusal),
+            Err(_) => refused(Refusal::new(ErrorCode::Internal, "the query failed")),
+        }
     }
 
-    fn rays(&mut self, rays: &[Ray], options: &RayOptions, objects: Option<&[u32]>) -> Result<Vec<BodyRay>, Error> {
-        self.transport_mut().world().and_then(|world| world.rays(rays, options, objects)).map_err(refused)
+    fn told(&self) -> Result<QueryAnswer, Refusal> {
+        match &self.query {
+            Query::Distance { a, b, tolerance } => {
+                let d = self.standing.distance(*a, *b, *tolerance)?;
+                Ok(QueryAnswer::Distance(ObjectDistance {
+                    lower: d.lower,
+                    upper: d.upper,
+                    points: [d.a.point.to_array(), d.b.point.to_array()],
+                    is_settled: d.is_settled,
+                    cells: d.cells,
+                }))
+            }
+            Query::Points { points, options, objects } => {
+                let points: Vec<DVec3> = points.iter().map(|x| DVec3::from_array(*x)).collect();
+                let told = self.standing.points(&points, options, objects.as_deref())?;
+                Ok(QueryAnswer::Points(told.iter().map(point).collect()))
+            }
+            Query::Rays { rays, options, objects } => {
+                let rays: Vec<Ray> = rays.iter().map(ray).collect();
+                let told = self.standing.rays(&rays, options, objects.as_deref())?;
+                Ok(QueryAnswer::Rays(told.iter().map(ray_answer).collect()))
+            }
+        }
     }
 }
 
-fn refused(refusal: Refusal) -> Error {
-    let Refusal { code, index, detail } = refusal;
-    Error::Refused { code, index, detail }
+fn ray(r: &ObjectRay) -> Ray {
+    let (origin, direction) = (DVec3::from_array(r.origin), DVec3::from_array(r.direction));
+    Ray { origin, direction, length: r.length }
+}
+
+fn point(told: &BodyPoint) -> PointAnswer {
+    let probe::PointAnswer { side, lower, upper, nearest, faces, is_settled, cells } = told.answer;
+    let (object, nearest) = (told.body, nearest.to_array());
+    PointAnswer { object, side, lower, upper, nearest, faces, is_settled, cells }
+}
+
+fn ray_answer(told: &BodyRay) -> RayAnswer {
+    let outcome = match told.answer.outcome {
+        probe::RayOutcome::Hit(hit) => {
+            let probe::RayHit { lower, t, upper, point, normal, face, primitive: _, faces, is_leaving } = hit;
+            let (point, normal) = (point.to_array(), normal.to_array());
+            RayOutcome::Hit(RayHit { lower, t, upper, point, normal, face, faces, is_leaving })
+        }
+        probe::RayOutcome::Miss { is_inside } => RayOutcome::Miss { is_inside },
+        probe::RayOutcome::Undecided { until } => RayOutcome::Undecided { until },
+    };
+    RayAnswer { object: told.body, outcome, cells: told.answer.cells }
 }

@@ -2,6 +2,7 @@
 
 use super::config::ServerConfig;
 use super::models::Loaded;
+use super::queries::Inquiry;
 use crate::math::halt;
 use crate::octree::mass::mass_properties;
 use crate::recording::{Change, Opening, SceneFolder, Standing, Tap};
@@ -47,6 +48,8 @@ pub enum CommandOutcome {
     Integrate(Integration),
     /// A step has to be written; `Save::answer` is the answer.
     Save(Save),
+    /// Objects are asked about; `Inquiry::answer` is the answer.
+    Ask(Inquiry),
 }
 
 /// A step that is to be written as a scene folder.
@@ -134,7 +137,7 @@ impl Scene {
     ///
     /// # Errors
     /// `Internal` where the engine has failed within a step.
-    pub fn world(&self) -> Result<&World, Refusal> {
+    fn world(&self) -> Result<&World, Refusal> {
         if self.broken {
             return Err(Refusal::new(ErrorCode::Internal, "the engine failed in an earlier step of this session"));
         }
@@ -226,6 +229,7 @@ impl Scene {
                 let options = options.map_err(|sentence| Refusal::new(ErrorCode::BadNumber, sentence))?;
                 return Ok(CommandOutcome::Integrate(Integration { model: loaded.clone(), options }));
             }
+            Command::Ask(query) => return Ok(CommandOutcome::Ask(Inquiry::new(self.world()?, query))),
             Command::SaveStep(folder) => {
                 return Ok(CommandOutcome::Save(Save { folder: folder.into(), scene: self.last_step() }));
             }

@@ -146,7 +146,8 @@ impl Stage {
             | Command::EndSession(_)
             | Command::Record(_)
             | Command::Recording { .. }
-            | Command::SaveStep(_) => None,
+            | Command::SaveStep(_)
+            | Command::Ask(_) => None,
         }
     }
 

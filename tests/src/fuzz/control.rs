@@ -5,6 +5,7 @@ use contactd_proto::control::{
     Answer, Command, Envelope, Facets, ModelFile, ObjectSpec, RecordingOrder, RecordingStatus, ServerStatus,
     SessionStatus, WireMass, WireRule, WireTrack, decode, encode,
 };
+use contactd_proto::query::{ObjectRay, PointOptions, Query, RayOptions};
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, MotionState, Pose, Rule};
 use glam::DVec3;
 
@@ -46,6 +47,17 @@ fn seeds() -> Vec<Vec<u8>> {
         Command::Record(RecordingOrder { path: "/a".into(), session: Some(3), process: (300, 70_000) }),
         Command::Recording { stop: true },
         Command::SaveStep("/a".into()),
+        Command::Ask(Query::Distance { a: 1, b: 2, tolerance: 1e-6 }),
+        Command::Ask(Query::Points {
+            points: vec![[1.0, 2.0, 3.0]],
+            options: PointOptions::default(),
+            objects: Some(vec![7]),
+        }),
+        Command::Ask(Query::Rays {
+            rays: vec![ObjectRay { origin: [0.0; 3], direction: [0.0, 0.0, 1.0], length: 9.0 }],
+            options: RayOptions::default(),
+            objects: None,
+        }),
     ];
     let envelope = |command| encode(&Envelope { epoch: 9, session: 3, command });
     let refused = Answer::Refused { code: 3, index: u32::MAX, detail: "why".into() };
@@ -119,6 +131,11 @@ fn taken(command: Command) -> Result<String, String> {
         Command::Record(_) => "record".into(),
         Command::Recording { .. } => "recording".into(),
         Command::SaveStep(_) => "save".into(),
+        Command::Ask(query) => match query {
+            Query::Distance { tolerance, .. } => format!("distance {:?}", tolerance >= 0.0),
+            Query::Points { points, .. } => format!("points {}", points.len().min(2)),
+            Query::Rays { rays, .. } => format!("rays {}", rays.len().min(2)),
+        },
         Command::LoadModel { facets, .. } => format!("load {facets:?}"),
         Command::RemoveObject(_) => "remove".into(),
         Command::SetResolution(r) => format!("resolution {:?}", r.map(|r| r.is_finite())),

@@ -4,14 +4,14 @@
 
 use super::judge::{Judge, refuted, solid};
 use super::rays::drawn;
-use contactd::Queries;
 use contactd::contact::probe::{
-    DEFAULT_LIMIT, PointOptions, PosedModel, Ray, RayAnswer, RayHit, RayOptions, RayOutcome, points,
+    DEFAULT_LIMIT, PointOptions, PosedModel, Ray, RayAnswer, RayOptions, RayOutcome, points,
 };
-use contactd::ipc::ServerConfig;
+use contactd::ipc::{Embedded, ServerConfig};
 use contactd::octree::Model;
 use contactd::world::{MeasuredModel, ObjectSpec, World};
-use contactd_client::Object;
+use contactd_client::{Object, Session};
+use contactd_proto::query::{self, ObjectRay};
 use contactd_proto::{ErrorCode, Pose, PoseRecord};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
@@ -74,13 +74,16 @@ fn first_hits_among_bodies_are_refuted_by_none_of_them() {
         let Bodies { world, judges, .. } = Bodies::drawn(&mut r, i);
         let asked: Vec<Ray> = (0..EACH).map(|_| drawn(&mut r, DVec3::ZERO, 2.5)).collect();
         let some: Vec<u32> = (1..=judges.len() as u32).filter(|id| id % 2 == 1).collect();
-        for (k, told) in world.rays(&asked, &RAYS, None).unwrap().iter().enumerate() {
+        for (k, told) in world.standing().rays(&asked, &RAYS, None).unwrap().iter().enumerate() {
             all += 1;
             hits += usize::from(matches!(told.answer.outcome, RayOutcome::Hit(_)));
             failures.extend(refuted_by_any(told.body, &told.answer, &asked[k], &judges));
         }
         // Of some of them: a body that is not asked is never told, and none is hit earlier than among all.
-        let (among, few) = (world.rays(&asked, &RAYS, None).unwrap(), world.rays(&asked, &RAYS, Some(&some)).unwrap());
+        let (among, few) = (
+            world.standing().rays(&asked, &RAYS, None).unwrap(),
+            world.standing().rays(&asked, &RAYS, Some(&some)).unwrap(),
+        );
         for (one, other) in among.iter().zip(&few) {
             assert!(other.body.is_none_or(|id| id % 2 == 1), "{i}: {other:?}");
             if one.body.is_some_and(|id| id % 2 == 1) {
@@ -101,7 +104,7 @@ fn signed_distances_among_bodies_are_the_least_of_all() {
         let mut r = Random::new(98_000 + i as u64);
         let Bodies { world, judges, models } = Bodies::drawn(&mut r, i);
         let asked: Vec<DVec3> = (0..EACH).map(|_| r.vector(2.5)).collect();
-        for (x, told) in asked.iter().zip(world.points(&asked, &options, None).unwrap()) {
+        for (x, told) in asked.iter().zip(world.standing().points(&asked, &options, None).unwrap()) {
             let each =
                 models.iter().map(|(model, pose)| points(&PosedModel { model, pose: *pose }, &[*x], &options)[0]);
             let least = each.map(|a| a.upper).fold(f64::INFINITY, f64::min);
@@ -127,14 +130,19 @@ fn a_session_is_asked_where_its_bodies_stand_now() {
     let wall = session.load_model("wall.csg", "cube(size = [1, 40, 40], center = true);").unwrap().id;
     let ball = session.add_object(Object::new("ball", ball)).unwrap();
     let wall = session.add_object(Object::new("wall", wall).at(Pose::at(DVec3::X * 10.5))).unwrap();
-    let ray = Ray { origin: DVec3::new(-5.0, 0.0, 0.6), direction: DVec3::X * 3.0, length: 30.0 };
-    let first = |session: &mut _, objects: Option<&[u32]>| -> (Option<u32>, RayHit) {
-        let told = Queries::rays(session, &[ray], &RAYS, objects).unwrap()[0];
-        let RayOutcome::Hit(hit) = told.answer.outcome else { panic!("{told:?}") };
-        (told.body, hit)
+    let ray = ObjectRay { origin: [-5.0, 0.0, 0.6], direction: [3.0, 0.0, 0.0], length: 30.0 };
+    let first = |session: &mut Session<Embedded>, objects: Option<&[u32]>| -> (Option<u32>, query::RayHit) {
+        let told = session.rays(&[ray], &RAYS, objects).unwrap()[0];
+        let query::RayOutcome::Hit(hit) = told.outcome else { panic!("{told:?}") };
+        (told.object, hit)
     };
     let (body, hit) = first(&mut session, None);
-    assert!(body == Some(ball) && (hit.t - 4.2).abs() < 1e-12 && hit.normal.distance(hit.point) < 1e-12, "{hit:?}");
+    assert!(
+        body == Some(ball)
+            && (hit.t - 4.2).abs() < 1e-12
+            && DVec3::from_array(hit.normal).distance(DVec3::from_array(hit.point)) < 1e-12,
+        "{hit:?}"
+    );
     assert_eq!(first(&mut session, Some(&[wall])).0, Some(wall));
     let d = session.distance(ball, wall, 1e-9).unwrap();
     assert!(d.lower <= 9.0 && 9.0 <= d.upper + 1e-13 && d.upper - d.lower < 1e-9, "{d:?}");
@@ -146,17 +154,17 @@ fn a_session_is_asked_where_its_bodies_stand_now() {
     let d = session.distance(ball, wall, 1e-9).unwrap();
     assert!((d.upper - 5.0).abs() < 1e-9, "{d:?}");
     let options = PointOptions { surface: 1e-9, tolerance: 1e-9, limit: DEFAULT_LIMIT };
-    let told = session.points(&[DVec3::new(4.0, 0.0, 2.5), DVec3::new(9.0, 0.0, -3.0)], &options, None).unwrap();
-    assert!(told[0].body == Some(ball) && (told[0].answer.upper + 0.5).abs() < 1e-9, "{told:?}");
-    assert!(told[1].body == Some(wall) && (told[1].answer.upper - 1.0).abs() < 1e-9, "{told:?}");
+    let told = session.points(&[[4.0, 0.0, 2.5], [9.0, 0.0, -3.0]], &options, None).unwrap();
+    assert!(told[0].object == Some(ball) && (told[0].upper + 0.5).abs() < 1e-9, "{told:?}");
+    assert!(told[1].object == Some(wall) && (told[1].upper - 1.0).abs() < 1e-9, "{told:?}");
     // What makes no sense is refused, with its place.
-    let nowhere = Ray { direction: DVec3::ZERO, ..ray };
+    let nowhere = ObjectRay { direction: [0.0; 3], ..ray };
     let refusal = session.rays(&[ray, nowhere], &RAYS, None).unwrap_err();
     assert_eq!(
         refusal.to_string(),
         "index 1: an option of the request is out of its range: a ray cannot go along [0, 0, 0]"
     );
     assert_eq!(session.distance(ball, 77, 1e-9).unwrap_err().code(), Some(ErrorCode::UnknownObject));
-    assert_eq!(session.points(&[DVec3::NAN], &options, None).unwrap_err().code(), Some(ErrorCode::NotFinite));
+    assert_eq!(session.points(&[[0.0, f64::NAN, 0.0]], &options, None).unwrap_err().code(), Some(ErrorCode::NotFinite));
     assert_eq!(session.distance(ball, wall, -1.0).unwrap_err().code(), Some(ErrorCode::BadNumber));
 }

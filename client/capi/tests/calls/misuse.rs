@@ -3,13 +3,15 @@
 use crate::stub::{Script, scripted};
 use crate::support::*;
 use contactd_capi::Session;
-use contactd_capi::abi::{Mass, Options, Pose};
+use contactd_capi::abi::{Mass, Options, Pose, RayQuery};
 use contactd_capi::error::*;
 use contactd_capi::model::*;
+use contactd_capi::query::*;
 use contactd_capi::scene::*;
 use contactd_capi::session::*;
 use contactd_capi::step::*;
 use contactd_client::Error;
+use contactd_proto::query::{ObjectRay, PointRecord, RayRecord};
 use contactd_proto::step::NO_INDEX;
 use contactd_proto::{ErrorCode, PoseRecord};
 use std::ptr::{null, null_mut};
@@ -39,6 +41,9 @@ fn every_function_refuses_a_session_that_is_null_or_closed() {
             contactd_get_face(s, 1, 0, null_mut()),
             contactd_get_warning(s, 1, 0, null_mut()),
             contactd_mass_properties(s, 1, 0.0, 0, null_mut()),
+            contactd_get_distance(s, 1, 2, 0.0, null_mut()),
+            contactd_get_points(s, null(), 0, null(), null_mut()),
+            contactd_cast_rays(s, null(), 0, null(), null_mut()),
             contactd_add_object(s, &object, null_mut()),
             contactd_remove_object(s, 1),
             contactd_set_rules(s, null(), 0),
@@ -55,7 +60,7 @@ fn every_function_refuses_a_session_that_is_null_or_closed() {
             contactd_get_region(s, 0, 0, null_mut(), null_mut(), null_mut()),
         ]
     };
-    assert_eq!(codes, [ERROR_NULL; 23]);
+    assert_eq!(codes, [ERROR_NULL; 26]);
     refused_at(unsafe { contactd_send(s) }, ERROR_NULL, NO_INDEX, "the session (closed, or never opened) is NULL");
     refused(unsafe { contactd_close(null_mut()) }, ERROR_NULL, "session is NULL");
 }
@@ -87,6 +92,18 @@ fn every_pointer_that_is_null_is_named_and_nothing_is_done() {
         refused(contactd_get_face(s, 1, 0, null_mut()), ERROR_NULL, "out is NULL");
         refused(contactd_get_warning(s, 1, 0, null_mut()), ERROR_NULL, "out is NULL");
         refused(contactd_mass_properties(s, 1, 0.0, 0, null_mut()), ERROR_NULL, "mass is NULL");
+        let (points, rays) = ([[0.0; 3]], [ObjectRay { origin: [0.0; 3], direction: [1.0; 3], length: 1.0 }]);
+        let (of_points, of_rays) = (contactd_point_query_new(), contactd_ray_query_new());
+        let (mut point, mut ray) = (PointRecord::default(), RayRecord::default());
+        refused(contactd_get_distance(s, 1, 2, 0.0, null_mut()), ERROR_NULL, "distance is NULL");
+        refused(contactd_get_points(s, null(), 1, &of_points, &mut point), ERROR_NULL, "points is NULL");
+        refused(contactd_get_points(s, points.as_ptr(), 1, null(), &mut point), ERROR_NULL, "query is NULL");
+        refused(contactd_get_points(s, points.as_ptr(), 1, &of_points, null_mut()), ERROR_NULL, "answers is NULL");
+        refused(contactd_cast_rays(s, null(), 1, &of_rays, &mut ray), ERROR_NULL, "rays is NULL");
+        refused(contactd_cast_rays(s, rays.as_ptr(), 1, null(), &mut ray), ERROR_NULL, "query is NULL");
+        refused(contactd_cast_rays(s, rays.as_ptr(), 1, &of_rays, null_mut()), ERROR_NULL, "answers is NULL");
+        let some = RayQuery { object_count: 1, ..of_rays };
+        refused(contactd_cast_rays(s, rays.as_ptr(), 1, &some, &mut ray), ERROR_NULL, "objects is NULL");
         refused(contactd_mass_placed(null(), &Pose::IDENTITY, &mut mass), ERROR_NULL, "mass is NULL");
         refused(contactd_mass_placed(&mass, null(), null_mut()), ERROR_NULL, "pose is NULL");
         refused(contactd_mass_placed(&mass, &Pose::IDENTITY, null_mut()), ERROR_NULL, "out is NULL");

@@ -3,12 +3,14 @@
 use crate::support::*;
 use contactd_capi::abi::{Mass, Names, Options, Pose};
 use contactd_capi::model::*;
+use contactd_capi::query::*;
 use contactd_capi::recording::*;
 use contactd_capi::scene::*;
 use contactd_capi::session::*;
 use contactd_capi::step::*;
 use contactd_client::MassOptions;
 use contactd_proto::contact_record::{CONTACT, OVERLAP, SENSOR, VALID_POINT};
+use contactd_proto::query::{NO_OBJECT, ObjectRay, PointOptions, RAY_HIT, RAY_MISS, RayOptions, Side};
 use contactd_proto::rule::RuleNumbers;
 use contactd_proto::step::{STEP_CLEAR, STEP_CONTACT};
 use contactd_proto::{Detect, InitialOverlap, PoseRecord, Report, pose_record};
@@ -286,4 +288,43 @@ fn options_come_back_as_they_were_set() {
     done(unsafe { contactd_set_advance(session.0, 0.25) });
     let reply = session.step(&[end(ball, [1.0, 0.0, 0.0])]);
     assert!((records(&reply)[0].time - (16.0 - 21f64.sqrt()) / 18.0).abs() < 1e-9);
+}
+
+#[test]
+fn queries_are_those_of_rust() {
+    let session = Open::embedded();
+    let (plate, ball) = session.scene();
+    let mut own = contactd::embedded(&contactd::ipc::ServerConfig::default()).unwrap();
+    for (name, text) in [("plate.csg", PLATE), ("ball.csg", BALL)] {
+        own.load_model(name, text.to_str().unwrap()).unwrap();
+    }
+    let seen = out(|d| unsafe { contactd_get_distance(session.0, plate, ball, 1e-9, d) });
+    assert!(seen.settled == 1 && seen.lower <= seen.upper && seen.upper > 0.0, "{seen:?}");
+    let way = (0..3).map(|k| (seen.point_a[k] - seen.point_b[k]).powi(2)).sum::<f64>().sqrt();
+    assert!((way - seen.upper).abs() < 1e-9, "{seen:?}");
+    // The corner of the plate, within it, and the middle of its hole.
+    let points = [[30.0, 0.0, 0.0], [19.0, 19.0, 1.0], [0.0, 0.0, 0.0]];
+    let query = contactd_point_query_new();
+    let asked = PointOptions { surface: query.surface, tolerance: query.tolerance, limit: query.limit };
+    assert_eq!(asked, PointOptions::default());
+    let only = [plate];
+    let query = contactd_capi::abi::PointQuery { objects: only.as_ptr(), object_count: 1, ..query };
+    let mut told = [Default::default(); 3];
+    done(unsafe { contactd_get_points(session.0, points.as_ptr(), 3, &query, told.as_mut_ptr()) });
+    assert_eq!(told.map(|t| t.side), [Side::Outside as u8, Side::Inside as u8, Side::Outside as u8]);
+    assert_eq!(told.map(|t| t.object), [plate; 3]);
+    for (t, d) in told.iter().zip([10.0, -1.0, 3.0]) {
+        assert!(t.settled == 1 && t.lower <= d + 1e-12 && d <= t.upper + 1e-12 && t.upper - t.lower < 1e-5, "{t:?}");
+    }
+    let ray = |x: f64, z: f64| ObjectRay { origin: [x, 0.0, 9.0], direction: [0.0, 0.0, z], length: 100.0 };
+    let rays = [ray(10.0, -2.0), ray(0.0, -1.0), ray(10.0, 1.0)];
+    let query = contactd_ray_query_new();
+    assert_eq!((query.depth, query.limit), (RayOptions::default().depth, RayOptions::default().limit));
+    let query = contactd_capi::abi::RayQuery { objects: only.as_ptr(), object_count: 1, ..query };
+    let mut told = [Default::default(); 3];
+    done(unsafe { contactd_cast_rays(session.0, rays.as_ptr(), 3, &query, told.as_mut_ptr()) });
+    assert_eq!(told.map(|t| t.outcome), [RAY_HIT, RAY_MISS, RAY_MISS]);
+    assert!((told[0].t - 7.0).abs() < 1e-12 && told[0].normal == [0.0, 0.0, 1.0], "{:?}", told[0]);
+    assert_eq!(told.map(|t| t.object), [plate, NO_OBJECT, NO_OBJECT]);
+    done(unsafe { contactd_get_points(session.0, null(), 0, &contactd_point_query_new(), null_mut()) });
 }

@@ -11,11 +11,13 @@ use crate::contact::distance::{self, Distance, DistanceQuery};
 use crate::contact::probe::{
     self, PointAnswer, PointOptions, PosedModel, Ray, RayAnswer, RayOptions, RayOutcome, Side,
 };
-use crate::math::Aabb;
+use crate::math::{Aabb, halt};
 use crate::motion::Placed;
 use contactd_proto::{ErrorCode, Motion};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::borrow::Cow;
+use std::collections::HashSet;
 
 /// A point among bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +37,13 @@ pub struct BodyRay {
     pub answer: RayAnswer,
 }
 
+/// Bodies where they stand, to be asked: those of a world, or a copy that outlives its next step.
+#[derive(Clone, Debug)]
+pub struct Standing<'w> {
+    /// In the order of their ids.
+    bodies: Cow<'w, [Body]>,
+}
+
 /// Bodies that are asked, with their boxes.
 struct Asked<'w> {
     bodies: Vec<&'w Body>,
@@ -50,6 +59,20 @@ impl Body {
 }
 
 impl World {
+    /// Its bodies where their last step ended.
+    pub fn standing(&self) -> Standing<'_> {
+        Standing { bodies: Cow::Borrowed(self.bodies()) }
+    }
+}
+
+impl Standing<'_> {
+    /// A copy of its own, of all bodies or of some; ids that it does not have are left out.
+    pub fn kept(&self, ids: Option<&[u32]>) -> Standing<'static> {
+        let wanted: Option<HashSet<u32>> = ids.map(|ids| ids.iter().copied().collect());
+        let is_wanted = |body: &&Body| wanted.as_ref().is_none_or(|ids| ids.contains(&body.id));
+        Standing { bodies: Cow::Owned(self.bodies.iter().filter(is_wanted).cloned().collect()) }
+    }
+
     /// How far two bodies are apart, to a tolerance (a length); `time` is of no meaning.
     ///
     /// # Errors
@@ -79,7 +102,11 @@ impl World {
             return Err(Refusal::new(ErrorCode::NotFinite, format!("the point {}", points[i])).at(i));
         }
         let asked = self.asked(bodies)?;
-        Ok(points.par_iter().map(|x| asked.point(*x, options)).collect())
+        let told = points.par_iter().map(|x| {
+            halt::point();
+            asked.point(*x, options)
+        });
+        Ok(told.collect())
     }
 
     /// What rays meet first of some bodies, or of all, in the order of the rays. A direction may have any length but 0; parameters are
@@ -105,16 +132,21 @@ impl World {
             unit.push(Ray { direction, ..*ray });
         }
         let asked = self.asked(bodies)?;
-        Ok(unit.par_iter().map(|ray| asked.ray(ray, options)).collect())
+        let told = unit.par_iter().map(|ray| {
+            halt::point();
+            asked.ray(ray, options)
+        });
+        Ok(told.collect())
     }
 
     fn known(&self, id: u32) -> Result<&Body, Refusal> {
-        self.body(id).ok_or_else(|| Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")))
+        let at = self.bodies.binary_search_by_key(&id, |body| body.id);
+        at.map(|i| &self.bodies[i]).map_err(|_| Refusal::new(ErrorCode::UnknownObject, format!("object id {id}")))
     }
 
     fn asked(&self, bodies: Option<&[u32]>) -> Result<Asked<'_>, Refusal> {
         let bodies: Vec<&Body> = match bodies {
-            None => self.bodies().iter().collect(),
+            None => self.bodies.iter().collect(),
             Some(ids) => ids.iter().map(|id| self.known(*id)).collect::<Result<_, _>>()?,
         };
         let boxes: Vec<Aabb> = bodies.iter().map(|body| body.standing()).collect();

@@ -107,7 +107,7 @@ pub struct Body {
     reach: f64,
     /// Where it stands and how it came there.
     pub motion_state: MotionState,
-    fixed: Box<Fixed>,
+    fixed: Arc<Fixed>,
 }
 
 const _: () = assert!(size_of::<Body>() == 192);
@@ -162,7 +162,7 @@ impl Body {
             rotates: spec.rotates,
             reach,
             motion_state: MotionState::resting(spec.pose),
-            fixed: Box::new(Fixed {
+            fixed: Arc::new(Fixed {
                 max_speed: spec.max_speed,
                 hull,
                 part: spec.part,

@@ -35,7 +35,7 @@ mod swept_shapes;
 mod tests;
 mod touch;
 
-pub use ask::{BodyPoint, BodyRay};
+pub use ask::{BodyPoint, BodyRay, Standing};
 pub use body::{MeasuredModel, ObjectSpec};
 pub use heed::{Crew, Heed, LONG_PRIORITY, yield_to_others};
 pub use options::{StepError, StepOptions};

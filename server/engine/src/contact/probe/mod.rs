@@ -32,29 +32,7 @@ pub struct PosedModel<'a> {
     pub pose: Pose,
 }
 
-/// What is asked of points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointOptions {
-    /// Points no farther from the surface than this are on it, a length >= 0. What is less than rounding is `Undecided` there.
-    pub surface: f64,
-    /// How far apart the bounds of the signed distance may be: a length, raised to what rounding allows. Infinite: the search ends
-    /// as soon as the side is known.
-    pub tolerance: f64,
-    /// Parts of the solid that may be looked at for a point: then the bounds stay as far apart as they are.
-    pub limit: u64,
-}
-
-/// What is asked of rays.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RayOptions {
-    /// A ray that comes no deeper than this into the solid passes it: a length, raised to what rounding needs (docs/queries.md).
-    pub depth: f64,
-    /// Stretches that may be looked at for a ray and a solid: then it is undecided from there.
-    pub limit: u64,
-}
-
-/// Parts that a point, and stretches that a ray may cost by default.
-pub const DEFAULT_LIMIT: u64 = 200_000;
+pub use contactd_proto::query::{DEFAULT_QUERY_LIMIT as DEFAULT_LIMIT, PointOptions, RayOptions, Side};
 
 /// A ray: origin + t·direction for 0 <= t <= length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,34 +49,6 @@ impl Ray {
     /// The point at a parameter.
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + self.direction * t
-    }
-}
-
-/// On which side of the surface a point is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// Proven inside, farther from the surface than told.
-    Inside,
-    /// Proven outside, farther from the surface than told.
-    Outside,
-    /// Proven no farther from the surface than told.
-    Surface,
-    /// None of them is proven: the bounds reach over the limit between two.
-    Undecided,
-}
-
-impl Side {
-    /// Of a signed distance between bounds, with what counts as on the surface.
-    pub fn of_bounds(lower: f64, upper: f64, surface: f64) -> Self {
-        if lower > surface {
-            Side::Outside
-        } else if upper < -surface {
-            Side::Inside
-        } else if lower >= -surface && upper <= surface {
-            Side::Surface
-        } else {
-            Side::Undecided
-        }
     }
 }
 
