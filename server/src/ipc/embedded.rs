@@ -160,7 +160,7 @@ impl Transport for Embedded {
                 CommandOutcome::Import(import) => self.import(import),
                 CommandOutcome::Integrate(integration) => integration.answer(),
                 CommandOutcome::Save(save) => save.answer(),
-                CommandOutcome::Ask(inquiry) => inquiry.answer(),
+                CommandOutcome::Ask(inquiry) => inquiry.answer().map_or_else(refused, Answer::Told),
             },
         })
     }

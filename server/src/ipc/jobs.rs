@@ -40,7 +40,7 @@ impl JobKind {
             JobKind::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
             JobKind::Integrate(integration) => Finished::Answered(integration.answer()),
             JobKind::Save(save) => Finished::Answered(save.answer()),
-            JobKind::Ask(inquiry) => Finished::Answered(inquiry.answer()),
+            JobKind::Ask(inquiry) => Finished::Answered(inquiry.answer().map_or_else(refused, Answer::Told)),
         }
     }
 }

@@ -1,12 +1,10 @@
 //! What a session is asked beside its steps: distances of objects, points, rays (docs/queries.md). The answers are the world's own,
 //! in the protocol's types.
 
-use super::scene::refused;
 use crate::contact::probe::{self, Ray};
 use crate::math::halt;
 use crate::world::{BodyPoint, BodyRay, Refusal, Standing, World};
 use contactd_proto::ErrorCode;
-use contactd_proto::control::Answer;
 use contactd_proto::query::{
     ObjectDistance, ObjectRay, PointAnswer, Query, QueryAnswer, RayAnswer, RayHit, RayOutcome,
 };
@@ -30,12 +28,12 @@ impl Inquiry {
     }
 
     /// Works the answer out; may take seconds.
-    pub fn answer(&self) -> Answer {
-        match halt::catch(|| self.told()) {
-            Ok(Ok(told)) => Answer::Told(told),
-            Ok(Err(refusal)) => refused(refusal),
-            Err(_) => refused(Refusal::new(ErrorCode::Internal, "the query failed")),
-        }
+    ///
+    /// # Errors
+    /// What the world refuses; `Internal` where the engine fails.
+    pub fn answer(&self) -> Result<QueryAnswer, Refusal> {
+        let failed = || Refusal::new(ErrorCode::Internal, "the query failed");
+        halt::catch(|| self.told()).unwrap_or_else(|_| Err(failed()))
     }
 
     fn told(&self) -> Result<QueryAnswer, Refusal> {
