@@ -12,6 +12,23 @@ pub struct Aabb {
 }
 
 impl Aabb {
+    /// Between which parameters a line is in the box, to rounding; `None` where it passes by.
+    pub fn along(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for k in 0..3 {
+            let (o, d) = (origin[k], direction[k]);
+            if d == 0.0 {
+                if o < self.min[k] || o > self.max[k] {
+                    return None;
+                }
+                continue;
+            }
+            let (p, q) = ((self.min[k] - o) / d, (self.max[k] - o) / d);
+            (from, to) = (from.max(p.min(q)), to.min(p.max(q)));
+        }
+        Some((from, to))
+    }
+
     /// The box without points.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
     /// The box of all points.

@@ -256,18 +256,8 @@ fn entry(ray: &Ray, aabb: &Aabb) -> Option<f64> {
     if aabb.is_empty() {
         return None;
     }
-    let (mut from, mut to) = (0.0f64, ray.length);
-    for k in 0..3 {
-        let (o, d) = (ray.origin[k], ray.direction[k]);
-        if d == 0.0 {
-            if o < aabb.min[k] || o > aabb.max[k] {
-                return None;
-            }
-            continue;
-        }
-        let (p, q) = ((aabb.min[k] - o) / d, (aabb.max[k] - o) / d);
-        (from, to) = (from.max(p.min(q)), to.min(p.max(q)));
-    }
+    let (from, to) = aabb.along(ray.origin, ray.direction)?;
+    let (from, to) = (from.max(0.0), to.min(ray.length));
     // The quotients are rounded.
     let slack = 1e-14 * (from.abs() + to.abs().min(1e300));
     (from <= to + slack).then_some((from - slack).max(0.0))

@@ -52,19 +52,7 @@ struct Caster<'a> {
 
 /// Where a line is in a box, and `None` where it passes by.
 fn clipped(line: &Line, aabb: &Aabb) -> Option<(f64, f64)> {
-    let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
-    for k in 0..3 {
-        let (o, d) = (line.origin[k], line.direction[k]);
-        if d == 0.0 {
-            if o < aabb.min[k] || o > aabb.max[k] {
-                return None;
-            }
-            continue;
-        }
-        let (p, q) = ((aabb.min[k] - o) / d, (aabb.max[k] - o) / d);
-        (from, to) = (from.max(p.min(q)), to.min(p.max(q)));
-    }
-    (from <= to).then_some((from, to))
+    aabb.along(line.origin, line.direction).filter(|(from, to)| from <= to)
 }
 
 /// A ray against a solid.
