@@ -17,6 +17,8 @@ pub enum Strategy {
     Fits,
     /// Curved faces touched where a contact was found.
     Hints,
+    /// Cells made smaller by what all their clauses share.
+    Tighten,
     /// Whole convex primitives answered in front of the search.
     Convex,
     /// Convex primitives against solids with holes answered in front of the search.
@@ -52,6 +54,7 @@ impl Options {
                 Strategy::Multipliers => strategies.multipliers = false,
                 Strategy::Fits => strategies.fits = false,
                 Strategy::Hints => strategies.hints = false,
+                Strategy::Tighten => strategies.tighten = false,
                 Strategy::Convex => strategies.convex = false,
                 Strategy::Cavities => strategies.cavities = false,
                 Strategy::Facets => strategies.facets = false,

@@ -107,6 +107,7 @@ pub const SEARCH_ALONE: Strategies = Strategies {
     multipliers: true,
     fits: true,
     hints: true,
+    tighten: true,
     convex: false,
     cavities: false,
     facets: false,

@@ -40,6 +40,7 @@ fn offs() -> Vec<Off> {
         of_search("stage 2 (octrees)", |i| i.walk = false),
         of_search("multipliers", |i| i.multipliers = false),
         of_search("same-shape fits", |i| i.fits = false),
+        of_search("smaller cells", |i| i.tighten = false),
         of_search("incumbent cuts", |i| i.hints = false),
     ]
 }

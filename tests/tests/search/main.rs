@@ -9,4 +9,5 @@ mod fronts;
 mod octree;
 mod rounding;
 mod stages;
+mod tighten;
 mod walk;

@@ -5,40 +5,16 @@ use crate::contact::query::options::QueryOptions;
 use crate::contact::query::question::{PlacedModel, Strategies, default_resolution};
 use crate::math::random::Random;
 use crate::motion::Placed;
-use crate::octree::Model;
-use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
-use crate::solid::{Label, NodeId, Shape, SolidBuilder};
+use crate::octree::testing::random_tree;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
-
-/// A tree of some depth, its operations nested at random: alternatives within alternatives.
-fn tree(b: &mut SolidBuilder, r: &mut Random, depth: u32) -> NodeId {
-    if depth == 0 {
-        let shape = match r.within(0.0, 3.0) as u32 {
-            0 => Shape::from(Cuboid { half: DVec3::new(r.within(0.2, 0.8), r.within(0.2, 0.8), r.within(0.2, 0.8)) }),
-            1 => Shape::from(Cylinder { radius: r.within(0.2, 0.6), half_height: r.within(0.2, 0.8) }),
-            _ => Shape::from(Sphere { radius: r.within(0.3, 0.8) }),
-        };
-        let pose = Pose::new(r.vector(0.6), quat_of_rotation_vector(r.vector(2.0)));
-        return b.primitive(shape, pose, Label::default());
-    }
-    let children: Vec<NodeId> = (0..2 + r.within(0.0, 2.0) as u32).map(|_| tree(b, r, depth - 1)).collect();
-    let op = [Op::Union, Op::Intersection, Op::Difference][r.within(0.0, 3.0) as usize];
-    b.operation(op, &children)
-}
-
-fn model(r: &mut Random, depth: u32) -> Model {
-    let mut b = SolidBuilder::new();
-    let root = tree(&mut b, r, depth);
-    Model::new(b.finish(root))
-}
 
 #[test]
 fn every_clause_is_closed_by_a_recorded_proof() {
     let mut r = Random(11);
     let (mut open, mut closings, mut joint) = (0, 0, 0);
     for _ in 0..300 {
-        let (a, b) = (model(&mut r, 3), model(&mut r, 3));
+        let (a, b) = (random_tree(&mut r, 3), random_tree(&mut r, 3));
         let motion = |r: &mut Random| Motion {
             start: Pose::new(r.vector(0.8), quat_of_rotation_vector(r.vector(2.0))),
             velocity: r.vector(0.5),

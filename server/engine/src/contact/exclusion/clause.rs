@@ -506,7 +506,8 @@ impl Run<'_, '_> {
                     terms.push(Term { literal: (l.side, l.id), other: l.other, lambda: [0.0; 2], point: l.point });
                     terms.len() - 1
                 });
-                terms[at].lambda[k] = lambda;
+                // A program that ended by rounding may have one plane twice.
+                terms[at].lambda[k] += lambda;
             }
         }
         record.push(Proof { dt: best.dt, terms });
@@ -552,10 +553,7 @@ impl Run<'_, '_> {
     /// The linear program with bounds looked ahead to `look`, and what its multipliers give through time.
     fn solve(&mut self, look: f64) -> Solved {
         let s = &mut *self.scratch;
-        s.planes.clear();
-        for l in &s.lits {
-            s.planes.push(l.normal_ahead(look), l.ahead(look));
-        }
+        s.planes.set(s.lits.iter().map(|l| (l.normal_ahead(look), l.ahead(look))));
         s.evaluations += s.lits.len() as u64;
         let solution = if self.view.multipliers {
             let solution = lp::min_max(&mut s.planes, self.view.half, &mut s.warm);

@@ -17,6 +17,7 @@ use super::clause::{
 };
 use super::literal::{Linear, Side, View};
 use super::lp;
+use super::tighten::Left;
 use crate::solid::local::{self, Expression};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -44,6 +45,34 @@ pub fn advance(
     useless: f64,
     scratch: &mut Scratch,
 ) -> Advance {
+    begin(Run { view, pair, hints, rounding, useless, left: MAX_CLAUSES, scratch }).weakest()
+}
+
+/// The same, unless no more than `worth` of the cell is left by what all clauses share: then that, and nothing is bounded.
+pub fn advance_or_tighten(
+    view: &View,
+    pair: &Expressions,
+    hints: &[Hint],
+    rounding: f64,
+    worth: f64,
+    scratch: &mut Scratch,
+) -> Result<Advance, Left> {
+    let mut run = begin(Run { view, pair, hints, rounding, useless: 0.0, left: MAX_CLAUSES, scratch });
+    if run.scratch.clash.is_none() {
+        let left = run.left();
+        if Left::part(&left.span, view.half) <= worth {
+            run.scratch.evaluations += std::mem::take(&mut run.scratch.checked).div_ceil(CHECKED);
+            return Err(left);
+        }
+    }
+    Ok(run.weakest())
+}
+
+/// Takes the literals that all clauses share.
+fn begin<'a, 'p>(run: Run<'a, 'p>) -> Run<'a, 'p> {
+    let mut run = run;
+    let pair = run.pair;
+    let scratch = &mut *run.scratch;
     scratch.lits.clear();
     scratch.notes.clear();
     scratch.taken.clear();
@@ -56,22 +85,26 @@ pub fn advance(
     scratch.places.resize((pair.a.1 - pair.a.0 + pair.b.1 - pair.b.0) as usize, UNMADE);
     scratch.clash = None;
     scratch.warm = lp::Warm::default();
-    let mut run = Run { view, pair, hints, rounding, useless, left: MAX_CLAUSES, scratch };
     for (side, range) in [(Side::A, pair.a), (Side::B, pair.b)] {
         if range.0 < range.1 {
             run.take(side, range, 0);
         }
     }
-    let mut found = run.bound(0, 0, view.motion.h).advance;
-    run.scratch.evaluations += std::mem::take(&mut run.scratch.checked).div_ceil(CHECKED);
-    if run.left == 0 {
-        // Clauses are missing: what the last one cost says nothing about the cell, its longest axis is halved.
-        found.cost = view.half;
-    }
-    found
+    run
 }
 
 impl Run<'_, '_> {
+    /// The weakest clause of the cell.
+    fn weakest(mut self) -> Advance {
+        let mut found = self.bound(0, 0, self.view.motion.h).advance;
+        self.scratch.evaluations += std::mem::take(&mut self.scratch.checked).div_ceil(CHECKED);
+        if self.left == 0 {
+            // Clauses are missing: what the last one cost says nothing about the cell, its longest axis is halved.
+            found.cost = self.view.half;
+        }
+        found
+    }
+
     /// Adds an expression that must hold: its literals at once, its alternatives to the open list. `list` are the
     /// lists of whose alternatives it is part.
     fn take(&mut self, side: Side, (start, end): (u32, u32), list: Lists) {

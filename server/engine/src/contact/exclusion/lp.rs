@@ -34,16 +34,17 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Takes all away.
-    pub fn clear(&mut self) {
-        self.normals.iter_mut().for_each(Vec::clear);
-        self.b.clear();
-    }
-
-    /// Adds a plane.
-    pub fn push(&mut self, normal: DVec3, b: f64) {
-        self.normals.iter_mut().zip(normal.to_array()).for_each(|(all, n)| all.push(n));
-        self.b.push(b);
+    /// Takes other planes in place of these: normals and values at the box's centre.
+    pub fn set(&mut self, planes: impl ExactSizeIterator<Item = (DVec3, f64)>) {
+        let count = planes.len();
+        let Self { normals: [nx, ny, nz], b, .. } = self;
+        for all in [&mut *nx, &mut *ny, &mut *nz, &mut *b] {
+            all.resize(count, 0.0);
+        }
+        let (nx, ny, nz, b) = (&mut nx[..count], &mut ny[..count], &mut nz[..count], &mut b[..count]);
+        for (i, (normal, value)) in planes.enumerate().take(count) {
+            (nx[i], ny[i], nz[i], b[i]) = (normal.x, normal.y, normal.z, value);
+        }
     }
 
     fn len(&self) -> usize {
@@ -229,7 +230,7 @@ mod tests {
     fn check(normals: &[DVec3], b: &[f64], half: DVec3) {
         let planes = |b: &[f64]| {
             let mut planes = Planes::default();
-            normals.iter().zip(b).for_each(|(n, b)| planes.push(*n, *b));
+            planes.set(normals.iter().copied().zip(b.iter().copied()));
             planes
         };
         let mut warm = Warm::default();

@@ -8,3 +8,4 @@ pub mod fit;
 pub mod literal;
 pub mod lp;
 pub mod rounding;
+pub mod tighten;

@@ -66,6 +66,8 @@ pub struct Strategies {
     pub fits: bool,
     /// Curved faces touched where a contact was found.
     pub hints: bool,
+    /// Cells made smaller by what all their clauses share before they are bounded.
+    pub tighten: bool,
     /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
     /// last digits: both solve the same equations, from another guess.
     pub convex: bool,
@@ -85,6 +87,7 @@ impl Default for Strategies {
             multipliers: true,
             fits: true,
             hints: true,
+            tighten: true,
             convex: true,
             cavities: true,
             facets: true,

@@ -58,6 +58,18 @@ impl Cell {
         }
     }
 
+    /// Leaves of the box what lies in `left`, offsets from its centre, rounded outwards.
+    pub(super) fn shrink(&mut self, left: &Aabb) {
+        let (offset, half) = (left.center(), left.half());
+        let rounding = (self.center.abs() + offset.abs() + self.half) * f64::EPSILON;
+        for k in 0..3 {
+            if left.min[k] > -self.half[k] || left.max[k] < self.half[k] {
+                self.center[k] += offset[k];
+                self.half[k] = half[k] + rounding[k];
+            }
+        }
+    }
+
     pub(super) fn source(t: f64, until: f64, source: Source) -> Self {
         Self { source, ..Self::new((t, until), &Aabb::around(DVec3::ZERO, DVec3::ZERO), (0, 0), (0, 0)) }
     }

@@ -20,6 +20,7 @@ use super::slices::Slices;
 use crate::contact::exclusion::clause::{self, Advance, Hint};
 use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Side, View};
+use crate::contact::exclusion::tighten::Left;
 use crate::contact::query::outcome::Counters;
 use crate::contact::witness::climb;
 use crate::contact::witness::contacts::Contacts;
@@ -36,6 +37,12 @@ const FIRST_PROBE: u64 = 2_000;
 
 /// Cells beyond the goal that are asked whether another contact touches earlier.
 const MAX_RIVALS: u32 = 16;
+
+/// Part of a cell that may be left at most where that is bounded in its stead.
+const WORTH: f64 = 0.7;
+
+/// How often a cell is made smaller before it is bounded as it is.
+const TIGHTENINGS: u32 = 4;
 
 /// Time, fraction of the step, below which an advance is no progress: at a contact a bound runs out in ever smaller ones.
 const LEAST_ADVANCE: f64 = 1e-15;
@@ -249,8 +256,8 @@ impl<'a> Search<'a> {
         if cell.a.0 == cell.a.1 && cell.t != 0.0 {
             return None;
         }
-        let span = self.span(&cell, &at);
-        let bounded = self.bound(&mut cell, &span, &at)?;
+        let mut span = self.span(&cell, &at);
+        let bounded = self.bound(&mut cell, &mut span, &at)?;
         if self.is_free(&cell, &span, &bounded) {
             return None;
         }
@@ -293,48 +300,116 @@ impl<'a> Search<'a> {
         Span { x_max, end, h, motion }
     }
 
-    /// Bounds a cell's clauses, of b's those that may hold something in it. `None` where b alone keeps it free.
-    fn bound(&mut self, cell: &mut Cell, span: &Span, at: &Instant) -> Option<Bounded> {
-        let (start, h) = (cell.t == 0.0, span.h);
+    /// Bounds a cell's clauses, of b's those that may hold something in it. Where much of the cell is cut off by what all clauses
+    /// share, what is left is bounded in its stead. `None` where nothing is left to be bounded.
+    fn bound(&mut self, cell: &mut Cell, span: &mut Span, at: &Instant) -> Option<Bounded> {
+        for round in 0..=TIGHTENINGS {
+            let b = self.prune_b(cell, span, at)?;
+            if cell.a.0 == cell.a.1 && cell.t != 0.0 {
+                return None;
+            }
+            let worth = if round < TIGHTENINGS && self.contacts.task.strategies.tighten { WORTH } else { -1.0 };
+            match self.bound_or_tighten(cell, span, at, b, worth) {
+                Ok(bounded) => return Some(bounded),
+                Err(left) => {
+                    if !self.tighten(cell, &left, span) {
+                        return None;
+                    }
+                }
+            }
+        }
+        unreachable!("the last round tightens nothing")
+    }
+
+    /// What is left of b in a cell. `None` where b alone keeps it free.
+    fn prune_b(&mut self, cell: &mut Cell, span: &Span, at: &Instant) -> Option<Range> {
+        let h = span.h;
         let scratch = &mut self.items.scratch;
-        let (clause_scratch, pool) = (&mut scratch.clause, &mut scratch.pool);
-        let hints: &[Hint] = if self.contacts.task.strategies.hints { &self.contacts.hints } else { &[] };
         let view = self.contacts.task.view((cell.center, cell.half), at, span.motion, &scratch.clip_planes_b);
         let source = if cell.t + h <= cell.b_until { cell.b } else { cell.b_always };
-        let b_truth = prune_in_pool(self.contacts.task.b, pool, source, &mut |id| view.truth(Side::B, id));
-        let b = match b_truth {
+        let classify = &mut |id| view.truth(Side::B, id);
+        match prune_in_pool(self.contacts.task.b, &mut scratch.pool, source, classify) {
             (Truth::Open, range) => {
                 cell.b = range;
                 cell.b_until = cell.t + h;
-                range
+                return Some(range);
             }
-            (Truth::True, _) => (0, 0),
-            (Truth::False, _) => {
-                self.again(*cell, h, span.end, true);
-                return None;
-            }
-        };
-        let b_full = b.0 == b.1;
-        if b_full && !start {
-            self.again(*cell, h, span.end, true);
-            return None;
+            (Truth::True, _) if cell.t == 0.0 => return Some((0, 0)),
+            (Truth::True | Truth::False, _) => {}
         }
-        let found = if b_full && cell.a.0 == cell.a.1 {
+        self.again(*cell, h, span.end, true);
+        None
+    }
+
+    /// Bounds the clauses of a cell, or tells what is left of it where that is no more than the part `worth`.
+    fn bound_or_tighten(
+        &mut self,
+        cell: &Cell,
+        span: &Span,
+        at: &Instant,
+        b: Range,
+        worth: f64,
+    ) -> Result<Bounded, Left> {
+        let scratch = &mut self.items.scratch;
+        let (clause_scratch, pool, rounding) = (&mut scratch.clause, &scratch.pool, self.contacts.task.rounding);
+        let hints: &[Hint] = if self.contacts.task.strategies.hints { &self.contacts.hints } else { &[] };
+        let view = self.contacts.task.view((cell.center, cell.half), at, span.motion, &scratch.clip_planes_b);
+        let pair = clause::Expressions { pool, a: cell.a, b };
+        let found = if b.0 == b.1 && cell.a.0 == cell.a.1 {
             Advance { dt: f64::NEG_INFINITY, support: Vec::new(), y: DVec3::ZERO, cost: DVec3::ZERO, now: 0.0 }
         } else {
-            let pair = clause::Expressions { pool, a: cell.a, b };
-            enumeration::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch)
+            enumeration::advance_or_tighten(&view, &pair, hints, rounding, worth, clause_scratch)?
         };
         // Where the bounds are lowest at the start itself: two faces a few resolutions inside each other leave a layer that
         // the lowest point of a later time misses.
-        let now = if start && found.dt < 0.0 && h > 0.0 && !found.support.is_empty() {
+        let now = if cell.t == 0.0 && found.dt < 0.0 && span.h > 0.0 && !found.support.is_empty() {
             let view = View { motion: self.contacts.task.relative.bounds(cell.t, 0.0, span.x_max), ..view };
-            let pair = clause::Expressions { pool, a: cell.a, b };
-            enumeration::advance(&view, &pair, hints, self.contacts.task.rounding, 0.0, clause_scratch).y
+            enumeration::advance(&view, &pair, hints, rounding, 0.0, clause_scratch).y
         } else {
             found.y
         };
-        Some(Bounded { b, found, now })
+        Ok(Bounded { b, found, now })
+    }
+
+    /// Makes a cell what is left of it. What is left over the span alone ends with it; behind it the cell goes on. False where nothing
+    /// is left for now.
+    fn tighten(&mut self, cell: &mut Cell, left: &Left, span: &mut Span) -> bool {
+        if left.span.is_empty() {
+            self.again(*cell, span.h, span.end, true);
+            return false;
+        }
+        let lasts = span.h >= span.end;
+        if lasts || Left::part(&left.always, cell.half) > WORTH {
+            if !lasts {
+                let mut rest = *cell;
+                rest.shrink(&left.always);
+                self.again(rest, span.h, span.end, true);
+                (cell.until, span.end) = (cell.t + span.h, span.h);
+            }
+            cell.shrink(&left.span);
+        } else {
+            cell.shrink(&left.always);
+        }
+        self.prune_a(cell)
+    }
+
+    /// Leaves of a's expression what may hold something in a cell; false where a is nowhere in it.
+    fn prune_a(&mut self, cell: &mut Cell) -> bool {
+        if cell.a.0 == cell.a.1 {
+            return true;
+        }
+        let (faces, delta, rounding) =
+            (&self.contacts.task.a.faces, self.contacts.task.delta, self.contacts.task.rounding);
+        let mut classify = |id: LiteralId| {
+            let span = local::face_span(&faces[id.face() as usize], cell.center, cell.half);
+            local::truth_of(id.sense(), span, delta, rounding)
+        };
+        match prune_in_pool(self.contacts.task.a, &mut self.items.scratch.pool, cell.a, &mut classify) {
+            (Truth::False, _) => return false,
+            (Truth::True, _) => cell.a = (0, 0),
+            (Truth::Open, range) => cell.a = range,
+        }
+        true
     }
 
     /// True where parts of large meshes are left in a cell, too many to be written out.
@@ -515,18 +590,8 @@ impl<'a> Search<'a> {
                 // The child must still reach from the parent's wall to its middle.
                 child.half[k] = (half[k] + off.abs()).next_up();
             }
-            if cell.a.0 < cell.a.1 {
-                let (faces, delta, rounding) =
-                    (&self.contacts.task.a.faces, self.contacts.task.delta, self.contacts.task.rounding);
-                let mut classify = |id: LiteralId| {
-                    let span = local::face_span(&faces[id.face() as usize], child.center, child.half);
-                    local::truth_of(id.sense(), span, delta, rounding)
-                };
-                match prune_in_pool(self.contacts.task.a, &mut self.items.scratch.pool, cell.a, &mut classify) {
-                    (Truth::False, _) => continue,
-                    (Truth::True, _) => child.a = (0, 0),
-                    (Truth::Open, range) => child.a = range,
-                }
+            if !self.prune_a(&mut child) {
+                continue;
             }
             self.items.push(child);
         }
