@@ -84,9 +84,19 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// A size: a number greater than zero, infinite included; `None` for zero or less, of which OpenSCAD makes nothing.
+    /// A size: a number greater than zero, infinite included; `None` for any other, of which OpenSCAD makes nothing: it writes
+    /// `nan` where a division by zero told the size.
     pub fn size(&self, name: &str) -> Result<Option<f64>> {
         self.size_of(name, self.required(name, "a positive number")?)
+    }
+
+    /// What says how finely curves are cut, `$fn` and its like, or `default`; possibly no finite number.
+    pub fn setting(&self, name: &str, default: f64) -> Result<f64> {
+        match self.get(name).map(|v| (v, &v.kind)) {
+            None => Ok(default),
+            Some((_, ValueKind::Number(n))) => Ok(*n),
+            Some((v, _)) => Err(self.wrong(v, "a number", name)),
+        }
     }
 
     /// A size that is finite.
@@ -98,13 +108,12 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// A number that is zero or more, infinite included; `None` for less.
+    /// A number that is zero or more, infinite included; `None` for less, and for `nan`.
     pub fn not_negative(&self, name: &str) -> Result<Option<f64>> {
         let v = self.required(name, "a number")?;
-        match self.number_of(name, v)? {
-            n if n >= 0.0 => Ok(Some(n)),
-            n if n.is_finite() => Ok(None),
-            _ => Err(self.wrong(v, "a number that is not negative", name)),
+        match v.kind {
+            ValueKind::Number(n) => Ok((n >= 0.0).then_some(n)),
+            _ => Err(self.wrong(v, "a number", name)),
         }
     }
 
@@ -134,22 +143,19 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// Two finite sizes, or one that stands for both; `None` where one is zero or less.
+    /// Two sizes (infinite included), or one that stands for both; `None` where one is zero or less.
     pub fn sizes_2d(&self, name: &str) -> Result<Option<DVec2>> {
         let v = self.required(name, "two positive numbers")?;
-        let finite = |v: &Value| match self.size_of(name, v)? {
-            Some(n) if !n.is_finite() => Err(self.wrong(v, "a finite number", name)),
-            size => Ok(size),
-        };
+        let size = |v: &Value| self.size_of(name, v);
         match &v.kind {
             ValueKind::List(l) => match l.as_slice() {
                 [x, y] => {
-                    let [x, y] = [finite(x)?, finite(y)?];
+                    let [x, y] = [size(x)?, size(y)?];
                     Ok(x.zip(y).map(|(x, y)| DVec2::new(x, y)))
                 }
                 _ => Err(self.wrong(v, "two positive numbers", name)),
             },
-            _ => Ok(finite(v)?.map(DVec2::splat)),
+            _ => Ok(size(v)?.map(DVec2::splat)),
         }
     }
 
@@ -163,45 +169,52 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// A list of points with `N` finite coordinates each.
-    pub fn points<const N: usize>(&self, name: &str) -> Result<Vec<[f64; N]>> {
+    /// The points of a list, of which OpenSCAD writes whatever it was given: `least` to `N` coordinates each, those that are
+    /// missing 0. What is none is told as an error would call it.
+    pub fn points<const N: usize>(
+        &self,
+        name: &str,
+        least: usize,
+    ) -> Result<Vec<std::result::Result<[f64; N], String>>> {
         let what = format!("a list of points with {N} coordinates");
         let v = self.required(name, &what)?;
         let ValueKind::List(items) = &v.kind else { return Err(self.wrong(v, &what, name)) };
-        let mut points = Vec::with_capacity(items.len());
-        for item in items {
-            let ValueKind::List(c) = &item.kind else { return Err(self.wrong(item, "a point", name)) };
-            if c.len() != N {
-                return Err(self.wrong(item, &format!("a point with {N} coordinates"), name));
+        let point = |item: &Value| {
+            let ValueKind::List(of) = &item.kind else { return Err(item.found()) };
+            if !(least..=N).contains(&of.len()) {
+                return Err(item.found());
             }
             let mut point = [0.0; N];
-            for (p, value) in point.iter_mut().zip(c) {
-                *p = finite(value)?;
+            for (p, v) in point.iter_mut().zip(of) {
+                *p = finite(v).map_err(|_| format!("a list that holds {}", v.found()))?;
             }
-            points.push(point);
-        }
-        Ok(points)
+            Ok(point)
+        };
+        Ok(items.iter().map(point).collect())
     }
 
-    /// A list of lists of indices, without those from `count` on, and how many of these there are.
-    pub fn index_lists(&self, name: &str, count: usize) -> Result<(Vec<Vec<u32>>, usize)> {
-        let what = "a list of lists of indices";
-        let v = self.required(name, what)?;
-        let ValueKind::List(items) = &v.kind else { return Err(self.wrong(v, what, name)) };
-        let (mut lists, mut beyond) = (Vec::with_capacity(items.len()), 0);
+    /// A list of lists of indices of `count` things, read as OpenSCAD reads them; none where it is missing.
+    pub fn index_lists(&self, name: &str, count: usize) -> Result<IndexLists> {
+        let mut read = IndexLists::default();
+        let Some(v) = self.get(name) else { return Ok(read) };
+        let ValueKind::List(items) = &v.kind else { return Err(self.wrong(v, "a list of lists of indices", name)) };
         for item in items {
-            let ValueKind::List(indices) = &item.kind else { return Err(self.wrong(item, what, name)) };
-            let mut list = Vec::with_capacity(indices.len());
+            let mut list = Vec::new();
+            // What is no list names nothing.
+            let indices = if let ValueKind::List(indices) = &item.kind { indices.as_slice() } else { &[] };
             for i in indices {
-                match i.kind {
-                    ValueKind::Number(n) if n >= 0.0 && n.fract() == 0.0 && n < count as f64 => list.push(n as u32),
-                    ValueKind::Number(n) if n >= 0.0 && n.fract() == 0.0 => beyond += 1,
-                    _ => return Err(self.wrong(i, &format!("an index below {count}"), name)),
+                let n = if let ValueKind::Number(n) = i.kind { n } else { 0.0 };
+                let whole = n.trunc();
+                if !(whole >= 0.0 && whole < count as f64) {
+                    read.beyond += 1;
+                    continue;
                 }
+                read.rough += usize::from(!matches!(i.kind, ValueKind::Number(n) if n == whole));
+                list.push(whole as u32);
             }
-            lists.push(list);
+            read.lists.push(list);
         }
-        Ok((lists, beyond))
+        Ok(read)
     }
 
     /// Where the call stands.
@@ -223,8 +236,7 @@ impl<'a> Arguments<'a> {
 
     fn size_of(&self, name: &str, v: &Value) -> Result<Option<f64>> {
         match v.kind {
-            ValueKind::Number(n) if n > 0.0 => Ok(Some(n)),
-            ValueKind::Number(n) if n.is_finite() => Ok(None),
+            ValueKind::Number(n) => Ok((n > 0.0).then_some(n)),
             _ => Err(self.wrong(v, "a positive number", name)),
         }
     }
@@ -232,6 +244,17 @@ impl<'a> Arguments<'a> {
     fn wrong(&self, v: &Value, what: &str, name: &str) -> (Place, Problem) {
         (v.at, Problem::syntax(format!("{what} as {name} of {}", self.call.name), v.found()))
     }
+}
+
+/// Lists of indices, and what was not one.
+#[derive(Default)]
+pub struct IndexLists {
+    /// Those that name something.
+    pub lists: Vec<Vec<u32>>,
+    /// How many name nothing: they are left out.
+    pub beyond: usize,
+    /// How many are no whole numbers: their fractions are cut off, and what is no number is 0.
+    pub rough: usize,
 }
 
 /// What to do about a call that takes its shape from another file.

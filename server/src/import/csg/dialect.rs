@@ -2,6 +2,7 @@
 //! is refused with its place. Nothing is dropped in silence.
 
 use crate::import::{Facets, Import, Limits, import_csg};
+use crate::math::random::Random;
 
 /// What becomes of an argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -348,6 +349,34 @@ fn what_is_left_out_is_reported() {
         ("cube(1); linear_extrude(height = 0) { circle(1); }", "1:10: linear_extrude of no height: left out"),
         ("cube(1); linear_extrude(height = 1) { circle(0); }", "1:39: circle of no size: left out, as OpenSCAD does"),
         ("cube(1); linear_extrude(height = 1) { polygon([]); }", "1:39: polygon without area: left out"),
+        ("cube(1); sphere(r = -nan);", "1:10: sphere of no size: left out, as OpenSCAD does"),
+        ("cube(1); sphere(r = inf);", "1:10: sphere of infinite size: left out, as OpenSCAD does"),
+        ("cube(1); cube([nan, 1, 1]);", "1:10: cube of no size: left out, as OpenSCAD does"),
+        ("cube(1); cylinder(h = inf, r1 = 1, r2 = 1);", "1:10: cylinder of infinite size: left out"),
+        ("cube(1); cylinder(h = 1, r1 = -inf, r2 = 0);", "1:10: cylinder of no size: left out"),
+        ("cube(1); linear_extrude(height = 1) { square([1, inf]); }", "1:39: square of infinite size: left out"),
+        (
+            "cube(1); linear_extrude(height = 1) { offset(r = -nan) { square(1); } }",
+            "1:39: offset by no finite distance",
+        ),
+        ("cube(1); linear_extrude(height = 1) { text(text = \"a\", size = -nan); }", "1:39: text of no finite size"),
+        (
+            "cube(1); multmatrix([[1,0,0,nan],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) { cube(2); }",
+            "1:10: multmatrix that holds no finite numbers: left out, as OpenSCAD does",
+        ),
+        ("cube(1); polyhedron(points = undef, faces = undef);", "1:10: polyhedron without points: left out"),
+        (
+            "cube(1); polyhedron([[0,0,0],[0,1,0],[1,0,0],[0,0,nan]], [[0,2,1],[0,1,3],[1,2,3],[2,0,3]]);",
+            "1:10: polyhedron whose point 3 is a list that holds nan: left out, as OpenSCAD does",
+        ),
+        (
+            "cube(1); linear_extrude(height = 1) { polygon([undef, [0,0], [2,0], [0,2]]); }",
+            "1:39: polygon whose point 0 is undef: left out, as OpenSCAD does",
+        ),
+        (
+            "linear_extrude(height = 1) { polygon([[0,0],[2,0],[0,2]], [[0,1.5,undef,2]]); }",
+            "1:30: a polygon whose paths name 2 points by no whole number: cut off, as OpenSCAD does",
+        ),
         (
             "cube(1); linear_extrude(height = 1) { polygon([[0, 0], [2, 0], [1, 0]]); }",
             "1:39: a polygon without area: left out, as OpenSCAD does",
@@ -425,6 +454,95 @@ fn what_is_left_out_is_reported() {
     ] {
         assert_eq!(read(text).expect(text).notes, vec![], "{text}");
     }
+}
+
+/// Anything that a list may hold and that is no point and no index.
+fn junk(r: &mut Random) -> &'static str {
+    ["undef", "\"a\"", "true", "[]", "[1]", "nan", "[1, nan, 2]", "[1, 2, 3, 4]", "-inf", "[\"x\", 1, 2]"]
+        [(r.unit() * 10.0) as usize]
+}
+
+#[test]
+fn whatever_openscad_writes_of_a_polyhedron_is_read_as_it_reads_it() {
+    let mut r = Random(20);
+    for round in 0..200 {
+        // A pyramid over a ring, its points in a random order among others that no face names.
+        let n = 3 + (r.unit() * 5.0) as usize;
+        let mut corners: Vec<[f64; 3]> = (0..n)
+            .map(|i| {
+                let (s, c) = libm::sincos(std::f64::consts::TAU * (i as f64 + r.within(0.0, 0.4)) / n as f64);
+                [c * 2.0, s * 2.0, 0.0]
+            })
+            .collect();
+        corners.push([0.0, 0.0, 3.0]);
+        let mut faces: Vec<Vec<usize>> = (0..n).map(|i| vec![(i + 1) % n, i, n]).collect();
+        faces.push((0..n).collect());
+        let plain = format!("polyhedron(points = {corners:?}, faces = {faces:?});");
+
+        let (mut points, mut place): (Vec<String>, Vec<usize>) = (Vec::new(), Vec::new());
+        for c in &corners {
+            while r.unit() < 0.3 {
+                points.push(junk(&mut r).into());
+            }
+            place.push(points.len());
+            // A point without z is one at z = 0.
+            points.push(if c[2] == 0.0 && r.unit() < 0.3 {
+                format!("[{:?}, {:?}]", c[0], c[1])
+            } else {
+                format!("{c:?}")
+            });
+        }
+        let mut lists: Vec<String> = Vec::new();
+        for face in &faces {
+            if r.unit() < 0.3 {
+                lists.push(["undef", "5", "[]", "[0]", "[0, 0]", "\"a\""][(r.unit() * 6.0) as usize].into());
+            }
+            let mut list: Vec<String> = face.iter().map(|i| place[*i].to_string()).collect();
+            for i in 0..list.len() {
+                if r.unit() < 0.2 {
+                    list[i] = format!("{}.{}", list[i], 1 + (r.unit() * 8.0) as usize);
+                }
+            }
+            if r.unit() < 0.3 {
+                let beyond = ["-1", "-7.5", "1000", "nan", "inf"][(r.unit() * 5.0) as usize];
+                list.insert((r.unit() * list.len() as f64) as usize, beyond.into());
+            }
+            lists.push(format!("[{}]", list.join(", ")));
+        }
+        let text = |points: &[String]| {
+            format!("polyhedron(points = [{}], faces = [{}]);", points.join(", "), lists.join(", "))
+        };
+        let written = text(&points);
+        assert_eq!(solid(&written).unwrap_or_else(|e| panic!("{written}: {e}")), solid(&plain).expect("a pyramid"));
+        // One that is named must be a point.
+        points[place[round % corners.len()]] = junk(&mut r).into();
+        let import = read(&text(&points)).expect("nothing");
+        assert!(import.solid.is_empty(), "{}", text(&points));
+        let which = format!("polyhedron whose point {} is", place[round % corners.len()]);
+        assert!(import.notes.iter().any(|n| n.text.starts_with(&which)), "{which}: {:?}", import.notes);
+    }
+}
+
+#[test]
+fn a_text_is_read_as_openscad_writes_it_without_escapes() {
+    let mut r = Random(21);
+    let mut quoted = 0;
+    for _ in 0..60 {
+        let mut raw = String::new();
+        for _ in 0..1 + (r.unit() * 7.0) as usize {
+            // A backslash before anything but what an escape may be.
+            raw.push_str(["a", "3", "\"", ", ", "\\a", ")", "+", "b"][(r.unit() * 8.0) as usize]);
+        }
+        quoted += usize::from(raw.contains('"'));
+        let escaped = raw.replace('\\', "\\\\").replace('"', "\\\"");
+        let call = |text: &str| {
+            let font = "size = 10, spacing = 1, font = \"\", direction = \"ltr\", language = \"en\", script = \"Latn\"";
+            format!("linear_extrude(height = 1) {{ text(text = \"{text}\", {font}, halign = \"left\", $fn = 8); }}")
+        };
+        let (as_written, as_meant) = (solid(&call(&raw)), solid(&call(&escaped)));
+        assert_eq!(as_written.unwrap_or_else(|e| panic!("{raw}: {e}")), as_meant.expect("escaped"), "{raw}");
+    }
+    assert!(quoted > 15, "{quoted}");
 }
 
 #[test]

@@ -179,6 +179,9 @@ pub fn height_field(shapes: &mut Shapes<'_>, call: &Call, (outer, hull): (&DAffi
     let Some(size) = (if arguments.get("size").is_some() { arguments.sizes_2d("size")? } else { Some(squares) }) else {
         return Ok(shapes.nothing(call, "of no size"));
     };
+    if !size.is_finite() {
+        return Err((call.at, Problem::syntax("a finite size of height_field", format!("{size}"))));
+    }
     let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
     let base = arguments.number_or("base", lowest - 1.0)?;
     if !(base < lowest && base.is_finite()) {

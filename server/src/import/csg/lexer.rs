@@ -40,6 +40,7 @@ fn shortened(text: &str) -> String {
 }
 
 /// Reads tokens one by one.
+#[derive(Clone)]
 pub struct Lexer<'a> {
     rest: &'a str,
     at: Place,
@@ -104,12 +105,18 @@ impl<'a> Lexer<'a> {
         for (i, c) in self.rest.char_indices().skip(1) {
             match c {
                 _ if escaped => {
-                    text.push(match c {
-                        'n' => '\n',
-                        't' => '\t',
-                        'r' => '\r',
-                        other => other,
-                    });
+                    let known = match c {
+                        'n' => Some('\n'),
+                        't' => Some('\t'),
+                        'r' => Some('\r'),
+                        '"' | '\\' => Some(c),
+                        _ => None,
+                    };
+                    // OpenSCAD writes texts and names as they are: what is no escape has its backslash.
+                    if known.is_none() {
+                        text.push('\\');
+                    }
+                    text.push(known.unwrap_or(c));
                     escaped = false;
                 }
                 '\\' => escaped = true,
@@ -121,6 +128,16 @@ impl<'a> Lexer<'a> {
             }
         }
         Err((at, Problem::syntax("a closing quote", "the end of the file")))
+    }
+
+    /// A string that OpenSCAD wrote as it is, quotes and backslashes in it included: up to the first `end` behind it, which begins with
+    /// its closing quote. `None` where none begins here or `end` does not follow.
+    pub fn unescaped(&mut self, end: &str) -> Option<(Token<'a>, Place)> {
+        self.skip_blanks().ok()?;
+        let at = self.at;
+        let length = self.rest.strip_prefix('"')?.find(end)?;
+        let quoted = self.take(length + 2);
+        Some((Token::Text(quoted[1..=length].to_owned()), at))
     }
 
     fn skip_blanks(&mut self) -> Result<(), (Place, Problem)> {

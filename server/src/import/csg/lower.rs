@@ -209,8 +209,8 @@ impl<'a> Lowering<'a> {
             "render" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "color" => Arguments::new(call, &["c", "alpha"]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "multmatrix" | "translate" | "rotate" | "scale" | "mirror" => Ok(match self.multmatrix(call, context)? {
-                Some(context) => Step::open(CallKind::Set(Op::Union), context),
-                None => Step::Leaf(self.shapes.nothing(call, "that flattens what is inside of it")),
+                Ok(context) => Step::open(CallKind::Set(Op::Union), context),
+                Err(why) => Step::Leaf(self.shapes.nothing(call, why)),
             }),
             "hull" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Hull)),
             "fill" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Fill)),
@@ -222,7 +222,9 @@ impl<'a> Lowering<'a> {
             }
             "resize" => self.resized(call, context),
             "offset" => {
-                let offset = Offset::new(call)?;
+                let Some(offset) = Offset::new(call)? else {
+                    return Ok(Step::Leaf(self.shapes.nothing(call, "by no finite distance")));
+                };
                 let pieces = self.shapes.pieces(&Offset::arguments(call)?, offset.by().abs())?;
                 let Some(plane) = context.plane else { return inside(CallKind::Set(Op::Union)) };
                 // Distances are those of the call's own coordinates.
@@ -688,10 +690,14 @@ impl<'a> Lowering<'a> {
         Err((at, Problem::syntax("an outline on one side of the axis of rotate_extrude", "one on both")))
     }
 
-    /// The context below a matrix; `None` where it flattens.
-    fn multmatrix(&mut self, call: &Call, context: Context) -> Result<Option<Context>> {
+    /// The context below a matrix; else why nothing is there.
+    fn multmatrix(&mut self, call: &Call, context: Context) -> Result<std::result::Result<Context, &'static str>> {
+        const FLAT: &str = "that flattens what is inside of it";
         let arguments = Arguments::new(call, &["m"])?;
         let value = arguments.required("m", "a 4×4 matrix")?;
+        if holds_no_finite(value) {
+            return Ok(Err("that holds no finite numbers"));
+        }
         let m = matrix(value)?;
         if m[3][..3] != [0.0; 3] {
             let text = "the last row of a matrix is not quite [0, 0, 0, 1]: ignored, as OpenSCAD does";
@@ -703,12 +709,12 @@ impl<'a> Lowering<'a> {
         let linear = DMat3::from_cols(columns(0), columns(1), columns(2));
         let Some(flat) = context.plane else {
             if place::is_flat(linear) {
-                return Ok(None);
+                return Ok(Err(FLAT));
             }
             let (linear, off) = place::snapped(linear);
             self.snapped(value.at, off);
             let outer = context.outer * DAffine3::from_mat3_translation(linear, shift);
-            return Ok(Some(Context { outer, ..context }));
+            return Ok(Ok(Context { outer, ..context }));
         };
         // In 2D only x and y count. With z scaled as they are, a plane similarity is one in space, and snaps as one.
         let aside = [m[0][2], m[1][2], m[2][0], m[2][1], m[2][3]].iter().fold(0.0, |a: f64, x| a.max(x.abs()));
@@ -719,13 +725,13 @@ impl<'a> Lowering<'a> {
         let plane = |z: f64| DMat3::from_cols(columns(0).with_z(0.0), columns(1).with_z(0.0), DVec3::Z * z);
         let size = plane(1.0).determinant().abs().sqrt();
         if place::is_flat(plane(size)) {
-            return Ok(None);
+            return Ok(Err(FLAT));
         }
         let (mut linear, off) = place::snapped(plane(size));
         linear.z_axis = DVec3::Z;
         self.snapped(value.at, off);
         let inner = flat.inner * DAffine3::from_mat3_translation(linear, shift.with_z(0.0));
-        Ok(Some(Context { plane: Some(Plane { inner, ..flat }), ..context }))
+        Ok(Ok(Context { plane: Some(Plane { inner, ..flat }), ..context }))
     }
 
     fn snapped(&mut self, at: Place, off: Option<f64>) {
@@ -766,6 +772,13 @@ fn hint(name: &str) -> &'static str {
         "roof" => " (write the shape out in spheres, cylinders, cubes and convex polyhedra)",
         _ => "",
     }
+}
+
+/// True for a matrix in which a number is infinite or `nan`, as divisions by zero leave them: OpenSCAD removes what is inside.
+fn holds_no_finite(value: &Value) -> bool {
+    let is = |v: &Value| matches!(v.kind, ValueKind::Number(n) if !n.is_finite());
+    let of = |v: &Value| matches!(&v.kind, ValueKind::List(row) if row.iter().any(is));
+    matches!(&value.kind, ValueKind::List(rows) if rows.iter().any(of))
 }
 
 /// Four rows of four; the last one (0, 0, 0, w), within `SIMILARITY`, divides the others.

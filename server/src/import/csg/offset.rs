@@ -46,8 +46,8 @@ impl Offset {
         Arguments::new(call, &["r", "delta", "chamfer"])
     }
 
-    /// Reads the arguments of `offset`.
-    pub fn new(call: &Call) -> Result<Self> {
+    /// Reads the arguments of `offset`; `None` by no finite distance, of which OpenSCAD makes nothing.
+    pub fn new(call: &Call) -> Result<Option<Self>> {
         let arguments = Self::arguments(call)?;
         let chamfer = arguments.bool_or("chamfer", false)?;
         let (name, join) = match (arguments.get("r"), chamfer) {
@@ -56,11 +56,8 @@ impl Offset {
             (None, false) => ("delta", Join::Sharp),
         };
         // OpenSCAD's own, where neither is given.
-        let by = arguments.number_or(name, 1.0)?;
-        if !by.is_finite() {
-            return Err((call.at, Problem::syntax(format!("a finite number as {name} of offset"), by.to_string())));
-        }
-        Ok(Self { by, join })
+        let by = arguments.setting(name, 1.0)?;
+        Ok(by.is_finite().then_some(Self { by, join }))
     }
 
     /// How far it reaches.

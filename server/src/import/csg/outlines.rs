@@ -4,7 +4,7 @@ use super::flat::{Flat, Outline};
 use super::hull::{Disc, disc_hull};
 use super::meshed::guarded;
 use super::parts::{Part, PartId, Parts};
-use super::polygon::{Region, overlay, turn};
+use super::polygon::{Region, overlay, triangles, turn};
 use super::{Place, Problem};
 use crate::solid::Op;
 use glam::{DAffine3, DVec2, DVec3};
@@ -297,12 +297,17 @@ pub fn hull(parts: &mut Parts<'_>, at: Place, like: &Flat, roots: &[PartId]) -> 
 }
 
 /// The sum of some operands about the plane point `origin`, which each of them was moved by: the union of the sums of their convex
-/// pieces.
+/// pieces. Of one operand that is itself.
 pub fn minkowski(parts: &mut Parts<'_>, at: Place, like: &Flat, operands: &[PartId], origin: DVec3) -> Result<Part> {
+    if let [one] = operands {
+        return Ok(Part::Op(Op::Union, at, vec![*one]));
+    }
     let origin = origin.truncate();
     let mut sums: Vec<Vec<Disc>> = vec![vec![Disc { center: origin, radius: 0.0 }]];
+    let mut cut = false;
     for operand in operands {
-        let pieces = convex_pieces(parts, at, *operand)?;
+        let (pieces, more) = convex_pieces(parts, at, *operand)?;
+        cut |= more;
         let mut next = Vec::with_capacity(sums.len() * pieces.len());
         for sum in &sums {
             for piece in &pieces {
@@ -313,8 +318,13 @@ pub fn minkowski(parts: &mut Parts<'_>, at: Place, like: &Flat, operands: &[Part
             }
         }
         sums = next;
-        parts.affordable(at, sums.iter().map(Vec::len).sum())?;
+        let corners = sums.iter().map(Vec::len).sum();
+        if cut { parts.meshable(at, corners)? } else { parts.affordable(at, corners)? }
     }
+    if cut && sums.iter().flatten().all(|disc| disc.radius == 0.0) {
+        return united(parts, at, like, &sums);
+    }
+    parts.affordable(at, sums.iter().map(Vec::len).sum())?;
     let mut made = Vec::new();
     for sum in sums {
         made.extend(hull_parts(parts, like, &sum));
@@ -322,28 +332,117 @@ pub fn minkowski(parts: &mut Parts<'_>, at: Place, like: &Flat, operands: &[Part
     Ok(Part::Op(Op::Union, at, made))
 }
 
-fn convex_pieces(parts: &mut Parts<'_>, at: Place, operand: PartId) -> Result<Vec<Vec<Disc>>> {
-    let refused = || {
-        let hint = " (write the sum out as a union of sums of convex pieces, or use offset)";
-        (at, Problem::Unsupported { construct: "minkowski of a shape that is not convex".into(), hint })
+/// The union of the hulls of some sets of points as one outline, for there are many of them: by Clipper.
+fn united(parts: &mut Parts<'_>, at: Place, like: &Flat, sums: &[Vec<Disc>]) -> Result<Part> {
+    let grid = Grid::of(sums.iter().flatten().map(|d| d.center));
+    let hull = |sum: &Vec<Disc>| disc_hull(sum).corners;
+    let all: Vec<CrossSection> = sums.iter().map(hull).filter(|h| h.len() >= 3).map(|h| grid.section(&[h])).collect();
+    let paths = grid.paths(&guarded(at, || CrossSection::batch_boolean(&all, OpType::Add))?);
+    if paths.is_empty() {
+        parts.note(at, "a minkowski without area: left out, as OpenSCAD does", None);
+        return Ok(Part::Empty);
+    }
+    Ok(flat(like, Outline::Paths(paths), DVec2::ZERO))
+}
+
+/// Convex pieces of which an operand consists; whether what is not convex had to be cut into triangles for that.
+fn convex_pieces(parts: &mut Parts<'_>, at: Place, operand: PartId) -> Result<(Vec<Vec<Disc>>, bool)> {
+    let point = |center: &DVec2| Disc { center: *center, radius: 0.0 };
+    let (mut pieces, mut cut) = (Vec::new(), false);
+    let mut of_paths = |paths: &[Vec<DVec2>]| {
+        let region = Region::of_paths(paths);
+        if region.open {
+            return Err((at, crossing()));
+        }
+        if region.is_convex() {
+            pieces.push(region.islands[0].hull.iter().map(point).collect());
+            return Ok(());
+        }
+        cut = true;
+        let corners: Vec<DVec2> = region.rings.iter().flatten().copied().collect();
+        pieces.extend(triangles(&region.rings).iter().map(|t| t.iter().map(|i| point(&corners[*i])).collect()));
+        Ok(())
     };
-    let leaves = match parts.leaves(operand) {
-        Some((leaves, false)) => leaves,
-        Some((_, true)) | None => return Err(refused()),
+    let Some((leaves, false)) = parts.leaves(operand) else {
+        of_paths(&paths(parts, at, &[operand], "minkowski")?)?;
+        return Ok((pieces, cut));
     };
-    let mut pieces = Vec::new();
+    let mut whole = Vec::new();
     for leaf in leaves {
         let Some((disc, paths)) = flat_of(parts, leaf).map(|f| (f.disc(), f.paths())) else { continue };
         if let Some(disc) = disc {
-            pieces.push(vec![disc]);
+            whole.push(vec![disc]);
             continue;
         }
         note_facets(parts, at, &[leaf], "minkowski");
-        let region = Region::of_paths(&paths);
-        if !region.is_convex() {
-            return Err(refused());
-        }
-        pieces.push(region.islands[0].hull.iter().map(|center| Disc { center: *center, radius: 0.0 }).collect());
+        of_paths(&paths)?;
     }
-    Ok(pieces)
+    pieces.extend(whole);
+    Ok((pieces, cut))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::import::{Facets, Limits, import_csg};
+    use crate::math::random::Random;
+    use glam::{DVec2, DVec3};
+
+    fn inside(ring: &[DVec2], p: DVec2) -> bool {
+        let sides = (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]));
+        let crossed =
+            sides.filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y));
+        crossed.count() % 2 == 1
+    }
+
+    /// Whether two rings have a point in common.
+    fn meet(a: &[DVec2], b: &[DVec2]) -> bool {
+        let sides = |r: &[DVec2]| -> Vec<[DVec2; 2]> { (0..r.len()).map(|i| [r[i], r[(i + 1) % r.len()]]).collect() };
+        let cross = |[p, q]: [DVec2; 2], [s, t]: [DVec2; 2]| {
+            let side = |x: DVec2, y: DVec2, z: DVec2| (y - x).perp_dot(z - x);
+            side(p, q, s) * side(p, q, t) <= 0.0 && side(s, t, p) * side(s, t, q) <= 0.0
+        };
+        inside(a, b[0]) || inside(b, a[0]) || sides(a).iter().any(|s| sides(b).iter().any(|t| cross(*s, *t)))
+    }
+
+    /// A point is in the sum of A and B where A meets B, turned by half a turn, about it.
+    #[test]
+    fn sums_of_outlines_that_are_not_convex_hold_where_one_meets_the_other_turned_about_the_point() {
+        let mut r = Random(9);
+        let limits = Limits::default();
+        for round in 0..40 {
+            let ring = |size: f64, r: &mut Random| -> Vec<DVec2> {
+                let n = 3 + (r.unit() * 8.0) as usize;
+                let at = |i: usize| libm::sincos(std::f64::consts::TAU * i as f64 / n as f64);
+                let aside = DVec2::new(r.within(-2.0, 2.0), r.within(-2.0, 2.0));
+                (0..n).map(|i| DVec2::new(at(i).1, at(i).0) * size * r.within(0.2, 1.0) + aside).collect()
+            };
+            let (a, b) = (ring(4.0, &mut r), ring(1.5, &mut r));
+            let list = |ring: &[DVec2]| format!("{:?}", ring.iter().map(|p| p.to_array()).collect::<Vec<_>>());
+            // As a polygon, or as what is left of a square.
+            let wrapped = |ring: &str| match round % 2 {
+                0 => format!("polygon({ring});"),
+                _ => format!("intersection() {{ square(40, center = true); polygon({ring}); }}"),
+            };
+            let text = format!(
+                "linear_extrude(height = 1) {{ minkowski() {{ {} polygon({}); }} }}",
+                wrapped(&list(&a)),
+                list(&b)
+            );
+            let import = import_csg("m.csg", &text, Facets::Auto, &limits).unwrap_or_else(|e| panic!("{text}: {e}"));
+            let bounds = import.solid.aabb();
+            let mut seen = [0, 0];
+            for _ in 0..400 {
+                let p = bounds.center() + r.vector(1.1) * bounds.half();
+                let p = DVec3::new(p.x, p.y, 0.5);
+                let turned = |by: f64| -> Vec<DVec2> { b.iter().map(|q| p.truncate() - *q * by).collect() };
+                let f = import.solid.value(p);
+                let truth = meet(&a, &turned(1.0));
+                if f.abs() > 1e-6 {
+                    assert_eq!(f < 0.0, truth, "{p}, f {f}: {text}");
+                    seen[usize::from(truth)] += 1;
+                }
+            }
+            assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}: {text}");
+        }
+    }
 }

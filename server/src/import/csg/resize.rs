@@ -27,7 +27,11 @@ pub fn scale(call: &Call, flat: bool, bounds: impl FnOnce() -> Result<Option<Bou
         match &v.kind {
             ValueKind::List(list) if (2..=3).contains(&list.len()) => {
                 for (size, v) in sizes.iter_mut().zip(list) {
-                    *size = finite(v)?;
+                    // What is no number, or below 0, asks for nothing.
+                    *size = match v.kind {
+                        ValueKind::Number(n) if n.is_nan() || n == f64::NEG_INFINITY => 0.0,
+                        _ => finite(v)?,
+                    };
                 }
             }
             _ => return Err((v.at, Problem::syntax("two or three numbers as newsize of resize", v.found()))),

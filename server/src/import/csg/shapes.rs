@@ -2,7 +2,7 @@
 //!
 //! What has no size is nothing, with a note, as in OpenSCAD.
 
-use super::arguments::{Arguments, vector};
+use super::arguments::{Arguments, IndexLists, vector};
 use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
 use super::hull::point_hull;
@@ -68,7 +68,10 @@ impl Shapes<'_> {
     /// `sphere`.
     pub fn sphere(&mut self, call: &Call, outer: &DAffine3) -> Result<PartId> {
         let arguments = Arguments::new(call, &["r"])?;
-        let Some(r) = arguments.finite_size("r")? else { return Ok(self.nothing(call, "of no size")) };
+        let r = match measured(arguments.size("r")?) {
+            Ok(r) => r,
+            Err(why) => return Ok(self.nothing(call, why)),
+        };
         let mesh = |n: u32| faceted_sphere(r, n, n.div_ceil(2));
         match self.fragments(&arguments, r)? {
             None => {
@@ -98,8 +101,7 @@ impl Shapes<'_> {
             return self.infinite_box(call, outer, sides, [true, true, center]);
         }
         if !(h.is_finite() && r1.is_finite() && r2.is_finite()) {
-            let found = format!("h = {h}, r1 = {r1}, r2 = {r2}");
-            return Err((call.at, Problem::syntax("a finite cylinder, or one with r1 and r2 infinite", found)));
+            return Ok(self.nothing(call, INFINITE));
         }
         let (low, high) = if center { (-0.5 * h, 0.5 * h) } else { (0.0, h) };
         let mesh = |n: u32| prism(&ring(r1, n), &ring(r2, n), low, high);
@@ -169,23 +171,43 @@ impl Shapes<'_> {
         Ok(self.parts.push(Part::Op(Op::Intersection, call.at, made)))
     }
 
-    fn note_beyond(&mut self, call: &Call, lists: &str, beyond: usize) {
-        if beyond > 0 {
-            let what = format!("a {} whose {lists} name {beyond} points that it has not", call.name);
-            self.parts.note(call.at, format!("{what}: left out, as OpenSCAD does"), None);
+    /// Tells what was wrong with lists of indices.
+    fn note_indices(&mut self, call: &Call, lists: &str, read: &IndexLists) {
+        let whose = format!("a {} whose {lists} name", call.name);
+        if read.beyond > 0 {
+            let text = format!("{whose} {} points that it has not: left out, as OpenSCAD does", read.beyond);
+            self.parts.note(call.at, text, None);
         }
+        if read.rough > 0 {
+            let text = format!("{whose} {} points by no whole number: cut off, as OpenSCAD does", read.rough);
+            self.parts.note(call.at, text, None);
+        }
+    }
+
+    /// Nothing, for a point that is none, nor is one to OpenSCAD.
+    fn pointless(&mut self, call: &Call, place: usize, found: &str) -> PartId {
+        self.nothing(call, &format!("whose point {place} is {found}"))
     }
 
     /// `polyhedron`; below a hull the points of its faces are enough.
     pub fn polyhedron(&mut self, call: &Call, outer: &DAffine3, hull: bool) -> Result<PartId> {
         let arguments = Arguments::new(call, &["points", "faces"])?;
-        let points: Vec<DVec3> = arguments.points::<3>("points")?.into_iter().map(DVec3::from_array).collect();
-        let (mut faces, beyond) = arguments.index_lists("faces", points.len())?;
-        if beyond > 0 {
-            faces.retain(|face| face.len() >= 3);
-            self.note_beyond(call, "faces", beyond);
+        if arguments.get("points").is_none() && !call.arguments.is_empty() {
+            return Ok(self.nothing(call, "without points"));
         }
-        self.of_faces(call, outer, hull, (points, faces))
+        let listed = arguments.points::<3>("points", 2)?;
+        let mut read = arguments.index_lists("faces", listed.len())?;
+        self.note_indices(call, "faces", &read);
+        read.lists.retain(|face| face.len() >= 3);
+        // Points that no face names may be anything.
+        for i in read.lists.iter().flatten() {
+            if let Err(found) = &listed[*i as usize] {
+                return Ok(self.pointless(call, *i as usize, found));
+            }
+        }
+        let spare = listed.iter().flatten().next().copied().unwrap_or_default();
+        let points = listed.into_iter().map(|p| DVec3::from_array(p.unwrap_or(spare))).collect();
+        self.of_faces(call, outer, hull, (points, read.lists))
     }
 
     /// The solid within faces that run clockwise as seen from outside.
@@ -292,7 +314,10 @@ impl Shapes<'_> {
         let outline = match call.name.as_str() {
             "circle" => {
                 let arguments = Arguments::new(call, &["r"])?;
-                let Some(r) = arguments.finite_size("r")? else { return Ok(self.nothing(call, "of no size")) };
+                let r = match measured(arguments.size("r")?) {
+                    Ok(r) => r,
+                    Err(why) => return Ok(self.nothing(call, why)),
+                };
                 pieces = self.pieces(&arguments, r)?;
                 match self.fragments(&arguments, r)? {
                     None => Outline::Circle(r),
@@ -304,6 +329,9 @@ impl Shapes<'_> {
                 let size = arguments.sizes_2d("size")?;
                 let center = arguments.bool_or("center", false)?;
                 let Some(size) = size else { return Ok(self.nothing(call, "of no size")) };
+                if !size.is_finite() {
+                    return Ok(self.nothing(call, INFINITE));
+                }
                 Outline::Square { corner: if center { size * -0.5 } else { DVec2::ZERO }, size }
             }
             _ => {
@@ -311,14 +339,18 @@ impl Shapes<'_> {
                 if arguments.get("points").is_none() && !call.arguments.is_empty() {
                     return Ok(self.nothing(call, "without points"));
                 }
-                let points: Vec<DVec2> = arguments.points::<2>("points")?.into_iter().map(DVec2::from_array).collect();
-                let paths = match arguments.get("paths") {
-                    None => vec![points],
-                    Some(_) => {
-                        let (lists, beyond) = arguments.index_lists("paths", points.len())?;
-                        self.note_beyond(call, "paths", beyond);
-                        lists.iter().map(|l| l.iter().map(|i| points[*i as usize]).collect()).collect()
-                    }
+                let listed = arguments.points::<2>("points", 2)?;
+                if let Some((i, found)) = listed.iter().enumerate().find_map(|(i, p)| Some((i, p.as_ref().err()?))) {
+                    return Ok(self.pointless(call, i, found));
+                }
+                let points: Vec<DVec2> = listed.into_iter().flatten().map(DVec2::from_array).collect();
+                let read = arguments.index_lists("paths", points.len())?;
+                self.note_indices(call, "paths", &read);
+                // No path at all is the way around all points, too.
+                let paths = if read.lists.is_empty() {
+                    vec![points]
+                } else {
+                    read.lists.iter().map(|l| l.iter().map(|i| points[*i as usize]).collect()).collect()
                 };
                 self.parts.meshable(call.at, paths.iter().map(Vec::len).sum())?;
                 if paths.iter().all(|p| p.len() < 3) {
@@ -333,7 +365,7 @@ impl Shapes<'_> {
 
     /// How many sides a curved primitive of radius `r` gets; `None` for as many as it has: none.
     pub fn fragments(&mut self, arguments: &Arguments<'_>, r: f64) -> Result<Option<u32>> {
-        let fn_ = arguments.number_or("$fn", 0.0)?;
+        let fn_ = turn_pieces(arguments)?;
         let name = arguments.name();
         let faceted = match self.facets {
             Facets::Exact => false,
@@ -366,10 +398,25 @@ impl Shapes<'_> {
     }
 }
 
+/// `$fn`: of a turn that is cut into no finite number of pieces OpenSCAD makes three.
+fn turn_pieces(arguments: &Arguments<'_>) -> Result<f64> {
+    let fn_ = arguments.setting("$fn", 0.0)?;
+    Ok(if fn_.is_finite() { fn_ } else { 3.0 })
+}
+
+/// Why OpenSCAD makes nothing of what reaches to infinity.
+const INFINITE: &str = "of infinite size";
+
+/// A finite size, or why nothing is there.
+fn measured(size: Option<f64>) -> std::result::Result<f64, &'static str> {
+    let r = size.ok_or("of no size")?;
+    if r.is_finite() { Ok(r) } else { Err(INFINITE) }
+}
+
 /// OpenSCAD's rule (Calc::get_fragments_from_r).
 fn pieces(arguments: &Arguments<'_>, r: f64) -> Result<f64> {
-    let fn_ = arguments.number_or("$fn", 0.0)?;
-    let (fs, fa) = (arguments.number_or("$fs", 2.0)?, arguments.number_or("$fa", 12.0)?);
+    let fn_ = turn_pieces(arguments)?;
+    let (fs, fa) = (arguments.setting("$fs", 2.0)?, arguments.setting("$fa", 12.0)?);
     Ok(if fn_ > 0.0 {
         fn_.max(3.0).floor()
     } else {

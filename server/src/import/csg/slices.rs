@@ -20,7 +20,7 @@ pub struct Curve {
 impl Curve {
     /// As a call has it, or OpenSCAD's own.
     pub fn of(arguments: &Arguments<'_>) -> Result<Self, (Place, Problem)> {
-        let number = |name, default| arguments.number_or(name, default);
+        let number = |name, default| arguments.setting(name, default);
         let fn_ = number("$fn", 0.0)?;
         let fn_ = if fn_.is_finite() { fn_.max(0.0) } else { 0.0 };
         Ok(Self { fn_, fa: number("$fa", 12.0)?.max(0.01), fs: number("$fs", 2.0)?.max(0.01) })

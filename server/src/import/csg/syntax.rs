@@ -212,8 +212,13 @@ impl<'a> Parser<'a> {
                         (Token::Mark(',' | ')' | '*' | '+' | '-'), _) => return Err((at, variable(word))),
                         (other, at) => return Err((at, Problem::syntax(format!("\"=\" after {word}"), other.found()))),
                     }
-                    let first = self.lexer.next()?;
-                    (Some(word.to_owned()), self.value(first, 0)?, self.lexer.next()?)
+                    let before = self.lexer.clone();
+                    let read = self.lexer.next().and_then(|first| self.value(first, 0));
+                    let value = match self.unescaped(before, (call, word), read.is_ok()) {
+                        Some(value) => value,
+                        None => read?,
+                    };
+                    (Some(word.to_owned()), value, self.lexer.next()?)
                 }
                 token => (None, self.value((token, at), 0)?, self.lexer.next()?),
             };
@@ -225,6 +230,17 @@ impl<'a> Parser<'a> {
                 (other, at) => return Err((at, Problem::syntax("\",\" or \")\"", other.found()))),
             }
         }
+    }
+
+    /// The text of a `text` that can be read in no other way: OpenSCAD writes it without escapes, and its size behind it. `before` it
+    /// the lexer stood; whether it could be `read` with escapes, and then as the call goes on behind it.
+    fn unescaped(&mut self, mut before: Lexer<'a>, what: (&str, &str), read: bool) -> Option<Value> {
+        if what != ("text", "text") || read && goes_on(self.lexer.clone()) {
+            return None;
+        }
+        let (Token::Text(text), at) = before.unescaped("\", size = ")? else { return None };
+        self.lexer = before;
+        Some(Value { at, kind: ValueKind::Text(text) })
     }
 
     /// The value that begins with `first`.
@@ -271,6 +287,16 @@ impl<'a> Parser<'a> {
             other => return Err((at, Problem::syntax("a value", other.found()))),
         };
         Ok(Value { at, kind })
+    }
+}
+
+/// True where a call goes on behind a value: with another argument by name, or with its end.
+fn goes_on(mut lexer: Lexer<'_>) -> bool {
+    let mut next = || lexer.next().map(|(token, _)| token);
+    match next() {
+        Ok(Token::Mark(',')) => matches!((next(), next()), (Ok(Token::Word(_)), Ok(Token::Mark('=')))),
+        Ok(Token::Mark(')')) => matches!(next(), Ok(Token::Mark(';'))),
+        _ => false,
     }
 }
 

@@ -316,22 +316,11 @@ fn every_refusal_is_a_sentence_with_its_place() {
             "1:1: expected a supported construct, found for, which is not supported (this is .scad: load the file by that \
              ending, or flatten it first: openscad -o model.csg model.scad)",
         ),
-        ("sphere(r = nan);".into(), "1:12: expected a positive number as r of sphere, found nan"),
-        ("sphere(r = -inf);".into(), "1:12: expected a positive number as r of sphere, found -inf"),
-        ("sphere(r = inf);".into(), "1:12: expected a finite number as r of sphere, found inf"),
+        ("sphere(r = \"1\");".into(), "1:12: expected a positive number as r of sphere, found the string \"1\""),
         ("sphere(r = undef);".into(), "1:1: expected a positive number as r of sphere, found undef"),
         ("sphere(1, r = 2);".into(), "1:11: expected each argument of sphere once, found a second r"),
         ("sphere(1, 2);".into(), "1:11: expected at most 1 unnamed arguments of sphere, found another"),
-        (
-            "cylinder(h = 1, r1 = -inf, r2 = 0);".into(),
-            "1:22: expected a number that is not negative as r1 of cylinder, found -inf",
-        ),
-        (
-            "cylinder(h = inf, r1 = 1, r2 = 1);".into(),
-            "1:1: expected a finite cylinder, or one with r1 and r2 infinite, found h = inf, r1 = 1, r2 = 1",
-        ),
         ("cube(size = [1, 2]);".into(), "1:13: expected three positive numbers as size of cube, found a list of 2"),
-        ("cube(size = [nan, 1, 1]);".into(), "1:14: expected a positive number as size of cube, found nan"),
         (
             "cube(1, center = true);cube(1, center = \"a\");".into(),
             "1:41: expected true or false as center of cube, found the string \"a\"",
@@ -363,7 +352,10 @@ fn every_refusal_is_a_sentence_with_its_place() {
             "1:1: expected at most 1000000 triangles of a mesh, found more",
         ),
         (under("[1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:13: expected a row of 4 numbers, found a list of 3"),
-        (under("[1, 0, 0, nan], [0, 1, 0, 0], [0, 0, 1, 0]", ""), "1:23: expected a finite number, found nan"),
+        (
+            under("[1, 0, 0, \"a\"], [0, 1, 0, 0], [0, 0, 1, 0]", ""),
+            "1:23: expected a finite number, found the string \"a\"",
+        ),
         ("multmatrix() { }".into(), "1:1: expected a 4×4 matrix as m of multmatrix, found none"),
         (
             "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,1,0,1]]) { }".into(),
@@ -377,10 +369,6 @@ fn every_refusal_is_a_sentence_with_its_place() {
         (
             format!("polyhedron(points = {crossed}, faces = {triangles});"),
             "1:1: expected a closed mesh, found one that crosses itself, lies on itself or is inside out near [",
-        ),
-        (
-            "polyhedron(points = [[0, 0, 0]], faces = [[0, -1, 2]]);".into(),
-            "1:47: expected an index below 1 as faces of polyhedron, found -1",
         ),
         (
             under("[1e99, 0, 0, 0], [0, 1e99, 0, 0], [0, 0, 1e99, 0]", "cube(1e250);"),

@@ -125,6 +125,10 @@ pub fn text(
     overshoot: u32,
     attached: Option<&[Attachment]>,
 ) -> Result<PartId> {
+    if matches!(Arguments::new(call, &PARAMETERS)?.get("size").map(|v| &v.kind), Some(ValueKind::Number(n)) if !n.is_finite())
+    {
+        return Ok(shapes.nothing(call, "of no finite size"));
+    }
     let setting = Setting::of(shapes, call)?;
     let at = call.at;
     let pattern = font_of(call).unwrap_or_else(|| Pattern::new(""));

@@ -2,7 +2,7 @@
 //!
 //! Their walls are ruled surfaces that no face here is, so they are taken as OpenSCAD has them: slices, whose quads are cut along the
 //! shorter diagonal, between caps (linear_extrude of OpenSCAD 2021.01; how many slices: its Calc). Slices so coarse that their facets
-//! cross are halved until they do not.
+//! cross are halved until they do not. Walls that end in a line have more corners than OpenSCAD's, which cross there (`Ridge`).
 
 use super::extrude::Extrusion;
 use super::facets::direction;
@@ -11,8 +11,10 @@ use super::parts::{Part, PartId, Parts};
 use super::place;
 use super::polygon::{Region, triangles};
 use super::{Place, Problem};
+use crate::math::tolerance::ROUNDING;
 use crate::solid::primitive::MeshFault;
 use glam::{DAffine3, DVec2, DVec3};
+use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -41,15 +43,22 @@ pub fn extruded(
         return Ok(Part::Empty);
     }
     let corners: Vec<DVec2> = region.rings.iter().flatten().copied().collect();
+    let (ridge, cut) = Ridge::of(extrusion, &region.rings).unzip();
+    let mut rings = &region.rings;
     let wanted = extrusion.slices(&corners);
     let mut slices = wanted;
     for halved in 0.. {
-        let bent = Bent { extrusion, rings: &region.rings, slices };
+        let bent = Bent { extrusion, rings, ridge: ridge.as_ref(), cut: !std::ptr::eq(rings, &region.rings), slices };
         let facets = bent.facets();
         parts.meshable(at, facets)?;
         let (points, faces) = bent.mesh();
         match place::mesh(outer, &points, &faces) {
-            Err(Problem::Surface(MeshFault::Crossing(_))) if halved < HALVINGS => slices *= 2,
+            Err(Problem::Surface(MeshFault::Crossing(_) | MeshFault::Intricate(_))) if halved < HALVINGS => {
+                match &cut {
+                    Some(cut) if halved == 0 => rings = cut,
+                    Some(_) | None => slices *= 2,
+                }
+            }
             Err(Problem::Surface(MeshFault::Flat)) => {
                 parts.note(at, "a linear_extrude without volume: left out, as OpenSCAD does", None);
                 return Ok(Part::Empty);
@@ -62,7 +71,9 @@ pub fn extruded(
                     parts.note(at, text, None);
                     return parts.leaf("linear_extrude", at, placed.map(|p| p.0));
                 }
-                let what = if slices == wanted {
+                let what = if slices == wanted && bent.cut {
+                    "linear_extrude to a line, cut into more facets than OpenSCAD's, which cross".to_owned()
+                } else if slices == wanted {
                     "linear_extrude with bent walls".to_owned()
                 } else {
                     format!("linear_extrude with bent walls, {slices} slices in place of {wanted}, whose facets cross")
@@ -80,6 +91,9 @@ struct Bent<'e> {
     extrusion: &'e Extrusion,
     /// Outlines with the inside on their left.
     rings: &'e [Vec<DVec2>],
+    ridge: Option<&'e Ridge>,
+    /// Every ring has a corner at every level of the ridge that it passes.
+    cut: bool,
     slices: usize,
 }
 
@@ -96,7 +110,11 @@ impl Bent<'_> {
     /// All corners at a level.
     fn corners(&self, k: usize) -> Vec<DVec2> {
         let (scale, x) = self.level(k);
-        self.rings.iter().flatten().map(|p| scale * x.rotate(*p)).collect()
+        let all = self.rings.iter().flatten().map(|p| scale * x.rotate(*p));
+        match self.ridge.filter(|_| k == self.slices) {
+            Some(ridge) => all.map(|p| ridge.levelled(p)).collect(),
+            None => all.collect(),
+        }
     }
 
     /// The largest number of its facets.
@@ -131,8 +149,8 @@ impl Bent<'_> {
 
     /// The walls of one slice; what an end that is a point or a line takes the area of is left out.
     fn walls(&self, low: &[DVec2], high: &[DVec2], (down, up): (usize, usize), faces: &mut Vec<Vec<u32>>) {
-        let flat = high.iter().all(|p| p.x == 0.0) || high.iter().all(|p| p.y == 0.0);
-        let mut first = 0;
+        let ridge = if up == self.slices * low.len() { self.ridge } else { None };
+        let (mut first, mut last) = (0, Vec::new());
         for ring in self.rings {
             let hole = area(ring) < 0.0;
             for i in 0..ring.len() {
@@ -141,17 +159,32 @@ impl Bent<'_> {
                 let even = (to_next - from_next).abs() <= SAME_DIAGONAL * 0.5 * (to_next + from_next);
                 // Equally long ones follow the twist.
                 let flip = hole != (self.extrusion.twist <= 0.0);
-                let rising = if even { !flip } else { to_next < from_next };
+                let rising = match ridge {
+                    // The same way everywhere, so that walls that are in order below and above stay so between.
+                    Some(ridge) if self.cut => high[a][ridge.axis] >= high[b][ridge.axis],
+                    Some(_) => even && flip || !even && to_next >= from_next,
+                    None => even && !flip || !even && to_next < from_next,
+                };
                 let [p, q, r, s] = [down + a, down + b, up + b, up + a].map(|i| i as u32);
-                let quads = if rising != flat { [[p, r, q], [p, s, r]] } else { [[p, s, q], [q, s, r]] };
+                let quads = if rising { [[p, r, q], [p, s, r]] } else { [[p, s, q], [q, s, r]] };
                 let at = |i: u32| {
                     let i = i as usize;
                     if i >= up { (high[i - up], true) } else { (low[i - down], false) }
                 };
                 let thin = |t: &[u32; 3]| (0..3).any(|k| at(t[k]) == at(t[(k + 1) % 3]));
-                faces.extend(quads.iter().filter(|t| !thin(t)).map(|t| t.to_vec()));
+                let kept = quads.iter().filter(|t| !thin(t));
+                if ridge.is_some() {
+                    last.extend(kept);
+                } else {
+                    faces.extend(kept.map(|t| t.to_vec()));
+                }
             }
             first += ring.len();
+        }
+        if let Some(ridge) = ridge {
+            let corner = |i: u32| if i as usize >= up { high[i as usize - up] } else { low[i as usize - down] };
+            let last = if self.cut { last } else { ridge.fanned(&last, (up, high)) };
+            faces.extend(ridge.without_doubles(&last, &|i| (i as usize >= up, corner(i))));
         }
     }
 
@@ -180,6 +213,106 @@ impl Bent<'_> {
     }
 }
 
+/// An upper end that is a line along x or y: walls of either side meet there, and must have the same edges. So every side of the
+/// outline has a corner wherever another one has, seen along that line.
+struct Ridge {
+    axis: usize,
+    /// Where corners are along it, in order.
+    levels: Vec<f64>,
+    /// Levels nearer than this are one.
+    near: f64,
+}
+
+impl Ridge {
+    /// That of an extrusion, and its outline with all the corners; `None` where the end is no line.
+    fn of(extrusion: &Extrusion, rings: &[Vec<DVec2>]) -> Option<(Self, Vec<Vec<DVec2>>)> {
+        let axis = match (extrusion.scale.x == 0.0, extrusion.scale.y == 0.0) {
+            (true, false) => 1,
+            (false, true) => 0,
+            (true, true) | (false, false) => return None,
+        };
+        let x = direction(-extrusion.twist);
+        let along = |p: DVec2| (extrusion.scale * x.rotate(p))[axis];
+        let mut levels: Vec<f64> = rings.iter().flatten().map(|p| along(*p)).collect();
+        levels.sort_by(f64::total_cmp);
+        let near = ROUNDING * levels.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
+        levels.dedup_by(|a, b| *a - *b <= near);
+        let ridge = Self { axis, levels, near };
+        let cut = |ring: &Vec<DVec2>| {
+            let mut all = Vec::with_capacity(ring.len());
+            for (i, a) in ring.iter().enumerate() {
+                let b = ring[(i + 1) % ring.len()];
+                all.push(*a);
+                let (from, to) = (along(*a), along(b));
+                let (low, high) = (from.min(to) + near, from.max(to) - near);
+                let between = ridge.levels.iter().filter(|l| (low..=high).contains(*l));
+                let mut ways: Vec<f64> = between.map(|l| (l - from) / (to - from)).collect();
+                if from > to {
+                    ways.reverse();
+                }
+                all.extend(ways.into_iter().map(|t| *a + (b - *a) * t));
+            }
+            all
+        };
+        let rings = rings.iter().map(cut).collect();
+        Some((ridge, rings))
+    }
+
+    /// Triangles with an edge on the ridge cut at every corner there, so that those of either side have the same edges.
+    fn fanned(&self, all: &[[u32; 3]], (up, high): (usize, &[DVec2])) -> Vec<[u32; 3]> {
+        // One corner of each level.
+        let level = |p: &DVec2| self.levels.partition_point(|l| *l < p[self.axis]);
+        let mut corner = vec![0; self.levels.len() + 1];
+        high.iter().enumerate().rev().for_each(|(i, p)| corner[level(p)] = (up + i) as u32);
+        let mut fans = Vec::with_capacity(2 * all.len());
+        for t in all {
+            let above = (0..3).find(|k| t[*k] as usize >= up && t[(k + 1) % 3] as usize >= up);
+            let Some(k) = above else {
+                fans.push(*t);
+                continue;
+            };
+            let [from, to] = [k, (k + 1) % 3].map(|k| level(&high[t[k] as usize - up]));
+            let mut way: Vec<u32> = corner[from.min(to)..=from.max(to)].to_vec();
+            if from > to {
+                way.reverse();
+            }
+            fans.extend(way.windows(2).map(|w| [w[0], w[1], t[(k + 2) % 3]]));
+        }
+        fans
+    }
+
+    /// Triangles without those that lie on each other the other way round, as walls do that begin in one corner; `at` tells of a
+    /// point whether it is of the end, and where it is.
+    fn without_doubles(&self, all: &[[u32; 3]], at: &dyn Fn(u32) -> (bool, DVec2)) -> Vec<Vec<u32>> {
+        // Where each stands over the ridge: its corner below, and how often more it runs up than down.
+        let mut over: HashMap<[u64; 4], i32> = HashMap::new();
+        let place = |t: &[u32; 3]| {
+            let corners = t.map(at);
+            let k = (0..3).find(|k| corners[*k].0 && corners[(k + 1) % 3].0)?;
+            let [one, two] = [k, (k + 1) % 3].map(|k| corners[k].1[self.axis]);
+            let below = corners[(k + 2) % 3].1;
+            Some(([below.x, below.y, one.min(two), one.max(two)].map(f64::to_bits), if one < two { 1 } else { -1 }))
+        };
+        all.iter().filter_map(place).for_each(|(key, way)| *over.entry(key).or_default() += way);
+        let mut kept = |t: &&[u32; 3]| {
+            let Some((key, way)) = place(t) else { return true };
+            let left = over.entry(key).or_default();
+            let keep = *left * way > 0;
+            *left -= if keep { way } else { 0 };
+            keep
+        };
+        all.iter().filter(|t| kept(t)).map(|t| t.to_vec()).collect()
+    }
+
+    /// A corner of the end, at its level.
+    fn levelled(&self, mut p: DVec2) -> DVec2 {
+        let x = &mut p[self.axis];
+        let i = self.levels.partition_point(|l| *l < *x - 2.0 * self.near);
+        *x = self.levels.get(i).copied().unwrap_or(*x);
+        p
+    }
+}
+
 /// Twice the area, positive counter-clockwise.
 fn area(ring: &[DVec2]) -> f64 {
     (0..ring.len()).map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0])).sum()
@@ -197,7 +330,10 @@ mod tests {
 
     /// The number behind a word of the note about bent walls.
     fn told(import: &Import, behind: &str) -> f64 {
-        let note = import.notes.iter().find(|n| n.text.starts_with("linear_extrude with bent walls")).expect("a note");
+        let bent = |text: &str| {
+            ["linear_extrude with bent walls", "linear_extrude to a line"].iter().any(|b| text.starts_with(b))
+        };
+        let note = import.notes.iter().find(|n| bent(&n.text)).expect("a note");
         let text = &note.text[note.text.find(behind).expect("the word") + behind.len()..];
         text.split([' ', ',']).next().expect("a number").parse().expect("a number")
     }
@@ -218,7 +354,7 @@ mod tests {
     #[test]
     fn twisted_and_unevenly_scaled_outlines_are_the_outline_turned_and_scaled_at_each_height() {
         let mut r = Random(31);
-        for round in 0..6 {
+        for round in 0..18 {
             let ring = |size: f64, r: &mut Random| -> Vec<DVec2> {
                 let n = 3 + (r.unit() * 7.0) as usize;
                 let at = |i: usize| libm::sincos(std::f64::consts::TAU * i as f64 / n as f64);
@@ -227,7 +363,11 @@ mod tests {
             let aside = DVec2::new(r.within(-4.0, 4.0), r.within(-4.0, 4.0));
             let rings: Vec<Vec<DVec2>> =
                 [3.0, 1.0].map(|s| ring(s, &mut r).into_iter().map(|p| p + aside).collect()).into();
-            let (height, scale) = (r.within(1.0, 9.0), [r.within(0.3, 2.0), r.within(0.3, 2.0)]);
+            let (height, mut scale) = (r.within(1.0, 9.0), [r.within(0.3, 2.0), r.within(0.3, 2.0)]);
+            // An end that is a line.
+            if round >= 6 {
+                scale[round % 2] = 0.0;
+            }
             let twist = if round % 4 == 0 { 0.0 } else { r.within(-300.0, 300.0) };
             let center = round % 2 == 0;
             let points: Vec<[f64; 2]> = rings.iter().flatten().map(|p| p.to_array()).collect();
