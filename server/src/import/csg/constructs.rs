@@ -399,7 +399,30 @@ fn cases() -> Vec<(String, Inside, f64)> {
     let text: String = balls.iter().map(|[x, y, z, r]| ball(*x, *y, *z, *r)).collect();
     let all = balls.iter().map(|[x, y, z, r]| (DVec3::new(*x, *y, *z), *r)).collect();
     cases.push((format!("hull() {{ {text} }}"), in_hull(all), 2e-3));
+    cases.extend((0..24).map(turned));
     cases
+}
+
+/// An outline of either side of the axis, turned in flat sides as OpenSCAD has them: each sector holds the outline as far out as its
+/// middle says.
+fn turned(round: u64) -> (String, Inside, f64) {
+    let mut r = Random(100 + round);
+    let pieces = 6 + (r.unit() * 3.0) as u32;
+    let angle =
+        if round.is_multiple_of(3) { 360.0 } else { r.within(130.0, 300.0) * if r.unit() < 0.5 { -1.0 } else { 1.0 } };
+    let side = if round.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let points: Vec<[f64; 2]> = RING.iter().map(|[x, y]| [x * side, *y]).collect();
+    let count = (f64::from(pieces) * angle.abs() / 360.0).floor().max(1.0);
+    // From +x on a part of a turn, from −x a whole one; on the other side of the axis from the other side.
+    let start = if angle == 360.0 { 180.0 } else { angle.min(0.0) } + if side < 0.0 { 180.0 } else { 0.0 };
+    let (turn, step) = (angle.abs(), angle.abs() / count);
+    let inside = move |p: DVec3| {
+        let at = (p.y.atan2(p.x).to_degrees() - start).rem_euclid(360.0);
+        let middle = (start + ((at / step).floor() + 0.5) * step).to_radians();
+        let out = (p.x * middle.cos() + p.y * middle.sin()) / (0.5 * step).to_radians().cos();
+        at < turn && even_odd(&[&RING], DVec2::new(out, p.z))
+    };
+    (revolved(&format!("angle = {angle}, $fn = {pieces}"), &format!("polygon({points:?});")), Box::new(inside), 0.0)
 }
 
 #[test]

@@ -349,6 +349,10 @@ fn what_is_left_out_is_reported() {
         ("cube(1); linear_extrude(height = 0) { circle(1); }", "1:10: linear_extrude of no height: left out"),
         ("cube(1); linear_extrude(height = 1) { circle(0); }", "1:39: circle of no size: left out, as OpenSCAD does"),
         ("cube(1); linear_extrude(height = 1) { polygon([]); }", "1:39: polygon without area: left out"),
+        (
+            "cube(1); intersection() { cube(2); circle(1); }",
+            "1:10: an intersection of solids with a 2D shape: nothing is left, as OpenSCAD has it",
+        ),
         ("cube(1); sphere(r = -nan);", "1:10: sphere of no size: left out, as OpenSCAD does"),
         ("cube(1); sphere(r = inf);", "1:10: sphere of infinite size: left out, as OpenSCAD does"),
         ("cube(1); cube([nan, 1, 1]);", "1:10: cube of no size: left out, as OpenSCAD does"),

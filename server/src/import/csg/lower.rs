@@ -388,7 +388,14 @@ impl<'a> Lowering<'a> {
             return self.projection(call, *cut, open.outside.plane, open.built);
         }
         if open.context.plane.is_none() {
+            // What is flat is nothing to solids, and what an intersection with it leaves is nothing, too.
+            let is_stray = |p: &PartId| matches!(self.shapes.parts.list[*p], Part::Stray(..));
+            let flat = matches!(open.kind, CallKind::Set(Op::Intersection)) && open.built.iter().any(is_stray);
             let (built, stray) = self.of_one_dimension(open.built, open.call.is_none())?;
+            if flat && stray.is_none() && !built.is_empty() {
+                self.note(at, "an intersection of solids with a 2D shape: nothing is left, as OpenSCAD has it", None);
+                return Ok(self.shapes.parts.push(Part::Empty));
+            }
             if let Some((at, name)) = stray {
                 return Ok(self.shapes.parts.push(Part::Stray(at, name)));
             }
@@ -610,6 +617,7 @@ impl<'a> Lowering<'a> {
         let arguments = Turn::arguments(call)?;
         let leaves = flats(&self.shapes.parts, &built);
         let side = self.side_of_axis(at, &leaves, &built)?;
+        let turn = if side < 0.0 { Turn { start: turn.start + 180.0, ..turn } } else { turn };
         let of_leaf = |parts: &Parts<'_>, leaf: PartId| flat_of(parts, leaf).map(Flat::paths).unwrap_or_default();
         let reach = |parts: &Parts<'_>| {
             let points = leaves.iter().flat_map(|l| of_leaf(parts, *l)).flatten();
@@ -653,8 +661,7 @@ impl<'a> Lowering<'a> {
             parts.list[leaf] = lathe.region(parts, &region)?;
         }
         let whole = parts.push(Part::Op(Op::Union, at, built));
-        let start = if side < 0.0 { turn.start + 180.0 } else { turn.start };
-        Ok(match (Turn { start, ..turn }).wedge(parts, at, outer)? {
+        Ok(match turn.wedge(parts, at, outer)? {
             Some(wedge) => parts.push(Part::Op(Op::Intersection, at, vec![whole, wedge])),
             None => whole,
         })
