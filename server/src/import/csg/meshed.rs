@@ -80,6 +80,15 @@ impl Meshed {
         (0..mesh.num_vert()).map(|i| DVec3::from_array(mesh.get_vert_pos(i))).collect()
     }
 
+    /// A point of it; of a convex one well inside.
+    fn inner(&self) -> DVec3 {
+        let corners = self.corners();
+        if self.solid.as_impl().is_convex() {
+            return corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+        }
+        corners.first().copied().unwrap_or_default()
+    }
+
     /// Its box.
     pub fn bounds(&self) -> Aabb {
         Aabb::of_points(self.corners())
@@ -99,8 +108,16 @@ impl Meshed {
         if pairs > MOST_PAIRS {
             return Err((at, Problem::Limit { what: "pairs of facets and corners of a sum", limit: MOST_PAIRS }));
         }
-        let back = Vec3::new(-origin.x, -origin.y, -origin.z);
-        let sum = guarded(at, || self.solid.minkowski_sum(&other.solid).translate(back))?;
+        // The union of what Manifold sums holds the operands, too, as if a point of each were the origin: so it is made to be.
+        let (a, b) = (self.inner(), other.inner());
+        let moved = |solid: &Manifold, by: DVec3| solid.translate(Vec3::new(by.x, by.y, by.z));
+        let sum = guarded(at, || {
+            let (left, right) = (moved(&self.solid, -a), moved(&other.solid, -b));
+            let sum = left.minkowski_sum(&right);
+            // Surfaces alone are summed where neither is convex: not the one all of which is within the other.
+            let whole = if flat(self) || flat(other) { sum } else { sum.union(&left).union(&right) };
+            moved(&whole, a + b - origin)
+        })?;
         Self::checked(at, sum, self.off + other.off)
     }
 

@@ -445,4 +445,50 @@ mod tests {
             assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}: {text}");
         }
     }
+
+    /// The same of prisms, one of them moved, so that it does not hold the origin.
+    #[test]
+    fn sums_of_solids_hold_where_one_meets_the_other_turned_about_the_point() {
+        let mut r = Random(10);
+        for round in 0..16 {
+            let ring = |size: f64, least: f64, r: &mut Random| -> Vec<DVec2> {
+                let n = 3 + (r.unit() * 3.0) as usize;
+                let at = |i: usize| libm::sincos(std::f64::consts::TAU * i as f64 / n as f64);
+                (0..n).map(|i| DVec2::new(at(i).1, at(i).0) * size * r.within(least, 1.0)).collect()
+            };
+            // The second is convex, or not.
+            let (a, b) = (ring(4.0, 0.1, &mut r), ring(1.5, if round % 2 == 0 { 1.0 } else { 0.2 }, &mut r));
+            let shift = r.vector(1.0) * 6.0;
+            let list = |ring: &[DVec2]| format!("{:?}", ring.iter().map(|p| p.to_array()).collect::<Vec<_>>());
+            let prism = |ring: &[DVec2], h: f64| format!("linear_extrude(height = {h}) {{ polygon({}); }}", list(ring));
+            let moved = format!(
+                "multmatrix([[1, 0, 0, {}], [0, 1, 0, {}], [0, 0, 1, {}], [0, 0, 0, 1]]) {{ {} }}",
+                shift.x,
+                shift.y,
+                shift.z,
+                prism(&b, 1.0)
+            );
+            let mut both = [prism(&a, 2.0), moved];
+            if round % 4 > 1 {
+                both.reverse();
+            }
+            let text = format!("minkowski() {{ {} }}", both.concat());
+            let import = import_csg("m.csg", &text, Facets::Auto, &Limits::default());
+            let import = import.unwrap_or_else(|e| panic!("{text}: {e}"));
+            let bounds = import.solid.aabb();
+            let mut seen = [0, 0];
+            for _ in 0..400 {
+                let p = bounds.center() + r.vector(1.1) * bounds.half();
+                let q = p - shift;
+                let turned: Vec<DVec2> = b.iter().map(|b| q.truncate() - *b).collect();
+                let truth = (0.0..=3.0).contains(&q.z) && meet(&a, &turned);
+                let f = import.solid.value(p);
+                if f.abs() > 1e-6 {
+                    assert_eq!(f < 0.0, truth, "{p}, f {f}: {text}");
+                    seen[usize::from(truth)] += 1;
+                }
+            }
+            assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}: {text}");
+        }
+    }
 }
