@@ -5,6 +5,7 @@
 pub mod aabb;
 pub mod ball;
 pub mod ball_tree;
+pub mod bound_queue;
 pub mod f64x2;
 pub mod halt;
 pub mod mix;
@@ -16,6 +17,7 @@ pub mod tolerance;
 pub use aabb::Aabb;
 pub use ball::Ball;
 pub use ball_tree::BallTree;
+pub use bound_queue::BoundQueue;
 pub use f64x2::{F64x2, Lanes};
 pub use moments::Moments;
 pub use oriented::Oriented;

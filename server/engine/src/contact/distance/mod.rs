@@ -7,8 +7,9 @@
 //!
 //! f of a tree is at most the distance and less at sharp features; these bounds are of the distance itself.
 
+pub(in crate::contact) mod active_set;
 pub(in crate::contact) mod part;
-pub(in crate::contact) mod polish;
+mod polish;
 pub(in crate::contact) mod polytope;
 mod search;
 mod span;

@@ -1,24 +1,21 @@
 //! Two near points of two bodies made nearest: a bound from above.
 //!
-//! Around a point a tree is the *and* of some literals: of each group of alternatives the one that holds best there. Least
-//! ½|x − y|² under those of both bodies is found by Newton's method on the conditions of Karush, Kuhn and Tucker with a set of
-//! literals that are taken as met and weights by least squares (J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., 18.1): one that
-//! pulls the wrong way leaves the set, one that is violated enters it. What comes out is a guess; both points are then moved inwards by as
-//! much as rounding may hide, and both trees are asked whether they are inside.
+//! Least ½|x − y|² under the literals that both trees are around the points is found by Newton's method on the conditions of Karush,
+//! Kuhn and Tucker with an active set of literals (`active_set`). What comes out is a guess; both points are then moved inwards by as much
+//! as rounding may hide, and both trees are asked whether they are inside.
 
+use super::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause, eliminated};
 use super::part::{Parts, literal_at};
 use crate::contact::convex::least_of;
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::witness::newton::hessian;
 use crate::motion::Instant;
 use crate::octree::Model;
-use crate::solid::local::{self, Expression, LiteralId, Token};
+use crate::solid::local::{LiteralId, Token};
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
-/// Literals met at a time on one side.
-const MOST_MET: usize = 4;
 /// Unknowns: two points and the weights.
 const MOST: usize = 6 + 2 * MOST_MET;
 /// Steps at most.
@@ -29,9 +26,6 @@ const CHOICES: usize = 3;
 const MET: f64 = 1e-7;
 /// Literals this near to 0, relative to the size, are told as the features of a point.
 const FEATURE: f64 = 1e-9;
-
-/// Literals that hold at a point.
-pub(in crate::contact) type Clause = SmallVec<[LiteralId; 16]>;
 
 /// A point of each body.
 #[derive(Clone, Copy, Debug)]
@@ -67,47 +61,10 @@ pub struct Polish<'s, 'a> {
     pub rounding: f64,
 }
 
-/// Appends an *and* of literals at x: of alternatives the one that is least there. False where a mesh's part stands in the way.
-pub(in crate::contact) fn choose(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64, out: &mut Clause) -> bool {
-    match local::first(tokens).0 {
-        Expression::Literal(id) => out.push(id),
-        Expression::And(mut body) => {
-            while !body.is_empty() {
-                let n = local::first(body).1;
-                if !choose(&body[..n], psi, out) {
-                    return false;
-                }
-                body = &body[n..];
-            }
-        }
-        Expression::Or(mut body) => {
-            let mut best: Option<(f64, &[Token])> = None;
-            while !body.is_empty() {
-                let n = local::first(body).1;
-                let v = local::value(&body[..n], psi);
-                if best.is_none_or(|b| v < b.0) {
-                    best = Some((v, &body[..n]));
-                }
-                body = &body[n..];
-            }
-            return best.is_some_and(|b| choose(b.1, psi, out));
-        }
-        Expression::Part(_) => return false,
-    }
-    true
-}
-
-/// The literals that are taken as met, with their weights.
-type Met = SmallVec<[(LiteralId, f64); MOST_MET]>;
-
 impl Polish<'_, '_> {
     fn clause(&self, side: usize, x: DVec3) -> Option<Clause> {
         let Side { parts, tokens, .. } = self.sides[side];
-        let mut clause = Clause::new();
-        if tokens.is_empty() {
-            return Some(clause);
-        }
-        choose(tokens, &mut |f| parts.solid.faces[f as usize].value(x), &mut clause).then_some(clause)
+        clause(tokens, &mut |f| parts.solid.faces[f as usize].value(x))
     }
 
     fn at(&self, side: usize, id: LiteralId, x: DVec3) -> (f64, DVec3) {
@@ -189,18 +146,16 @@ impl Polish<'_, '_> {
 
     /// Newton's steps of both points, or of the one that is not held.
     fn solve(&self, clauses: &[Clause; 2], (mut x, mut y): (DVec3, DVec3), held: Option<usize>) -> (DVec3, DVec3) {
-        let mut met: [Met; 2] = Default::default();
+        let mut met: [ActiveSet; 2] = Default::default();
         let (near, tiny) = (MET * self.scale, 4.0 * self.rounding);
         for (side, p) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
-            let mut all: SmallVec<[(f64, LiteralId); 16]> =
-                clauses[side].iter().map(|id| (self.at(side, *id, p).0, *id)).filter(|v| v.0 > -near).collect();
-            all.sort_by(|p, q| q.0.total_cmp(&p.0));
-            met[side] = all.iter().take(MOST_MET).map(|v| (v.1, 0.0)).collect();
+            met[side] = ActiveSet::new(&clauses[side], near, |id| self.at(side, id, p).0);
         }
         for _ in 0..STEPS {
             let way = self.at.a_point(y) - x;
-            self.weigh(0, &mut met[0], x, way);
-            self.weigh(1, &mut met[1], y, -(self.at.b_from_a * way));
+            // Towards the other point, in the side's frame.
+            met[0].weigh(way, |id| self.at(0, id, x).1);
+            met[1].weigh(-(self.at.b_from_a * way), |id| self.at(1, id, y).1);
             let Some((p, q)) = self.step(&met, (x, y), held) else { break };
             let length = p.length().max(q.length());
             let most = 0.25 * self.scale;
@@ -208,15 +163,7 @@ impl Polish<'_, '_> {
             (x, y) = (x + p * damp, y + q * damp);
             let mut changed = false;
             for (side, at) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
-                let out = clauses[side].iter().filter(|id| !met[side].iter().any(|m| m.0 == **id));
-                let worst = out.map(|id| (self.at(side, *id, at).0, *id)).max_by(|a, b| a.0.total_cmp(&b.0));
-                if let Some((value, id)) = worst
-                    && value > tiny
-                    && met[side].len() < MOST_MET
-                {
-                    met[side].push((id, 0.0));
-                    changed = true;
-                }
+                changed |= met[side].enter(&clauses[side], tiny, |id| self.at(side, id, at).0);
             }
             if !changed && length <= 1e-14 * self.scale {
                 break;
@@ -225,34 +172,8 @@ impl Polish<'_, '_> {
         (x, y)
     }
 
-    /// Gives the met literals of one side the weights with which their gradients pull most nearly along `way` (towards the other point,
-    /// the side's frame), those that would pull back leaving: least squares without negative weights.
-    fn weigh(&self, side: usize, met: &mut Met, x: DVec3, way: DVec3) {
-        loop {
-            let gradients: SmallVec<[DVec3; MOST_MET]> = met.iter().map(|m| self.at(side, m.0, x).1).collect();
-            let n = gradients.len();
-            let (mut a, mut f) = ([[0.0; MOST]; MOST], [0.0; MOST]);
-            for i in 0..n {
-                for j in 0..n {
-                    a[i][j] = gradients[i].dot(gradients[j]);
-                }
-                a[i][i] += REGULAR;
-                f[i] = gradients[i].dot(way);
-            }
-            let Some(weights) = eliminated(&mut a, f, n) else { return };
-            for (m, weight) in met.iter_mut().zip(weights) {
-                m.1 = weight;
-            }
-            let back = (0..n).min_by(|i, j| weights[*i].total_cmp(&weights[*j]));
-            match back.filter(|i| weights[*i] < -1e-9 * way.length()) {
-                Some(i) => met.remove(i),
-                None => return,
-            };
-        }
-    }
-
     /// One step of both points, each in its frame.
-    fn step(&self, met: &[Met; 2], (x, y): (DVec3, DVec3), held: Option<usize>) -> Option<(DVec3, DVec3)> {
+    fn step(&self, met: &[ActiveSet; 2], (x, y): (DVec3, DVec3), held: Option<usize>) -> Option<(DVec3, DVec3)> {
         let n = 6 + met[0].len() + met[1].len();
         let mut a = [[0.0; MOST]; MOST];
         let mut f = [0.0; MOST];
@@ -261,12 +182,12 @@ impl Polish<'_, '_> {
         let mut blocks = [0, 1].map(|side| DMat3::IDENTITY * stiff(side));
         let mut k = 6;
         for side in [0, 1] {
-            for (id, weight) in &met[side] {
+            for (id, weight) in met[side].iter() {
                 let p = if side == 0 { x } else { y };
                 let face = &self.sides[side].parts.solid.faces[id.face() as usize];
                 let (value, mut g) = literal_at(face, id.sense(), p);
                 let sign = if id.sense() == Sense::Positive { 1.0 } else { -1.0 };
-                let mut h = hessian(face, p) * (sign * *weight);
+                let mut h = hessian(face, p) * (sign * weight);
                 if side == 1 {
                     // Along A's axes.
                     g = self.at.a_vector(g);
@@ -279,7 +200,7 @@ impl Polish<'_, '_> {
                     a[k][3 * side + i] = g[i];
                 }
                 a[k][k] = -REGULAR;
-                f[k] = -value - REGULAR * *weight;
+                f[k] = -value - REGULAR * weight;
                 k += 1;
             }
         }
@@ -315,40 +236,3 @@ impl Polish<'_, '_> {
 
 /// Stiffness that holds a point.
 const HELD: f64 = 1e30;
-
-/// What is added to the curvature of the distance and taken from the conditions, so that neither what slides freely nor a condition
-/// too many makes the system singular.
-const REGULAR: f64 = 1e-10;
-
-/// Solves a system by elimination with partial pivoting.
-pub(in crate::contact) fn eliminated<const N: usize>(
-    a: &mut [[f64; N]; N],
-    mut f: [f64; N],
-    n: usize,
-) -> Option<[f64; N]> {
-    for k in 0..n {
-        let p = (k..n).max_by(|p, q| a[*p][k].abs().total_cmp(&a[*q][k].abs()))?;
-        if a[p][k] == 0.0 || !a[p][k].is_finite() {
-            return None;
-        }
-        a.swap(k, p);
-        f.swap(k, p);
-        let row = a[k];
-        for i in k + 1..n {
-            let factor = a[i][k] / row[k];
-            if factor != 0.0 {
-                for j in k + 1..n {
-                    a[i][j] -= factor * row[j];
-                }
-                f[i] -= factor * f[k];
-            }
-        }
-    }
-    for k in (0..n).rev() {
-        for j in k + 1..n {
-            f[k] -= a[k][j] * f[j];
-        }
-        f[k] /= a[k][k];
-    }
-    Some(f)
-}

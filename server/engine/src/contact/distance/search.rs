@@ -6,14 +6,12 @@ use super::polytope::support;
 use super::span::{Span, Stray};
 use super::{Distance, DistanceQuery, NearPoint};
 use crate::contact::convex::{Cores, of_supports};
-use crate::math::Aabb;
+use crate::math::{Aabb, BoundQueue};
 use crate::motion::{Instant, Relative, Sweep};
 use crate::octree::Model;
 use crate::solid::Sense;
 use crate::solid::local::LiteralId;
 use glam::DVec3;
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 /// Rounds in which a pair of parts takes tangents where its hulls come nearest.
 const ROUNDS: usize = 6;
@@ -41,28 +39,6 @@ struct Cell {
     y: DVec3,
     /// What of the hulls' distance is lost to time.
     lost: f64,
-    number: u64,
-}
-
-impl PartialEq for Cell {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Cell {}
-
-impl PartialOrd for Cell {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Cell {
-    /// The lowest bound is the greatest; of equals the one made last.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.bound.total_cmp(&self.bound).then(self.number.cmp(&other.number))
-    }
 }
 
 /// Points that hold a part within a radius of their hull.
@@ -85,7 +61,7 @@ pub struct Search<'a> {
     slack: f64,
     scale: f64,
     limit: u64,
-    heap: BinaryHeap<Cell>,
+    queue: BoundQueue<Cell>,
     /// The least bound of what is done with.
     done: f64,
     best: Option<(Pair, f64)>,
@@ -118,7 +94,7 @@ impl<'a> Search<'a> {
             slack,
             scale,
             limit: query.limit,
-            heap: BinaryHeap::new(),
+            queue: BoundQueue::new(),
             done: f64::INFINITY,
             best: None,
             upper: f64::INFINITY,
@@ -139,8 +115,7 @@ impl<'a> Search<'a> {
             self.first_points(from, to);
             self.push(0, 0, 0, 0.0);
             self.search();
-            let open = self.heap.peek().map_or(f64::INFINITY, |cell| cell.bound);
-            let lower = open.min(self.done).min(self.upper);
+            let lower = self.queue.lowest().min(self.done).min(self.upper);
             return self.answer(lower, from);
         }
         self.answer(0.0, from)
@@ -314,13 +289,14 @@ impl<'a> Search<'a> {
         self.upper - self.tolerance
     }
 
+    fn is_enough(&self) -> bool {
+        self.queue.lowest() >= self.goal() || self.upper == 0.0 || self.cells >= self.limit
+    }
+
     fn search(&mut self) {
         let mut looks = 0u64;
-        while let Some(cell) = self.heap.peek().copied() {
-            if cell.bound >= self.goal() || self.upper == 0.0 || self.cells >= self.limit {
-                return;
-            }
-            self.heap.pop();
+        while !self.is_enough() {
+            let Some((_, cell)) = self.queue.pop() else { return };
             looks += 1;
             if looks <= FIRST || looks.is_multiple_of(EVERY) {
                 let at = self.spans[cell.span as usize].middle;
@@ -343,7 +319,7 @@ impl<'a> Search<'a> {
     fn push(&mut self, a: u32, b: u32, span: u32, least: f64) {
         self.cells += 1;
         if let Look::Open(cell) = self.look([a, b], span, least) {
-            self.heap.push(cell);
+            self.queue.push(cell.bound, cell);
         }
     }
 
@@ -389,7 +365,7 @@ impl<'a> Search<'a> {
         }
         let at = self.spans[span as usize].middle;
         let [a, b] = parts;
-        Look::Open(Cell { a, b, span, bound, x: near.0, y: at.b_point(near.1), lost, number: self.cells })
+        Look::Open(Cell { a, b, span, bound, x: near.0, y: at.b_point(near.1), lost })
     }
 
     /// Takes the tangents of convex faces at the points where two hulls are nearest. False where nothing changes.

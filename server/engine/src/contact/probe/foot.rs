@@ -1,12 +1,11 @@
 //! The foot of a point on a solid: a guess made nearest by Newton's steps, then proven to be in what is sought. A bound from above.
 //!
-//! Least ½|y − x|² under the literals that are met, by Newton's method on the conditions of Karush, Kuhn and Tucker with a set of them that
-//! changes: one that pulls the wrong way leaves, one that is violated enters (J. Nocedal, S. Wright, Numerical Optimization, 2nd ed.,
-//! 18.1). As two points of two bodies are made nearest (`contact/distance/polish`), with one of them fixed.
+//! Least ½|y − x|² under the literals that are met, by Newton's method on the conditions of Karush, Kuhn and Tucker with an active set of
+//! them (`contact/distance/active_set`). As two points of two bodies are made nearest (`contact/distance/polish`), with one of them fixed.
 
 use super::{Sought, literal_at};
 use crate::contact::convex::least_of;
-use crate::contact::distance::polish::{Clause, choose, eliminated};
+use crate::contact::distance::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause, eliminated};
 use crate::contact::witness::newton::hessian;
 use crate::octree::Model;
 use crate::solid::Sense;
@@ -14,8 +13,6 @@ use crate::solid::local::{LiteralId, Token};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
-/// Literals met at a time.
-const MOST_MET: usize = 4;
 /// Unknowns: a point and the weights.
 const MOST: usize = 3 + MOST_MET;
 /// Steps at most.
@@ -24,8 +21,6 @@ const STEPS: usize = 40;
 const CHOICES: usize = 3;
 /// Literals this near to 0, relative to the size, count as met at first.
 const MET: f64 = 1e-7;
-/// What is added to the curvature of the distance and taken from the conditions, so that no system is singular.
-const REGULAR: f64 = 1e-10;
 /// Steps of the first descent along f.
 const DESCENT: usize = 64;
 
@@ -43,9 +38,6 @@ pub struct Ground<'a> {
     /// The size at hand, a length.
     pub scale: f64,
 }
-
-/// The literals that are taken as met, with their weights.
-type Met = SmallVec<[(LiteralId, f64); MOST_MET]>;
 
 impl Ground<'_> {
     /// f as it is negative in what is sought.
@@ -105,11 +97,7 @@ impl Ground<'_> {
     }
 
     fn clause(&self, tokens: &[Token], y: DVec3) -> Option<Clause> {
-        let mut clause = Clause::new();
-        if tokens.is_empty() {
-            return Some(clause);
-        }
-        choose(tokens, &mut |f| self.model.solid.faces[f as usize].value(y), &mut clause).then_some(clause)
+        clause(tokens, &mut |f| self.model.solid.faces[f as usize].value(y))
     }
 
     /// The apexes of cones of a clause.
@@ -142,66 +130,35 @@ impl Ground<'_> {
     }
 
     fn solve(&self, clause: &Clause, mut y: DVec3) -> DVec3 {
-        let near = MET * self.scale;
-        let mut all: SmallVec<[(f64, LiteralId); 16]> =
-            clause.iter().map(|id| (self.at(*id, y).0, *id)).filter(|v| v.0 > -near).collect();
-        all.sort_by(|p, q| q.0.total_cmp(&p.0));
-        let mut met: Met = all.iter().take(MOST_MET).map(|v| (v.1, 0.0)).collect();
+        let mut met = ActiveSet::new(clause, MET * self.scale, |id| self.at(id, y).0);
         for _ in 0..STEPS {
-            self.weigh(&mut met, y);
+            met.weigh(self.x - y, |id| self.at(id, y).1);
             let Some(step) = self.step(&met, y) else { break };
             let (length, most) = (step.length(), 0.25 * self.scale);
             y += step * if length > most { most / length } else { 1.0 };
-            let out = clause.iter().filter(|id| !met.iter().any(|m| m.0 == **id));
-            let worst = out.map(|id| (self.at(*id, y).0, *id)).max_by(|a, b| a.0.total_cmp(&b.0));
-            let enters = worst.filter(|w| w.0 > 4.0 * self.rounding && met.len() < MOST_MET);
-            met.extend(enters.map(|w| (w.1, 0.0)));
-            if enters.is_none() && length <= 1e-14 * self.scale {
+            let enters = met.enter(clause, 4.0 * self.rounding, |id| self.at(id, y).0);
+            if !enters && length <= 1e-14 * self.scale {
                 break;
             }
         }
         y
     }
 
-    /// Weights with which the gradients pull most nearly towards the point, those that would pull back leaving.
-    fn weigh(&self, met: &mut Met, y: DVec3) {
-        let way = self.x - y;
-        loop {
-            let gradients: SmallVec<[DVec3; MOST_MET]> = met.iter().map(|m| self.at(m.0, y).1).collect();
-            let n = gradients.len();
-            let (mut a, mut f) = ([[0.0; MOST]; MOST], [0.0; MOST]);
-            for i in 0..n {
-                for j in 0..n {
-                    a[i][j] = gradients[i].dot(gradients[j]);
-                }
-                a[i][i] += REGULAR;
-                f[i] = gradients[i].dot(way);
-            }
-            let Some(weights) = eliminated(&mut a, f, n) else { return };
-            met.iter_mut().zip(weights).for_each(|(m, weight)| m.1 = weight);
-            let back = (0..n).min_by(|i, j| weights[*i].total_cmp(&weights[*j]));
-            match back.filter(|i| weights[*i] < -1e-9 * way.length()) {
-                Some(i) => met.remove(i),
-                None => return,
-            };
-        }
-    }
-
-    fn step(&self, met: &Met, y: DVec3) -> Option<DVec3> {
+    fn step(&self, met: &ActiveSet, y: DVec3) -> Option<DVec3> {
         let n = 3 + met.len();
         let (mut a, mut f) = ([[0.0; MOST]; MOST], [0.0; MOST]);
         let mut block = DMat3::IDENTITY * (1.0 + REGULAR);
         for (i, (id, weight)) in met.iter().enumerate() {
             let face = &self.model.solid.faces[id.face() as usize];
-            let (value, g) = self.at(*id, y);
+            let (value, g) = self.at(id, y);
             let sign = if id.sense() == Sense::Positive { 1.0 } else { -1.0 };
-            block += hessian(face, y) * (sign * *weight);
+            block += hessian(face, y) * (sign * weight);
             let k = 3 + i;
             for j in 0..3 {
                 (a[j][k], a[k][j]) = (g[j], g[j]);
             }
             a[k][k] = -REGULAR;
-            f[k] = -value - REGULAR * *weight;
+            f[k] = -value - REGULAR * weight;
         }
         let way = self.x - y;
         for i in 0..3 {

@@ -9,13 +9,11 @@ use super::{Sought, children, has_octree, open_voxel, worthwhile};
 use crate::contact::convex::{Cores, of_supports};
 use crate::contact::distance::part::{Cut, Part, Parts};
 use crate::contact::distance::polytope::support;
-use crate::math::Aabb;
+use crate::math::{Aabb, BoundQueue};
 use crate::octree::Node;
 use crate::solid::Sense;
 use crate::solid::local::{self, LiteralId, Truth};
 use glam::DVec3;
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 /// Rounds in which a part takes tangents where its hull is nearest.
 const ROUNDS: usize = 6;
@@ -36,42 +34,13 @@ const SHALLOW: f64 = 4.0;
 /// Convex faces this near to the foot, relative to the size, are touched there.
 const TANGENT: f64 = 1e-6;
 
-/// What a cell is of.
+/// A cell of the queue.
 #[derive(Clone, Copy, Debug)]
 enum Place<'a> {
     /// A voxel, and how many terms are worth its decomposition.
     Voxel(&'a Node, usize),
     /// A part, and where its hull is nearest.
     Part(u32, DVec3),
-}
-
-/// A cell of the queue.
-#[derive(Clone, Copy, Debug)]
-struct Cell<'a> {
-    place: Place<'a>,
-    bound: f64,
-    number: u64,
-}
-
-impl PartialEq for Cell<'_> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Cell<'_> {}
-
-impl PartialOrd for Cell<'_> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Cell<'_> {
-    /// The lowest bound is the greatest; of equals the one made last.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.bound.total_cmp(&self.bound).then(self.number.cmp(&other.number))
-    }
 }
 
 /// When a search may end.
@@ -104,7 +73,7 @@ struct Search<'a> {
     around: Aabb,
     parts: Parts<'a>,
     enough: Enough,
-    heap: BinaryHeap<Cell<'a>>,
+    queue: BoundQueue<Place<'a>>,
     done: f64,
     foot: Option<DVec3>,
     upper: f64,
@@ -114,9 +83,9 @@ struct Search<'a> {
 /// The distance of a point from what is sought.
 pub fn distance(ground: Ground, enough: Enough) -> Known {
     let parts = Parts::none(&ground.model.solid, ground.rounding);
-    let (heap, around) = (BinaryHeap::new(), Aabb::ALL);
+    let (queue, around) = (BoundQueue::new(), Aabb::ALL);
     let (done, upper, foot) = (f64::INFINITY, f64::INFINITY, None);
-    let mut search = Search { ground, around, parts, enough, heap, done, foot, upper, cells: 0 };
+    let mut search = Search { ground, around, parts, enough, queue, done, foot, upper, cells: 0 };
     search.keep(ground.descended());
     search.run()
 }
@@ -165,8 +134,7 @@ impl<'a> Search<'a> {
     }
 
     fn known(self, reach: f64) -> Known {
-        let open = self.heap.peek().map_or(f64::INFINITY, |cell| cell.bound);
-        let lower = open.min(self.done).min(self.upper).min(reach).max(0.0);
+        let lower = self.queue.lowest().min(self.done).min(self.upper).min(reach).max(0.0);
         Known { lower, upper: self.upper, foot: self.foot, cells: self.cells }
     }
 
@@ -176,20 +144,17 @@ impl<'a> Search<'a> {
 
     fn search(&mut self) {
         let mut looks = 0u64;
-        while let Some(cell) = self.heap.peek().copied() {
-            if self.is_enough(cell.bound.min(self.done)) || self.cells >= self.enough.limit {
-                return;
-            }
-            self.heap.pop();
-            match cell.place {
-                Place::Voxel(node, most) => self.open(node, most, cell.bound),
+        while !self.is_enough(self.queue.lowest().min(self.done)) && self.cells < self.enough.limit {
+            let Some((bound, place)) = self.queue.pop() else { return };
+            match place {
+                Place::Voxel(node, most) => self.open(node, most, bound),
                 Place::Part(part, y) => {
                     looks += 1;
                     if looks <= FIRST || looks.is_multiple_of(EVERY) {
                         let found = self.ground.foot(&self.parts[part].tokens, y);
                         self.keep(found);
                     }
-                    let bound = cell.bound.max(self.at_foot(part));
+                    let bound = bound.max(self.at_foot(part));
                     if bound < self.goal() {
                         self.branch(part, y, bound);
                     } else {
@@ -204,7 +169,7 @@ impl<'a> Search<'a> {
         if bound >= self.goal() {
             self.done = self.done.min(bound);
         } else {
-            self.heap.push(Cell { place, bound, number: self.cells });
+            self.queue.push(bound, place);
         }
     }
 
