@@ -5,13 +5,17 @@
 //!
 //! Floor 13: may import everything else.
 
+mod arguments;
 mod joints;
 mod overlaps;
 mod pages;
 mod recorded;
 
-use self::joints::{ClearanceArguments, JointArguments, is_scene, read_scene, without_touching};
-use self::overlaps::OverlapsArguments;
+use self::arguments::{
+    Arguments, CheckArguments, Command, RecordArguments, ReplayArguments, ServeArguments, SessionsCommand,
+    ViewArguments,
+};
+use self::joints::{JointArguments, is_scene, read_scene, without_touching};
 use crate::cache::{self, Cache, Prepared};
 use crate::check::Check;
 use crate::contact::Status;
@@ -27,10 +31,10 @@ use crate::picture::{
     scene::{Actor, Meeting},
 };
 use crate::report::{self, Answer, PairReport, TableStyle};
-use crate::terminal::{Colour, Paint, clean};
+use crate::terminal::{Paint, clean};
 use crate::view::show::Show;
 use crate::world::{PairOutcome, StepOutcome};
-use clap::{Parser, Subcommand};
+use clap::Parser as _;
 use contactd_proto::ErrorCode;
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
 use std::error::Error;
@@ -39,173 +43,6 @@ use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Certified earliest contact of solids modelled by constructive solid geometry.
-#[derive(Parser)]
-#[command(name = "contactd", bin_name = "contactd", version, about)]
-struct Arguments {
-    /// Colour in what is printed: auto is where it goes to a terminal, unless NO_COLOR is set.
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_possible_values = true)]
-    color: Colour,
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(Subcommand)]
-enum Command {
-    /// One step of a scene in this process, without a server: the earliest contact of every pair. Of models: whether they overlap.
-    Check(CheckArguments),
-    /// The least clearance of a robot over ranges of its joints, proven, or a clash: exit status 1 where there is one.
-    Clearance(ClearanceArguments),
-    /// What is in each other of a geometry (GDML) or a scene, each pair proven: exit status 1 where something is.
-    Overlaps(OverlapsArguments),
-    /// The server, until SIGINT or SIGTERM; prints one line when ready.
-    Serve(ServeArguments),
-    /// The servers of this user: their sessions, steps a second, how long steps took in the last minute, memory.
-    Status {
-        /// Only the server of this name.
-        #[arg(long)]
-        name: Option<String>,
-        /// One JSON object instead of text.
-        #[arg(long)]
-        json: bool,
-    },
-    /// What can be done to a server's sessions; `contactd status` lists them.
-    Sessions {
-        #[command(subcommand)]
-        what: SessionsCommand,
-    },
-    /// Records the steps of a running server into a file, until SIGINT or SIGTERM.
-    Record(RecordArguments),
-    /// Repeats a recording and compares every bit; the exit status is 1 where an answer differs.
-    Replay(ReplayArguments),
-    /// A server process and a client process on real parts: steps, earliest contacts, latencies.
-    Demo {
-        /// The engine in this process instead of a server.
-        #[arg(long)]
-        embedded: bool,
-        /// Also write every contact, numbers exact, into a file.
-        #[arg(long, value_name = "FILE")]
-        csv: Option<PathBuf>,
-        /// One line for each contact of the table, however long, with its point and normal; else it has 80 columns.
-        #[arg(long)]
-        wide: bool,
-        /// Write the scene of one step instead, for `contactd check`.
-        #[arg(long, value_name = "STEP", conflicts_with_all = ["embedded", "csv", "cache", "wide"])]
-        scene_of: Option<usize>,
-        /// Where that scene and its models go.
-        #[arg(long, value_name = "FOLDER", default_value = ".", requires = "scene_of")]
-        into: PathBuf,
-        #[command(flatten)]
-        cache: CacheArguments,
-    },
-    /// A scene in a browser: a page on this machine alone, until it is ended by SIGINT; prints the page's address.
-    View(ViewArguments),
-    /// What is in a model or scene file, and how it was imported.
-    Inspect {
-        /// A model (.scad, .csg, .stl, .off, .obj), a scene (.toml) or a robot (.urdf, .sdf, MJCF's .xml).
-        file: PathBuf,
-        /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
-        #[arg(long, default_value = "auto", value_parser = facets)]
-        facets: Facets,
-        /// Also draw it, into an .svg or .png file: a model's tree with its bounds and its octree, a scene's contacts.
-        #[arg(long, value_name = "FILE")]
-        picture: Option<PathBuf>,
-        /// Where the camera of a scene's picture stands, seen from the scene; else where it sees the contacts.
-        #[arg(long, value_name = "X,Y,Z", requires = "picture", value_parser = direction, allow_hyphen_values = true)]
-        camera: Option<glam::DVec3>,
-        #[command(flatten)]
-        joints: JointArguments,
-        #[command(flatten)]
-        access: AccessArguments,
-        #[command(flatten)]
-        cache: CacheArguments,
-    },
-    /// A script for a shell that completes these commands and their options: bash, elvish, fish, powershell or zsh.
-    Completions {
-        /// The shell.
-        #[arg(hide_possible_values = true)]
-        shell: clap_complete::Shell,
-    },
-    /// This program's pages for `man`, one for each command.
-    Man {
-        /// The folder that they go to, made if need be.
-        #[arg(value_name = "FOLDER")]
-        folder: PathBuf,
-    },
-}
-
-#[derive(Subcommand)]
-enum SessionsCommand {
-    /// Ends a session; its client is told, and others go on.
-    End {
-        /// Its number, as `contactd status` tells it.
-        #[arg(value_name = "N")]
-        session: u64,
-        /// The server.
-        #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
-        name: String,
-    },
-}
-
-#[derive(clap::Args)]
-struct RecordArguments {
-    /// The server.
-    #[arg(default_value = contactd_proto::names::DEFAULT_NAME)]
-    name: String,
-    /// The file; it does not exist before.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
-    /// One session, as `contactd status` numbers them; else all, those to come too.
-    #[arg(long, value_name = "N")]
-    session: Option<u64>,
-    /// Ends after this time.
-    #[arg(long, value_parser = seconds)]
-    seconds: Option<Duration>,
-}
-
-#[derive(clap::Args)]
-struct ReplayArguments {
-    /// The recording.
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
-    /// One step, by its number in the recording, from 1: written as a scene, and not repeated.
-    #[arg(long, value_name = "N", requires = "scene")]
-    step: Option<u64>,
-    /// The folder for that scene; it does not exist before.
-    #[arg(long, value_name = "DIR", requires = "step")]
-    scene: Option<PathBuf>,
-}
-
-#[derive(clap::Args)]
-struct ServeArguments {
-    /// Its name: clients connect to it by this.
-    #[arg(long, default_value = contactd_proto::names::DEFAULT_NAME)]
-    name: String,
-    /// A TOML file of limits and waiting times.
-    #[arg(long)]
-    config: Option<PathBuf>,
-    /// Milliseconds within which a step is answered, undecided where it is not known by then; 0: no such limit.
-    #[arg(long, value_name = "MS")]
-    deadline: Option<u64>,
-    /// A folder of this machine: texts that clients send may import files of it and below. Else they import none.
-    #[arg(long, value_name = "DIR")]
-    import_root: Option<PathBuf>,
-    /// A folder in which this start of the server records all of its steps, into a new file.
-    #[arg(long, value_name = "DIR")]
-    record: Option<PathBuf>,
-    /// A port of 127.0.0.1 on which OpenMetrics are told; 0: any that is free. Else none are.
-    #[arg(long, value_name = "PORT")]
-    metrics: Option<u16>,
-    /// Tells models and refused commands too, on standard error; else as CONTACTD_LOG says (warn, info, debug), or sessions alone.
-    #[arg(short, long, conflicts_with = "quiet")]
-    verbose: bool,
-    /// Tells only what is wrong.
-    #[arg(short, long)]
-    quiet: bool,
-    #[command(flatten)]
-    cache: CacheArguments,
-}
 
 /// What reading a file may reach beside it.
 #[derive(clap::Args)]
@@ -246,69 +83,6 @@ impl CacheArguments {
         let folder = self.cache.as_ref().and_then(CacheFolder::folder)?;
         Cache::open(folder, cache::DEFAULT_BYTES).map_err(|e| warn(&e)).ok()
     }
-}
-
-#[derive(clap::Args)]
-struct CheckArguments {
-    /// The scene's .toml file, or a robot's (.urdf, .sdf, MJCF's .xml); or models, which are taken as they stand.
-    #[arg(required = true)]
-    files: Vec<PathBuf>,
-    /// One JSON object instead of a table: every pair, every digit.
-    #[arg(long)]
-    json: bool,
-    /// Clear pairs in the table, too: else those alone that touch or come within their margin.
-    #[arg(long)]
-    all: bool,
-    /// One line for each pair, however long, and nine digits; else the table has 80 columns.
-    #[arg(long)]
-    wide: bool,
-    /// Resolution for every pair, in the models' unit.
-    #[arg(long, value_parser = length)]
-    resolution: Option<f64>,
-    /// Only the pairs that meet first.
-    #[arg(long)]
-    first: bool,
-    /// Also write the proof of every answer, for another program to check (docs/certificate.md).
-    #[arg(long, value_name = "FILE")]
-    certificate: Option<PathBuf>,
-    /// What each answer cost: by which stage it was told, counts of work, the time of each stage (beside --json: on
-    /// standard error).
-    #[arg(long)]
-    explain: bool,
-    /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
-    #[arg(long, default_value = "auto", value_parser = facets)]
-    facets: Facets,
-    #[command(flatten)]
-    joints: JointArguments,
-    #[command(flatten)]
-    access: AccessArguments,
-    #[command(flatten)]
-    cache: CacheArguments,
-}
-
-#[derive(clap::Args)]
-struct ViewArguments {
-    /// The scene's .toml file, a robot's (.urdf, .sdf, MJCF's .xml), a recording (.mcap); or models, which are taken as they stand.
-    #[arg(required_unless_present = "demo")]
-    files: Vec<PathBuf>,
-    /// The acts of the demo instead.
-    #[arg(long, conflicts_with = "files")]
-    demo: bool,
-    /// The port of 127.0.0.1; 0: any that is free.
-    #[arg(long, default_value = "0")]
-    port: u16,
-    /// Writes it as one binary glTF file, moving objects and contacts as an animation, and serves no page.
-    #[arg(long, value_name = "FILE.glb", conflicts_with = "port")]
-    gltf: Option<PathBuf>,
-    /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
-    #[arg(long, default_value = "auto", value_parser = facets)]
-    facets: Facets,
-    #[command(flatten)]
-    joints: JointArguments,
-    #[command(flatten)]
-    access: AccessArguments,
-    #[command(flatten)]
-    cache: CacheArguments,
 }
 
 /// What the process ends with.

@@ -1,6 +1,6 @@
 //! What is made of the command line itself: pages for `man`, scripts that complete words in a shell.
 
-use super::Arguments;
+use super::arguments::Arguments;
 use clap::CommandFactory as _;
 use std::path::{Path, PathBuf};
 

@@ -23,6 +23,15 @@ pub struct Flat {
     pub pieces: u32,
 }
 
+/// The plane of an extrusion, seen from a call inside of it.
+#[derive(Clone, Copy)]
+pub struct Plane {
+    /// From the call's coordinates to the plane's.
+    pub inner: DAffine3,
+    /// How often the call is subtracted.
+    pub overshoot: u32,
+}
+
 /// The kinds of flat shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outline {

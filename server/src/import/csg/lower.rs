@@ -6,28 +6,26 @@
 //! exactly one leaf. What a call makes of all that is inside of it (an extrusion, a hull, a sum, an offset) is made when it closes.
 
 use super::arguments::{Arguments, OTHER_FILES, finite};
-use super::convex;
+use super::combined;
 use super::extrude::Extrusion;
-use super::flat::{Flat, Outline};
+use super::flat::{Flat, Outline, Plane};
 use super::imports;
-use super::meshed::Meshed;
 use super::offset::Offset;
 use super::outlines::{self, flat_of, flats};
 use super::parts::{Part, PartId, Parts, emit, is_unbounded};
 use super::place;
-use super::polygon::Region;
 use super::quadrics;
-use super::revolve::{Lathe, Turn};
+use super::revolve::Turn;
 use super::shapes::Shapes;
 use super::superellipsoid;
 use super::syntax::{Call, CallId, FLATTEN, File, Value, ValueKind};
 use super::{Facets, Import, Limits, Place, Problem};
-use super::{resize, shadow, text, twist};
+use super::{resize, text, twist};
 use crate::import::{Attachment, Note};
 use crate::math::Aabb;
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
 use crate::solid::Op;
-use glam::{DAffine3, DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -63,14 +61,6 @@ struct Context {
     plane: Option<Plane>,
     /// Below a hull with nothing but unions in between: points are all that counts.
     hull: bool,
-}
-
-#[derive(Clone, Copy)]
-struct Plane {
-    /// From the call's coordinates to the plane's.
-    inner: DAffine3,
-    /// How often the call is subtracted.
-    overshoot: u32,
 }
 
 /// What a call makes of what is inside of it.
@@ -385,13 +375,13 @@ impl<'a> Lowering<'a> {
     fn close(&mut self, open: Open<'_>) -> Result<PartId> {
         let at = open.at();
         if let (CallKind::Projection { cut }, Some(call)) = (&open.kind, open.call) {
-            return self.projection(call, *cut, open.outside.plane, open.built);
+            return combined::projection(&mut self.shapes.parts, call, *cut, open.outside.plane, open.built);
         }
         if open.context.plane.is_none() {
             // What is flat is nothing to solids, and what an intersection with it leaves is nothing, too.
             let is_stray = |p: &PartId| matches!(self.shapes.parts.list[*p], Part::Stray(..));
             let flat = matches!(open.kind, CallKind::Set(Op::Intersection)) && open.built.iter().any(is_stray);
-            let (built, stray) = self.of_one_dimension(open.built, open.call.is_none())?;
+            let (built, stray) = combined::of_one_dimension(&mut self.shapes.parts, open.built, open.call.is_none())?;
             if flat && stray.is_none() && !built.is_empty() {
                 self.note(at, "an intersection of solids with a 2D shape: nothing is left, as OpenSCAD has it", None);
                 return Ok(self.shapes.parts.push(Part::Empty));
@@ -399,11 +389,12 @@ impl<'a> Lowering<'a> {
             if let Some((at, name)) = stray {
                 return Ok(self.shapes.parts.push(Part::Stray(at, name)));
             }
+            let parts = &mut self.shapes.parts;
             let part = match open.kind {
                 CallKind::Set(op) => Part::Op(op, at, built),
                 CallKind::Fill => Part::Op(Op::Union, at, built),
-                CallKind::Hull => self.hull(at, &built)?,
-                CallKind::Minkowski => self.minkowski(at, &built, open.outside.outer.translation)?,
+                CallKind::Hull => combined::hull(parts, at, &built)?,
+                CallKind::Minkowski => combined::minkowski(parts, at, &built, open.outside.outer.translation)?,
                 CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) | CallKind::Projection { .. } => {
                     Part::Empty
                 }
@@ -440,7 +431,9 @@ impl<'a> Lowering<'a> {
                 }
                 Part::Op(Op::Union, at, open.built)
             }
-            (CallKind::Revolve(turn), Some(call)) => return self.revolve(call, *turn, &open.context.outer, open.built),
+            (CallKind::Revolve(turn), Some(call)) => {
+                return combined::revolve(&mut self.shapes, call, *turn, &open.context.outer, open.built);
+            }
             (CallKind::Hull, Some(call)) => outlines::hull(parts, at, &like(most, call), &open.built)?,
             (CallKind::Fill, Some(call)) => outlines::filled(parts, at, &like(most, call), &open.built)?,
             (CallKind::Minkowski, Some(call)) => {
@@ -460,241 +453,6 @@ impl<'a> Lowering<'a> {
             }
         };
         Ok(self.shapes.parts.push(part))
-    }
-
-    /// Of operands in space and in the plane those that OpenSCAD takes: as many dimensions as the first has, at the top solids.
-    /// Whatever else is there is left out with a note. The place and name of the first in the plane where these are taken.
-    fn of_one_dimension(&mut self, built: Vec<PartId>, top: bool) -> Result<(Vec<PartId>, Option<(Place, String)>)> {
-        let list = &self.shapes.parts.list;
-        let solid = |p: PartId| match &list[p] {
-            Part::Leaf(..) => Some(true),
-            Part::Op(_, _, of) => (!of.is_empty()).then_some(true),
-            Part::Stray(..) => Some(false),
-            Part::Empty | Part::Flat(_) => None,
-        };
-        let kinds: Vec<Option<bool>> = built.iter().map(|p| solid(*p)).collect();
-        let first = kinds.iter().flatten().next().copied();
-        let stray = built.iter().find_map(|p| match &list[*p] {
-            Part::Stray(at, name) => Some((*at, name.clone())),
-            _ => None,
-        });
-        let solids = if top { kinds.contains(&Some(true)) } else { first != Some(false) };
-        let Some((at, name)) = stray else { return Ok((built, None)) };
-        if !solids {
-            if top {
-                let text = format!(
-                    "{name} outside of linear_extrude: a 2D shape, without volume (OpenSCAD: \"Current top level object is not a \
-                     3D object.\")"
-                );
-                self.note(at, text, None);
-                return Ok((Vec::new(), None));
-            }
-            if kinds.contains(&Some(true)) {
-                self.note(
-                    at,
-                    format!("{name} among solids, as the first: all solids beside it left out, as OpenSCAD does"),
-                    None,
-                );
-            }
-            return Ok((Vec::new(), Some((at, name))));
-        }
-        let mut kept = Vec::with_capacity(built.len());
-        for p in built {
-            match &self.shapes.parts.list[p] {
-                Part::Stray(at, name) => {
-                    let (at, text) = (*at, format!("{name} among solids: a 2D shape, left out, as OpenSCAD does"));
-                    self.note(at, text, None);
-                }
-                Part::Empty | Part::Leaf(..) | Part::Flat(_) | Part::Op(..) => kept.push(p),
-            }
-        }
-        Ok((kept, None))
-    }
-
-    /// The flat parts of a projection of some solids, in a plane or where none is.
-    fn projection(&mut self, call: &Call, cut: bool, plane: Option<Plane>, built: Vec<PartId>) -> Result<PartId> {
-        let at = call.at;
-        let (built, stray) = self.of_one_dimension(built, false)?;
-        let parts = &mut self.shapes.parts;
-        if let Some((at, name)) = stray {
-            parts.note(at, format!("{name} inside of projection: a 2D shape, left out, as OpenSCAD does"), None);
-        }
-        let Some(plane) = plane else { return Ok(parts.push(Part::Stray(at, call.name.clone()))) };
-        let like = Flat {
-            outline: Outline::Circle(1.0),
-            inner: DAffine3::IDENTITY,
-            overshoot: plane.overshoot,
-            name: call.name.clone(),
-            at,
-            pieces: built.iter().filter_map(|p| parts.most_pieces(*p)).max().unwrap_or(convex::PIECES),
-        };
-        let part =
-            if cut { shadow::section(parts, at, &like, &built)? } else { shadow::shadow(parts, at, &like, &built)? };
-        let id = parts.push(part);
-        for leaf in flats(parts, &[id]) {
-            if let Part::Flat(flat) = &mut parts.list[leaf] {
-                flat.inner = plane.inner * flat.inner;
-            }
-        }
-        Ok(id)
-    }
-
-    fn hull(&mut self, at: Place, built: &[PartId]) -> Result<Part> {
-        let parts = &mut self.shapes.parts;
-        let mut elements = Vec::new();
-        for p in built {
-            if let Some(more) = convex::extremes(parts, *p) {
-                elements.extend(more);
-                continue;
-            }
-            // The corners of what is left of it.
-            let mesh = Meshed::of(parts, at, *p)?;
-            if mesh.off > 0.0 {
-                parts.faceted(at, "what a hull holds, cut", mesh.triangles(), mesh.off);
-            }
-            elements.extend(mesh.elements());
-        }
-        if elements.is_empty() {
-            return Ok(Part::Empty);
-        }
-        convex::hull(parts, "hull", at, &elements)
-    }
-
-    /// The sum of operands that were each moved by `origin`.
-    fn minkowski(&mut self, at: Place, built: &[PartId], origin: DVec3) -> Result<Part> {
-        let parts = &mut self.shapes.parts;
-        if let [one] = built {
-            return Ok(Part::Op(Op::Union, at, vec![*one]));
-        }
-        let mut operands = Vec::with_capacity(built.len());
-        for p in built {
-            let pieces = match convex::pieces(parts, *p) {
-                Some(pieces) => pieces,
-                None => {
-                    let mesh = Meshed::of(parts, at, *p)?;
-                    let Some(piece) = mesh.convex() else { return self.minkowski_of_meshes(at, built, origin) };
-                    if mesh.off > 0.0 {
-                        parts.faceted(at, "what minkowski sums, cut", mesh.triangles(), mesh.off);
-                    }
-                    if mesh.is_empty() { Vec::new() } else { vec![piece] }
-                }
-            };
-            if !pieces.is_empty() {
-                operands.push(pieces);
-            }
-        }
-        let back = origin * (1.0 - operands.len() as f64);
-        let mut made = Vec::new();
-        if !operands.is_empty() {
-            for sum in convex::sums(parts, at, &operands)? {
-                let sum: Vec<convex::Element> = sum.into_iter().map(|e| e.moved(back)).collect();
-                let part = convex::hull(parts, "minkowski", at, &sum)?;
-                made.push(parts.push(part));
-            }
-        }
-        Ok(Part::Op(Op::Union, at, made))
-    }
-
-    /// The same of solids that are not unions of convex ones: of their meshes.
-    fn minkowski_of_meshes(&mut self, at: Place, built: &[PartId], origin: DVec3) -> Result<Part> {
-        let parts = &mut self.shapes.parts;
-        let mut sum: Option<Meshed> = None;
-        for p in built {
-            let mesh = Meshed::of(parts, at, *p)?;
-            sum = match sum {
-                _ if mesh.is_empty() => sum,
-                None => Some(mesh),
-                Some(before) => Some(before.plus(&mesh, at, origin)?),
-            };
-        }
-        let Some(sum) = sum else { return Ok(Part::Empty) };
-        parts.faceted(at, "minkowski", sum.triangles(), sum.off);
-        sum.part(parts, at, "faceted minkowski")
-    }
-
-    fn revolve(&mut self, call: &Call, turn: Turn, outer: &DAffine3, built: Vec<PartId>) -> Result<PartId> {
-        let at = call.at;
-        let arguments = Turn::arguments(call)?;
-        let leaves = flats(&self.shapes.parts, &built);
-        let side = self.side_of_axis(at, &leaves, &built)?;
-        let turn = if side < 0.0 { Turn { start: turn.start + 180.0, ..turn } } else { turn };
-        let of_leaf = |parts: &Parts<'_>, leaf: PartId| flat_of(parts, leaf).map(Flat::paths).unwrap_or_default();
-        let reach = |parts: &Parts<'_>| {
-            let points = leaves.iter().flat_map(|l| of_leaf(parts, *l)).flatten();
-            points.fold(0.0, |m: f64, p| m.max(p.x * side))
-        };
-        let far = reach(&self.shapes.parts);
-        let sides = match self.shapes.fragments(&arguments, far)? {
-            Some(count) => {
-                let count = (f64::from(count) * turn.angle / 360.0).floor().max(1.0) as u32;
-                Lathe::flat_sides(&turn, count)
-            }
-            None => Vec::new(),
-        };
-        let parts = &mut self.shapes.parts;
-        for leaf in leaves {
-            let Some(flat) = flat_of(parts, leaf) else { continue };
-            let (name, at) = (flat.name.clone(), flat.at);
-            let lathe = Lathe { name: &name, at, outer, sides: sides.clone() };
-            if let Some(disc) = flat.disc().filter(|_| sides.is_empty()) {
-                let center = *outer * DAffine3::from_translation(DVec3::Z * disc.center.y);
-                let away = disc.center.x.abs();
-                let placed = if away <= ROUNDING * disc.radius {
-                    place::sphere(&center, disc.radius)
-                } else {
-                    place::torus(&center, away, disc.radius)
-                };
-                if placed.is_ok() {
-                    parts.pieces.insert(leaf, flat.pieces);
-                    parts.list[leaf] = parts.leaf(&name, at, placed)?;
-                    continue;
-                }
-            }
-            let paths: Vec<Vec<DVec2>> =
-                flat.paths().iter().map(|p| p.iter().map(|p| DVec2::new(p.x * side, p.y)).collect()).collect();
-            outlines::note_facets(parts, at, &[leaf], "rotate_extrude");
-            parts.affordable(at, paths.iter().map(Vec::len).sum::<usize>() + 2)?;
-            let region = Region::of_paths(&paths);
-            if region.open {
-                return Err((at, outlines::crossing()));
-            }
-            parts.list[leaf] = lathe.region(parts, &region)?;
-        }
-        let whole = parts.push(Part::Op(Op::Union, at, built));
-        Ok(match turn.wedge(parts, at, outer)? {
-            Some(wedge) => parts.push(Part::Op(Op::Intersection, at, vec![whole, wedge])),
-            None => whole,
-        })
-    }
-
-    /// On which side of the axis an outline lies: 1 or −1. One on both has no solid in OpenSCAD, either.
-    fn side_of_axis(&mut self, at: Place, leaves: &[PartId], built: &[PartId]) -> Result<f64> {
-        let parts = &mut self.shapes.parts;
-        let extent = |paths: &mut dyn Iterator<Item = DVec2>| {
-            paths.fold([0.0, 0.0], |[l, h]: [f64; 2], p| [l.min(p.x), h.max(p.x)])
-        };
-        let all: Vec<DVec2> =
-            leaves.iter().filter_map(|l| flat_of(parts, *l)).flat_map(Flat::paths).flatten().collect();
-        let [low, high] = extent(&mut all.into_iter());
-        let least = SIMILARITY * (high - low);
-        if low >= -least {
-            return Ok(1.0);
-        }
-        if high <= least {
-            return Ok(-1.0);
-        }
-        // What is subtracted may lie on both sides: the outline itself tells.
-        let before = parts.notes.len();
-        let rims = outlines::paths(parts, at, built, "rotate_extrude")?;
-        parts.notes.truncate(before);
-        let [low, high] = extent(&mut rims.into_iter().flatten());
-        if low >= -least {
-            return Ok(1.0);
-        }
-        if high <= least {
-            return Ok(-1.0);
-        }
-        Err((at, Problem::syntax("an outline on one side of the axis of rotate_extrude", "one on both")))
     }
 
     /// The context below a matrix; else why nothing is there.

@@ -13,6 +13,7 @@
 //! What has no size, no area or no volume is left out, as OpenSCAD does, and a note names its line.
 
 mod arguments;
+mod combined;
 #[cfg(test)]
 mod constructs;
 mod convex;

@@ -6,6 +6,7 @@
 
 mod expression;
 mod solids;
+mod text;
 
 use super::problem::Problem;
 use super::scene::SceneError;

@@ -5,6 +5,7 @@
 use super::super::problem::Problem;
 use super::super::written::placed;
 use super::super::{Place, xml};
+use super::text::{both, clean, cone, cylinder, is_whole, minus, polyhedron, scaled, sweep, turned};
 use super::{Geometry, Result, needed, only};
 use contactd_proto::Pose;
 use glam::{DVec2, DVec3};
@@ -15,11 +16,6 @@ use std::f64::consts::TAU;
 const DEEPEST: usize = 200;
 /// Bytes of one solid's text.
 const LONGEST: usize = 16 << 20;
-
-/// A whole turn, but for the rounding of angles that are written in degrees.
-fn is_whole(turn: f64) -> bool {
-    turn >= TAU - 1e-9
-}
 
 /// Attributes of a solid, in millimetres and radians.
 struct Read<'g, 'a, 'i> {
@@ -99,62 +95,6 @@ impl<'g, 'a, 'i> Read<'g, 'a, 'i> {
     }
 }
 
-fn cylinder(r: f64, h: f64) -> String {
-    cone(r, r, h)
-}
-
-fn cone(below: f64, above: f64, h: f64) -> String {
-    format!("cylinder($fn = 0, h = {h:?}, r1 = {below:?}, r2 = {above:?}, center = true);")
-}
-
-fn minus(a: &str, b: &str) -> String {
-    format!("difference() {{ {a} {b} }}")
-}
-
-fn both(a: &str, b: &str) -> String {
-    format!("intersection() {{ {a} {b} }}")
-}
-
-fn scaled(by: DVec3, text: &str) -> String {
-    format!(
-        "multmatrix([[{:?}, 0, 0, 0], [0, {:?}, 0, 0], [0, 0, {:?}, 0], [0, 0, 0, 1]]) {{ {text} }}",
-        by.x, by.y, by.z
-    )
-}
-
-/// An outline of (r, z) turned about z from an angle on.
-fn turned(outline: &[DVec2], from: f64, turn: f64) -> String {
-    let mut points: Vec<DVec2> = Vec::new();
-    for p in outline {
-        if points.last() != Some(p) {
-            points.push(*p);
-        }
-    }
-    if points.len() > 1 && points.first() == points.last() {
-        points.pop();
-    }
-    let list: Vec<String> = points.iter().map(|p| format!("[{:?}, {:?}]", p.x, p.y)).collect();
-    sweep(&format!("polygon(points = [{}]);", list.join(", ")), from, turn)
-}
-
-/// A flat shape turned about z.
-fn sweep(flat: &str, from: f64, turn: f64) -> String {
-    let angle = if is_whole(turn) { 360.0 } else { turn.to_degrees() };
-    let text = format!("rotate_extrude(angle = {angle:?}, $fn = 0) {{ {flat} }}");
-    if is_whole(turn) {
-        return text;
-    }
-    placed(&Pose::new(DVec3::ZERO, glam::DQuat::from_rotation_z(from)), &text)
-}
-
-/// Points and faces, these counter-clockwise from outside as the three of a tetrahedron are.
-fn polyhedron(points: &[DVec3], faces: &[Vec<usize>]) -> String {
-    let points: Vec<String> = points.iter().map(|p| format!("{:?}", p.to_array())).collect();
-    // OpenSCAD's faces are clockwise.
-    let faces: Vec<String> = faces.iter().map(|f| format!("{:?}", f.iter().rev().collect::<Vec<_>>())).collect();
-    format!("polyhedron(points = [{}], faces = [{}]);", points.join(", "), faces.join(", "))
-}
-
 /// Eight corners, the lower four first, both counter-clockwise from above; sides that are no planes are refused.
 fn eight(read: &Read<'_, '_, '_>, points: [DVec3; 8]) -> Result<String> {
     let faces = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
@@ -167,32 +107,6 @@ fn eight(read: &Read<'_, '_, '_>, points: [DVec3; 8]) -> Result<String> {
         }
     }
     Ok(clean(&points, &faces.map(Vec::from)))
-}
-
-/// A polyhedron of which corners may fall together: faces without an area are left out.
-fn clean(points: &[DVec3], faces: &[Vec<usize>]) -> String {
-    let mut used: Vec<DVec3> = Vec::new();
-    let index: Vec<usize> = points
-        .iter()
-        .map(|p| {
-            used.iter().position(|u| u == p).unwrap_or_else(|| {
-                used.push(*p);
-                used.len() - 1
-            })
-        })
-        .collect();
-    let mut kept = Vec::new();
-    for face in faces {
-        let mut corners: Vec<usize> = face.iter().map(|i| index[*i]).collect();
-        corners.dedup();
-        while corners.len() > 1 && corners.first() == corners.last() {
-            corners.pop();
-        }
-        if corners.len() >= 3 {
-            kept.push(corners);
-        }
-    }
-    polyhedron(&used, &kept)
 }
 
 /// What stands inside of a solid of a kind.
