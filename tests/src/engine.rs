@@ -156,7 +156,7 @@ pub fn differences(x: &Outcome, y: &Outcome, size: f64) -> Vec<String> {
 
 /// The most cells a named scene may cost: its line in `cell_ceilings.toml`, twice what it cost when that was recorded.
 pub fn cell_ceiling(name: &str) -> u64 {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("cell_ceilings.toml");
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../cell_ceilings.toml");
     let table: toml::Table = std::fs::read_to_string(path).expect("cell_ceilings.toml").parse().expect("valid TOML");
     table.get(name).and_then(toml::Value::as_integer).unwrap_or_else(|| panic!("no ceiling for {name}")) as u64
 }

@@ -63,7 +63,7 @@ fn sound(o: &Outcome) -> Result<(), String> {
 
 /// The inputs of a target's corpus, by name of their files.
 pub fn corpus(target: &Target) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../corpus").join(target.name);
     let mut files: Vec<_> = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
     files.sort();
     files.iter().map(|f| std::fs::read(f).expect("a file of the corpus")).collect()

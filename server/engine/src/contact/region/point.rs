@@ -500,6 +500,7 @@ mod tests {
 
     #[test]
     fn every_set_that_balances_in_a_box_is_handed_over() {
+        const ENOUGH: usize = 100;
         let mut r = Random(0x0073_6574_7300);
         let (mut balanced, mut kept_out) = (0, 0);
         for i in 0..144 {
@@ -530,11 +531,14 @@ mod tests {
                         assert!(found.is_empty(), "{i}: {lits:?} balance at {found:?} and were left out");
                     }
                 }
+                // No more than it takes to know that such places are met: each is as dear as one that was left out.
                 for lits in &listed {
-                    balanced += usize::from(!balances(bodies, place, lits, r).is_empty());
+                    if balanced <= ENOUGH {
+                        balanced += usize::from(!balances(bodies, place, lits, r).is_empty());
+                    }
                 }
             });
         }
-        assert!(balanced > 100 && kept_out > 2000, "{balanced} balance, {kept_out} left out");
+        assert!(balanced > ENOUGH && kept_out > 2000, "{balanced} balance, {kept_out} left out");
     }
 }
