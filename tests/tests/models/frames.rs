@@ -3,7 +3,7 @@
 //!
 //! `CONTACTD_FRAMES=5000 cargo test --release -p contactd-tests --test models frames::` sets the number of random worlds (60 by default).
 
-use super::robots::{frame, models, read, turn, words};
+use super::robots::{Maker, frame, models, read, turn, words};
 use contactd::import::robot::{Ask, Values, read_robot, scene_of};
 use contactd::import::{Facets, Limits};
 use contactd_tests::random_solids::Random;
@@ -42,19 +42,7 @@ struct Made {
     canonical: Option<String>,
 }
 
-struct Maker<'a> {
-    r: &'a mut Random,
-    folder: &'a Path,
-    files: usize,
-    names: usize,
-}
-
 impl Maker<'_> {
-    fn name(&mut self, letter: &str) -> String {
-        self.names += 1;
-        format!("{letter}{}", self.names)
-    }
-
     /// A pose as text, relative to one of some frames or to what it is by default, and its matrix.
     fn pose(&mut self, frames: &[(String, DMat4, Option<String>)], default: DMat4) -> (String, DMat4) {
         let (xyz, rpy) = (self.r.vector(1.0), self.r.vector(3.0));
@@ -155,8 +143,7 @@ impl Maker<'_> {
         let is_merged = depth > 0 && self.r.chance(0.3);
         let body = made.text.join("\n");
         if is_merged || self.r.chance(0.4) {
-            self.files += 1;
-            let file = format!("part{}.sdf", self.files);
+            let file = self.file("sdf");
             let placed = chosen.map(|k| format!("<placement_frame>{}</placement_frame>", made.frames[k].0));
             // What the file says of the model's own place is not asked for.
             let whole =
@@ -290,7 +277,7 @@ fn frames_are_where_matrices_have_them() {
     let mut r = Random::new(77);
     let (mut links, mut moved, mut followed, mut worst) = (0, 0, 0, 0.0_f64);
     for k in 0..sized("CONTACTD_FRAMES", 60usize) {
-        let mut maker = Maker { r: &mut r, folder: folder.path(), files: 0, names: 0 };
+        let mut maker = Maker::new(&mut r, folder.path());
         let made = maker.scope(0);
         let text = format!("<sdf version=\"1.11\"><world name=\"w\">\n{}\n</world></sdf>", made.text.join("\n"));
         let is_one = made.links.iter().all(|l| l.name.split("::").next() == made.links[0].name.split("::").next());

@@ -3,14 +3,13 @@
 //!
 //! `CONTACTD_MJCF=3000 cargo test --release -p contactd-tests --test models mjcf::` sets the number of random models (60 by default).
 
-use super::robots::{frame, models, read, turn, words};
+use super::robots::{Maker, frame, models, read, turn, words};
 use contactd::import::robot::{Ask, Values, read_robot, scene_of};
 use contactd::import::{Facets, Limits};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
 use glam::{DMat4, DVec3};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 struct Joint {
     name: String,
@@ -52,26 +51,13 @@ struct Truth {
     is_welded: bool,
 }
 
-struct Maker<'a> {
-    r: &'a mut Random,
-    folder: &'a Path,
-    files: usize,
-    names: usize,
-}
-
 impl Maker<'_> {
-    fn name(&mut self, letter: &str) -> String {
-        self.names += 1;
-        format!("{letter}{}x", self.names)
-    }
-
     /// Elements of a section, some of them in a file of their own, which may include another one.
     fn cut(&mut self, mut elements: Vec<String>) -> String {
         if !elements.is_empty() && self.r.chance(0.3) {
             let from = self.r.below(elements.len());
             let to = from + 1 + self.r.below(elements.len() - from);
-            self.files += 1;
-            let name = format!("part{}.xml", self.files);
+            let name = self.file("xml");
             let inner: Vec<String> = elements.drain(from..to).collect();
             let inner = self.cut(inner);
             std::fs::write(self.folder.join(&name), format!("<mujocoinclude>\n{inner}\n</mujocoinclude>"))
@@ -225,7 +211,7 @@ fn bodies_are_where_matrices_have_them_and_pairs_are_filtered() {
     let mut r = Random::new(31);
     let (mut bodies, mut pairs, mut coupled, mut worst) = (0, 0, 0, 0.0_f64);
     for k in 0..sized("CONTACTD_MJCF", 60usize) {
-        let mut maker = Maker { r: &mut r, folder: folder.path(), files: 0, names: 0 };
+        let mut maker = Maker::new(&mut r, folder.path());
         let numbers = |r: &mut Random, n: usize| (0..n).map(|_| r.within(0.1, 0.5)).collect::<Vec<f64>>();
         let main = numbers(maker.r, 3);
         // A class begins with its parent's sizes, and tells some of its own.

@@ -40,6 +40,32 @@ pub(super) struct Arm {
     pub links: Vec<Geometry>,
 }
 
+/// Draws a robot's text: with names that no two things have, and cut into files of a folder.
+pub(super) struct Maker<'a> {
+    pub r: &'a mut Random,
+    pub folder: &'a Path,
+    files: usize,
+    names: usize,
+}
+
+impl<'a> Maker<'a> {
+    pub fn new(r: &'a mut Random, folder: &'a Path) -> Self {
+        Self { r, folder, files: 0, names: 0 }
+    }
+
+    /// A name that stays its own where a copy of what bears it has a number after it.
+    pub fn name(&mut self, letter: &str) -> String {
+        self.names += 1;
+        format!("{letter}{}x", self.names)
+    }
+
+    /// The name of one more file.
+    pub fn file(&mut self, ending: &str) -> String {
+        self.files += 1;
+        format!("part{}.{ending}", self.files)
+    }
+}
+
 pub(super) fn turn(axis: DVec3, angle: f64) -> DMat4 {
     // Rodrigues' formula, entry by entry.
     let (s, c) = angle.sin_cos();
