@@ -10,6 +10,8 @@ mod joints;
 mod overlaps;
 mod pages;
 mod recorded;
+#[cfg(test)]
+mod reference;
 
 use self::arguments::{
     Arguments, CheckArguments, Command, RecordArguments, ReplayArguments, ServeArguments, SessionsCommand,

@@ -5,16 +5,16 @@
 //! no effect (a rule for a group that no object has, which leaves its pairs without one) is a `Note`. The models'
 //! files are read by `Scene::load_models`, so that a scene can be looked at without them.
 
+mod raw;
 mod rules;
 
-use self::rules::RawRule;
+use self::raw::{RawObject, RawPose, RawScene};
 use super::format::{ModelBytes, Source};
 use super::openscad::Access;
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Motion, MotionState, Pose, Report, Rule};
 use glam::DVec3;
-use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -277,53 +277,6 @@ impl Scene {
         });
         each.collect()
     }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawScene {
-    unit: Option<String>,
-    resolution: Option<Spanned<f64>>,
-    dt: Option<Spanned<f64>>,
-    import_root: Option<Spanned<String>>,
-    #[serde(default)]
-    model: Vec<RawModel>,
-    #[serde(default)]
-    object: Vec<RawObject>,
-    #[serde(default)]
-    rule: Vec<RawRule>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawModel {
-    name: Spanned<String>,
-    file: Spanned<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawObject {
-    name: Spanned<String>,
-    model: Spanned<String>,
-    group: Option<String>,
-    motion: Option<Spanned<String>>,
-    #[serde(default)]
-    place: RawPose,
-    #[serde(default)]
-    start: RawPose,
-    #[serde(default)]
-    end: RawPose,
-    rotation_vector: Option<Spanned<[f64; 3]>>,
-    rotates: Option<bool>,
-    max_speed: Option<Spanned<f64>>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct RawPose {
-    position: Option<Spanned<[f64; 3]>>,
-    rotation: Option<Spanned<[f64; 4]>>,
 }
 
 /// A pose as it stands in the file, and what it means.

@@ -123,33 +123,14 @@ impl ServerConfig {
             let at = crate::import::Place::of_offset(text, e.span().map_or(0, |s| s.start));
             format!("{file}:{at}: {}", e.message())
         })?;
-        let limits = crate::import::Limits::default();
         // The values' places; what could be read once can be read again.
         let places: BTreeMap<String, toml::Spanned<toml::Value>> = toml::from_str(text).unwrap_or_default();
-        let bounded = [
-            ("sessions", config.sessions, 200),
-            ("objects", config.objects, 1 << 24),
-            ("batch", config.batch, 1 << 24),
-            ("records", config.records, 1 << 24),
-            ("text", config.text, contactd_proto::control::DECODE_LIMIT - (1 << 20)),
-            ("nodes", config.nodes, 1 << 30),
-            ("depth", config.depth, limits.depth),
-            ("faces", config.faces, 1 << 30),
-            ("idle_s", usize::try_from(config.idle_s).unwrap_or(usize::MAX), 1 << 31),
-            ("models_mb", config.models_mb as usize, 1 << 20),
-            ("cache_mb", config.cache_mb as usize, 1 << 20),
-        ];
         if let Some(root) = config.import_root.as_ref().filter(|root| !root.is_dir()) {
             let start = places.get("import_root").map_or(0, |v| v.span().start);
             let at = crate::import::Place::of_offset(text, start);
             return Err(format!("{file}:{at}: import_root = {root:?}: expected a folder"));
         }
-        let spin = usize::try_from(config.spin_us).unwrap_or(usize::MAX);
-        let deadline = usize::try_from(config.deadline_ms).unwrap_or(usize::MAX);
-        let each = bounded.map(|(name, value, most)| (name, value, 1, most));
-        for (name, value, least, most) in
-            each.into_iter().chain([("spin_us", spin, 0, 1_000_000), ("deadline_ms", deadline, 0, 1 << 31)])
-        {
+        for (name, value, least, most) in config.bounded() {
             if !(least..=most).contains(&value) {
                 let start = places.get(name).map_or(0, |v| v.span().start);
                 let at = crate::import::Place::of_offset(text, start);
@@ -157,6 +138,27 @@ impl ServerConfig {
             }
         }
         Ok(config)
+    }
+
+    /// Its numbers that have bounds: key, value, the least and the most that it may be.
+    pub fn bounded(&self) -> [(&'static str, u64, u64, u64); 13] {
+        let limits = crate::import::Limits::default();
+        let longest = contactd_proto::control::DECODE_LIMIT - (1 << 20);
+        [
+            ("sessions", self.sessions as u64, 1, 200),
+            ("objects", self.objects as u64, 1, 1 << 24),
+            ("batch", self.batch as u64, 1, 1 << 24),
+            ("records", self.records as u64, 1, 1 << 24),
+            ("text", self.text as u64, 1, longest as u64),
+            ("nodes", self.nodes as u64, 1, 1 << 30),
+            ("depth", self.depth as u64, 1, limits.depth as u64),
+            ("faces", self.faces as u64, 1, 1 << 30),
+            ("idle_s", self.idle_s, 1, 1 << 31),
+            ("models_mb", self.models_mb, 1, 1 << 20),
+            ("cache_mb", self.cache_mb, 1, 1 << 20),
+            ("spin_us", self.spin_us, 0, 1_000_000),
+            ("deadline_ms", self.deadline_ms, 0, 1 << 31),
+        ]
     }
 
     /// What an import may use.

@@ -6,7 +6,7 @@ use crate::math::random::Random;
 
 /// What becomes of an argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fate {
+pub(crate) enum Fate {
     /// It shapes the solid: two values make two solids, and a value of the wrong type is refused.
     Read(&'static str, &'static str),
     /// Whatever its value, the solid is the same.
@@ -14,15 +14,15 @@ enum Fate {
     /// Refused at its own place.
     Refused,
 }
-use Fate::{Harmless, Read, Refused};
+pub(crate) use Fate::{Harmless, Read, Refused};
 
 /// A kind of node that is supported: its name, arguments that make something of it, what is inside of it, and every argument
 /// that OpenSCAD writes or reads for it (the node's `toString` and its module's parameters, 2015.03 to the snapshots of 2026).
-struct Construct {
-    name: &'static str,
+pub(crate) struct Construct {
+    pub(crate) name: &'static str,
     arguments: &'static [(&'static str, &'static str)],
     inside: &'static str,
-    fates: &'static [(&'static str, Fate)],
+    pub(crate) fates: &'static [(&'static str, Fate)],
 }
 
 const CURVES: [(&str, Fate); 4] = [("$fn", Read("3", "4")), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
@@ -36,7 +36,7 @@ const FILE: [(&str, Fate); 4] = [("file", Refused), ("layer", Refused), ("origin
 /// Written for drawings of other files by rotate_extrude, and without one by old versions of OpenSCAD.
 const WITHOUT_FILE: [&str; 3] = ["layer", "origin", "timestamp"];
 
-const KINDS: [Construct; 23] = [
+pub(crate) const KINDS: [Construct; 23] = [
     Construct { name: "group", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "union", arguments: &[], inside: BALL, fates: &[] },
     Construct { name: "difference", arguments: &[], inside: BALL, fates: &[] },

@@ -18,7 +18,7 @@ mod combined;
 mod constructs;
 mod convex;
 #[cfg(test)]
-mod dialect;
+pub(crate) mod dialect;
 mod extrude;
 mod facets;
 mod flat;

@@ -10,7 +10,9 @@ use toml::Spanned;
 
 /// A rule as it stands in the file.
 pub(super) struct RawRule {
+    /// The two groups; both may be the same.
     between: [Spanned<String>; 2],
+    /// Single pairs, by the objects' names, that this rule leaves out.
     except: Vec<[Spanned<String>; 2]>,
     /// The fields that are stated.
     settings: Vec<(&'static Field, Stated)>,
