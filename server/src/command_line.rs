@@ -7,6 +7,7 @@
 
 mod arguments;
 mod joints;
+mod live;
 mod overlaps;
 mod pages;
 mod recorded;
@@ -311,6 +312,10 @@ fn scene_of(files: &[PathBuf], access: &AccessArguments, joints: &JointArguments
 }
 
 fn view_scene(arguments: &ViewArguments) -> Result<Done, Box<dyn Error>> {
+    if let Some(name) = &arguments.server {
+        live::view(name, arguments.port, &arguments.cache)?;
+        return Ok(Done::Well);
+    }
     let show = if arguments.demo {
         crate::demo::show(arguments.cache.open().as_ref())?
     } else if let Some(file) = arguments.files.iter().find(|f| recorded::is_recording(f)) {

@@ -19,6 +19,16 @@ const AT_ONCE: usize = 32;
 /// How long a client may take to send its request, and to take its answer.
 const PATIENCE: Duration = Duration::from_secs(10);
 
+/// Texts that are told one after the other, as events of a stream; `None` ends it. It may wait for the next one, and tells an empty text
+/// every now and then where there is none, so that a client that has gone is noticed.
+pub struct Events(pub Box<dyn FnMut() -> Option<String> + Send>);
+
+impl std::fmt::Debug for Events {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Events")
+    }
+}
+
 /// What is answered.
 #[derive(Debug)]
 pub struct Answer {
@@ -28,17 +38,24 @@ pub struct Answer {
     pub content: &'static str,
     /// The content.
     pub body: Vec<u8>,
+    /// What comes behind it until it ends (server-sent events).
+    pub events: Option<Events>,
 }
 
 impl Answer {
     /// What was asked for.
     pub fn of(content: &'static str, body: impl Into<Vec<u8>>) -> Self {
-        Self { status: 200, content, body: body.into() }
+        Self { status: 200, content, body: body.into(), events: None }
+    }
+
+    /// A stream of server-sent events.
+    pub fn stream(events: Events) -> Self {
+        Self { events: Some(events), ..Self::of("text/event-stream", "") }
     }
 
     /// A sentence why not.
     pub fn refused(status: u16, sentence: impl Into<String>) -> Self {
-        Self { status, content: "text/plain; charset=utf-8", body: (sentence.into() + "\n").into_bytes() }
+        Self { status, ..Self::of("text/plain; charset=utf-8", sentence.into() + "\n") }
     }
 }
 
@@ -84,7 +101,7 @@ impl Listening {
             };
             let (answers, open, port) = (answers.clone(), open.clone(), self.address.port());
             if open.fetch_add(1, Ordering::AcqRel) >= AT_ONCE {
-                let _ = write(&stream, &Answer::refused(503, "too many requests at the same time: ask again"));
+                let _ = write(&stream, Answer::refused(503, "too many requests at the same time: ask again"));
                 open.fetch_sub(1, Ordering::AcqRel);
                 continue;
             }
@@ -105,7 +122,7 @@ fn serve(stream: &TcpStream, port: u16, answers: &Answers) -> io::Result<()> {
         Ok(head) => asked(&head, port).map_or_else(|refused| refused, |path| answers(&path)),
         Err(refused) => refused,
     };
-    write(stream, &answer)
+    write(stream, answer)
 }
 
 /// The bytes of a request up to the empty line.
@@ -157,7 +174,7 @@ pub fn asked(head: &[u8], port: u16) -> Result<String, Answer> {
     }
 }
 
-fn write(mut stream: &TcpStream, answer: &Answer) -> io::Result<()> {
+fn write(mut stream: &TcpStream, answer: Answer) -> io::Result<()> {
     let reason = match answer.status {
         200 => "OK",
         400 => "Bad Request",
@@ -169,17 +186,24 @@ fn write(mut stream: &TcpStream, answer: &Answer) -> io::Result<()> {
         503 => "Service Unavailable",
         _ => "Error",
     };
+    // A stream ends where the connection does.
+    let length =
+        if answer.events.is_none() { format!("Content-Length: {}\r\n", answer.body.len()) } else { String::new() };
     let head = format!(
-        "HTTP/1.1 {} {reason}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\nCache-Control: no-store\r\n\
+        "HTTP/1.1 {} {reason}\r\nContent-Type: {}\r\n{length}Connection: close\r\nCache-Control: no-store\r\n\
          X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\n\
          Cross-Origin-Resource-Policy: same-origin\r\nContent-Security-Policy: default-src 'self'; frame-ancestors 'none'; \
          base-uri 'none'; form-action 'none'\r\n\r\n",
-        answer.status,
-        answer.content,
-        answer.body.len(),
+        answer.status, answer.content,
     );
     stream.write_all(head.as_bytes())?;
-    stream.write_all(&answer.body)
+    stream.write_all(&answer.body)?;
+    let Some(Events(mut next)) = answer.events else { return Ok(()) };
+    while let Some(text) = next() {
+        let event = if text.is_empty() { ":\n\n".into() } else { format!("data: {text}\n\n") };
+        stream.write_all(event.as_bytes())?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -131,16 +131,41 @@ impl Recording {
     /// # Errors
     /// There is no such server or session; it records already, or refuses to.
     pub fn start(name: &str, file: &Path, session: Option<u64>) -> Result<Self, Error> {
-        let address = Address::of(name).map_err(Error::Address)?;
-        let path = std::path::absolute(file).map_err(|e| Error::System(format!("{}: {e}", file.display())))?;
-        let path = path.display().to_string();
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
             signal_hook::flag::register(signal, stop.clone())
                 .map_err(|e| Error::System(format!("signal handler: {e}")))?;
         }
+        Ok(Self { stop, ..Self::begin(name, file, session)? })
+    }
+
+    /// The same without a word about signals: it ends with this process, however that ends.
+    ///
+    /// # Errors
+    /// As `start`.
+    pub fn begin(name: &str, file: &Path, session: Option<u64>) -> Result<Self, Error> {
+        let address = Address::of(name).map_err(Error::Address)?;
+        let path = std::path::absolute(file).map_err(|e| Error::System(format!("{}: {e}", file.display())))?;
+        let path = path.display().to_string();
         operator::record(&address, &path, session, PATIENCE)?;
-        Ok(Self { address, path, stop })
+        Ok(Self { address, path, stop: Arc::default() })
+    }
+
+    /// Whether it still goes on.
+    ///
+    /// # Errors
+    /// The server has gone, or the recording has failed.
+    pub fn look(&self) -> Result<(), Error> {
+        let status = self.asked(false)?;
+        if status.failure.is_empty() { Ok(()) } else { Err(Error::System(status.failure)) }
+    }
+
+    /// Ends it.
+    ///
+    /// # Errors
+    /// The server has gone.
+    pub fn end(&self) -> Result<(), Error> {
+        self.asked(true).map(|_| ())
     }
 
     /// Waits until it is stopped, for so long, or until it cannot go on; what was recorded, as a line.

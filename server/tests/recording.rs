@@ -1,5 +1,7 @@
 //! Recordings: repeated to the bit, cut short, damaged, left out of, and looked at by others.
 
+#[path = "recording/following.rs"]
+mod following;
 #[allow(dead_code, reason = "other tests use the rest of it")]
 mod harness;
 #[path = "recording/numbers.rs"]

@@ -8,10 +8,13 @@ import math
 import os
 import random
 import re
+import shutil
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.request
 import zlib
@@ -448,6 +451,115 @@ def thousand(program, browser, keep):
             met = browser.ask("contactdView.meetings().length")
             quiet(browser)
             return f"program ready in {ready:.2f} s, page open in {took:.2f} s, at full resolution in {whole:.1f} s, {met} contacts"
+
+
+class Running:
+    """A server of its own, and a page that follows it."""
+
+    def __init__(self, program):
+        self.program = program
+        self.folder = tempfile.mkdtemp(prefix="ct", dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else "/tmp")
+        self.env = os.environ | {"XDG_RUNTIME_DIR": self.folder, "TMPDIR": self.folder}
+        self.server = subprocess.Popen([program, "serve", "-q"], stdout=subprocess.PIPE, text=True, env=self.env)
+        line = self.server.stdout.readline()
+        check("is ready" in line, f"expected a server, found {line!r}")
+        command = [program, "view", "--server", "default"]
+        self.view = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.env)
+        line = self.view.stdout.readline()
+        check("waiting for a step" in line, f"expected a page that waits, found {line!r}")
+
+    def client(self, name, *arguments):
+        example = os.path.join(os.path.dirname(self.program), "examples", name)
+        return subprocess.Popen([example, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=self.env)
+
+    def get(self, path):
+        with urllib.request.urlopen(self.address + path, timeout=60) as answer:
+            return json.load(answer)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in (self.view, self.server):
+            process.kill()
+            process.wait()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def until(browser, expression, sentence, patience=60):
+    """Waits until something holds on the page, which may load itself anew meanwhile."""
+    end = time.monotonic() + patience
+    while True:
+        try:
+            if browser.ask(expression):
+                return
+            found = browser.ask("JSON.stringify([contactdView.stepAt, contactdView.scene?.acts?.map((a) => [a.steps, a.objects.length])])")
+        except Exception as e:  # noqa: BLE001: between two pages there is none to ask
+            found = e
+        check(time.monotonic() < end, f"{sentence}: {found}")
+        time.sleep(0.05)
+
+
+def slowed(process):
+    """Lets a client run a twentieth of the time, until it has ended: one without a pause takes what the browser needs to draw."""
+    while process.poll() is None:
+        for word, seconds in ((signal.SIGCONT, 0.005), (signal.SIGSTOP, 0.095)):
+            try:
+                process.send_signal(word)
+            except ProcessLookupError:
+                return
+            time.sleep(seconds)
+
+
+def live(program, browser, keep):
+    """A server's steps as they are taken."""
+    rnd = random.Random(11)
+    with Running(program) as running:
+        check(running.client("hello", "default").wait(60) == 0, "the client hello failed")
+        line = running.view.stdout.readline()
+        found = re.search(r"http://127\.0\.0\.1:\d+/", line)
+        check(found, f"expected the page's address, found {line!r}")
+        running.address = found.group()
+        left = [name for name in os.listdir(running.folder) if name.endswith(".mcap")]
+        check(not left, f"the recording still has a name: {left}")
+        opened(browser, running)
+        # The ball meets the rim of the hole: a closed form.
+        times = browser.ask("contactdView.meetings().map((p) => p.time)")
+        fall = (18 - math.sqrt(21)) / 20
+        check(len(times) == 1 and abs(times[0] - fall) < 1e-12, f"expected one contact at {fall}, found {times}")
+        browser.ask("contactdView.settled()")
+        keep("live.png")
+
+        # Another session: the page shows it, and the newest of its steps.
+        steps = 1500
+        check(running.client("latency", 16, steps).wait(120) == 0, "the client latency failed")
+        until(browser, f"contactdView.act.objects.length === 16 && contactdView.act.steps === {2 * steps}", "the steps do not come")
+        until(browser, f"contactdView.stepAt === {2 * steps - 1}", "the newest step is not shown")
+        # In the last step ball i goes from (10 i, 0, 0) to (10 i, 1, 0).
+        for t in (0.0, 0.25, 1.0):
+            for i, pose in enumerate(browser.ask(f"contactdView.posesAt({t})")):
+                off = math.dist(pose["position"], (10 * i, t, 0))
+                check(off < 1e-12, f"ball {i} is {off} from where its client has put it at t = {t}")
+        poses_agree(browser, running, rnd, 0, 2 * steps - 1)
+
+        # Who looks at an old step is left there while others come.
+        more = running.client("latency", 3, 200000)
+        paced = threading.Thread(target=slowed, args=(more,), daemon=True)
+        paced.start()
+        until(browser, "contactdView.act.objects.length === 3 && contactdView.act.steps > 50", "the third session does not come")
+        browser.ask("contactdView.ready")
+        browser.ask("contactdView.goTo(7)")
+        seen = browser.ask("contactdView.act.steps")
+        until(browser, f"contactdView.act.steps > {seen + 100}", "no more steps come")
+        check(browser.ask("contactdView.stepAt") == 7, "the page has left the step that was looked at")
+        running.server.terminate()
+        running.server.wait(30)
+        more.kill()
+        more.wait()
+        paced.join()
+        until(browser, "contactdView.word?.startsWith('It is over')", "the page does not tell that its server has ended")
+        browser.console.clear()
+    return f"live: a closed form met, {2 * steps} steps followed, the newest shown, an old one kept"
 
 
 def main():

@@ -217,11 +217,14 @@ pub(super) struct CheckArguments {
 #[derive(clap::Args)]
 pub(super) struct ViewArguments {
     /// The scene's .toml file, a robot's (.urdf, .sdf, MJCF's .xml), a recording (.mcap); or models, which are taken as they stand.
-    #[arg(required_unless_present = "demo")]
+    #[arg(required_unless_present_any = ["demo", "server"])]
     pub files: Vec<PathBuf>,
     /// The acts of the demo instead.
     #[arg(long, conflicts_with = "files")]
     pub demo: bool,
+    /// The steps of the running server of this name instead, as they are taken.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["files", "demo", "gltf"])]
+    pub server: Option<String>,
     /// The port of 127.0.0.1; 0: any that is free.
     #[arg(long, default_value = "0")]
     pub port: u16,

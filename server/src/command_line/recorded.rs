@@ -52,7 +52,7 @@ pub(super) fn show(file: &Path, cache: Option<&Cache>) -> Result<Show, String> {
     Show::new(file.file_name().unwrap_or_default().to_string_lossy().into_owned(), models, acts)
 }
 
-fn model(content: &Content, cache: Option<&Cache>) -> Result<Shown, String> {
+pub(super) fn model(content: &Content, cache: Option<&Cache>) -> Result<Shown, String> {
     let source = Source {
         name: &content.name,
         format: &content.format,

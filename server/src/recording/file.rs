@@ -54,6 +54,10 @@ pub struct Recording {
     is_over: bool,
     /// It was cut: it has no end.
     pub is_cut: bool,
+    /// It is still written: where it ends now more may come.
+    is_followed: bool,
+    /// Bytes that were read.
+    read: u64,
 }
 
 /// One record of the file that matters.
@@ -94,6 +98,8 @@ impl Recording {
             end: None,
             is_over: false,
             is_cut: false,
+            is_followed: false,
+            read: 0,
         };
         loop {
             match recording.record()? {
@@ -110,6 +116,18 @@ impl Recording {
                 None => return Err(recording.foreign("nothing that it says of itself".into())),
             }
         }
+    }
+
+    /// The same of a file that is still written: `next_entry` gives `None` where there is no more yet, and what has come since when it
+    /// is asked again.
+    #[must_use]
+    pub fn followed(self) -> Self {
+        Self { is_followed: true, ..self }
+    }
+
+    /// Bytes that were read, and those that were written since.
+    pub fn bytes(&self) -> (u64, u64) {
+        (self.read, self.file.metadata().map_or(0, |m| m.len()).saturating_sub(self.read))
     }
 
     /// A model's content, which stood in the file before it is named.
@@ -174,7 +192,7 @@ impl Recording {
         if self.is_over {
             return Ok(None);
         }
-        let Self { name, file, reader, channels, entries, .. } = self;
+        let Self { name, file, reader, channels, entries, is_followed, read: total, .. } = self;
         let damaged = |e| FileError::Damaged(name.clone(), *entries, e);
         loop {
             let event = match reader.next_event() {
@@ -191,6 +209,11 @@ impl Recording {
             match event {
                 LinearReadEvent::ReadRequest(n) => {
                     let read = file.read(reader.insert(n)).map_err(|e| FileError::Read(name.clone(), e))?;
+                    // A reader that is told of 0 bytes takes them for the end.
+                    if read == 0 && *is_followed {
+                        return Ok(None);
+                    }
+                    *total += read as u64;
                     reader.notify_read(read);
                 }
                 LinearReadEvent::Record { opcode, data } => {

@@ -13,10 +13,10 @@ use crate::recording::{
     About, Change, Content, Entry, FileError, Key, Opening, Recording, SceneFolder, Standing, StepMessage,
 };
 use contactd_client::{Error, Transport};
-use contactd_proto::control::{Answer, Command, ObjectSpec};
+use contactd_proto::control::{Answer, Command, ObjectSpec, WirePose};
 use contactd_proto::step::{NO_INDEX, STEP_REFUSED};
 use contactd_proto::{ErrorCode, MotionState, Rule, Tracks};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -231,54 +231,127 @@ pub struct Run {
     pub scenes: Vec<String>,
 }
 
+/// A step of a recording as a scene.
+#[derive(Clone, Debug)]
+pub struct Told {
+    /// Its session.
+    pub session: u64,
+    /// Its number in the recording, from 1.
+    pub number: u64,
+    /// Something has changed since the session's step before it: its objects, models, rules, resolution.
+    pub is_fresh: bool,
+    /// What the models of the scene were made of, in order; of a step that is fresh.
+    pub contents: Vec<Arc<Content>>,
+    /// The objects of the scene, in order, without where they stand; of a step that is fresh.
+    pub objects: Vec<ObjectSpec>,
+    /// The text of a scene file.
+    pub scene: String,
+}
+
+/// The steps of a recording as scenes, one after the other; also of one that is still written.
+pub struct Following {
+    recording: Recording,
+    name: String,
+    sessions: BTreeMap<u64, Followed>,
+    /// Sessions in which nothing has changed since their last step.
+    settled: BTreeSet<u64>,
+    steps: u64,
+}
+
+impl Following {
+    /// A recording that is complete, or was cut.
+    ///
+    /// # Errors
+    /// A file that is no recording.
+    pub fn open(path: &Path) -> Result<Self, ReplayError> {
+        Ok(Self::of(path, Recording::open(path)?))
+    }
+
+    /// A recording that a server has begun to write: `None` until it says what it is.
+    pub fn growing(path: &Path) -> Option<Self> {
+        Recording::open(path).ok().map(|recording| Self::of(path, recording.followed()))
+    }
+
+    fn of(path: &Path, recording: Recording) -> Self {
+        let name = path.display().to_string();
+        Self { recording, name, sessions: BTreeMap::new(), settled: BTreeSet::new(), steps: 0 }
+    }
+
+    /// Bytes of the file that were read, and those that were written since.
+    pub fn bytes(&self) -> (u64, u64) {
+        self.recording.bytes()
+    }
+
+    /// The next step that was taken; steps that were refused moved nothing, and are left out. `None` at the end, or where a recording
+    /// that is still written has no more yet.
+    ///
+    /// # Errors
+    /// As `replay`.
+    pub fn next_step(&mut self) -> Result<Option<Told>, ReplayError> {
+        let refused = |name: &str, what: String| ReplayError::Content(name.to_owned(), what);
+        while let Some(entry) = self.recording.next_entry()? {
+            let (steps, name) = (self.steps, self.name.as_str());
+            match entry {
+                Entry::Opening(session, opening) => {
+                    let followed = Followed::open(opening)
+                        .map_err(|e| refused(name, format!("the opening after step {steps}: {e}")))?;
+                    self.sessions.insert(session, followed);
+                    self.settled.remove(&session);
+                }
+                Entry::Change(session, change) => {
+                    let followed = self.sessions.get_mut(&session);
+                    let followed =
+                        followed.ok_or_else(|| refused(name, format!("session {session} has no opening")))?;
+                    followed.alter(change).map_err(|e| refused(name, format!("a change after step {steps}: {e}")))?;
+                    self.settled.remove(&session);
+                }
+                Entry::Step(step) => {
+                    self.steps += 1;
+                    let (session, number) = (step.session, self.steps);
+                    let followed = self.sessions.get_mut(&session);
+                    let followed =
+                        followed.ok_or_else(|| refused(name, format!("session {session} has no opening")))?;
+                    if step.reply.status == STEP_REFUSED {
+                        continue;
+                    }
+                    followed.tracks.take(&step.records, step.request.advance);
+                    let wrong = |e: String| refused(name, format!("step {number}: {e}"));
+                    let folder = followed.scene(&self.recording, number, &step).map_err(wrong)?;
+                    let is_fresh = self.settled.insert(session);
+                    let nowhere = WirePose { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
+                    let objects = folder.objects.iter().map(|o| ObjectSpec { pose: nowhere, ..o.spec.clone() });
+                    let (contents, objects) =
+                        if is_fresh { (folder.contents(), objects.collect()) } else { (Vec::new(), Vec::new()) };
+                    let scene = folder.text().map_err(|e| wrong(e.to_string()))?;
+                    return Ok(Some(Told { session, number, is_fresh, contents, objects, scene }));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
 /// The steps of a recording as scenes, the first `most` of them; and whether there are more.
 ///
 /// # Errors
 /// As `replay`.
 pub fn runs(path: &Path, most: usize) -> Result<(Vec<Run>, bool), ReplayError> {
-    let mut recording = Recording::open(path)?;
-    let refused = |what: String| ReplayError::Content(path.display().to_string(), what);
-    let mut sessions: BTreeMap<u64, Followed> = BTreeMap::new();
+    let mut following = Following::open(path)?;
     let mut runs: Vec<Run> = Vec::new();
-    // Of each session the run that its next step belongs to, unless something has changed.
+    // Of each session the run that its next step belongs to.
     let mut current: BTreeMap<u64, usize> = BTreeMap::new();
-    let (mut steps, mut kept) = (0, 0);
-    while let Some(entry) = recording.next_entry()? {
-        match entry {
-            Entry::Opening(session, opening) => {
-                let followed =
-                    Followed::open(opening).map_err(|e| refused(format!("the opening after step {steps}: {e}")))?;
-                sessions.insert(session, followed);
-                current.remove(&session);
-            }
-            Entry::Change(session, change) => {
-                let followed =
-                    sessions.get_mut(&session).ok_or_else(|| refused(format!("session {session} has no opening")))?;
-                followed.alter(change).map_err(|e| refused(format!("a change after step {steps}: {e}")))?;
-                current.remove(&session);
-            }
-            Entry::Step(step) => {
-                steps += 1;
-                let session = step.session;
-                let followed =
-                    sessions.get_mut(&session).ok_or_else(|| refused(format!("session {session} has no opening")))?;
-                if step.reply.status == STEP_REFUSED {
-                    continue;
-                }
-                if kept == most {
-                    return Ok((runs, true));
-                }
-                kept += 1;
-                followed.tracks.take(&step.records, step.request.advance);
-                let scene = followed.scene(&recording, steps, &step);
-                let scene = scene.map_err(|e| refused(format!("step {steps}: {e}")))?;
-                let text = scene.text().map_err(|e| refused(format!("step {steps}: {e}")))?;
-                let at = *current.entry(session).or_insert_with(|| {
-                    runs.push(Run { session, first: steps, contents: scene.contents(), scenes: Vec::new() });
-                    runs.len() - 1
-                });
-                runs[at].scenes.push(text);
-            }
+    let mut kept = 0;
+    while let Some(Told { session, number, is_fresh, contents, scene, .. }) = following.next_step()? {
+        if kept == most {
+            return Ok((runs, true));
+        }
+        kept += 1;
+        if is_fresh {
+            current.insert(session, runs.len());
+            runs.push(Run { session, first: number, contents, scenes: Vec::new() });
+        }
+        if let Some(run) = current.get(&session).and_then(|at| runs.get_mut(*at)) {
+            run.scenes.push(scene);
         }
     }
     Ok((runs, false))

@@ -9,6 +9,7 @@
 pub mod buffers;
 pub mod cells;
 pub mod gltf;
+pub mod live;
 pub mod show;
 
 use crate::http::{Answer, Answers, Listening};

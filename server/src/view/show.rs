@@ -16,6 +16,7 @@ use contactd_proto::{Motion, Pose, Report, Rule};
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Makes the scene of a step; its models are those of the act, in order.
@@ -25,7 +26,7 @@ pub type SceneOf = Box<dyn Fn(usize) -> Result<Scene, String> + Send + Sync>;
 pub struct Act {
     /// What happens.
     pub title: String,
-    /// How many steps there are.
+    /// How many steps there are; of one that grows, at most.
     pub steps: usize,
     /// Which of the show's models the scene's are, in the scene's order.
     pub models: Vec<usize>,
@@ -52,6 +53,8 @@ pub struct Show {
     pub buffers: Buffers,
     /// Where what is endless is cut off, a box in the frame of each model.
     pub extents: Vec<Aabb>,
+    /// Of a show whose acts grow (`live`): which one it is, from 1, and how many steps each act has by now.
+    pub growing: Option<(u64, Vec<Arc<AtomicUsize>>)>,
     /// Steps that were solved, as JSON.
     solved: Mutex<HashMap<(usize, usize), String>>,
 }
@@ -101,6 +104,8 @@ struct Told<'a> {
     title: &'a str,
     models: Vec<ModelTold<'a>>,
     acts: Vec<ActTold>,
+    /// Of a show whose acts grow, which one it is.
+    live: Option<u64>,
     rows: usize,
     words: usize,
     triangles: usize,
@@ -216,7 +221,7 @@ impl Show {
             return Err(format!("{title}: expected something to show, found nothing"));
         }
         let buffers = Buffers::new(&models, &extents);
-        let show = Self { title, models, acts, buffers, extents, solved: Mutex::default() };
+        let show = Self { title, models, acts, buffers, extents, growing: None, solved: Mutex::default() };
         for act in 0..show.acts.len() {
             show.solved(act, 0)?;
         }
@@ -241,10 +246,14 @@ impl Show {
             let objects = scene.objects.iter().map(object).collect();
             Ok(ActTold { title: act.title.clone(), steps: act.steps, unit: scene.unit, objects })
         };
+        let mut acts = self.acts.iter().map(act).collect::<Result<Vec<_>, String>>()?;
+        let growing = self.growing.iter().flat_map(|(_, steps)| steps);
+        acts.iter_mut().zip(growing).for_each(|(act, steps)| act.steps = steps.load(Relaxed));
         json(&Told {
             title: &self.title,
             models: models.map(|(m, drawn)| ModelTold { name: &m.name, file: &m.file, drawn }).collect(),
-            acts: self.acts.iter().map(act).collect::<Result<_, String>>()?,
+            acts,
+            live: self.growing.as_ref().map(|(number, _)| *number),
             rows: self.buffers.rows.len(),
             words: self.buffers.words.len(),
             triangles: self.buffers.triangles.len() / 3,

@@ -35,6 +35,7 @@ class Page {
         await this.showAct(0);
         const notes = this.scene.models.map((m) => m.note).filter(Boolean);
         if (notes.length) this.say(notes[0]);
+        if (this.scene.live !== null) this.follow();
         requestAnimationFrame((now) => this.frame(now));
     }
 
@@ -62,10 +63,41 @@ class Page {
         this.panel.act(this.scene, at);
         find("stepping").hidden = steps < 2;
         find("step").max = steps - 1;
-        const marks = steps > 1 ? this.scene.marks(at) : null;
-        await this.showStep(0, true);
-        this.bestSide();
+        const live = this.scene.live !== null;
+        const marks = steps > 1 && !live ? this.scene.marks(at) : null;
+        await this.showStep(live ? steps - 1 : 0, true);
+        // Who asked for another step meanwhile sees that one, which is not here yet.
+        if (this.step) this.bestSide();
         marks?.then((m) => this.strip(m), (e) => this.trouble(e));
+    }
+
+    /** A server's steps as they are taken: the newest is shown until the user looks at another one. */
+    follow() {
+        this.newest = true;
+        const events = new EventSource("/live");
+        events.onmessage = (e) => {
+            const { live, steps, ended } = JSON.parse(e.data);
+            if (live !== this.scene.live) return location.reload();
+            steps.forEach((n, i) => (this.scene.acts[i].steps = n));
+            if (ended) {
+                events.close();
+                this.say(`It is over: ${ended}.`);
+            }
+            return this.grown().catch((x) => this.trouble(x));
+        };
+    }
+
+    /** There are more steps. */
+    async grown() {
+        const last = this.act.steps - 1;
+        find("stepping").hidden = last < 1;
+        find("step").max = last;
+        find("number").textContent = `${this.stepAt + 1} of ${this.act.steps}`;
+        if (!this.newest || this.playing || this.turning || last === this.stepAt) return;
+        this.turning = true;
+        await this.showStep(last, true).finally(() => (this.turning = false));
+        // Those that came meanwhile.
+        if (this.act.steps - 1 > last) await this.grown();
     }
 
     /** Goes to a step; `opening` at its first contact, else at its beginning. */
@@ -383,11 +415,12 @@ class Page {
         on("play", "click", () => this.toggle());
         on("time", "input", (e) => {
             this.stop();
+            this.newest = false;
             this.setTime(this.snapped(Number(e.target.value)));
         });
         on("t", "change", (e) => this.setTime(Number(e.target.value)));
         on("hold", "change", () => this.move());
-        on("step", "input", (e) => this.showStep(Number(e.target.value), true));
+        on("step", "input", (e) => this.goTo(Number(e.target.value)));
         on("before", "click", () => this.goBy(-1));
         on("after", "click", () => this.goBy(1));
         this.listenToPointer();
@@ -438,7 +471,12 @@ class Page {
 
     goBy(by) {
         const at = clamp(this.stepAt + by, 0, this.act.steps - 1);
-        return at === this.stepAt ? undefined : this.showStep(at, true);
+        return at === this.stepAt ? undefined : this.goTo(at);
+    }
+
+    goTo(at) {
+        this.newest = at === this.act.steps - 1;
+        return this.showStep(at, true);
     }
 
     key(e) {
