@@ -4,7 +4,7 @@
 //! the objects of the one before, each with its end alone, and take all of the last step: then the end of an object is what that
 //! batch says, and only the last two have anything to tell. They are kept as they are, and worked out when somebody asks.
 
-use contactd_proto::control::{Command, Facets, ModelFile, ObjectSpec, WireRule, WireTrack};
+use contactd_proto::control::{Command, Facets, ModelFile, ObjectSpec, WireFrame, WireRule, WireTrack};
 use contactd_proto::{MotionState, PoseRecord, Rule, Tracks};
 use std::collections::BTreeMap;
 
@@ -49,6 +49,16 @@ impl Journal {
     pub fn removed(&mut self, id: u32) {
         self.objects.remove(&id);
         self.tracks.removed(id);
+    }
+
+    /// An object was given another frame.
+    pub fn reframed(&mut self, frame: &WireFrame) {
+        // The server accepted it, so its poses are some.
+        if let (Ok((place, pose)), Some(spec)) = (frame.checked(), self.objects.get_mut(&frame.object)) {
+            spec.place = place.into();
+            self.settle();
+            self.tracks.put(frame.object, MotionState::resting(pose));
+        }
     }
 
     /// Rules were set.

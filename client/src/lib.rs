@@ -53,7 +53,7 @@ pub use error::Error;
 pub use glam;
 pub use object::{ModelInfo, Object};
 pub use reply::Reply;
-pub use session::{Session, StepOptions};
+pub use session::{Frame, Session, StepOptions};
 pub use shm::SharedMemory;
 pub use solid::Solid;
 pub use transport::Transport;

@@ -2,22 +2,24 @@
 //!
 //! Ids are given here, counting up, so that they stay the same when the session is replayed on another server.
 
+mod attach;
 mod options;
 mod query;
 mod recording;
 mod stage;
 mod step;
 
+pub use attach::Frame;
 pub use options::StepOptions;
 
 use crate::journal::Journal;
 use crate::solid::ModelText;
 use crate::transport::{Opened, Transport};
-use crate::{Error, ModelInfo, Object, SharedMemory};
-use contactd_proto::control::{Answer, Command, Facets, ModelFile, WireRule};
+use crate::{Error, ModelInfo, SharedMemory};
+use contactd_proto::control::{Answer, Command, Facets, ModelFile};
 use contactd_proto::names::Address;
 use contactd_proto::step::NO_INDEX;
-use contactd_proto::{ErrorCode, MassOptions, MassProperties, PoseRecord, Rule};
+use contactd_proto::{ErrorCode, MassOptions, MassProperties, PoseRecord};
 use stage::Stage;
 use std::time::{Duration, Instant};
 
@@ -34,6 +36,9 @@ pub struct Session<T: Transport> {
     /// What is asked of the steps to come.
     pub options: StepOptions,
     stage: Stage,
+    company: attach::Company,
+    /// Slots of the batch in hand that are the caller's; behind them stand those of what is attached.
+    own_slots: usize,
     step: u64,
     last_model: u32,
     last_object: u32,
@@ -76,6 +81,8 @@ impl<T: Transport> Session<T> {
             journal: Journal::default(),
             options: StepOptions::default(),
             stage: Stage::Idle,
+            company: attach::Company::default(),
+            own_slots: 0,
             step: 0,
             last_model: 0,
             last_object: 0,
@@ -110,7 +117,7 @@ impl<T: Transport> Session<T> {
         facets: Facets,
     ) -> Result<ModelInfo, Error> {
         let bytes = model.model_text()?.into_owned().into_bytes();
-        self.load_model_file(ModelFile { name: name.into(), format: "csg".into(), bytes }, facets)
+        self.load_model_file(ModelFile::new(name, "csg", bytes), facets)
     }
 
     /// Loads a model from a file's bytes, in any format that the server reads.
@@ -144,41 +151,6 @@ impl<T: Transport> Session<T> {
             Answer::Mass(mass) => Ok(MassProperties::from(&mass)),
             other => Err(unexpected(&other)),
         }
-    }
-
-    /// Adds an object; returns its id.
-    ///
-    /// # Errors
-    /// `Refused`: unknown model, bad pose or speed, too many objects, resolution; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
-    pub fn add_object(&mut self, object: Object) -> Result<u32, Error> {
-        let id = self.last_object + 1;
-        let spec = object.spec(id);
-        self.done(Command::AddObject(spec.clone()))?;
-        self.last_object = id;
-        if self.transport.may_lose_server() {
-            self.journal.object(spec);
-        }
-        Ok(id)
-    }
-
-    /// Removes an object; its id is not used again.
-    ///
-    /// # Errors
-    /// `Refused`: unknown object; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
-    pub fn remove_object(&mut self, object: u32) -> Result<(), Error> {
-        self.done(Command::RemoveObject(object))?;
-        self.journal.removed(object);
-        Ok(())
-    }
-
-    /// Replaces the session's rules.
-    ///
-    /// # Errors
-    /// `Refused` at the index of a bad rule; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
-    pub fn set_rules(&mut self, rules: &[Rule]) -> Result<(), Error> {
-        self.done(Command::SetRules(rules.iter().map(WireRule::from).collect()))?;
-        self.journal.rules(rules);
-        Ok(())
     }
 
     /// Sets the resolution of every pair; `None`: each its default.
@@ -251,7 +223,8 @@ impl<T: Transport> Session<T> {
                 | Answer::Mass(_)
                 | Answer::Status(_)
                 | Answer::Recorded(_)
-                | Answer::Told(_) => {}
+                | Answer::Told(_)
+                | Answer::Reframed(_) => {}
             }
         }
         self.stage = Stage::Idle;

@@ -42,6 +42,9 @@ pub trait Transport {
     /// The slots of the last `loan` until its reply has been received and the next is loaned.
     fn loaned(&self) -> &[PoseRecord];
 
+    /// The same, to be written until they are sent.
+    fn loaned_mut(&mut self) -> &mut [PoseRecord];
+
     /// Sends the loaned slots.
     ///
     /// # Errors
@@ -81,6 +84,10 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
 
     fn loaned(&self) -> &[PoseRecord] {
         (**self).loaned()
+    }
+
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        (**self).loaned_mut()
     }
 
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {

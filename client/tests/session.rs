@@ -74,6 +74,10 @@ impl Transport for Scripted {
         &self.records
     }
 
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        &mut self.records
+    }
+
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         self.say(Said::Step(self.records.clone()));
         self.reply = Some(StepReply { step: request.step, index: u32::MAX, ..StepReply::default() });

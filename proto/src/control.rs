@@ -127,6 +127,18 @@ impl WirePose {
     }
 }
 
+/// Another frame of an object, and where that stands. A motion is one of the frame: its origin goes straight while it turns, so
+/// that an object which is to turn about an axis needs a frame on that axis.
+#[derive(Clone, Copy, Debug, PartialEq, Encode, Decode)]
+pub struct WireFrame {
+    /// Object id.
+    pub object: u32,
+    /// The model in the frame.
+    pub place: WirePose,
+    /// The frame in the world, where the object rests.
+    pub pose: WirePose,
+}
+
 /// An object's track in bytes, for the replay after a restart of the server.
 #[derive(Clone, Copy, Debug, PartialEq, Encode, Decode)]
 pub struct WireTrack {
@@ -140,6 +152,16 @@ pub struct WireTrack {
     pub spin: [f64; 3],
     /// Pose after it.
     pub end: WirePose,
+}
+
+impl WireFrame {
+    /// The model in the frame, and the frame.
+    ///
+    /// # Errors
+    /// `NotFinite`, `BadQuaternion`.
+    pub fn checked(&self) -> Result<(Pose, Pose), ErrorCode> {
+        Ok((self.place.checked()?, self.pose.checked()?))
+    }
 }
 
 impl WireTrack {
@@ -206,6 +228,35 @@ pub struct ModelFile {
     pub format: String,
     /// What the file has in it.
     pub bytes: Vec<u8>,
+    /// The files that it names, sent with it; `None`: it may name those of the server's import root alone.
+    pub attached: Option<Vec<Attachment>>,
+}
+
+impl ModelFile {
+    /// A file that names no others of its own.
+    pub fn new(name: impl Into<String>, format: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
+        Self { name: name.into(), format: format.into(), bytes: bytes.into(), attached: None }
+    }
+
+    /// Its bytes and those of the files that are sent with it.
+    pub fn size(&self) -> usize {
+        let attached = self.attached.iter().flatten().filter_map(|a| a.bytes.as_ref().ok());
+        self.bytes.len() + attached.map(Vec::len).sum::<usize>()
+    }
+}
+
+/// A file that another one names, in memory.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Encode, Decode)]
+pub struct Attachment {
+    /// As the other one names it; of a font `font:` and the pattern that asks for it.
+    pub name: String,
+    /// What it has in it, or why it was not read.
+    pub bytes: Result<Vec<u8>, String>,
+}
+
+impl Attachment {
+    /// The name of what OpenSCAD warned of when it flattened the text: a line each.
+    pub const WARNINGS: &'static str = "openscad:";
 }
 
 /// What a client asks of the server beside steps.
@@ -263,6 +314,17 @@ pub enum Command {
     SaveStep(String),
     /// Asks about objects where the last step has left them; other sessions' steps go on meanwhile.
     Ask(Query),
+    /// Gives objects other frames: all of them, or none.
+    Reframe(Vec<WireFrame>),
+    /// Gives an object the frame of another one, where it stands: a motion of that frame then moves both as one body.
+    Carry {
+        /// The object that gets the frame.
+        object: u32,
+        /// The object whose frame it is.
+        carrier: u32,
+        /// The part of the last step, 0..1, that leaves both where they stand.
+        advance: f64,
+    },
 }
 
 /// What is to be recorded.
@@ -403,6 +465,8 @@ pub enum Answer {
     Recorded(RecordingStatus),
     /// What was asked.
     Told(QueryAnswer),
+    /// The frame that an object was given.
+    Reframed(WireFrame),
 }
 
 /// A command with its session (0 for `Open`).

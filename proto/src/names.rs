@@ -14,15 +14,15 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Version of the protocol; part of every service name but the status service's.
-pub const PROTOCOL_VERSION: u32 = 2;
+pub const PROTOCOL_VERSION: u32 = 3;
 /// The service whose layout never changes.
 pub const STATUS_SERVICE: &str = "contactd/status";
 /// Request-response service of steps.
-pub const STEP_SERVICE: &str = "contactd/2/step";
+pub const STEP_SERVICE: &str = "contactd/3/step";
 /// Request-response service of commands.
-pub const CONTROL_SERVICE: &str = "contactd/2/control";
+pub const CONTROL_SERVICE: &str = "contactd/3/control";
 /// Event service by which clients wake the server.
-pub const WAKE_SERVICE: &str = "contactd/2/wake";
+pub const WAKE_SERVICE: &str = "contactd/3/wake";
 /// The server's name when none is given.
 pub const DEFAULT_NAME: &str = "default";
 

@@ -59,6 +59,7 @@
 //! | 9 | [`metrics`] | what a server counts, as OpenMetrics |
 //! | 10 | [`check`], [`ipc`] | a scene file's step in this process; sessions over shared memory or embedded |
 //! | 10 | [`clearance`] | the least clearance of a robot over ranges of its joints |
+//! | 10 | [`load`] | scenes and robots from files into a session |
 //! | 10 | [`overlaps`] | what is in each other of volumes or of a scene |
 //! | 10 | [`operator`] | servers and their sessions, as an operator sees them |
 //! | 11 | [`batch`] | many steps of one scene that know nothing of each other |
@@ -105,6 +106,7 @@ pub mod http;
 pub mod import;
 pub mod inspect;
 pub mod ipc;
+pub mod load;
 pub mod metrics;
 pub mod operator;
 pub mod overlaps;

@@ -80,7 +80,7 @@ impl Play {
         let (name, text) = MODELS[self.r.below(MODELS.len() as u64) as usize];
         let text = if name.ends_with(".off") { ELL } else { text };
         let facets = [Facets::Auto, Facets::Exact, Facets::AsWritten][self.r.below(3) as usize];
-        let file = ModelFile { name: name.into(), format: String::new(), bytes: text.into() };
+        let file = ModelFile::new(name, "", text);
         self.models.push(session.load_model_file(file, facets).unwrap_or_else(|e| panic!("{name}: {e}")).id);
     }
 

@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 #define CONTACTD_VERSION "0.1.0"
-#define CONTACTD_PROTOCOL_VERSION 2
+#define CONTACTD_PROTOCOL_VERSION 3
 
 // Why the server refused: numbers that never change, each with its sentence.
 

@@ -70,7 +70,7 @@ pub unsafe extern "C" fn contactd_load_model_file(
         let bytes = unsafe { row(bytes, length, "bytes")? };
         // SAFETY: the caller's variable (1).
         let model = unsafe { place(model, "model")? };
-        let file = ModelFile { name: name.into(), format: format.into(), bytes: bytes.into() };
+        let file = ModelFile::new(name, format, bytes);
         let info = state.session.load_model_file(file, word(&FACETS, facets, "facets")?)?;
         model.write(info.id);
         state.models.add(info);

@@ -53,8 +53,9 @@ from .records import (
     Valid,
 )
 from .rules import Effect, Rule
+from .scene import Joint, Scene
 from .session import Distance, Face, Model, Recording, Region, Reply, Session, connect, embedded
 from .solid import Outline, Solid
 from .view import View
 
-__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "rules", "session", "view")]
+__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "rules", "scene", "session", "view")]

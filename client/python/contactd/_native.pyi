@@ -156,6 +156,17 @@ class Session:
         exists or cannot be written."""
     def remove_object(self, object: int) -> None:
         """Removes an object; its id is not used again."""
+    def attach(self, part: int, carrier: int, touching: Sequence[int] = ...) -> None:
+        """From now on ``part`` moves with ``carrier``, as it stands to it (at ``options.advance`` of the last step), and is not tested
+        against it nor against the objects in ``touching``. It gets the carrier's records, and none of its own. ``Misuse`` for a part to
+        itself or to what it carries."""
+    def detach(self, part: int) -> None:
+        """The part stays where it is, and is tested as the rules say."""
+    def carrier(self, part: int) -> int | None:
+        """The object that a part moves with; None where it is not attached."""
+    def allow(self, pairs: Sequence[Sequence[int]], allowed: bool = True) -> None:
+        """Pairs of objects that may meet and are not tested, whatever the rules say; ``allowed=False``: no longer."""
+    def _reframe(self, object: int, place: _Pose, at: _Pose) -> None: ...
     def set_resolution(self, resolution: float | None) -> None:
         """Sets the resolution of every pair, a length; None: each pair its default."""
     def begin_step(self, n: int) -> View:
@@ -221,6 +232,18 @@ class Reply:
     @property
     def effect_counters(self) -> dict[str, int]:
         """How often each effect was worked out, by its word."""
+
+class LoadedScene:
+    """A scene that was loaded: ``contactd.Scene``."""
+
+    def objects(self) -> list[tuple[str, int, int]]: ...
+    def joints(self) -> list[tuple[str, bool, list[float], float]]: ...
+    def about(self) -> tuple[str, list[str], float | None]: ...
+    def rules(self) -> list[tuple[list[str], list[list[str]], dict[str, Any]]]: ...
+    def set_joints(self, session: Session, values: dict[str, float]) -> None: ...
+    def stop_at(self, session: Session, time: float) -> None: ...
+    def records(self, session: Session, to: dict[str, float]) -> bytes: ...
+    def refused(self) -> None: ...
 
 class Manifolds:
     """The points of all pairs, from step to step: ``contactd.manifold.Manifolds``."""
@@ -292,6 +315,9 @@ class Batch:
         self, offsets: bytes, records: bytes, options: tuple[bool, bool, int, int, int, int]
     ) -> tuple[list[bytes], list[tuple[int, str]]]: ...
 
+def _load_scene(
+    session: Session, path: str | os.PathLike[str], joints: dict[str, float], options: tuple[Any, ...]
+) -> LoadedScene: ...
 def _batch_key(scene: str, resolution: float | None) -> str: ...
 def _primitive(name: str, numbers: Sequence[float]) -> Solid: ...
 def _outline(name: str, numbers: Sequence[float]) -> Outline: ...

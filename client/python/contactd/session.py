@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Any, Iterable, Iterator, NamedTuple, Sequence
+from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from .errors import Error
 from .pose import PoseLike, pose
 from .records import DETAIL, PATCH, POINT, RAY, REGION, StepStatus, Tag
 from .rules import Effect, Rule
+from .scene import Scene, _values
 from .view import Part, View
 
 
@@ -272,6 +273,34 @@ class Session(_native.Session):
         frame. ``at``: where the object stands. Poses are a ``Pose``, a pair of position and quaternion x y z w, or a position.
         """
         return self._add_object(name, _id(model), group, (fixed, rotates, max_speed), (pose(place), pose(at)))
+
+    def load_scene(
+        self,
+        path: str | os.PathLike[str],
+        joints: Mapping[str, float] | None = None,
+        *,
+        key: str | None = None,
+        hulls: bool = False,
+        packages: Sequence[str | os.PathLike[str]] = (),
+        srdf: str | os.PathLike[str] | None = None,
+        import_root: str | os.PathLike[str] | None = None,
+        keep_rules: bool = False,
+    ) -> Scene:
+        """Loads a scene file (``.toml``) or a robot or world (URDF, SDFormat, MJCF) into the session, beside what it has.
+
+        The files are read here; a server needs none of them. ``joints``: where a robot's joints stand, radians and metres; ``key``: at
+        a keyframe of MJCF. ``hulls``: meshes as their convex hulls. ``packages``: folders in which ``package://NAME/…`` is looked for.
+        ``srdf``: a file with pairs that are not to be tested. ``import_root``: the folder that texts may import files from; None: their
+        own. ``keep_rules``: the session's rules and resolution stay; otherwise the scene's replace them, where it has any.
+        ``Refused`` with file, line and column; the session keeps what it had.
+        """
+        options = (hulls, list(packages), srdf, key, import_root, keep_rules)
+        return Scene(self, _native._load_scene(self, path, _values(joints or {}), options))
+
+    def reframe(self, object: int, place: PoseLike, at: PoseLike) -> None:
+        """Gives an object another frame, in which its model is at ``place``; the frame rests at ``at``. A motion is one of the frame:
+        its origin goes straight while it turns, so what is to turn about an axis needs a frame on that axis."""
+        self._reframe(object, pose(place), pose(at))
 
     def recording(self) -> Recording:
         """What was recorded so far, since ``record``."""

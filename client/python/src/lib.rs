@@ -21,6 +21,7 @@ mod pose;
 mod queries;
 mod reply;
 mod rules;
+mod scene;
 mod session;
 mod slots;
 mod solid;
@@ -51,6 +52,8 @@ mod _native {
     use crate::options::Options;
     #[pymodule_export]
     use crate::reply::Reply;
+    #[pymodule_export]
+    use crate::scene::{LoadedScene, load_scene};
     #[pymodule_export]
     use crate::session::Session;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! What a session is asked about its objects: arguments from Python's buffers, answers as records for numpy.
 
 use bytemuck::Pod;
+use contactd_proto::PoseRecord;
 use contactd_proto::query::ObjectRay;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -9,6 +10,11 @@ use pyo3::types::PyBytes;
 pub fn records<'py, A, R: Pod + for<'a> From<&'a A>>(py: Python<'py>, answers: &[A]) -> Bound<'py, PyBytes> {
     let records: Vec<R> = answers.iter().map(R::from).collect();
     PyBytes::new(py, bytemuck::cast_slice(&records))
+}
+
+/// Poses as bytes.
+pub fn bytes(records: &[PoseRecord]) -> &[u8] {
+    bytemuck::cast_slice(records)
 }
 
 /// Points from doubles, three each.

@@ -13,7 +13,7 @@ use crate::slots::{Batch, Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::control::{Facets, ModelFile};
 use contactd_client::transport::Opened;
-use contactd_client::{Error, MassOptions, Object, SharedMemory, StepOptions, Transport};
+use contactd_client::{Error, Frame, MassOptions, Object, SharedMemory, StepOptions, Transport};
 use contactd_proto::names::Address;
 use contactd_proto::query::{PointOptions, PointRecord, RayOptions, RayRecord};
 use contactd_proto::{ContactRecord, PoseRecord, StepReply};
@@ -107,6 +107,17 @@ impl Session {
     /// A call of the session with the interpreter's lock released.
     fn call<R: Send>(slf: &Bound<'_, Self>, work: impl FnOnce(&mut Inner) -> Result<R, Error> + Send) -> PyResult<R> {
         Self::enter(slf)?.detached(slf.py(), work)
+    }
+
+    /// The same of work with failures of its own, with the options that the next step has.
+    pub fn whole<R: Send>(slf: &Bound<'_, Self>, work: impl FnOnce(&mut Inner) -> R + Send) -> PyResult<R> {
+        let py = slf.py();
+        let this = Self::enter(slf)?;
+        let options = StepOptions::from(&*this.options.try_borrow(py)?);
+        this.with(py, |s| {
+            s.options = options;
+            detached(py, s, work)
+        })
     }
 
     /// Takes the memory of poses and reply back.
@@ -268,7 +279,7 @@ impl Session {
                 return Err(PyValueError::new_err(sentence));
             }
         };
-        let file = ModelFile { name, format, bytes };
+        let file = ModelFile::new(name, format, bytes);
         let info = Self::call(slf, move |s| s.load_model_file(file, facets))?;
         let faces = info.faces.into_iter().map(|f| (f.primitive, f.name, f.face, f.subtracted)).collect();
         Ok((info.id, faces, info.warnings))
@@ -298,6 +309,34 @@ impl Session {
     /// Removes an object; its id is not used again.
     fn remove_object(slf: &Bound<'_, Self>, object: u32) -> PyResult<()> {
         Self::call(slf, move |s| s.remove_object(object))
+    }
+
+    /// From now on ``part`` moves with ``carrier`` as it stands to it, and is not tested against it nor against the objects in ``touching``.
+    #[pyo3(signature = (part, carrier, touching = Vec::new()))]
+    fn attach(slf: &Bound<'_, Self>, part: u32, carrier: u32, touching: Vec<u32>) -> PyResult<()> {
+        let attached = Self::whole(slf, move |s| s.attach(part, carrier, &touching))?;
+        attached.map_err(|e| errors::of(slf.py(), &e))
+    }
+
+    /// The part stays where it is, and is tested as the rules say.
+    fn detach(slf: &Bound<'_, Self>, part: u32) -> PyResult<()> {
+        Self::call(slf, move |s| s.detach(part))
+    }
+
+    /// The object that a part moves with; None where it is not attached.
+    fn carrier(slf: &Bound<'_, Self>, part: u32) -> PyResult<Option<u32>> {
+        Self::enter(slf)?.with(slf.py(), |s| s.carrier(part))
+    }
+
+    /// Pairs of objects that may meet and are not tested, whatever the rules say; ``allowed=False``: no longer.
+    #[pyo3(signature = (pairs, allowed = true))]
+    fn allow(slf: &Bound<'_, Self>, pairs: Vec<[u32; 2]>, allowed: bool) -> PyResult<()> {
+        Self::call(slf, move |s| s.allow(&pairs, allowed))
+    }
+
+    fn _reframe(slf: &Bound<'_, Self>, object: u32, place: PoseFields, at: PoseFields) -> PyResult<()> {
+        let frame = Frame { object, place: pose(place.0, place.1), pose: pose(at.0, at.1) };
+        Self::call(slf, move |s| s.reframe(&[frame]))
     }
 
     /// Bounds of the distance of two objects, a point of each, whether they are settled, parts that were looked at.

@@ -49,6 +49,10 @@ impl Transport for Flaky {
         self.engine.loaned()
     }
 
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        self.engine.loaned_mut()
+    }
+
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         self.engine.send(request)
     }

@@ -15,11 +15,17 @@ impl<T: Transport> Session<T> {
     /// `Refused` (`TooMany`), `Misuse` while a step is in flight, `ServerLost`, `System`.
     pub fn begin_step(&mut self, n: usize) -> Result<&mut [PoseRecord], Error> {
         self.check_idle()?;
-        self.check_count(n)?;
+        self.loan(n)
+    }
+
+    /// Slots for `n` records of the caller, with room behind them for what is attached.
+    fn loan(&mut self, n: usize) -> Result<&mut [PoseRecord], Error> {
+        let all = n + self.company.slots();
+        self.check_count(all)?;
         self.stage = Stage::Idle;
-        let slots = self.transport.loan(n)?;
-        self.stage = Stage::Loaned;
-        Ok(slots)
+        let slots = self.transport.loan(all)?;
+        (self.stage, self.own_slots) = (Stage::Loaned, n);
+        Ok(&mut slots[..n])
     }
 
     /// Whether something else may begin.
@@ -49,6 +55,10 @@ impl<T: Transport> Session<T> {
             Stage::Lost => return Err(Error::ServerLost),
             Stage::Idle | Stage::Sent => return Err(Error::Misuse("no step was begun")),
         }
+        let records = match self.company.slots() {
+            0 => self.own_slots,
+            _ => self.company.fill(self.transport.loaned_mut(), self.own_slots),
+        };
         let o = &self.options;
         let asked = [(o.first, ASK_FIRST), (o.details, ASK_DETAILS), (o.clear, ASK_CLEAR), (o.polling, ASK_POLLING)];
         let request = StepRequest {
@@ -62,7 +72,7 @@ impl<T: Transport> Session<T> {
             cell_limit: o.cell_limit,
             batch_limit: o.batch_limit,
             max_records: o.max_records,
-            records: self.transport.loaned().len() as u32,
+            records: records as u32,
         };
         match self.transport.send(request) {
             Ok(()) => {
@@ -70,7 +80,7 @@ impl<T: Transport> Session<T> {
                 self.stage = Stage::Sent;
                 if self.transport.may_lose_server() {
                     // While the server works on it.
-                    self.journal.sent(self.transport.loaned(), o.advance);
+                    self.journal.sent(&self.transport.loaned()[..records], o.advance);
                 }
                 Ok(())
             }
@@ -130,13 +140,11 @@ impl<T: Transport> Session<T> {
         let Some(n) = self.unanswered.as_ref().map(Vec::len) else {
             return Err(Error::Misuse("no step was in flight when the server was lost"));
         };
-        self.check_count(n)?;
-        self.stage = Stage::Idle;
-        let slots = self.transport.loan(n)?;
+        self.loan(n)?;
+        let slots = &mut self.transport.loaned_mut()[..n];
         if let Some(batch) = &self.unanswered {
             slots.copy_from_slice(batch);
         }
-        self.stage = Stage::Loaned;
         Ok(slots)
     }
 
@@ -157,7 +165,8 @@ impl<T: Transport> Session<T> {
     /// was kept before still has none, unless another is under way.
     pub(super) fn lose(&mut self) {
         if matches!(self.stage, Stage::Loaned | Stage::Sent) {
-            self.unanswered = Some(self.transport.loaned().to_vec());
+            let loaned = self.transport.loaned();
+            self.unanswered = Some(loaned[..self.own_slots.min(loaned.len())].to_vec());
         }
         self.stage = Stage::Lost;
     }

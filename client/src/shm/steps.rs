@@ -202,6 +202,14 @@ impl Transport for SharedMemory {
         &records[..(header.records as usize).min(records.len())]
     }
 
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        let Some(loan) = self.link.as_mut().and_then(|link| link.loan.as_mut()) else { return &mut [] };
+        let n = loan.user_header().records as usize;
+        let records = loan.payload_mut();
+        let n = n.min(records.len());
+        &mut records[..n]
+    }
+
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         let link = self.link()?;
         if link.alive.elapsed() > POLLED && link.control.life.is_over() {

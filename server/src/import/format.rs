@@ -8,6 +8,8 @@ use super::openscad::{self, Access};
 use super::{Facets, Import, ImportError, Limits, csg, mesh};
 use std::path::{Path, PathBuf};
 
+pub use contactd_proto::control::Attachment;
+
 /// A file format.
 #[derive(Clone, Copy, Debug)]
 pub struct Format {
@@ -28,25 +30,6 @@ pub enum Named {
     File(String),
     /// A font.
     Font(Pattern),
-}
-
-/// A file that another one names, in memory.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, bincode::Encode, bincode::Decode)]
-pub struct Attachment {
-    /// As the other one names it; of a font what `of_font` says.
-    pub name: String,
-    /// What it has in it, or why it was not read.
-    pub bytes: Result<Vec<u8>, String>,
-}
-
-impl Attachment {
-    /// The name of a font that a pattern asks for.
-    pub fn of_font(pattern: &Pattern) -> String {
-        format!("font:{}", pattern.written)
-    }
-
-    /// The name of what OpenSCAD warned of when it flattened the text: a line each.
-    pub const WARNINGS: &'static str = "openscad:";
 }
 
 /// Every format that is read. A file whose name ends in none of these ways is taken for one of the first.
@@ -185,7 +168,7 @@ fn attached(source: &Source, path: &Path, access: &Access, limits: &Limits) -> R
     let roots = (access.root.as_deref(), access.packages.as_slice());
     let attach = |named| match named {
         Named::File(name) => Attachment { bytes: beside(folder, roots, &name, limits), name },
-        Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: Attachment::of_font(&pattern) },
+        Named::Font(pattern) => Attachment { bytes: machine::find(&pattern), name: pattern.attachment() },
     };
     Ok((source.format()?.names)(source.bytes, limits).into_iter().map(attach).collect())
 }

@@ -136,7 +136,7 @@ impl Embedded {
 
     fn import(&mut self, import: Import) -> Answer {
         let loaded = self.models.load(&import.file, import.facets);
-        self.scene.loaded(import.model, import.file.bytes.len(), loaded)
+        self.scene.loaded(import.model, import.file.size(), loaded)
     }
 }
 
@@ -174,6 +174,10 @@ impl Transport for Embedded {
 
     fn loaned(&self) -> &[PoseRecord] {
         &self.records
+    }
+
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        &mut self.records
     }
 
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {

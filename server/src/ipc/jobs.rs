@@ -37,7 +37,7 @@ pub enum Finished {
 impl JobKind {
     fn run(self, models: &Models) -> Finished {
         match self {
-            JobKind::Import(i) => Finished::Imported(i.model, i.file.bytes.len(), models.load(&i.file, i.facets)),
+            JobKind::Import(i) => Finished::Imported(i.model, i.file.size(), models.load(&i.file, i.facets)),
             JobKind::Integrate(integration) => Finished::Answered(integration.answer()),
             JobKind::Save(save) => Finished::Answered(save.answer()),
             JobKind::Ask(inquiry) => Finished::Answered(inquiry.answer().map_or_else(refused, Answer::Told)),
@@ -109,7 +109,7 @@ mod tests {
         };
         let many: String = (0..20_000).map(sphere).collect();
         let import = |model, text: String| {
-            let file = ModelFile { name: "m.csg".into(), format: String::new(), bytes: text.into() };
+            let file = ModelFile::new("m.csg", "", text);
             JobKind::Import(Import { model, file, facets: Facets::Auto })
         };
         let start = |model, text: String| {

@@ -61,10 +61,11 @@ impl Models {
     /// # Errors
     /// `Model` or a limit, with line and column in the sentence.
     pub fn load(&self, file: &ModelFile, facets: Facets) -> Result<Arc<Loaded>, Refusal> {
-        let ModelFile { name, format, bytes } = file;
+        let ModelFile { name, format, bytes, attached } = file;
         let source = Source { name, format, bytes, attached: None };
         let format = source.format().map_err(|e| Refusal::new(ErrorCode::Model, e.to_string()))?;
-        let attached = self.root.as_ref().map(|root| import::files_of(&source, root, &self.limits));
+        let of_root = || self.root.as_ref().map(|root| import::files_of(&source, root, &self.limits));
+        let attached = attached.clone().or_else(of_root);
         let (name, format) = (name.clone(), format.name.to_owned());
         self.of_content(Arc::new(Content { name, format, facets, bytes: bytes.clone(), attached }))
     }
@@ -98,6 +99,12 @@ impl Models {
         let facets = import::Facets::from(*facets);
         if source.bytes.len() > self.limits.bytes {
             return Err(Refusal::new(ErrorCode::LimitText, format!("{}: {} bytes", source.name, source.bytes.len())));
+        }
+        for file in attached.iter().flatten() {
+            if let Some(bytes) = file.bytes.as_ref().ok().filter(|bytes| bytes.len() > self.limits.bytes) {
+                let detail = format!("{name}: {} of {} bytes", file.name, bytes.len());
+                return Err(Refusal::new(ErrorCode::LimitText, detail));
+            }
         }
         let prepared = cache::prepare(self.cache.as_ref(), source, facets, &self.limits);
         let prepared = prepared.map_err(|e| Refusal::new(code_of(&e), e.to_string()))?;
@@ -166,7 +173,7 @@ mod tests {
         let models = Models::new(&ServerConfig { import_root: Some(root.clone()), ..ServerConfig::default() });
         let load = |models: &Models, name: &str| {
             let bytes = format!("import(file = \"{name}\");").into_bytes();
-            models.load(&ModelFile { name: "sent".into(), format: String::new(), bytes }, Facets::Auto)
+            models.load(&ModelFile::new("sent", "", bytes), Facets::Auto)
         };
         let first = load(&models, "part.stl").unwrap_or_else(|e| panic!("{}", e.detail));
         assert_eq!(first.part.model.solid.primitives.len(), 1);
@@ -195,7 +202,7 @@ mod tests {
         for config in [ServerConfig::default(), ServerConfig { cache, ..ServerConfig::default() }] {
             let models = Models::new(&config);
             let load = |name: &str, facets| {
-                let file = ModelFile { name: name.into(), format: String::new(), bytes: PART.into() };
+                let file = ModelFile::new(name, "", PART);
                 models.load(&file, facets).expect("a valid text")
             };
             let (first, second) = (load("one", Facets::Auto), load("another", Facets::Auto));

@@ -8,7 +8,7 @@ use crate::octree::mass::mass_properties;
 use crate::recording::{Change, Opening, SceneFolder, Standing, Tap};
 use crate::world::{Heed, ObjectSpec, Refusal, StepOptions, World, record};
 use contactd_proto::control::{
-    Answer, Command, Facets, ModelFile, ObjectSpec as WireObject, WireMass, WireRule, WireTrack,
+    Answer, Command, Facets, ModelFile, ObjectSpec as WireObject, WireFrame, WireMass, WireRule, WireTrack,
 };
 use contactd_proto::names::PROTOCOL_VERSION;
 use contactd_proto::step::{ASK_ALL, ASK_CLEAR, ASK_DETAILS, ASK_FIRST, NO_INDEX, STEP_REFUSED};
@@ -201,7 +201,7 @@ impl Scene {
                     let detail = format!("model id {model} was used before");
                     return Err(Refusal::new(ErrorCode::BadCommand, detail));
                 }
-                self.fits(file.bytes.len() as u64, &file.name)?;
+                self.fits(file.size() as u64, &file.name)?;
                 return Ok(CommandOutcome::Import(Import { model, file, facets }));
             }
             Command::AddObject(spec) => {
@@ -228,6 +228,16 @@ impl Scene {
                 let options = MassOptions { tolerance, boxes }.checked();
                 let options = options.map_err(|sentence| Refusal::new(ErrorCode::BadNumber, sentence))?;
                 return Ok(CommandOutcome::Integrate(Integration { model: loaded.clone(), options }));
+            }
+            Command::Reframe(frames) => {
+                let each = frames.iter().enumerate().map(|(i, frame)| {
+                    let (place, pose) = frame.checked().map_err(|code| Refusal::new(code, "").at(i))?;
+                    Ok((frame.object, place, pose))
+                });
+                self.world.reframe(&each.collect::<Result<Vec<_>, Refusal>>()?)?;
+            }
+            Command::Carry { object, carrier, advance } => {
+                return self.carry(object, carrier, advance).map(CommandOutcome::Answered);
             }
             Command::Ask(query) => return Ok(CommandOutcome::Ask(Inquiry::new(self.world()?, query))),
             Command::SaveStep(folder) => {
@@ -256,6 +266,17 @@ impl Scene {
             name: spec.name,
             group: spec.group,
         })
+    }
+
+    /// Gives an object the frame of another one, and tells which that is. Whoever follows the session is told of the frame alone.
+    fn carry(&mut self, object: u32, carrier: u32, advance: f64) -> Result<Answer, Refusal> {
+        let (place, pose) = self.world.frame_of(object, carrier, advance)?;
+        self.world.reframe(&[(object, place, pose)]).map_err(|e| Refusal { index: None, ..e })?;
+        let frame = WireFrame { object, place: place.into(), pose: pose.into() };
+        if let Some(tap) = self.tap.as_mut().filter(|tap| tap.is_open()) {
+            tap.change(Change::Command(Command::Reframe(vec![frame])), None);
+        }
+        Ok(Answer::Reframed(frame))
     }
 
     /// The ids of its models, by where what was made of them lies in memory.
@@ -415,6 +436,7 @@ fn changes(command: &Command) -> bool {
             | Command::SetRules(_)
             | Command::SetResolution(_)
             | Command::Restore(_)
+            | Command::Reframe(_)
     )
 }
 

@@ -136,6 +136,22 @@ impl Stage {
                 }
                 None
             }
+            Command::Reframe(frames) => {
+                let mut drawn = Vec::with_capacity(frames.len());
+                for frame in frames {
+                    let Some((spec, Ok((place, pose)))) =
+                        self.objects.get_mut(&frame.object).zip(Some(frame.checked()))
+                    else {
+                        continue;
+                    };
+                    spec.place = place.into();
+                    let spec = spec.clone();
+                    self.tracks.put(spec.id, MotionState::resting(pose));
+                    self.moved.push(spec.id);
+                    drawn.push(self.entity(time, &spec));
+                }
+                Some(update(vec![], drawn))
+            }
             Command::Open { .. }
             | Command::Close
             | Command::LoadModel { .. }
@@ -147,6 +163,7 @@ impl Stage {
             | Command::Record(_)
             | Command::Recording { .. }
             | Command::SaveStep(_)
+            | Command::Carry { .. }
             | Command::Ask(_) => None,
         }
     }

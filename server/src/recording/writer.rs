@@ -262,7 +262,8 @@ impl File {
             (Change::Command(command), _) => followed.stage.command(time, command),
             (Change::Model(..), None) => None,
         };
-        let is_moved = matches!(change, Change::Command(Command::AddObject(_) | Command::Restore(_)));
+        let is_moved =
+            matches!(change, Change::Command(Command::AddObject(_) | Command::Restore(_) | Command::Reframe(_)));
         let transforms = is_moved.then(|| followed.stage.transforms(time)).flatten();
         if let Some(update) = drawn {
             self.message(topic::SCENE, time, &update)?;

@@ -434,6 +434,15 @@ impl Followed {
                     self.tracks.put(track.object, track.checked()?);
                 }
             }
+            Change::Command(Command::Reframe(frames)) => {
+                for frame in frames {
+                    let (place, pose) = frame.checked()?;
+                    if let Some(spec) = self.objects.get_mut(&frame.object) {
+                        spec.place = place.into();
+                        self.tracks.put(frame.object, MotionState::resting(pose));
+                    }
+                }
+            }
             Change::Command(_) => return Err(ErrorCode::BadCommand),
         }
         Ok(())

@@ -3,7 +3,7 @@
 use super::Target;
 use contactd_proto::control::{
     Answer, Command, Envelope, Facets, ModelFile, ObjectSpec, RecordingOrder, RecordingStatus, ServerStatus,
-    SessionStatus, WireMass, WireRule, WireTrack, decode, encode,
+    SessionStatus, WireFrame, WireMass, WireRule, WireTrack, decode, encode,
 };
 use contactd_proto::query::{ObjectRay, PointOptions, Query, RayOptions};
 use contactd_proto::{ErrorCode, MassOptions, MassProperties, Motion, MotionState, Pose, Rule};
@@ -31,11 +31,7 @@ fn seeds() -> Vec<Vec<u8>> {
     let commands = [
         Command::Open { version: 1, process: (300, 70_000) },
         Command::Close,
-        Command::LoadModel {
-            model: 1,
-            file: ModelFile { name: "ball".into(), format: "csg".into(), bytes: b"sphere(r = 1);".into() },
-            facets: Facets::Exact,
-        },
+        Command::LoadModel { model: 1, file: ModelFile::new("ball", "csg", *b"sphere(r = 1);"), facets: Facets::Exact },
         Command::AddObject(object),
         Command::RemoveObject(7),
         Command::SetRules(vec![WireRule::from(&rule)]),
@@ -47,6 +43,12 @@ fn seeds() -> Vec<Vec<u8>> {
         Command::Record(RecordingOrder { path: "/a".into(), session: Some(3), process: (300, 70_000) }),
         Command::Recording { stop: true },
         Command::SaveStep("/a".into()),
+        Command::Reframe(vec![WireFrame {
+            object: 7,
+            place: Pose::at(DVec3::Y).into(),
+            pose: Pose::at(DVec3::X).into(),
+        }]),
+        Command::Carry { object: 7, carrier: 8, advance: 0.5 },
         Command::Ask(Query::Distance { a: 1, b: 2, tolerance: 1e-6 }),
         Command::Ask(Query::Points {
             points: vec![[1.0, 2.0, 3.0]],
@@ -124,6 +126,14 @@ fn taken(command: Command) -> Result<String, String> {
             }
             format!("restore {:?}", checked.iter().map(|t| t.as_ref().err()).collect::<Vec<_>>())
         }
+        Command::Reframe(frames) => {
+            let checked: Vec<_> = frames.iter().take(3).map(WireFrame::checked).collect();
+            for (place, pose) in checked.iter().flatten() {
+                unit(place).and(unit(pose))?;
+            }
+            format!("reframe {:?}", checked.iter().map(|f| f.as_ref().err()).collect::<Vec<_>>())
+        }
+        Command::Carry { advance, .. } => format!("carry {}", (0.0..=1.0).contains(&advance)),
         Command::Open { .. } => "open".into(),
         Command::Close => "close".into(),
         Command::Status => "status".into(),

@@ -378,7 +378,7 @@ fn a_session_takes_the_bytes_of_a_mesh_by_the_name_of_their_format() {
     let mut session = contactd::embedded(&config).expect("a session");
     let tetrahedron = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
     let mut load = |name: &str, format: &str, bytes: &[u8]| {
-        let file = ModelFile { name: name.into(), format: format.into(), bytes: bytes.into() };
+        let file = ModelFile::new(name, format, bytes);
         session.load_model_file(file, Facets::Auto)
     };
     let info = load("a part", "off", tetrahedron.as_bytes()).expect("a tetrahedron");

@@ -14,6 +14,7 @@ mod gdml_contacts;
 mod gltf;
 mod heights;
 mod import_models;
+mod load;
 mod mass;
 mod mjcf;
 mod models;

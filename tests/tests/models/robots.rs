@@ -114,6 +114,13 @@ impl Arm {
         values
     }
 
+    /// The value of a joint that nobody has told: 0, or the nearest within its limits.
+    pub fn start(&self, joint: &str) -> f64 {
+        let i: usize = joint[1..].parse().expect("the joint's number");
+        let own = &self.joints[i];
+        if own.kind == "continuous" { 0.0 } else { 0.0_f64.clamp(own.range[0], own.range[1]) }
+    }
+
     /// Where its links stand.
     pub fn stands(&self, values: &Values) -> Vec<DMat4> {
         let mut at = DMat4::IDENTITY;
@@ -236,8 +243,13 @@ pub(super) fn words(v: DVec3) -> String {
 }
 
 impl Geometry {
+    /// A point within or beside it, in the link's frame.
+    pub fn point(&self, r: &mut Random) -> DVec3 {
+        frame(self.xyz, self.rpy).transform_point3(r.vector(0.6))
+    }
+
     /// The signed distance of a point of the link. Source: textbooks.
-    fn value(&self, x: DVec3) -> f64 {
+    pub fn value(&self, x: DVec3) -> f64 {
         let x = frame(self.xyz, self.rpy).inverse().transform_point3(x);
         let (r, half) = (self.size.x, self.size.y);
         match self.kind {

@@ -48,6 +48,10 @@ impl Transport for Stub {
         &self.records
     }
 
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        &mut self.records
+    }
+
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
         self.reply = Some(StepReply { step: request.step, epoch: request.epoch, status: 1, ..StepReply::default() });
         Ok(())

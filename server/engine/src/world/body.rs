@@ -173,6 +173,22 @@ impl Body {
         }
     }
 
+    /// The same body in another frame, at rest: its model at `place` in the frame, that at `pose`.
+    pub(super) fn reframe(&mut self, place: Pose, pose: Pose) {
+        let spec = ObjectSpec {
+            id: self.id,
+            name: self.name.clone(),
+            group: String::new(),
+            part: self.part.clone(),
+            is_static: self.is_static,
+            rotates: self.rotates,
+            max_speed: self.max_speed,
+            place,
+            pose,
+        };
+        *self = Self::new(spec, self.group);
+    }
+
     /// Largest speed of any of its points under `motion`, length per step.
     pub fn speed(&self, motion: &Motion) -> f64 {
         let turning = if motion.spin == DVec3::ZERO { 0.0 } else { motion.spin.length() * self.reach };

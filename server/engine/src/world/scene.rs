@@ -200,6 +200,49 @@ impl World {
         Ok(())
     }
 
+    /// Gives objects other frames: each is the id, the model in its new frame, and that frame in the world, where the object then rests.
+    /// A motion is one of an object's frame, whose origin goes straight while it turns; so what is to turn about an axis needs a frame
+    /// that has its origin on it. All of them, or none.
+    ///
+    /// # Errors
+    /// `UnknownObject`, `StaticObject`, `NotFinite`, `BadQuaternion`, at the index of the frame.
+    pub fn reframe(&mut self, frames: &[(u32, Pose, Pose)]) -> Result<(), Refusal> {
+        let mut checked = Vec::with_capacity(frames.len());
+        for (i, (id, place, pose)) in frames.iter().enumerate() {
+            let index = self.index_of(*id).map_err(|e| e.at(i))?;
+            let refuse = |code| Refusal::new(code, format!("object id {id}")).at(i);
+            if self.roster.bodies[index].is_static {
+                return Err(refuse(ErrorCode::StaticObject));
+            }
+            checked.push((index, check_pose(place).map_err(refuse)?, check_pose(pose).map_err(refuse)?));
+        }
+        for (index, place, pose) in checked {
+            self.roster.bodies[index].reframe(place, pose);
+        }
+        self.forget();
+        Ok(())
+    }
+
+    /// The frame of `carrier` for an object, where `advance` (0..1) of the last step leaves both: the object's model in that frame,
+    /// and the frame.
+    ///
+    /// # Errors
+    /// `UnknownObject`; `BadNumber` for a part of a step that is none.
+    pub fn frame_of(&self, object: u32, carrier: u32, advance: f64) -> Result<(Pose, Pose), Refusal> {
+        if !(0.0..=1.0).contains(&advance) {
+            return Err(Refusal::new(ErrorCode::BadNumber, format!("{advance} of a step")));
+        }
+        let [object, carrier] = [object, carrier].map(|id| self.index_of(id).map(|i| &self.roster.bodies[i]));
+        let (object, frame) = (object?, carrier?.motion_state.at(advance));
+        let place = frame.inverse().compose(&object.motion_state.at(advance)).compose(&object.place);
+        Ok((place, frame))
+    }
+
+    fn index_of(&self, id: u32) -> Result<usize, Refusal> {
+        let unknown = || Refusal::new(ErrorCode::UnknownObject, format!("object id {id}"));
+        self.roster.by_id.get(&id).map(|index| *index as usize).ok_or_else(unknown)
+    }
+
     /// Forgets what was proven in earlier steps. It changes no answer, only the work of the next ones.
     pub fn forget(&mut self) {
         self.state.forget(&self.roster.bodies, &mut self.roster.heads);

@@ -132,7 +132,7 @@ pub fn text(
     let setting = Setting::of(shapes, call)?;
     let at = call.at;
     let pattern = font_of(call).unwrap_or_else(|| Pattern::new(""));
-    let name = Attachment::of_font(&pattern);
+    let name = pattern.attachment();
     let found = attached.unwrap_or_default().iter().find(|a| a.name == name).and_then(|a| a.bytes.as_ref().ok());
     let font = found.and_then(|bytes| Font::new(bytes)).or_else(|| Font::carried(&pattern));
     let Some(font) = font else {

@@ -29,6 +29,11 @@ const SUBSTITUTES: [&[&str]; 3] = [
 ];
 
 impl Pattern {
+    /// The name under which the font that it asks for is attached to a text.
+    pub fn attachment(&self) -> String {
+        format!("font:{}", self.written)
+    }
+
     /// Reads what a text says; anything behind the family but the style is let be.
     pub fn new(written: &str) -> Self {
         let mut parts = written.split(':');

@@ -21,7 +21,7 @@ mod urdf;
 
 pub use kinematics::{Dof, DofKind, Link, Robot, Values};
 pub use reader::Ask;
-pub use scene::{read_robot, scene_of};
+pub use scene::{LinkPath, paths_of, read_robot, scene_of};
 
 use std::path::Path;
 

@@ -7,7 +7,7 @@ use super::super::{Limits, Note, Place, read_bytes, xml};
 use super::kinematics::{Part, Robot, Values};
 use super::reader::{self, Ask, Reader};
 use super::{mjcf, sdf, urdf};
-use contactd_proto::{MotionState, PoseRecord, Rule};
+use contactd_proto::{Motion, MotionState, Pose, PoseRecord, Rule};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -71,25 +71,9 @@ pub(super) fn of_problem(file: &str, at: Place, problem: Problem) -> SceneError 
 /// rate of turn.
 pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneError> {
     let file = path.display().to_string();
-    let from = checked(&file, robot, &ask.from)?;
-    let mut to = from.clone();
-    to.extend(checked(&file, robot, &ask.to)?);
+    let (paths, step_notes) = paths_of(path, robot, &ask.from, &ask.to)?;
     let mut notes = robot.notes.clone();
-    notes.extend(followers(&file, robot, [&from, &to])?);
-    let motions = robot.motions(&from, &to).map_err(|(link, joints)| {
-        let link = &robot.links[link];
-        let (last, others) = joints.split_last().expect("two joints at least");
-        SceneError::Value {
-            file: file.clone(),
-            at: link.at,
-            expected: format!("joints of which one turns the link {:?} in a step: move one after the other", link.name),
-            found: format!(
-                "{} and {} moving at once, on a path that is no arc",
-                shown(&others.join(", ")),
-                shown(last)
-            ),
-        }
-    })?;
+    notes.extend(step_notes);
     let mut models: Vec<ModelSource> = Vec::new();
     let mut known: HashMap<&str, usize> = HashMap::new();
     let mut objects = Vec::new();
@@ -109,10 +93,7 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
                 });
                 models.len() - 1
             });
-            let (place, motion) = motions[i];
-            let state = MotionState { motion, end: motion.at(1.0) };
-            let record =
-                (!state.is_rest()).then(|| PoseRecord::turn(0, motion.start.position + motion.velocity, motion.spin));
+            let LinkPath { place, motion, record } = paths[i];
             objects.push(SceneObject {
                 name,
                 at: link.at,
@@ -149,6 +130,55 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
         file,
         access: Access { packages: robot.packages.clone(), ..Access::default() },
     })
+}
+
+/// What a link does in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkPath {
+    /// The link in its object's frame, which has its origin on the axis that turns it.
+    pub place: Pose,
+    /// That frame's motion.
+    pub motion: Motion,
+    /// The same as a record, whose object id is the caller's to set; `None` for a link that rests.
+    pub record: Option<PoseRecord>,
+}
+
+/// What each link does in a step from joint values to others, those that are not named stay; and notes.
+///
+/// # Errors
+/// As `scene_of`.
+pub fn paths_of(
+    path: &Path,
+    robot: &Robot,
+    from: &Values,
+    to: &Values,
+) -> Result<(Vec<LinkPath>, Vec<Note>), SceneError> {
+    let file = path.display().to_string();
+    let from = checked(&file, robot, from)?;
+    let mut end = from.clone();
+    end.extend(checked(&file, robot, to)?);
+    let notes = followers(&file, robot, [&from, &end])?;
+    let motions = robot.motions(&from, &end).map_err(|(link, joints)| {
+        let link = &robot.links[link];
+        let (last, others) = joints.split_last().expect("two joints at least");
+        SceneError::Value {
+            file: file.clone(),
+            at: link.at,
+            expected: format!("joints of which one turns the link {:?} in a step: move one after the other", link.name),
+            found: format!(
+                "{} and {} moving at once, on a path that is no arc",
+                shown(&others.join(", ")),
+                shown(last)
+            ),
+        }
+    })?;
+    let path = |(place, motion): (Pose, Motion)| {
+        let state = MotionState { motion, end: motion.at(1.0) };
+        let end = motion.start.position + motion.velocity;
+        let record = (!state.is_rest()).then(|| PoseRecord::turn(0, end, motion.spin));
+        LinkPath { place, motion, record }
+    };
+    Ok((motions.into_iter().map(path).collect(), notes))
 }
 
 /// A name within a sentence: characters that would break its line are written as escapes.

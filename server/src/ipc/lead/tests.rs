@@ -148,7 +148,7 @@ impl Clients {
     }
 
     fn load(&self, session: u64, text: String) -> Receiver<Vec<u8>> {
-        let file = ModelFile { name: "m.csg".into(), format: String::new(), bytes: text.into() };
+        let file = ModelFile::new("m.csg", "", text);
         self.send(session, Command::LoadModel { model: 1, file, facets: Facets::Auto })
     }
 
