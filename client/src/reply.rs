@@ -1,7 +1,7 @@
 //! The answer to a step: records and their further slots, in place.
 
 use contactd_proto::StepReply;
-use contactd_proto::contact_record::{ContactRecord, DetailSlot, PatchSlot, RegionSlot};
+use contactd_proto::contact_record::{ClearanceSlot, ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 
 /// The answer to a step, in place: valid until the session's next call.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +45,11 @@ impl<'s> Reply<'s> {
     /// The detail slot of a record, when details were asked for.
     pub fn detail(&self, record: &ContactRecord) -> Option<&'s DetailSlot> {
         self.further(record).find_map(ContactRecord::as_detail)
+    }
+
+    /// The least distance of a record's pair over the step, when its rule asks for its clearance.
+    pub fn clearance(&self, record: &ContactRecord) -> Option<&'s ClearanceSlot> {
+        self.further(record).find_map(ContactRecord::as_clearance)
     }
 
     /// The patch slots of a record, when its rule reports patches.

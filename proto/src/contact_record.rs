@@ -111,6 +111,42 @@ pub const PATCH_SLOT: u32 = 2;
 /// First word of a [`RegionSlot`].
 pub const REGION_SLOT: u32 = 3;
 
+/// First word of a [`ClearanceSlot`].
+pub const CLEARANCE_SLOT: u32 = 4;
+
+/// `flags` of a [`ClearanceSlot`]: the bounds are as near to each other as was asked, or as rounding lets them be.
+pub const CLEARANCE_SETTLED: u32 = 1;
+/// `flags` of a [`ClearanceSlot`]: points were found; without it they are zero.
+pub const CLEARANCE_POINTS: u32 = 2;
+
+/// A further slot: the least distance of a pair over the step, where its rule asks for it; the last of its record.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, Pod, Zeroable)]
+#[repr(C)]
+pub struct ClearanceSlot {
+    /// [`CLEARANCE_SLOT`].
+    pub tag: u32,
+    /// [`CLEARANCE_SETTLED`], [`CLEARANCE_POINTS`].
+    pub flags: u32,
+    /// Proven: at no time of the step are two points of the bodies nearer to each other. A length; infinite where a body is empty.
+    pub lower: f64,
+    /// Proven: two points of them come as near; 0 where the bodies share a point, infinite where no points were found.
+    pub upper: f64,
+    /// When they do, fraction of the step.
+    pub time: f64,
+    /// The point of a and that of b, world frame, at that time.
+    pub points: [[f64; 3]; 2],
+    /// Faces of a at its point, by id within its model; [`NO_FACE`] fills.
+    pub faces_a: [u32; 3],
+    /// Faces of b.
+    pub faces_b: [u32; 3],
+    /// The tolerance that was asked for, a length.
+    pub tolerance: f64,
+    /// Pairs of parts that were looked at.
+    pub cells: u64,
+    /// Zero.
+    pub spare: u64,
+}
+
 /// A further slot: a contact region; the [`PatchSlot`]s with its points follow it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[repr(C)]
@@ -184,6 +220,7 @@ pub struct PatchSlot {
 
 const _: () = {
     assert!(size_of::<ContactRecord>() == 128 && size_of::<DetailSlot>() == 128 && size_of::<PatchSlot>() == 128);
+    assert!(size_of::<ClearanceSlot>() == 128 && std::mem::offset_of!(ClearanceSlot, points) == 32);
     assert!(size_of::<RegionSlot>() == 128 && std::mem::offset_of!(RegionSlot, normal) == 16);
     assert!(std::mem::offset_of!(ContactRecord, status) == 8);
     assert!(std::mem::offset_of!(ContactRecord, valid) == 12);
@@ -203,6 +240,12 @@ impl ContactRecord {
         (slot.tag == DETAIL_SLOT).then_some(slot)
     }
 
+    /// This slot as a clearance slot, if it is one.
+    pub fn as_clearance(&self) -> Option<&ClearanceSlot> {
+        let slot: &ClearanceSlot = bytemuck::cast_ref(self);
+        (slot.tag == CLEARANCE_SLOT).then_some(slot)
+    }
+
     /// This slot as a region slot, if it is one.
     pub fn as_region(&self) -> Option<&RegionSlot> {
         let slot: &RegionSlot = bytemuck::cast_ref(self);
@@ -218,6 +261,12 @@ impl ContactRecord {
 
 impl From<DetailSlot> for ContactRecord {
     fn from(slot: DetailSlot) -> Self {
+        bytemuck::cast(slot)
+    }
+}
+
+impl From<ClearanceSlot> for ContactRecord {
+    fn from(slot: ClearanceSlot) -> Self {
         bytemuck::cast(slot)
     }
 }

@@ -90,6 +90,8 @@ effects! {
         Some(|e| e.initial_overlap == InitialOverlap::IgnoreIfSeparating);
     /// Sensor pairs told.
     sensors = EFFECT_SENSOR: 512, "sensor", Some(|e| e.sensor);
+    /// Least distances over the step worked out.
+    clearances = EFFECT_CLEARANCE: 1024, "clearance", Some(|e| e.clearance > 0.0);
 }
 
 const _: () = assert!(size_of::<EffectCounters>() == 8 * ALL.len());

@@ -35,7 +35,7 @@ pub mod rule;
 pub mod status;
 pub mod step;
 
-pub use contact_record::{ContactRecord, DetailSlot, PatchSlot, RegionSlot};
+pub use contact_record::{ClearanceSlot, ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 pub use effects::EffectCounters;
 pub use error::ErrorCode;
 pub use glam;

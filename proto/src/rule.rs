@@ -298,6 +298,8 @@ rules! {
     lengths {
         /// Report at this separation too (length, >= 0): measured by f, never late, early at sharp features.
         margin;
+        /// Tell the least distance over the step, its bounds no farther apart than this (length); 0: not asked.
+        clearance;
     }
 }
 

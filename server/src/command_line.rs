@@ -400,6 +400,7 @@ fn pairs_of<'a>(scene: &Scene, files: &'a [String], check: &'a Check, outcome: &
             report: p.plan.report,
             regions: outcome.regions_of(p),
             regions_complete: p.regions_complete,
+            clearance: outcome.clearance_of(p),
         }
     };
     outcome.pairs.iter().map(pair).collect()

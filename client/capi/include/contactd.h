@@ -221,6 +221,15 @@
 // First word of a contactd_region_slot.
 #define CONTACTD_REGION_SLOT 3
 
+// First word of a contactd_clearance_slot.
+#define CONTACTD_CLEARANCE_SLOT 4
+
+// `flags` of a contactd_clearance_slot: the bounds are as near to each other as was asked, or as rounding lets them be.
+#define CONTACTD_CLEARANCE_SETTLED 1
+
+// `flags` of a contactd_clearance_slot: points were found; without it they are zero.
+#define CONTACTD_CLEARANCE_POINTS 2
+
 // Outcome of a step's search over all its pairs: nothing met.
 #define CONTACTD_STEP_CLEAR 1
 
@@ -277,6 +286,9 @@
 
 // `effects`: sensor pairs told.
 #define CONTACTD_EFFECT_SENSOR 512
+
+// `effects`: least distances over the step worked out.
+#define CONTACTD_EFFECT_CLEARANCE 1024
 
 // Not at all.
 #define CONTACTD_DETECT_OFF 0
@@ -442,6 +454,8 @@ typedef struct contactd_rule {
     size_t except_count;
     // Report at this separation too (length, >= 0): measured by f, never late, early at sharp features.
     double margin;
+    // Tell the least distance over the step, its bounds no farther apart than this (length); 0: not asked.
+    double clearance;
     // CONTACTD_DETECT_…: how the pair is searched.
     uint32_t detect;
     // CONTACTD_REPORT_…: what is told of it.
@@ -540,6 +554,8 @@ typedef struct contactd_effect_counters {
     uint64_t past_overlaps;
     // Sensor pairs told.
     uint64_t sensors;
+    // Least distances over the step worked out.
+    uint64_t clearances;
 } contactd_effect_counters;
 
 // Header of a step's reply.
@@ -652,6 +668,32 @@ typedef struct contactd_detail_slot {
     // Zero.
     uint64_t spare[4];
 } contactd_detail_slot;
+
+// A further slot: the least distance of a pair over the step, where its rule asks for it; the last of its record.
+typedef struct contactd_clearance_slot {
+    // CONTACTD_CLEARANCE_SLOT.
+    uint32_t tag;
+    // CONTACTD_CLEARANCE_SETTLED, CONTACTD_CLEARANCE_POINTS.
+    uint32_t flags;
+    // Proven: at no time of the step are two points of the bodies nearer to each other. A length; infinite where a body is empty.
+    double lower;
+    // Proven: two points of them come as near; 0 where the bodies share a point, infinite where no points were found.
+    double upper;
+    // When they do, fraction of the step.
+    double time;
+    // The point of a and that of b, world frame, at that time.
+    double points[2][3];
+    // Faces of a at its point, by id within its model; CONTACTD_NO_FACE fills.
+    uint32_t faces_a[3];
+    // Faces of b.
+    uint32_t faces_b[3];
+    // The tolerance that was asked for, a length.
+    double tolerance;
+    // Pairs of parts that were looked at.
+    uint64_t cells;
+    // Zero.
+    uint64_t spare;
+} contactd_clearance_slot;
 
 // A further slot: a contact region; the contactd_patch_slots with its points follow it.
 typedef struct contactd_region_slot {
@@ -1085,6 +1127,20 @@ int32_t contactd_remove_object(struct contactd_session *session, uint32_t id);
 // rules; without rules every pair is continuous, report contact. contactd_error_index names the rule that was refused.
 int32_t contactd_set_rules(struct contactd_session *session, const struct contactd_rule *rules, size_t count);
 
+// From now on `part` moves with `carrier` as it stands to it (at `options.advance` of the last step), and is not tested against it nor
+// against the `count` objects in `touching`. It gets the carrier's records, and none of its own.
+int32_t contactd_attach(struct contactd_session *session,
+                        uint32_t part,
+                        uint32_t carrier,
+                        const uint32_t *touching,
+                        size_t count);
+
+// The part stays where it is, and is tested as the rules say. Nothing where it is not attached.
+int32_t contactd_detach(struct contactd_session *session, uint32_t part);
+
+// A pair of objects that may meet and is not tested, whatever the rules say; `allowed` 0: it is no longer.
+int32_t contactd_allow(struct contactd_session *session, uint32_t a, uint32_t b, uint32_t allowed);
+
 // Sets the resolution of every pair, a length; 0: each its default (1e-9 of the larger bounding radius).
 int32_t contactd_set_resolution(struct contactd_session *session, double resolution);
 
@@ -1116,6 +1172,12 @@ int32_t contactd_resend(struct contactd_session *session, struct contactd_pose_r
 
 // The detail slot of record number `record` of the last reply, in place; `*slot` is NULL when details were not asked for.
 int32_t contactd_get_detail(struct contactd_session *session, size_t record, const struct contactd_detail_slot **slot);
+
+// The least distance over the step of the pair of record number `record` of the last reply, in place; `*slot` is NULL where its rule
+// does not ask for its clearance.
+int32_t contactd_get_clearance(struct contactd_session *session,
+                               size_t record,
+                               const struct contactd_clearance_slot **slot);
 
 // Number of contact regions of record number `record` of the last reply: told when its rule reports patches or has a margin.
 int32_t contactd_count_regions(struct contactd_session *session, size_t record, uint32_t *count);
@@ -1420,13 +1482,25 @@ CONTACTD_AT(contactd_region_slot, faces_a, 40);
 CONTACTD_AT(contactd_region_slot, faces_b, 52);
 CONTACTD_AT(contactd_region_slot, separation, 64);
 CONTACTD_AT(contactd_region_slot, spare, 72);
+CONTACTD_SIZE(contactd_clearance_slot, 128);
+CONTACTD_AT(contactd_clearance_slot, tag, 0);
+CONTACTD_AT(contactd_clearance_slot, flags, 4);
+CONTACTD_AT(contactd_clearance_slot, lower, 8);
+CONTACTD_AT(contactd_clearance_slot, upper, 16);
+CONTACTD_AT(contactd_clearance_slot, time, 24);
+CONTACTD_AT(contactd_clearance_slot, points, 32);
+CONTACTD_AT(contactd_clearance_slot, faces_a, 80);
+CONTACTD_AT(contactd_clearance_slot, faces_b, 92);
+CONTACTD_AT(contactd_clearance_slot, tolerance, 104);
+CONTACTD_AT(contactd_clearance_slot, cells, 112);
+CONTACTD_AT(contactd_clearance_slot, spare, 120);
 CONTACTD_SIZE(contactd_patch_slot, 128);
 CONTACTD_AT(contactd_patch_slot, tag, 0);
 CONTACTD_AT(contactd_patch_slot, count, 4);
 CONTACTD_AT(contactd_patch_slot, points, 8);
 CONTACTD_AT(contactd_patch_slot, separations, 104);
 CONTACTD_AT(contactd_patch_slot, region, 120);
-CONTACTD_SIZE(contactd_step_reply, 224);
+CONTACTD_SIZE(contactd_step_reply, 232);
 CONTACTD_AT(contactd_step_reply, step, 0);
 CONTACTD_AT(contactd_step_reply, epoch, 8);
 CONTACTD_AT(contactd_step_reply, status, 16);
@@ -1550,12 +1624,12 @@ CONTACTD_AT(contactd_options, max_records, 32);
 CONTACTD_AT(contactd_options, cell_limit, 36);
 CONTACTD_AT(contactd_options, batch_limit, 40);
 CONTACTD_AT(contactd_options, reserved, 44);
-CONTACTD_SIZE(contactd_reply, 256);
+CONTACTD_SIZE(contactd_reply, 264);
 CONTACTD_AT(contactd_reply, header, 0);
-CONTACTD_AT(contactd_reply, records, 224);
-CONTACTD_AT(contactd_reply, record_count, 232);
-CONTACTD_AT(contactd_reply, slots, 240);
-CONTACTD_AT(contactd_reply, slot_count, 248);
+CONTACTD_AT(contactd_reply, records, 232);
+CONTACTD_AT(contactd_reply, record_count, 240);
+CONTACTD_AT(contactd_reply, slots, 248);
+CONTACTD_AT(contactd_reply, slot_count, 256);
 CONTACTD_SIZE(contactd_manifold_point, 112);
 CONTACTD_AT(contactd_manifold_point, id, 0);
 CONTACTD_AT(contactd_manifold_point, group, 4);
@@ -1571,7 +1645,7 @@ CONTACTD_AT(contactd_manifold, status, 8);
 CONTACTD_AT(contactd_manifold, is_complete, 12);
 CONTACTD_AT(contactd_manifold, points, 16);
 CONTACTD_AT(contactd_manifold, point_count, 24);
-CONTACTD_SIZE(contactd_effect_counters, 80);
+CONTACTD_SIZE(contactd_effect_counters, 88);
 CONTACTD_AT(contactd_effect_counters, continuous, 0);
 CONTACTD_AT(contactd_effect_counters, discrete, 8);
 CONTACTD_AT(contactd_effect_counters, turning, 16);
@@ -1582,16 +1656,18 @@ CONTACTD_AT(contactd_effect_counters, penetrations, 48);
 CONTACTD_AT(contactd_effect_counters, margins, 56);
 CONTACTD_AT(contactd_effect_counters, past_overlaps, 64);
 CONTACTD_AT(contactd_effect_counters, sensors, 72);
-CONTACTD_SIZE(contactd_rule, 64);
+CONTACTD_AT(contactd_effect_counters, clearances, 80);
+CONTACTD_SIZE(contactd_rule, 72);
 CONTACTD_AT(contactd_rule, between, 0);
 CONTACTD_AT(contactd_rule, except, 16);
 CONTACTD_AT(contactd_rule, except_count, 24);
 CONTACTD_AT(contactd_rule, margin, 32);
-CONTACTD_AT(contactd_rule, detect, 40);
-CONTACTD_AT(contactd_rule, report, 44);
-CONTACTD_AT(contactd_rule, initial_overlap, 48);
-CONTACTD_AT(contactd_rule, penetration, 52);
-CONTACTD_AT(contactd_rule, sensor, 56);
+CONTACTD_AT(contactd_rule, clearance, 40);
+CONTACTD_AT(contactd_rule, detect, 48);
+CONTACTD_AT(contactd_rule, report, 52);
+CONTACTD_AT(contactd_rule, initial_overlap, 56);
+CONTACTD_AT(contactd_rule, penetration, 60);
+CONTACTD_AT(contactd_rule, sensor, 64);
 #undef CONTACTD_AT
 #undef CONTACTD_SIZE
 #undef CONTACTD_ASSERT

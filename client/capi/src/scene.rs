@@ -83,6 +83,43 @@ pub unsafe extern "C" fn contactd_set_rules(session: *mut Session, rules: *const
     unsafe { on(session, call) }
 }
 
+/// From now on `part` moves with `carrier` as it stands to it (at `options.advance` of the last step), and is not tested against it nor
+/// against the `count` objects in `touching`. It gets the carrier's records, and none of its own.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_attach(
+    session: *mut Session,
+    part: u32,
+    carrier: u32,
+    touching: *const u32,
+    count: usize,
+) -> i32 {
+    let call = |state: &mut State| {
+        // SAFETY: the caller's numbers (1).
+        let touching = unsafe { row(touching, count, "touching")? };
+        Ok(state.session.attach(part, carrier, touching)?)
+    };
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, call) }
+}
+
+/// The part stays where it is, and is tested as the rules say. Nothing where it is not attached.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_detach(session: *mut Session, part: u32) -> i32 {
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, |state| Ok(state.session.detach(part)?)) }
+}
+
+/// A pair of objects that may meet and is not tested, whatever the rules say; `allowed` 0: it is no longer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_allow(session: *mut Session, a: u32, b: u32, allowed: u32) -> i32 {
+    let call = |state: &mut State| {
+        let allowed = flag(allowed, "allowed")?;
+        Ok(state.session.allow(&[[a, b]], allowed)?)
+    };
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, call) }
+}
+
 /// Sets the resolution of every pair, a length; 0: each its default (1e-9 of the larger bounding radius).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_set_resolution(session: *mut Session, resolution: f64) -> i32 {

@@ -5,7 +5,7 @@ use crate::error::Failure;
 use crate::handle::{Session, State, on};
 use crate::raw::{flag, given, place, reserved, seconds};
 use contactd_client::{StepOptions, Transport as _};
-use contactd_proto::{ContactRecord, DetailSlot, PatchSlot, PoseRecord, RegionSlot};
+use contactd_proto::{ClearanceSlot, ContactRecord, DetailSlot, PatchSlot, PoseRecord, RegionSlot};
 
 /// What is asked of the steps to come, as it is set.
 #[unsafe(no_mangle)]
@@ -143,6 +143,25 @@ pub unsafe extern "C" fn contactd_get_detail(
         let place = unsafe { place(slot, "slot")? };
         let detail = state.further(record)?.iter().find_map(ContactRecord::as_detail);
         place.write(detail.map_or(std::ptr::null(), |slot| slot));
+        Ok(())
+    };
+    // SAFETY: the caller's handle (3).
+    unsafe { on(session, call) }
+}
+
+/// The least distance over the step of the pair of record number `record` of the last reply, in place; `*slot` is NULL where its rule
+/// does not ask for its clearance.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn contactd_get_clearance(
+    session: *mut Session,
+    record: usize,
+    slot: *mut *const ClearanceSlot,
+) -> i32 {
+    let call = |state: &mut State| {
+        // SAFETY: the caller's variable (1).
+        let place = unsafe { place(slot, "slot")? };
+        let clearance = state.further(record)?.iter().find_map(ContactRecord::as_clearance);
+        place.write(clearance.map_or(std::ptr::null(), |slot| slot));
         Ok(())
     };
     // SAFETY: the caller's handle (3).

@@ -11,7 +11,9 @@ use contactd_proto::effects::{self, EffectCounters};
 use contactd_proto::query::{ObjectRay, PointRecord, RayRecord};
 use contactd_proto::rule::{Effects, Field, RuleNumbers, Values};
 use contactd_proto::step::WorkCounters;
-use contactd_proto::{ContactRecord, DetailSlot, ErrorCode, PatchSlot, PoseRecord, RegionSlot, StepReply};
+use contactd_proto::{
+    ClearanceSlot, ContactRecord, DetailSlot, ErrorCode, PatchSlot, PoseRecord, RegionSlot, StepReply,
+};
 use std::fmt::Write as _;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
@@ -89,6 +91,9 @@ fn offsets() -> String {
         }
         "contactd_region_slot" RegionSlot {
             tag, region, kind, extent, reserved, points, normal, faces_a, faces_b, separation, spare,
+        }
+        "contactd_clearance_slot" ClearanceSlot {
+            tag, flags, lower, upper, time, points, faces_a, faces_b, tolerance, cells, spare,
         }
         "contactd_patch_slot" PatchSlot { tag, count, points, separations, region }
         "contactd_step_reply" StepReply {

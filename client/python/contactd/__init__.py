@@ -31,6 +31,7 @@ from .errors import (
 )
 from .pose import Pose, end, start, turn
 from .records import (
+    CLEARANCE,
     CONTACT,
     DETAIL,
     EXTENT_NAMES,
@@ -45,6 +46,7 @@ from .records import (
     REGION,
     SIDE_NAMES,
     STATUS_NAMES,
+    ClearanceFlag,
     Flag,
     Order,
     Status,

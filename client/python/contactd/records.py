@@ -28,6 +28,8 @@ CONTACT: np.dtype = _LAYOUTS["CONTACT"]
 DETAIL: np.dtype = _LAYOUTS["DETAIL"]
 #: A further slot: a contact region; the patch slots with its points follow it.
 REGION: np.dtype = _LAYOUTS["REGION"]
+#: A further slot: the least distance of a pair over the step: certified bounds, when, a point of each body, faces there, work.
+CLEARANCE: np.dtype = _LAYOUTS["CLEARANCE"]
 #: A further slot: up to four points of a region.
 PATCH: np.dtype = _LAYOUTS["PATCH"]
 
@@ -99,6 +101,14 @@ class Tag(enum.IntEnum):
     DETAIL = 1
     PATCH = 2
     REGION = 3
+    CLEARANCE = 4
+
+
+class ClearanceFlag(enum.IntFlag):
+    """``flags`` of a clearance slot: its bounds are as near as was asked; points were found."""
+
+    SETTLED = 1
+    POINTS = 2
 
 
 #: Words for ``status``, ``kind`` and ``extent``, by number.

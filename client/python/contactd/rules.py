@@ -34,6 +34,8 @@ class Rule:
     sensor: bool = False
     #: Report at this separation too (length, >= 0): measured by f, never late, early at sharp features.
     margin: float = 0.0
+    #: Tell the least distance over the step, its bounds no farther apart than this (length); 0: not asked.
+    clearance: float = 0.0
 
 
 class Effect(enum.IntFlag):
@@ -59,3 +61,5 @@ class Effect(enum.IntFlag):
     PAST_OVERLAP = 256
     #: Sensor pairs told.
     SENSOR = 512
+    #: Least distances over the step worked out.
+    CLEARANCE = 1024

@@ -13,7 +13,7 @@ from . import _native
 from ._native import MassProperties, Solid
 from .errors import Error
 from .pose import PoseLike, pose
-from .records import DETAIL, PATCH, POINT, RAY, REGION, StepStatus, Tag
+from .records import CLEARANCE, DETAIL, PATCH, POINT, RAY, REGION, StepStatus, Tag
 from .rules import Effect, Rule
 from .scene import Scene, _values
 from .view import Part, View
@@ -108,6 +108,13 @@ class Reply(_native.Reply):
                 return Part(slot.view(DETAIL), self._lease)
         return None
 
+    def clearance(self, record: int | View) -> View | None:
+        """The least distance of a record's pair over the step (dtype ``CLEARANCE``), when its rule asks for its clearance."""
+        for slot in self._further(record):
+            if slot["a"] == Tag.CLEARANCE:
+                return Part(slot.view(CLEARANCE), self._lease)
+        return None
+
     def regions(self, record: int | View) -> list[Region]:
         """The contact regions of a record in order, when its rule reports patches or has a margin."""
         further = self._further(record)
@@ -130,6 +137,11 @@ class Reply(_native.Reply):
         """The detail slots of all records in order. A view where they stand alone, as they do unless regions were asked for;
         otherwise a copy."""
         return self._chosen(self.slots._array[len(self) :], Tag.DETAIL, DETAIL)
+
+    @property
+    def clearances(self) -> View:
+        """The clearance slots of all records in order; a copy unless they stand alone."""
+        return self._chosen(self.slots._array[len(self) :], Tag.CLEARANCE, CLEARANCE)
 
     @property
     def all_regions(self) -> View:

@@ -3,7 +3,7 @@
 use contactd_proto::contact_record as wire;
 use contactd_proto::query::{NO_OBJECT, OUTCOME_NAMES, PointRecord, RayRecord, Side};
 use contactd_proto::rule::Values;
-use contactd_proto::{ContactRecord, DetailSlot, Effects, PatchSlot, PoseRecord, RegionSlot};
+use contactd_proto::{ClearanceSlot, ContactRecord, DetailSlot, Effects, PatchSlot, PoseRecord, RegionSlot};
 use contactd_proto::{effects, pose_record, step};
 use pyo3::prelude::*;
 use std::mem::offset_of;
@@ -105,6 +105,22 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
             }),
         ),
         (
+            "CLEARANCE",
+            layout!(ClearanceSlot {
+                tag: "<u4",
+                flags: "<u4",
+                lower: "<f8",
+                upper: "<f8",
+                time: "<f8",
+                points: "(2,3)<f8",
+                faces_a: "(3,)<u4",
+                faces_b: "(3,)<u4",
+                tolerance: "<f8",
+                cells: "<u8",
+                spare: "<u8",
+            }),
+        ),
+        (
             "PATCH",
             layout!(PatchSlot {
                 tag: "<u4",
@@ -148,6 +164,9 @@ pub fn constants() -> Vec<(&'static str, &'static str, u32)> {
         ("Tag", "DETAIL", wire::DETAIL_SLOT),
         ("Tag", "PATCH", wire::PATCH_SLOT),
         ("Tag", "REGION", wire::REGION_SLOT),
+        ("Tag", "CLEARANCE", wire::CLEARANCE_SLOT),
+        ("ClearanceFlag", "SETTLED", wire::CLEARANCE_SETTLED),
+        ("ClearanceFlag", "POINTS", wire::CLEARANCE_POINTS),
         ("", "NO_FACE", wire::NO_FACE),
         ("", "NO_OBJECT", NO_OBJECT),
     ];

@@ -2,7 +2,8 @@
 
 use contactd_proto::StepReply;
 use contactd_proto::contact_record::{
-    ContactRecord, DETAIL_SLOT, DetailSlot, PATCH_SLOT, PatchSlot, REGION_SLOT, RegionSlot,
+    CLEARANCE_SLOT, ClearanceSlot, ContactRecord, DETAIL_SLOT, DetailSlot, PATCH_SLOT, PatchSlot, REGION_SLOT,
+    RegionSlot,
 };
 use std::mem::offset_of;
 
@@ -66,6 +67,20 @@ const REGION: &[Field] = &[
     ("spare", offset_of!(RegionSlot, spare), Double),
 ];
 
+const CLEARANCE: &[Field] = &[
+    ("tag", 0, Word),
+    ("flags", offset_of!(ClearanceSlot, flags), Word),
+    ("lower", offset_of!(ClearanceSlot, lower), Double),
+    ("upper", offset_of!(ClearanceSlot, upper), Double),
+    ("time", offset_of!(ClearanceSlot, time), Double),
+    ("points", offset_of!(ClearanceSlot, points), Double),
+    ("faces_a", offset_of!(ClearanceSlot, faces_a), Word),
+    ("faces_b", offset_of!(ClearanceSlot, faces_b), Word),
+    ("tolerance", offset_of!(ClearanceSlot, tolerance), Double),
+    ("cells", offset_of!(ClearanceSlot, cells), Double),
+    ("spare", offset_of!(ClearanceSlot, spare), Double),
+];
+
 const PATCH: &[Field] = &[
     ("tag", 0, Word),
     ("count", offset_of!(PatchSlot, count), Word),
@@ -117,6 +132,9 @@ fn slot(i: usize, is_record: bool, x: &ContactRecord, y: &ContactRecord) -> Opti
             if let Some(detail) = slot.as_detail().copied() {
                 *slot = DetailSlot { cells: 0, ..detail }.into();
             }
+            if let Some(clearance) = slot.as_clearance().copied() {
+                *slot = ClearanceSlot { cells: 0, ..clearance }.into();
+            }
         }
     }
     let bytes = [bytemuck::bytes_of(&x_slot), bytemuck::bytes_of(&y_slot)];
@@ -129,6 +147,7 @@ fn slot(i: usize, is_record: bool, x: &ContactRecord, y: &ContactRecord) -> Opti
             DETAIL_SLOT => DETAIL,
             REGION_SLOT => REGION,
             PATCH_SLOT => PATCH,
+            CLEARANCE_SLOT => CLEARANCE,
             _ => &[("tag", 0, Word)],
         };
         (format!("further slot {i}"), fields)

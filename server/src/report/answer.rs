@@ -1,5 +1,6 @@
 //! The answer for each pair, as the JSON object of `check --json` has it.
 
+use crate::contact::distance::Distance;
 use crate::contact::{Outcome, Region, Status};
 use crate::solid::{Sense, Solid};
 use contactd_proto::Report;
@@ -22,6 +23,8 @@ pub struct PairReport<'a> {
     pub regions: &'a [Region],
     /// False when there may be more of them.
     pub regions_complete: bool,
+    /// Its least distance over the step, where its rule asks for it.
+    pub clearance: Option<&'a Distance>,
 }
 
 /// The object that `check --json` prints.
@@ -62,6 +65,9 @@ pub struct PairAnswer {
     /// Told of a clear pair that comes within its margin: until when it is proven farther apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin_time: Option<f64>,
+    /// Told where the rule asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<ClearanceAnswer>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionAnswer>,
     /// Told when the work limit cut the search for regions.
@@ -89,6 +95,32 @@ pub struct Penetration {
     pub depth: f64,
     pub direction: [f64; 3],
     pub point: [f64; 3],
+}
+
+/// The least distance over the step: proven bounds, when, and a point of each body; infinite bounds and points that were not found are
+/// none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[allow(missing_docs)]
+pub struct ClearanceAnswer {
+    pub lower: Option<f64>,
+    pub upper: Option<f64>,
+    pub time: f64,
+    pub points: Option<[[f64; 3]; 2]>,
+    pub settled: bool,
+}
+
+impl From<&Distance> for ClearanceAnswer {
+    fn from(d: &Distance) -> Self {
+        let finite = |x: f64| x.is_finite().then_some(x);
+        let points = [d.a.point, d.b.point];
+        Self {
+            lower: finite(d.lower),
+            upper: finite(d.upper),
+            time: d.time,
+            points: points.iter().all(|x| x.is_finite()).then(|| points.map(|x| x.to_array())),
+            settled: d.is_settled,
+        }
+    }
 }
 
 /// A region in which a pair touches: points with the separation at each, and the faces that meet.
@@ -199,6 +231,7 @@ impl PairAnswer {
                 point: p.point.to_array(),
             }),
             margin_time: (o.margin_time < 1.0).then_some(o.margin_time),
+            clearance: pair.clearance.map(ClearanceAnswer::from),
             regions: pair
                 .regions
                 .iter()
@@ -270,6 +303,7 @@ mod tests {
             report: Report::Contact,
             regions: &[],
             regions_complete: true,
+            clearance: None,
         }
     }
 

@@ -11,6 +11,6 @@ mod answer;
 mod table;
 mod work;
 
-pub use answer::{Answer, Feature, Features, PairAnswer, PairReport, Penetration, RegionAnswer};
+pub use answer::{Answer, ClearanceAnswer, Feature, Features, PairAnswer, PairReport, Penetration, RegionAnswer};
 pub use table::{TableStyle, faces};
 pub use work::{effects_line, work_table};

@@ -3,7 +3,7 @@
 //! Positions are rounded to a millionth of the larger bounding radius, directions to a millionth; lengths and speeds have six
 //! digits. Nothing is told finer than the pair's resolution: what is smaller is 0. Times have nine decimals.
 
-use super::answer::{Answer, Feature, PairAnswer};
+use super::answer::{Answer, ClearanceAnswer, Feature, PairAnswer};
 use crate::terminal::{Paint, Piece, Role, WIDTH, aligned, clean, cut, fold, number, time, width};
 use std::fmt::Write as _;
 
@@ -95,7 +95,7 @@ impl Answer {
 
 /// Clear, and nothing else to be told.
 fn is_plain(p: &PairAnswer) -> bool {
-    p.status == "clear" && !p.touching && p.margin_time.is_none()
+    p.status == "clear" && !p.touching && p.margin_time.is_none() && p.clearance.is_none()
 }
 
 fn role(status: &str) -> Role {
@@ -166,12 +166,24 @@ fn details(p: &PairAnswer) -> Vec<Piece> {
         told.push(format!("deepest at {at}"));
     }
     told.extend(p.margin_time.map(|t| format!("farther apart than its margin until {}", time(t))));
+    if let Some(c) = &p.clearance {
+        told.push(apart(c, |x| number(x, FINE * p.size, 9)));
+    }
     match (p.regions.len(), p.regions_complete) {
         (0 | 1, true) => {}
         (n, true) => told.push(format!("{n} regions (--json)")),
         (n, false) => told.push(format!("{n} regions (--json) and maybe more")),
     }
     told.into_iter().map(|text| (None, text)).collect()
+}
+
+/// A least distance in words.
+fn apart(c: &ClearanceAnswer, length: impl Fn(f64) -> String) -> String {
+    let bound = |x: Option<f64>| x.map_or_else(|| "infinity".to_owned(), &length);
+    match (bound(c.lower), bound(c.upper)) {
+        (lower, upper) if lower == upper => format!("least distance {upper}, at {}", time(c.time)),
+        (lower, upper) => format!("least distance {lower} to {upper}, at {}", time(c.time)),
+    }
 }
 
 /// Faces as "bolt.csg:41 cylinder, side".
@@ -223,6 +235,9 @@ fn wide(pairs: &[&PairAnswer]) -> String {
         }
         if let Some(t) = p.margin_time {
             let _ = writeln!(out, "{a} and {b} farther apart than their margin until {}", time(t));
+        }
+        if let Some(c) = &p.clearance {
+            let _ = writeln!(out, "{a} and {b} {}", apart(c, |x| digits(x, FINE * p.size)));
         }
         if let Some(f) = &p.features {
             let side = |f: &[Feature]| {

@@ -402,6 +402,7 @@ impl Show {
                 report: p.plan.report,
                 regions: outcome.regions_of(p),
                 regions_complete: p.regions_complete,
+                clearance: outcome.clearance_of(p),
             };
             pairs.push(PairTold::new([p.a, p.b], &report));
         }

@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 mod bodies;
+mod clearances;
 mod coherence;
 mod dynamics;
 mod effect_costs;

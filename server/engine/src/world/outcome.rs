@@ -1,6 +1,7 @@
 //! The answer of a step.
 
 use super::plan::PairPlan;
+use crate::contact::distance::Distance;
 use crate::contact::{Counters, Outcome, Region};
 use contactd_proto::EffectCounters;
 
@@ -23,8 +24,10 @@ pub struct PairOutcome {
     pub regions_complete: bool,
     /// Where its regions stand in `StepOutcome::regions`: the first one, and how many; none unless asked for.
     pub regions: (u32, u32),
-    /// Further slots that the regions of the pairs before it take, and its own.
+    /// Further slots that regions and clearances of the pairs before it take, and its own.
     pub patch_slots: (u32, u32),
+    /// Where its least distance over the step stands in `StepOutcome::clearances`; `None` unless asked for.
+    pub clearance: Option<u32>,
 }
 
 /// The answer of a step. Valid until the next one.
@@ -34,6 +37,8 @@ pub struct StepOutcome {
     pub pairs: Vec<PairOutcome>,
     /// The contact regions of told pairs, pair by pair.
     pub regions: Vec<Region>,
+    /// The least distances over the step of told pairs, in their order.
+    pub clearances: Vec<Distance>,
     /// More pairs would have been told without `max_records`.
     pub truncated: bool,
     /// Smallest time_lower over all pairs, told or not.
@@ -62,11 +67,17 @@ impl StepOutcome {
     /// Makes room for another step's answer: nothing is told, and nothing stands in the way of the whole step. Lists keep their
     /// memory.
     pub(super) fn clear(&mut self) {
-        let Self { pairs, regions, .. } = self;
+        let Self { pairs, regions, clearances, .. } = self;
         pairs.clear();
         regions.clear();
-        let (pairs, regions) = (std::mem::take(pairs), std::mem::take(regions));
-        *self = Self { pairs, regions, safe_time: 1.0, ..Self::default() };
+        clearances.clear();
+        let (pairs, regions, clearances) = (std::mem::take(pairs), std::mem::take(regions), std::mem::take(clearances));
+        *self = Self { pairs, regions, clearances, safe_time: 1.0, ..Self::default() };
+    }
+
+    /// The least distance of a told pair over the step, where its rule asks for it.
+    pub fn clearance_of(&self, pair: &PairOutcome) -> Option<&Distance> {
+        self.clearances.get(pair.clearance? as usize)
     }
 
     /// The contact regions of a told pair.

@@ -4,6 +4,7 @@ use super::boxes::SweptBoxes;
 use super::neighbours::{Neighbours, PairHint};
 use super::notes::{Decided, Notes};
 use super::options::StepOptions;
+use super::plan::PairPlan;
 use super::roster::Roster;
 use super::search::PairJob;
 use super::state::StepState;
@@ -22,9 +23,13 @@ pub(super) fn find(roster: &Roster, state: &mut StepState, options: &StepOptions
     jobs.clear();
     let mut sieve = Sieve { roster, neighbours, boxes, swept_shapes, notes: notes.as_deref_mut(), glanced: 0 };
     if options.clear {
-        sieve.all_pairs(jobs)
+        sieve.all_pairs(0..roster.bodies.len() as u32, |_| true, jobs)
     } else {
-        sieve.near_pairs(near, jobs)
+        sieve.near_pairs(near, jobs);
+        if roster.plans.measures() {
+            let is_measured = |i: &u32| roster.plans.is_measured(roster.bodies[*i as usize].group);
+            sieve.all_pairs((0..roster.bodies.len() as u32).filter(is_measured), PairPlan::reports_clearance, jobs);
+        }
     }
     *glanced = sieve.glanced;
 }
@@ -41,11 +46,19 @@ struct Sieve<'a> {
 }
 
 impl Sieve<'_> {
-    /// A job for every pair that has a plan: the caller wants a line for each, the excluded ones are listed too.
-    fn all_pairs(&mut self, jobs: &mut Vec<PairJob>) {
-        let count = self.roster.bodies.len() as u32;
-        for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
+    /// A job for every pair of some bodies that has a plan of which something is told in any case; the excluded ones are listed too.
+    fn all_pairs(
+        &mut self,
+        of: impl Iterator<Item = u32> + Clone,
+        is_told: impl Fn(&PairPlan) -> bool,
+        jobs: &mut Vec<PairJob>,
+    ) {
+        let rest = of.clone();
+        for (i, j) in of.flat_map(|i| rest.clone().filter(move |j| *j > i).map(move |j| (i, j))) {
             let Some((index, plan, resolution)) = self.roster.pair(i, j) else { continue };
+            if !is_told(&plan) {
+                continue;
+            }
             // Side by side: bodies whose corners are farther apart may be within it.
             let reach = 0.5 * plan.reach();
             let boxes = [i, j].map(|k| self.boxes.of(k, self.roster));
@@ -68,6 +81,10 @@ impl Sieve<'_> {
     fn near_pairs(&mut self, near: &mut Vec<usize>, jobs: &mut Vec<PairJob>) {
         near.clear();
         self.neighbours.each_near(|pair| near.push(pair));
+        if self.roster.plans.measures() {
+            // Something is told of these wherever they are.
+            near.retain(|pair| !self.roster.plans.plan(self.neighbours.plan(*pair)).reports_clearance());
+        }
         if self.roster.plans.count() > 1 {
             near.sort_unstable_by_key(|pair| (self.neighbours.plan(*pair), *pair));
         }

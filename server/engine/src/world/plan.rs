@@ -45,6 +45,11 @@ impl PairPlan {
         self.margin > 0.0 || self.report >= Report::Patch
     }
 
+    /// True when the least distance over the step is told.
+    pub fn reports_clearance(&self) -> bool {
+        self.clearance > 0.0
+    }
+
     /// True when contact regions are told: for patches, and of pairs within a margin whose contacts are told.
     pub fn reports_regions(&self) -> bool {
         self.report >= Report::Patch || (self.margin > 0.0 && self.report >= Report::Contact)
@@ -65,6 +70,8 @@ pub struct Plans {
     table: HashMap<(u32, u32), Vec<u32>>,
     /// Largest margin of each group.
     margins: Vec<f64>,
+    /// Whether some rule that names a group asks for clearances; empty where none does.
+    measured: Vec<bool>,
 }
 
 impl Plans {
@@ -111,6 +118,16 @@ impl Plans {
         self.margins.get(group as usize).copied().unwrap_or(0.0)
     }
 
+    /// True where some rule asks for clearances.
+    pub fn measures(&self) -> bool {
+        !self.measured.is_empty()
+    }
+
+    /// True for a group of which some rule asks for clearances.
+    pub fn is_measured(&self, group: u32) -> bool {
+        self.measured.get(group as usize).is_some_and(|measured| *measured)
+    }
+
     /// The plan of an index.
     pub fn plan(&self, index: u32) -> &PairPlan {
         self.plans.get(index as usize).unwrap_or(&PairPlan::DEFAULT)
@@ -142,12 +159,20 @@ impl Plans {
         self.table.clear();
         self.margins.clear();
         self.margins.resize(self.groups.len(), 0.0);
+        self.measured.clear();
+        let asks = |rule: &Rule| rule.detect != Detect::Off && PairPlan(rule.effects()).reports_clearance();
+        if self.rules.iter().any(asks) {
+            self.measured.resize(self.groups.len(), false);
+        }
         for (r, rule) in self.rules.iter().enumerate() {
             let [p, q] = rule.between.each_ref().map(|name| self.by_name.get(name).copied());
             let (Some(p), Some(q)) = (p, q) else { continue };
             for group in [p, q] {
                 let margin = &mut self.margins[group as usize];
                 *margin = margin.max(if rule.detect == Detect::Off { 0.0 } else { PairPlan(rule.effects()).reach() });
+            }
+            if asks(rule) {
+                (self.measured[p as usize], self.measured[q as usize]) = (true, true);
             }
             for key in [(p, q), (q, p)].into_iter().take(if p == q { 1 } else { 2 }) {
                 self.table.entry(key).or_default().push(r as u32);

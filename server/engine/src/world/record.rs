@@ -5,8 +5,9 @@
 
 use super::outcome::{PairOutcome, StepOutcome};
 use super::scene::World;
+use crate::contact::distance::Distance;
 use crate::contact::{Region, Status};
-use contactd_proto::contact_record::{self as wire, ContactRecord, DetailSlot, PatchSlot, RegionSlot};
+use contactd_proto::contact_record::{self as wire, ClearanceSlot, ContactRecord, DetailSlot, PatchSlot, RegionSlot};
 use contactd_proto::step::{STEP_CLEAR, STEP_CONTACT, STEP_UNDECIDED, StepReply, WorkCounters};
 use contactd_proto::{Report, step};
 
@@ -42,7 +43,35 @@ pub fn slot(world: &World, out: &StepOutcome, details: bool, index: usize) -> Co
     }
     let pair = &out.pairs[low];
     let own = index - start(low);
-    if own < detail_slots { detail(world, pair).into() } else { patch(out.regions_of(pair), own - detail_slots) }
+    if own < detail_slots {
+        return detail(world, pair).into();
+    }
+    match out.clearance_of(pair) {
+        Some(found) if own + 1 == detail_slots + pair.patch_slots.1 as usize => {
+            clearance(found, pair.plan.clearance).into()
+        }
+        _ => patch(out.regions_of(pair), own - detail_slots),
+    }
+}
+
+/// The slot of a least distance that was asked for to a tolerance.
+fn clearance(found: &Distance, tolerance: f64) -> ClearanceSlot {
+    let points = [found.a.point, found.b.point];
+    let has_points = points.iter().all(|x| x.is_finite());
+    let flags = [(found.is_settled, wire::CLEARANCE_SETTLED), (has_points, wire::CLEARANCE_POINTS)];
+    ClearanceSlot {
+        tag: wire::CLEARANCE_SLOT,
+        flags: flags.iter().map(|(on, bit)| if *on { *bit } else { 0 }).sum(),
+        lower: found.lower,
+        upper: found.upper,
+        time: found.time,
+        points: if has_points { points.map(|x| x.to_array()) } else { [[0.0; 3]; 2] },
+        faces_a: found.a.faces,
+        faces_b: found.b.faces,
+        tolerance,
+        cells: found.cells,
+        spare: 0,
+    }
 }
 
 /// Slot `index` of a pair's regions.

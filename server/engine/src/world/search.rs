@@ -170,9 +170,10 @@ pub fn run(
     } else if first || searches.beyond.into_inner() {
         run_queue(bodies, jobs, options, first, clock, heed);
     }
-    if options.clear {
+    let is_told = |job: &PairJob| options.clear || job.plan.reports_clearance();
+    if options.clear || jobs.iter().any(is_told) {
         // A line for each pair, the same whether it was searched or known.
-        for job in jobs.iter_mut().filter(|job| job.near && job.found.known) {
+        for job in jobs.iter_mut().filter(|job| job.near && job.found.known && is_told(job)) {
             job.found.outcome.resolution = contact::resolution_of(&query(bodies, job, options));
         }
     }

@@ -186,6 +186,9 @@ impl World {
         let mut left = search::batch_limit(options);
         decide(bodies, state, options, &mut left, heed);
         report(state, options);
+        if self.roster.plans.measures() {
+            touch::measure(bodies, &state.jobs, options, &mut state.outcome, heed);
+        }
         touch::find_regions(bodies, &mut state.jobs, options, left, &mut state.outcome, heed);
         learn(bodies, state, options);
     }
@@ -241,7 +244,8 @@ fn report(state: &mut StepState, options: &StepOptions) {
         let PairJob { plan, found, resolution, .. } = &jobs[i as usize];
         let (outcome, coarser) = (found.outcome, found.outcome.resolution > *resolution);
         let (regions, patch_slots) = ((0, 0), (0, 0));
-        PairOutcome { a, b, plan: *plan, outcome, coarser, job: i, regions_complete, regions, patch_slots }
+        let clearance = None;
+        PairOutcome { a, b, plan: *plan, outcome, coarser, job: i, regions_complete, regions, patch_slots, clearance }
     }));
     if options.first {
         keep_first(&mut out.pairs);
@@ -331,7 +335,7 @@ fn is_reported(plan: &PairPlan, o: &Outcome, options: &StepOptions) -> bool {
         Status::Contact | Status::Overlap | Status::Undecided => true,
         Status::Clear => {
             let near = o.touching && plan.reports_nearness();
-            options.clear || near || o.margin_time < 1.0
+            options.clear || near || o.margin_time < 1.0 || plan.reports_clearance()
         }
     }
 }

@@ -11,6 +11,7 @@ use super::outcome::StepOutcome;
 use super::record;
 use super::search::{self, PairJob};
 use crate::contact::clearance;
+use crate::contact::distance::{self, DistanceQuery};
 use crate::contact::within::Within;
 use crate::contact::{Outcome, PairQuery, Scratch, Status, region};
 use contactd_proto::{Detect, EffectCounters, Report};
@@ -111,6 +112,31 @@ fn reported(job: &PairJob) -> Option<&Reported> {
     job.pair_cache.as_ref()?.reported().filter(|_| job.found.known && !job.found.apart)
 }
 
+/// Works out the least distances over the step of the told pairs whose rules ask. The work has a limit of its own, and nothing of it is
+/// remembered: what is told does not depend on what else was asked or known.
+pub(super) fn measure(
+    bodies: &[Body],
+    jobs: &[PairJob],
+    options: &StepOptions,
+    out: &mut StepOutcome,
+    heed: Option<&Heed>,
+) {
+    let mut left = search::batch_limit(options);
+    for p in out.pairs.iter_mut().filter(|p| p.plan.reports_clearance()) {
+        if heed.is_some_and(Heed::is_over) {
+            left = 0;
+        }
+        let PairQuery { a, b, cell_limit, .. } = search::query(bodies, &jobs[p.job as usize], options);
+        let limit = distance::DEFAULT_LIMIT.min(cell_limit).min(left);
+        let found = distance::over_step(&DistanceQuery { a, b, tolerance: p.plan.clearance, limit });
+        left = left.saturating_sub(found.cells);
+        out.effect_counters.clearances += 1;
+        out.counters.instant_cells += found.cells;
+        p.clearance = Some(out.clearances.len() as u32);
+        out.clearances.push(found);
+    }
+}
+
 /// Finds the regions of the told pairs and gives each its slots.
 pub(super) fn find_regions(
     bodies: &[Body],
@@ -149,10 +175,11 @@ pub(super) fn find_regions(
                 pair_cache.report(Reported { outcome: p.outcome, regions: found.regions });
             }
         }
-        let own = record::patch_slots(&out.regions[p.regions.0 as usize..]);
+        let own = record::patch_slots(&out.regions[p.regions.0 as usize..]) + u32::from(p.clearance.is_some());
         let fits = options.max_patch_slots == 0 || slots + own <= options.max_patch_slots;
         out.truncated |= !fits;
         p.patch_slots = (slots, if fits { own } else { 0 });
+        p.clearance = p.clearance.filter(|_| fits);
         slots += p.patch_slots.1;
     }
 }
