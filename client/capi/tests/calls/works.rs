@@ -46,6 +46,37 @@ fn a_ball_meets_the_rim_of_a_hole() {
     assert!(again.is_null());
 }
 
+/// Two balls over the plate, the one on the other: the lower one falls, and the upper one goes along.
+#[test]
+fn a_part_that_is_attached_goes_along_and_a_rule_tells_clearances() {
+    let session = Open::embedded();
+    let (plate, ball) = session.scene();
+    let model = session.model("small.csg", c"sphere(r = 1);");
+    let part = session.object(c"part", model, |o| o.pose.position = [10.0, 0.0, 20.0]);
+    let mut rule = contactd_rule_new(c"default".as_ptr(), c"default".as_ptr());
+    rule.effects = RuleNumbers { clearance: 1e-9, ..rule.effects };
+    done(unsafe { contactd_set_rules(session.0, &rule, 1) });
+    done(unsafe { contactd_attach(session.0, part, ball, null(), 0) });
+    session.begin(1)[0] = end(ball, [10.0, 0.0, 12.0]);
+    let reply = session.finish();
+    // Not the two against each other; the part ends a radius of 1 above the plate's top at 2, and began as far from it as 8 more.
+    let told = records(&reply);
+    let clearance = |i| unsafe { *out(|slot| contactd_get_clearance(session.0, i, slot)) };
+    let found: Vec<_> = told.iter().enumerate().map(|(i, c)| (c.a, c.b, clearance(i))).collect();
+    assert_eq!(found.iter().map(|(a, b, _)| (*a, *b)).collect::<Vec<_>>(), [(plate, ball), (plate, part)]);
+    for ((_, _, slot), expected) in found.iter().zip([5.0, 9.0]) {
+        assert!(slot.lower <= expected + 1e-12 && expected <= slot.upper + 1e-12, "{slot:?}");
+        assert!(slot.upper - slot.lower < 1e-9 && slot.time == 1.0 && slot.tolerance == 1e-9, "{slot:?}");
+    }
+    done(unsafe { contactd_allow(session.0, plate, part, 1) });
+    done(unsafe { contactd_detach(session.0, part) });
+    session.begin(0);
+    let pairs: Vec<_> = records(&session.finish()).iter().map(|c| (c.a, c.b)).collect();
+    assert_eq!(pairs, [(plate, ball), (ball, part)]);
+    refused(unsafe { contactd_attach(session.0, part, part, null(), 0) }, 1006, "attached to itself");
+    refused(unsafe { contactd_allow(session.0, part, 99, 1) }, 1006, "objects of this session");
+}
+
 #[test]
 fn a_session_is_recorded_and_its_step_saved() {
     let folder = tempfile::tempdir().unwrap();
