@@ -46,7 +46,7 @@ class Scene:
     @property
     def rules(self) -> list[Rule]:
         """The scene's rules."""
-        return [Rule(between, except_, **settings) for between, except_, settings in self._native.rules()]
+        return [Rule(between, tuple(except_), **settings) for between, except_, settings in self._native.rules()]
 
     @property
     def joints(self) -> dict[str, Joint]:

@@ -39,5 +39,7 @@ with contactd.embedded() if "--embedded" in sys.argv else contactd.connect(*name
     at = (1.5 * -0.4161468365471424, 1.5 * -0.9092974268256817, 0.5)  # at the rod's end
     part = session.add_object("part", model, at=at)
     session.attach(part, arm.objects["rod"])
+    called = {id: name for name, id in arm.objects.items()} | {part: "part"}
+    # The part is not tested against the rod, but against the post.
     for c in arm.step({"turn": 1.5}, timeout=5):
-        print(f"{c.a}-{c.b} meet at t = {c.time:.9f}: the part is not tested against the rod, but against the post")
+        print(f"{called[c.a]} and {called[c.b]} meet at t = {c.time:.9f}")
