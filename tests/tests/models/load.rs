@@ -372,10 +372,8 @@ fn what_is_attached_goes_along_as_one_solid_with_its_gripper() {
         }
         if k % 5 == 0 {
             // Over shared memory, with a server that is lost between two steps: the successor knows what is attached.
-            let mut session = served(base.path(), "first", |address| {
-                let session = Session::connect_to(address.clone()).expect("a session");
-                session
-            });
+            let mut session =
+                served(base.path(), "first", |address| Session::connect_to(address.clone()).expect("a session"));
             let again = std::cell::Cell::new(false);
             let told = served(base.path(), "first", |_| {
                 session.reconnect(PATIENCE).unwrap_or_else(|e| panic!("{e}"));
