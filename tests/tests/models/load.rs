@@ -158,10 +158,12 @@ fn drive<T: Transport>(session: &mut Session<T>, path: &Path, arm: &Arm, seed: u
         all.push(told);
     }
     // Put elsewhere without a step, and stopped on the way.
-    let to = one_joint(arm, &mut r);
-    scene.set_joints(session, &to).unwrap_or_else(|e| panic!("{e}"));
-    values.extend(to);
-    stands(session, &scene, arm, &values, &mut r);
+    for _ in 0..3 {
+        let to = one_joint(arm, &mut r);
+        scene.set_joints(session, &to).unwrap_or_else(|e| panic!("{e}"));
+        values.extend(to);
+        stands(session, &scene, arm, &values, &mut r);
+    }
     let (from, to) = (values.clone(), one_joint(arm, &mut r));
     scene.step(session, &to, PATIENCE).unwrap_or_else(|e| panic!("{e}"));
     let t = r.within(0.0, 1.0);
