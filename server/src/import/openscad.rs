@@ -2,12 +2,14 @@
 //!
 //! The program is started by its name, without a shell, and told the text's absolute path and that of an empty file to write.
 //! What it says goes to a file, too, so that neither a pipe nor memory fills up; it is ended when its time is over or when it has
-//! written more than a model's file may have. Nothing that a client sends comes here: files alone do.
+//! written more than a model's file may have, and with it what it has started itself. Nothing that a client sends comes here: files alone do.
 
 use super::{ImportError, Limits};
+use rustix::process::{Pid, Signal, kill_process_group};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
+use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -69,6 +71,8 @@ impl Openscad {
         let ears = || said.try_clone().map(Stdio::from).map_err(no_room);
         let mut command = Command::new(&self.program);
         command.arg("-o").arg(written.path()).arg(absolute).stdin(Stdio::null()).stdout(ears()?).stderr(ears()?);
+        // What the program starts itself ends with it: it may be a script around OpenSCAD.
+        command.process_group(0);
         let name = self.program.to_string_lossy();
         let child = command.spawn().map_err(|e| {
             failed(format!("no program {name:?} ({e}): install OpenSCAD, or name it by --openscad or {VARIABLE}"))
@@ -108,7 +112,7 @@ impl Openscad {
             let ended =
                 if begun.elapsed() > self.time { Some(Ended::Late) } else { too_large().then_some(Ended::Large) };
             if let Some(ended) = ended {
-                child.kill()?;
+                kill_process_group(Pid::from_child(&child), Signal::KILL)?;
                 child.wait()?;
                 return Ok(ended);
             }
@@ -217,8 +221,8 @@ mod tests {
             ("echo 'ERROR: Assertion false failed'\necho > \"$2\"", "found an error: ERROR: Assertion false failed"),
             ("echo out of tune >&2\nkill -9 $$", "found a failure (signal: 9 (SIGKILL)): out of tune"),
             ("exit 0", "found nothing written"),
-            ("yes > \"$2\"", "found more than 1000 bytes written"),
-            ("exec yes", "found more than 1000 bytes written: y; y; "),
+            ("yes | head -c 5000 > \"$2\"; sleep 60", "found more than 1000 bytes written"),
+            ("yes | head -c 5000; sleep 60", "found more than 1000 bytes written: y; y; "),
         ] {
             let error = stand_in(folder.path(), lines).flatten(&scad, &limits).expect_err(lines).to_string();
             assert!(error.contains(found), "{error}\nnot {found}");
@@ -229,5 +233,39 @@ mod tests {
         let error = slow.flatten(&scad, &limits).expect_err("late").to_string();
         assert!(error.ends_with("found none after 0.2 s, the time that it has"), "{error}");
         assert!(begun.elapsed() < Duration::from_secs(10));
+    }
+
+    /// Processes of a group that are not at their end.
+    fn at_work(group: &str) -> usize {
+        let stats = fs::read_dir("/proc").expect("/proc").filter_map(|entry| {
+            let stat = fs::read_to_string(entry.ok()?.path().join("stat")).ok()?;
+            // Behind the name, which may hold anything: state, parent, group.
+            let (_, rest) = stat.rsplit_once(')')?;
+            let mut fields = rest.split_whitespace();
+            Some((fields.next()? != "Z", fields.nth(1)? == group))
+        });
+        stats.filter(|stat| *stat == (true, true)).count()
+    }
+
+    #[test]
+    fn what_a_program_has_started_ends_with_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (scad, group) = (folder.path().join("part.scad"), folder.path().join("group"));
+        fs::write(&scad, "cube();").expect("written");
+        let limits = Limits { bytes: 1000, ..Limits::default() };
+        let begin = format!("echo $$ > '{}'", group.display());
+        for (time, end) in [(1000, "sleep 60 & sleep 60"), (20_000, "yes | head -c 5000 > \"$2\"; sleep 60 & sleep 60")]
+        {
+            let program = stand_in(folder.path(), &format!("{begin}\n{end}"));
+            let program = Openscad { time: Duration::from_millis(time), ..program };
+            program.flatten(&scad, &limits).expect_err("late, or large");
+            let group = fs::read_to_string(&group).expect("a group");
+            // They are told to end, which takes them a moment.
+            let begun = Instant::now();
+            while at_work(group.trim()) > 0 {
+                assert!(begun.elapsed() < Duration::from_secs(10), "{end}: {} are at work", at_work(group.trim()));
+                std::thread::sleep(LOOK);
+            }
+        }
     }
 }
