@@ -321,7 +321,7 @@ fn a_limit_of_cells_counts_their_work() {
 #[test]
 fn a_limit_of_cells_cuts_the_same_bits() {
     let (fork, plate) = fork_and_plate();
-    const LIMIT: u64 = 20;
+    const LIMIT: u64 = 4;
     let mut cut = 0;
     for k in 0..60 {
         let r = |a: f64| (f64::from(k) * a).fract() * 2.0 - 1.0;

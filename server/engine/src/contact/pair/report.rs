@@ -137,7 +137,8 @@ fn at_the_start(task: &Task, touch: &Solution, deep: &Solution) -> Option<Soluti
     let most = witness_level(task.delta, task.rounding) + INCIDENT * task.rounding;
     let values = [task.model_a.value(s.x), task.model_b.value(at.b_point(s.x))];
     let held = s.lambda.iter().zip(&s.active).all(|(l, c)| *l >= -ACTIVE || matches!(c, Constraint::Apex(..)));
-    (held && values.iter().all(|v| v.abs() <= most)).then_some(s)
+    // Between like faces steps may stop short, far from where the multipliers balance: the way tells more than these.
+    (held && s.stationarity <= NEARLY && values.iter().all(|v| v.abs() <= most)).then_some(s)
 }
 
 /// The deepest point beside one that is deeper than `most` in a body, or in one of them alone, at the start: between

@@ -190,16 +190,7 @@ impl Touch<'_, '_> {
         let off = values[0].abs().max(values[1].abs());
         let most = TOUCHES * self.task.scale + self.task.rounding;
         let is_deep_at_start = t == 0.0 && held.1 > ON_SURFACE * self.task.rounding;
-        let climbed = self.climbed(t, &held);
-        let balances = self.is_balanced(held.0, &at, off) && self.imbalance(&climbed, &at) <= SETTLED;
-        ((is_deep_at_start || off <= most) && balances).then_some(climbed)
-    }
-
-    /// What the multiplied gradients of a solution leave of each other: its normal is right to no less than that.
-    fn imbalance(&self, s: &Solution, at: &Instant) -> f64 {
-        let problem = Problem::of(self.task);
-        let terms = s.active.iter().zip(&s.lambda).map(|(c, l)| problem.row(c, s.x, at, 0.0).gradient * *l);
-        terms.sum::<DVec3>().length() / s.lambda.iter().map(|l| l.abs()).sum::<f64>()
+        ((is_deep_at_start || off <= most) && self.is_balanced(held.0, &at, off)).then(|| self.climbed(t, &held))
     }
 
     /// Touches that the faces beside a point may have, which pass it no farther than a witness is deep, by what holds both
