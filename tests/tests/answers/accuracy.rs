@@ -319,7 +319,7 @@ fn a_batch_spends_its_limit_on_what_meets_first() {
             if i < decided {
                 // But for the cells behind the contact that are asked whether another one touches first.
                 let counters = p.outcome.counters;
-                assert_eq!(Outcome { counters, ..q.outcome.clone() }, p.outcome, "limit {limit}");
+                assert_eq!(Outcome { counters, ..q.outcome }, p.outcome, "limit {limit}");
             } else {
                 assert_eq!(q.outcome.status(), Status::Undecided, "limit {limit}");
                 assert!(q.outcome.time_lower() <= p.outcome.time() && q.outcome.time() == 1.0, "{q:?}");
