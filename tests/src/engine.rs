@@ -114,6 +114,12 @@ pub const SEARCH_ALONE: Strategies = Strategies {
     coarser: true,
 };
 
+/// Of two contacts that come at one time, as mirror images do, either may be told.
+pub fn are_tied(x: &Outcome, y: &Outcome, size: f64) -> bool {
+    let speed = x.at().normal_speed.abs().max(y.at().normal_speed.abs()) / size;
+    x.status() == Status::Contact && y.status() == Status::Contact && (x.time() - y.time()).abs() * speed <= 1e-12
+}
+
 /// In which fields two answers to one question differ, counters apart; times and places by more than rounding: times
 /// weigh with the closing speed, in units of the pair's size. Where a contact is a line or a patch any of its points will do.
 pub fn differences(x: &Outcome, y: &Outcome, size: f64) -> Vec<String> {

@@ -4,19 +4,12 @@
 //! `CONTACTD_FRONTS=100000 cargo test -p contactd-tests --test search fronts:: -- --nocapture`.
 //! The two share the trees' values and Newton's equations, and nothing of how time before a contact is excluded.
 
-use contactd::contact::{Outcome, Status};
-use contactd_tests::engine::ReportedPoint as _;
-use contactd_tests::engine::{SEARCH_ALONE, ask, ask_scene_with, differences};
+use contactd::contact::Status;
+use contactd_tests::engine::{SEARCH_ALONE, are_tied, ask, ask_scene_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes;
 use contactd_tests::sweep::sized;
 use rayon::prelude::*;
-
-/// Of two contacts that come at one time, as mirror images do, either may be told.
-fn are_tied(x: &Outcome, y: &Outcome, size: f64) -> bool {
-    let speed = x.at().normal_speed.abs().max(y.at().normal_speed.abs()) / size;
-    x.status() == Status::Contact && y.status() == Status::Contact && (x.time() - y.time()).abs() * speed <= 1e-12
-}
 
 #[test]
 fn what_is_told_in_front_of_the_search_is_what_the_search_says() {

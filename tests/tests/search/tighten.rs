@@ -3,19 +3,12 @@
 //! 300 random scenes here; for more
 //! `CONTACTD_TIGHTEN=100000 cargo test -p contactd-tests --test search tighten:: -- --nocapture`.
 
-use contactd::contact::{Outcome, Status, Strategies};
-use contactd_tests::engine::ReportedPoint as _;
-use contactd_tests::engine::{SEARCH_ALONE, ask_scene_with, differences};
+use contactd::contact::{Status, Strategies};
+use contactd_tests::engine::{SEARCH_ALONE, are_tied, ask_scene_with, differences};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes;
 use contactd_tests::sweep::sized;
 use rayon::prelude::*;
-
-/// Of two contacts that come at one time, as mirror images do, either may be told.
-fn are_tied(x: &Outcome, y: &Outcome, size: f64) -> bool {
-    let speed = x.at().normal_speed.abs().max(y.at().normal_speed.abs()) / size;
-    x.status() == Status::Contact && y.status() == Status::Contact && (x.time() - y.time()).abs() * speed <= 1e-12
-}
 
 #[test]
 fn smaller_cells_change_no_answer_and_are_fewer() {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::contact::query::outcome::EVALUATIONS_PER_CELL;
+use crate::math::random::Random;
 use crate::motion::Placed;
 use crate::octree::Model;
 use crate::octree::testing::{pierced, simple};
@@ -28,6 +29,22 @@ fn turn(pose: Pose, way: DVec3, spin: DVec3) -> Motion {
 
 fn tilt(v: DVec3) -> glam::DQuat {
     quat_of_rotation_vector(v)
+}
+
+/// A question about two models near each other that move and turn at random.
+pub(super) fn random_query<'m>(a: &'m Model, b: &'m Model, r: &mut Random) -> PairQuery<'m> {
+    let mut placed = || Placed {
+        place: Pose::IDENTITY,
+        motion: turn(Pose::new(r.vector(0.8), tilt(r.vector(2.0))), r.vector(0.5), r.vector(0.5)),
+    };
+    PairQuery {
+        a: PlacedModel { model: a, placed: placed() },
+        b: PlacedModel { model: b, placed: placed() },
+        resolution: default_resolution(a, b),
+        cell_limit: 1000,
+        strategies: Strategies::default(),
+        query_options: QueryOptions::CONTACT,
+    }
 }
 
 /// The answer of the search alone; a whole-primitive answer in front of it must say the same.

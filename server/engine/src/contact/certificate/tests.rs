@@ -1,13 +1,9 @@
 //! What a cell's bound says is what its recorded proofs say: every clause of the expressions is closed by one of them.
 
 use super::*;
-use crate::contact::query::options::QueryOptions;
-use crate::contact::query::question::{PlacedModel, Strategies, default_resolution};
+use crate::contact::tests::random_query;
 use crate::math::random::Random;
-use crate::motion::Placed;
 use crate::octree::testing::random_tree;
-use contactd_proto::motion::quat_of_rotation_vector;
-use contactd_proto::{Motion, Pose};
 
 #[test]
 fn every_clause_is_closed_by_a_recorded_proof() {
@@ -15,20 +11,7 @@ fn every_clause_is_closed_by_a_recorded_proof() {
     let (mut open, mut closings, mut joint) = (0, 0, 0);
     for _ in 0..300 {
         let (a, b) = (random_tree(&mut r, 3), random_tree(&mut r, 3));
-        let motion = |r: &mut Random| Motion {
-            start: Pose::new(r.vector(0.8), quat_of_rotation_vector(r.vector(2.0))),
-            velocity: r.vector(0.5),
-            spin: r.vector(0.5),
-        };
-        let (of_a, of_b) = (motion(&mut r), motion(&mut r));
-        let query = PairQuery {
-            a: PlacedModel { model: &a, placed: Placed { place: Pose::IDENTITY, motion: of_a } },
-            b: PlacedModel { model: &b, placed: Placed { place: Pose::IDENTITY, motion: of_b } },
-            resolution: default_resolution(&a, &b),
-            cell_limit: 1000,
-            strategies: Strategies::default(),
-            query_options: QueryOptions::CONTACT,
-        };
+        let query = random_query(&a, &b, &mut r);
         let (task, _) = Task::of(&query);
         if task.a.is_void() || task.b.is_void() {
             continue;

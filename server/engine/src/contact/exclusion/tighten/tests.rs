@@ -2,15 +2,11 @@
 
 use crate::contact::exclusion::clause::{self, Expressions};
 use crate::contact::exclusion::enumeration::advance_or_tighten;
-use crate::contact::query::options::QueryOptions;
-use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
 use crate::contact::query::task::Task;
+use crate::contact::tests::random_query;
 use crate::math::Aabb;
 use crate::math::random::Random;
-use crate::motion::Placed;
 use crate::octree::testing::random_tree;
-use contactd_proto::motion::quat_of_rotation_vector;
-use contactd_proto::{Motion, Pose};
 use glam::DVec3;
 
 #[test]
@@ -19,20 +15,7 @@ fn what_is_cut_off_holds_no_contact() {
     let (mut beyond, mut beyond_always, mut none, mut later) = (0, 0, 0, 0);
     for _ in 0..400 {
         let (a, b) = (random_tree(&mut r, 2), random_tree(&mut r, 2));
-        let motion = |r: &mut Random| Motion {
-            start: Pose::new(r.vector(0.8), quat_of_rotation_vector(r.vector(2.0))),
-            velocity: r.vector(0.5),
-            spin: r.vector(0.5),
-        };
-        let (of_a, of_b) = (motion(&mut r), motion(&mut r));
-        let query = PairQuery {
-            a: PlacedModel { model: &a, placed: Placed { place: Pose::IDENTITY, motion: of_a } },
-            b: PlacedModel { model: &b, placed: Placed { place: Pose::IDENTITY, motion: of_b } },
-            resolution: default_resolution(&a, &b),
-            cell_limit: 1000,
-            strategies: Strategies::default(),
-            query_options: QueryOptions::CONTACT,
-        };
+        let query = random_query(&a, &b, &mut r);
         let (task, _) = Task::of(&query);
         if task.a.is_void() || task.b.is_void() {
             continue;
