@@ -201,7 +201,7 @@ fn a_session_that_is_ended_hears_why_and_others_go_on() {
     let loading = std::thread::spawn(move || {
         let mut waits = Session::connect_to(address).unwrap();
         send.send(waits.opened().session).unwrap();
-        waits.load_model("large.csg", &spheres(20_000)).map(|m| m.id)
+        waits.load_model("large.csg", &spheres(10_000)).map(|m| m.id)
     });
     let third = opened.recv().unwrap();
     let until = Instant::now() + PATIENCE;
@@ -226,9 +226,9 @@ fn a_session_that_is_ended_hears_why_and_others_go_on() {
 fn a_step_that_is_under_way_does_not_keep_its_session_from_being_ended() {
     let mut server = ServerProcess::start("long", "");
     let mut session = connect(&server);
-    // Every two of them overlap, and each pair is told: half a million.
+    // Every two of them overlap, and each pair is told: some 180,000.
     let ball = session.load_model("ball.csg", "sphere(r = 1);").unwrap().id;
-    let ids: Vec<u32> = (0..1000).map(|i| session.add_object(Object::new(&format!("o{i}"), ball)).unwrap()).collect();
+    let ids: Vec<u32> = (0..600).map(|i| session.add_object(Object::new(&format!("o{i}"), ball)).unwrap()).collect();
     session.begin_step(1).unwrap()[0] = PoseRecord::end(ids[0], &Pose::at(DVec3::X * 0.01));
     session.send().unwrap();
     let id = session.opened().session.to_string();

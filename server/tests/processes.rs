@@ -234,7 +234,7 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     let mut session = connect();
     // No import is answered at once, however quick the machine and whether its cache has the model or not.
     session.command_timeout = Duration::ZERO;
-    assert_eq!(session.load_model("large.csg", &spheres(15_000)).map(|m| m.id), Err(Error::Timeout));
+    assert_eq!(session.load_model("large.csg", &spheres(4_000)).map(|m| m.id), Err(Error::Timeout));
     session.command_timeout = PATIENCE;
     session.close().unwrap();
     assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 0);
@@ -482,14 +482,14 @@ fn a_large_model_delays_only_the_session_that_loads_it() {
     let ids = build(&mut session, 1);
     let loading = std::thread::spawn(move || {
         let mut other = Session::connect_to(address).unwrap();
-        other.load_model("large.csg", &spheres(15_000)).map(|m| m.faces.len())
+        other.load_model("large.csg", &spheres(8_000)).map(|m| m.faces.len())
     });
     let mut steps = 0;
     while !loading.is_finished() {
         step(&mut session, &ids, steps, 2).unwrap();
         steps += 1;
     }
-    assert_eq!(loading.join().unwrap(), Ok(15_000));
+    assert_eq!(loading.join().unwrap(), Ok(8_000));
     assert!(steps > 3, "only {steps} steps while a model was loaded");
 }
 

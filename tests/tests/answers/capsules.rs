@@ -46,7 +46,7 @@ fn between((a, half_a): (&Pose, f64), (b, half_b): (&Pose, f64)) -> f64 {
 
 #[test]
 fn capsules_meet_each_other_balls_and_planes_when_closed_forms_say_so() {
-    let count = pairs(100);
+    let count = pairs(60);
     compare("two capsules", (count, 1, NEAR), |r| {
         let (p, q) = (capsule(r, 1.0), capsule(r, 1.0));
         let motions = [turning(r), past(r, 2.8)];
@@ -105,7 +105,7 @@ fn of_kind(r: &mut Random, kind: usize) -> Shape {
 
 #[test]
 fn capsules_are_answered_in_front_of_the_search_as_by_it() {
-    let count = pairs(40);
+    let count = pairs(30);
     for (kind, name) in ["ball", "cylinder", "cone", "box", "polyhedron", "capsule", "hole"].into_iter().enumerate() {
         let mut r = Random::new(70 + kind as u64);
         let in_hole = name == "hole";
@@ -159,7 +159,7 @@ fn capsules_are_answered_in_front_of_the_search_as_by_it() {
 
 #[test]
 fn certificates_of_capsules_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(80);
+    let count = pairs(50);
     certify_all("kinds", (count, 0xca_9501), |r| {
         let other = if r.chance(0.3) { capsule(r, 0.8).into() } else { shape(r, 0.8) };
         [(alone(capsule(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.4)))]
@@ -169,7 +169,7 @@ fn certificates_of_capsules_against_every_kind_and_of_trees_with_them_hold() {
 
 #[test]
 fn trees_with_capsules_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    values_and_volumes(shape_or_capsule, (pairs(150).div_ceil(50).min(24), 3, pairs(150) * 10), [96, 61]);
+    values_and_volumes(shape_or_capsule, (pairs(90).div_ceil(30).min(24), 3, pairs(90) * 10), [96, 61]);
 }
 
 #[test]
@@ -255,7 +255,7 @@ fn hulls_of_two_balls_of_one_size_are_capsules() {
         format!("multmatrix([[1,0,0,{x:?}],[0,1,0,{y:?}],[0,0,1,{z:?}],[0,0,0,1]]) {{ sphere(r = {radius:?}); }}")
     };
     let mut r = Random::new(8);
-    for i in 0..pairs(40) {
+    for i in 0..pairs(30) {
         // Nearly along an axis, too: nothing is lost there.
         let way = if i % 2 == 0 { r.vector(2.0) } else { DVec3::AXES[i % 3] * 2.0 + r.vector(1.0) * 1e-8 };
         let (from, radius) = (r.vector(1.0), r.within(0.1, 1.0));

@@ -167,7 +167,7 @@ fn at_rest(model: Recipe) -> (Model, Placed) {
 
 /// Two positive primitives.
 fn family(a: usize, b: usize) {
-    let count = pairs(200);
+    let count = pairs(120);
     let mut r = Random::new(1000 + 10 * a as u64 + b as u64);
     let mut tally = Tally::default();
     for i in 0..count {

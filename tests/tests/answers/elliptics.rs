@@ -61,7 +61,7 @@ fn off_ellipsoid(semi: DVec3, y: DVec3) -> f64 {
 
 #[test]
 fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
-    let count = pairs(70);
+    let count = pairs(40);
     let on_plane = |r: &mut Random, shape: Shape| {
         let floor = Recipe::cuboid(8.0, 8.0, 1.0).at(0.0, 0.0, -1.0);
         let motions = [past(r, 2.5), Motion::resting(Pose::new(r.vector(0.2), r.rotation()))];
@@ -123,7 +123,7 @@ fn elliptic_solids_meet_planes_and_balls_when_closed_forms_say_so() {
 
 #[test]
 fn elliptic_solids_meet_convex_bodies_in_front_of_the_search_as_in_it() {
-    let count = pairs(150);
+    let count = pairs(90);
     let mut r = Random::new(0xe11);
     let (mut contacts, mut clear, mut in_front, mut apart) = (0, 0, 0, 0);
     for i in 0..count {
@@ -148,7 +148,7 @@ fn elliptic_solids_meet_convex_bodies_in_front_of_the_search_as_in_it() {
 
 #[test]
 fn certificates_of_elliptic_solids_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(70);
+    let count = pairs(40);
     certify_all("kinds", (count, 0xe1_1195), |r| {
         let other = if r.chance(0.3) { elliptic(r, 0.8) } else { shape(r, 0.8) };
         [(alone(elliptic(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]
@@ -159,7 +159,7 @@ fn certificates_of_elliptic_solids_against_every_kind_and_of_trees_with_them_hol
 #[test]
 fn trees_with_elliptic_solids_have_the_values_and_the_volumes_of_an_independent_evaluation() {
     // A volume by rays takes a second: an eighth of them in the command.
-    values_and_volumes(shape_or_elliptic, (pairs(150).div_ceil(50).min(24), 3, pairs(150) * 10), [96, 61]);
+    values_and_volumes(shape_or_elliptic, (pairs(90).div_ceil(30).min(24), 3, pairs(90) * 10), [96, 61]);
 }
 
 #[test]
@@ -243,7 +243,7 @@ fn elliptic_solids_touch_along_lines_and_at_points() {
 #[test]
 fn round_calls_under_any_matrix_are_their_exact_images() {
     let (mut r, mut seen) = (Random::new(5), 0);
-    for i in 0..pairs(120) {
+    for i in 0..pairs(70) {
         let m = match r.below(3) {
             0 => DMat3::from_diagonal(semi(&mut r)),
             1 => {
@@ -294,5 +294,5 @@ fn round_calls_under_any_matrix_are_their_exact_images() {
         let mass = mass_properties(&Model::new(solid.clone()), &MassOptions::default()).expect("bounded");
         assert!((mass.volume - volume).abs() <= 1e-9 * volume, "{text}: {} not {volume}", mass.volume);
     }
-    assert!(seen > 20 * pairs(120), "{seen} points inside");
+    assert!(seen > 20 * pairs(70), "{seen} points inside");
 }

@@ -17,7 +17,7 @@ const CELLS: u64 = 20_000;
 
 #[test]
 fn nothing_is_wrong_and_nothing_undecided() {
-    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 30), sized("CONTACTD_FAMILY_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 20), sized("CONTACTD_FAMILY_SEED", 1));
     let cells = if scenes > 40 { 0 } else { CELLS };
     let of_family = |family: usize| {
         let verdicts: Vec<_> = (0..scenes)
@@ -61,7 +61,7 @@ fn scenes_are_what_their_seed_says() {
 fn the_judge_notices_wrong_answers() {
     let mut noticed = [0; 5];
     let mut contacts = 0;
-    for index in 0..60 {
+    for index in 0..30 {
         let scene = scene(1, 0, index);
         let answer = ask(&scene, 0).expect("an answer");
         let o = answer.pair.outcome;
@@ -91,7 +91,7 @@ fn the_judge_notices_wrong_answers() {
         assert_eq!(judge(&scene, &o, Effort::Quick, || answer.witness()), [], "scene {index}");
     }
     println!("{contacts} contacts; noticed: {noticed:?}");
-    assert!(contacts >= 20);
+    assert!(contacts >= 10);
     assert!(noticed[..2].iter().all(|n| n * 20 >= contacts * 17), "misses go unnoticed: {noticed:?} of {contacts}");
     assert!(noticed[2..].iter().all(|n| *n == contacts), "{noticed:?} of {contacts}");
 }

@@ -32,7 +32,7 @@ fn ask(a: &Model, b: &Model, motions: [Motion; 2]) -> Outcome {
 fn a_point_is_inside_where_the_mesh_winds_around_it_and_f_is_no_more_than_its_distance() {
     let mut r = Random::new(5);
     let (mut inside, mut seen) = (0, 0);
-    for i in 0..pairs(150) {
+    for i in 0..pairs(90) {
         let mesh = meshes::random(&mut r, 1.0);
         let model = alone(meshes::solid(&mesh));
         let around = model.solid.aabb();
@@ -59,7 +59,7 @@ fn a_point_is_inside_where_the_mesh_winds_around_it_and_f_is_no_more_than_its_di
 
 #[test]
 fn trees_with_meshes_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    values_and_volumes(shape_or_mesh, (pairs(150).div_ceil(75).min(9), 2, pairs(150) * 4), [84, 55]);
+    values_and_volumes(shape_or_mesh, (pairs(90).div_ceil(75).min(9), 2, pairs(90) * 4), [84, 55]);
 }
 
 /// Enclosed volume, by signed tetrahedra.
@@ -81,7 +81,7 @@ fn the_volume_of_a_mesh_is_that_of_its_tetrahedra() {
 
 #[test]
 fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(25);
+    let count = pairs(20);
     certify_all("kinds", (count, 0x3e_5105), |r| {
         let mesh = |r: &mut Random| Shape::from(meshes::solid(&meshes::random(r, 0.8)));
         let other = if r.chance(0.3) { mesh(r) } else { shape(r, 0.8) };
@@ -148,7 +148,7 @@ fn moved(r: &mut Random, motion: Motion) -> Motion {
 
 #[test]
 fn what_is_told_of_meshes_in_front_of_the_search_is_what_the_search_says() {
-    let count = pairs(40);
+    let count = pairs(30);
     let (mut contacts, mut in_front, mut worst) = (0, 0, 0.0_f64);
     for i in 0..count {
         let mut r = Random::new(0xface_7000 + i as u64);
@@ -234,7 +234,7 @@ fn bar(long: f64, [width, height]: [f64; 2], pieces: u32) -> Mesh {
 #[test]
 fn a_bar_that_swings_meets_what_stands_in_its_way_when_its_side_has_come_there() {
     let mut r = Random::new(41);
-    for i in 0..pairs(60) {
+    for i in 0..pairs(40) {
         let (long, w, q) = (r.within(2.0, 4.0), r.within(0.02, 0.2), r.within(0.02, 0.2));
         let whole = r.within(1.5, 3.0);
         let d = r.within(0.3, 0.9) * long;
@@ -259,7 +259,7 @@ fn a_bar_that_swings_meets_what_stands_in_its_way_when_its_side_has_come_there()
 fn a_convex_mesh_meets_when_the_polyhedron_of_its_points_does() {
     let mut r = Random::new(3);
     let (mut contacts, mut worst) = (0, 0.0_f64);
-    let count = pairs(60);
+    let count = pairs(40);
     for i in 0..count {
         let mesh = if r.chance(0.5) {
             let radius = r.within(0.3, 0.8);
@@ -305,7 +305,7 @@ fn facets_close_in(name: &str, (exact, is_convex): (Recipe, bool), counts: &[u32
         .collect();
     let mut r = Random::new(11);
     let mut contacts = vec![0; counts.len()];
-    for i in 0..pairs(30) {
+    for i in 0..pairs(20) {
         // A ball small enough to come in from all sides, straight: its depth in the exact solid grows no faster than it moves.
         let ball = alone(contactd::solid::primitive::Sphere { radius: r.within(0.05, 0.5) });
         let start = r.direction() * 2.5;
@@ -343,7 +343,7 @@ fn facets_close_in(name: &str, (exact, is_convex): (Recipe, bool), counts: &[u32
         }
     }
     println!("{name}: contacts {contacts:?}");
-    assert!(contacts.iter().all(|c| *c * 5 > pairs(30)), "{contacts:?}");
+    assert!(contacts.iter().all(|c| *c * 5 > pairs(20)), "{contacts:?}");
 }
 
 #[test]

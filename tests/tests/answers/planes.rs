@@ -93,7 +93,7 @@ const KINDS: [(&str, Draw); 9] = [
 
 #[test]
 fn bodies_meet_planes_when_their_supports_say_so_without_a_cell() {
-    let count = pairs(150);
+    let count = pairs(90);
     for (tilts, word) in [(false, "floor"), (true, "turning plane")] {
         for (seed, (name, draw)) in (0..).zip(KINDS) {
             let scene = |r: &mut Random| {
@@ -110,7 +110,7 @@ fn bodies_meet_planes_when_their_supports_say_so_without_a_cell() {
 
 #[test]
 fn trees_meshes_and_elliptic_bodies_meet_planes_when_their_supports_say_so() {
-    let count = pairs(150);
+    let count = pairs(90);
     for (tilts, word) in [(false, "floor"), (true, "turning plane")] {
         let one = |shape: Shape| vec![(shape, Pose::IDENTITY)];
         compare(&format!("elliptic, {word}"), (count, 1, 4.0), |r| {
@@ -130,7 +130,7 @@ fn trees_meshes_and_elliptic_bodies_meet_planes_when_their_supports_say_so() {
 
 #[test]
 fn certificates_of_planes_against_every_kind_and_of_trees_hold() {
-    certify_all("planes", (pairs(200), 0x91_A7E5), |r| {
+    certify_all("planes", (pairs(120), 0x91_A7E5), |r| {
         let body = match r.below(6) {
             0 => alone(torus(r, 0.8)),
             1 => alone(elliptic(r, 0.8)),

@@ -72,7 +72,7 @@ fn off_parabola(alpha: f64, own: f64, z: f64) -> f64 {
 
 #[test]
 fn quadrics_meet_planes_and_balls_when_closed_forms_say_so() {
-    let count = pairs(40);
+    let count = pairs(30);
     let on_plane = |r: &mut Random, body: Recipe, reach: Box<dyn Fn(DVec3) -> f64>| {
         let floor = Recipe::cuboid(8.0, 8.0, 1.0).at(0.0, 0.0, -1.0);
         let motions = [past(r, 2.8), Motion::resting(Pose::new(r.vector(0.2), r.rotation()))];
@@ -160,7 +160,7 @@ fn quadrics_meet_planes_and_balls_when_closed_forms_say_so() {
 
 #[test]
 fn certificates_of_quadrics_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(60);
+    let count = pairs(40);
     certify_all("kinds", (count, 0x0_dd1c), |r| {
         let other = if r.chance(0.3) { random(r, 0.8) } else { shape(r, 0.8) };
         [(alone(random(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]
@@ -170,13 +170,13 @@ fn certificates_of_quadrics_against_every_kind_and_of_trees_with_them_hold() {
 
 #[test]
 fn trees_with_quadrics_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    values_and_volumes(shape_or_quadric, (pairs(150).div_ceil(50).min(24), 3, pairs(150) * 10), [96, 61]);
+    values_and_volumes(shape_or_quadric, (pairs(90).div_ceil(30).min(24), 3, pairs(90) * 10), [96, 61]);
 }
 
 #[test]
 fn f_of_a_quadric_is_no_larger_than_the_distance_and_small_at_its_surface_alone() {
     let (mut r, mut looked) = (Random::new(23), 0);
-    for i in 0..pairs(100).div_ceil(10).min(400) {
+    for i in 0..pairs(60).div_ceil(10).min(400) {
         let shape = of_kind(&mut r, 1.0, i % KINDS);
         let solid = Recipe::of(shape).build();
         let around = solid.aabb().grown(0.3);
@@ -239,7 +239,7 @@ fn quadrics_touch_at_points_and_along_rims() {
 #[test]
 fn a_quadric_under_any_matrix_is_its_exact_image() {
     let (mut r, mut seen, mut refused) = (Random::new(5), 0, 0);
-    for i in 0..pairs(200) {
+    for i in 0..pairs(120) {
         let map = DMat3::from_cols(r.vector(1.0), r.vector(1.0), r.vector(1.0));
         let worst = map.inverse().to_cols_array().iter().fold(0.0f64, |s, x| s.max(x.abs()));
         if worst.is_nan() || worst >= 30.0 {
@@ -289,7 +289,7 @@ fn a_quadric_under_any_matrix_is_its_exact_image() {
         }
     }
     println!("{seen} points inside, {refused} refused");
-    assert!(seen > 20 * pairs(200) && refused * 2 < pairs(200), "{seen}, {refused}");
+    assert!(seen > 20 * pairs(120) && refused * 2 < pairs(120), "{seen}, {refused}");
 }
 
 #[test]

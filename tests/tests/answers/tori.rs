@@ -25,7 +25,7 @@ fn from_circle(pose: &Pose, major: f64, x: DVec3) -> f64 {
 
 #[test]
 fn a_torus_meets_a_ball_and_a_plane_and_leaves_round_walls_when_closed_forms_say_so() {
-    let count = pairs(50);
+    let count = pairs(30);
     compare("ball", (count, 1, 4.0), |r| {
         let (t, ball) = (torus(r, 1.0), r.within(0.05, 0.6));
         let motions = [turning(r), past(r, 2.0)];
@@ -80,7 +80,7 @@ fn a_torus_meets_a_ball_and_a_plane_and_leaves_round_walls_when_closed_forms_say
 
 #[test]
 fn certificates_of_tori_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(60);
+    let count = pairs(40);
     certify_all("kinds", (count, 0x70_7105), |r| {
         let other = if r.chance(0.3) { torus(r, 0.8).into() } else { shape(r, 0.8) };
         [(alone(torus(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]
@@ -91,7 +91,7 @@ fn certificates_of_tori_against_every_kind_and_of_trees_with_them_hold() {
 #[test]
 fn trees_with_tori_have_the_values_and_the_volumes_of_an_independent_evaluation() {
     // A volume by rays takes a second: an eighth of them in the command.
-    values_and_volumes(shape_or_torus, (pairs(150).div_ceil(50).min(24), 3, pairs(150) * 10), [96, 61]);
+    values_and_volumes(shape_or_torus, (pairs(90).div_ceil(30).min(24), 3, pairs(90) * 10), [96, 61]);
 }
 
 #[test]

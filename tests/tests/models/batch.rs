@@ -138,7 +138,7 @@ fn alone(objects: &Objects, records: &[PoseRecord], options: &BatchOptions) -> R
 #[test]
 fn each_query_has_the_bits_of_a_session_that_was_made_for_it() {
     let folder = tempfile::tempdir().unwrap();
-    let all = sized("CONTACTD_BATCH", 400);
+    let all = sized("CONTACTD_BATCH", 200);
     let (mut r, mut asked, mut refused, mut met, mut limited) = (Random::new(12), 0, 0, 0, 0);
     while asked < all {
         let objects = objects(&mut r);

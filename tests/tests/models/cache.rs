@@ -46,7 +46,8 @@ fn the_projects_models_come_back_bit_for_bit() {
             .collect();
         files.sort();
         for path in files.iter().filter(|f| f.extension().is_some_and(|e| e == "csg")) {
-            for facets in [Facets::Auto, Facets::Exact, Facets::AsWritten] {
+            // Read as it is by default, and in one of the other two ways.
+            for facets in [Facets::Auto, [Facets::Exact, Facets::AsWritten][models / 2 % 2]] {
                 let Ok(import) = read_model(path, facets, &import::Limits::default()) else { continue };
                 let model = Model::new(import.solid);
                 assert!(all(&kept(&model, &import.notes)) == all(&model), "{}, {facets:?}", path.display());
@@ -54,14 +55,14 @@ fn the_projects_models_come_back_bit_for_bit() {
             }
         }
     }
-    assert!(models >= 40, "{models}");
+    assert!(models >= 30, "{models}");
 }
 
 #[test]
 fn random_solids_come_back_and_answer_as_before() {
     let mut r = Random::new(71);
     let mut met = 0;
-    let count = sized("CONTACTD_TREES", 40);
+    let count = sized("CONTACTD_TREES", 20);
     for i in 0..count {
         let models = [1 + i % 4, 1 + i % 3].map(|depth| Model::new(solid(&mut r, depth)));
         let back = models.each_ref().map(|m| kept(m, &[]));

@@ -285,7 +285,7 @@ fn arms_of_three_formats_stand_and_move_where_matrices_have_them() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(12);
     let (mut moved, mut worst) = (0, 0.0_f64);
-    for k in 0..sized("CONTACTD_ROBOTS", 40usize) {
+    for k in 0..sized("CONTACTD_ROBOTS", 20usize) {
         let arm = Arm::random(&mut r);
         let from = arm.values(&mut r);
         let mut to = Values::new();
@@ -490,7 +490,7 @@ fn texts_that_were_damaged_are_read_or_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(99);
     let (mut scenes, mut refused) = (0, 0);
-    for k in 0..sized("CONTACTD_ROBOTS", 40usize) * 10 {
+    for k in 0..sized("CONTACTD_ROBOTS", 20usize) * 10 {
         let arm = Arm::random(&mut r);
         let (name, text) = match k % 3 {
             0 => ("d.urdf", arm.urdf()),

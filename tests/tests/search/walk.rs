@@ -96,7 +96,7 @@ fn region_of(a: &Model, pa: Placed, b: &Model, pb: Placed, margin: f64) -> Optio
 }
 
 /// Pairs of random solids for the law below.
-const PAIRS: usize = 240;
+const PAIRS: usize = 120;
 
 #[test]
 fn no_pair_of_surfaces_that_meets_is_missed() {
@@ -176,7 +176,7 @@ fn no_pair_of_surfaces_that_meets_is_missed() {
         "walk: {PAIRS} pairs: {met} contact, {clear} clear, {overlap} overlap; {subtracted} on subtracted surfaces; \
          primitive pairs {pairs_all} -> {pairs_found}"
     );
-    assert!(met * 10 >= 3 * PAIRS && subtracted * 100 >= 15 * PAIRS && clear > 20 && pairs_found < pairs_all);
+    assert!(met * 10 >= 3 * PAIRS && subtracted * 100 >= 15 * PAIRS && clear > 10 && pairs_found < pairs_all);
 }
 
 fn still() -> Placed {

@@ -229,7 +229,7 @@ fn check(slot: &ClearanceSlot, a: &Way, b: &Way, discrete: bool, tolerance: f64)
 fn every_pair_that_asks_is_told_its_least_distance_and_nothing_else_changes() {
     let (mut pairs, mut far, mut met, mut plain) = (0, 0, 0, 0);
     let mut failures = Vec::new();
-    for k in 0..sized("CONTACTD_CLEARANCES", 12u64) {
+    for k in 0..sized("CONTACTD_CLEARANCES", 8u64) {
         let mut r = Random::new(900 + k);
         let bodies: Vec<Made> = (0..4 + r.below(4)).map(|_| made(&mut r)).collect();
         let model = |made: &Made| Arc::new(MeasuredModel::new(Arc::new(Model::new(made.recipe.clone().build()))));

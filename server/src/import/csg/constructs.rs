@@ -460,7 +460,7 @@ fn constructs_hold_what_they_mean_without_seams() {
         assert!(b.is_finite() && !faceted, "{text}: {:?}", import.notes);
         let tell = 1e-9 + off;
         let (mut full, mut near) = (0, 0);
-        for _ in 0..if off > 0.0 { 600 } else { 6000 } {
+        for _ in 0..if off > 0.0 { 600 } else { 3000 } {
             let x = b.center() + (r.vector(1.0) * 1.2) * b.half();
             let f = solid.value(x);
             if f.abs() <= tell {
@@ -481,7 +481,7 @@ fn constructs_hold_what_they_mean_without_seams() {
                 assert!(other, "a seam at {x}, f {f}: {text}");
             }
         }
-        assert!(full > 40 && near < 60, "{full} inside, {near} near: {text}");
+        assert!(full > 20 && near < 60, "{full} inside, {near} near: {text}");
     }
 }
 

@@ -381,7 +381,7 @@ mod tests {
             let off = told(&import, "max deviation ") * 1.01 + 1e-9;
             let b = import.solid.aabb();
             let mut sure = [0, 0];
-            for _ in 0..800 {
+            for _ in 0..400 {
                 let x = b.center() + r.vector(1.0) * 1.1 * b.half();
                 let low = if center { -0.5 * height } else { 0.0 };
                 let t = (x.z - low) / height;
@@ -406,7 +406,7 @@ mod tests {
                 assert_eq!(f < 0.0, inside, "{x}, f {f}, facets within {off}: {text}");
                 sure[usize::from(inside)] += 1;
             }
-            assert!(sure[0] > 100 && sure[1] > 5, "{sure:?}: {text}");
+            assert!(sure[0] > 50 && sure[1] > 2, "{sure:?}: {text}");
         }
     }
 
