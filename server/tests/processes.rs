@@ -5,14 +5,15 @@ mod harness;
 
 use contactd::ipc::ServerConfig;
 use contactd_client::proto::control::{Answer, Command, encode};
+use contactd_client::proto::motion::quat_of_rotation_vector;
 use contactd_client::proto::names::{self, Address};
 use contactd_client::proto::query::{ObjectRay, PointOptions, QueryAnswer, RayOptions, RayOutcome, Side};
 use contactd_client::proto::status::StatusRecord;
 use contactd_client::proto::step::{ASK_ALL, STEP_REFUSED};
 use contactd_client::proto::{Detect, ErrorCode, InitialOverlap, Pose, PoseRecord, Report, Rule, StepRequest};
-use contactd_client::{Error, MassOptions, Object, Session, SharedMemory, Transport};
+use contactd_client::{Error, Frame, MassOptions, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
-use harness::scene::{Bits, bits, build, fill, set_options, spheres};
+use harness::scene::{Bits, bits, build, fill, numbers, set_options, spheres};
 use harness::{PATIENCE, ServerProcess, serve_command};
 use std::os::unix::fs::MetadataExt as _;
 use std::process::{Child, Command as Process, Stdio};
@@ -120,6 +121,72 @@ fn a_killed_server_is_noticed_and_its_successor_continues_bit_for_bit() {
     drop(session);
     assert!(server.stop().success());
     assert_eq!(server.remains(), Vec::<String>::new());
+}
+
+/// Objects get other frames, a part goes with another body and is put down again, some pair is allowed: after each the server may die,
+/// and its successor goes on as if it had not.
+#[test]
+fn a_successor_knows_frames_parts_and_allowed_pairs() {
+    let mut server = ServerProcess::start("frames", "");
+    let mut session = Session::connect_to(server.address.clone()).unwrap();
+    let mut own = contactd::embedded(&ServerConfig::default()).unwrap();
+    let texts = [
+        "cube(size = [4, 4, 0.2], center = true);",
+        "cube(size = [1, 0.4, 0.3], center = true);",
+        "sphere($fn = 0, r = 0.3);",
+    ];
+    fn scene<T: Transport>(session: &mut Session<T>, texts: [&str; 3]) -> Vec<u32> {
+        let places = [DVec3::ZERO, DVec3::Z * 1.5, DVec3::new(0.9, 0.0, 1.5)];
+        let add = |(text, place): (&str, DVec3)| {
+            let model = session.load_model("thing.csg", text).unwrap().id;
+            session.add_object(Object::new("", model).at(Pose::at(place))).unwrap()
+        };
+        texts.into_iter().zip(places).map(add).collect()
+    }
+    let ids = scene(&mut session, texts);
+    assert_eq!(ids, scene(&mut own, texts));
+    let mut n = numbers(5);
+    let mut vector = move || DVec3::new(n() * 2.0 - 1.0, n() * 2.0 - 1.0, n() * 2.0 - 1.0);
+    let (mut met, mut answers) = (0, 0);
+    let mut frame = Frame { object: ids[1], place: Pose::IDENTITY, pose: Pose::IDENTITY };
+    for round in 0..24 {
+        if round % 4 == 0 {
+            let place = Pose::new(vector(), quat_of_rotation_vector(vector() * 2.0));
+            let at = Pose::new(DVec3::Z * 1.2 + vector() * 0.2, quat_of_rotation_vector(vector()));
+            frame = Frame { place, pose: at.compose(&place.inverse()), ..frame };
+        }
+        // Put down where it was taken along to.
+        fn change<T: Transport>(session: &mut Session<T>, ids: &[u32], frame: Frame, round: u32) {
+            match round % 4 {
+                0 => session.reframe(&[frame]).unwrap(),
+                1 => session.attach(ids[2], ids[1], &[]).unwrap(),
+                2 => session.allow(&[[ids[0], ids[1]]], round % 8 == 2).unwrap(),
+                _ => session.detach(ids[2]).unwrap(),
+            }
+        }
+        change(&mut session, &ids, frame, round);
+        change(&mut own, &ids, frame, round);
+        if round % 3 < 2 {
+            server.kill();
+            server.restart();
+            session.reconnect(PATIENCE).unwrap();
+        }
+        let (to, turn) = (frame.pose.position + DVec3::Z * -1.5 + vector() * 0.2, vector());
+        let record = PoseRecord::turn(ids[1], to, turn);
+        let back = PoseRecord::start(ids[1], &frame.pose);
+        for record in [record, back] {
+            let ask = |slots: &mut [PoseRecord]| slots[0] = record;
+            ask(session.begin_step(1).unwrap());
+            ask(own.begin_step(1).unwrap());
+            let answer = session.finish(PATIENCE).map(|reply| (bits(&reply), reply.records().len())).unwrap();
+            assert_eq!(answer.0, own.finish(PATIENCE).map(|reply| bits(&reply)).unwrap(), "round {round}");
+            met += usize::from(answer.1 > 0);
+            answers += 1;
+        }
+    }
+    assert!(10 * met > answers, "{met} of {answers} steps meet");
+    drop(session);
+    assert!(server.stop().success());
 }
 
 #[test]

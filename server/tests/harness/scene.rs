@@ -76,7 +76,7 @@ pub fn bits(reply: &Reply) -> Bits {
     (h.status, h.records, h.safe_time.to_bits(), slots)
 }
 
-fn numbers(seed: u64) -> impl FnMut() -> f64 {
+pub fn numbers(seed: u64) -> impl FnMut() -> f64 {
     let mut s = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     move || {
         s = s.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
