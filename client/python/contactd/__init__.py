@@ -54,10 +54,11 @@ from .records import (
     Tag,
     Valid,
 )
+from .reply import Region, Reply
 from .rules import Effect, Rule
 from .scene import Joint, Scene
-from .session import Distance, Face, Model, Recording, Region, Reply, Session, connect, embedded
+from .session import Distance, Face, Model, Recording, Session, connect, embedded
 from .solid import Outline, Solid
 from .view import View
 
-__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "rules", "scene", "session", "view")]
+__all__ = [name for name in dir() if not name.startswith("_") and name not in ("errors", "pose", "records", "reply", "rules", "scene", "session", "view")]

@@ -7,7 +7,7 @@ from typing import Any, Callable, Self, Sequence, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .session import Reply as PublicReply
+from .reply import Reply as PublicReply
 from .view import View
 
 __version__: str

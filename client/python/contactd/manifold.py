@@ -21,7 +21,7 @@ import numpy as np
 from . import _native
 from .pose import PoseLike
 from .pose import pose as as_pose
-from .session import Reply
+from .reply import Reply
 
 
 class Point(NamedTuple):

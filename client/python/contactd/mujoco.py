@@ -42,7 +42,8 @@ from .mujoco_filter import CouplingWarning, Filter, StandIn
 from .mujoco_geoms import MESHES, solid_of
 from .pose import Pose
 from .records import Order, Status
-from .session import Reply, Session, embedded
+from .reply import Reply
+from .session import Session, embedded
 from .solid import Solid
 
 __all__ = ["Coupling", "CouplingWarning", "attach"]

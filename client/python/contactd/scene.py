@@ -12,8 +12,8 @@ from .records import POSE
 from .rules import Rule
 
 if TYPE_CHECKING:
-    from ._native import LoadedScene
-    from .session import Reply, Session
+    from ._native import LoadedScene, Session
+    from .reply import Reply
 
 
 class Joint(NamedTuple):

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 pub struct Known {
     /// `contactd.view.Slots`.
     slots: Py<PyAny>,
-    /// `contactd.session.Reply`.
+    /// `contactd.reply.Reply`.
     pub reply: Py<PyAny>,
     ndarray: Py<PyAny>,
     float: Py<PyAny>,
@@ -36,7 +36,7 @@ pub fn known(py: Python<'_>) -> PyResult<&Known> {
         let dtype = |code: &str| py.import("numpy")?.getattr("dtype")?.call1((code,)).map(Bound::unbind);
         Ok(Known {
             slots: of("contactd.view", "Slots")?,
-            reply: of("contactd.session", "Reply")?,
+            reply: of("contactd.reply", "Reply")?,
             ndarray: of("numpy", "ndarray")?,
             float: dtype("<f8")?,
             word: dtype("<u4")?,
