@@ -264,6 +264,11 @@ fn circle(all: &BTreeMap<Module, Names>) -> (Option<Vec<Module>>, usize) {
         to.insert(at, places.filter(|place| !at.starts_with(place) && all.contains_key(place)).collect());
     }
     let count = to.values().map(BTreeSet::len).sum();
+    (circle_among(to), count)
+}
+
+/// Files that import each other, one after the other; of each file those that it imports.
+fn circle_among(mut to: BTreeMap<&Module, BTreeSet<Module>>) -> Option<Vec<Module>> {
     // What imports nothing that is left goes; what stays is on a circle or above one.
     loop {
         let ends: Vec<Module> = to.iter().filter(|(_, b)| b.is_empty()).map(|(a, _)| (*a).clone()).collect();
@@ -273,15 +278,14 @@ fn circle(all: &BTreeMap<Module, Names>) -> (Option<Vec<Module>>, usize) {
         to.retain(|a, _| !ends.contains(a));
         to.values_mut().for_each(|b| b.retain(|place| !ends.contains(place)));
     }
-    let Some((&first, _)) = to.first_key_value() else { return (None, count) };
-    let mut at = first;
+    let mut at = *to.first_key_value()?.0;
     let mut way: Vec<Module> = Vec::new();
     while !way.contains(at) {
         way.push(at.clone());
         at = to.keys().find(|place| to[at].contains(**place)).unwrap();
     }
     let begin = way.iter().position(|place| *place == *at).unwrap();
-    (Some(way.split_off(begin)), count)
+    Some(way.split_off(begin))
 }
 
 /// Floors of the folders within a folder, from the table rows `| 6.1 | contact/exclusion | … |`, by the whole path.
@@ -376,12 +380,53 @@ fn no_files_import_each_other_in_a_circle() {
         ("server", 100),
         ("client/capi", 10),
         ("client/rapier", 1),
+        ("client/python", 10),
     ] {
         let (found, count) = circle(&modules(&root().join(package).join("src")));
         println!("{package}: {count} imports");
         assert!(found.is_none(), "{package}: {:?} import each other", found.unwrap());
         assert!(count >= least, "{package}: only {count} imports were found: the reader of sources is broken");
     }
+}
+
+/// The files of a Python package that one of them imports, for types alone, too.
+fn python_imports(text: &str, files: &BTreeSet<Module>) -> BTreeSet<Module> {
+    let one = |name: &str| vec![name.trim().split(' ').next().unwrap_or_default().to_owned()];
+    let of_line = |line: &str| -> Vec<Module> {
+        let Some((from, names)) = line.trim().strip_prefix("from .").and_then(|rest| rest.split_once(" import "))
+        else {
+            return Vec::new();
+        };
+        if from.is_empty() { names.split(',').map(one).collect() } else { vec![one(from)] }
+    };
+    text.lines().flat_map(of_line).filter(|module| files.contains(module)).collect()
+}
+
+#[test]
+fn no_python_files_import_each_other_in_a_circle() {
+    let folder = root().join("client/python/contactd");
+    let texts: BTreeMap<Module, String> = std::fs::read_dir(&folder)
+        .expect("the package")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "py") && path.file_stem().is_some_and(|s| s != "__init__"))
+        .map(|path| {
+            (vec![path.file_stem().unwrap().to_str().unwrap().to_owned()], std::fs::read_to_string(&path).unwrap())
+        })
+        .collect();
+    let found = |texts: &BTreeMap<Module, String>| {
+        let files = texts.keys().cloned().collect();
+        let to: BTreeMap<_, _> = texts.iter().map(|(at, text)| (at, python_imports(text, &files))).collect();
+        (to.values().map(BTreeSet::len).sum::<usize>(), circle_among(to))
+    };
+    let (count, circle) = found(&texts);
+    assert!(count > 20 && circle.is_none(), "{count} imports, {circle:?} import each other");
+    let mut texts = texts;
+    texts
+        .get_mut(&vec!["reply".to_owned()])
+        .expect("replies")
+        .push_str("\nif TYPE_CHECKING:\n    from . import session as s\n");
+    texts.get_mut(&vec!["scene".to_owned()]).expect("scenes").push_str("\nfrom .reply import Reply\n");
+    assert!(found(&texts).1.is_some(), "a circle is seen");
 }
 
 #[test]
