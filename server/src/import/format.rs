@@ -1,7 +1,8 @@
 //! The file formats of models, one row each: what a format is called, how its files end, what reads it.
 //!
-//! A new format is a folder beside `csg` and a row of `FORMATS`. Nothing else names one: the wire, the cache, the journal and the
-//! clients carry a format's name and a file's bytes.
+//! A new format is a row of `FORMATS` and a folder beside `csg`; one of meshes is a file in `mesh` and an arm of `mesh::of_file`,
+//! which reads by the ending alone. Nothing else names one: the wire, the cache, the journal and the clients carry a format's name
+//! and a file's bytes.
 
 use super::font::{Pattern, machine};
 use super::openscad::{self, Access};
