@@ -20,16 +20,17 @@
 //!        nothing -> gone;   else a cell per alternative of the reference body ------+
 //!             |                                                                     |
 //!    cell: a box that rides with the reference body, what is left there of both     |
-//!      stage 3  bound each clause of their literals over the     contact::exclusion |
-//!               cell: free until t + dt                                             |
+//!      stage 3  cut it down to what the clauses of their         contact::exclusion |
+//!               literals leave (`tighten`), then bound each                         |
+//!               clause over what is left: free until t + dt                         |
 //!        the whole slice -> gone;   a good while -> the cell at t + dt -------------+
 //!               else solve for the contact that the bound points contact::witness   |
 //!               to; it counts if both whole trees confirm it                        |
 //!        and the cell's two halves -------------------------------------------------+
 //! ```
 //!
-//! In front of the queue stand two proofs that need no cells: two convex primitives (`contact::convex`), convex bodies at
-//! solids with holes (`contact::cavity`). What they do not settle is queued.
+//! In front of the queue stand three proofs that need no cells: two convex primitives (`contact::convex`), convex bodies at
+//! solids with holes (`contact::cavity`), meshes (`contact::facets`). What they do not settle is queued.
 //!
 //! It ends when the earliest item lies beyond the confirmed contact: then all that is still queued is the proof that
 //! nothing came before (`contact`). An empty queue is `clear`; a spent work limit is `undecided`, with the time up to
