@@ -141,8 +141,8 @@ impl PoseRecord {
     /// What a record asks for (pass a copy when it lies in shared memory), once its numbers are checked.
     ///
     /// # Errors
-    /// `BadCount` for flags out of the protocol and for a [`TURN`] whose last number is not 0, `NotFinite` (of a position also beyond [`FARTHEST`](crate::pose::FARTHEST)),
-    /// `BadQuaternion`.
+    /// `BadCount` for flags out of the protocol and for a [`TURN`] whose last number is not 0, `NotFinite` (of a
+    /// position also beyond [`FARTHEST`](crate::pose::FARTHEST)), `BadQuaternion`.
     pub fn decode(&self) -> Result<PoseCommand, ErrorCode> {
         let mut checked = *self;
         checked.check()?;

@@ -1,18 +1,19 @@
 //! The engine of contactd: certified earliest contact of moving solids modelled by constructive solid geometry.
 //!
-//! It knows trees of exact faces and how they move; it knows no file format, no transport and no process but its own. The
-//! package `contactd` adds those, hands on every module of this one, and has the page that shows the three stages, the queue
-//! and the floors (`server/src/lib.rs`).
+//! It knows trees of exact faces and how they move; it knows no file format, no transport and no process but its own.
+//! The package `contactd` adds those, hands on every module of this one, and has the page that shows the three stages
+//! and the queue (`server/src/lib.rs`). docs/architecture.md has the floors: each module imports from smaller ones
+//! only.
 //!
-//! | module | |
-//! |---|---|
-//! | [`math`] | boxes, balls, every tolerance with its reason |
-//! | [`motion`] | a step's motion, one body seen from the other |
-//! | [`solid`] | faces, primitives, trees, what is left of a tree in a small box |
-//! | [`bound`] | stage 1: S-bounds of two trees |
-//! | [`octree`] | stage 2: extended CSG octrees and their walk |
-//! | [`contact`] | stage 3 and the queue: the answer for a pair ([`contact::earliest_contact`]) |
-//! | [`world`] | a session's objects and rules: the answers of a step ([`world::World::step`]) |
+//! | floor | module | |
+//! |---|---|---|
+//! | 0 | [`math`] | boxes, balls, every tolerance with its reason |
+//! | 1 | [`motion`] | a step's motion, one body seen from the other |
+//! | 2 | [`solid`] | faces, primitives, trees, what is left of a tree in a small box |
+//! | 3 | [`bound`] | stage 1: S-bounds of two trees |
+//! | 4 | [`octree`] | stage 2: extended CSG octrees and their walk |
+//! | 5 | [`contact`] | stage 3 and the queue: the answer for a pair ([`contact::earliest_contact`]) |
+//! | 6 | [`world`] | a session's objects and rules: the answers of a step ([`world::World::step`]) |
 //!
 //! ```
 //! use contactd_engine::contact::{PairQuery, PlacedModel, QueryOptions, Scratch, Strategies, default_resolution, earliest_contact};

@@ -1,5 +1,5 @@
-//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; what flattens them: `openscad`; meshes: `mesh`), scene files (`scene`) and
-//! robots (`robot`).
+//! File formats: models (`format` lists them; OpenSCAD's flattened ones: `csg`; what flattens them: `openscad`; meshes:
+//! `mesh`), scene files (`scene`) and robots (`robot`).
 //!
 //! A file is read completely or refused with one sentence that names the file, the line, the column, what was expected
 //! and what stands there. Real files are rough; whatever is snapped, flipped, merged or taken in another way than

@@ -1,4 +1,4 @@
-//! Earliest contact of one pair over one step: kernels that answer without cells, and the queue that orders the three stages.
+//! Earliest contact of one pair over one step: proofs in front that need no cells, and the queue of the three stages.
 //!
 //! Floor 5: imports `octree`, `bound`, `motion`, `solid`, `math`, `proto`. Its folders stand on floors of their own
 //! (docs/architecture.md): each holds one idea and imports only from those below it, by their own paths.

@@ -10,8 +10,9 @@
 //! | cylinder, cone | the larger of tangent v − Σ e_k\|n_k\| and axis (rho >= 0) | largest corner value, exact |
 //! | torus | the larger of the tangent less what it dips and that of ρ and z | largest corner value of the ball at c, or ρ and z |
 //!
-//! v is psi(c) and n its gradient: psi is convex (but for a torus), so it lies above its tangents and is largest at a corner. The maximum
-//! over a primitive's faces is exact from above and a lower bound from below; a formula's minima and maxima are bounds of both kinds. Both are moved outwards by the rounding.
+//! v is psi(c) and n its gradient: psi is convex (but for a torus and a saddle), so it lies above its tangents and is
+//! largest at a corner. The maximum over a primitive's faces is exact from above and a lower bound from below; a
+//! formula's minima and maxima are bounds of both kinds. Both are moved outwards by the rounding.
 
 use crate::math::tolerance::OUTWARD;
 use crate::solid::{Face, Primitive};

@@ -1,4 +1,5 @@
-//! Where the told pairs of a step touch, for the rules that ask: a margin, or patches.
+//! What a step tells of its pairs beside their search, for the rules that ask: where they touch (a margin, or patches),
+//! and their least distance over the step (`measure`).
 //!
 //! First it is decided whether a pair touches at the start, since a clear pair that does is told. The regions are found
 //! last, of the told pairs alone and in their order, so that the work that the batch's limit left is spent on the earliest.

@@ -1,9 +1,9 @@
 //! How far apart two bodies are: certified bounds of the least distance at an instant or over a step, its time, both points.
 //!
-//! Branch and bound over pairs of parts (`part`) and spans of time, the lowest bound first (A. Land, A. Doig, Econometrica 28(3),
-//! 1960). From below a pair of parts is bounded by directions and faces (`search`): every point of the parts is within the hull of some
-//! points, thickened by a radius. From above two points are made nearest (`polish`), proven inside of their bodies. docs/algorithm/clearance.md
-//! has the formulas.
+//! Branch and bound over pairs of parts (`part`) and spans of time, the lowest bound first (A. Land, A. Doig,
+//! Econometrica 28(3), 1960). From below a pair of parts is bounded by directions and faces (`search`): every point of
+//! the parts is within the hull of some points, thickened by a radius. From above two points are made nearest
+//! (`polish`), proven inside of their bodies. docs/algorithm/clearance.md has the formulas.
 //!
 //! f of a tree is at most the distance and less at sharp features; these bounds are of the distance itself.
 

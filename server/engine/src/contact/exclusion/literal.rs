@@ -3,10 +3,11 @@
 //! The cell is a box fixed in A. For x in it, a literal is at least a + n·(x − c) − R:
 //! * +psi: where psi is convex a tangent plane bounds it everywhere: R = 0; where it is not (`Surface::under`), it bends away from
 //!   its tangent as a subtracted cone does, and R is that of the next line;
-//! * −psi (ρ and D those of B(x − o) and B y where a face is the affine image of another): concave; R is the supremum of k·(ρ(x) − ρ − u·(x−c)): k·D²/(2ρ) over |x−c| <= D across the face's axis (exact
-//!   where D <= 2ρ, an upper bound beyond), or k·T²/(2(ρ−S)) where the cell reaches S along the radial direction u and
-//!   T along the curving tangents (sqrt((ρ+s)² + τ²) − (ρ+s) falls with s). Where D > 2ρ the radial direction means
-//!   nothing over the cell: it is left out and R = k·D.
+//! * −psi (ρ and D those of B(x − o) and B y where a face is the affine image of another): concave; R is the supremum
+//!   of k·(ρ(x) − ρ − u·(x−c)): k·D²/(2ρ) over |x−c| <= D across the face's axis (exact where D <= 2ρ, an upper bound
+//!   beyond), or k·T²/(2(ρ−S)) where the cell reaches S along the radial direction u and T along the curving tangents
+//!   (sqrt((ρ+s)² + τ²) − (ρ+s) falls with s). Where D > 2ρ the radial direction means nothing over the cell: it is
+//!   left out and R = k·D.
 //!
 //! A contact at depth delta needs every literal of a clause <= −delta, so `bound` carries a + delta − R and "excluded" is
 //! bound > 0 for a convex combination. Guards (the planes of an octree voxel) need <= 0 and carry no delta.

@@ -1,4 +1,4 @@
-//! One pair over one step: the kernels in front of the queue, then the queue; and the answer's fields.
+//! One pair over one step: the proofs in front of the queue, then the queue; and the answer's fields.
 
 mod report;
 pub mod search;

@@ -1,15 +1,22 @@
 //! The search: one queue ordered by the earliest time at which an item could hold a contact.
 //!
-//! Items are slices of time (`slices`) and cells: boxes fixed in the reference body A with what is left there of both trees. The
-//! earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a slice into
-//! smaller ones or into cells, a cell into its halves. Where a cell's bounds point to a contact, one is proposed and
-//! confirmed (`propose`). When the earliest item lies beyond the verified contact, all that was
-//! queued is the proof that nothing came before.
+//! Items are slices of time (`slices`) and cells: boxes fixed in the reference body A with what is left there of both
+//! trees. The earliest is popped, bounded (`clause`) and put back at the time it is proven free until, or refined: a
+//! slice into smaller ones or into cells, a cell into its halves. Before a cell is bounded it is cut down to what its
+//! clauses leave (`exclusion::tighten`). Where a cell's bounds point to a contact, one is proposed and confirmed
+//! (`propose`). When the earliest item lies beyond the verified contact, all that was queued is the proof that nothing
+//! came before.
+//!
+//! In the order in which they are called: `run` pops the earliest item. `refine` takes a slice apart, or goes on with a
+//! cell: `bound` bounds it, and makes it smaller first where that is worth it (`bound_or_tighten`, `tighten`);
+//! `is_free` puts back what is free for a while; `propose` makes a guess of a contact; `look_closer` looks where
+//! rounding or a thin wall leaves the bound no room; `split` queues both halves.
 //!
 //! A cell inside one body may be dropped only at t > 0: once the start is known to be free of overlap and containment,
-//! the first contact lies on both surfaces (f_A = f_B = −delta). Were x deeper in A and just at −delta in B, the same point of B
-//! was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for clearances, too. At t = 0 such cells are refined like any other, and a
-//! witness found there restarts the search at 2 delta, then means overlap.
+//! the first contact lies on both surfaces (f_A = f_B = −delta). Were x deeper in A and just at −delta in B, the same
+//! point of B was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for
+//! distances that are kept, too. At t = 0 such cells are refined like any other, and a witness found there restarts the
+//! search at 2 delta, then means overlap.
 
 use super::cell::{Cell, Range, Source};
 use super::clock::Stage;

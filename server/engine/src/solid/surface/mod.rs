@@ -71,12 +71,13 @@ use smallvec::SmallVec;
 pub struct FaceAt {
     /// psi(x): signed distance-like value, length.
     pub value: f64,
-    /// Gradient of psi: a unit vector, but of elliptic faces and quadrics, where psi may grow slower than the distance. What bounds psi
-    /// goes by this; what looks for a direction goes by `unit`.
+    /// Gradient of psi, 1 long at most: shorter where psi grows slower than the distance (elliptic faces, bowls,
+    /// saddles, superellipsoids). What bounds psi goes by this; what looks for a direction goes by `unit`.
     pub normal: DVec3,
     /// Its length: 1 at most, and just that of all but these.
     pub slope: f64,
-    /// Curvature factor k: 0 plane, cos α cone, max(p, q) − 1 superellipsoid, 1 any other. psi rises above its tangent by k D²/(2ρ) at most.
+    /// Curvature factor k: 0 plane, cos α cone, max(p, q) − 1 superellipsoid, 1 any other. psi rises above its tangent
+    /// by k D²/(2ρ) at most.
     pub k: f64,
     /// Distance ρ from the centre, the axis or the circle (infinite for a plane, where k is 0); of an elliptic face or a bowl
     /// |B(x − o)|, of a saddle |P(x)|, of a superellipsoid sN.
@@ -245,9 +246,10 @@ pub trait Surface: Copy {
         None
     }
 
-    /// Gradient of the length by which psi bends at `x`, 1 long at most, and what that bends along: psi is no more than k (√((ρ + a)² + τ²) − ρ − a) above its
-    /// tangent, a what an offset has along the first, τ along the others. One alone of these, of a length |P| where P has two rows, is 1 long
-    /// at most, and the length no more than what an offset has along both.
+    /// Gradient of the length by which psi bends at `x`, 1 long at most, and what that bends along: psi is no more than
+    /// k (√((ρ + a)² + τ²) − ρ − a) above its tangent, a what an offset has along the first, τ along the others. One
+    /// alone of these, of a length |P| where P has two rows, is 1 long at most, and the length no more than what an
+    /// offset has along both.
     #[inline]
     fn split(&self, _x: DVec3) -> Option<[DVec3; 3]> {
         None

@@ -4,10 +4,11 @@
 //!
 //! N = ((|y₁/a|^q + |y₂/b|^q)^(p/q) + |y₃/c|^p)^(1/p)
 //!
-//! (A. Barr, Superquadrics and angle-preserving transformations, IEEE CG&A 1(1), 1981; e₁ shapes it north to south, e₂ east to west.) With both exponents 1 it
-//! is an ellipsoid, towards 0 a box (both), or a cylinder (e₁ alone). N is a norm wherever p, q >= 1, and psi is convex. For p, q >= 2 it is nowhere larger than the
-//! ellipsoid's, so that the nearest points of the surface are those of the shortest semi-axis: s = min(a, b, c), and psi is
-//! 1-Lipschitz, a lower bound of the distance that is at most (a² + b² + c²)^½/s times too small.
+//! (A. Barr, Superquadrics and angle-preserving transformations, IEEE CG&A 1(1), 1981; e₁ shapes it north to south, e₂
+//! east to west.) With both exponents 1 it is an ellipsoid, towards 0 a box (both), or a cylinder (e₁ alone). N is a
+//! norm wherever p, q >= 1, and psi is convex. For p, q >= 2 it is nowhere larger than the ellipsoid's, so that the
+//! nearest points of the surface are those of the shortest semi-axis: s = min(a, b, c), and psi is 1-Lipschitz, a lower
+//! bound of the distance that is at most (a² + b² + c²)^½/s times too small.
 //!
 //! From above: for p, q >= 2 N is 2-uniformly smooth with the constant k = max(p, q) − 1 (K. Ball, E. Carlen, E. Lieb, Sharp uniform
 //! convexity and smoothness inequalities for trace norms, 1994; of a norm of norms by the same Hessians). With the gradient g of sN at
@@ -21,8 +22,9 @@
 //! For exponents above 1 (p or q below 2) the curvature is infinite all along a plane of symmetry, and no such bound is there: those are
 //! refused, and so is what is below `EXPONENTS`, where k exceeds 19: that is a box to within 6 % of its size.
 //!
-//! Rounding: both norms are taken as m (1 + t^p)^(1/p), t <= 1 the smaller part over the larger one m, so that an error of t or of the power counts in
-//! N by no more than it is, whatever p is. The gradient is that of a t that is off by as much.
+//! Rounding: both norms are taken as m (1 + t^p)^(1/p), t <= 1 the smaller part over the larger one m, so that an error
+//! of t or of the power counts in N by no more than it is, whatever p is. The gradient is that of a t that is off by as
+//! much.
 
 use super::elliptic::{Stretch, WHOLE, axes_of, moved_turn, turn_of};
 use super::{
