@@ -19,7 +19,7 @@ pub struct Writer {
 }
 
 /// All of them.
-pub const WRITERS: [Writer; 12] = [
+pub const WRITERS: [Writer; 14] = [
     Writer { ending: "stl", single: true, write: |b, _| ascii_stl(&b[0].0) },
     Writer { ending: "stl", single: true, write: |b, _| binary_stl(&b[0].0) },
     Writer { ending: "off", single: true, write: |b, _| off(&b[0].0) },
@@ -27,12 +27,25 @@ pub const WRITERS: [Writer; 12] = [
     Writer { ending: "ply", single: true, write: |b, _| ply(&b[0].0, "ascii") },
     Writer { ending: "ply", single: true, write: |b, _| ply(&b[0].0, "binary_little_endian") },
     Writer { ending: "ply", single: true, write: |b, _| ply(&b[0].0, "binary_big_endian") },
+    Writer { ending: "msh", single: true, write: |b, r| msh(&b[0].0, r) },
     Writer { ending: "3mf", single: false, write: threemf },
     Writer { ending: "amf", single: false, write: |b, _| amf(b).into_bytes() },
     Writer { ending: "amf", single: false, write: |b, _| archive(&[("part.amf", amf(b).as_bytes())]) },
     Writer { ending: "gltf", single: false, write: |b, r| gltf(b, false, r) },
     Writer { ending: "glb", single: false, write: |b, r| gltf(b, true, r) },
+    Writer { ending: "dae", single: false, write: dae },
 ];
+
+/// With normals and texture coordinates that mean nothing, or without.
+fn msh((points, triangles): &Mesh, r: &mut Random) -> Vec<u8> {
+    let (normals, textures) = (r.below(2) * points.len(), r.below(2) * points.len());
+    let mut out = Vec::new();
+    [points.len(), normals, textures, triangles.len()].iter().for_each(|n| out.extend((*n as u32).to_le_bytes()));
+    points.iter().flat_map(|p| p.to_array()).for_each(|v| out.extend((v as f32).to_le_bytes()));
+    (0..3 * normals + 2 * textures).for_each(|k| out.extend((k as f32).to_le_bytes()));
+    triangles.iter().flatten().for_each(|i| out.extend(i.to_le_bytes()));
+    out
+}
 
 fn ascii_stl((points, triangles): &Mesh) -> Vec<u8> {
     let mut out = String::from("solid part\n");
@@ -282,6 +295,49 @@ fn gltf(bodies: &[Body], binary: bool, r: &mut Random) -> Vec<u8> {
         out.extend(chunk);
     }
     out
+}
+
+/// Bodies as nodes within each other's transforms, in metres with +z up; the second half of a mesh's triangles in a primitive of its own.
+fn dae(bodies: &[Body], r: &mut Random) -> Vec<u8> {
+    let (mut geometries, mut nodes) = (String::new(), String::new());
+    for (i, ((points, triangles), place)) in bodies.iter().enumerate() {
+        let numbers: String = points.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
+        let (half, uneven) = (triangles.len() / 2, r.chance(0.5));
+        let list =
+            |part: &[[u32; 3]], gap: &str| -> String { part.iter().flatten().map(|i| format!("{gap}{i} ")).collect() };
+        let input = |at: u32| format!("<input semantic=\"VERTEX\" source=\"#v{i}\" offset=\"{at}\"/>");
+        let (first, rest) = triangles.split_at(half);
+        let counts = "3 ".repeat(rest.len());
+        let (at, gap) = if uneven { (1, "0 ") } else { (0, "") };
+        let _ = write!(
+            geometries,
+            "<geometry id=\"g{i}\"><mesh><source id=\"s{i}\"><float_array id=\"f{i}\" count=\"{}\">{numbers}</float_array>\
+             <technique_common><accessor source=\"#f{i}\" count=\"{}\" stride=\"3\"/></technique_common></source>\
+             <vertices id=\"v{i}\"><input semantic=\"POSITION\" source=\"#s{i}\"/></vertices>\
+             <triangles count=\"{half}\">{}<p>{}</p></triangles>\
+             <polylist count=\"{}\">{}<vcount>{counts}</vcount><p>{}</p></polylist></mesh></geometry>",
+            3 * points.len(),
+            points.len(),
+            input(0),
+            list(first, ""),
+            rest.len(),
+            input(at),
+            list(rest, gap),
+        );
+        let m = glam::DMat4::from(*place).transpose().to_cols_array();
+        let matrix: Vec<String> = m.iter().map(f64::to_string).collect();
+        let _ = write!(
+            nodes,
+            "<node><matrix>{}</matrix><node><instance_geometry url=\"#g{i}\"/></node></node>",
+            matrix.join(" ")
+        );
+    }
+    format!(
+        "<?xml version=\"1.0\"?>\n<COLLADA version=\"1.4.1\"><asset><unit meter=\"1\"/><up_axis>Z_UP</up_axis></asset>\
+         <library_geometries>{geometries}</library_geometries><library_visual_scenes><visual_scene id=\"all\">{nodes}\
+         </visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#all\"/></scene></COLLADA>"
+    )
+    .into_bytes()
 }
 
 fn base64(bytes: &[u8]) -> String {

@@ -83,6 +83,7 @@ fn a_key_is_told_apart_by_all_that_decides_the_import() {
         key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { depth: 5, ..limits }),
         key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { faces: 5, ..limits }),
         key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { polyhedron_faces: 5, ..limits }),
+        key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { hull_faces: 5, ..limits }),
         key_of(&FORMATS[0], BALL, Facets::Auto, &Limits { values: 5, ..limits }),
     ];
     for (i, a) in keys.iter().enumerate() {

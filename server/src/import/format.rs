@@ -43,6 +43,8 @@ pub const FORMATS: &[Format] = &[
     mesh::amf::FORMAT,
     mesh::ply::FORMAT,
     mesh::gltf::FORMAT,
+    mesh::dae::FORMAT,
+    mesh::msh::FORMAT,
 ];
 
 /// A file that is in memory.
@@ -238,7 +240,7 @@ mod tests {
         let sentence = of("part.csg", "step").unwrap_err().to_string();
         assert_eq!(
             sentence,
-            "part.csg: expected one of the formats csg, stl, off, obj, 3mf, amf, ply, gltf, found \"step\""
+            "part.csg: expected one of the formats csg, stl, off, obj, 3mf, amf, ply, gltf, dae, msh, found \"step\""
         );
     }
 

@@ -138,8 +138,10 @@ pub struct Limits {
     pub depth: usize,
     /// Faces of all primitives together.
     pub faces: usize,
-    /// Faces of one polyhedron, whose checks grow with their square.
+    /// Faces of one polyhedron that a text lists, or a curve's pieces: what looks at all of them for each of them is cheap enough.
     pub polyhedron_faces: usize,
+    /// Faces of one convex hull.
+    pub hull_faces: usize,
     /// Triangles of one mesh that is not convex.
     pub mesh_facets: usize,
     /// Values in one list.
@@ -155,6 +157,7 @@ impl Default for Limits {
             depth: 1_000,
             faces: 2_000_000,
             polyhedron_faces: 5_000,
+            hull_faces: 100_000,
             mesh_facets: 1_000_000,
             values: 1_000_000,
         }

@@ -25,7 +25,7 @@ pub(super) const DRAWINGS: Target = Target {
 };
 
 /// How names of files end, by an input's first byte; "in 3mf" is the model within a package.
-const MESHES_OF: [&str; 9] = ["stl", "off", "obj", "ply", "3mf", "amf", "gltf", "glb", "in 3mf"];
+const MESHES_OF: [&str; 11] = ["stl", "off", "obj", "ply", "3mf", "amf", "gltf", "glb", "in 3mf", "dae", "msh"];
 const DRAWINGS_OF: [&str; 4] = ["svg", "dxf", "dat", "png"];
 
 const MESH_WORDS: [&str; 24] = [

@@ -438,7 +438,12 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
             &none,
             "not negative, found \"-1\"",
         ),
-        ("a.xml", "<mujoco><contact><pair/></contact></mujoco>", &none, "a <pair> of geoms, which is not supported"),
+        (
+            "a.xml",
+            "<mujoco><contact><pair/></contact></mujoco>",
+            &none,
+            "a.xml:1:18: expected geom1 of the pair, found none",
+        ),
         ("a.urdf", "<robot xmlns:x=\"http://ros.org/wiki/xacro\"><x:arm/></robot>", &none, "run xacro first"),
         ("a.urdf", "<robot/>", &none, "expected links of the robot"),
         ("a.urdf", "<robot><link name=\"a\"/><link name=\"b\"/></robot>", &none, "found a second one, \"b\""),

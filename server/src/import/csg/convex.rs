@@ -6,7 +6,7 @@
 //! OpenSCAD has it, with every curve in the pieces that its text asks for, and a note tells how many facets and how far off.
 
 use super::facets::{faceted_sphere, prism, ring};
-use super::hull::{Disc, DiscHull, ball_hull, disc_hull, point_hull};
+use super::hull::{Disc, DiscHull, ball_hull, corners_of, disc_hull, point_hull};
 use super::parts::{Part, PartId, Parts};
 use super::place;
 use super::polygon::{Region, convex_hull};
@@ -358,7 +358,7 @@ impl Hull<'_> {
             parts.note(self.at, format!("a {} without volume: left out, as OpenSCAD does", self.name), None);
             return Ok(Part::Empty);
         };
-        parts.affordable(self.at, faces.len())?;
+        parts.hullable(self.at, faces.len())?;
         let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
         match place::polyhedron(&DAffine3::IDENTITY, points, &faces) {
             Err(Problem::Mesh(crate::solid::primitive::MeshError::Flat)) => {
@@ -501,15 +501,6 @@ fn outermost(elements: &[Element]) -> Vec<(DVec3, f64)> {
         }
     }
     kept
-}
-
-/// The corners of the hull of points; all of them where they span no volume.
-fn corners_of(points: Vec<DVec3>) -> Vec<DVec3> {
-    let Some(faces) = point_hull(&points) else { return points };
-    let mut used: Vec<usize> = faces.into_iter().flatten().collect();
-    used.sort_unstable();
-    used.dedup();
-    used.into_iter().map(|i| points[i]).collect()
 }
 
 /// The meridian of elements that are symmetric about an axis, both sides of it.

@@ -17,7 +17,7 @@ type Result<T> = std::result::Result<T, (Place, Problem)>;
 const PARAMETERS: [&str; 9] = ["file", "layer", "convexity", "origin", "scale", "center", "dpi", "id", "timestamp"];
 
 /// The formats that are read of other files, for sentences.
-const READ: &str = " (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dxf and svg are read)";
+const READ: &str = " (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dae, msh, dxf and svg are read)";
 
 /// The same of extrusions that name a drawing, with what they have of their own.
 const OF_EXTRUSIONS: [&str; 13] = [
@@ -296,7 +296,7 @@ mod tests {
             ("parts", "which is no plain file"),
             (
                 "t.dat",
-                "found import of \"t.dat\", which is not supported (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dxf and svg are read)",
+                "found import of \"t.dat\", which is not supported (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dae, msh, dxf and svg are read)",
             ),
             ("broken.off", "m.csg:1:1: broken.off:9:7: expected a point's number below 4, found \"9\""),
         ] {

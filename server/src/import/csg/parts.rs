@@ -114,6 +114,14 @@ impl<'a> Parts<'a> {
         Ok(())
     }
 
+    /// Refuses more faces of one hull than the limit says.
+    pub fn hullable(&self, at: Place, faces: usize) -> Result<()> {
+        if faces > self.limits.hull_faces {
+            return Err((at, Problem::Limit { what: "faces of a hull", limit: self.limits.hull_faces }));
+        }
+        Ok(())
+    }
+
     /// Refuses more triangles of one mesh than the limit says.
     pub fn meshable(&self, at: Place, triangles: usize) -> Result<()> {
         if triangles > self.limits.mesh_facets {

@@ -5,7 +5,7 @@
 use super::arguments::{Arguments, IndexLists, vector};
 use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
-use super::hull::point_hull;
+use super::hull::{corners_of, point_hull};
 use super::parts::{Part, PartId, Parts};
 use super::place::{self, PlacedShape};
 use super::syntax::Call;
@@ -218,10 +218,14 @@ impl Shapes<'_> {
         hull: bool,
         (points, faces): (Vec<DVec3>, Vec<Vec<u32>>),
     ) -> Result<PartId> {
-        if faces.len() > self.limits.polyhedron_faces && !hull {
-            return self.mesh(call, outer, (&points, &faces), None);
+        if faces.len() > self.limits.polyhedron_faces {
+            return if hull {
+                self.parts.meshable(call.at, faces.len())?;
+                Ok(self.corners(outer, corners_of(used(&points, &faces))))
+            } else {
+                self.mesh(call, outer, (&points, &faces), None)
+            };
         }
-        self.parts.affordable(call.at, faces.len())?;
         let mut mesh = place::polyhedron(outer, &points, &faces);
         if !hull
             && matches!(mesh, Err(Problem::Mesh(MeshError::Mixed(..))))
@@ -237,13 +241,9 @@ impl Shapes<'_> {
         }
         if hull && matches!(mesh, Err(Problem::Mesh(_))) {
             let used: Vec<DVec3> = faces.iter().flatten().map(|i| points[*i as usize]).collect();
-            let Some(faces) = point_hull(&used) else {
-                // What is flat has corners, too.
-                let id = self.parts.push(Part::Empty);
-                self.parts.points.insert(id, used.into_iter().map(|p| outer.transform_point3(p)).collect());
-                return Ok(id);
-            };
-            self.parts.affordable(call.at, faces.len())?;
+            // What is flat has corners, too.
+            let Some(faces) = point_hull(&used) else { return Ok(self.corners(outer, used)) };
+            self.parts.hullable(call.at, faces.len())?;
             let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
             mesh = place::polyhedron(outer, &used, &faces);
         }
@@ -265,6 +265,13 @@ impl Shapes<'_> {
             );
         }
         self.leaf(call, Ok(placed))
+    }
+
+    /// What has no inside of its own, below a hull: points of it.
+    fn corners(&mut self, outer: &DAffine3, points: Vec<DVec3>) -> PartId {
+        let id = self.parts.push(Part::Empty);
+        self.parts.points.insert(id, points.into_iter().map(|p| outer.transform_point3(p)).collect());
+        id
     }
 
     /// A mesh that need not be convex; what it is not closed for was told by `before` where that is known.
@@ -422,4 +429,11 @@ fn pieces(arguments: &Arguments<'_>, r: f64) -> Result<f64> {
     } else {
         (360.0 / fa.max(0.01)).min(r * std::f64::consts::TAU / fs.max(0.01)).max(5.0).ceil()
     })
+}
+
+/// The points that some faces name, each once.
+fn used(points: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
+    let mut named = vec![false; points.len()];
+    faces.iter().flatten().for_each(|i| named[*i as usize] = true);
+    points.iter().zip(named).filter(|(_, named)| *named).map(|(p, _)| *p).collect()
 }

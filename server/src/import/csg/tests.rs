@@ -386,7 +386,16 @@ fn every_refusal_is_a_sentence_with_its_place() {
 
 #[test]
 fn limits_are_named() {
-    let limits = Limits { bytes: 1000, nodes: 5, depth: 3, faces: 20, polyhedron_faces: 6, mesh_facets: 9, values: 8 };
+    let limits = Limits {
+        bytes: 1000,
+        nodes: 5,
+        depth: 3,
+        faces: 20,
+        polyhedron_faces: 6,
+        hull_faces: 8,
+        mesh_facets: 9,
+        values: 8,
+    };
     let table = [
         (" ".repeat(1001), "m.csg:1:1: expected at most 1000 bytes of text, found more"),
         ("group();".repeat(6), "m.csg:1:41: expected at most 5 nodes, found more"),

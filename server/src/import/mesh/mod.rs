@@ -1,10 +1,12 @@
-//! Files that are meshes: `stl`, `off`, `obj`, `ply`, which are one each; `threemf`, `amf`, `gltf`, which may be some.
+//! Files that are meshes: `stl`, `off`, `obj`, `msh`, `ply`, which are one each; `threemf`, `amf`, `gltf`, `dae`, which may be some.
 //!
 //! A mesh that is exactly convex becomes a polyhedron, any other one a mesh; several bodies are their union. Numbers are taken as they
-//! stand; a note says what the file says of its unit and of which way is up.
+//! stand, those of Collada in metres with +z up; a note says what the file says of its unit and of which way is up.
 
 pub mod amf;
+pub mod dae;
 pub mod gltf;
+pub mod msh;
 pub mod obj;
 pub mod off;
 pub mod ply;
@@ -200,9 +202,11 @@ pub fn of_file(name: &str, bytes: &[u8], limits: &Limits) -> Option<Result<Bodie
         "stl" => Some(stl::read(bytes, limits).map(|mesh| Bodies::of(mesh, "STL"))),
         "off" => Some(off::read(bytes, limits).map(|mesh| Bodies::of(mesh, "OFF"))),
         "obj" => Some(obj::read(bytes, limits).map(|mesh| Bodies::of(mesh, "OBJ"))),
+        "msh" => Some(msh::read(bytes, limits).map(|mesh| Bodies::of(mesh, "MSH"))),
         "ply" => Some(ply::read(bytes, limits)),
         "3mf" => Some(threemf::read(bytes, limits)),
         "amf" => Some(amf::read(bytes, limits)),
+        "dae" => Some(dae::read(bytes, limits)),
         "glb" | "gltf" => Some(gltf::read(bytes, limits)),
         _ => None,
     }

@@ -95,7 +95,7 @@ fn every_format_tells_the_same_solid() {
         matches!(solid.primitives[0].shape, Shape::Polyhedron(_)),
         "what is convex has the kernels of what is convex"
     );
-    assert_eq!(FORMATS.len(), 8);
+    assert_eq!(FORMATS.len(), 10);
 }
 
 #[test]

@@ -86,6 +86,8 @@ pub struct Robot {
     pub links: Vec<Link>,
     /// Pairs of links, by index, that are not tested.
     pub excepted: HashSet<[usize; 2]>,
+    /// Pairs of parts, by their links and their places there, that are tested all the same, whatever their masks (MuJoCo's `<pair>`).
+    pub pairs: HashSet<[(usize, usize); 2]>,
     /// What was left out or taken in another way.
     pub notes: Vec<Note>,
     /// The packages that its meshes are in, folders that are not in the file's own: what they hold may be read, and nothing around it.

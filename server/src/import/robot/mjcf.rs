@@ -7,14 +7,14 @@
 use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::kinematics::{Dof, DofKind, Link, Part, Robot};
-use super::mjcf_couplings::{Slot, begin_at, equalities, filters};
+use super::mjcf_couplings::{Slot, begin_at, equalities, filters, paired};
 use super::mjcf_files::{Files, included};
 use super::reader::Reader;
 use super::shape::{Shape, union};
 use super::urdf::{Result, needed, not_negative, numbers_of, vector_of};
 use contactd_proto::Pose;
 use contactd_proto::motion::quat_of_rotation_vector;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -39,8 +39,8 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     }
     let is_active = model.defaults.get(&("main".to_owned(), "equality".to_owned()));
     let is_active = is_active.and_then(|all| all.get("active")).is_none_or(|word| word == "true");
-    let Model { mut robot, mocap, slots, .. } = model;
-    filters(&mut robot, &files, &mocap)?;
+    let Model { mut robot, mocap, slots, places, .. } = model;
+    filters(&mut robot, &files, &mocap, &places)?;
     if let Some(key) = &reader.ask.key {
         begin_at(&mut robot, &files, &slots, key)?;
     }
@@ -84,6 +84,12 @@ struct Model<'a, 'i> {
     mocap: HashSet<usize>,
     /// The joints of each body, as keyframes have them.
     slots: Vec<Vec<Slot>>,
+    /// Names of geoms that a `<pair>` names, each a part of its own.
+    paired: HashSet<String>,
+    /// Those that are there: link and part; `None` for one that has no inside.
+    places: HashMap<String, Option<(usize, usize)>>,
+    /// Height fields: their attributes and elements.
+    fields: HashMap<String, (Attributes, Node<'a, 'i>)>,
 }
 
 impl<'a, 'i> Model<'a, 'i> {
@@ -103,6 +109,9 @@ impl<'a, 'i> Model<'a, 'i> {
             names: 0,
             mocap: HashSet::new(),
             slots: Vec::new(),
+            paired: paired(files),
+            places: HashMap::new(),
+            fields: HashMap::new(),
         };
         for compiler in files.sections("compiler") {
             this.compiler(compiler).map_err(|e| files.told(compiler, e))?;
@@ -110,18 +119,24 @@ impl<'a, 'i> Model<'a, 'i> {
         for default in files.sections("default") {
             this.class(default, None, 0).map_err(|e| files.told(default, e))?;
         }
-        for mesh in files.within("asset").into_iter().filter(|n| n.tag_name().name() == "mesh") {
-            this.asset(mesh).map_err(|e| files.told(mesh, e))?;
+        for asset in files.within("asset") {
+            this.asset(asset).map_err(|e| files.told(asset, e))?;
         }
         Ok(this)
     }
 
-    fn asset(&mut self, mesh: Node<'a, 'i>) -> Result<()> {
-        let attributes = self.merged(mesh, None)?;
+    /// Takes a mesh or a height field.
+    fn asset(&mut self, asset: Node<'a, 'i>) -> Result<()> {
+        let kind = asset.tag_name().name();
+        if !["mesh", "hfield"].contains(&kind) {
+            return Ok(());
+        }
+        let attributes = self.merged(asset, None)?;
         let stem = |file: &String| Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned());
         let name = attributes.get("name").cloned().or_else(|| attributes.get("file").and_then(stem));
-        let Some(name) = name else { return Err(xml::wrong(mesh, "a name or a file of the mesh", None)) };
-        self.meshes.insert(name, (attributes, mesh));
+        let Some(name) = name else { return Err(xml::wrong(asset, format!("a name or a file of the {kind}"), None)) };
+        let all = if kind == "mesh" { &mut self.meshes } else { &mut self.fields };
+        all.insert(name, (attributes, asset));
         Ok(())
     }
 
@@ -379,7 +394,8 @@ impl<'a, 'i> Model<'a, 'i> {
                 .map_err(|_| xml::wrong(node, format!("a whole number as {key}"), Some(word))),
         };
         let masks = [mask("contype")?, mask("conaffinity")?];
-        if masks == [0, 0] {
+        let own = of("name").map(|name| format!("{name}{}", at.suffix)).filter(|name| self.paired.contains(name));
+        if masks == [0, 0] && own.is_none() {
             return Ok(());
         }
         let sizes = of("size").map_or(Ok(vec![]), |text| numbers_of(node, text, "size"))?;
@@ -412,17 +428,21 @@ impl<'a, 'i> Model<'a, 'i> {
             "box" if half.is_some() => Shape::Box(2.0 * DVec3::new(size(0)?, size(0)?, long(2)?)),
             "box" => Shape::Box(2.0 * DVec3::new(size(0)?, size(1)?, size(2)?)),
             "mesh" => self.mesh(node, of("mesh"))?,
+            "hfield" => self.field(node, of("hfield"))?,
             other => return Err((xml::place(node), Problem::unsupported(format!("a geom of type {other}")))),
         };
         let shape = not_negative(node, shape)?;
         if shape.is_nothing() {
             self.files.note(&mut self.robot, node, "a geom has no inside and is left out");
+            self.places.extend(own.map(|name| (name, None)));
             return Ok(());
         }
         let text = shape.at(&at.frame.compose(&pose));
-        if shape == Shape::Plane {
+        if own.is_some() || shape == Shape::Plane {
             let name = self.name(of("name"), "plane", at);
-            self.robot.links[at.link].parts.push(Part { name, text: union(&[text]), masks });
+            let parts = &mut self.robot.links[at.link].parts;
+            self.places.extend(own.map(|name| (name, Some((at.link, parts.len())))));
+            parts.push(Part { name, text: union(&[text]), masks });
         } else {
             geoms.push((masks, text));
         }
@@ -444,6 +464,51 @@ impl<'a, 'i> Model<'a, 'i> {
         let own = Path::new(file).file_name().filter(|_| self.strips);
         let path = self.meshdir.join(own.map_or_else(|| Path::new(file), Path::new));
         Ok(Shape::Mesh(self.reader.file(&path.display().to_string()), scale, true))
+    }
+
+    /// The solid under a height field: `elevation` from 0 to 1 of the height that `size` tells, or flat where only a program fills it.
+    fn field(&self, node: Node<'_, '_>, name: Option<&str>) -> Result<Shape> {
+        /// Heights of one field.
+        const MOST: f64 = 1e6;
+        let found = name.and_then(|name| self.fields.get(name));
+        let Some((all, asset)) = found else {
+            return Err(xml::wrong(node, "the name of a height field among the assets", name));
+        };
+        if let Some(file) = all.get("file") {
+            return Err((xml::place(*asset), Problem::unsupported(format!("a height field of a file, {file:?}"))));
+        }
+        let of = |key: &str| all.get(key).map(String::as_str);
+        let numbers = |key: &str| numbers_of(*asset, of(key).unwrap_or_default(), key);
+        let [x, y, top, base] = numbers("size")?[..] else {
+            return Err(xml::wrong(*asset, "four numbers as size of the hfield", of("size")));
+        };
+        let (rows, columns) = match (numbers("nrow")?.as_slice(), numbers("ncol")?.as_slice()) {
+            ([r], [c]) if r.min(*c) >= 2.0 && r * c <= MOST && r.fract() + c.fract() == 0.0 => {
+                (*r as usize, *c as usize)
+            }
+            _ => {
+                return Err(xml::wrong(
+                    *asset,
+                    format!("nrow and ncol of 2 or more, {MOST} heights in all"),
+                    of("nrow"),
+                ));
+            }
+        };
+        let mut heights = numbers("elevation")?;
+        if heights.is_empty() {
+            heights = vec![0.0; rows * columns];
+        }
+        if heights.len() != rows * columns || [x, y, top, base].iter().any(|l| *l <= 0.0) {
+            let expected = format!("lengths above 0 and {} numbers as elevation of the hfield", rows * columns);
+            return Err(xml::wrong(*asset, expected, Some(&heights.len().to_string())));
+        }
+        let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        heights.iter_mut().for_each(|z| *z -= low);
+        let high = heights.iter().copied().fold(0.0, f64::max);
+        let scale = if high > 0.0 { top / high } else { 0.0 };
+        // The file's rows begin at the far side, where y is greatest.
+        let rows = heights.chunks(columns).rev().map(|row| row.iter().map(|z| z * scale).collect()).collect();
+        Ok(Shape::Heights(rows, DVec2::new(2.0 * x, 2.0 * y), -base))
     }
 
     /// Where an element stands: `pos`, and one of five ways to turn it.

@@ -10,7 +10,7 @@ use super::urdf::{Result, needed, numbers_of};
 use contactd_proto::Pose;
 use glam::{DQuat, DVec3};
 use roxmltree::Node;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// A joint's place among the numbers of a keyframe.
 pub(super) enum Slot {
@@ -24,7 +24,13 @@ pub(super) enum Slot {
 
 /// Which pairs are not tested: parent and child unless the parent is the world, pairs of which neither has a degree of freedom (welded to
 /// the world, or moved by hand: `mocap`), and those that the file excludes.
-pub(super) fn filters(robot: &mut Robot, files: &Files<'_, '_>, mocap: &HashSet<usize>) -> Result<()> {
+/// Pairs of geoms that the file names are tested whatever else is said of them, but for those of one body.
+pub(super) fn filters(
+    robot: &mut Robot,
+    files: &Files<'_, '_>,
+    mocap: &HashSet<usize>,
+    places: &HashMap<String, Option<(usize, usize)>>,
+) -> Result<()> {
     for i in 0..robot.links.len() {
         robot.links[i].is_static = robot.welded_to(i).is_none();
     }
@@ -51,11 +57,27 @@ pub(super) fn filters(robot: &mut Robot, files: &Files<'_, '_>, mocap: &HashSet<
                 let pair = excluded(robot, node).map_err(|e| files.told(node, e))?;
                 robot.excepted.insert(pair);
             }
-            "pair" => return Err(files.told(node, (xml::place(node), Problem::unsupported("a <pair> of geoms")))),
+            "pair" => {
+                let geom = |key| {
+                    let name = needed(node, key)?;
+                    places.get(name).ok_or_else(|| xml::wrong(node, "the name of a geom", Some(name)))
+                };
+                let [a, b] = [geom("geom1"), geom("geom2")].map(|g| g.map_err(|e| files.told(node, e)));
+                if let (Some(a), Some(b)) = (a?, b?) {
+                    robot.pairs.insert([*a.min(b), *a.max(b)]);
+                }
+            }
             _ => {}
         }
     }
     Ok(())
+}
+
+/// The names of the geoms that pairs of them name.
+pub(super) fn paired(files: &Files<'_, '_>) -> HashSet<String> {
+    let pairs = files.within("contact").into_iter().filter(|n| n.tag_name().name() == "pair");
+    let names = pairs.flat_map(|n| [n.attribute("geom1"), n.attribute("geom2")]);
+    names.flatten().map(str::to_owned).collect()
 }
 
 fn excluded(robot: &Robot, node: Node<'_, '_>) -> Result<[usize; 2]> {

@@ -33,7 +33,7 @@ fn add(
 ) -> Result<()> {
     for include in node.descendants().filter(|n| n.is_element() && n.tag_name().name() == "include") {
         let at = within.unwrap_or_else(|| xml::place(include));
-        let path = folder.join(needed(include, "file").map_err(|(_, e)| (at, e))?);
+        let path = file_of(folder, needed(include, "file").map_err(|(_, e)| (at, e))?);
         let wrong = |e: String| (at, Problem::syntax(format!("the included file {}", path.display()), e));
         if texts.iter().any(|known| known.path == path) {
             return Err(wrong("a file that is included twice".into()));
@@ -42,7 +42,7 @@ fn add(
             return Err(wrong("files that include each other".into()));
         }
         let bytes = read_bytes(&path, &Limits::default()).map_err(|e| wrong(e.to_string()))?;
-        let text = String::from_utf8(bytes).map_err(|_| wrong("text that is not UTF-8".into()))?;
+        let text = String::from_utf8(xml::mended(bytes)).map_err(|_| wrong("text that is not UTF-8".into()))?;
         texts.push(Included { path: path.clone(), text: text.clone(), at });
         let file = path.display().to_string();
         let document = xml::parse(text.as_bytes())
@@ -50,6 +50,11 @@ fn add(
         add(document.root_element(), folder, texts, (depth + 1, Some(at)))?;
     }
     Ok(())
+}
+
+/// The file of a name in which, as MuJoCo has it, folders may be told apart by backslashes.
+fn file_of(folder: &Path, name: &str) -> PathBuf {
+    folder.join(name.replace('\\', "/"))
 }
 
 /// All files of a model.
@@ -74,7 +79,7 @@ impl<'a, 'i> Files<'a, 'i> {
                 all.push(child);
                 continue;
             }
-            let path = self.folder.join(child.attribute("file").unwrap_or_default());
+            let path = file_of(self.folder, child.attribute("file").unwrap_or_default());
             let root = self.others.iter().find(|(file, _)| file.path == path);
             all.extend(root.into_iter().flat_map(|(_, root)| self.children(*root)));
         }

@@ -45,7 +45,7 @@ impl Reader<'_> {
     }
 
     /// The file that a mesh's name means: of `package://NAME/PATH`, `model://NAME/PATH` the folder NAME among the packages, or beside
-    /// or above the text; of `file://PATH` the path; else relative to the text.
+    /// or above the text; of `file://PATH` the path; else relative to the text, and of what is not there as of `model://`.
     pub fn file(&self, uri: &str) -> String {
         let named = uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://"));
         if let Some(path) = named {
@@ -61,6 +61,10 @@ impl Reader<'_> {
         }
         match uri.strip_prefix("file://") {
             Some(path) => path.to_owned(),
+            // What is not there may be a model's name alone.
+            None if !self.folder().join(uri).exists() && self.package(uri).is_some() => {
+                self.file(&format!("model://{uri}"))
+            }
             None => self.base.join(uri).display().to_string(),
         }
     }

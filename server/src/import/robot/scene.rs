@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// One sentence with file, line and column.
 pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
     let file = path.display().to_string();
-    let bytes = read_bytes(path, &Limits::default())?;
+    let bytes = xml::mended(read_bytes(path, &Limits::default())?);
     let wrong = |(at, problem): (Place, Problem)| of_problem(&file, at, problem);
     let document = xml::parse(&bytes).map_err(wrong)?;
     let found = RefCell::new(Vec::new());
@@ -49,7 +49,7 @@ pub fn read_robot(path: &Path, ask: &Ask) -> Result<Robot, SceneError> {
     }
     if let Some(path) = &ask.srdf {
         let file = path.display().to_string();
-        let bytes = read_bytes(path, &Limits::default())?;
+        let bytes = xml::mended(read_bytes(path, &Limits::default())?);
         let wrong = |(at, problem): (Place, Problem)| of_problem(&file, at, problem);
         let document = xml::parse(&bytes).map_err(wrong)?;
         urdf::disabled(document.root_element(), &mut robot).map_err(wrong)?;
@@ -78,10 +78,10 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
     let mut known: HashMap<&str, usize> = HashMap::new();
     let mut objects = Vec::new();
     // Which link and part each object is.
-    let mut owners: Vec<(usize, &Part)> = Vec::new();
+    let mut owners: Vec<((usize, usize), &Part)> = Vec::new();
     let mut names = HashMap::new();
     for (i, link) in robot.links.iter().enumerate() {
-        for part in &link.parts {
+        for (k, part) in link.parts.iter().enumerate() {
             let whole = if part.name.is_empty() { link.name.clone() } else { format!("{}/{}", link.name, part.name) };
             let name = unique(whole, &mut names);
             let model = *known.entry(&part.text).or_insert_with(|| {
@@ -106,14 +106,16 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
                 rotates: true,
                 max_speed: None,
             });
-            owners.push((i, part));
+            owners.push(((i, k), part));
         }
     }
     let mut rule = Rule::new(["default".into(), "default".into()]);
     for (a, (i, part)) in owners.iter().enumerate() {
         for (b, (j, other)) in owners.iter().enumerate().skip(a + 1) {
             let meets = |p: &Part, q: &Part| p.masks[0] & q.masks[1] != 0;
-            if i == j || robot.is_excepted(*i, *j) || !(meets(part, other) || meets(other, part)) {
+            let are_alike = meets(part, other) || meets(other, part);
+            let is_tested = are_alike && !robot.is_excepted(i.0, j.0) || robot.pairs.contains(&[*i, *j]);
+            if i.0 == j.0 || !is_tested {
                 rule.except.push([objects[a].name.clone(), objects[b].name.clone()]);
             }
         }

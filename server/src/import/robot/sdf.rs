@@ -186,6 +186,7 @@ impl World {
             let named = Problem::Named { file: path.display().to_string(), at, problem: Box::new(problem) };
             (xml::place(node), named)
         };
+        let bytes = xml::mended(bytes);
         let document: Document<'_> = xml::parse(&bytes).map_err(told)?;
         let root = document.root_element();
         let within = Some(file.reader.place(node));
@@ -507,6 +508,7 @@ fn mimic(node: Node<'_, '_>) -> Result<(String, f64, f64)> {
 fn model_file(folder: &Path) -> PathBuf {
     let limits = super::super::Limits::default();
     let stated = super::super::read_bytes(&folder.join("model.config"), &limits).ok().and_then(|bytes| {
+        let bytes = xml::mended(bytes);
         let document = xml::parse(&bytes).ok()?;
         let files = xml::inside(document.root_element(), "sdf");
         let newest = files.filter(|n| n.text().is_some()).max_by_key(|n| version_of(*n))?;

@@ -6,7 +6,7 @@ use super::shape::Shape;
 use super::urdf::{Result, not_negative, numbers_of, roll_pitch_yaw, vector_of};
 use contactd_proto::Pose;
 use contactd_proto::pose_record::unit_quaternion;
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use roxmltree::Node;
 
 /// Major and minor: 1.10 comes after 1.9.
@@ -59,7 +59,7 @@ fn pose_of(node: Node<'_, '_>) -> Result<Pose> {
 
 /// A geometry, with how it is turned; `None` for one that is empty on purpose.
 pub(super) fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Option<(Shape, DQuat)>> {
-    let kinds = "one of box, sphere, cylinder, capsule, cone, ellipsoid, plane, mesh as the geometry";
+    let kinds = "one of box, sphere, cylinder, capsule, cone, ellipsoid, plane, polyline, mesh as the geometry";
     let Some(shape) = node.children().find(|n| n.is_element()) else { return Ok(None) };
     let length = |key: &'static str, none: f64| match text(shape, key) {
         None => Ok(none),
@@ -86,6 +86,10 @@ pub(super) fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Opt
             turn = DQuat::from_rotation_arc(DVec3::Z, unit);
             Shape::Plane
         }
+        "polyline" => {
+            let lines = xml::inside(node, "polyline").map(line_of).collect::<Result<Vec<_>>>()?;
+            Shape::Extrusion(lines, length("height", 1.0)?)
+        }
         "mesh" => {
             if let Some(part) = xml::inside(shape, "submesh").next() {
                 return Err(xml::wrong(part, "a whole mesh: parts of a file are not read", Some("submesh")));
@@ -96,4 +100,18 @@ pub(super) fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Opt
         other => return Err(xml::wrong(shape, kinds, Some(other))),
     };
     Ok(Some((not_negative(shape, made)?, turn)))
+}
+
+/// The points of a polyline.
+fn line_of(node: Node<'_, '_>) -> Result<Vec<DVec2>> {
+    let point = |point: Node<'_, '_>| {
+        let words = point.text().unwrap_or_default();
+        let two = <[f64; 2]>::try_from(numbers_of(point, words, "point")?).ok().map(DVec2::from_array);
+        two.ok_or_else(|| xml::wrong(point, "two numbers as a point", Some(words)))
+    };
+    let points = xml::inside(node, "point").map(point).collect::<Result<Vec<_>>>()?;
+    if points.len() < 3 {
+        return Err(xml::wrong(node, "three points or more of the polyline", Some(&points.len().to_string())));
+    }
+    Ok(points)
 }

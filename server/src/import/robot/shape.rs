@@ -2,7 +2,7 @@
 
 use crate::import::written::placed;
 use contactd_proto::Pose;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::fmt::Write as _;
 
 /// A geometry about its own origin, lengths in metres.
@@ -22,6 +22,10 @@ pub(super) enum Shape {
     Ellipsoid(DVec3),
     /// All z <= 0.
     Plane,
+    /// What stands on z = 0 above some closed lines, those within others its holes: the lines, the height.
+    Extrusion(Vec<Vec<DVec2>>, f64),
+    /// The solid under a grid of heights about the origin: rows that go up in y, its size, the height of its floor.
+    Heights(Vec<Vec<f64>>, DVec2, f64),
     /// A mesh's file, scaled; as it is or its convex hull.
     Mesh(String, DVec3, bool),
 }
@@ -34,7 +38,8 @@ impl Shape {
             Self::Sphere(r) => *r == 0.0,
             Self::Cylinder(r, l) | Self::Cone(r, l) => *r == 0.0 || *l == 0.0,
             Self::Capsule(r, _) => *r == 0.0,
-            Self::Plane => false,
+            Self::Extrusion(_, height) => *height == 0.0,
+            Self::Plane | Self::Heights(..) => false,
         }
     }
 
@@ -44,7 +49,8 @@ impl Shape {
             Self::Box(v) | Self::Ellipsoid(v) => v.to_array(),
             Self::Sphere(r) => [*r; 3],
             Self::Cylinder(r, l) | Self::Cone(r, l) | Self::Capsule(r, l) => [*r, *l, 0.0],
-            Self::Plane | Self::Mesh(..) => [0.0; 3],
+            Self::Extrusion(_, height) => [*height, 0.0, 0.0],
+            Self::Plane | Self::Heights(..) | Self::Mesh(..) => [0.0; 3],
         };
         lengths.into_iter().find(|l| *l < 0.0)
     }
@@ -61,6 +67,19 @@ impl Shape {
                 format!("hull() {{ {} {} }}", end(0.5 * l), end(-0.5 * l))
             }
             Self::Ellipsoid(v) => scaled(*v, &Self::Sphere(1.0).text()),
+            Self::Extrusion(lines, height) => {
+                let points: Vec<[f64; 2]> = lines.iter().flatten().map(|p| p.to_array()).collect();
+                let mut first = 0;
+                let mut path = |line: &Vec<DVec2>| {
+                    first += line.len();
+                    (first - line.len()..first).collect::<Vec<usize>>()
+                };
+                let paths: Vec<Vec<usize>> = lines.iter().map(&mut path).collect();
+                format!("linear_extrude(height = {height:?}) {{ polygon(points = {points:?}, paths = {paths:?}); }}")
+            }
+            Self::Heights(rows, size, base) => {
+                format!("height_field(heights = {rows:?}, size = {:?}, base = {base:?});", size.to_array())
+            }
             Self::Plane => "half_space(normal = [0, 0, 1], offset = 0);".into(),
             Self::Mesh(file, scale, is_hull) => {
                 let file = file.replace('\\', "\\\\").replace('"', "\\\"");

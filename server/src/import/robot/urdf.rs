@@ -107,7 +107,7 @@ fn link(
     robot: &mut Robot,
 ) -> Result<Link> {
     let name = needed(node, "name")?.to_owned();
-    let mut texts = Vec::new();
+    let (mut texts, mut parts) = (Vec::new(), Vec::new());
     for collision in xml::inside(node, "collision") {
         let Some(geometry) = xml::inside(collision, "geometry").next() else {
             return Err(xml::wrong(collision, "a geometry of the collision", None));
@@ -117,15 +117,23 @@ fn link(
             robot.note(xml::place(geometry), format!("a collision of {name} has no inside and is left out"));
             continue;
         }
-        texts.push(shape.at(&origin(collision)?));
+        let text = shape.at(&origin(collision)?);
+        if shape == Shape::Plane {
+            let name = collision.attribute("name").unwrap_or("plane").to_owned();
+            parts.push(Part { name, text, masks: [1, 1] });
+        } else {
+            texts.push(text);
+        }
     }
-    let parts =
-        if texts.is_empty() { vec![] } else { vec![Part { name: String::new(), text: union(&texts), masks: [1, 1] }] };
+    if !texts.is_empty() {
+        parts.insert(0, Part { name: String::new(), text: union(&texts), masks: [1, 1] });
+    }
     let (origin, dofs) = match joint {
         None => (Pose::IDENTITY, vec![]),
         Some(joint) => (origin(joint.node)?, dofs_of(joint.node, robot)?),
     };
-    let is_free = joint.is_some_and(|j| ["floating", "planar"].contains(&j.node.attribute("type").unwrap_or_default()));
+    let is_free = joint
+        .is_some_and(|j| ["floating", "planar", "spherical"].contains(&j.node.attribute("type").unwrap_or_default()));
     Ok(Link { name, at: xml::place(node), parent, origin, dofs, parts, is_free, is_static: false })
 }
 
@@ -145,12 +153,13 @@ fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
     let anchor = DVec3::ZERO;
     let along =
         || axis.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some(&axis.to_string())));
-    let (kind, range) = match needed(node, "type")? {
+    let (kind, mut range) = match needed(node, "type")? {
         "fixed" => return Ok(vec![]),
         "revolute" => (DofKind::Hinge { anchor, axis: along()? }, [bound("lower", 0.0)?, bound("upper", 0.0)?]),
         "continuous" => (DofKind::Hinge { anchor, axis: along()? }, endless),
         "prismatic" => (DofKind::Slide { axis: along()? }, [bound("lower", 0.0)?, bound("upper", 0.0)?]),
-        "floating" | "planar" => {
+        // The last one is pybullet's.
+        "floating" | "planar" | "spherical" => {
             robot.note(xml::place(node), format!("the joint {name} is taken as fixed where it stands"));
             return Ok(vec![]);
         }
@@ -160,11 +169,10 @@ fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
         }
     };
     if range[0] > range[1] {
-        return Err(xml::wrong(
-            node,
-            "a lower limit below the upper one",
-            Some(&format!("{} and {}", range[0], range[1])),
-        ));
+        // As pybullet has it, which writes them so where there are none.
+        robot
+            .note(xml::place(node), format!("the limits of {name}, {} and {}, are none: left out", range[0], range[1]));
+        range = endless;
     }
     let mimic = match xml::inside(node, "mimic").next() {
         None => None,
@@ -177,7 +185,7 @@ fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
 }
 
 fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Shape> {
-    let kinds = "one of box, cylinder, sphere, capsule, mesh as the geometry";
+    let kinds = "one of box, cylinder, sphere, capsule, plane, mesh as the geometry";
     let Some(shape) = node.children().find(|n| n.is_element()) else { return Err(xml::wrong(node, kinds, None)) };
     let length = |key: &str| {
         xml::number(shape, key)?
@@ -188,6 +196,18 @@ fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Shape> {
         "sphere" => Shape::Sphere(length("radius")?),
         "cylinder" => Shape::Cylinder(length("radius")?, length("length")?),
         "capsule" => Shape::Capsule(length("radius")?, length("length")?),
+        // pybullet's, which has a normal, too.
+        "plane" => {
+            let normal = vector(shape, "normal", DVec3::Z)?;
+            if normal.try_normalize() != Some(DVec3::Z) {
+                return Err(xml::wrong(
+                    shape,
+                    "0 0 1 as the normal of a plane: turn it by its origin",
+                    shape.attribute("normal"),
+                ));
+            }
+            Shape::Plane
+        }
         "mesh" => {
             let file = reader.file(needed(shape, "filename")?);
             Shape::Mesh(file, vector(shape, "scale", DVec3::ONE)?, reader.ask.hulls)

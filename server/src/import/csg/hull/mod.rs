@@ -7,4 +7,4 @@ mod points;
 
 pub use balls::ball_hull;
 pub use plane::{Disc, DiscHull, disc_hull};
-pub use points::point_hull;
+pub use points::{corners_of, point_hull};

@@ -48,6 +48,15 @@ pub fn point_hull(points: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     Some(facets.into_iter().filter(|f| f.alive).map(|f| f.corners).collect())
 }
 
+/// The corners of the hull of points; all of them where they span no volume.
+pub fn corners_of(points: Vec<DVec3>) -> Vec<DVec3> {
+    let Some(faces) = point_hull(&points) else { return points };
+    let mut used: Vec<usize> = faces.into_iter().flatten().collect();
+    used.sort_unstable();
+    used.dedup();
+    used.into_iter().map(|i| points[i]).collect()
+}
+
 /// Above the plane of a triangle, on the side from which it runs counter-clockwise; exact.
 fn above(points: &[DVec3], [a, b, c]: [usize; 3], p: usize) -> bool {
     let at = |i: usize| Coord3D { x: points[i].x, y: points[i].y, z: points[i].z };

@@ -2,11 +2,12 @@
 //!
 //! Every cut keeps the parts of the faces on the inner side and closes the gap with a new face whose corners are sorted
 //! around its middle. A cut edge's new corner is always computed from its inner end, so the two faces that share the
-//! edge get the same bits. Quadratic in the number of faces.
+//! edge get the same bits. Quadratic in the number of faces, by a comparison for each two of them.
 
 use super::Polyhedron;
 use crate::math::{Aabb, any_perpendicular, tolerance::ROUNDING};
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// A face under construction: the plane it lies on (`None` for a side of the starting cube) and its corners in order.
 struct Facet {
@@ -29,6 +30,10 @@ impl Polyhedron {
             let mut rim: Vec<DVec3> = Vec::new();
             let mut lies_on_face = false;
             for f in &mut facets {
+                // Most faces lie below the plane and stay as they are.
+                if f.corners.iter().all(|p| n.dot(*p) - d < -eps) {
+                    continue;
+                }
                 let heights: Vec<f64> = f.corners.iter().map(|p| above(*p)).collect();
                 if heights.iter().all(|s| *s == 0.0) {
                     lies_on_face = true;
@@ -70,14 +75,26 @@ impl Polyhedron {
         }
         let mut used: Vec<usize> = facets.iter().filter_map(|f| f.plane).collect();
         used.sort_unstable();
-        let mut vertices: Vec<DVec3> = Vec::new();
-        for p in facets.iter().flat_map(|f| f.corners.iter()) {
-            if !vertices.iter().any(|v| (*v - *p).length() <= eps) {
-                vertices.push(*p);
-            }
-        }
+        let vertices = apart(facets.iter().flat_map(|f| f.corners.iter()), eps);
         Some(Self { vertices, planes: used.into_iter().map(|k| planes[k]).collect() })
     }
+}
+
+/// The points that are farther than `eps` from all before them that are kept.
+fn apart<'a>(points: impl Iterator<Item = &'a DVec3>, eps: f64) -> Vec<DVec3> {
+    let mut kept: Vec<DVec3> = Vec::new();
+    // What is near lies in the same cube of this side, or in one of its neighbours.
+    let mut cubes: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    for p in points {
+        let at = (*p / (2.0 * eps)).floor().to_array().map(|c| c as i64);
+        let near = |k: i64| [at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1];
+        let beside = (0..27).filter_map(|k| cubes.get(&near(k))).flatten();
+        if !beside.into_iter().any(|i| (kept[*i as usize] - *p).length() <= eps) {
+            cubes.entry(at).or_default().push(kept.len() as u32);
+            kept.push(*p);
+        }
+    }
+    kept
 }
 
 fn cube(b: &Aabb) -> Vec<Facet> {
