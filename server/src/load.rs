@@ -10,7 +10,7 @@
 
 use crate::import::robot::{self, Ask, DofKind, LinkPath, Robot, Values};
 use crate::import::{Attachment, Limits, Note, Place, Scene, SceneError, read_scene};
-use contactd_client::{Error, Frame, Object, Reply, Session, Transport};
+use contactd_client::{Error, Frame, ModelInfo, Object, Reply, Session, Transport};
 use contactd_proto::control::{Facets, ModelFile};
 use contactd_proto::{Pose, PoseRecord, Rule};
 use std::collections::HashMap;
@@ -98,6 +98,8 @@ pub struct Joint {
 pub struct LoadedScene {
     /// Its objects, in the order of the file.
     pub objects: Vec<LoadedObject>,
+    /// Its models, each once: their ids and their faces.
+    pub models: Vec<ModelInfo>,
     /// Its rules, by names of groups and objects.
     pub rules: Vec<Rule>,
     /// The unit of length; may be empty.
@@ -215,7 +217,7 @@ fn put<T: Transport>(
     };
     let mut notes: Vec<String> = scene.notes.iter().map(|n: &Note| format!("{}:{n}", scene.file)).collect();
     let mut known: HashMap<(String, Vec<u8>, Option<Vec<Attachment>>), u32> = HashMap::new();
-    let mut models = Vec::with_capacity(scene.models.len());
+    let (mut models, mut infos) = (Vec::with_capacity(scene.models.len()), Vec::new());
     for (file, source) in files(&scene)?.into_iter().zip(&scene.models) {
         let key = (file.format.clone(), file.bytes.clone(), file.attached.clone());
         let id = match known.get(&key) {
@@ -224,8 +226,10 @@ fn put<T: Transport>(
                 let loaded = session.load_model_file(file, Facets::Auto);
                 let info = loaded.map_err(refused(source.at, format!("model \"{}\"", source.name)))?;
                 notes.extend(info.warnings.iter().map(|w| format!("{}:{w}", source.text_name())));
-                known.insert(key, info.id);
-                info.id
+                let id = info.id;
+                known.insert(key, id);
+                infos.push(info);
+                id
             }
         };
         models.push(id);
@@ -256,6 +260,7 @@ fn put<T: Transport>(
         objects,
         frames: scene.objects.iter().map(|o| Some((o.place, o.motion.start))).collect(),
         fixed: scene.objects.iter().map(|o| o.is_static).collect(),
+        models: infos,
         rules: scene.rules,
         unit: scene.unit,
         notes,

@@ -356,6 +356,9 @@ typedef struct contactd_solid contactd_solid;
 // A flat shape in the making.
 typedef struct contactd_outline contactd_outline;
 
+// A scene that was loaded into a session. It belongs to no thread, but is in one call at a time.
+typedef struct contactd_scene contactd_scene;
+
 // The points of all pairs, from step to step.
 typedef struct contactd_manifolds contactd_manifolds;
 
@@ -468,42 +471,75 @@ typedef struct contactd_rule {
     uint32_t sensor;
 } contactd_rule;
 
-// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
-typedef struct contactd_options {
-    // Fraction 0..1 of its previous step at which every object stands before the next one.
-    double advance;
-    // Duration of a step in seconds, for objects with a declared largest speed; 0: unknown.
+// A value of a joint.
+typedef struct contactd_joint_value {
+    // The joint's name.
+    const char *name;
+    // Radians of what turns, metres of what slides.
+    double value;
+} contactd_joint_value;
+
+// How a scene is loaded. contactd_scene_options_new sets the defaults.
+typedef struct contactd_scene_options {
+    // Where a robot's joints stand; of others what the file says. NULL for none.
+    const struct contactd_joint_value *joints;
+    // Number of them.
+    size_t joint_count;
+    // The keyframe that joints begin at, of MJCF; NULL for none.
+    const char *key;
+    // Folders in which packages are looked for (package://NAME/…, model://NAME/…), before the file's own and those above it.
+    const char *const *packages;
+    // Number of them.
+    size_t package_count;
+    // An SRDF file with pairs that are not to be tested; NULL for none.
+    const char *srdf;
+    // The folder that texts may import files from; NULL: each from its own.
+    const char *import_root;
+    // 1: meshes are taken as their convex hulls, as MuJoCo does anyway.
+    uint32_t hulls;
+    // 1: the session's rules and resolution stay as they are.
+    uint32_t keeps_rules;
+} contactd_scene_options;
+
+// What a loaded scene has in it. Strings are valid until the scene is freed.
+typedef struct contactd_scene_info {
+    // The unit of length; may be empty.
+    const char *unit;
+    // Duration of the step in seconds that a scene file says; 0 for none.
     double dt;
-    // 1: only the pairs whose bracket meets the scene's earliest contact.
-    uint32_t first;
-    // 1: a detail slot with each record (contactd_get_detail).
-    uint32_t details;
-    // 1: records of clear pairs too.
-    uint32_t clear;
-    // 1: this client polls while it waits; the server then need not wake it.
-    uint32_t polling;
-    // Most records, the earliest first; 0: all.
-    uint32_t max_records;
-    // Most cells that one pair's search may refine; 0: the server's default.
-    uint32_t cell_limit;
-    // Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
-    // undecided, the latest first.
-    uint32_t batch_limit;
+    // Number of its objects.
+    size_t object_count;
+    // Number of its joints that have values of their own.
+    size_t joint_count;
+    // Number of its notes.
+    size_t note_count;
+} contactd_scene_info;
+
+// An object of a loaded scene.
+typedef struct contactd_scene_object {
+    // Its name, valid until the scene is freed.
+    const char *name;
+    // Its id in the session.
+    uint32_t object;
+    // The id of its model.
+    uint32_t model;
+} contactd_scene_object;
+
+// A joint of a robot that has a value of its own.
+typedef struct contactd_joint {
+    // Its name, valid until the scene is freed.
+    const char *name;
+    // 1: it turns, and its value is an angle in radians; 0: it slides, metres.
+    uint32_t turns;
     // Zero.
     uint32_t reserved;
-} contactd_options;
-
-// One object's motion, as it lies in shared memory.
-typedef struct contactd_pose_record {
-    // Object id of the session.
-    uint32_t object;
-    // Exactly one of CONTACTD_END, CONTACTD_TURN, CONTACTD_START.
-    uint32_t flags;
-    // Position x, y, z of the object's origin in the world.
-    double position[3];
-    // Quaternion x, y, z, w; for CONTACTD_TURN the rotation vector and a zero.
-    double rotation[4];
-} contactd_pose_record;
+    // Its lower limit; infinite where it has none.
+    double low;
+    // Its upper limit.
+    double high;
+    // Where it stands.
+    double value;
+} contactd_joint;
 
 // Counted work of a step. Never part of the bits that must agree between two ways to the same answer.
 typedef struct contactd_work_counters {
@@ -643,6 +679,43 @@ typedef struct contactd_reply {
     // Number of them.
     size_t slot_count;
 } contactd_reply;
+
+// One object's motion, as it lies in shared memory.
+typedef struct contactd_pose_record {
+    // Object id of the session.
+    uint32_t object;
+    // Exactly one of CONTACTD_END, CONTACTD_TURN, CONTACTD_START.
+    uint32_t flags;
+    // Position x, y, z of the object's origin in the world.
+    double position[3];
+    // Quaternion x, y, z, w; for CONTACTD_TURN the rotation vector and a zero.
+    double rotation[4];
+} contactd_pose_record;
+
+// What is asked of the steps to come. Stays as it is set, but for `advance`, which each accepted step puts back to 1.
+typedef struct contactd_options {
+    // Fraction 0..1 of its previous step at which every object stands before the next one.
+    double advance;
+    // Duration of a step in seconds, for objects with a declared largest speed; 0: unknown.
+    double dt;
+    // 1: only the pairs whose bracket meets the scene's earliest contact.
+    uint32_t first;
+    // 1: a detail slot with each record (contactd_get_detail).
+    uint32_t details;
+    // 1: records of clear pairs too.
+    uint32_t clear;
+    // 1: this client polls while it waits; the server then need not wake it.
+    uint32_t polling;
+    // Most records, the earliest first; 0: all.
+    uint32_t max_records;
+    // Most cells that one pair's search may refine; 0: the server's default.
+    uint32_t cell_limit;
+    // Most cells that all searches of a step may refine together; 0: the server's default. Pairs that would need more stay
+    // undecided, the latest first.
+    uint32_t batch_limit;
+    // Zero.
+    uint32_t reserved;
+} contactd_options;
 
 // A further slot: what few callers need of every pair.
 typedef struct contactd_detail_slot {
@@ -1144,6 +1217,72 @@ int32_t contactd_allow(struct contactd_session *session, uint32_t a, uint32_t b,
 // Sets the resolution of every pair, a length; 0: each its default (1e-9 of the larger bounding radius).
 int32_t contactd_set_resolution(struct contactd_session *session, double resolution);
 
+// Options with defaults: a robot stands where its file says, and the scene's rules replace the session's.
+struct contactd_scene_options contactd_scene_options_new(void);
+
+// Loads a scene file (.toml) or a robot or world (URDF, SDFormat, MJCF) into the session, beside what it has; `options` may be NULL.
+// The caller's process reads the files and sends what they name along. Objects, motions and rules are those of `contactd check`, to the
+// bit. What is wrong is one sentence with file, line and column, and the session keeps what it had, but for models. The scene is to be
+// freed by contactd_scene_free, before or after its session is closed.
+int32_t contactd_load_scene(struct contactd_session *session,
+                            const char *path,
+                            const struct contactd_scene_options *options,
+                            struct contactd_scene **scene);
+
+// Frees a scene and sets `*scene` to NULL; its objects stay in the session. One that is NULL already is done.
+int32_t contactd_scene_free(struct contactd_scene **scene);
+
+// What a scene has in it.
+int32_t contactd_scene_get_info(struct contactd_scene *scene, struct contactd_scene_info *out);
+
+// An object of a scene by its number from 0, in the order of the file.
+int32_t contactd_scene_get_object(struct contactd_scene *scene, size_t index, struct contactd_scene_object *out);
+
+// The id of the object of a name.
+int32_t contactd_scene_find(struct contactd_scene *scene, const char *name, uint32_t *id);
+
+// A joint of a robot that has a value of its own, by its number from 0, in the order of the file.
+int32_t contactd_scene_get_joint(struct contactd_scene *scene, size_t index, struct contactd_joint *out);
+
+// A note by its number from 0: a sentence about what has no effect, was left out or was taken in another way.
+int32_t contactd_scene_get_note(struct contactd_scene *scene, size_t index, const char **note);
+
+// Gives the session the scene's rules instead of its own: those that `keeps_rules` left aside.
+int32_t contactd_scene_set_rules(struct contactd_session *session, struct contactd_scene *scene);
+
+// Puts a robot where its joints have these `count` values (radians, metres), the others as they stand; nothing is searched. What is
+// attached to a link goes along. Refused where a joint is not there, or a value beyond its limits.
+int32_t contactd_scene_set_joints(struct contactd_session *session,
+                                  struct contactd_scene *scene,
+                                  const struct contactd_joint_value *joints,
+                                  size_t count);
+
+// A step in which a robot's joints go from where they stand to these `count` values at constant rates, its links on their true arcs; of
+// a scene file its own step, by no values. Its records are sent alone and answered as by contactd_finish. Refused where two hinges would
+// turn a link at once, which is no arc: move one after the other. A robot whose step is refused stands where it was.
+int32_t contactd_scene_step(struct contactd_session *session,
+                            struct contactd_scene *scene,
+                            const struct contactd_joint_value *joints,
+                            size_t count,
+                            double timeout,
+                            struct contactd_reply *reply);
+
+// The records of that step, to be put into a batch with those of other objects: `*written` of them into `records`, which has room for
+// `room`; no more than the scene has objects. After it the joints stand at its end. Where there is not room enough nothing is done.
+int32_t contactd_scene_records(struct contactd_session *session,
+                               struct contactd_scene *scene,
+                               const struct contactd_joint_value *joints,
+                               size_t count,
+                               struct contactd_pose_record *records,
+                               size_t room,
+                               size_t *written);
+
+// The step of the last contactd_scene_records was refused: nothing has moved, and a robot's joints are where they were.
+int32_t contactd_scene_refused(struct contactd_scene *scene);
+
+// Puts a robot where its joints were at a time, 0 to 1, of the last step: where it met something, say.
+int32_t contactd_scene_stop_at(struct contactd_session *session, struct contactd_scene *scene, double time);
+
 // What is asked of the steps to come, as it is set.
 int32_t contactd_get_options(struct contactd_session *session, struct contactd_options *options);
 
@@ -1613,6 +1752,36 @@ CONTACTD_AT(contactd_object, reserved, 28);
 CONTACTD_AT(contactd_object, max_speed, 32);
 CONTACTD_AT(contactd_object, place, 40);
 CONTACTD_AT(contactd_object, pose, 96);
+CONTACTD_SIZE(contactd_joint_value, 16);
+CONTACTD_AT(contactd_joint_value, name, 0);
+CONTACTD_AT(contactd_joint_value, value, 8);
+CONTACTD_SIZE(contactd_scene_options, 64);
+CONTACTD_AT(contactd_scene_options, joints, 0);
+CONTACTD_AT(contactd_scene_options, joint_count, 8);
+CONTACTD_AT(contactd_scene_options, key, 16);
+CONTACTD_AT(contactd_scene_options, packages, 24);
+CONTACTD_AT(contactd_scene_options, package_count, 32);
+CONTACTD_AT(contactd_scene_options, srdf, 40);
+CONTACTD_AT(contactd_scene_options, import_root, 48);
+CONTACTD_AT(contactd_scene_options, hulls, 56);
+CONTACTD_AT(contactd_scene_options, keeps_rules, 60);
+CONTACTD_SIZE(contactd_scene_info, 40);
+CONTACTD_AT(contactd_scene_info, unit, 0);
+CONTACTD_AT(contactd_scene_info, dt, 8);
+CONTACTD_AT(contactd_scene_info, object_count, 16);
+CONTACTD_AT(contactd_scene_info, joint_count, 24);
+CONTACTD_AT(contactd_scene_info, note_count, 32);
+CONTACTD_SIZE(contactd_scene_object, 16);
+CONTACTD_AT(contactd_scene_object, name, 0);
+CONTACTD_AT(contactd_scene_object, object, 8);
+CONTACTD_AT(contactd_scene_object, model, 12);
+CONTACTD_SIZE(contactd_joint, 40);
+CONTACTD_AT(contactd_joint, name, 0);
+CONTACTD_AT(contactd_joint, turns, 8);
+CONTACTD_AT(contactd_joint, reserved, 12);
+CONTACTD_AT(contactd_joint, low, 16);
+CONTACTD_AT(contactd_joint, high, 24);
+CONTACTD_AT(contactd_joint, value, 32);
 CONTACTD_SIZE(contactd_options, 48);
 CONTACTD_AT(contactd_options, advance, 0);
 CONTACTD_AT(contactd_options, dt, 8);

@@ -46,6 +46,86 @@ impl From<Session> for Opened {
     }
 }
 
+/// A value of a joint.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct JointValue {
+    /// The joint's name.
+    pub name: *const c_char,
+    /// Radians of what turns, metres of what slides.
+    pub value: f64,
+}
+
+/// How a scene is loaded. contactd_scene_options_new sets the defaults.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct SceneOptions {
+    /// Where a robot's joints stand; of others what the file says. NULL for none.
+    pub joints: *const JointValue,
+    /// Number of them.
+    pub joint_count: usize,
+    /// The keyframe that joints begin at, of MJCF; NULL for none.
+    pub key: *const c_char,
+    /// Folders in which packages are looked for (package://NAME/…, model://NAME/…), before the file's own and those above it.
+    pub packages: *const *const c_char,
+    /// Number of them.
+    pub package_count: usize,
+    /// An SRDF file with pairs that are not to be tested; NULL for none.
+    pub srdf: *const c_char,
+    /// The folder that texts may import files from; NULL: each from its own.
+    pub import_root: *const c_char,
+    /// 1: meshes are taken as their convex hulls, as MuJoCo does anyway.
+    pub hulls: u32,
+    /// 1: the session's rules and resolution stay as they are.
+    pub keeps_rules: u32,
+}
+
+/// What a loaded scene has in it. Strings are valid until the scene is freed.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct SceneInfo {
+    /// The unit of length; may be empty.
+    pub unit: *const c_char,
+    /// Duration of the step in seconds that a scene file says; 0 for none.
+    pub dt: f64,
+    /// Number of its objects.
+    pub object_count: usize,
+    /// Number of its joints that have values of their own.
+    pub joint_count: usize,
+    /// Number of its notes.
+    pub note_count: usize,
+}
+
+/// An object of a loaded scene.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct LoadedObject {
+    /// Its name, valid until the scene is freed.
+    pub name: *const c_char,
+    /// Its id in the session.
+    pub object: u32,
+    /// The id of its model.
+    pub model: u32,
+}
+
+/// A joint of a robot that has a value of its own.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Joint {
+    /// Its name, valid until the scene is freed.
+    pub name: *const c_char,
+    /// 1: it turns, and its value is an angle in radians; 0: it slides, metres.
+    pub turns: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Its lower limit; infinite where it has none.
+    pub low: f64,
+    /// Its upper limit.
+    pub high: f64,
+    /// Where it stands.
+    pub value: f64,
+}
+
 /// What was recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
@@ -238,4 +318,18 @@ pub struct Reply {
     pub slots: *const ContactRecord,
     /// Number of them.
     pub slot_count: usize,
+}
+
+impl Reply {
+    /// What a session has received.
+    pub(crate) fn of(reply: &contactd_client::Reply<'_>) -> Self {
+        let (records, slots) = (reply.records(), reply.slots());
+        Self {
+            header: *reply.header(),
+            records: records.as_ptr(),
+            record_count: records.len(),
+            slots: slots.as_ptr(),
+            slot_count: slots.len(),
+        }
+    }
 }

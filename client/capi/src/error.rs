@@ -74,6 +74,11 @@ impl Failure {
         Self::new(ERROR_PANIC, format!("contactd failed internally: {what}"))
     }
 
+    /// The same in other words.
+    pub(crate) fn saying(self, sentence: String) -> Self {
+        Self { sentence, ..self }
+    }
+
     /// The same, of one element of what was given.
     pub(crate) fn at(self, index: usize) -> Self {
         Self { index: index as u32, sentence: format!("index {index}: {}", self.sentence), ..self }

@@ -19,12 +19,15 @@
 //! 5. manifolds came from `contactd_manifolds_new`, were not freed since (freeing sets the caller's variable to NULL), and are in one
 //!    call at a time;
 //! 6. solids and outlines came from functions of `contactd_solid_…` and `contactd_outline_…`, were not freed since (freeing sets the
-//!    caller's variable to NULL), and are in one call at a time.
+//!    caller's variable to NULL), and are in one call at a time;
+//! 7. scenes came from `contactd_load_scene`, were not freed since (freeing sets the caller's variable to NULL), are in one call at a
+//!    time, and are passed with the session that they were loaded into.
 
 pub mod abi;
 pub mod convention;
 pub mod error;
 pub mod handle;
+pub mod loaded;
 pub mod manifold;
 pub mod model;
 pub mod query;

@@ -99,15 +99,8 @@ pub unsafe extern "C" fn contactd_finish(session: *mut Session, timeout: f64, re
         // SAFETY: the caller's variable (1).
         let place = unsafe { place(reply, "reply")? };
         let reply = state.session.finish(seconds(timeout, "a timeout")?)?;
-        let (records, slots) = (reply.records(), reply.slots());
-        state.records = Some(records.len());
-        place.write(Reply {
-            header: *reply.header(),
-            records: records.as_ptr(),
-            record_count: records.len(),
-            slots: slots.as_ptr(),
-            slot_count: slots.len(),
-        });
+        state.records = Some(reply.records().len());
+        place.write(Reply::of(&reply));
         Ok(())
     };
     // SAFETY: the caller's handle (3).

@@ -4,7 +4,8 @@
 
 use cbindgen::{Builder, Config};
 use contactd_capi::abi::{
-    Distance, Face, Mass, Names, Object, Opened, Options, PointQuery, Pose, RayQuery, Recording, Reply, Rule,
+    Distance, Face, Joint, JointValue, LoadedObject, Mass, Names, Object, Opened, Options, PointQuery, Pose, RayQuery,
+    Recording, Reply, Rule, SceneInfo, SceneOptions,
 };
 use contactd_capi::manifold::{Manifold, ManifoldPoint};
 use contactd_proto::effects::{self, EffectCounters};
@@ -23,7 +24,7 @@ use std::sync::OnceLock;
 const TABLES: &str = "tables";
 
 /// Sources of the header, in its order.
-const SOURCES: [&str; 18] = [
+const SOURCES: [&str; 19] = [
     "src/error.rs",
     "../../proto/src/pose_record.rs",
     "../../proto/src/contact_record.rs",
@@ -36,6 +37,7 @@ const SOURCES: [&str; 18] = [
     "src/model.rs",
     "src/solid.rs",
     "src/scene.rs",
+    "src/loaded.rs",
     "src/step.rs",
     "src/query.rs",
     "src/recording.rs",
@@ -123,6 +125,13 @@ fn offsets() -> String {
         "contactd_distance" Distance { lower, upper, point_a, point_b, cells, settled, reserved }
         "contactd_names" Names { a, b }
         "contactd_object" Object { name, group, model, is_static, rotates, reserved, max_speed, place, pose }
+        "contactd_joint_value" JointValue { name, value }
+        "contactd_scene_options" SceneOptions {
+            joints, joint_count, key, packages, package_count, srdf, import_root, hulls, keeps_rules,
+        }
+        "contactd_scene_info" SceneInfo { unit, dt, object_count, joint_count, note_count }
+        "contactd_scene_object" LoadedObject { name, object, model }
+        "contactd_joint" Joint { name, turns, reserved, low, high, value }
         "contactd_options" Options {
             advance, dt, first, details, clear, polling, max_records, cell_limit, batch_limit, reserved,
         }

@@ -4,6 +4,7 @@
 mod convention;
 mod manifold;
 mod misuse;
+mod scene;
 mod solid;
 mod stub;
 #[path = "../support/mod.rs"]
