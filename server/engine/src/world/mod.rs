@@ -16,6 +16,7 @@ pub mod body;
 mod boxes;
 pub mod broad;
 mod coherence;
+mod distances;
 pub mod heed;
 pub mod memory;
 mod neighbours;

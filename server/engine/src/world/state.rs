@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::boxes::SweptBoxes;
+use super::distances::Distances;
 use super::neighbours::Neighbours;
 use super::notes::Notes;
 use super::outcome::StepOutcome;
@@ -39,6 +40,7 @@ pub struct StepState {
     /// Memory of what is asked beside the searches.
     pub(super) scratch: Scratch,
     pub(super) outcome: StepOutcome,
+    pub(super) distances: Distances,
     /// What is noted for certificates of what is remembered, where somebody asks for them.
     pub(super) notes: Option<Box<Notes>>,
 }
@@ -63,6 +65,7 @@ impl StepState {
             searches: search::Memory::default(),
             scratch: Scratch::default(),
             outcome: StepOutcome::default(),
+            distances: Distances::default(),
             notes: None,
         }
     }
@@ -96,6 +99,7 @@ impl StepState {
     /// Bodies, their places or the rules have changed: nothing is known any more.
     pub(super) fn forget(&mut self, bodies: &[Body], heads: &mut [Head]) {
         self.neighbours.forget();
+        self.distances = Distances::default();
         self.moving.clear();
         for (i, (body, head)) in bodies.iter().zip(heads).enumerate() {
             head.is_moving = !body.motion_state.is_rest();

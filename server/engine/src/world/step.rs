@@ -187,7 +187,7 @@ impl World {
         decide(bodies, state, options, &mut left, heed);
         report(state, options);
         if self.roster.plans.measures() {
-            touch::measure(bodies, &state.jobs, options, &mut state.outcome, heed);
+            touch::measure(bodies, &state.jobs, options, (&mut state.distances, &mut state.outcome), heed);
         }
         touch::find_regions(bodies, &mut state.jobs, options, left, &mut state.outcome, heed);
         learn(bodies, state, options);

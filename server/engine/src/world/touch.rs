@@ -6,6 +6,7 @@
 
 use super::body::Body;
 use super::coherence::Reported;
+use super::distances::Distances;
 use super::heed::Heed;
 use super::options::StepOptions;
 use super::outcome::StepOutcome;
@@ -113,13 +114,13 @@ fn reported(job: &PairJob) -> Option<&Reported> {
     job.pair_cache.as_ref()?.reported().filter(|_| job.found.known && !job.found.apart)
 }
 
-/// Works out the least distances over the step of the told pairs whose rules ask. The work has a limit of its own, and nothing of it is
-/// remembered: what is told does not depend on what else was asked or known.
+/// Works out the least distances over the step of the told pairs whose rules ask, but for those that the last step knows. The work has a
+/// limit of its own, of which a known answer takes what it has cost: what is told does not depend on what else was asked or known.
 pub(super) fn measure(
     bodies: &[Body],
     jobs: &[PairJob],
     options: &StepOptions,
-    out: &mut StepOutcome,
+    (known, out): (&mut Distances, &mut StepOutcome),
     heed: Option<&Heed>,
 ) {
     let mut left = search::batch_limit(options);
@@ -127,15 +128,23 @@ pub(super) fn measure(
         if heed.is_some_and(Heed::is_over) {
             left = 0;
         }
-        let PairQuery { a, b, cell_limit, .. } = search::query(bodies, &jobs[p.job as usize], options);
+        let job = &jobs[p.job as usize];
+        let PairQuery { a, b, cell_limit, .. } = search::query(bodies, job, options);
         let limit = distance::DEFAULT_LIMIT.min(cell_limit).min(left);
-        let found = distance::over_step(&DistanceQuery { a, b, tolerance: p.plan.clearance, limit });
+        let query = DistanceQuery { a, b, tolerance: p.plan.clearance, limit };
+        let pair = (bodies[job.a as usize].id, bodies[job.b as usize].id);
+        let found = known.recall(pair, &query).unwrap_or_else(|| {
+            let found = distance::over_step(&query);
+            out.effect_counters.clearances += 1;
+            out.counters.instant_cells += found.cells;
+            found
+        });
+        known.keep(pair, &query, &found);
         left = left.saturating_sub(found.cells);
-        out.effect_counters.clearances += 1;
-        out.counters.instant_cells += found.cells;
         p.clearance = Some(out.clearances.len() as u32);
         out.clearances.push(found);
     }
+    known.turn();
 }
 
 /// Finds the regions of the told pairs and gives each its slots.
