@@ -5,7 +5,7 @@
 //! combinations each: two positive primitives (p), a body in a cavity of a block (n), a hollow body in a cavity (nn: two
 //! subtracted surfaces, which must neither add a contact nor hide one). `CONTACTD_PAIRS=10000 cargo test --release -p
 //! contactd-tests --test answers closed_forms:: -- --nocapture` sets the number of
-//! pairs per combination (200, 60 and 30 by default).
+//! pairs per combination (120, 60 and 30 by default).
 
 use contactd::contact::{Outcome, Status, default_resolution};
 use contactd::motion::{Placed, Relative};

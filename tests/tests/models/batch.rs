@@ -1,6 +1,6 @@
 //! Queries of one scene, each against a session that was made for it: whatever was asked before, on however many threads.
 //!
-//! `CONTACTD_BATCH=20000 cargo test --release -p contactd-tests --test models batch::` sets the number of queries (400 by default).
+//! `CONTACTD_BATCH=20000 cargo test --release -p contactd-tests --test models batch::` sets the number of queries (200 by default).
 
 use contactd::batch::{Answers, Batch, BatchOptions, Row};
 use contactd::import::{Facets, Scene};

@@ -1,6 +1,6 @@
 //! The least clearance over ranges of joints against arms of capsules, whose distances are closed forms.
 //!
-//! `CONTACTD_ROBOTS=2000 cargo test --release -p contactd-tests --test models clearance::` sets the number of random arms (40 by default).
+//! `CONTACTD_ROBOTS=2000 cargo test --release -p contactd-tests --test models clearance::` sets the number of random arms (20 by default).
 
 use super::robots::{Arm, Joint, frame, models, read};
 use contactd::clearance::{Least, Question, least};

@@ -1,6 +1,6 @@
 //! Robots of three formats: random arms, written as URDF, MJCF and SDFormat, stand and move where matrices of the test's own have them.
 //!
-//! `CONTACTD_ROBOTS=2000 cargo test --release -p contactd-tests --test models robots::` sets the number of random arms (40 by default).
+//! `CONTACTD_ROBOTS=2000 cargo test --release -p contactd-tests --test models robots::` sets the number of random arms (20 by default).
 
 use contactd::check::Check;
 use contactd::contact::Status;

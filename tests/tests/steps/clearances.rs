@@ -1,6 +1,6 @@
 //! The effect `clearance`: bounds of the least distance over a step, against closed forms of unions of balls and rods and of boxes, on
 //! their way by a motion of the test's own; of every pair that asks, wherever it is, whatever is remembered, and without a change of
-//! any other bit. `CONTACTD_CLEARANCES=300` sets the number of random worlds (12 by default), of some steps each.
+//! any other bit. `CONTACTD_CLEARANCES=300` sets the number of random worlds (8 by default), of some steps each.
 
 use contactd::octree::Model;
 use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World, record};
