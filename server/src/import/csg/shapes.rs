@@ -287,7 +287,8 @@ impl Shapes<'_> {
             let problem = Problem::Limit { what: "triangles of a mesh", limit: self.limits.mesh_facets };
             return Err((call.at, problem));
         }
-        self.meshed(call, place::mesh(outer, points, faces), before)
+        let made = place::mesh(outer, points, faces).map_err(|fault| by_faces(fault, outer, (points, faces)));
+        self.meshed(call, made, before)
     }
 
     /// A mesh of many faces, which run counter-clockwise as seen from outside.
@@ -436,4 +437,22 @@ fn used(points: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
     let mut named = vec![false; points.len()];
     faces.iter().flatten().for_each(|i| named[*i as usize] = true);
     points.iter().zip(named).filter(|(_, named)| *named).map(|(p, _)| *p).collect()
+}
+
+/// What is wrong with a polyhedron of which two facets cross, by the numbers of its faces.
+fn by_faces(fault: Problem, outer: &DAffine3, (points, faces): (&[DVec3], &[Vec<u32>])) -> Problem {
+    let Problem::Surface(MeshFault::Through { near, facets }) = &fault else { return fault };
+    let points: Vec<DVec3> = points.iter().map(|p| outer.transform_point3(*p)).collect();
+    // Corners that were taken as others near them are none of its own.
+    let face_of = |facet: &[DVec3; 3]| {
+        faces.iter().position(|face| facet.iter().all(|c| face.iter().any(|i| points[*i as usize] == *c)))
+    };
+    let [Some(one), Some(other)] = [face_of(&facets[0]), face_of(&facets[1])] else { return fault };
+    let corners = |i: usize| format!("faces[{i}] = {:?}", faces[i]);
+    let found = format!(
+        "one that crosses itself near {near}, where {} meets {} (part them, or make it a union of closed parts)",
+        corners(one),
+        corners(other)
+    );
+    Problem::syntax("a closed mesh", found)
 }

@@ -53,7 +53,9 @@ pub fn extruded(
         parts.meshable(at, facets)?;
         let (points, faces) = bent.mesh();
         match place::mesh(outer, &points, &faces) {
-            Err(Problem::Surface(MeshFault::Crossing(_) | MeshFault::Intricate(_))) if halved < HALVINGS => {
+            Err(Problem::Surface(MeshFault::Crossing(_) | MeshFault::Through { .. } | MeshFault::Intricate(_)))
+                if halved < HALVINGS =>
+            {
                 match &cut {
                     Some(cut) if halved == 0 => rings = cut,
                     Some(_) | None => slices *= 2,

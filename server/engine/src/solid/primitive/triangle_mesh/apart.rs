@@ -1,7 +1,9 @@
 //! Whether two facets have more in common than what joins them: decided exactly where they cross, told as doubt where they are as
 //! near to each other as roundings.
 
+use super::MeshFault;
 use super::surface::Surface;
+use crate::math::Aabb;
 use glam::DVec3;
 use robust::{Coord3D, orient3d};
 
@@ -196,6 +198,26 @@ pub fn pair(tolerance: f64, facets: [&Facet; 2]) -> FacetPair {
         }
         _ => FacetPair::Crossing,
     }
+}
+
+/// What is wrong with a mesh of which two facets cross.
+pub fn through(surface: &Surface, facets: [u32; 2]) -> MeshFault {
+    let facets = facets.map(|i| surface.corners(i));
+    let [one, other] = facets.map(Aabb::of_points);
+    MeshFault::Through { near: one.intersection(&other).center(), facets: Box::new(facets) }
+}
+
+/// The first two facets of few that cross, all of them held against each other.
+pub fn first_through(surface: &Surface) -> Option<MeshFault> {
+    let count = surface.triangles.len() as u32;
+    let all: Vec<(Facet, Aabb)> =
+        (0..count).map(|i| (Facet::of(surface, i), Aabb::of_points(surface.corners(i)))).collect();
+    let pairs = (0..count).flat_map(|i| (0..i).map(move |j| [j, i]));
+    let cross = |[j, i]: &[u32; 2]| {
+        let ((one, around), (other, beside)) = (&all[*j as usize], &all[*i as usize]);
+        around.meets(beside) && pair(surface.tolerance, [one, other]) == FacetPair::Crossing
+    };
+    pairs.into_iter().find(cross).map(|facets| through(surface, facets))
 }
 
 /// True where two triangles run along an edge that they share in opposite directions.

@@ -16,7 +16,7 @@
 use super::MeshFault;
 use super::cells;
 use super::edges::NONE;
-use super::growth::{Builder, IN, KIND, Leaf, Node, OUT, PART, Tree, UNDECIDED, UPPER, upper, written};
+use super::growth::{Builder, IN, KIND, Leaf, Node, OUT, Of, PART, Rough, Tree, UNDECIDED, UPPER, upper, written};
 use super::local::Expr;
 use super::planes::area;
 use super::side::crosses;
@@ -69,8 +69,8 @@ impl Divided {
     pub fn new(surface: Arc<Surface>, leaders: &[u32]) -> Result<Self, MeshFault> {
         let domain = cells::domain(&surface.around);
         let count = surface.triangles.len() as u32;
-        let boxes = (0..count).into_par_iter().map(|i| Aabb::of_points(surface.corners(i))).collect();
-        let builder = Builder { surface: &surface, boxes, some: None };
+        let rough = |i| Rough::of(&Aabb::of_points(surface.corners(i)));
+        let builder = Builder { surface: &surface, of: Of::All((0..count).into_par_iter().map(rough).collect()) };
         let grown = builder.grown((0..count).collect(), domain, (usize::MAX, 0))?;
         drop(builder);
         let (tree, top) = Tree::of(grown);

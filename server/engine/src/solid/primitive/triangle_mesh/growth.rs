@@ -81,6 +81,41 @@ impl Grown {
             }
         }
     }
+
+    /// Names places by their numbers in the whole, of which so many nodes, leaves and facets come before; the place of its top, which is
+    /// below the half `parent`.
+    fn number(&mut self, before: &mut [u32; 3], parent: u32) -> u32 {
+        match self {
+            Grown::Tree(tree, top) => tree.number(*top, before, parent),
+            Grown::Divided(node, halves) => {
+                let n = before[0];
+                before[0] += 1;
+                node.parent = parent;
+                for (k, half) in halves.iter_mut().enumerate() {
+                    let below = half.as_mut().map(|half| half.number(before, upper(n, k)));
+                    node.halves[k] = below.unwrap_or(UNDECIDED);
+                }
+                n
+            }
+        }
+    }
+
+    /// Calls for what it consists of, in the order of numbers.
+    fn walk(&mut self, each: &mut dyn FnMut(Met<'_>)) {
+        match self {
+            Grown::Tree(tree, _) => each(Met::Tree(tree)),
+            Grown::Divided(node, halves) => {
+                each(Met::Node(*node));
+                halves.iter_mut().flatten().for_each(|half| half.walk(each));
+            }
+        }
+    }
+}
+
+/// What a walk meets.
+enum Met<'g> {
+    Node(Node),
+    Tree(&'g mut Tree),
 }
 
 /// A part of the tree with numbers of its own.
@@ -92,59 +127,84 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// All that was grown as one tree, and its top.
-    pub(super) fn of(grown: Grown) -> (Self, u32) {
+    /// All that was grown as one tree, and its top. Facets, leaves and nodes one after another: what is moved is freed, and of a large
+    /// mesh each takes as much as its planes do.
+    pub(super) fn of(mut grown: Grown) -> (Self, u32) {
         let [nodes, leaves, facets] = grown.sizes();
-        let (nodes, leaves) = (Vec::with_capacity(nodes), Vec::with_capacity(leaves));
-        let mut tree = Self { nodes, leaves, facets: Vec::with_capacity(facets) };
-        let top = tree.take(grown, NONE);
-        (tree, top)
+        let top = grown.number(&mut [0; 3], NONE);
+        let mut all = Self { facets: Vec::with_capacity(facets), ..Self::default() };
+        grown.walk(&mut |met| match met {
+            Met::Node(_) => {}
+            Met::Tree(tree) => all.facets.append(&mut std::mem::take(&mut tree.facets)),
+        });
+        all.leaves.reserve_exact(leaves);
+        grown.walk(&mut |met| match met {
+            Met::Node(_) => {}
+            Met::Tree(tree) => all.leaves.append(&mut std::mem::take(&mut tree.leaves)),
+        });
+        all.nodes.reserve_exact(nodes);
+        grown.walk(&mut |met| match met {
+            Met::Node(node) => all.nodes.push(node),
+            Met::Tree(tree) => all.nodes.append(&mut std::mem::take(&mut tree.nodes)),
+        });
+        (all, top)
     }
 
-    fn take(&mut self, grown: Grown, parent: u32) -> u32 {
-        match grown {
-            Grown::Tree(tree, top) => self.append(tree, top, parent),
-            Grown::Divided(node, halves) => {
-                let n = self.nodes.len();
-                self.nodes.push(Node { parent, ..node });
-                for (k, half) in halves.into_iter().enumerate() {
-                    self.nodes[n].halves[k] = half.map_or(UNDECIDED, |half| self.take(*half, upper(n as u32, k)));
-                }
-                n as u32
-            }
-        }
-    }
-
-    /// Appends another one whose top is `top`, below the half `parent`; its place.
-    fn append(&mut self, other: Tree, top: u32, parent: u32) -> u32 {
-        let (nodes, leaves, facets) = (self.nodes.len() as u32, self.leaves.len() as u32, self.facets.len() as u32);
+    /// Its part of `Grown::number`.
+    fn number(&mut self, top: u32, before: &mut [u32; 3], parent: u32) -> u32 {
+        let [nodes, leaves, facets] = *before;
         let shifted = |place: u32| match place & KIND {
             0 => place + nodes,
             PART => place + leaves,
             _ => place,
         };
         let above = |p: u32| if p == NONE { parent } else { p + nodes };
-        self.nodes.extend(other.nodes.into_iter().map(|n| Node {
-            halves: n.halves.map(shifted),
-            parent: above(n.parent),
-            ..n
-        }));
-        self.leaves.extend(other.leaves.into_iter().map(|l| Leaf {
-            from: l.from + facets,
-            to: l.to + facets,
-            parent: above(l.parent),
-        }));
-        self.facets.extend(other.facets);
+        for n in &mut self.nodes {
+            (n.halves, n.parent) = (n.halves.map(shifted), above(n.parent));
+        }
+        for l in &mut self.leaves {
+            *l = Leaf { from: l.from + facets, to: l.to + facets, parent: above(l.parent) };
+        }
+        let own = [self.nodes.len(), self.leaves.len(), self.facets.len()];
+        *before = std::array::from_fn(|k| before[k] + own[k] as u32);
         shifted(top)
+    }
+
+    /// Without room for more.
+    fn shrink(&mut self) {
+        self.nodes.shrink_to_fit();
+        self.leaves.shrink_to_fit();
+        self.facets.shrink_to_fit();
+    }
+}
+
+/// The box of a facet in single precision, rounded outwards: half the room, and enough for most of what is asked.
+#[derive(Clone, Copy)]
+pub(super) struct Rough {
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl Rough {
+    /// That of a box.
+    pub(super) fn of(exact: &Aabb) -> Self {
+        let (low, high) = (exact.min.to_array(), exact.max.to_array());
+        Self { low: low.map(|x| (x as f32).next_down()), high: high.map(|x| (x as f32).next_up()) }
     }
 }
 
 /// Makes the tree: of all facets, or of some that lie side by side in memory then.
 pub(super) struct Builder<'s> {
     pub(super) surface: &'s Surface,
-    pub(super) boxes: Vec<Aabb>,
-    /// Their numbers and corners, of some.
-    pub(super) some: Option<(Vec<u32>, Vec<[DVec3; 3]>)>,
+    pub(super) of: Of,
+}
+
+/// Of which facets a tree is made.
+pub(super) enum Of {
+    /// Of all, with their boxes.
+    All(Vec<Rough>),
+    /// Of some, with their numbers, corners and boxes.
+    Some(Vec<u32>, Vec<[DVec3; 3]>, Vec<Aabb>),
 }
 
 /// A place whose side is not decided yet.
@@ -155,22 +215,53 @@ const TRIED: usize = 4;
 impl Builder<'_> {
     /// The number of a facet in the mesh.
     fn number(&self, i: u32) -> u32 {
-        self.some.as_ref().map_or(i, |some| some.0[i as usize])
+        match &self.of {
+            Of::All(_) => i,
+            Of::Some(numbers, ..) => numbers[i as usize],
+        }
     }
 
     fn corners(&self, i: u32) -> [DVec3; 3] {
-        self.some.as_ref().map_or_else(|| self.surface.corners(i), |some| some.1[i as usize])
+        match &self.of {
+            Of::All(_) => self.surface.corners(i),
+            Of::Some(_, corners, _) => corners[i as usize],
+        }
+    }
+
+    /// The box of a facet.
+    fn around(&self, i: u32) -> Aabb {
+        match &self.of {
+            Of::All(_) => Aabb::of_points(self.surface.corners(i)),
+            Of::Some(.., boxes) => boxes[i as usize],
+        }
+    }
+
+    /// Whether the box of a facet reaches below the one place of an axis, and above the other, which is lower.
+    #[inline]
+    fn beside(&self, i: u32, axis: usize, [below, above]: [f64; 2]) -> [bool; 2] {
+        if let Of::All(rough) = &self.of {
+            let rough = &rough[i as usize];
+            if f64::from(rough.high[axis]) < above {
+                return [true, false];
+            }
+            if f64::from(rough.low[axis]) > below {
+                return [false, true];
+            }
+        }
+        let exact = self.around(i);
+        [exact.min[axis] <= below, exact.max[axis] >= above]
     }
 
     /// The tree of a cell that some facets reach; `last`: the facets of the one before, and for how long it has been so.
     pub(super) fn grown(&self, list: Vec<u32>, cell: Aabb, last: (usize, u32)) -> Result<Grown, MeshFault> {
         if list.len() < SHARED {
             let all = 0..list.len() as u32;
-            let boxes = list.iter().map(|i| self.boxes[*i as usize]).collect();
-            let corners = list.iter().map(|i| self.surface.corners(*i)).collect();
-            let near = Builder { surface: self.surface, boxes, some: Some((list, corners)) };
+            let corners: Vec<[DVec3; 3]> = list.iter().map(|i| self.surface.corners(*i)).collect();
+            let boxes = corners.iter().map(|c| Aabb::of_points(*c)).collect();
+            let near = Builder { surface: self.surface, of: Of::Some(list, corners, boxes) };
             let mut tree = Tree::default();
             let top = near.grow(all.collect(), cell, last, NONE, &mut tree)?;
+            tree.shrink();
             return Ok(Grown::Tree(tree, top));
         }
         halt::point();
@@ -236,7 +327,7 @@ impl Builder<'_> {
     }
 
     fn middle(&self, list: &[u32]) -> DVec3 {
-        list.first().map_or(DVec3::ZERO, |i| self.boxes[*i as usize].center())
+        list.first().map_or(DVec3::ZERO, |i| self.around(*i).center())
     }
 
     fn has_few_planes(&self, list: &[u32]) -> bool {
@@ -252,7 +343,7 @@ impl Builder<'_> {
         let mut doubt = last;
         let facets: SmallVec<[Facet; FEW_FACETS]> =
             list.iter().map(|i| Facet::of(self.surface, self.number(*i))).collect();
-        let boxes: SmallVec<[Aabb; FEW_FACETS]> = list.iter().map(|i| self.boxes[*i as usize]).collect();
+        let boxes: SmallVec<[Aabb; FEW_FACETS]> = list.iter().map(|i| self.around(*i)).collect();
         for i in 0..facets.len() {
             for j in 0..i {
                 if !boxes[i].meets(&boxes[j]) {
@@ -261,7 +352,9 @@ impl Builder<'_> {
                 match pair(self.surface.tolerance, [&facets[i], &facets[j]]) {
                     FacetPair::Apart => {}
                     FacetPair::Doubtful => doubt = true,
-                    FacetPair::Crossing => return Err(MeshFault::Crossing(boxes[i].intersection(&boxes[j]).center())),
+                    FacetPair::Crossing => {
+                        return Err(apart::through(self.surface, [list[j], list[i]].map(|f| self.number(f))));
+                    }
                 }
             }
         }
@@ -294,8 +387,7 @@ impl Builder<'_> {
         (below.max[axis], above.min[axis]) = (s + w, s - w);
         let (mut low, mut high) = (Vec::with_capacity(list.len()), Vec::with_capacity(list.len()));
         for i in list {
-            let b = &self.boxes[*i as usize];
-            let (under, over) = (b.min[axis] <= below.max[axis], b.max[axis] >= above.min[axis]);
+            let [under, over] = self.beside(*i, axis, [below.max[axis], above.min[axis]]);
             // What lies on one side alone was in the cell before.
             let both = under && over;
             if under && (!both || self.reaches(*i, &below)) {
@@ -341,7 +433,7 @@ impl Builder<'_> {
     fn place(&self, list: &[u32], cell: &Aabb, k: usize, w: f64) -> f64 {
         let (from, size) = (cell.min[k], cell.max[k] - cell.min[k]);
         let step = list.len().div_ceil(1024);
-        let mut middles: Vec<f64> = list.iter().step_by(step).map(|i| self.boxes[*i as usize].center()[k]).collect();
+        let mut middles: Vec<f64> = list.iter().step_by(step).map(|i| self.around(*i).center()[k]).collect();
         let half = middles.len() / 2;
         let median = *middles.select_nth_unstable_by(half, f64::total_cmp).1;
         let middle = median.clamp(from + 0.25 * size, from + 0.75 * size);

@@ -58,9 +58,23 @@ pub enum MeshFault {
     /// Facets that cross or lie on each other.
     #[error("one that crosses itself, lies on itself or is inside out near {0}")]
     Crossing(DVec3),
+    /// Two facets that meet elsewhere than where they join: near which place, and the corners of both.
+    #[error("one that crosses itself near {near}, where {} meets {} (part them, or make it a union of closed parts)",
+        named(&facets[0]), named(&facets[1]))]
+    Through {
+        /// A place near to where they do.
+        near: DVec3,
+        /// Both, counter-clockwise from outside.
+        facets: Box<[[DVec3; 3]; 2]>,
+    },
     /// More facets at a corner, or nearer to each other, than a formula is made for.
     #[error("one that is too intricate near {0}: too many facets in too little room")]
     Intricate(DVec3),
+}
+
+/// A facet in words.
+fn named([a, b, c]: &[DVec3; 3]) -> String {
+    format!("the triangle {a}, {b}, {c}")
 }
 
 /// A closed surface of which a mesh is to be made, and what was repaired in it.
@@ -173,7 +187,13 @@ impl TriangleMesh {
         }
         let pieces = surface.pieces(0..count as u32);
         let faces = surface.planes.len();
-        let (expr, mut planes) = Cells::formula(std::mem::take(&mut surface.planes), pieces, around, tolerance)?;
+        let formula = Cells::formula(std::mem::take(&mut surface.planes), pieces, around, tolerance);
+        // Of few facets the pair is looked for where their formula has told that something is wrong.
+        let named = |fault| match fault {
+            MeshFault::Crossing(_) | MeshFault::Intricate(_) => apart::first_through(&surface).unwrap_or(fault),
+            MeshFault::Flat | MeshFault::Open(..) | MeshFault::Mixed(..) | MeshFault::Through { .. } => fault,
+        };
+        let (expr, mut planes) = formula.map_err(named)?;
         let Expr::Open(tokens) = expr else { return Err(MeshFault::Flat) };
         let cuts = planes.split_off(faces);
         surface.planes = planes;

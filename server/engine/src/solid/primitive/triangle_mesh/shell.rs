@@ -117,7 +117,7 @@ impl Shell {
         }
         vertices.shrink_to_fit();
         kept.shrink_to_fit();
-        let edges = Edges::of(&kept);
+        let edges = Edges::of(&kept, vertices.len());
         Self { vertices, triangles: kept, edges }
     }
 

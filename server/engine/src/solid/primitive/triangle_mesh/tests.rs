@@ -213,3 +213,42 @@ fn boxes_hold_what_is_in_them_and_every_facet_is_in_one() {
     assert!((0..mesh.triangles().len() as u32).all(|i| !meets(i) || near.contains(&i)));
     assert!(near.iter().any(|f| meets(*f)));
 }
+
+/// Whether an edge of one triangle goes through the other: volumes of tetrahedra, in doubles.
+fn goes_through(one: [DVec3; 3], other: [DVec3; 3]) -> bool {
+    let volume = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| (b - a).cross(c - a).dot(d - a);
+    let [a, b, c] = other;
+    (0..3).any(|k| {
+        let (p, q) = (one[k], one[(k + 1) % 3]);
+        let around = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
+        let passes = around.iter().all(|v| *v >= 0.0) || around.iter().all(|v| *v <= 0.0);
+        volume(a, b, c, p) * volume(a, b, c, q) < 0.0 && passes
+    })
+}
+
+#[test]
+fn two_facets_that_cross_are_told_with_where_they_do() {
+    let mut r = Random(31);
+    for round in 0..40 {
+        let (mut points, mut triangles) = bumps(&mut r, 6, 8, 0.1);
+        let (more, others) = bumps(&mut r, 5 + round % 4, 7, 0.1);
+        let aside = r.vector(1.0).normalize() * r.within(0.7, 1.5);
+        let first = points.len() as u32;
+        points.extend(more.into_iter().map(|p| p + aside));
+        triangles.extend(others.into_iter().map(|t| t.map(|v| v + first)));
+        for few in [0, usize::MAX] {
+            match TriangleMesh::divided_from(few, &points, &triangles) {
+                Err(MeshFault::Through { near, facets }) => {
+                    let [one, other] = *facets;
+                    assert!(goes_through(one, other) || goes_through(other, one), "round {round}: {one:?} {other:?}");
+                    for facet in [one, other] {
+                        assert!(Aabb::of_points(facet).grown(1e-9).contains(near), "round {round}: {near} {facet:?}");
+                        let is_own = |t: &[u32; 3]| t.map(|v| points[v as usize]) == facet;
+                        assert_eq!(triangles.iter().filter(|t| is_own(t)).count(), 1, "round {round}: {facet:?}");
+                    }
+                }
+                told => panic!("round {round}, few {few}: {told:?}"),
+            }
+        }
+    }
+}
