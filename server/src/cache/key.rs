@@ -10,8 +10,19 @@ impl Key {
     /// The key of a file's content and of how it is read. The limits count: what would be refused is not to be had from the cache.
     pub fn of(format: &Format, bytes: &[u8], facets: Facets, limits: &Limits) -> Self {
         let mut hasher = blake3::Hasher::new_derive_key("contactd 2026 key of a preprocessed model");
-        let Limits { bytes: most, nodes, depth, faces, polyhedron_faces, hull_faces, mesh_facets, values } = *limits;
-        for number in [facets as usize, most, nodes, depth, faces, polyhedron_faces, hull_faces, mesh_facets, values] {
+        let Limits {
+            bytes: most,
+            nodes,
+            depth,
+            faces,
+            polyhedron_faces,
+            hull_faces,
+            outline_corners,
+            mesh_facets,
+            values,
+        } = *limits;
+        let shapes = [faces, polyhedron_faces, hull_faces, outline_corners, mesh_facets];
+        for number in [facets as usize, most, nodes, depth].into_iter().chain(shapes).chain([values]) {
             hasher.update(&(number as u64).to_le_bytes());
         }
         hasher.update(&(format.name.len() as u64).to_le_bytes());

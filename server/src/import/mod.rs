@@ -142,6 +142,8 @@ pub struct Limits {
     pub polyhedron_faces: usize,
     /// Faces of one convex hull.
     pub hull_faces: usize,
+    /// Corners of one outline that is extruded, each the half-space of a side.
+    pub outline_corners: usize,
     /// Triangles of one mesh that is not convex.
     pub mesh_facets: usize,
     /// Values in one list.
@@ -158,6 +160,7 @@ impl Default for Limits {
             faces: 2_000_000,
             polyhedron_faces: 5_000,
             hull_faces: 100_000,
+            outline_corners: 200_000,
             mesh_facets: 1_000_000,
             values: 1_000_000,
         }

@@ -485,39 +485,106 @@ fn constructs_hold_what_they_mean_without_seams() {
     }
 }
 
-#[test]
-fn outlines_of_more_corners_than_a_formula_has_are_meshes_with_flat_faces() {
-    let star = |n: usize| {
-        let corner = |i: usize| {
-            let (sin, cos) = libm::sincos(i as f64 / n as f64 * std::f64::consts::TAU);
-            let r = if i.is_multiple_of(2) { 5.0 } else { 4.9 };
-            format!("[{},{}]", r * cos, r * sin)
-        };
-        format!("polygon([{}]);", (0..n).map(corner).collect::<Vec<_>>().join(","))
+/// A ring about the origin whose corners lie at random distances: two rays from there never cross a side twice.
+fn coast(r: &mut Random, n: usize) -> Vec<[f64; 2]> {
+    let waves: Vec<[f64; 3]> =
+        (1..60).map(|k| [f64::from(k), r.within(-2.0, 2.0) / f64::from(k), r.within(0.0, 6.3)]).collect();
+    let corner = |i: usize| {
+        let angle = std::f64::consts::TAU * i as f64 / n as f64;
+        let far = 9.0 + waves.iter().map(|[k, a, at]| a * (k * angle + at).cos()).sum::<f64>();
+        [far * angle.cos(), far * angle.sin()]
     };
-    let holed = format!("difference() {{ {} {} }}", star(120), moved(4.0, 0.0, 0.0, "square([2, 1]);"));
-    // How far the outline and the notch are moved, outwards positive.
-    for (call, by) in [("union()", 0.0), ("offset(delta = -0.25)", -0.25), ("offset(r = 0.25, $fn = 40)", 0.25)] {
-        let text = linear("height = 2", &format!("{call} {{ {holed} }}"));
-        let read = |polyhedron_faces| {
-            let limits = Limits { polyhedron_faces, ..Limits::default() };
-            import_csg("m.csg", &text, Facets::Auto, &limits).unwrap_or_else(|e| panic!("{text}: {e}"))
+    (0..n).map(corner).collect()
+}
+
+/// Points about an outline that goes once around the origin, as their sectors tell: inside or not where that is clear.
+fn by_sector(ring: &[[f64; 2]], p: DVec2) -> bool {
+    let angle = p.y.atan2(p.x).rem_euclid(std::f64::consts::TAU);
+    let i = (angle / std::f64::consts::TAU * ring.len() as f64) as usize % ring.len();
+    let (a, b) = (DVec2::from_array(ring[i]), DVec2::from_array(ring[(i + 1) % ring.len()]));
+    (b - a).perp_dot(p - a) > 0.0
+}
+
+#[test]
+fn outlines_of_very_many_corners_hold_what_their_sectors_say() {
+    let mut r = Random(5);
+    let rounds = std::env::var("CONTACTD_OUTLINES").ok().and_then(|n| n.parse().ok());
+    for round in 0..rounds.unwrap_or(3) {
+        // Every third is convex: of it all sides are on the hull.
+        let n = if rounds.is_some() { 50_000 } else { 12_000 };
+        let ring = if round % 3 == 2 {
+            let at = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+            (0..n).map(|i| [9.0 * at(i).1, 9.0 * at(i).0]).collect()
+        } else {
+            coast(&mut r, n)
         };
-        let (few, exact) = (read(60), read(5000));
-        assert!(few.notes.iter().any(|n| n.text.contains("corners: taken as a mesh")), "{:?}", few.notes);
-        assert_eq!(few.solid.primitives.len(), 1);
-        let mut r = Random(5);
-        let mut inside = 0;
-        for _ in 0..300 {
-            let p = DVec3::new(r.within(-5.5, 5.5), r.within(-5.5, 5.5), r.within(-0.2, 2.2));
-            let (a, b) = (few.solid.value(p), exact.solid.value(p));
-            assert!(a.abs().min(b.abs()) < 2e-3 || (a < 0.0) == (b < 0.0), "{call} at {p}: {a} {b}");
-            let round = p.x.hypot(p.y);
-            if (0.0..2.0).contains(&p.z) && round < 4.8 + by && p.x < 3.9 + by.min(0.0) {
-                assert!(a < 0.0, "{call} at {p}: {a}");
-                inside += 1;
+        let text = linear("height = 2", &format!("polygon({});", list(&ring)));
+        let started = std::time::Instant::now();
+        let import = import_csg("m.csg", &text, Facets::Auto, &Limits::default()).expect("an outline");
+        let took = started.elapsed();
+        assert!(import.notes.is_empty(), "{:?}", import.notes);
+        if rounds.is_some() {
+            println!("{n} corners: {} faces in {took:?}", import.solid.faces.len());
+        }
+        let mut seen = [0, 0];
+        for _ in 0..40 {
+            let (angle, far) = (r.within(0.0, 6.3), r.within(6.0, 12.0));
+            let p = DVec3::new(far * angle.cos(), far * angle.sin(), r.within(-0.2, 2.2));
+            let f = import.solid.value(p);
+            let inside = (0.0..2.0).contains(&p.z) && by_sector(&ring, p.truncate());
+            if f.abs() > 1e-9 {
+                assert_eq!(f < 0.0, inside, "{p}, f {f}, round {round}");
+                seen[usize::from(inside)] += 1;
             }
         }
-        assert!(inside > 60, "{inside}");
+        assert!(seen[0] > 4 && seen[1] > 4, "{seen:?}");
     }
+    // What is hull, shadow or sum of one is of its corners.
+    let ring = coast(&mut r, 8_000);
+    let outline = linear("height = 2", &format!("polygon({});", list(&ring)));
+    let shadow = linear("height = 1", &format!("projection() {{ {outline} }}"));
+    let shadow = import_csg("m.csg", &shadow, Facets::Auto, &Limits::default()).expect("a shadow");
+    let hull = import_csg("m.csg", &format!("hull() {{ {outline} }}"), Facets::Auto, &Limits::default());
+    let hull = hull.expect("a hull").solid;
+    for _ in 0..60 {
+        let (angle, far) = (r.within(0.0, 6.3), r.within(6.0, 12.0));
+        let p = DVec2::new(far * angle.cos(), far * angle.sin());
+        let inside = by_sector(&ring, p);
+        let f = shadow.solid.value(p.extend(0.5));
+        assert!(f.abs() < 1e-6 || (f < 0.0) == inside, "{p}: {f}");
+        assert!(!inside || hull.value(p.extend(1.0)) < 1e-9, "{p}");
+    }
+}
+
+#[test]
+fn outlines_as_deep_as_they_have_corners_are_meshes_and_too_many_corners_are_refused() {
+    let arm = |i: usize, width: f64| {
+        let angle = 0.05 * i as f64;
+        [angle.cos() * (1.0 + 0.05 * angle + width), angle.sin() * (1.0 + 0.05 * angle + width)]
+    };
+    let ring: Vec<[f64; 2]> = (0..700).map(|i| arm(i, 0.1)).chain((0..700).rev().map(|i| arm(i, 0.0))).collect();
+    // As it stands, and taken from a plate: then it goes through.
+    let spiral = format!("polygon({});", list(&ring));
+    let plate = format!("difference() {{ {} {spiral} }}", moved(-5.0, -5.0, 0.0, "square(10);"));
+    let mut r = Random(9);
+    for (text, from) in [(&spiral, false), (&plate, true)] {
+        let text = linear("height = 2", text);
+        let import = import_csg("m.csg", &text, Facets::Auto, &Limits::default()).expect("a spiral");
+        assert!(import.notes.iter().any(|n| n.text.contains("corners: taken as a mesh")), "{:?}", import.notes);
+        let mut seen = [0, 0];
+        for _ in 0..400 {
+            let p = DVec3::new(r.within(-4.0, 4.0), r.within(-4.0, 4.0), r.within(-0.2, 2.2));
+            let inside = (0.0..2.0).contains(&p.z) && even_odd(&[&ring], p.truncate()) != from;
+            let f = import.solid.value(p);
+            if f.abs() > 1e-9 {
+                assert_eq!(f < 0.0, inside, "{p}, f {f}, from a plate {from}");
+                seen[usize::from(inside)] += 1;
+            }
+        }
+        assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
+    }
+    let limits = Limits { outline_corners: 1000, ..Limits::default() };
+    let refused = import_csg("m.csg", &linear("height = 2", &spiral), Facets::Auto, &limits).expect_err("too many");
+    assert!(refused.to_string().contains("at most 1000 corners of an outline"), "{refused}");
+    assert!(refused.to_string().contains("found 1400"), "{refused}");
 }

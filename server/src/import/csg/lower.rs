@@ -416,8 +416,7 @@ impl<'a> Lowering<'a> {
             (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
             (_, None) | (CallKind::Projection { .. }, _) => Part::Empty,
             (CallKind::Extrude(extrusion), _)
-                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f)))
-                    || outlines::is_intricate(parts, &open.built) =>
+                if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f))) =>
             {
                 twist::extruded(parts, at, &open.context.outer, extrusion, &open.built)?
             }

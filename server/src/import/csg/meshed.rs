@@ -201,6 +201,14 @@ impl Maker<'_, '_> {
     }
 
     fn part(&mut self, p: PartId) -> Result<Manifold> {
+        if let Some(surface) = self.parts.prisms.get(&p) {
+            let (corners, triangles) = surface();
+            let prism = of_triangles(&corners, &triangles);
+            // Where rings touch it is none.
+            if prism.status() == Error::NoError {
+                return Ok(prism);
+            }
+        }
         match &self.parts.list[p] {
             Part::Empty | Part::Flat(_) | Part::Stray(..) => Ok(Manifold::empty()),
             Part::Leaf(shape, frame, _) => {

@@ -38,6 +38,7 @@ mod revolve;
 mod shadow;
 mod shapes;
 mod slices;
+mod straight;
 mod superellipsoid;
 mod syntax;
 #[cfg(test)]

@@ -208,16 +208,6 @@ impl Grid {
     }
 }
 
-/// True for flat shapes of which one has more corners than a formula is made of.
-pub fn is_intricate(parts: &Parts<'_>, roots: &[PartId]) -> bool {
-    let corners = |f: &Flat| match &f.outline {
-        Outline::Circle(_) | Outline::Square { .. } => 0,
-        Outline::Paths(paths) => paths.iter().map(Vec::len).sum::<usize>() + 2,
-    };
-    let most = flats(parts, roots).into_iter().filter_map(|l| flat_of(parts, l)).map(corners).max();
-    most.is_some_and(|most| parts.affordable(Place::START, most).is_err())
-}
-
 /// Some parts without the holes in them.
 pub fn filled(parts: &mut Parts<'_>, at: Place, like: &Flat, roots: &[PartId]) -> Result<Part> {
     let leaves = flats(parts, roots);

@@ -12,6 +12,9 @@ use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
+/// Makes corners and triangles of a prism.
+pub type Prism = Box<dyn Fn() -> (Vec<DVec3>, Vec<[u32; 3]>)>;
+
 /// Index of a part.
 pub type PartId = usize;
 
@@ -55,6 +58,8 @@ pub struct Parts<'a> {
     pub points: HashMap<PartId, Vec<DVec3>>,
     /// Of an extruded island: the part that is its convex hull.
     pub hulls: HashMap<PartId, PartId>,
+    /// Of an extruded island of very many sides: what makes its surface, to be cut as a mesh.
+    pub prisms: HashMap<PartId, Prism>,
     faces: usize,
 }
 
@@ -67,7 +72,8 @@ impl<'a> Parts<'a> {
     /// None yet.
     pub fn new(limits: &'a Limits) -> Self {
         let (pieces, bent, points, hulls) = (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
-        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, bent, points, hulls, faces: 0 }
+        let prisms = HashMap::new();
+        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, bent, points, hulls, prisms, faces: 0 }
     }
 
     /// Adds a part.
@@ -120,6 +126,21 @@ impl<'a> Parts<'a> {
             return Err((at, Problem::Limit { what: "faces of a hull", limit: self.limits.hull_faces }));
         }
         Ok(())
+    }
+
+    /// Refuses more corners of one outline than the limit says.
+    pub fn extrudable(&self, at: Place, corners: usize) -> Result<()> {
+        let limit = self.limits.outline_corners;
+        if corners > limit {
+            let expected = format!("at most {limit} corners of an outline (draw it coarser, or divide it)");
+            return Err((at, Problem::syntax(expected, format!("{corners}"))));
+        }
+        Ok(())
+    }
+
+    /// Sides that the hull of an outline has at most to be one shape.
+    pub fn most_sides(&self) -> usize {
+        self.limits.polyhedron_faces.saturating_sub(2)
     }
 
     /// Refuses more triangles of one mesh than the limit says.
@@ -184,25 +205,26 @@ impl<'a> Parts<'a> {
         formula: &Formula,
         edge: &mut dyn FnMut(&mut Self, usize) -> Result<Signed>,
     ) -> Result<Signed> {
-        if formula.depth() > self.limits.depth {
-            return Err((at, Problem::Limit { what: "levels of nesting", limit: self.limits.depth }));
+        // Operands before operators, from the last one on: one that is deep takes no stack.
+        enum Step<'f> {
+            Enter(&'f Formula),
+            Leave(bool, usize),
         }
-        self.below(at, formula, edge)
-    }
-
-    fn below(
-        &mut self,
-        at: Place,
-        formula: &Formula,
-        edge: &mut dyn FnMut(&mut Self, usize) -> Result<Signed>,
-    ) -> Result<Signed> {
-        match formula {
-            Formula::Edge(e) => edge(self, *e),
-            Formula::Many(all, list) => {
-                let of = list.iter().map(|f| self.below(at, f, edge)).collect::<Result<Vec<_>>>()?;
-                Ok(self.many(*all, at, of))
+        let (mut steps, mut made) = (vec![Step::Enter(formula)], Vec::new());
+        while let Some(step) = steps.pop() {
+            match step {
+                Step::Enter(Formula::Edge(e)) => made.push(edge(self, *e)?),
+                Step::Enter(Formula::Many(all, list)) => {
+                    steps.push(Step::Leave(*all, list.len()));
+                    steps.extend(list.iter().rev().map(Step::Enter));
+                }
+                Step::Leave(all, count) => {
+                    let of = made.split_off(made.len() - count);
+                    made.push(self.many(all, at, of));
+                }
             }
         }
+        Ok(made.pop().unwrap_or(Signed::Known(true)))
     }
 
     /// The leaves below a part of which it is the union, and whether something is taken from any of them; `None` where it is cut

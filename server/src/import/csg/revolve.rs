@@ -8,7 +8,7 @@ use super::arguments::Arguments;
 use super::facets::{direction, prism, ring};
 use super::parts::{Part, PartId, Parts, Signed};
 use super::place;
-use super::polygon::{Edge, Island, Region};
+use super::polygon::{Edge, Island, MOST_LEVELS, Region};
 use super::syntax::Call;
 use super::{Place, Problem};
 use crate::math::tolerance::ROUNDING;
@@ -95,6 +95,12 @@ impl Lathe<'_> {
 
     /// All of a region about the axis.
     pub fn region(&self, parts: &mut Parts<'_>, region: &Region) -> Result<Part> {
+        if region.intricate {
+            let expected = format!(
+                "an outline whose formula has at most {MOST_LEVELS} levels (divide it into parts that overlap)"
+            );
+            return Err((self.at, Problem::syntax(expected, "one that is deeper, such as a spiral")));
+        }
         let mut made = Vec::new();
         for island in &region.islands {
             if let Some(part) = self.island(parts, region, island)? {

@@ -393,6 +393,7 @@ fn limits_are_named() {
         faces: 20,
         polyhedron_faces: 6,
         hull_faces: 8,
+        outline_corners: 6,
         mesh_facets: 9,
         values: 8,
     };

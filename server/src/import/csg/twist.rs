@@ -42,6 +42,28 @@ pub fn extruded(
         parts.note(at, "a linear_extrude without area: left out, as OpenSCAD does", None);
         return Ok(Part::Empty);
     }
+    of_region(parts, at, outer, extrusion, &region)
+}
+
+/// The surface of an extrusion without twist, counter-clockwise as seen from outside.
+pub fn surface(outer: &DAffine3, extrusion: &Extrusion, rings: &[Vec<DVec2>]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let (points, faces) = Bent { extrusion, rings, ridge: None, cut: false, slices: 1 }.mesh();
+    let mirrored = outer.matrix3.determinant() < 0.0;
+    let turned = |f: &Vec<u32>| if mirrored { [f[0], f[1], f[2]] } else { [f[2], f[1], f[0]] };
+    (points.into_iter().map(|p| outer.transform_point3(p)).collect(), faces.iter().map(turned).collect())
+}
+
+/// The extrusion of outlines without crossings.
+///
+/// # Errors
+/// More facets than the limit says; facets that cross however fine the slices are.
+pub fn of_region(
+    parts: &mut Parts<'_>,
+    at: Place,
+    outer: &DAffine3,
+    extrusion: &Extrusion,
+    region: &Region,
+) -> Result<Part> {
     let corners: Vec<DVec2> = region.rings.iter().flatten().copied().collect();
     let (ridge, cut) = Ridge::of(extrusion, &region.rings).unzip();
     let mut rings = &region.rings;
@@ -69,7 +91,10 @@ pub fn extruded(
                 let m = outer.matrix3;
                 let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
                 if !extrusion.may_bend() {
-                    let text = format!("linear_extrude of {} corners: taken as a mesh", corners.len());
+                    let text = format!(
+                        "linear_extrude of {} corners: taken as a mesh, for its formula is too deep",
+                        corners.len()
+                    );
                     parts.note(at, text, None);
                     return parts.leaf("linear_extrude", at, placed.map(|p| p.0));
                 }

@@ -38,6 +38,9 @@ const SPANS: u64 = 2;
 /// Slabs among which one is looked up that cost as much.
 const LOOKUPS: u64 = 16;
 
+/// Literals of a box beyond which it is halved without a look at their slabs: far more than it may have cuts.
+const MOST_LITERALS: usize = 4096;
+
 /// A face without a slab in the box at hand.
 const NO_SLAB: u32 = u32::MAX;
 
@@ -178,7 +181,8 @@ impl<'a> Evaluator<'a> {
         for (face, _) in self.slabs.drain(..) {
             self.places[face as usize] = NO_SLAB;
         }
-        for id in literals(kept) {
+        let few = literals(kept).nth(MOST_LITERALS).is_none() || self.most_cuts > MOST_LITERALS;
+        for id in literals(kept).take_while(|_| few) {
             let place = &mut self.places[id.face() as usize];
             if *place == NO_SLAB {
                 *place = self.slabs.len() as u32;
@@ -190,7 +194,8 @@ impl<'a> Evaluator<'a> {
         let mut part = VoxelPart::default();
         let unit = half.x * half.y * half.z;
         // Parts that are not written out are too many faces, too.
-        if kept.iter().all(|t| !is_part(*t)) && self.measure(kept, &cube, VoxelBody::Solid, &mut part) {
+        let whole = few && kept.iter().all(|t| !is_part(*t));
+        if whole && self.measure(kept, &cube, VoxelBody::Solid, &mut part) {
             // Planes are known to their rounding, a sheet of the box; and so is each of the cells.
             let sheets: f64 = self.slabs.iter().map(|(_, slab)| slab.sheet(CUBE)).sum();
             let rounding = sheets + CUBE * CELL_ROUNDING * self.cuts as f64;

@@ -15,6 +15,7 @@ pub use peterson::Formula;
 pub use triangles::triangles;
 
 use glam::DVec2;
+use peterson::Effort;
 use robust::{Coord, orient2d};
 
 /// A directed edge with the inside on its left.
@@ -33,6 +34,8 @@ pub struct Region {
     pub crossed: bool,
     /// Some edges made no closed ring: paths cross where a double cannot tell.
     pub open: bool,
+    /// Formulas are missing: they would be too deep, or take too long.
+    pub intricate: bool,
 }
 
 /// A ring less the rings inside of it.
@@ -40,17 +43,38 @@ pub struct Region {
 pub struct Island {
     /// Corners of its convex hull, counter-clockwise.
     pub hull: Vec<DVec2>,
+    /// The hull has too many sides to be one shape: one of the cuts tells them, and what is around may be anything.
+    pub wide: bool,
     /// Pockets and holes: each must hold.
     pub cuts: Vec<Formula>,
+    /// Its ring and those inside of it, as places in the region's.
+    pub rings: std::ops::Range<usize>,
 }
+
+/// What the formulas of a region take at most: some tenths of a second. A chain of n corners takes n log n looks where its formula is
+/// shallow, n² where it is as deep as it has corners, as that of a spiral is.
+const MOST: Effort = Effort { looks: 50_000_000, levels: MOST_LEVELS };
+/// Trees are walked by recursion.
+pub const MOST_LEVELS: usize = 1000;
 
 impl Region {
     /// What closed paths enclose by the even-odd rule.
     pub fn of_paths(paths: &[Vec<DVec2>]) -> Self {
+        Self::with_hulls(paths, usize::MAX)
+    }
+
+    /// The same with hulls of so many sides at most: of another island the cuts tell the sides, too.
+    pub fn with_hulls(paths: &[Vec<DVec2>], most_sides: usize) -> Self {
         let rings::Loops { rings, crossed, open } = rings::loops(paths);
         let mut region = Self { crossed, open, ..Self::default() };
+        let mut left = MOST;
         for nest in rings::nested(rings) {
-            region.island(&nest.outer, &nest.holes);
+            let first = region.rings.len();
+            let rings = first..first + 1 + nest.holes.len();
+            match region.island(&nest.outer, &nest.holes, most_sides, &mut left) {
+                Some(island) => region.islands.push(Island { rings, ..island }),
+                None => region.intricate = true,
+            }
             region.rings.push(nest.outer);
             region.rings.extend(nest.holes);
         }
@@ -59,42 +83,56 @@ impl Region {
 
     /// The convex parts in place of everything: true when one island has no pocket and no hole.
     pub fn is_convex(&self) -> bool {
-        matches!(self.islands.as_slice(), [one] if one.cuts.is_empty())
+        !self.intricate && matches!(self.islands.as_slice(), [one] if one.cuts.is_empty())
     }
 
-    fn island(&mut self, outer: &[DVec2], holes: &[Vec<DVec2>]) {
+    /// An island; `None` where its formulas would be too deep or take too long. An edge between corners of the hull is one of its sides.
+    fn island(
+        &mut self,
+        outer: &[DVec2],
+        holes: &[Vec<DVec2>],
+        most_sides: usize,
+        left: &mut Effort,
+    ) -> Option<Island> {
         let on_hull = corners_on_hull(outer);
-        let mut island = Island { hull: Vec::new(), cuts: Vec::new() };
+        let mut island = Island { hull: Vec::new(), wide: false, cuts: Vec::new(), rings: 0..0 };
         let places: Vec<usize> = (0..outer.len()).filter(|i| on_hull[*i]).collect();
+        // What lies on a side of the hull is no corner of it.
+        let n = places.len();
+        let corner = |k: usize| outer[places[k % n]];
+        let straight = |k: &usize| turn(corner(k + n - 1), corner(*k), corner(k + 1)) == 0.0;
+        island.hull = (0..n).filter(|k| !straight(k)).map(corner).collect();
+        island.wide = island.hull.len() > most_sides;
+        let mut sides = Vec::new();
         for (k, &from) in places.iter().enumerate() {
-            island.hull.push(outer[from]);
             let to = places[(k + 1) % places.len()];
             let count = (to + outer.len() - from - 1) % outer.len() + 1;
             let chain: Vec<DVec2> = (0..=count).map(|i| outer[(from + i) % outer.len()]).collect();
-            // A single edge is a side of the hull.
             if count > 1 {
-                island.cuts.push(self.chain(&chain));
+                island.cuts.push(self.chain(&chain, left)?);
+            } else if island.wide {
+                sides.push(Formula::Edge(self.edges.len()));
+                self.edges.push([chain[0], chain[1]]);
             }
         }
-        // What lies on a side of the hull is no corner of it.
-        let n = island.hull.len();
-        let straight = |i: usize| turn(island.hull[(i + n - 1) % n], island.hull[i], island.hull[(i + 1) % n]) == 0.0;
-        island.hull = (0..n).filter(|i| !straight(*i)).map(|i| island.hull[i]).collect();
+        if !sides.is_empty() {
+            island.cuts.push(Formula::Many(true, sides));
+        }
         for hole in holes {
             // Of a ring the other way round the left is what is outside of it: and for or, or for and.
             let first = lowest(hole);
             let around: Vec<DVec2> = (0..=hole.len()).map(|i| hole[(first + i) % hole.len()]).collect();
             let far = (0..hole.len()).max_by(|a, b| order(around[*a], around[*b])).unwrap_or(0);
-            let halves = [self.chain(&around[..=far]), self.chain(&around[far..])];
+            let halves = [self.chain(&around[..=far], left)?, self.chain(&around[far..], left)?];
             island.cuts.push(Formula::of_many(false, halves));
         }
-        self.islands.push(island);
+        Some(island)
     }
 
-    fn chain(&mut self, corners: &[DVec2]) -> Formula {
+    fn chain(&mut self, corners: &[DVec2], left: &mut Effort) -> Option<Formula> {
         let first = self.edges.len();
         self.edges.extend(corners.windows(2).map(|w| [w[0], w[1]]));
-        peterson::formula(corners, first)
+        peterson::formula(corners, first, left)
     }
 }
 
@@ -173,7 +211,8 @@ mod tests {
         };
         let one = |island: &Island| {
             let n = island.hull.len();
-            let hull = (0..n).map(|i| plane([island.hull[i], island.hull[(i + 1) % n]]));
+            let sides = if island.wide { 0 } else { n };
+            let hull = (0..sides).map(|i| plane([island.hull[i], island.hull[(i + 1) % n]]));
             let cuts = island.cuts.iter().map(|f| f.value(&mut |e| plane(region.edges[e])));
             hull.chain(cuts).fold(f64::NEG_INFINITY, f64::max)
         };
@@ -231,7 +270,10 @@ mod tests {
     }
 
     fn agrees(paths: &[Vec<DVec2>], r: &mut Random, count: usize) {
-        let region = Region::of_paths(paths);
+        // With the hulls of its islands as one shape, or without.
+        let most_sides = if below(r, 2) == 0 { usize::MAX } else { 3 };
+        let region = Region::with_hulls(paths, most_sides);
+        assert!(region.islands.iter().all(|i| i.wide == (i.hull.len() > most_sides)));
         for _ in 0..count {
             let p = DVec2::new(r.within(-3.0, 3.0), r.within(-3.0, 3.0));
             let (f, away) = (value(&region, p), distance(paths, p));

@@ -39,39 +39,46 @@ impl Formula {
             Formula::Many(false, list) => list.iter().map(|f| f.value(edge)).fold(f64::INFINITY, f64::min),
         }
     }
-
-    /// Levels of nesting.
-    pub fn depth(&self) -> usize {
-        match self {
-            Formula::Edge(_) => 1,
-            Formula::Many(_, list) => 1 + list.iter().map(Formula::depth).max().unwrap_or(0),
-        }
-    }
 }
 
-/// An operator under construction: operands that are edges, and those that are operators, by their index.
+/// An operator under construction: operands that are edges, and those that are operators, by their index; and how deep it lies.
 struct Operator {
     all: bool,
     edges: Vec<usize>,
     operators: Vec<usize>,
+    level: usize,
 }
 
-/// The formula of what lies left of a chain of corners; its edges are numbered from `first` on.
-pub fn formula(corners: &[DVec2], first: usize) -> Formula {
+/// What making formulas may take.
+pub struct Effort {
+    /// Corners that may be looked at yet: a chain is looked through once for each corner that splits it.
+    pub looks: usize,
+    /// Levels of nesting.
+    pub levels: usize,
+}
+
+/// The formula of what lies left of a chain of corners; its edges are numbered from `first` on. `None` where it takes more.
+pub fn formula(corners: &[DVec2], first: usize, left: &mut Effort) -> Option<Formula> {
     let last = corners.len() - 1;
-    let mut operators = vec![Operator { all: true, edges: Vec::new(), operators: Vec::new() }];
+    let new = |all: bool, level: usize| Operator { all, edges: Vec::new(), operators: Vec::new(), level };
+    let mut operators = vec![new(true, 1)];
     let mut work = vec![(0, last, 0)];
     while let Some((from, to, parent)) = work.pop() {
         if to == from + 1 {
             operators[parent].edges.push(first + from);
             continue;
         }
+        left.looks = left.looks.checked_sub(to - from)?;
         let at = split(corners, from, to);
         let all = turn(corners[at - 1], corners[at], corners[at + 1]) >= 0.0;
         let target = if operators[parent].all == all {
             parent
         } else {
-            operators.push(Operator { all, edges: Vec::new(), operators: Vec::new() });
+            let level = operators[parent].level + 1;
+            if level >= left.levels {
+                return None;
+            }
+            operators.push(new(all, level));
             let new = operators.len() - 1;
             operators[parent].operators.push(new);
             new
@@ -87,7 +94,7 @@ pub fn formula(corners: &[DVec2], first: usize) -> Formula {
         list.extend(operator.operators.iter().filter_map(|o| done[*o].take()));
         done[k] = Some(if list.len() == 1 { list.remove(0) } else { Formula::Many(operator.all, list) });
     }
-    done.swap_remove(0).unwrap_or(Formula::Many(true, Vec::new()))
+    Some(done.swap_remove(0).unwrap_or(Formula::Many(true, Vec::new())))
 }
 
 /// The corner at which the chain `from..=to` is split: the farthest along a direction in which neither end goes.
