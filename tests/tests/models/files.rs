@@ -249,6 +249,90 @@ fn a_point_is_inside_of_a_drawing_where_an_element_says_so() {
     }
 }
 
+/// Boxes that OpenSCAD 2021.01 exports (`openscad -o x.off`, six digits; strokes on a grid): nothing where it makes nothing.
+#[test]
+fn lengths_with_units_are_what_they_are_to_openscad() {
+    let read = |text: &str| {
+        let pieces = |_| 8;
+        let frame =
+            Frame { layer: "", id: "", dpi: 72.0, center: false, origin: DVec2::ZERO, scale: 1.0, pieces: &pieces };
+        svg::read(text.as_bytes(), &frame).unwrap_or_else(|(at, e)| panic!("{at}: {e}\n{text}"))
+    };
+    let bounds = |text: &str| {
+        let drawing = read(text);
+        let all = || drawing.shapes.iter().flatten().flatten().copied();
+        let (low, high) = (all().fold(DVec2::INFINITY, DVec2::min), all().fold(DVec2::NEG_INFINITY, DVec2::max));
+        ((high - low).min_element() > 0.0).then_some([low.x, low.y, high.x, high.y])
+    };
+    let is = |text: &str, expected: Option<[f64; 4]>| match (bounds(text), expected) {
+        (Some(found), Some(expected)) => {
+            let near = found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= 3e-5 * b.abs().max(1.0));
+            assert!(near, "{text}: {found:?}, not {expected:?}");
+        }
+        (found, expected) => assert_eq!(found, expected, "{text}"),
+    };
+    // Of the page, which the view box is put on.
+    for (unit, expected) in [
+        ("", [1.76389, 12.3472, 7.05554, 15.875]),
+        ("mm", [5.0, 35.0, 20.0, 45.0]),
+        (" mm", [5.0, 35.0, 20.0, 45.0]),
+        ("cm", [50.0, 350.0, 200.0, 450.0]),
+        ("in", [127.0, 889.0, 508.0, 1143.0]),
+        ("pt", [1.76389, 12.3472, 7.05554, 15.875]),
+        ("px", [1.32291, 9.26041, 5.29166, 11.9062]),
+        ("pc", [21.1667, 148.167, 84.6667, 190.5]),
+        ("%", [10.0, 70.0, 40.0, 90.0]),
+        ("em", [10.0, 70.0, 40.0, 90.0]),
+        ("Q", [3.52777, 24.6944, 14.1111, 31.75]),
+    ] {
+        let page = format!("width='100{unit}' height='50{unit}' viewBox='0 0 200 100'");
+        is(&format!("<svg {page}><rect x='10' y='10' width='30' height='20'/></svg>"), Some(expected));
+    }
+    // Of what is drawn: they are 0.
+    for (element, expected) in [
+        ("<rect x='1mm' y='2' width='20' height='10'/>", Some([0.0, 5.63889, 20.0, 15.6389])),
+        ("<rect x='abc' y='2' width='20' height='10'/>", Some([0.0, 5.63889, 20.0, 15.6389])),
+        ("<rect x='1' y='2' width='20 ' height='10'/>", None),
+        ("<rect x='1' y='2' width='30mm' height='20mm'/>", None),
+        ("<rect x='1' y='2' width='20' height='10' rx='2mm'/>", Some([1.0, 5.63889, 21.0, 15.6389])),
+        ("<circle cx='10' cy='20' r='5%'/>", None),
+        ("<ellipse cx='1mm' cy='2' rx='20' ry='10'/>", Some([-20.0, 5.63889, 20.0, 25.6389])),
+        ("<ellipse cx='1' cy='2' rx='20mm' ry='10'/>", None),
+        ("<line x1='1' y1='2' x2='30mm' y2='5' stroke-width='2px'/>", Some([-0.632492, 12.0064, 1.63249, 16.2714])),
+        ("<line x1='1' y1='2' x2='30' y2='5' style='stroke-width:3mm'/>", Some([0.451187, 12.0901, 30.5488, 16.1877])),
+        ("<line x1='1' y1='2' x2='30' y2='5' style='stroke-width:3'/>", Some([-0.646393, 10.9925, 31.6464, 17.2853])),
+    ] {
+        is(&format!("<svg width='100' height='50'>{element}</svg>"), expected);
+    }
+    // At random: as if 0 stood there, and counted.
+    let mut r = Random::new(41);
+    for _ in 0..200 {
+        let (mut text, mut plain, mut count) = (String::new(), String::new(), 0);
+        for _ in 0..4 {
+            let kinds: [(&str, &[&str]); 4] = [
+                ("rect", &["x", "y", "width", "height", "rx"]),
+                ("circle", &["cx", "cy", "r"]),
+                ("ellipse", &["cx", "cy", "rx", "ry"]),
+                ("line", &["x1", "y1", "x2", "y2"]),
+            ];
+            let (kind, names) = kinds[r.below(4)];
+            (text, plain) = (format!("{text}<{kind}"), format!("{plain}<{kind}"));
+            for name in names {
+                let number = r.within(-20.0, 40.0);
+                let unit = ["", "", "", "mm", "in", "%", " "][r.below(7)];
+                count += usize::from(!unit.is_empty());
+                text += &format!(" {name}='{number}{unit}'");
+                plain += &format!(" {name}='{}'", if unit.is_empty() { number } else { 0.0 });
+            }
+            (text, plain) = (text + "/>", plain + "/>");
+        }
+        let [with, without] = [&text, &plain].map(|t| read(&format!("<svg width='100' height='50'>{t}</svg>")));
+        assert_eq!(with.shapes, without.shapes, "{text}");
+        assert_eq!(with.zeros.map_or(0, |z| z.1), count, "{text}");
+        assert!(without.zeros.is_none(), "{plain}");
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_file_is_told_with_its_place() {
     let read = |name: &str, bytes: &[u8]| {

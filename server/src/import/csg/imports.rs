@@ -236,6 +236,13 @@ pub fn flat(
     for (what, count) in &drawing.left_out {
         shapes.parts.note(at, format!("{count} {what} of {name:?}: left out, as OpenSCAD does"), None);
     }
+    if let Some((first, count)) = &drawing.zeros {
+        let text = format!(
+            "{count} lengths of {name:?} that are no plain numbers count as 0, as for OpenSCAD: first {first} (write them without \
+             units; width and height of the page may have some)"
+        );
+        shapes.parts.note(at, text, None);
+    }
     let mut drawn: Vec<Vec<Vec<DVec2>>> = drawing.shapes;
     drawn.retain(|paths| !paths.is_empty());
     if drawn.is_empty() {

@@ -61,7 +61,7 @@ pub fn read(bytes: &[u8], frame: &Frame<'_>) -> Result<Drawing> {
         let high = corners().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
         shapes.iter_mut().flatten().flatten().for_each(|p| *p -= (low + high) * 0.5);
     }
-    Ok(Drawing { shapes, off, left_out: left.into_iter().collect() })
+    Ok(Drawing { shapes, off, left_out: left.into_iter().collect(), zeros: None })
 }
 
 /// Where in a file an entity stands.

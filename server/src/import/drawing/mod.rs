@@ -34,6 +34,8 @@ pub struct Drawing {
     pub off: f64,
     /// What was left out, by its name, and how often.
     pub left_out: Vec<(String, usize)>,
+    /// A length that is no plain number, and how many there are: they count as 0.
+    pub zeros: Option<(String, usize)>,
 }
 
 /// True for the name of a drawing.

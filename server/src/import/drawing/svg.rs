@@ -44,11 +44,11 @@ pub fn read(bytes: &[u8], frame: &Frame<'_>) -> Result<Drawing> {
     if root.tag_name().name() != "svg" {
         return Err(xml::wrong(root, "an element svg", Some(root.tag_name().name())));
     }
-    let mut reader = Reader { frame, shapes: Vec::new(), corners: 0, off: 0.0, left: BTreeMap::new() };
+    let mut reader = Reader { frame, shapes: Vec::new(), corners: 0, off: 0.0, left: BTreeMap::new(), zeros: None };
     let all = frame.id.is_empty() && frame.layer.is_empty();
     reader.element(root, DAffine2::IDENTITY, (all, false), 0)?;
     let page = Page::of(root, frame.dpi);
-    let Reader { mut shapes, off, left, .. } = reader;
+    let Reader { mut shapes, off, left, zeros, .. } = reader;
     let scale = page.scale;
     let origin = if frame.center {
         let corners = || shapes.iter().flatten().flatten();
@@ -63,7 +63,7 @@ pub fn read(bytes: &[u8], frame: &Frame<'_>) -> Result<Drawing> {
     let put = |p: &mut DVec2| *p = (*p * DVec2::new(1.0, -1.0) - page.corner) * scale + origin;
     shapes.iter_mut().flatten().flatten().for_each(put);
     let off = off * scale.abs().max_element();
-    Ok(Drawing { shapes, off, left_out: left.into_iter().collect() })
+    Ok(Drawing { shapes, off, left_out: left.into_iter().collect(), zeros })
 }
 
 /// Where a drawing lies in millimetres.
@@ -138,7 +138,11 @@ struct Reader<'f> {
     /// How far pieces of curves lie off them at most, in the drawing's units.
     off: f64,
     left: BTreeMap<String, usize>,
+    zeros: Zeros,
 }
+
+/// The first attribute that is no plain number, and how many there are.
+type Zeros = Option<(String, usize)>;
 
 impl Reader<'_> {
     /// Reads an element with all inside of it, which `to_page` places; `chosen`: by the id and the layer, or only the layer.
@@ -163,7 +167,7 @@ impl Reader<'_> {
             _ => DAffine2::IDENTITY,
         };
         let to_page = to_page * own;
-        let mut pen = Pen { paths: Vec::new(), off: 0.0, stroke: Stroke::of(node) };
+        let mut pen = Pen { paths: Vec::new(), off: 0.0, stroke: Stroke::of(node), zeros: None };
         match name {
             "svg" if depth > 0 => self.leave("svg inside of svg"),
             "svg" | "g" => {
@@ -173,18 +177,18 @@ impl Reader<'_> {
                 return Ok(());
             }
             "path" => pen.path(node, node.attribute("d").unwrap_or_default())?,
-            "rect" => pen.rect(node)?,
+            "rect" => pen.rect(node),
             "circle" | "ellipse" => {
-                let at = DVec2::new(number(node, "cx")?, number(node, "cy")?);
+                let at = pen.point(node, ["cx", "cy"]);
                 let half = match name {
-                    "circle" => DVec2::splat(number(node, "r")?),
-                    _ => DVec2::new(number(node, "rx")?, number(node, "ry")?),
+                    "circle" => DVec2::splat(pen.number(node, "r")),
+                    _ => pen.point(node, ["rx", "ry"]),
                 };
                 pen.ellipse(at, half.abs());
             }
             "line" => {
-                let point = |x: &str, y: &str| Ok(DVec2::new(number(node, x)?, number(node, y)?));
-                pen.stroke(&[point("x1", "y1")?, point("x2", "y2")?]);
+                let ends = [pen.point(node, ["x1", "y1"]), pen.point(node, ["x2", "y2"])];
+                pen.stroke(&ends);
             }
             "polyline" | "polygon" => {
                 let numbers = Words::of(node, node.attribute("points").unwrap_or_default()).all()?;
@@ -197,6 +201,9 @@ impl Reader<'_> {
         }
         if !chosen {
             return Ok(());
+        }
+        if let Some((first, count)) = pen.zeros {
+            self.zeros.get_or_insert((first, 0)).1 += count;
         }
         pen.paths.retain(|p| p.len() >= 3);
         if pen.paths.is_empty() {
@@ -215,15 +222,6 @@ impl Reader<'_> {
 
     fn leave(&mut self, what: &str) {
         *self.left.entry(what.to_owned()).or_default() += 1;
-    }
-}
-
-/// An attribute's number, 0 where there is none; a unit is not looked at.
-fn number(node: Node<'_, '_>, attribute: &str) -> Result<f64> {
-    let Some(word) = node.attribute(attribute) else { return Ok(0.0) };
-    match length(word) {
-        Some((number, _)) => Ok(number),
-        None => Err(xml::wrong(node, format!("a number as {attribute} of {}", node.tag_name().name()), Some(word))),
     }
 }
 
@@ -375,9 +373,26 @@ struct Pen {
     paths: Vec<Path>,
     off: f64,
     stroke: Stroke,
+    zeros: Zeros,
 }
 
 impl Pen {
+    /// An attribute's number, 0 where there is none. So it is to OpenSCAD 2021.01, too, where anything else stands than a number, a unit
+    /// behind one or a blank; that is kept to be told.
+    fn number(&mut self, node: Node<'_, '_>, attribute: &str) -> f64 {
+        let Some(word) = node.attribute(attribute) else { return 0.0 };
+        word.parse::<f64>().ok().filter(|n| n.is_finite()).unwrap_or_else(|| {
+            let place = xml::place(node);
+            let first = || (format!("{attribute}={word:?} of {} at {place}", node.tag_name().name()), 0);
+            self.zeros.get_or_insert_with(first).1 += 1;
+            0.0
+        })
+    }
+
+    fn point(&mut self, node: Node<'_, '_>, [x, y]: [&str; 2]) -> DVec2 {
+        DVec2::new(self.number(node, x), self.number(node, y))
+    }
+
     /// The outline of a line as wide as its stroke.
     fn stroke(&mut self, points: &[DVec2]) {
         // What lies beyond could not be told on the grid; a drawing is not that large.
@@ -408,14 +423,14 @@ impl Pen {
         self.paths.push((1..=OF_ELLIPSE).map(point).collect());
     }
 
-    fn rect(&mut self, node: Node<'_, '_>) -> Result<()> {
-        let at = DVec2::new(number(node, "x")?, number(node, "y")?);
-        let size = DVec2::new(number(node, "width")?, number(node, "height")?);
-        let (mut rx, mut ry) = (number(node, "rx")?.abs(), number(node, "ry")?.abs());
+    fn rect(&mut self, node: Node<'_, '_>) {
+        let at = self.point(node, ["x", "y"]);
+        let size = self.point(node, ["width", "height"]);
+        let [mut rx, mut ry] = self.point(node, ["rx", "ry"]).abs().to_array();
         if rx < 1e-8 && ry < 1e-8 {
             self.paths
                 .push([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|c| at + size * DVec2::from(c)).into());
-            return Ok(());
+            return;
         }
         if rx < 1e-8 {
             rx = ry;
@@ -436,7 +451,6 @@ impl Pen {
         let first = path[0];
         self.arc(&mut path, r, 0.0, (false, true), first);
         self.paths.push(path);
-        Ok(())
     }
 
     /// An arc from where the path ends (SVG 1.1, F.6.5 and F.6.6).
