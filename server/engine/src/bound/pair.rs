@@ -17,6 +17,7 @@ use crate::math::{Aabb, Ball, Oriented, tolerance::BOUND_PROGRESS};
 use crate::motion::{Placed, Sweep};
 use crate::solid::{Node, NodeId, Op, Solid};
 use glam::DVec3;
+use std::cell::OnceCell;
 
 /// Cap on how often the two sides clip each other. Each round costs two sweeps; the third rarely gains 1%.
 const MAX_ROUNDS: usize = 4;
@@ -69,10 +70,11 @@ pub fn locate(a: &Side, b: &Side, t0: f64, t1: f64, margin: f64) -> Option<Regio
     // Each mover as the other one sees it.
     let sweeps = [Sweep::new(b.placed, a.placed), Sweep::new(a.placed, b.placed)];
     let boxes = [bounds_a.root().aabb, bounds_b.root().aabb];
+    // The ball as a whole and what is left of the box: both hold the mover, each is the better one at times.
+    let balls: [OnceCell<Aabb>; 2] = Default::default();
     let clipped = |k: usize, own: &Aabb, other: &Aabb| {
-        // The ball as a whole and what is left of the box: both hold the mover, each is the better one at times.
-        let whole = sweeps[k].of_ball(&sides[1 - k].1.root().ball, t0, t1);
-        own.intersection(&sweeps[k].of_box(other, t0, t1).intersection(&whole))
+        let whole = balls[k].get_or_init(|| sweeps[k].of_ball(&sides[1 - k].1.root().ball, t0, t1));
+        own.intersection(&sweeps[k].of_box(other, t0, t1).intersection(whole))
     };
     let [box_a, box_b] = match (bounds_a.volumes(), bounds_b.volumes()) {
         (Volumes::Balls, Volumes::Balls) => {

@@ -51,7 +51,13 @@ impl Approach {
 
     /// A lower bound, at least `t`, of the first time in [t, end] at which a cube of A's frame and one of B's frame meet;
     /// `None` when they don't.
-    pub fn earliest(&self, a: Cube, b: Cube, mut t: f64, end: f64) -> Option<f64> {
+    pub fn earliest(&self, a: Cube, b: Cube, t: f64, end: f64) -> Option<f64> {
+        self.earliest_from(a, b, &self.relative.at(t), end)
+    }
+
+    /// The same from an instant on that many pairs of cubes begin with.
+    pub fn earliest_from(&self, a: Cube, b: Cube, start: &Instant, end: f64) -> Option<f64> {
+        let mut t = start.t;
         if !(a.1.is_finite() && b.1.is_finite()) {
             return Some(t);
         }
@@ -59,8 +65,11 @@ impl Approach {
         let x_max = (a.0 - self.relative.center_a()).length() + r;
         let rounding = (self.offset + x_max + b.0.length() + b.1) * CARRIED;
         let span = end - t;
-        for _ in 0..MAX_STEPS {
-            let at = self.relative.at(t);
+        let mut at = *start;
+        for round in 0..MAX_STEPS {
+            if round > 0 {
+                at = self.relative.at(t);
+            }
             let (gap, n) = widest_gap(&at, a, b);
             let gap = gap - self.margin - rounding;
             if gap <= 0.0 {

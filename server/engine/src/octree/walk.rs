@@ -17,7 +17,7 @@ use super::approach::Approach;
 use super::nodes::Node;
 use super::tables::{Meet, NodeKind, meet};
 use crate::bound::{Pruned, Region};
-use crate::motion::Placed;
+use crate::motion::{Instant, Placed};
 use crate::solid::{Sense, Solid};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -148,11 +148,18 @@ impl<'m> Walk<'m> {
 
     /// The pair of roots, if they can meet in [start, end].
     pub fn root(&self, start: f64, end: f64) -> Option<NodePair<'m>> {
-        self.timed(NodePair { a: self.a.octree.root(), b: self.b.octree.root(), time: start }, end)
+        let pair = NodePair { a: self.a.octree.root(), b: self.b.octree.root(), time: start };
+        self.timed(pair, &self.at(start), end)
     }
 
-    /// The pair with its time moved up to the earliest at which the two can meet; `None` when they cannot until `end`.
-    pub fn timed(&self, pair: NodePair<'m>, end: f64) -> Option<NodePair<'m>> {
+    /// The instant at a time: what all children of a pair begin with.
+    pub fn at(&self, time: f64) -> Instant {
+        self.approach.relative().at(time)
+    }
+
+    /// The pair with its time, that of `at`, moved up to the earliest at which the two can meet; `None` when they cannot until
+    /// `end`.
+    pub fn timed(&self, pair: NodePair<'m>, at: &Instant, end: f64) -> Option<NodePair<'m>> {
         let (a, b) = (pair.a, pair.b);
         let outside = |p: &Pruned, n: &Node| !p.aabb.meets(&n.aabb().grown(self.margin));
         if a.kind() == NodeKind::Empty || b.kind() == NodeKind::Empty {
@@ -161,7 +168,7 @@ impl<'m> Walk<'m> {
         if self.region.as_ref().is_some_and(|r| outside(&r.a, a) || outside(&r.b, b)) {
             return None;
         }
-        let time = self.approach.earliest((a.center, a.half), (b.center, b.half), pair.time, end)?;
+        let time = self.approach.earliest_from((a.center, a.half), (b.center, b.half), at, end)?;
         Some(NodePair { time, ..pair })
     }
 
@@ -209,11 +216,13 @@ impl<'m> Walk<'m> {
                 Next::Pairs => ends.push(pair),
                 Next::SplitA(children) => {
                     count += children.len();
-                    queue.extend(children.iter().filter_map(|a| self.timed(NodePair { a, ..pair }, 1.0)));
+                    let at = self.at(pair.time);
+                    queue.extend(children.iter().filter_map(|a| self.timed(NodePair { a, ..pair }, &at, 1.0)));
                 }
                 Next::SplitB(children) => {
                     count += children.len();
-                    queue.extend(children.iter().filter_map(|b| self.timed(NodePair { b, ..pair }, 1.0)));
+                    let at = self.at(pair.time);
+                    queue.extend(children.iter().filter_map(|b| self.timed(NodePair { b, ..pair }, &at, 1.0)));
                 }
             }
         }

@@ -119,11 +119,13 @@ impl<'a> Slices<'_, 'a> {
                 Next::Pairs => ends.push(pair),
                 Next::SplitA(children) => {
                     count += children.len();
-                    queue.extend(children.iter().filter_map(|a| walk.timed(NodePair { a, ..pair }, t1)));
+                    let at = walk.at(pair.time);
+                    queue.extend(children.iter().filter_map(|a| walk.timed(NodePair { a, ..pair }, &at, t1)));
                 }
                 Next::SplitB(children) => {
                     count += children.len();
-                    queue.extend(children.iter().filter_map(|b| walk.timed(NodePair { b, ..pair }, t1)));
+                    let at = walk.at(pair.time);
+                    queue.extend(children.iter().filter_map(|b| walk.timed(NodePair { b, ..pair }, &at, t1)));
                 }
             }
         }
