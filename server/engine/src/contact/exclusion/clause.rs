@@ -8,9 +8,10 @@
 //! s = −w_B·v(c) + Σ_k e_k |w_B × omega|_k + Σ λ s_i,   q = curvature(w_B) + Σ λ q_i.
 //! ```
 //!
-//! λ is chosen for the longest dt, not for the largest LB: the linear program is solved with the literals' bounds looked
-//! ahead to h, then to the best dt found so far, where the bound gives out. Curved convex literals are re-touched at the
-//! program's minimiser there (the cutting planes of Kelley 1960), which replaces one tangent plane by the face's shape.
+//! λ is chosen for the longest dt, not for the largest LB: where the bound is positive now, the linear program is solved
+//! with the literals' bounds looked ahead to h, then to the best dt found so far, where the bound gives out. Curved convex
+//! literals are re-touched at the program's minimiser there (the cutting planes of Kelley 1960), which replaces one tangent
+//! plane by the face's shape.
 
 use super::course::Course;
 use super::fit::{self, Fitted, Touchable, fit, spun};
@@ -400,15 +401,19 @@ impl Run<'_, '_> {
     /// completions.
     pub fn clause(&mut self, rounds: usize, enough: f64) -> Bounded {
         let h = self.view.motion.h;
-        let last = self.solve(h);
-        let mut best = Reach { dt: f64::NEG_INFINITY, path: [last.solution; 2], enough };
-        let mut gone = Gone { look: h, lowest: last };
-        if self.improve(&mut best, None, &last, h) {
-            return self.finish(&best, &last, &gone);
-        }
         let mut first = self.solve(0.0);
-        if self.improve(&mut best, None, &first, 0.0) || self.improve(&mut best, Some(&first), &last, h) {
+        let mut best = Reach { dt: f64::NEG_INFINITY, path: [first.solution; 2], enough };
+        let mut gone = Gone { look: h, lowest: first };
+        if self.improve(&mut best, None, &first, 0.0) {
             return self.finish(&best, &first, &gone);
+        }
+        // What no multipliers hold now they do not hold for any time: no later program is asked.
+        if best.dt >= 0.0 {
+            gone.lowest = self.solve(h);
+            let last = gone.lowest;
+            if self.improve(&mut best, None, &last, h) || self.improve(&mut best, Some(&first), &last, h) {
+                return self.finish(&best, &last, &gone);
+            }
         }
         // Where the bound gives out is where it must get better: look ahead to just that time; touch the curved faces at
         // the lowest point there, and see how much further that reaches. Beyond it look where the best bound seems to
@@ -452,12 +457,10 @@ impl Run<'_, '_> {
                     gone = Gone { look, lowest };
                 }
             }
-            let nearer = gone.look < gone_before - 0.02 * (gone_before - best.dt.max(0.0));
-            if !touched && !nearer && best.dt <= before + 0.02 * before.abs() {
+            let nearer = best.dt >= 0.0 && gone.look < gone_before - 0.02 * (gone_before - best.dt);
+            let stands = !touched && !nearer && best.dt <= before + 0.02 * before.abs();
+            if stands {
                 break;
-            }
-            if touched && best.dt > 0.0 {
-                first = self.solve(0.0);
             }
         }
         self.finish(&best, &lowest, &gone)

@@ -26,6 +26,8 @@ type Weighed = (Side, LiteralId, f64);
 pub(super) struct Proposals<'s, 'a> {
     pub(super) items: &'s mut Items,
     pub(super) contacts: &'s mut Contacts<'a>,
+    /// Guesses that do not converge steadily are followed to their ends.
+    pub(super) patient: bool,
 }
 
 impl Proposals<'_, '_> {
@@ -36,10 +38,10 @@ impl Proposals<'_, '_> {
         let Some(support) = self.support(cell, advance, x, at) else { return };
         let mut key: Vec<_> = support.iter().map(|l| (l.0, l.1)).collect();
         key.sort_unstable();
-        if self.items.scratch.tried.iter().any(|(k, l)| *l == level && *k == key) {
+        if self.items.scratch.tried.iter().any(|(k, l, patient)| *l == level && *patient >= self.patient && *k == key) {
             return;
         }
-        self.items.scratch.tried.push((key, level));
+        self.items.scratch.tried.push((key, level, self.patient));
         let t = cell.t + advance.dt.max(0.0);
         let active: Vec<_> = support.iter().map(|l| Constraint::Literal(l.0, l.1)).collect();
         // A fit weighs both of its literals: together they are 1 again.
@@ -170,6 +172,6 @@ impl Proposals<'_, '_> {
     }
 
     fn solve(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, lambda: Vec<f64>) -> bool {
-        self.contacts.polish(Known::Handed(&self.items.handed), true, Guess { active, x, t, lambda })
+        self.contacts.polish(Known::Handed(&self.items.handed), self.patient, Guess { active, x, t, lambda })
     }
 }

@@ -17,7 +17,8 @@ pub struct Scratch {
     pub(super) pool: Vec<Token>,
     pub(super) clip_planes_b: Vec<Face>,
     pub(super) clause: clause::Scratch,
-    pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32)>,
+    /// Guesses that were followed: of which literals, from how small a cell, and whether to their ends.
+    pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32, bool)>,
     clock: Option<Clock>,
     /// Ends searches like their limit, from outside.
     pub halt: Option<Arc<Halt>>,

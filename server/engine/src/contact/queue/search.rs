@@ -57,6 +57,9 @@ const LEAST_ADVANCE: f64 = 1e-15;
 /// The same as a way, in roundings of a bound.
 const LEAST_STEP: f64 = 1e-2;
 
+/// Cells after which no guess of a contact is given up early: what took as many is no easy one.
+const FEW: u64 = 24;
+
 /// Cells after which a contact that is known, and comes soon, is told as it is.
 const LONG: u64 = 20_000;
 
@@ -282,7 +285,7 @@ impl<'a> Search<'a> {
         }
         // Bodies that stand still to each other meet at the start or never.
         if !bounded.is_one_sided(&cell) && span.motion.speed > 0.0 {
-            self.propose(&cell, &bounded.found, &at);
+            self.propose(&cell, &bounded.found, &at, false);
             if cell.t >= self.contacts.goal() {
                 return None;
             }
@@ -485,7 +488,7 @@ impl<'a> Search<'a> {
         let view = self.contacts.task.view((cell.center, cell.half), at, still, &self.items.scratch.clip_planes_b);
         let pair = clause::Expressions { pool: &self.items.scratch.pool, a: cell.a, b: bounded.b };
         let now = enumeration::advance(&view, &pair, &[], rounding, 0.0, &mut self.items.scratch.clause);
-        self.propose(cell, &now, at);
+        self.propose(cell, &now, at, true);
         if cell.t >= self.contacts.goal() {
             return ControlFlow::Break(None);
         }
@@ -502,9 +505,11 @@ impl<'a> Search<'a> {
         ControlFlow::Break(settled.or(Some(Ending::Rounding(cell.t))))
     }
 
-    /// Tries to find the contact that a cell's weakest clause points to.
-    fn propose(&mut self, cell: &Cell, advance: &Advance, at: &Instant) {
-        Proposals { items: &mut self.items, contacts: &mut self.contacts }.attempt(cell, advance, at);
+    /// Tries to find the contact that a cell's weakest clause points to. Guesses that do not converge steadily are given up while
+    /// cells are few, unless one is to be `patient`: a smaller cell's are better.
+    fn propose(&mut self, cell: &Cell, advance: &Advance, at: &Instant, patient: bool) {
+        let patient = patient || self.contacts.counters.cells >= FEW;
+        Proposals { items: &mut self.items, contacts: &mut self.contacts, patient }.attempt(cell, advance, at);
     }
 
     /// Looks for a witness at a thin wall, beside x.

@@ -166,8 +166,8 @@ impl Problem<'_> {
         Row { value, gradient, hessian: curvature.matrix(), rate, gradient_rate }
     }
 
-    /// Solves from a starting guess. `None` when it does not converge to finite numbers, or, where one is not `patient`, not
-    /// steadily.
+    /// Solves from a starting guess. `None` when it does not converge to finite numbers, or, where one is not `patient` and the
+    /// constraints leave something open, not steadily.
     pub fn solve(
         &self,
         active: &[Constraint],
@@ -179,7 +179,7 @@ impl Problem<'_> {
     ) -> Option<Solution> {
         let found = self.descend(active, x, t, lambda, level, patient);
         let is_settled = found.as_ref().is_some_and(|s| s.stationarity < SETTLED);
-        if is_settled || !patient || active.len() < HELD {
+        if is_settled || active.len() < HELD {
             return found;
         }
         self.settle(active, x, t, level).filter(|s| s.stationarity < SETTLED).or(found)
