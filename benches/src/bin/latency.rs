@@ -374,7 +374,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     ]);
     let sizes: &[usize] = options.pick(&[0, 1, 16, 256, 4_096, 65_536], &[0, 16, 256]);
     let shared: &[usize] = options.pick(&[1, 16, 256, 4_096], &[16]);
-    let blocks = options.pick(21, 5);
+    let blocks = options.pick(21, 3);
     for mode in [Mode::Polled, Mode::Spin, Mode::Blocked] {
         let process = Process::start(mode)?;
         let rows = sizes.iter().map(|n| (1, *n)).chain(shared.iter().map(|n| (CLIENTS, *n)));
@@ -397,7 +397,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             }
             table.push(cells);
         }
-        let count = options.pick(5_000, 500);
+        let count = options.pick(5_000, 250);
         let of = |block: &Vec<u64>, q: f64| quantile(block.iter().map(|t| *t as f64), q);
         let compared = |times: [Vec<Vec<u64>>; 2]| {
             let micros = |which: usize, q: f64| median(times[which].iter().map(|block| 1e-3 * of(block, q)));

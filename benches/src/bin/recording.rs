@@ -147,7 +147,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(callgrind::Task::Probe(probe)) = task {
         return probe.run();
     }
-    let steps = options.pick(4000, 1000);
+    let steps = options.pick(4000, 300);
     let counts = callgrind::is_there();
     let mut table =
         Table::new(&["scene", "steps", "records", "us_off", "us_on", "ratio", "instr_off", "instr_on", "more"]);
