@@ -270,12 +270,20 @@ impl<'a, S: Fn(usize) -> Option<&'a Shape>> AxisSearch<'a, S> {
     /// Notes the direction at the end in `last` where it is another one.
     #[inline]
     fn look_to(&self, along: DVec3, last: &mut DVec3) -> SeparatingAxisTest {
-        let along = if along == DVec3::ZERO { self.way().normalize_or(DVec3::X) } else { along };
+        let is_remembered = along != DVec3::ZERO;
+        let along = if is_remembered { along } else { self.way().normalize_or(DVec3::X) };
         let gaps = self.gap(along);
         if self.proves((along, gaps[0]), (along, gaps[1])) {
             return self.seen(along, gaps[0], true);
         }
-        self.look_around(along, gaps[0], last)
+        let found = self.look_around(along, gaps[0], last);
+        if found.apart || !is_remembered {
+            return found;
+        }
+        // What is told of a pair must not depend on what is remembered of it: what a first look proves is proven here, too.
+        *last = DVec3::ZERO;
+        let first = self.look_to(DVec3::ZERO, last);
+        if first.apart { first } else { found }
     }
 
     /// Looks along the directions of nearest points, where `along` does not keep the bodies apart.
