@@ -7,10 +7,10 @@
 use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::frames::{Attached, Frames, Lost};
-use super::kinematics::{Dof, DofKind, Link, Part, Robot};
+use super::kinematics::{Dof, DofKind, Link, Robot};
 use super::reader::Reader;
 use super::sdf_elements::{geometry_of, is_true, placed, text, version_of};
-use super::shape::{Shape, union};
+use super::shape::Collisions;
 use super::urdf::{Result, needed, vector_of};
 use contactd_proto::Pose;
 use glam::DVec3;
@@ -277,7 +277,7 @@ impl World {
     }
 
     fn link(&mut self, node: Node<'_, '_>, file: &File<'_>, frames: &Frames, (name, at): (&str, usize)) -> Result<()> {
-        let (mut texts, mut parts) = (Vec::new(), Vec::new());
+        let mut collisions = Collisions::default();
         for collision in xml::inside(node, "collision") {
             let Some(geometry) = xml::inside(collision, "geometry").next() else {
                 return Err(xml::wrong(collision, "a geometry of the collision", None));
@@ -293,18 +293,10 @@ impl World {
                 None => own,
                 Some(of) => frames.pose(&of, name).map_err(|e| (xml::place(collision), lost(&e)))?.compose(&own),
             };
-            let text = shape.at(&own.compose(&Pose::new(DVec3::ZERO, turn)));
-            if shape == Shape::Plane {
-                let name = collision.attribute("name").unwrap_or("plane").to_owned();
-                parts.push(Part { name, text, masks: [1, 1] });
-            } else {
-                texts.push(text);
-            }
+            let at = own.compose(&Pose::new(DVec3::ZERO, turn));
+            collisions.add(&shape, &at, collision.attribute("name"));
         }
-        if !texts.is_empty() {
-            parts.insert(0, Part { name: String::new(), text: union(&texts), masks: [1, 1] });
-        }
-        self.links[at].link.parts = parts;
+        self.links[at].link.parts = collisions.parts();
         Ok(())
     }
 

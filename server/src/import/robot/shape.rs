@@ -1,5 +1,6 @@
 //! Collision geometry as flattened OpenSCAD texts.
 
+use super::kinematics::Part;
 use crate::import::written::placed;
 use contactd_proto::Pose;
 use glam::{DVec2, DVec3};
@@ -101,6 +102,32 @@ fn scaled(by: DVec3, text: &str) -> String {
     }
     let [x, y, z] = by.to_array();
     format!("multmatrix([[{x:?}, 0, 0, 0], [0, {y:?}, 0, 0], [0, 0, {z:?}, 0], [0, 0, 0, 1]]) {{ {text} }}")
+}
+
+/// The collisions of a link in formats without masks: together one part of it, but each plane, which has no bounds, by itself.
+#[derive(Default)]
+pub(super) struct Collisions {
+    texts: Vec<String>,
+    planes: Vec<Part>,
+}
+
+impl Collisions {
+    /// Adds a shape at its place in the link's frame; `name` is the collision's, if it has one.
+    pub(super) fn add(&mut self, shape: &Shape, at: &Pose, name: Option<&str>) {
+        let text = shape.at(at);
+        if *shape == Shape::Plane {
+            self.planes.push(Part { name: name.unwrap_or("plane").to_owned(), text, masks: [1, 1] });
+        } else {
+            self.texts.push(text);
+        }
+    }
+
+    /// The parts, the planes last.
+    pub(super) fn parts(self) -> Vec<Part> {
+        let all = (!self.texts.is_empty()).then(|| union(&self.texts));
+        let one = all.map(|text| Part { name: String::new(), text, masks: [1, 1] });
+        one.into_iter().chain(self.planes).collect()
+    }
 }
 
 /// Several texts as one solid.

@@ -5,9 +5,9 @@
 
 use super::super::problem::Problem;
 use super::super::{Place, xml};
-use super::kinematics::{Dof, DofKind, Link, Part, Robot};
+use super::kinematics::{Dof, DofKind, Link, Robot};
 use super::reader::Reader;
-use super::shape::{Shape, union};
+use super::shape::{Collisions, Shape};
 use contactd_proto::Pose;
 use glam::{DQuat, DVec3};
 use roxmltree::Node;
@@ -107,7 +107,7 @@ fn link(
     robot: &mut Robot,
 ) -> Result<Link> {
     let name = needed(node, "name")?.to_owned();
-    let (mut texts, mut parts) = (Vec::new(), Vec::new());
+    let mut collisions = Collisions::default();
     for collision in xml::inside(node, "collision") {
         let Some(geometry) = xml::inside(collision, "geometry").next() else {
             return Err(xml::wrong(collision, "a geometry of the collision", None));
@@ -117,17 +117,9 @@ fn link(
             robot.note(xml::place(geometry), format!("a collision of {name} has no inside and is left out"));
             continue;
         }
-        let text = shape.at(&origin(collision)?);
-        if shape == Shape::Plane {
-            let name = collision.attribute("name").unwrap_or("plane").to_owned();
-            parts.push(Part { name, text, masks: [1, 1] });
-        } else {
-            texts.push(text);
-        }
+        collisions.add(&shape, &origin(collision)?, collision.attribute("name"));
     }
-    if !texts.is_empty() {
-        parts.insert(0, Part { name: String::new(), text: union(&texts), masks: [1, 1] });
-    }
+    let parts = collisions.parts();
     let (origin, dofs) = match joint {
         None => (Pose::IDENTITY, vec![]),
         Some(joint) => (origin(joint.node)?, dofs_of(joint.node, robot)?),
