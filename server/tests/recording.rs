@@ -249,12 +249,15 @@ fn recorded(folder: &Path) -> (Vec<u8>, Vec<(usize, Vec<u8>)>) {
     assert_eq!(session.stop_recording().unwrap().steps, 40);
     let bytes = std::fs::read(&path).unwrap();
     let mut recording = Recording::open(&path).unwrap();
-    let mut steps = Vec::new();
+    let mut steps: Vec<(usize, Vec<u8>)> = Vec::new();
     while let Some(entry) = recording.next_entry().unwrap() {
         if let Entry::Step(step) = entry {
             let mut message = Vec::new();
             step.write(&mut message);
-            let at = bytes.windows(message.len()).position(|window| window == message).expect("its bytes");
+            let from = steps.last().map_or(0, |(end, _)| *end);
+            let mut rest = bytes[from..].windows(message.len());
+            let at =
+                from + rest.position(|window| window == message).expect("its bytes, after those of the step before");
             steps.push((at + message.len(), message));
         }
     }

@@ -11,6 +11,7 @@ pub mod judge;
 pub mod lanes;
 pub mod mesh_files;
 pub mod meshes;
+pub mod models;
 pub mod openscad;
 pub mod primitive_pairs;
 pub mod quadrics;

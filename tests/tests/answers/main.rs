@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 mod accuracy;
+mod by_hand;
 mod capsules;
 mod cases;
 mod closed_forms;

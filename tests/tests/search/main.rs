@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 mod bounds;
+mod cavities;
 mod certificate;
 mod fits;
 mod fronts;

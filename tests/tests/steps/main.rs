@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 mod bodies;
+mod by_hand;
 mod clearances;
 mod coherence;
 mod dynamics;

@@ -17,7 +17,7 @@ pub mod query;
 pub mod queue;
 pub mod region;
 #[cfg(test)]
-mod tests;
+mod testing;
 pub mod witness;
 
 pub(crate) use convex::{AxisSearch, Hull, SeparatingAxisTest, SweptShape};

@@ -32,8 +32,6 @@ mod search;
 mod state;
 pub mod step;
 mod swept_shapes;
-#[cfg(test)]
-mod tests;
 mod touch;
 
 pub use ask::{BodyPoint, BodyRay, Standing};

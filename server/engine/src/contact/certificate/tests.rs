@@ -1,7 +1,7 @@
 //! What a cell's bound says is what its recorded proofs say: every clause of the expressions is closed by one of them.
 
 use super::*;
-use crate::contact::tests::random_query;
+use crate::contact::testing::random_query;
 use crate::math::random::Random;
 use crate::octree::testing::random_tree;
 

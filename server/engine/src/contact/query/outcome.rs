@@ -421,3 +421,24 @@ impl Outcome {
         .for_each(ContactPoint::swap_sides);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A limit is one of work, too: what a million cells may evaluate ends a search of fewer, whatever its own limit is below that.
+    #[test]
+    fn a_limit_of_cells_counts_their_work() {
+        let most = EVALUATIONS_PER_CELL * DEFAULT_CELL_LIMIT;
+        for limit in [20, 30_000, DEFAULT_CELL_LIMIT, 4 * DEFAULT_CELL_LIMIT] {
+            let allowed = EVALUATIONS_PER_CELL * limit.max(DEFAULT_CELL_LIMIT);
+            let with = |evaluations: u64| Counters { cells: 7, evaluations, ..Counters::default() };
+            assert!(with(allowed - 1).spent(limit) < limit && with(allowed).spent(limit) >= limit, "{limit}");
+            assert!(!with(allowed).fits(limit) && with(most / 2).fits(limit), "{limit}");
+            assert_eq!(Counters { cells: limit, ..Counters::default() }.spent(limit), limit);
+            // How deep an overlap is was worked out within the same limit.
+            let split = |instant_cells| Counters { cells: limit / 2, instant_cells, ..Counters::default() };
+            assert!(split(limit - limit / 2 - 1).fits(limit) && !split(limit - limit / 2).fits(limit), "{limit}");
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use crate::contact::exclusion::clause::{self, Expressions};
 use crate::contact::exclusion::enumeration::advance_or_tighten;
 use crate::contact::query::task::Task;
-use crate::contact::tests::random_query;
+use crate::contact::testing::random_query;
 use crate::math::Aabb;
 use crate::math::random::Random;
 use crate::octree::testing::random_tree;

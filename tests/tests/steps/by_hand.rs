@@ -1,14 +1,16 @@
 //! Steps of small worlds whose answers can be worked out by hand.
 
-use super::*;
-use crate::contact::{Counters, Outcome, Status};
-use crate::octree::Model;
-use crate::octree::testing::{pierced, simple};
-use crate::solid::primitive::{Cuboid, Cylinder, Sphere};
-use crate::solid::{Label, Op, SolidBuilder};
+use contactd::contact::{Counters, Status};
+use contactd::octree::Model;
+use contactd::solid::primitive::{Cuboid, Cylinder, Sphere};
+use contactd::solid::{Label, Op, SolidBuilder};
+use contactd::world::{
+    MeasuredModel, ObjectSpec, PairOutcome, Refusal, StepError, StepOptions, StepOutcome, World, record,
+};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::pose_record::{END, START};
 use contactd_proto::{Detect, ErrorCode, Pose, PoseRecord, Report, Rule};
+use contactd_tests::models::{pierced, simple};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -380,8 +382,11 @@ fn resting_pairs_are_told_with_their_regions_and_cost_nothing_unasked() {
     let mut reported = |records: &[PoseRecord]| {
         let out = world.step(records, &StepOptions::default()).unwrap();
         // What they cost may differ: it is remembered that nothing has changed.
-        let free =
-            |p: &PairOutcome| PairOutcome { outcome: Outcome { counters: Counters::default(), ..p.outcome }, ..*p };
+        let free = |p: &PairOutcome| {
+            let mut told = *p;
+            told.outcome.counters = Counters::default();
+            told
+        };
         (out.pairs.iter().map(free).collect::<Vec<_>>(), out.regions.clone())
     };
     let first = reported(&[]);

@@ -1,15 +1,19 @@
 //! Pairs with a right answer in closed form, each through the whole search.
 
-use super::*;
-use crate::contact::query::outcome::EVALUATIONS_PER_CELL;
-use crate::math::random::Random;
-use crate::motion::Placed;
-use crate::octree::Model;
-use crate::octree::testing::{pierced, simple};
-use crate::solid::{Shape, primitive::*};
+use contactd::contact::{
+    ContactKind, Extent, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Stage, Status, Strategies,
+    default_resolution, earliest_contact,
+};
+use contactd::math::halt::Halt;
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd::solid::Shape;
+use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::models::{pierced, simple};
 use glam::DVec3;
+use std::sync::Arc;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -29,22 +33,6 @@ fn turn(pose: Pose, way: DVec3, spin: DVec3) -> Motion {
 
 fn tilt(v: DVec3) -> glam::DQuat {
     quat_of_rotation_vector(v)
-}
-
-/// A question about two models near each other that move and turn at random.
-pub(super) fn random_query<'m>(a: &'m Model, b: &'m Model, r: &mut Random) -> PairQuery<'m> {
-    let mut placed = || Placed {
-        place: Pose::IDENTITY,
-        motion: turn(Pose::new(r.vector(0.8), tilt(r.vector(2.0))), r.vector(0.5), r.vector(0.5)),
-    };
-    PairQuery {
-        a: PlacedModel { model: a, placed: placed() },
-        b: PlacedModel { model: b, placed: placed() },
-        resolution: default_resolution(a, b),
-        cell_limit: 1000,
-        strategies: Strategies::default(),
-        query_options: QueryOptions::CONTACT,
-    }
 }
 
 /// The answer of the search alone; a whole-primitive answer in front of it must say the same.
@@ -318,22 +306,6 @@ fn fork_and_plate() -> (Model, Model) {
     (pierced(Cuboid { half: v(0.1, 0.6, 0.5) }, vec![slot(-0.25), slot(0.25)]), plate)
 }
 
-/// A limit is one of work, too: what a million cells may evaluate ends a search of fewer, whatever its own limit is below that.
-#[test]
-fn a_limit_of_cells_counts_their_work() {
-    let most = EVALUATIONS_PER_CELL * DEFAULT_CELL_LIMIT;
-    for limit in [20, 30_000, DEFAULT_CELL_LIMIT, 4 * DEFAULT_CELL_LIMIT] {
-        let allowed = EVALUATIONS_PER_CELL * limit.max(DEFAULT_CELL_LIMIT);
-        let with = |evaluations: u64| Counters { cells: 7, evaluations, ..Counters::default() };
-        assert!(with(allowed - 1).spent(limit) < limit && with(allowed).spent(limit) >= limit, "{limit}");
-        assert!(!with(allowed).fits(limit) && with(most / 2).fits(limit), "{limit}");
-        assert_eq!(Counters { cells: limit, ..Counters::default() }.spent(limit), limit);
-        // How deep an overlap is was worked out within the same limit.
-        let split = |instant_cells| Counters { cells: limit / 2, instant_cells, ..Counters::default() };
-        assert!(split(limit - limit / 2 - 1).fits(limit) && !split(limit - limit / 2).fits(limit), "{limit}");
-    }
-}
-
 /// A limit cuts the same bits again.
 #[test]
 fn a_limit_of_cells_cuts_the_same_bits() {
@@ -361,11 +333,25 @@ fn a_limit_of_cells_cuts_the_same_bits() {
             cut += 1;
         }
         // Ended from outside before the first cell: nothing is known but that.
-        let halt = std::sync::Arc::new(crate::math::halt::Halt::default());
+        let halt = Arc::new(Halt::default());
         halt.set();
         let ended = earliest_contact(&query, &mut Scratch::heeding(Some(halt)));
         assert!(ended.counters.cells == 0 && matches!(ended.status(), Status::Undecided | Status::Clear), "{ended:?}");
         assert!(ended.time_lower() <= o.time_upper());
     }
     assert!(cut > 3, "{cut} of 60 were cut");
+}
+
+/// A box on its corner falls on a block, the corner above a point of the block's edge.
+#[test]
+fn a_corner_that_falls_on_an_edge_meets_the_edge() {
+    let (block, on_corner) = (v(1.0, 1.0, 0.5), DVec3::splat(0.3));
+    let turned = tilt(v(0.5, 0.7, 0.0));
+    let corners = (0..8).map(|k| on_corner * DVec3::from_array([0, 1, 2].map(|i| f64::from(k >> i & 1) * 2.0 - 1.0)));
+    let lowest = corners.map(|c| turned * c).min_by(|p, q| p.z.total_cmp(&q.z)).expect("eight corners");
+    let (block, cube) = (simple(Cuboid { half: block }), simple(Cuboid { half: on_corner }));
+    let at = v(1.0, 0.3, 1.0) - lowest;
+    let o = hits("corner on an edge", &block, rest(), &cube, turn(Pose::new(at, turned), -DVec3::Z, DVec3::ZERO), 0.5);
+    assert_eq!(o.point().map(|p| p.kind), Some(ContactKind::VertexEdge), "{o:?}");
+    assert!((o.time() - 0.5).abs() <= 1e-12, "{o:?}");
 }
