@@ -39,6 +39,7 @@
 //!
 //! The same sequence of replies makes the same points; when the buffers have grown, an update allocates nothing.
 
+pub mod cache;
 pub mod span;
 
 use crate::Reply;
@@ -84,6 +85,12 @@ impl Point {
     /// The point without its id, for [`crate::convention`]'s converters.
     pub fn contact(&self) -> Contact {
         Contact { point: self.position, normal: self.normal, separation: self.separation }
+    }
+
+    /// The point where its bodies stand: its place on each is carried along, the separation is that along its normal, which stays.
+    pub fn carried(&self, a: &Pose, b: &Pose) -> Self {
+        let (on_a, on_b) = (a.point(self.on_a), b.point(self.on_b));
+        Self { position: 0.5 * (on_a + on_b), separation: (on_b - on_a).dot(self.normal), ..*self }
     }
 }
 
@@ -207,6 +214,18 @@ impl Manifolds {
         }
         pair.points[1] = self.now.points.len();
         self.now.pairs.push(pair);
+    }
+
+    /// Of the pairs of the update before those that `of` (objects, the smaller id first) admits keep their points as they were told.
+    /// Between `start` and `finish`, of pairs that are not added.
+    pub fn keep(&mut self, of: impl Fn(u32, u32) -> bool) {
+        for was in self.before.pairs.iter().filter(|p| of(p.objects[0], p.objects[1])) {
+            let (groups, points) = (self.now.groups.len(), self.now.points.len());
+            self.now.groups.extend_from_slice(&self.before.groups[was.groups[0]..was.groups[1]]);
+            self.now.points.extend_from_slice(&self.before.points[was.points[0]..was.points[1]]);
+            let (groups, points) = ([groups, self.now.groups.len()], [points, self.now.points.len()]);
+            self.now.pairs.push(PairPoints { groups, points, ..*was });
+        }
     }
 
     /// Ends an update: pairs that were not added are forgotten.

@@ -1,4 +1,6 @@
-"""What a step costs in Python beyond the same step in Rust: the same embedded session, the same batches, steps taking turns.
+"""What a step costs in Python beyond the same step in Rust, and what contacts for MuJoCo cost beside MuJoCo's own.
+
+Rust and Python: the same embedded session, the same batches, steps taking turns.
 
 overhead.py [--quick]. A step: slots loaned, filled with poses, sent, the answer's records looked at. Rust and Python fill them from
 the same arrays, in three ways: a batch of records in one call, the same copied into the slots of a begun step, or field by field
@@ -10,8 +12,12 @@ median, and the error of the median (half of a 95 % interval, by its binomial or
 
 "one call" is what stands between Rust's step and who asks for it from Python: one call of a compiled function, there and back,
 whose step lies in between. After a step that has gone through megabytes the interpreter comes back to cold caches.
+
+MuJoCo (where it is installed): stock's collision stage is ``mj_collision`` of the same scene with its own contacts, ``contacts`` is
+``Coupling.add_contacts``; steps are ``mj_step`` and ``Coupling.step``, taking turns. "asked" counts requests to the engine, a step.
 """
 
+import pathlib
 import sys
 import time
 from itertools import cycle
@@ -135,5 +141,80 @@ def main(quick):
     )
 
 
+def primitives(friction):
+    """Boxes and cylinders, 20 in all, over a plane."""
+    bodies = "".join(
+        f'<body pos="{0.3 * (i % 5)} {0.3 * (i // 5)} .05"><freejoint/><geom type="{kind}" size=".05 .05 .05"/></body>'
+        for i, kind in enumerate(["box", "cylinder"] * 10)
+    )
+    return f"""<mujoco><option timestep="0.001"/><default><geom friction="{friction}"/></default><worldbody>
+        <geom type="plane" size="1 1 .1"/>{bodies}</worldbody></mujoco>"""
+
+
+def coupled(name, make, couple, settle, speed, count):
+    """A line of the table: medians in microseconds."""
+    import mujoco
+
+    stock, model = make(), make()
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    now, times, inner = time.perf_counter_ns, [], []
+    with couple(model) as coupling:
+        add_contacts = coupling.add_contacts
+
+        def timed(data):
+            start = now()
+            n = add_contacts(data)
+            inner.append(now() - start)
+            return n
+
+        coupling.add_contacts = timed
+        for _ in range(settle):
+            mujoco.mj_step(stock, theirs)
+            coupling.step(data)
+        for d in (theirs, data):
+            d.qvel[::6] += speed
+        before = coupling.asked.requests
+        for _ in range(count):
+            marks = [now()]
+            mujoco.mj_step(stock, theirs)
+            marks.append(now())
+            n = coupling.step(data)
+            marks.append(now())
+            mujoco.mj_fwdPosition(stock, theirs)
+            marks.append(now())
+            mujoco.mj_collision(stock, theirs)
+            marks.append(now())
+            times.append(np.diff(marks))
+        asked = (coupling.asked.requests - before) / count
+    step, coupled_step, _, collision = np.median(np.array(times), axis=0) / 1000.0
+    contacts = np.median(inner[settle:]) / 1000.0
+    more = f"{collision:8.2f} {contacts:9.2f} {contacts / collision:6.1f} {step:8.1f} {coupled_step:9.1f} {asked:6.2f}"
+    print(f"{name:>22} {theirs.ncon:6} {n:6} {more}")
+
+
+def contacts(quick):
+    """Contacts for MuJoCo, beside its own."""
+    try:
+        import mujoco
+    except ImportError:
+        print("mujoco is not installed: its table is left out")
+        return
+    from contactd.mujoco import attach
+
+    sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "examples"))
+    import mujoco_peg
+
+    settle, count = (1500, 100) if quick else (1500, 1000)
+    print(f"{'':>22} {'contacts':>13} {'collision stage':>24} {'whole step':>19}")
+    print(f"{'':>22} {'stock':>6} {'here':>6} {'stock':>8} {'here':>9} {'ratio':>6} {'stock':>8} {'here':>9} {'asked':>6}")
+    resting = lambda: mujoco.MjModel.from_xml_string(primitives(1))  # noqa: E731
+    sliding = lambda: mujoco.MjModel.from_xml_string(primitives(0))  # noqa: E731
+    coupled("20 at rest", resting, attach, settle, 0.0, count)
+    coupled("20 sliding at .2 m/s", sliding, attach, settle, 0.2, count)
+    peg = lambda model: attach(model, mujoco_peg.SOLIDS, unit=1e-3)  # noqa: E731
+    coupled("peg and plate at rest", mujoco_peg.scene, peg, settle, 0.0, count)
+
+
 if __name__ == "__main__":
     main("--quick" in sys.argv[1:])
+    contacts("--quick" in sys.argv[1:])

@@ -2,7 +2,7 @@
 
 import os
 import pathlib
-from typing import Any, Callable, Self, Sequence, TypeAlias
+from typing import Any, Callable, Mapping, Self, Sequence, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -256,6 +256,27 @@ class Manifolds:
     def finish(self) -> None:
         """Ends an update: pairs that were not added are forgotten."""
     def _pairs(self) -> list[tuple[int, int, int, bool, list[_Point]]]: ...
+
+class Coupled:
+    """A model's contacts: what ``contactd.mujoco.Coupling`` does in every step."""
+
+    def __new__(
+        cls,
+        session: Session,
+        model: Any,
+        parts: Sequence[tuple[int, int, int, float, _Pose | None]],
+        pairs: Mapping[tuple[int, int], int],
+        scale: tuple[float, float, float],
+        mujoco: tuple[int, int, float, float],
+        contact: tuple[bytes, Mapping[str, int]],
+    ) -> Self: ...
+    def add_contacts(self, xpos: np.ndarray, xquat: np.ndarray, data: int) -> int: ...
+    def contacts(
+        self,
+    ) -> list[tuple[tuple[int, int, int, int], tuple[_Vector, _Vector, float, _Vector, _Vector]]]: ...
+    def geoms(self) -> list[tuple[int, int]]: ...
+    def asked(self) -> tuple[int, int, int]: ...
+    def forget(self) -> None: ...
 
 class Solid:
     """A solid in the making, immutable and cheap to copy; made by ``contactd.solid``."""

@@ -22,31 +22,33 @@ points are those of the face it came through; this second request happens in the
 
 A step that raises has not moved ``data`` on: it may be repeated. Where the wait for a server was interrupted, the next step first
 waits for the answer that is still under way.
+
+What rests is not asked about again: contactd is told of a body once it has gone by a hundredth of the skin (``slack``) since it was told last,
+and a step in which none has makes no request. The contacts of a pair that was not told are carried along with its bodies.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pathlib
 import warnings
-from typing import Any, Container, Mapping
+from typing import Any, Container, Mapping, NamedTuple
 
 import mujoco as mj
 import numpy as np
 
+from . import _native
 from . import session as sessions
-from .convention import contact_to_mujoco, quaternion_from_wxyz
-from .errors import Error
-from .manifold import Manifold, Manifolds, Point
+from .convention import quaternion_from_wxyz
+from .manifold import Point
 from .mujoco_filter import CouplingWarning, Filter, StandIn
 from .mujoco_geoms import MESHES, solid_of
 from .pose import Pose
-from .records import Order, Status
-from .reply import Reply
 from .session import Session, embedded
 from .solid import Solid
 
-__all__ = ["Coupling", "CouplingWarning", "attach"]
+__all__ = ["Asked", "Coupling", "CouplingWarning", "attach"]
 
 
 #: A solid as it is given: OpenSCAD CSG text, a solid that was built, or the path of a file (CSG, STL, OFF …).
@@ -59,6 +61,7 @@ def attach(
     *,
     meshes: str = "hull",
     skin: float = 2e-4,
+    slack: float = 1e-2,
     unit: float = 1.0,
     session: Session | None = None,
 ) -> Coupling:
@@ -69,7 +72,18 @@ def attach(
     ``conaffinity``, ``<exclude>``, ``<pair>``, parents, ``condim``, friction, solver parameters. What has no solid (a signed distance
     function of a plugin) is refused by name. The rest is ``Coupling``'s.
     """
-    return Coupling(model, replace or {}, geoms=True, meshes=meshes, skin=skin, unit=unit, session=session)
+    return Coupling(model, replace or {}, geoms=True, meshes=meshes, skin=skin, slack=slack, unit=unit, session=session)
+
+
+class Asked(NamedTuple):
+    """What a coupling has asked contactd since it was made."""
+
+    #: Requests; none in a step in which all bodies rest.
+    requests: int
+    #: Bodies told in them.
+    bodies: int
+    #: Second requests of a step, for pairs in overlap.
+    retracted: int
 
 
 class Coupling:
@@ -79,7 +93,9 @@ class Coupling:
     (``contactd.solid``), or the path of a file; its unit is ``unit`` lengths of MuJoCo (0.001: models in millimetres in a scene in
     metres). ``geoms``: every other geom that collides gets its own solid, too (``attach``); ``meshes``: what a mesh then stands
     for, "hull" or "exact". Bodies welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
-    unit, at which contacts begin to act, in place of the geoms' ``margin``. ``session``: to use one that is open (by
+    unit, at which contacts begin to act, in place of the geoms' ``margin``. ``slack``: the part of it by which any point of a body
+    may go until contactd is asked about it anew; until then its contacts are carried along, and a gap is off by about the
+    square of that way over the radius of the surfaces (0: not at all where they are flat). ``session``: to use one that is open (by
     default an embedded one is opened, and closed with the coupling); its rules are replaced.
 
     Geoms that have a solid get ``contype`` and ``conaffinity`` 0 until the coupling is closed, and no contact of a ``<pair>``. What
@@ -98,15 +114,19 @@ class Coupling:
         geoms: bool = False,
         meshes: str = "hull",
         skin: float = 2e-4,
+        slack: float = 1e-2,
         unit: float = 1.0,
         session: Session | None = None,
     ) -> None:
         if not 0.0 < skin < np.inf or not 0.0 < unit < np.inf:
             raise ValueError(f"expected a finite skin and unit above 0, found {skin} and {unit}")
+        if not 0.0 <= slack < 1.0:
+            raise ValueError(f"expected a part of the skin as slack, at least 0 and below 1, found {slack}")
         if meshes not in MESHES:
             raise ValueError(f"expected one of {', '.join(map(repr, MESHES))} for meshes, found {meshes!r}")
         self.model = model
         self.skin = skin
+        self.slack = slack
         self.unit = unit
         self._filter = Filter(model)
         given = self._given(solids)
@@ -115,15 +135,8 @@ class Coupling:
         self._filter.take([part for part, _ in given])
         for sentence in self._filter.warnings:
             warnings.warn(sentence, CouplingWarning, stacklevel=2 + geoms)
-        #: Second requests so far, for pairs in overlap.
-        self.retracted = 0
-        #: The contacts of the last step in the order in which MuJoCo got them: the bodies' ids in MuJoCo, and the point in contactd's
-        #: unit. Its ``id`` names it within the pair of solids for as long as it lasts.
-        self.contacts: list[tuple[int, int, Point]] = []
-        #: The names of the geoms by which MuJoCo is told of each of ``contacts``; "geom 3" for one without.
-        self.contact_geoms: list[tuple[str, str]] = []
-        self._manifolds = Manifolds()
-        self._in_flight = False
+        self._contacts: list[tuple[int, int, Point]] | None = None
+        self._contact_geoms: list[tuple[str, str]] | None = None
         self._own = session is None
         self.session = embedded() if session is None else session
         #: What no longer collides: geoms with their contype and conaffinity, pairs with their margin.
@@ -186,11 +199,8 @@ class Coupling:
         groups, rules = self._filter.rules(self.skin / self.unit)
         rest = mj.MjData(model)
         mj.mj_kinematics(model, rest)
-        self._bodies: dict[int, int] = {}
-        self._geoms: dict[int, int] = {}
-        self._fixed: dict[int, Pose] = {}
         loaded: dict[str, sessions.Model] = {}
-        moving = []
+        parts = []
         for (part, solid), group in zip(given, groups):
             key = solid.text if isinstance(solid, Solid) else str(solid)
             if key not in loaded:
@@ -202,17 +212,20 @@ class Coupling:
             if not part.is_whole:
                 place = Pose(model.geom_pos[first] / self.unit, quaternion_from_wxyz(model.geom_quat[first]))
             object = session.add_object(part.name, loaded[key], group=group, fixed=fixed, at=at, place=place)
-            self._bodies[object] = part.body
-            self._geoms[object] = first
-            if fixed:
-                self._fixed[object] = at
-            else:
-                moving.append(object)
-        self._moving = np.array(moving, dtype=np.uint32)
-        self._index = {object: i for i, object in enumerate(moving)}
-        self._moving_bodies = np.array([self._bodies[o] for o in moving], dtype=int)
+            parts.append((object, part.body, first, self._reach(part), at if fixed else None))
         session.set_rules(rules)
         session.options.details = True
+        add_contact, template, offsets = _contact_layout(model, rest, self.skin)
+        skin = self.skin / self.unit
+        self._coupled = _native.Coupled(
+            session,
+            model,
+            [(*part, at and (tuple(at.position), tuple(at.rotation))) for *part, at in parts],
+            self._filter.pairs,
+            (skin, self.slack * skin, self.unit),
+            (add_contact, model._address, mj.mjMINMU, mj.mjMINVAL),
+            (template, offsets),
+        )
         # Last, so that what is refused before has changed nothing.
         for geom in sorted(g for part, _ in given for g in part.geoms):
             self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
@@ -239,146 +252,50 @@ class Coupling:
 
     def add_contacts(self, data: mj.MjData) -> int:
         """Asks contactd about the bodies as they stand in ``data`` and adds its contacts; for loops that stage their own steps."""
-        positions = data.xpos[self._moving_bodies] / self.unit
-        rotations = quaternion_from_wxyz(data.xquat[self._moving_bodies])
-        points = self._points(positions, rotations)
-        self.contacts, self.contact_geoms = [], []
-        for a, b, point in points:
-            self.contacts.append((self._bodies[a], self._bodies[b], point))
-            contact = self._contact(a, b, point)
-            self.contact_geoms.append((self._name(int(contact.geom[0])), self._name(int(contact.geom[1]))))
-            if mj.mj_addContact(self.model, data, contact) != 0:
-                raise MemoryError("MuJoCo's arena has no room for another contact: enlarge <size memory>")
-        return len(points)
+        n = self._coupled.add_contacts(data.xpos, data.xquat, data._address)
+        self._contacts = self._contact_geoms = None
+        return n
 
-    def _points(self, positions: np.ndarray, rotations: np.ndarray) -> list[tuple[int, int, Point]]:
-        """Objects and points of all contacts, in contactd's unit."""
-        reply = self._ask(positions, rotations)
-        # Not before there is an answer: without one, what is kept stays that of the last step.
-        self._manifolds.start()
-        pairs = self._told(reply, positions, rotations)
-        deep = {(pair.a, pair.b): pair.points[0] for pair in pairs if pair.status == Status.OVERLAP}
-        if not deep:
-            return [(pair.a, pair.b, p) for pair in pairs for p in pair.points]
-        back = self._retracted(deep, positions)
-        moved = positions + back
-        found = []
-        for pair in self._told(self._ask(moved, rotations), moved, rotations, deep):
-            # The gap that a pair has where it really is: one that is still in overlap was told there.
-            was_moved = (pair.a, pair.b) in deep and pair.status != Status.OVERLAP
-            away = self._gone(pair.a, pair.b, back) if was_moved else 0.0
-            gaps = [p._replace(separation=p.separation - float(np.sum(p.normal * away))) for p in pair.points]
-            found.extend((pair.a, pair.b, p) for p in gaps)
-        return found
+    @property
+    def contacts(self) -> list[tuple[int, int, Point]]:
+        """The contacts of the last step in the order in which MuJoCo got them: the bodies' ids in MuJoCo, and the point in contactd's
+        unit. Its ``id`` names it within the pair of solids for as long as it lasts."""
+        if self._contacts is None:
+            self._contacts = [
+                (a, b, Point(id, group, np.array(position), np.array(normal), separation, np.array(on_a), np.array(on_b)))
+                for (a, b, id, group), (position, normal, separation, on_a, on_b) in self._coupled.contacts()
+            ]
+        return self._contacts
 
-    def _told(
-        self, reply: Reply, positions: np.ndarray, rotations: np.ndarray, again: Container[tuple[int, int]] | None = None
-    ) -> list[Manifold]:
-        """The points of all pairs with those of an answer; ``again``: only these pairs are taken of it, where they are out of
-        overlap, in place of what they had."""
-        for i, record in enumerate(reply):
-            a, b = int(record["a"]), int(record["b"])
-            if again is None or ((a, b) in again and record["status"] != Status.OVERLAP):
-                self._manifolds.add(reply, i, self._place(a, positions, rotations), self._place(b, positions, rotations))
-        self._manifolds.finish()
-        return self._manifolds.pairs
+    @property
+    def contact_geoms(self) -> list[tuple[str, str]]:
+        """The names of the geoms by which MuJoCo is told of each of ``contacts``; "geom 3" for one without."""
+        if self._contact_geoms is None:
+            self._contact_geoms = [(self._name(first), self._name(second)) for first, second in self._coupled.geoms()]
+        return self._contact_geoms
 
-    def _retracted(self, deep: dict[tuple[int, int], Point], positions: np.ndarray) -> np.ndarray:
-        """How far each body goes so that the pairs in overlap are apart along their directions, the moving body alone, by half a
-        skin's gap."""
-        self.retracted += 1
-        back = np.zeros_like(positions)
-        for (a, b), p in deep.items():
-            way = p.normal * (0.5 * self.skin / self.unit - p.separation)
-            # The normal points from a to b: b goes along, a against; where both move b does.
-            body, way = (self._index[b], way) if b in self._index else (self._index[a], -way)
-            # What an earlier pair has asked for already need not be gone again.
-            length = np.linalg.norm(way)
-            back[body] += way * max(0.0, 1.0 - float(back[body] @ way) / float(length * length))
-        return back
+    @property
+    def asked(self) -> Asked:
+        """What contactd was asked so far."""
+        return Asked(*self._coupled.asked())
 
-    def _gone(self, a: int, b: int, back: np.ndarray) -> np.ndarray | float:
-        """How far b went from a."""
-        return (back[self._index[b]] if b in self._index else 0.0) - (back[self._index[a]] if a in self._index else 0.0)
+    @property
+    def retracted(self) -> int:
+        """Second requests so far, for pairs in overlap."""
+        return self.asked.retracted
 
-    def _place(self, object: int, positions: np.ndarray, rotations: np.ndarray) -> Pose:
-        """Where an object stands."""
-        at = self._index.get(object)
-        return self._fixed[object] if at is None else Pose(positions[at], rotations[at])
+    def refresh(self) -> None:
+        """Asks about all bodies at the next step, wherever they stand: after a change to the session's rules or options."""
+        self._coupled.forget()
 
-    def _ask(self, positions: np.ndarray, rotations: np.ndarray) -> Reply:
-        if self._in_flight:
-            # An earlier request whose wait was interrupted: its answer is of no use any more.
-            try:
-                self.session.finish()
-            except Error:
-                pass  # it is over all the same
-            self._in_flight = False
-        poses = self.session.begin_step(len(self._moving))
-        poses["object"] = self._moving
-        poses["flags"] = Order.START
-        poses["position"] = positions
-        poses["rotation"] = rotations
-        self._in_flight = True
-        try:
-            reply = self.session.finish()
-        except Error:
-            self._in_flight = False
-            raise
-        self._in_flight = False
-        return reply
+    def _reach(self, part: StandIn) -> float:
+        """How far the geoms of a part are from its body's origin, in contactd's unit; infinite with a plane among them."""
+        model = self.model
+        bounds = [float(model.geom_rbound[g]) or np.inf for g in part.geoms]
+        return max(float(np.linalg.norm(model.geom_pos[g])) + r for g, r in zip(part.geoms, bounds)) / self.unit
 
     def _name(self, geom: int) -> str:
         return mj.mj_id2name(self.model, mj.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
-
-    def _contact(self, a: int, b: int, point: Point) -> mj.MjContact:
-        model = self.model
-        g1, g2, normal = self._geoms[a], self._geoms[b], point.normal
-        k = self._filter.pairs.get((min(g1, g2), max(g1, g2)))
-        # MuJoCo tells the geoms of a contact by their types, where these are the same by their bodies, or as the pair does.
-        first = int(model.pair_geom1[k]) if k is not None else -1
-        if self._order(g2, first) < self._order(g1, first):
-            g1, g2, normal = g2, g1, -normal
-        contact = mj.MjContact()
-        contact.pos, contact.frame, contact.dist = contact_to_mujoco(
-            point.position * self.unit, normal, point.separation * self.unit
-        )
-        contact.geom = [g1, g2]
-        contact.flex = contact.elem = contact.vert = [-1, -1]
-        contact.efc_address = -1
-        contact.includemargin = self.skin
-        contact.exclude = 0
-        if k is None:
-            self._parameters(contact, g1, g2)
-        else:
-            contact.dim = int(model.pair_dim[k])
-            contact.friction = np.maximum(model.pair_friction[k], mj.mjMINMU)
-            contact.solref, contact.solimp = model.pair_solref[k], model.pair_solimp[k]
-            contact.solreffriction = model.pair_solreffriction[k]
-        return contact
-
-    def _order(self, geom: int, first: int) -> tuple[int, bool, int, int]:
-        return int(self.model.geom_type[geom]), geom != first, int(self.model.geom_bodyid[geom]), geom
-
-    def _parameters(self, contact: mj.MjContact, g1: int, g2: int) -> None:
-        """As mj_contactParam: the geom of higher priority, else the larger condim and friction, and solver parameters mixed."""
-        model = self.model
-        p1, p2 = model.geom_priority[g1], model.geom_priority[g2]
-        if p1 != p2:
-            g = g1 if p1 > p2 else g2
-            dim, friction = model.geom_condim[g], model.geom_friction[g]
-            solref, solimp = model.geom_solref[g], model.geom_solimp[g]
-        else:
-            dim = max(model.geom_condim[g1], model.geom_condim[g2])
-            friction = np.maximum(model.geom_friction[g1], model.geom_friction[g2])
-            mix = _mix(model.geom_solmix[g1], model.geom_solmix[g2])
-            r1, r2 = model.geom_solref[g1], model.geom_solref[g2]
-            solref = mix * r1 + (1 - mix) * r2 if r1[0] > 0 and r2[0] > 0 else np.minimum(r1, r2)
-            solimp = mix * model.geom_solimp[g1] + (1 - mix) * model.geom_solimp[g2]
-        contact.dim = int(dim)
-        slide, spin, roll = np.maximum(friction, mj.mjMINMU)
-        contact.friction = [slide, slide, spin, roll, roll]
-        contact.solref, contact.solimp = solref, solimp
 
 
 def _names_a_file(text: str) -> bool:
@@ -386,11 +303,30 @@ def _names_a_file(text: str) -> bool:
     return "(" not in text and ";" not in text and bool(pathlib.PurePath(text).suffix)
 
 
-def _mix(first: float, second: float) -> float:
-    """Weight of the first geom's solver parameters (engine_collision_driver.c, mj_contactParam)."""
-    least = mj.mjMINVAL
-    if first >= least and second >= least:
-        return float(first / (first + second))
-    if first < least and second < least:
-        return 0.5
-    return 0.0 if first < least else 1.0
+def _contact_layout(model: mj.MjModel, data: mj.MjData, skin: float) -> tuple[int, bytes, dict[str, int]]:
+    """The address of ``mj_addContact``, the bytes of an ``mjContact`` as contacts of solids begin, and the offsets of its fields, as
+    MuJoCo's own arrays tell them. ``data`` is only used to look at."""
+    add_contact = ctypes.CDLL(mj._functions.__file__).mj_addContact
+    add_contact.argtypes = [ctypes.c_void_p] * 3
+    blank = mj.MjContact()
+    # Numbers that differ, so that a field in another's place is seen below; the first three are each contact's own.
+    blank.dist, blank.pos, blank.frame = 0.5, [1.0, 2.0, 3.0], np.arange(4.0, 13.0)
+    blank.includemargin = skin
+    blank.flex = blank.elem = blank.vert = [-1, -1]
+    blank.efc_address = -1
+    blank.exclude = 0
+    full = mj.mj_addContact(model, data, blank)
+    arrays = {name: getattr(data.contact, name) for name in dir(data.contact) if not name.startswith("_")}
+    places = {name: a.__array_interface__["data"][0] for name, a in arrays.items() if isinstance(a, np.ndarray) and len(a)}
+    if not full:
+        first = min(places.values())
+        template = ctypes.string_at(first, data.contact.dist.strides[0])
+        full = add_contact(model._address, data._address, template)
+    if full:
+        raise MemoryError("MuJoCo's arena has no room for two contacts: enlarge <size memory>")
+    for name in places:
+        own, copied = getattr(data.contact, name)
+        if not np.array_equal(own, copied):
+            raise RuntimeError(f"{name} of MuJoCo's contacts is not where its Python package says: this version is not known")
+    address = ctypes.cast(add_contact, ctypes.c_void_p).value or 0
+    return address, template, {name: at - first for name, at in places.items()}

@@ -4,7 +4,8 @@
 //! It holds what needs Rust, and what every step does: the session, the memory of its poses and replies, the records' layouts.
 //! Views, rules, poses and exceptions are Python (`contactd/*.py`), which is what users see.
 //!
-//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`, `bench.rs`) and where the interpreter's lock is released
+//! `unsafe` occurs where Python's buffers meet a session's memory (`lease.rs`, `slots.rs`, `reply.rs`, `bench.rs`), where contacts
+//! meet MuJoCo's (`mujoco.rs`), and where the interpreter's lock is released
 //! around a session that belongs to one thread (`confined.rs`).
 
 mod batch;
@@ -16,6 +17,7 @@ mod layout;
 mod lease;
 mod manifold;
 mod mass;
+mod mujoco;
 mod options;
 mod pose;
 mod queries;
@@ -48,6 +50,8 @@ mod _native {
     use crate::manifold::Manifolds;
     #[pymodule_export]
     use crate::mass::MassProperties;
+    #[pymodule_export]
+    use crate::mujoco::Coupled;
     #[pymodule_export]
     use crate::options::Options;
     #[pymodule_export]

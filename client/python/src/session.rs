@@ -13,7 +13,7 @@ use crate::slots::{Batch, Slots, references};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::control::{Facets, ModelFile};
 use contactd_client::transport::Opened;
-use contactd_client::{Error, Frame, MassOptions, Object, SharedMemory, StepOptions, Transport};
+use contactd_client::{Error, Frame, MassOptions, Object, Reply as Answer, SharedMemory, StepOptions, Transport};
 use contactd_proto::names::Address;
 use contactd_proto::query::{PointOptions, PointRecord, RayOptions, RayRecord};
 use contactd_proto::{ContactRecord, PoseRecord, StepReply};
@@ -199,6 +199,71 @@ impl Session {
             self.with(py, |s| s.options = options)?;
         }
         Ok(())
+    }
+}
+
+impl Session {
+    /// Waits for the answer under way, with the interpreter's lock released and an ear for signals; what `read` makes of it.
+    fn wait<R: Send>(
+        &self,
+        py: Python<'_>,
+        timeout: Duration,
+        mut read: impl FnMut(&Answer<'_>) -> R + Send,
+    ) -> PyResult<R> {
+        let mut left = timeout;
+        loop {
+            let wait = left.min(SLICE);
+            match self.with(py, |s| detached(py, s, |s| s.finish(wait).map(|r| read(&r))))? {
+                Ok(answer) => return Ok(answer),
+                Err(Error::Timeout) if left > wait => {
+                    py.check_signals()?;
+                    left -= wait;
+                }
+                Err(e) => return Err(errors::of(py, &e)),
+            }
+        }
+    }
+
+    /// A whole step of records, for code of this package; `is_sent` is true from when they are sent until there is an answer, or none
+    /// will come.
+    pub fn ask<R: Send>(
+        slf: &Bound<'_, Self>,
+        records: &[PoseRecord],
+        is_sent: &mut bool,
+        read: impl FnMut(&Answer<'_>) -> R + Send,
+    ) -> PyResult<R> {
+        let py = slf.py();
+        let this = Self::fresh(slf)?;
+        let options = StepOptions::from(&*this.options.try_borrow(py)?);
+        let begun = this.with(py, |s| {
+            s.options = options;
+            s.begin_step(records.len()).map(|slots| slots.copy_from_slice(records))
+        })?;
+        begun.map_err(|e| errors::of(py, &e))?;
+        let answer = this.wait(py, Duration::MAX, read);
+        *is_sent = this.with(py, |s| s.is_in_flight())?;
+        if answer.is_ok() {
+            this.options.try_borrow_mut(py)?.advance = 1.0;
+        }
+        answer
+    }
+
+    /// Waits for an answer that is still under way, if one is, and drops it.
+    pub fn drain(slf: &Bound<'_, Self>) -> PyResult<()> {
+        let this = Self::enter(slf)?;
+        if this.with(slf.py(), |s| s.is_in_flight())? {
+            let dropped = this.wait(slf.py(), Duration::MAX, |_| ());
+            // Where it failed it is over all the same.
+            if this.with(slf.py(), |s| s.is_in_flight())? {
+                return dropped;
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps that were sent so far.
+    pub fn steps(slf: &Bound<'_, Self>) -> PyResult<u64> {
+        Self::enter(slf)?.with(slf.py(), |s| s.steps())
     }
 }
 
@@ -451,21 +516,8 @@ impl Session {
         let timeout = duration(timeout)?;
         let mut this = Self::enter(slf)?;
         this.send_loaned(py)?;
-        let mut left = timeout;
-        let (header, address, slots) = loop {
-            let wait = left.min(SLICE);
-            let answer = this.with(py, |s| {
-                detached(py, s, |s| s.finish(wait).map(|r| (*r.header(), r.slots().as_ptr() as usize, r.slots().len())))
-            })?;
-            match answer {
-                Ok(answer) => break answer,
-                Err(Error::Timeout) if left > wait => {
-                    py.check_signals()?;
-                    left -= wait;
-                }
-                Err(e) => return Err(errors::of(py, &e)),
-            }
-        };
+        let read = |r: &Answer<'_>| (*r.header(), r.slots().as_ptr() as usize, r.slots().len());
+        let (header, address, slots) = this.wait(py, timeout, read)?;
         this.options.try_borrow_mut(py)?.advance = 1.0;
         this.reply(py, &header, address as *const ContactRecord, slots)
     }

@@ -140,6 +140,8 @@ def test_a_pair_that_stays_in_overlap_keeps_its_depth_and_ids():
     with Coupling(model, {"left": slab, "right": slab, "box": BOX}, unit=1e-3) as coupling:
         seen = []
         for _ in range(3):
+            # By more than the slack, so that it is asked about.
+            data.qpos[2] += 1e-5
             mujoco.mj_step1(model, data)
             assert coupling.add_contacts(data) == data.ncon == 5
             by_wall = {}
@@ -150,6 +152,11 @@ def test_a_pair_that_stays_in_overlap_keeps_its_depth_and_ids():
             assert all(min(ids) >= 0 and len(set(ids)) == len(ids) for ids in by_wall.values())
             seen.append(by_wall)
         assert seen[0] == seen[1] == seen[2] and coupling.retracted == 3
+        asked, kept = coupling.asked, coupling.contacts
+        assert asked == (6, 6, 3)
+        mujoco.mj_step1(model, data)
+        assert coupling.add_contacts(data) == data.ncon == 5 and coupling.asked == asked, "nothing has moved"
+        assert [p.id for *_, p in coupling.contacts] == [p.id for *_, p in kept] and coupling.contacts is not kept
 
 
 def turned_over(session):

@@ -290,12 +290,14 @@ def test_a_pair_is_met_by_its_own_parameters_and_given_back():
     assert model.pair_margin[0] == 0 and model.geom_contype.tolist() == [1, 1]
 
 
+TWENTY = FLOOR + "".join(
+    f'<body pos="{0.3 * (i % 5)} {0.3 * (i // 5)} .05"><freejoint/><geom type="{kind}" size=".05 .05 .05"/></body>'
+    for i, kind in enumerate(["box", "cylinder"] * 10)
+)
+
+
 def test_a_settled_scene_stays_as_still_as_mujocos_own():
-    bodies = "".join(
-        f'<body pos="{0.3 * (i % 5)} {0.3 * (i // 5)} .05"><freejoint/><geom type="{kind}" size=".05 .05 .05"/></body>'
-        for i, kind in enumerate(["box", "cylinder"] * 10)
-    )
-    stock, model = scene(FLOOR + bodies), scene(FLOOR + bodies)
+    stock, model = scene(TWENTY), scene(TWENTY)
     theirs = mujoco.MjData(stock)
     data = mujoco.MjData(model)
     with attach(model) as coupling:
@@ -305,6 +307,115 @@ def test_a_settled_scene_stays_as_still_as_mujocos_own():
     own, stocks = (np.abs(d.qvel).max() for d in (data, theirs))
     print(f"fastest of 20 bodies after 1500 steps: {own} here, {stocks} in stock MuJoCo")
     assert own < max(2 * stocks, 1e-9)
+
+
+def test_what_rests_is_not_asked_about():
+    model = scene(TWENTY)
+    data = mujoco.MjData(model)
+    with attach(model) as coupling:
+        for _ in range(1000):
+            coupling.step(data)
+        settled = coupling.asked
+        for _ in range(200):
+            assert coupling.step(data) == data.ncon == 80
+        assert coupling.asked == settled, "20 bodies at rest take no request"
+        # One goes, and is the one that is told; the others' contacts stay.
+        first = {(a, b, p.id): p for a, b, p in coupling.contacts}
+        data.qpos[0] += 1e-5
+        assert coupling.step(data) == 80
+        requests, bodies, retracted = (now - before for now, before in zip(coupling.asked, settled))
+        assert (requests, bodies, retracted) == (1, 1, 0)
+        for a, b, p in coupling.contacts:
+            way = [1e-5, 0, 0] if b == 1 else np.zeros(3)
+            assert np.allclose(p.position, first[a, b, p.id].position + way, atol=1e-8)
+
+
+def test_contacts_that_are_carried_along_are_those_that_a_request_would_tell():
+    compared = 0
+    for seed in range(MODELS):
+        model = mujoco.MjModel.from_xml_string(Maker(seed).text())
+        data = mujoco.MjData(model)
+        rng = np.random.default_rng(seed)
+        with attach(model, skin=SKIN) as coupling:
+            for _ in range(STATES):
+                shuffled(model, data, rng)
+                mujoco.mj_step1(model, data)
+                coupling.add_contacts(data)
+                # A creep: none of its points goes by the slack, a hundredth of the skin. Bodies reach less than a metre.
+                data.qvel[:] = rng.uniform(-1, 1, model.nv)
+                mujoco.mj_integratePos(model, data.qpos, data.qvel, 1e-7)
+                mujoco.mj_step1(model, data)
+                asked = coupling.asked
+                coupling.add_contacts(data)
+                assert coupling.asked == asked
+                carried = contacts(model, data)
+                coupling.refresh()
+                mujoco.mj_step1(model, data)
+                coupling.add_contacts(data)
+                assert coupling.asked.requests > asked.requests
+                anew = contacts(model, data)
+                for pair in carried.keys() | anew.keys():
+                    (dist, fields), (other, others) = (found.get(pair, (SKIN, None)) for found in (carried, anew))
+                    # Of what is deep in each other, the depth is found to a thousandth.
+                    assert dist == pytest.approx(other, abs=1e-7 + 2e-3 * abs(min(other, 0))), f"model {seed}: {pair}"
+                    assert fields is None or others is None or np.array_equal(fields, others)
+                    compared += fields is not None and others is not None
+    assert compared > 5 * MODELS
+
+
+def test_parameters_are_those_of_the_model_as_it_is():
+    model = scene(FLOOR + BALL.format(0, 0, 0.0501))
+    data = mujoco.MjData(model)
+    with attach(model) as coupling:
+        for friction in (0.3, 0.7):
+            model.geom_friction[:, 0] = friction
+            mujoco.mj_step1(model, data)
+            assert coupling.add_contacts(data) == 1 and data.contact[0].friction[0] == friction
+        assert coupling.asked.requests == 1
+
+
+def test_what_others_have_moved_in_the_session_is_told_anew():
+    model = scene(FLOOR + BALL.format(0, 0, 0.0501))
+    data = mujoco.MjData(model)
+    with contactd.embedded() as session, attach(model, session=session) as coupling:
+        mujoco.mj_step1(model, data)
+        assert coupling.add_contacts(data) == 1
+        # The plane is the session's first object, the ball its second one.
+        session.begin_step(1)[0] = contactd.start(2, (0, 0, 5.0))
+        session.finish()
+        mujoco.mj_step1(model, data)
+        assert coupling.add_contacts(data) == 1 and coupling.asked.requests == 2
+
+
+def test_the_slack_may_be_none_and_is_checked():
+    model = scene(FLOOR + BALL.format(0, 0, 0.0501))
+    data = mujoco.MjData(model)
+    with attach(model, slack=0.0) as coupling:
+        for k in range(3):
+            data.qpos[0] = k * 1e-12
+            mujoco.mj_step1(model, data)
+            coupling.add_contacts(data)
+        assert coupling.asked.requests == 3
+    for slack in (-1e-3, 1.0, np.nan):
+        with pytest.raises(ValueError, match="expected a part of the skin as slack"):
+            attach(scene(FLOOR), slack=slack)
+
+
+def test_an_arena_without_room_is_told():
+    text = f'<mujoco><size memory="20K"/><worldbody>{TWENTY}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    with attach(model) as coupling:
+        mujoco.mj_kinematics(model, data)
+        with pytest.raises(MemoryError, match="enlarge <size memory>"):
+            coupling.add_contacts(data)
+
+
+def test_data_of_another_model_is_refused():
+    model = scene(FLOOR + BALL.format(0, 0, 0.0501))
+    other = mujoco.MjData(scene(FLOOR))
+    with attach(model) as coupling, pytest.raises(ValueError, match="the data of the coupling's own model"):
+        coupling.add_contacts(other)
 
 
 def test_a_model_without_anything_to_warn_of_warns_of_nothing():

@@ -28,6 +28,16 @@ impl<T: Transport> Session<T> {
         Ok(&mut slots[..n])
     }
 
+    /// True from when a batch is sent until its answer was taken.
+    pub fn is_in_flight(&self) -> bool {
+        self.stage == Stage::Sent
+    }
+
+    /// Batches that were sent so far: who keeps what an earlier answer told sees by it whether there was another.
+    pub fn steps(&self) -> u64 {
+        self.step
+    }
+
     /// Whether something else may begin.
     pub(super) fn check_idle(&self) -> Result<(), Error> {
         match self.stage {

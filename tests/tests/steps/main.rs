@@ -6,6 +6,7 @@ mod bodies;
 mod by_hand;
 mod clearances;
 mod coherence;
+mod contact_cache;
 mod dynamics;
 mod effect_costs;
 mod effects;

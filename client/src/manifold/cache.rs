@@ -1,0 +1,278 @@
+//! Contacts that are asked for where something has moved, and carried along where nothing has: for loops that want the contacts
+//! of all bodies at every step, most of which rest.
+//!
+//! ```
+//! # use contactd_client::manifold::cache::ContactCache;
+//! # use contactd_client::{Error, Session, Transport, proto::Pose};
+//! # use std::time::Duration;
+//! # fn step<T: Transport>(session: &mut Session<T>, cache: &mut ContactCache, poses: &[Pose]) -> Result<(), Error> {
+//! let mut asked = cache.begin(poses).len();              // 0: everything rests
+//! while asked > 0 {
+//!     session.begin_step(asked)?.copy_from_slice(cache.records());
+//!     asked = cache.answer(&session.finish(Duration::MAX)?).len();
+//! }
+//! for (pair, p) in cache.contacts() {
+//!     println!("{} {} #{}: {} {} {}", pair.a, pair.b, p.id, p.position, p.normal, p.separation);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A body is told to the engine once any of its points may have gone farther than the *slack* from where it was told last;
+//! until then the engine has it there. So a pair of which neither body was told keeps its points. Each is carried: its place on
+//! a with a, that on b with b ([`Point::carried`]). The separation along the normal is then exact where a face is flat; where
+//! both are round, with radii R, it is off by (2 slack)²/R at most. Places that come within the margin meanwhile are found at
+//! most twice the slack late. A slack of 0 asks whenever a bit has changed.
+//!
+//! Bodies that overlap touch nowhere, so a pair that is told in overlap is asked about once more, moved apart along its
+//! direction until half of the given gap is between its bodies: its points are those of the face it came through, carried
+//! back. Of a pair that overlaps even there the depth is kept, one point. What was moved apart is put back with the next request.
+
+use super::{Manifold, Manifolds, Point};
+use crate::Reply;
+use contactd_proto::contact_record::OVERLAP;
+use contactd_proto::{Pose, PoseRecord};
+use glam::DVec3;
+
+/// A body whose contacts are followed.
+#[derive(Clone, Copy, Debug)]
+struct Followed {
+    object: u32,
+    /// How far its farthest point is from its origin.
+    reach: f64,
+    /// Where it stands.
+    now: Pose,
+    /// Where it was told last to stand.
+    told: Option<Pose>,
+    /// Where the engine has it for a pair that was moved apart.
+    apart: Option<Pose>,
+    is_fixed: bool,
+    /// It is told anew.
+    is_asked: bool,
+}
+
+/// Which of its two requests a step waits for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Phase {
+    #[default]
+    Idle,
+    First,
+    Again,
+}
+
+/// What was counted since the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// Requests, the second ones of a step among them.
+    pub requests: u64,
+    /// Bodies told in them.
+    pub bodies: u64,
+    /// Second requests, for pairs in overlap.
+    pub retracted: u64,
+}
+
+/// The contacts of some bodies of a session, from step to step. Rules have to ask for patches and the penetration, the step for
+/// details (see [`Manifolds`]).
+#[derive(Clone, Debug)]
+pub struct ContactCache {
+    slack: f64,
+    gap: f64,
+    /// By object.
+    bodies: Vec<Followed>,
+    manifolds: Manifolds,
+    records: Vec<PoseRecord>,
+    /// Pairs in overlap that are asked about again.
+    deep: Vec<[u32; 2]>,
+    phase: Phase,
+    asked: Asked,
+}
+
+impl ContactCache {
+    /// Without bodies. `slack`: a length; `gap`: that to which pairs in overlap are moved apart, half of it.
+    pub fn new(slack: f64, gap: f64) -> Self {
+        let (manifolds, phase, asked) = (Manifolds::default(), Phase::Idle, Asked::default());
+        Self { slack, gap, bodies: Vec::new(), manifolds, records: Vec::new(), deep: Vec::new(), phase, asked }
+    }
+
+    /// Follows an object that stands where it stands. Objects are added in the order of their ids.
+    pub fn add_fixed(&mut self, object: u32, pose: Pose) {
+        self.add(Followed {
+            object,
+            reach: 0.0,
+            now: pose,
+            told: Some(pose),
+            apart: None,
+            is_fixed: true,
+            is_asked: false,
+        });
+    }
+
+    /// Follows an object that moves; `reach`: how far its points are from its origin, infinite for one without bounds.
+    pub fn add_moving(&mut self, object: u32, reach: f64) {
+        let (now, told, apart) = (Pose::IDENTITY, None, None);
+        self.add(Followed { object, reach, now, told, apart, is_fixed: false, is_asked: false });
+    }
+
+    fn add(&mut self, body: Followed) {
+        debug_assert!(self.bodies.last().is_none_or(|last| last.object < body.object), "in the order of their ids");
+        self.bodies.push(body);
+    }
+
+    /// A step begins, with the moving objects at these poses, in the order in which they were added. The records to be sent
+    /// to the engine, whose reply `answer` takes; none where everything rests.
+    pub fn begin(&mut self, poses: &[Pose]) -> &[PoseRecord] {
+        self.records.clear();
+        let mut any = false;
+        for (body, pose) in self.bodies.iter_mut().filter(|body| !body.is_fixed).zip(poses) {
+            body.now = *pose;
+            // What is no number has gone, too: the engine says so.
+            let rests = body.told.is_some_and(|told| displacement(&told, pose, body.reach) <= self.slack);
+            body.is_asked = !rests;
+            any |= body.is_asked;
+        }
+        if !any {
+            self.phase = Phase::Idle;
+            return &self.records;
+        }
+        for body in &self.bodies {
+            let pose = if body.is_asked { Some(body.now) } else { body.told.filter(|_| body.apart.is_some()) };
+            self.records.extend(pose.map(|pose| PoseRecord::start(body.object, &pose)));
+        }
+        self.phase = Phase::First;
+        &self.records
+    }
+
+    /// The records that are to be sent.
+    pub fn records(&self) -> &[PoseRecord] {
+        &self.records
+    }
+
+    /// Takes the reply to the records. Returns those of the step's second request; none where it needs none.
+    pub fn answer(&mut self, reply: &Reply) -> &[PoseRecord] {
+        self.asked.requests += 1;
+        self.asked.bodies += self.records.len() as u64;
+        self.records.clear();
+        match std::mem::take(&mut self.phase) {
+            Phase::Idle => {}
+            Phase::First => self.first(reply),
+            Phase::Again => self.again(reply),
+        }
+        &self.records
+    }
+
+    /// A request has failed, or others have moved the session's objects: where the engine has them is unknown. Points stay those of
+    /// the last step; all bodies are told at the next.
+    pub fn forget(&mut self) {
+        self.phase = Phase::Idle;
+        for body in self.bodies.iter_mut().filter(|body| !body.is_fixed) {
+            (body.told, body.apart) = (None, None);
+        }
+    }
+
+    /// All points in the order (a, b), where the bodies stand.
+    pub fn contacts(&self) -> impl Iterator<Item = (Manifold<'_>, Point)> {
+        self.manifolds.pairs().flat_map(|pair| {
+            let [a, b] = [pair.a, pair.b].map(|object| {
+                index(&self.bodies, object).map_or(Pose::IDENTITY, |i| self.bodies[i].now)
+            });
+            pair.points.iter().map(move |p| (pair, p.carried(&a, &b)))
+        })
+    }
+
+    /// What was asked of the engine.
+    pub fn asked(&self) -> Asked {
+        self.asked
+    }
+
+    /// Where the engine has an object.
+    fn there(&self, object: u32) -> Option<Pose> {
+        let body = &self.bodies[index(&self.bodies, object)?];
+        body.apart.or(body.told)
+    }
+
+    fn first(&mut self, reply: &Reply) {
+        for body in self.bodies.iter_mut().filter(|body| !body.is_fixed) {
+            body.apart = None;
+            if body.is_asked {
+                body.told = Some(body.now);
+            }
+        }
+        self.manifolds.start();
+        self.take(reply, |cache, a, b, _| is_asked(&cache.bodies, a, b));
+        let bodies = &self.bodies;
+        self.manifolds.keep(|a, b| !is_asked(bodies, a, b));
+        self.manifolds.finish();
+        self.move_apart();
+    }
+
+    /// Takes the records of the pairs that `of` (objects, status) admits.
+    fn take(&mut self, reply: &Reply, of: impl Fn(&Self, u32, u32, u8) -> bool) {
+        for record in reply.records() {
+            if !of(self, record.a, record.b, record.status) {
+                continue;
+            }
+            if let (Some(a), Some(b)) = (self.there(record.a), self.there(record.b)) {
+                self.manifolds.add(reply, record, &a, &b);
+            }
+        }
+    }
+
+    /// Plans the second request: each pair in overlap apart along its direction by half the gap, b alone or, where that is fixed, a.
+    fn move_apart(&mut self) {
+        self.deep.clear();
+        let mut ways: Vec<(usize, DVec3)> = Vec::new();
+        for pair in self.manifolds.pairs().filter(|pair| pair.status == OVERLAP) {
+            let (Some(p), true) = (pair.points.first(), is_asked(&self.bodies, pair.a, pair.b)) else { continue };
+            let (Some(a), Some(b)) = (index(&self.bodies, pair.a), index(&self.bodies, pair.b)) else { continue };
+            self.deep.push([pair.a, pair.b]);
+            // The normal points from a to b: b goes along, a against.
+            let way = p.normal * (0.5 * self.gap - p.separation);
+            let (index, way) = if self.bodies[b].is_fixed { (a, -way) } else { (b, way) };
+            let k = ways.iter().position(|(i, _)| *i == index).unwrap_or_else(|| {
+                ways.push((index, DVec3::ZERO));
+                ways.len() - 1
+            });
+            // What an earlier pair has asked for already need not be gone again.
+            let gone = ways[k].1.dot(way) / way.length_squared();
+            ways[k].1 += way * (1.0 - gone).max(0.0);
+        }
+        if self.deep.is_empty() {
+            return;
+        }
+        for (index, way) in ways {
+            let body = &mut self.bodies[index];
+            let apart = body.told.map(|told| Pose { position: told.position + way, ..told });
+            body.apart = apart;
+            self.records.extend(apart.map(|pose| PoseRecord::start(body.object, &pose)));
+        }
+        self.asked.retracted += 1;
+        self.phase = Phase::Again;
+    }
+
+    fn again(&mut self, reply: &Reply) {
+        let deep = std::mem::take(&mut self.deep);
+        self.take(reply, |_, a, b, status| status != OVERLAP && deep.contains(&[a, b]));
+        self.manifolds.finish();
+        self.deep = deep;
+    }
+}
+
+/// Place of an object's body.
+fn index(bodies: &[Followed], object: u32) -> Option<usize> {
+    bodies.binary_search_by_key(&object, |body| body.object).ok()
+}
+
+/// True when one of two objects was told anew.
+fn is_asked(bodies: &[Followed], a: u32, b: u32) -> bool {
+    [a, b].iter().any(|object| index(bodies, *object).is_some_and(|i| bodies[i].is_asked))
+}
+
+/// How far a body's points are from where they were at another pose, at most: the way of its origin, and the chord of the turn.
+fn displacement(from: &Pose, to: &Pose, reach: f64) -> f64 {
+    let way = (to.position - from.position).length();
+    if to.rotation == from.rotation {
+        return way;
+    }
+    let turn = to.rotation * from.rotation.conjugate();
+    way + 2.0 * DVec3::new(turn.x, turn.y, turn.z).length() * reach
+}

@@ -1,0 +1,296 @@
+//! Contacts that are kept while bodies rest: true where the bodies stand, by closed forms of balls, boxes and cylinders over a plane.
+//!
+//! Long form: `CONTACTD_CACHE_SCENES=2000 cargo test -p contactd-tests --test steps contact_cache::`
+
+use contactd::ipc::Embedded;
+use contactd_client::manifold::cache::ContactCache;
+use contactd_client::manifold::{Manifold, Point};
+use contactd_client::{Object, Session};
+use contactd_proto::motion::quat_of_rotation_vector;
+use contactd_proto::{Pose, Report, Rule};
+use contactd_tests::random_solids::Random;
+use glam::{DVec3, dvec3};
+use std::time::Duration;
+
+/// Pairs are told within this of each other; bodies are about 1 in size.
+const MARGIN: f64 = 4e-3;
+/// Of the length of a group, how much nearer than all chosen points another one may be.
+const CHOICE: f64 = 1e-3;
+
+/// How far bodies lean. Of a face that leans by about the margin over its size the engine may tell an edge of the place within the margin
+/// and not the corner that is nearest: what is told then is not judged here.
+const LEANS: [f64; 4] = [0.0, 1e-6, 3e-5, 0.7];
+
+/// A body's shape, centred at its origin.
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    Ball(f64),
+    Cuboid(DVec3),
+    Cylinder(f64, f64),
+}
+
+impl Shape {
+    fn random(r: &mut Random) -> Self {
+        match r.below(3) {
+            0 => Shape::Ball(r.within(0.3, 0.8)),
+            1 => Shape::Cuboid(dvec3(r.within(0.2, 0.6), r.within(0.2, 0.6), r.within(0.2, 0.6))),
+            _ => Shape::Cylinder(r.within(0.2, 0.6), r.within(0.2, 0.6)),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Shape::Ball(radius) => format!("sphere(r = {radius});"),
+            Shape::Cuboid(half) => {
+                format!("cube(size = [{}, {}, {}], center = true);", 2.0 * half.x, 2.0 * half.y, 2.0 * half.z)
+            }
+            Shape::Cylinder(radius, half) => {
+                format!("cylinder(h = {}, r1 = {radius}, r2 = {radius}, center = true);", 2.0 * half)
+            }
+        }
+    }
+
+    /// How far its farthest point is from its origin.
+    fn reach(&self) -> f64 {
+        match self {
+            Shape::Ball(radius) => *radius,
+            Shape::Cuboid(half) => half.length(),
+            Shape::Cylinder(radius, half) => radius.hypot(*half),
+        }
+    }
+
+    /// How far it reaches from its origin along a direction of its own frame.
+    fn support(&self, along: DVec3) -> f64 {
+        match self {
+            Shape::Ball(radius) => *radius,
+            Shape::Cuboid(half) => half.dot(along.abs()),
+            Shape::Cylinder(radius, half) => radius * along.x.hypot(along.y) + half * along.z.abs(),
+        }
+    }
+
+    /// How far a point is from its surface, near it.
+    fn off(&self, x: DVec3) -> f64 {
+        match self {
+            Shape::Ball(radius) => x.length() - radius,
+            Shape::Cuboid(half) => (x.abs() - half).max_element(),
+            Shape::Cylinder(radius, half) => (x.x.hypot(x.y) - radius).max(x.z.abs() - half),
+        }
+    }
+}
+
+/// Points that were judged, and those among them that are off by more than rounding and the slack allow.
+#[derive(Default)]
+struct Count {
+    points: usize,
+    rough: usize,
+}
+
+/// Bodies over a slab whose upper face is a plane, everything turned somewhere.
+struct Scene {
+    session: Session<Embedded>,
+    cache: ContactCache,
+    floor: Pose,
+    slab: u32,
+    bodies: Vec<(u32, Shape)>,
+}
+
+impl Scene {
+    fn new(r: &mut Random, slack: f64) -> Self {
+        let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default()).unwrap();
+        let turn = quat_of_rotation_vector(r.direction() * r.within(0.0, 3.0));
+        let floor = Pose::new(r.vector(5.0), turn);
+        let slab =
+            "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,-1],[0,0,0,1]]) { cube(size = [60, 60, 2], center = true); }";
+        let slab = session.load_model("slab.csg", slab).unwrap().id;
+        let slab = session.add_object(Object::new("slab", slab).fixed().at(floor)).unwrap();
+        let mut cache = ContactCache::new(slack, MARGIN);
+        cache.add_fixed(slab, floor);
+        let mut bodies = Vec::new();
+        for i in 0..3 {
+            let shape = Shape::random(r);
+            let model = session.load_model(&format!("body {i}.csg"), shape.text().as_str()).unwrap().id;
+            let object = session.add_object(Object::new(&format!("body {i}"), model)).unwrap();
+            cache.add_moving(object, shape.reach());
+            bodies.push((object, shape));
+        }
+        let mut rule = Rule::new(["default".into(), "default".into()]);
+        (rule.report, rule.margin, rule.penetration) = (Report::Patch, MARGIN, true);
+        session.set_rules(&[rule]).unwrap();
+        session.options.details = true;
+        Self { session, cache, floor, slab, bodies }
+    }
+
+    /// One step; how many requests it took.
+    fn step(&mut self, poses: &[Pose]) -> u64 {
+        let before = self.cache.asked().requests;
+        let mut more = !self.cache.begin(poses).is_empty();
+        while more {
+            let records = self.cache.records();
+            self.session.begin_step(records.len()).unwrap().copy_from_slice(records);
+            more = !self.cache.answer(&self.session.finish(Duration::from_secs(60)).unwrap()).is_empty();
+        }
+        self.cache.asked().requests - before
+    }
+
+    /// The pose of body `i` at which it is `gap` over the floor, leaning by `lean`.
+    fn over(&self, i: usize, gap: f64, lean: DVec3) -> Pose {
+        let rotation = self.floor.rotation * quat_of_rotation_vector(lean);
+        let down = rotation.inverse() * (self.floor.rotation * DVec3::NEG_Z);
+        let height = gap + self.bodies[i].1.support(down);
+        Pose::new(self.floor.point(dvec3(4.0 * i as f64 - 4.0, 0.0, height)), rotation)
+    }
+
+    /// How far body `i` is over the floor.
+    fn gap(&self, i: usize, pose: &Pose) -> f64 {
+        let down = pose.rotation.inverse() * (self.floor.rotation * DVec3::NEG_Z);
+        self.height(pose.position) - self.bodies[i].1.support(down)
+    }
+
+    fn height(&self, x: DVec3) -> f64 {
+        (x - self.floor.position).dot(self.floor.rotation * DVec3::Z)
+    }
+
+    /// Holds what is told of body `i` against what is true where it stands.
+    fn judge(&self, i: usize, pose: &Pose, slack: f64, what: &str, count: &mut Count) {
+        let (object, shape) = self.bodies[i];
+        let told: Vec<(Manifold, Point)> = self.cache.contacts().filter(|(m, _)| m.b == object).collect();
+        let gap = self.gap(i, pose);
+        if gap > MARGIN + 2.0 * slack + 1e-9 {
+            assert!(told.is_empty(), "{what}: {gap} over the floor: {told:?}");
+            return;
+        }
+        if gap > MARGIN - 2.0 * slack - 1e-9 {
+            return;
+        }
+        // The normal may be that of a body's face that leans a little: what slides along the floor then counts by that much.
+        let tilts = told.iter().map(|(_, p)| p.normal.distance(self.floor.rotation * DVec3::Z));
+        let tilt = tilts.fold(0.0, f64::max);
+        assert!(tilt < 0.03, "{what}: {told:?}");
+        let room = 1e-8 + 4.0 * slack * slack / shape.reach() + 4.0 * slack * tilt + tilt * tilt * MARGIN;
+        // Of what is deep in the floor its depth is found to a part of it.
+        let room = room + 0.02 * gap.min(0.0).abs();
+        let lowest = told.iter().map(|(_, p)| p.separation).fold(f64::INFINITY, f64::min);
+        let chosen = CHOICE * 2.0 * shape.reach();
+        assert!(lowest >= gap - room && lowest < f64::INFINITY, "{what}: {lowest} told of {gap}: {told:?}");
+        count.rough += usize::from(lowest > gap + room + chosen);
+        for (m, p) in &told {
+            assert_eq!(m.a, self.slab);
+            // Its places are on both surfaces, and as far apart as it is told where the bodies stand. The engine lays the end of an edge
+            // that rises out of the margin where it leaves it but for a margin or two: few points, and no worse.
+            let (a, b) = (self.floor.point(p.on_a), pose.point(p.on_b));
+            let errors = [self.height(a), shape.off(p.on_b), self.height(b) - self.height(a) - p.separation];
+            let off = errors.iter().fold(0.0f64, |most, e| most.max(e.abs()));
+            assert!(off < 5.0 * MARGIN, "{what}: {errors:?} off: {p:?}");
+            count.rough += usize::from(off > room);
+            assert!(p.position.distance(0.5 * (a + b)) < 1e-12, "{what}: not in the middle: {p:?}");
+        }
+        count.points += told.len();
+    }
+}
+
+/// How far any of a body's points goes, at most.
+fn way(from: &Pose, to: &Pose, reach: f64) -> f64 {
+    let turn = to.rotation * from.rotation.conjugate();
+    from.position.distance(to.position) + 2.0 * turn.xyz().length() * reach
+}
+
+#[test]
+fn contacts_are_true_where_the_bodies_stand() {
+    let scenes = std::env::var("CONTACTD_CACHE_SCENES").map_or(40, |n| n.parse().expect("a number of scenes"));
+    let (mut count, mut resting, mut asked) = (Count::default(), 0, 0);
+    for seed in 0..scenes {
+        let mut r = Random::new(seed);
+        let slack = MARGIN * 10f64.powf(r.within(-4.0, -2.0));
+        let mut scene = Scene::new(&mut r, slack);
+        let lean = |r: &mut Random| r.direction() * LEANS[r.below(4)];
+        let mut poses: Vec<Pose> = (0..3).map(|i| scene.over(i, MARGIN * r.within(-0.5, 1.3), lean(&mut r))).collect();
+        for step in 0..12 {
+            let still = poses.clone();
+            // All at rest, one thrown somewhere, all creeping, all turning in place; what creeps leaves the slack sooner or later.
+            let kind = r.below(4);
+            for (i, pose) in poses.iter_mut().enumerate() {
+                if kind == 1 && i == step % 3 {
+                    *pose = scene.over(i, MARGIN * r.within(-0.5, 1.3), lean(&mut r));
+                } else if kind >= 2 {
+                    let by = slack * 10f64.powf(r.within(-3.0, 0.3));
+                    let (way, turn) = if kind == 2 { (by, by) } else { (0.0, 4.0 * by) };
+                    let turn = quat_of_rotation_vector(r.direction() * turn);
+                    *pose = Pose::new(pose.position + r.direction() * way, (turn * pose.rotation).normalize());
+                }
+            }
+            let requests = scene.step(&poses);
+            let what = format!("scene {seed}, step {step}, slack {slack}");
+            let ways = |k: usize| way(&still[k], &poses[k], scene.bodies[k].1.reach());
+            let farthest = (0..3).map(ways).fold(0.0, f64::max);
+            // From wherever a body was told last, it was no farther than the slack.
+            let expected = step == 0 || farthest > 2.0 * slack * (1.0 + 1e-9);
+            assert!(!expected || requests > 0, "{what}: nothing was asked, {farthest} gone");
+            if step > 0 && farthest == 0.0 {
+                assert_eq!(requests, 0, "{what}: asked though nothing has moved");
+                resting += 1;
+            }
+            asked += u64::from(requests > 0);
+            for (i, pose) in poses.iter().enumerate() {
+                scene.judge(i, pose, slack, &format!("{what}, {:?}", scene.bodies[i].1), &mut count);
+            }
+        }
+    }
+    let Count { points, rough } = count;
+    println!("{scenes} scenes: {points} points, {rough} rough ends, {asked} steps that asked, {resting} at rest");
+    assert!(points > 20 * scenes as usize && resting > scenes / 4 && asked > scenes);
+    assert!(rough * 1000 < points, "{rough} of {points} points are off");
+}
+
+#[test]
+fn what_has_crept_by_less_than_the_slack_is_not_asked_about_and_carried_along() {
+    let mut count = Count::default();
+    for seed in 0..40 {
+        let mut r = Random::new(seed);
+        let slack = 1e-3 * MARGIN;
+        let mut scene = Scene::new(&mut r, slack);
+        let home: Vec<Pose> = (0..3).map(|i| scene.over(i, MARGIN * r.within(-0.4, 0.9), DVec3::ZERO)).collect();
+        assert!(scene.step(&home) > 0);
+        for step in 0..20 {
+            let mut near = |i: usize| {
+                let (reach, by) = (scene.bodies[i].1.reach(), slack * r.within(0.0, 0.45));
+                let turn = quat_of_rotation_vector(r.direction() * (by / reach));
+                Pose::new(home[i].position + r.direction() * by, (turn * home[i].rotation).normalize())
+            };
+            let poses: Vec<Pose> = (0..3).map(&mut near).collect();
+            assert_eq!(scene.step(&poses), 0, "scene {seed}, step {step}");
+            for (i, pose) in poses.iter().enumerate() {
+                scene.judge(i, pose, slack, &format!("scene {seed}, step {step}, {:?}", scene.bodies[i].1), &mut count);
+            }
+        }
+        scene.cache.forget();
+        assert!(scene.step(&home) > 0, "what is unknown is told");
+    }
+    assert!(count.points > 1000 && count.rough == 0, "{} of {} points are off", count.rough, count.points);
+}
+
+/// A box that lies in the floor is moved apart from it for its points, and is where it is for a ball that comes down on it.
+#[test]
+fn what_was_moved_apart_is_put_back_for_others() {
+    let slack = 1e-3 * MARGIN;
+    let mut count = Count::default();
+    for seed in 0..20 {
+        let mut r = Random::new(seed);
+        let mut scene = Scene::new(&mut r, slack);
+        let deep = MARGIN * r.within(-0.8, -0.1);
+        let mut poses: Vec<Pose> = (0..3).map(|i| scene.over(i, deep, DVec3::ZERO)).collect();
+        let top = 2.0 * scene.bodies[0].1.support(DVec3::Z) + deep;
+        let above = MARGIN * r.within(0.2, 0.8);
+        poses[1] = scene.over(1, top + 1.0, DVec3::ZERO);
+        assert!(scene.step(&poses) == 2 && scene.cache.asked().retracted == 1);
+        // Over the middle of the first body.
+        let over = scene.over(1, top + above, DVec3::ZERO);
+        poses[1] = Pose { position: over.position - scene.floor.rotation * (4.0 * DVec3::X), ..over };
+        assert_eq!(scene.step(&poses), 1, "the first body lies where it lay");
+        let (low, high) = (scene.bodies[0].0, scene.bodies[1].0);
+        let told: Vec<Point> = scene.cache.contacts().filter(|(m, _)| (m.a, m.b) == (low, high)).map(|c| c.1).collect();
+        let lowest = told.iter().map(|p| p.separation).fold(f64::INFINITY, f64::min);
+        assert!((lowest - above).abs() < 1e-8, "scene {seed}: {lowest} told of {above}: {told:?}");
+        scene.judge(0, &poses[0], slack, &format!("scene {seed}, {:?}", scene.bodies[0].1), &mut count);
+    }
+    assert!(count.points > 20 && count.rough == 0);
+}
