@@ -172,9 +172,8 @@ impl ContactCache {
     /// All points in the order (a, b), where the bodies stand.
     pub fn contacts(&self) -> impl Iterator<Item = (Manifold<'_>, Point)> {
         self.manifolds.pairs().flat_map(|pair| {
-            let [a, b] = [pair.a, pair.b].map(|object| {
-                index(&self.bodies, object).map_or(Pose::IDENTITY, |i| self.bodies[i].now)
-            });
+            let [a, b] = [pair.a, pair.b]
+                .map(|object| index(&self.bodies, object).map_or(Pose::IDENTITY, |i| self.bodies[i].now));
             pair.points.iter().map(move |p| (pair, p.carried(&a, &b)))
         })
     }
