@@ -92,22 +92,51 @@ fn support(solid: &Solid, node: NodeId, m: Vector, clip: [Interval; 3]) -> f64 {
 }
 
 /// The steps by which parts of a direction go over from one operand to another: of disjoint operands no step is too long.
-const STEPS: [f64; 8] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125];
+const STEPS: [f64; 11] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625, 0.0078125, 0.00390625];
+
+/// Rounds of such steps, of each length.
+const ROUNDS: usize = 12;
+/// Intersections that a tree is expanded into, at most.
+const EXPANDED: usize = 64;
+
+/// What a node is within: the operands of its intersections, and of its differences the first ones.
+fn operands(solid: &Solid, node: NodeId, out: &mut Vec<NodeId>) {
+    match &solid.nodes[node as usize] {
+        Node::Op(Op::Intersection, children) => children.iter().for_each(|c| operands(solid, *c, out)),
+        Node::Op(Op::Difference, children) => operands(solid, children[0], out),
+        Node::Op(Op::Union, _) | Node::Primitive(_) | Node::Empty => out.push(node),
+    }
+}
 
 /// The same for an intersection. Of any vectors that sum up to m, one for each operand, the operands' supports along them sum up to
 /// no less than what the intersection reaches along m; for convex operands the best split reaches just that (R. Rockafellar, Convex
 /// Analysis (1970), theorem 16.4). The split is looked for by steps on a grid.
 fn split_support(solid: &Solid, node: NodeId, m: Vector, clip: [Interval; 3]) -> f64 {
-    let plain = support(solid, node, m, clip);
-    let children = match &solid.nodes[node as usize] {
-        Node::Empty | Node::Primitive(_) => return plain,
-        Node::Op(Op::Difference, children) => return plain.min(split_support(solid, children[0], m, clip)),
-        Node::Op(Op::Union, children) => {
-            let each = children.iter().map(|c| split_support(solid, *c, m, clip));
-            return plain.min(each.fold(f64::NEG_INFINITY, f64::max));
+    let mut children = Vec::new();
+    operands(solid, node, &mut children);
+    split_among(solid, &children, m, clip, EXPANDED).min(support(solid, node, m, clip))
+}
+
+/// The same of the operands of an intersection. One that is a union is each of its operands in turn, as long as there are fewer than
+/// `left` intersections.
+fn split_among(solid: &Solid, children: &[NodeId], m: Vector, clip: [Interval; 3], left: usize) -> f64 {
+    for (k, child) in children.iter().enumerate() {
+        if let Node::Op(Op::Union, parts) = &solid.nodes[*child as usize]
+            && parts.len() <= left
+        {
+            let each = parts.iter().map(|part| {
+                let mut of_part = children.to_vec();
+                of_part.remove(k);
+                operands(solid, *part, &mut of_part);
+                split_among(solid, &of_part, m, clip, left / parts.len())
+            });
+            return each.fold(f64::NEG_INFINITY, f64::max);
         }
-        Node::Op(Op::Intersection, children) => children,
-    };
+    }
+    let plain = children.iter().map(|c| support(solid, *c, m, clip)).fold(f64::INFINITY, f64::min);
+    if children.len() < 2 {
+        return plain;
+    }
     let of = |parts: &[[f64; 3]], rest: usize| {
         // One operand takes what rounding leaves of the others' sum.
         let mut left = m;
@@ -123,18 +152,25 @@ fn split_support(solid: &Solid, node: NodeId, m: Vector, clip: [Interval; 3]) ->
     let mut parts = vec![[0.0; 3]; children.len()];
     let mut best = of(&parts, rest).min(plain);
     for step in STEPS {
-        for k in (0..children.len()).filter(|k| *k != rest) {
-            // To the 26 neighbours in a cubic grid.
-            for way in (0..27).filter(|way| *way != 13) {
-                let before = parts[k];
-                let to = [way % 3, way / 3 % 3, way / 9].map(|digit| step * (f64::from(digit) - 1.0));
-                parts[k] = std::array::from_fn(|j| before[j] + to[j]);
-                let sum = of(&parts, rest);
-                if sum < best {
-                    best = sum;
-                } else {
-                    parts[k] = before;
+        // As long as a round of them leads down.
+        for _ in 0..ROUNDS {
+            let reached = best;
+            for k in (0..children.len()).filter(|k| *k != rest) {
+                // To the 26 neighbours in a cubic grid.
+                for way in (0..27).filter(|way| *way != 13) {
+                    let before = parts[k];
+                    let to = [way % 3, way / 3 % 3, way / 9].map(|digit| step * (f64::from(digit) - 1.0));
+                    parts[k] = std::array::from_fn(|j| before[j] + to[j]);
+                    let sum = of(&parts, rest);
+                    if sum < best {
+                        best = sum;
+                    } else {
+                        parts[k] = before;
+                    }
                 }
+            }
+            if best == reached {
+                break;
             }
         }
     }

@@ -147,7 +147,7 @@ fn all_regions_of_bodies_that_rest_are_told_again() {
 fn plays_that_were_told_wrong_once_are_told_right() {
     let seeds = [
         40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_001_917, 40_001_935, 40_002_002, 40_002_375, 40_003_306,
-        40_002_817, 40_000_682, 77_001_574,
+        40_002_817, 40_000_682, 77_001_574, 260_416,
     ];
     seeds.into_par_iter().for_each(|seed| {
         let work = run(seed, STEPS);
