@@ -11,6 +11,7 @@ use super::patch::{Corner, key_of};
 use super::surface::{FacePair, Standing, is_convex, standing};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::separation::Place;
+use crate::solid::Sense;
 use crate::solid::surface::curve::{self, Nearness, Outward};
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_4, TAU};
@@ -134,7 +135,7 @@ fn edge(bodies: &Bodies, p: Lit, q: Lit, found: &mut impl FnMut(Curve)) {
 fn tangent(bodies: &Bodies, p: Lit, q: Lit) -> Option<Curve> {
     let [out_p, out_q] = [p, q].map(|l| Outward { face: bodies.face(l), is_convex: is_convex(l) });
     let within = Nearness { near: bodies.tau, lie: bodies.lie, size: bodies.size };
-    let found = curve::tangent(out_p, out_q, |x| bodies.look_out(q, x).normal, &within);
+    let found = curve::tangent(out_p, out_q, |x| bodies.slant_out(q, x).1, &within);
     found.map(|curve| Curve::of(bodies, q.0, curve))
 }
 
@@ -179,6 +180,21 @@ fn lies_in(bodies: &Bodies, curve: &Curve, (from, to): (f64, f64), lit: Lit) -> 
     })
 }
 
+/// True when no piece of a straight candidate lies in any face of a side that does not make it, all of them flat: it rises from each
+/// faster than `lies_in` allows for the shortest piece.
+fn leaves(bodies: &Bodies, c: &Candidate, others: &[Lit]) -> bool {
+    let Curve::Line { along, .. } = c.curve else { return false };
+    let least = 6.0 * (bodies.lie * bodies.size).sqrt();
+    let most = 2.0 * (4.0 * bodies.lie + bodies.eps);
+    let rises = |lit: &Lit| {
+        bodies.work.look(1);
+        // A tenth more: rounding is far less.
+        bodies.face(*lit).flat().is_some_and(|(normal, _)| normal.dot(along).abs() * least > 1.1 * most)
+    };
+    let without = |side: Side| c.faces.iter().all(|l| l.0 != side) && others.iter().filter(|l| l.0 == side).all(rises);
+    without(Side::A) || without(Side::B)
+}
+
 /// True when the straight way between two points of a pair's flat patch leaves it nowhere.
 pub fn sees(bodies: &Bodies, pair: &FacePair, lits: &[Lit], x: DVec3, y: DVec3) -> bool {
     let Some(along) = (y - x).try_normalize() else { return true };
@@ -194,31 +210,85 @@ pub fn sees(bodies: &Bodies, pair: &FacePair, lits: &[Lit], x: DVec3, y: DVec3) 
         .all(|w| standing(bodies, pair, curve.point(0.5 * (w[0] + w[1]))) != Standing::Outside)
 }
 
+/// A literal along a curve. Of a flat one along a line what is farther from zero than rounding is known without a look.
+struct Along<'b, 't, 'a> {
+    bodies: &'b Bodies<'t, 'a>,
+    curve: &'b Curve,
+    lit: Lit,
+    /// Value at parameter 0, what it gains a unit of length, and by how much rounding may move either way of working it out.
+    law: Option<[f64; 3]>,
+}
+
+impl<'b, 't, 'a> Along<'b, 't, 'a> {
+    fn new(bodies: &'b Bodies<'t, 'a>, curve: &'b Curve, lit: Lit, (from, to): (f64, f64)) -> Self {
+        let law = match (*curve, bodies.face(lit).flat()) {
+            (Curve::Line { origin, along }, Some((normal, offset))) => {
+                let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
+                let far = origin.length() + from.abs().max(to.abs()) + offset.abs();
+                Some([sign * (normal.dot(origin) - offset), sign * normal.dot(along), SURE * f64::EPSILON * far])
+            }
+            _ => None,
+        };
+        Self { bodies, curve, lit, law }
+    }
+
+    fn value(&self, s: f64) -> f64 {
+        self.bodies.value(self.lit, self.curve.point(s))
+    }
+
+    /// The sign of `value(s) − level` where that is beyond doubt.
+    fn side(&self, s: f64, level: f64) -> Option<bool> {
+        let [at, gain, doubt] = self.law?;
+        let v = at + gain * s - level;
+        (v.abs() > doubt).then_some(v < 0.0)
+    }
+
+    fn is_negative(&self, s: f64) -> bool {
+        self.side(s, 0.0).unwrap_or_else(|| self.value(s) < 0.0)
+    }
+
+    /// True when the value's amount is more than `reach`.
+    fn is_beyond(&self, s: f64, reach: f64) -> bool {
+        match (self.side(s, reach), self.side(s, -reach)) {
+            (Some(false), _) | (_, Some(true)) => true,
+            (Some(true), Some(false)) => false,
+            _ => self.value(s).abs() > reach,
+        }
+    }
+}
+
+/// Roundings, of the numbers that a flat literal's value along a line is made of, beyond which its sign is known: some ten are made.
+const SURE: f64 = 64.0;
+
 /// Parameters in [from, to] at which a face passes through the curve.
 fn roots(bodies: &Bodies, curve: &Curve, lit: Lit, (from, to): (f64, f64), out: &mut Vec<f64>) {
-    let value = |s: f64| bodies.value(lit, curve.point(s));
+    let along = Along::new(bodies, curve, lit, (from, to));
     // A curve that lies in a face (more common points than a conic and a quadric can have) has no crossing with it.
-    if (0..6).all(|k| value(from + (to - from) * (0.07 + 0.15 * f64::from(k))).abs() <= bodies.lie + bodies.eps) {
+    let near = bodies.lie + bodies.eps;
+    if (0..6).all(|k| !along.is_beyond(from + (to - from) * (0.07 + 0.15 * f64::from(k)), near)) {
         return;
     }
     let (speed, least) = (curve.speed(), 1e-4 * bodies.size);
     let mut stack = vec![(from, to)];
     while let Some((s, e)) = stack.pop() {
         let m = 0.5 * (s + e);
-        let v = value(m);
-        if v.abs() > 0.5 * (e - s) * speed || bodies.work.is_spent() {
+        if along.is_beyond(m, 0.5 * (e - s) * speed) || bodies.work.is_spent() {
             continue;
         }
         if (e - s) * speed > least {
             stack.extend([(m, e), (s, m)]);
             continue;
         }
-        let (vs, ve) = (value(s), value(e));
-        if (vs < 0.0) != (ve < 0.0) {
+        let below = along.is_negative(s);
+        if below != along.is_negative(e) {
             let (mut lo, mut hi) = (s, e);
             for _ in 0..80 {
                 let m = 0.5 * (lo + hi);
-                if (value(m) < 0.0) == (vs < 0.0) { lo = m } else { hi = m }
+                // Neighbours: it stays so.
+                if m == lo || m == hi {
+                    break;
+                }
+                if along.is_negative(m) == below { lo = m } else { hi = m }
             }
             out.push(0.5 * (lo + hi));
         }
@@ -241,8 +311,8 @@ fn touches(bodies: &Bodies, faces: &[Lit; 2], others: &[Lit], x: DVec3) -> Optio
             .find(|y| bodies.f(side, *y).abs() <= bodies.eps)
     };
     let feet = [foot_on(Side::A)?, foot_on(Side::B)?];
-    let bodily = bodies.is_bodily(Side::A, feet[0]) && bodies.is_bodily(Side::B, feet[1]);
-    (bodily && (feet[1] - feet[0]).length() <= bodies.tau + bodies.eps).then_some(feet)
+    let near = (feet[1] - feet[0]).length() <= bodies.tau + bodies.eps;
+    (near && bodies.is_bodily(Side::A, feet[0]) && bodies.is_bodily(Side::B, feet[1])).then_some(feet)
 }
 
 /// The runs of a candidate on which the bodies touch and no patch holds them already.
@@ -254,12 +324,23 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
         .collect();
     others.sort_unstable();
     others.dedup();
+    if leaves(bodies, c, &others) { Vec::new() } else { runs_among(bodies, c, places, &others, in_patch) }
+}
+
+/// The same; `others`: the faces of the places that do not make the candidate.
+fn runs_among(
+    bodies: &Bodies,
+    c: &Candidate,
+    places: &[&Place],
+    others: &[Lit],
+    in_patch: &dyn Fn(DVec3) -> bool,
+) -> Vec<Run> {
     let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
-    let Some(stops) = range.and_then(|range| stops(bodies, c, &others, range)) else { return Vec::new() };
+    let Some(stops) = range.and_then(|range| stops(bodies, c, others, range)) else { return Vec::new() };
     let round = matches!(c.curve, Curve::Circle { .. });
     let pieces = stops.windows(2).map(|w| {
         let x = c.curve.point(0.5 * (w[0] + w[1]));
-        Piece { from: w[0], to: w[1], feet: touches(bodies, &c.faces, &others, x).filter(|_| !in_patch(x)) }
+        Piece { from: w[0], to: w[1], feet: touches(bodies, &c.faces, others, x).filter(|_| !in_patch(x)) }
     });
     let mut out = joined(&c.curve, pieces.collect());
     // A curve that only bends close to a face is no line: it would leave it if it went on. One that lies in it stays.
@@ -276,7 +357,7 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
         let corner = |(i, s): (usize, f64)| {
             let x = c.curve.point(s);
             // Gaps are linear along a line to first order; where its very end has no feet, those of the middle tell.
-            let (x, gap) = touches(bodies, &c.faces, &others, x).map_or_else(
+            let (x, gap) = touches(bodies, &c.faces, others, x).map_or_else(
                 || (x, (run.feet[1] - run.feet[0]).length()),
                 |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()),
             );
@@ -373,4 +454,109 @@ fn ends(run: &Run, round: bool) -> Vec<f64> {
         ends.extend(marks.filter(|s| *s > run.from + 1e-6 && *s < run.to - 1e-6));
     }
     ends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::instant::separation::Cover;
+    use crate::contact::instant::work::Work;
+    use crate::contact::query::options::QueryOptions;
+    use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
+    use crate::contact::query::task::Task;
+    use crate::math::random::Random;
+    use crate::motion::Placed;
+    use crate::octree::testing::simple;
+    use crate::solid::primitive::Cuboid;
+    use contactd_proto::motion::quat_of_rotation_vector;
+    use contactd_proto::{Motion, Pose};
+    use glam::dvec3;
+
+    /// Shows two random boxes that lie on each other, one of them tilted a little, as bodies with a cover of what is near.
+    fn each_pair(seed: u64, count: usize, mut seen: impl FnMut(&Bodies, &[Place], &mut Random)) {
+        let mut r = Random(seed);
+        for i in 0..count {
+            let mut half = || dvec3(r.within(0.2, 1.0), r.within(0.2, 1.0), r.within(0.2, 1.0));
+            let (own, other) = (half(), half());
+            let (slab, block) = (simple(Cuboid { half: own }), simple(Cuboid { half: other }));
+            let tilt = [0.0, 1e-5, 1e-3, 0.03, 0.1, 0.5][i % 6];
+            let turn = quat_of_rotation_vector(
+                r.vector(1.0) * DVec3::Z + dvec3(r.within(-tilt, tilt), r.within(-tilt, tilt), 0.0),
+            );
+            let lowest =
+                [-1.0, 1.0].into_iter().flat_map(|x| [-1.0, 1.0].map(|y| (turn * (other * dvec3(x, y, -1.0))).z));
+            let up = own.z - lowest.fold(f64::INFINITY, f64::min) + r.within(-2e-4, 8e-4);
+            let frame = Pose::new(r.vector(3.0), quat_of_rotation_vector(r.vector(2.0)));
+            let placed = |pose| Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) };
+            let on_it = Pose::new(dvec3(r.within(-0.3, 0.3), r.within(-0.3, 0.3), up), turn);
+            let query = PairQuery {
+                a: PlacedModel { model: &slab, placed: placed(frame) },
+                b: PlacedModel { model: &block, placed: placed(frame.compose(&on_it)) },
+                resolution: default_resolution(&slab, &block),
+                cell_limit: 1000,
+                strategies: Strategies::default(),
+                query_options: QueryOptions::DEPTH,
+            };
+            let (task, _) = Task::of(&query);
+            let (instant, work) = (task.relative.at(0.0), Work::new(1_000_000));
+            let bodies = Bodies::new(&task, &instant, 1e-3, &work);
+            let mut cover = Cover::new(&task, &instant, bodies.tau, bodies.tau, &work);
+            let places: Vec<Place> = std::iter::from_fn(|| cover.next(0.5 * bodies.tau)).collect();
+            seen(&bodies, &places, &mut r);
+        }
+    }
+
+    #[test]
+    fn what_is_known_of_a_plane_along_a_line_is_what_a_look_says() {
+        let mut counts = [0; 4];
+        each_pair(0x0061_6c6f_6e67, 120, |bodies, places, r| {
+            for place in places {
+                for c in candidates(bodies, place) {
+                    let range = c.curve.range(place);
+                    for lit in [Side::A, Side::B].iter().flat_map(|s| place.lits(*s)).filter(|l| !c.faces.contains(l)) {
+                        let along = Along::new(bodies, &c.curve, lit, range);
+                        let Some([at, gain, _]) = along.law else { panic!("a plane along a line has a law") };
+                        for _ in 0..40 {
+                            // Anywhere, and next to where the value is the level: from far roundings to none.
+                            let reach = if r.unit() < 0.5 { 0.0 } else { r.within(0.0, 1e-3) };
+                            let level = if r.unit() < 0.5 { reach } else { -reach };
+                            let near = (level - at) / gain + r.within(-1.0, 1.0) * 10f64.powf(r.within(-17.0, -1.0));
+                            let s = if near.abs() < 3.0 { near } else { r.within(range.0, range.1) };
+                            let v = along.value(s);
+                            assert_eq!(along.is_negative(s), v < 0.0, "{s} of {:?}: {v}", along.law);
+                            assert_eq!(
+                                along.is_beyond(s, reach),
+                                v.abs() > reach,
+                                "{s}, {reach} of {:?}: {v}",
+                                along.law
+                            );
+                            counts[usize::from(along.side(s, 0.0).is_some())] += 1;
+                            counts[2 + usize::from(v < 0.0)] += 1;
+                        }
+                    }
+                }
+            }
+        });
+        assert!(counts.iter().all(|n| *n > 1000), "looked at, known, outside, inside: {counts:?}");
+    }
+
+    #[test]
+    fn a_candidate_that_leaves_all_faces_has_no_run() {
+        let (mut left, mut stayed, mut ran) = (0, 0, 0);
+        each_pair(0x6c65_6176_6573, 240, |bodies, places, _| {
+            for place in places {
+                let lits = [Side::A, Side::B].map(|s| place.lits(s)).concat();
+                for c in candidates(bodies, place) {
+                    let others: Vec<Lit> = lits.iter().filter(|l| !c.faces.contains(l)).copied().collect();
+                    let runs = runs_among(bodies, &c, &[place], &others, &|_| false);
+                    let leaves = leaves(bodies, &c, &others);
+                    assert!(!leaves || runs.is_empty(), "{c:?} is said to leave, and runs {runs:?}");
+                    left += usize::from(leaves);
+                    stayed += usize::from(!leaves);
+                    ran += usize::from(!runs.is_empty());
+                }
+            }
+        });
+        assert!(left > 150 && stayed > 500 && ran > 300, "{left} leave, {stayed} stay, {ran} of these touch");
+    }
 }

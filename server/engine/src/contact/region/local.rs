@@ -11,6 +11,7 @@ use crate::motion::Instant;
 use crate::solid::local::{self, Expression, LiteralId, Token, Truth};
 use crate::solid::{Face, Sense, Solid};
 use glam::{DMat3, DVec3};
+use smallvec::{SmallVec, smallvec};
 use std::cell::OnceCell;
 
 /// Gradients within this angle are parallel.
@@ -19,6 +20,8 @@ pub const ANGLE: f64 = 1e-7;
 /// Largest separation, in diameters of the smaller body, at which surfaces are said to touch in regions. From farther away
 /// all of a body is near: there one place counts, the nearest.
 const REACH: f64 = 0.125;
+/// Tokens for which there is room from the start in what is open at a point: few faces pass there.
+const ROOM: usize = 16;
 /// Largest deviation, in the same unit, with which they lie along each other.
 const LIE: f64 = 0.01;
 
@@ -73,8 +76,16 @@ impl Carried {
         Self { listed, made }
     }
 
+    #[inline]
     fn face(&self, solid: &Solid, at: &Instant, id: usize) -> &Face {
-        let Some(i) = id.checked_sub(self.listed.len()) else { return &self.listed[id] };
+        match self.listed.get(id) {
+            Some(face) => face,
+            None => self.made(solid, at, id - self.listed.len()),
+        }
+    }
+
+    /// A face behind those that are listed.
+    fn made(&self, solid: &Solid, at: &Instant, i: usize) -> &Face {
         let chunk = self.made[i / Self::TOGETHER].get_or_init(|| {
             let from = self.listed.len() + i / Self::TOGETHER * Self::TOGETHER;
             let all = from..(from + Self::TOGETHER).min(solid.faces.len());
@@ -101,6 +112,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     }
 
     /// The face of a literal, in A's frame.
+    #[inline]
     pub fn face(&self, (side, id): Lit) -> &Face {
         match side {
             Side::A => &self.task.a.faces[id.face() as usize],
@@ -113,8 +125,46 @@ impl<'t, 'a> Bodies<'t, 'a> {
         self.work.look(1);
         let face = self.face(lit);
         let f = face.at(x);
-        let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
-        At { value: f.value * sign, normal: f.normal * sign, hessian: newton::hessian(face, x) * sign, slope: f.slope }
+        let sign = sign(lit);
+        At {
+            value: f.value * sign,
+            normal: f.normal * sign,
+            hessian: newton::hessian_at(face, x, &f) * sign,
+            slope: f.slope,
+        }
+    }
+
+    /// A literal's value and gradient at a point: the same as `look` tells of them, for who has no use for the rest.
+    #[inline]
+    pub fn slant(&self, lit: Lit, x: DVec3) -> (f64, DVec3) {
+        self.work.look(1);
+        let f = self.face(lit).at(x);
+        let sign = sign(lit);
+        (f.value * sign, f.normal * sign)
+    }
+
+    /// The same with the Hessian, `None` for that of a flat face.
+    pub fn bent(&self, lit: Lit, x: DVec3) -> (f64, DVec3, Option<DMat3>) {
+        if self.face(lit).is_flat() {
+            let (value, normal) = self.slant(lit, x);
+            return (value, normal, None);
+        }
+        let at = self.look(lit, x);
+        (at.value, at.normal, Some(at.hessian))
+    }
+
+    /// The same as `look_out` tells of them.
+    #[inline]
+    pub fn slant_out(&self, lit: Lit, x: DVec3) -> (f64, DVec3) {
+        self.work.look(1);
+        let f = self.face(lit).at(x);
+        let sign = sign(lit);
+        let (value, normal) = (f.value * sign, f.normal * sign);
+        if f.slope == 1.0 {
+            return (value, normal);
+        }
+        let by = 1.0 / f.slope;
+        (value * by, normal * by)
     }
 
     /// The same as a distance, next to the surface: all over the length of the gradient, which is then a unit vector.
@@ -128,6 +178,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     }
 
     /// A literal's value at a point.
+    #[inline]
     pub fn value(&self, lit: Lit, x: DVec3) -> f64 {
         self.work.look(1);
         let v = self.face(lit).value(x);
@@ -153,8 +204,12 @@ impl<'t, 'a> Bodies<'t, 'a> {
     /// The point of a literal's surface next to `x`.
     pub fn foot(&self, lit: Lit, mut x: DVec3) -> DVec3 {
         for _ in 0..3 {
-            let at = self.look_out(lit, x);
-            x -= at.normal * at.value;
+            let (value, normal) = self.slant_out(lit, x);
+            let from = x;
+            x -= normal * value;
+            if x == from {
+                break;
+            }
         }
         x
     }
@@ -172,7 +227,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
     pub fn open(&self, side: Side, x: DVec3) -> (Truth, Vec<Token>) {
         let solid = if side == Side::A { self.task.a } else { self.task.b };
         self.work.look(solid.faces.len());
-        let mut out = Vec::new();
+        let mut out = Vec::with_capacity(solid.normal_form.len().min(ROOM));
         let truth = solid.prune(&solid.normal_form, &mut out, &mut |id| {
             let v = self.face((side, id)).value(x);
             local::truth_of(id.sense(), (v, v), 0.0, self.eps)
@@ -181,25 +236,21 @@ impl<'t, 'a> Bodies<'t, 'a> {
     }
 
     /// The literals through a point, each once.
-    pub fn through(&self, side: Side, x: DVec3) -> Vec<LiteralId> {
-        let (_, tokens) = self.open(side, x);
-        let mut ids: Vec<LiteralId> = local::literals(&tokens).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        ids
+    pub fn through(&self, side: Side, x: DVec3) -> SmallVec<[LiteralId; ROOM]> {
+        each_once(&self.open(side, x).1)
     }
 
     /// Direction in which a literal rises at `x`; away from the cone along the axis at an apex, and whether it is one.
     pub fn rise(&self, lit: Lit, x: DVec3) -> (DVec3, bool) {
         match self.face(lit).apex().filter(|apex| (x - apex.point).length() <= self.eps) {
             Some(apex) => (if lit.1.sense() == Sense::Positive { -apex.axis } else { apex.axis }, true),
-            None => (self.look_out(lit, x).normal, false),
+            None => (self.slant_out(lit, x).1, false),
         }
     }
 
     /// 1 on a face of a body, 2 on an edge, 3 at a vertex: dimensions that the normals of the faces through `x` span.
     pub fn rank(&self, side: Side, x: DVec3) -> usize {
-        let mut span: Vec<DVec3> = Vec::new();
+        let mut span: SmallVec<[DVec3; 3]> = SmallVec::new();
         for id in self.through(side, x) {
             let (g, is_apex) = self.rise((side, id), x);
             if is_apex {
@@ -226,10 +277,24 @@ impl<'t, 'a> Bodies<'t, 'a> {
             return truth == Truth::True;
         }
         clauses(&tokens).iter().any(|clause| {
-            let rises: Vec<DVec3> = clause.iter().map(|id| self.rise((side, *id), x).0).collect();
+            let rises: SmallVec<[DVec3; FEW]> = clause.iter().map(|id| self.rise((side, *id), x).0).collect();
             has_descent(&rises, 1e-6)
         })
     }
+}
+
+/// The sign with which a literal takes its face's psi.
+#[inline]
+fn sign(lit: Lit) -> f64 {
+    if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 }
+}
+
+/// The literals of an expression, each once, in order.
+pub fn each_once(tokens: &[Token]) -> SmallVec<[LiteralId; ROOM]> {
+    let mut ids: SmallVec<[LiteralId; ROOM]> = local::literals(tokens).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
 }
 
 /// Gradients up to which `has_descent` tries every direction that can be the best one.
@@ -283,19 +348,26 @@ fn falls_by_turns(gradients: &[DVec3], least: f64) -> bool {
     false
 }
 
+/// An alternative of an expression, and all of them.
+type Clause = SmallVec<[LiteralId; FEW]>;
+type Clauses = SmallVec<[Clause; 1]>;
+
 /// The alternatives of an expression, each a set of literals that must hold together; the first few of many.
-fn clauses(tokens: &[Token]) -> Vec<Vec<LiteralId>> {
+fn clauses(tokens: &[Token]) -> Clauses {
     const MOST: usize = 64;
-    fn of(e: Expression<'_>) -> Vec<Vec<LiteralId>> {
+    fn of(e: Expression<'_>) -> Clauses {
         match e {
-            Expression::Literal(id) => vec![vec![id]],
-            Expression::Part(_) => vec![vec![]],
+            Expression::Literal(id) => smallvec![smallvec![id]],
+            Expression::Part(_) => smallvec![Clause::new()],
             Expression::Or(body) => local::operands(body).flat_map(of).take(MOST).collect(),
-            Expression::And(body) => local::operands(body).map(of).fold(vec![vec![]], |all, one| {
-                all.iter()
-                    .flat_map(|left| one.iter().map(move |right| [left.as_slice(), right].concat()))
-                    .take(MOST)
-                    .collect()
+            Expression::And(body) => local::operands(body).fold(smallvec![Clause::new()], |mut all: Clauses, e| {
+                if let Expression::Literal(id) = e {
+                    all.iter_mut().for_each(|clause| clause.push(id));
+                    return all;
+                }
+                let one = of(e);
+                let joined = |left: &Clause, right: &Clause| left.iter().chain(right).copied().collect::<Clause>();
+                all.iter().flat_map(|left| one.iter().map(move |right| joined(left, right))).take(MOST).collect()
             }),
         }
     }

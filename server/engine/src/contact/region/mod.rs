@@ -199,6 +199,7 @@ fn find(bodies: &Bodies) -> Regions {
     let (places, covered) = cover(bodies);
     let mut out = Regions::default();
     let patches = pairs(bodies, &places);
+    let mut ends: Vec<DVec3> = Vec::new();
     for (pair, of) in &patches {
         for part in parts(bodies, &places, of) {
             let corners = patch::corners(bodies, pair, &part);
@@ -206,6 +207,7 @@ fn find(bodies: &Bodies) -> Regions {
                 return out;
             }
             for corners in apart(bodies, pair, &part, corners) {
+                ends.extend(corners.iter().map(|c| c.x));
                 out.regions.push(patch_region(bodies, pair, &corners));
             }
         }
@@ -236,6 +238,7 @@ fn find(bodies: &Bodies) -> Regions {
     for m in point::meetings(bodies, &places) {
         let x = m.middle();
         let known = points.iter().any(|p| (*p - x).length() <= 1e-6 * bodies.size + bodies.lie)
+            || ends.iter().any(|c| (*c - x).length() <= bodies.eps)
             || lines.iter().any(|l| on_run(bodies, l, x))
             || in_patch(x);
         if !known {
@@ -415,7 +418,7 @@ fn points_of(corners: &[Corner]) -> Vec<RegionPoint> {
 }
 
 fn patch_region(bodies: &Bodies, pair: &FacePair, corners: &[Corner]) -> Region {
-    let normals = corners.iter().map(|c| bodies.look_out(pair.alpha, c.x).normal);
+    let normals = corners.iter().map(|c| bodies.slant_out(pair.alpha, c.x).1);
     let mean = normals.clone().sum::<DVec3>();
     let normal = if mean.length() > 1e-3 { mean.normalize() } else { normals.clone().next().unwrap_or(DVec3::Z) };
     Region {

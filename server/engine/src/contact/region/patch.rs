@@ -108,8 +108,8 @@ fn newton(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], mut x: DVec3) -> Op
                 Cut::Face(lit) => {
                     // Each face is read on its own body's side of the gap.
                     let own = if lit.0 == Side::A { pair.alpha } else { pair.beta };
-                    let at = bodies.look_out(lit, bodies.foot(own, x));
-                    (at.value, at.normal - n * at.normal.dot(n))
+                    let (value, normal) = bodies.slant_out(lit, bodies.foot(own, x));
+                    (value, normal - n * normal.dot(n))
                 }
             };
         }
@@ -220,7 +220,7 @@ const LEAST_ANGLE: f64 = 1e-3;
 
 /// Flat patches run round their middle, starting at the point with the smallest key; others go by keys alone.
 pub fn order(bodies: &Bodies, pair: &FacePair, points: &mut [Corner]) {
-    let n = bodies.look_out(pair.alpha, points.first().map_or(DVec3::ZERO, |c| c.x)).normal;
+    let n = bodies.slant_out(pair.alpha, points.first().map_or(DVec3::ZERO, |c| c.x)).1;
     let u = bodies.material(Side::A, n);
     let v = n.cross(u);
     // Of two roots of the same faces the farther one along a direction that is fixed in A.

@@ -55,8 +55,9 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
             if bodies.work.is_spent() {
                 return out;
             }
-            let start = [place.lowest, place.center];
-            let found = start.into_iter().find_map(|x| {
+            // Equations of planes are linear: what has no solution from one start has none from another.
+            let starts = [place.lowest, place.center];
+            let found = starts[..if is_flat { 1 } else { 2 }].iter().find_map(|&x| {
                 let balance = balance(bodies, &lits, x)?;
                 Some((balance.0, meeting(bodies, place, &lits, balance)))
             });
@@ -83,9 +84,12 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
     out
 }
 
+/// Faces that may balance, those of A first.
+type System = SmallVec<[Lit; MOST_BALANCED]>;
+
 /// The sets of one to three faces a side that may balance, each once with the boxes in which they may.
-fn systems<'p>(bodies: &Bodies, places: &'p [Place]) -> BTreeMap<Vec<Lit>, Vec<&'p Place>> {
-    let mut found: BTreeMap<Vec<Lit>, Vec<&Place>> = BTreeMap::new();
+fn systems<'p>(bodies: &Bodies, places: &'p [Place]) -> BTreeMap<System, Vec<&'p Place>> {
+    let mut found: BTreeMap<System, Vec<&Place>> = BTreeMap::new();
     for place in places {
         if bodies.work.is_spent() {
             return found;
@@ -150,7 +154,7 @@ impl InBox {
 
 /// Hands over the sets that may balance in a box, or some of them where the work runs out. Of others two are on no common level in
 /// it, or some direction leads down all of their literals wherever one is, so that their gradients have no sum zero.
-fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(Vec<Lit>) -> ControlFlow<()>) -> ControlFlow<()> {
+fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(System) -> ControlFlow<()>) -> ControlFlow<()> {
     let reach = place.half.length() * (1.0 + SLACK) + bodies.eps;
     let most = 0.5 * bodies.tau + 2.0 * bodies.eps;
     let [of_a, of_b] = [Side::A, Side::B].map(|side| {
@@ -161,7 +165,7 @@ fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(Vec<Lit>) -
             let turn = face.turn(place.center, &at, reach);
             InBox { lit, value: at.value * sign, gradient: at.normal * sign, turn }
         };
-        place.lits(side).into_iter().map(in_box).collect::<Vec<_>>()
+        place.lits(side).into_iter().map(in_box).collect::<SmallVec<[InBox; 2 * MOST_BALANCED]>>()
     });
     bodies.work.look(of_a.len() + of_b.len());
     let level = |way: &[usize], of: &[InBox]| {
@@ -169,7 +173,8 @@ fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(Vec<Lit>) -
     };
     let mut ways_b = choices(of_b.len());
     ways_b.retain(|way| level(way, &of_b));
-    let meets: Vec<bool> = of_a.iter().flat_map(|p| of_b.iter().map(|q| p.may_level(q, reach, most))).collect();
+    let meets: SmallVec<[bool; 32]> =
+        of_a.iter().flat_map(|p| of_b.iter().map(|q| p.may_level(q, reach, most))).collect();
     let mut gradients = SmallVec::<[DVec3; MOST_BALANCED]>::new();
     for way_a in choices(of_a.len()).iter().filter(|way| level(way, &of_a)) {
         if bodies.work.is_spent() {
@@ -211,7 +216,10 @@ fn choices(count: usize) -> Vec<SmallVec<[usize; 3]>> {
 const MOST_PACES: usize = 32;
 
 /// A place where literals balance: point, level, multipliers.
-type Balance = (DVec3, f64, Vec<f64>);
+type Balance = (DVec3, f64, Multipliers);
+
+/// One for each face that balances.
+type Multipliers = SmallVec<[f64; MOST_BALANCED]>;
 
 /// What a balance within a box is to the bodies.
 fn meeting(bodies: &Bodies, place: &Place, lits: &[Lit], (x, level, lambda): Balance) -> Option<Meeting> {
@@ -225,7 +233,7 @@ fn meeting(bodies: &Bodies, place: &Place, lits: &[Lit], (x, level, lambda): Bal
     }
     let sum = |side: Side| {
         let of = lits.iter().zip(&lambda).filter(|(l, _)| l.0 == side);
-        of.map(|(l, w)| bodies.look(*l, x).normal * *w).sum::<DVec3>()
+        of.map(|(l, w)| bodies.slant(*l, x).1 * *w).sum::<DVec3>()
     };
     let normal = (sum(Side::A) - sum(Side::B)).try_normalize()?;
     on_feet(bodies, lits, x, normal).filter(|m| m.gap.abs() <= bodies.tau + eps)
@@ -234,7 +242,7 @@ fn meeting(bodies: &Bodies, place: &Place, lits: &[Lit], (x, level, lambda): Bal
 /// From a point at which literals balance back to each body's own surface, where both trees confirm it.
 fn on_feet(bodies: &Bodies, lits: &[Lit], x: DVec3, normal: DVec3) -> Option<Meeting> {
     // The sharper feature first: a face is met under it, not under the point at which the levels agree.
-    let own = |side: Side| lits.iter().filter(|l| l.0 == side).copied().collect::<Vec<Lit>>();
+    let own = |side: Side| lits.iter().filter(|l| l.0 == side).copied().collect::<SmallVec<[Lit; MOST_BALANCED]>>();
     let (of_a, of_b) = (own(Side::A), own(Side::B));
     let feet = if of_a.len() >= of_b.len() {
         let on_a = follow(bodies, &of_a, x);
@@ -281,20 +289,22 @@ fn balance(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> Option<Balance> {
     let n = m + 4;
     let size = bodies.size;
     let mut level = 0.0;
-    let mut lambda = vec![1.0 / m as f64; m];
+    let mut lambda: Multipliers = smallvec![1.0 / m as f64; m];
     let fill = |x: DVec3, level: f64, lambda: &[f64]| {
         let (mut f, mut jac) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
         let mut total = -1.0;
         for (i, lit) in lits.iter().enumerate() {
-            let at = bodies.look(*lit, x);
-            f[i] = (at.value - level) / size;
+            let (value, normal, hessian) = bodies.bent(*lit, x);
+            f[i] = (value - level) / size;
             jac[i][3] = -1.0;
             for k in 0..3 {
-                jac[i][k] = at.normal[k];
-                jac[m + k][4 + i] = at.normal[k];
-                f[m + k] += lambda[i] * at.normal[k];
-                for j in 0..3 {
-                    jac[m + k][j] += lambda[i] * at.hessian.col(j)[k] * size;
+                jac[i][k] = normal[k];
+                jac[m + k][4 + i] = normal[k];
+                f[m + k] += lambda[i] * normal[k];
+            }
+            if let Some(hessian) = hessian {
+                for (k, j) in (0..9).map(|n| (n / 3, n % 3)) {
+                    jac[m + k][j] += lambda[i] * hessian.col(j)[k] * size;
                 }
             }
             total += lambda[i];
@@ -313,7 +323,7 @@ fn balance(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> Option<Balance> {
         let step = damped_step(&jac, &f, n, (damping * best.min(1e-2)).max(1e-15))?;
         let nx = x + DVec3::new(step[0], step[1], step[2]) * size;
         let nlevel = level + step[3] * size;
-        let nlambda: Vec<f64> = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
+        let nlambda: Multipliers = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
         let next = fill(nx, nlevel, &nlambda);
         if next.2 < best {
             let slow = next.2 > 0.25 * best && best < 1e-26;
@@ -340,17 +350,18 @@ fn balance(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> Option<Balance> {
 fn follow(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> DVec3 {
     let m = lits.len();
     for _ in 0..6 {
-        let at: Vec<_> = lits.iter().map(|l| bodies.look(*l, x)).collect();
+        let at: SmallVec<[(f64, DVec3); MOST_BALANCED]> = lits.iter().map(|l| bodies.slant(*l, x)).collect();
         let (mut gram, mut rhs) = ([[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS], [0.0; MAX_UNKNOWNS]);
         for i in 0..m {
-            for j in 0..m {
-                gram[i][j] = at[i].normal.dot(at[j].normal);
+            // The other half of the matrix is not looked at.
+            for j in 0..=i {
+                gram[i][j] = at[i].1.dot(at[j].1);
             }
             gram[i][i] += 1e-13;
-            rhs[i] = -at[i].value;
+            rhs[i] = -at[i].0;
         }
         let Some(y) = cholesky_solve(&mut gram, rhs, m) else { break };
-        let next = x + (0..m).map(|i| at[i].normal * y[i]).sum::<DVec3>();
+        let next = x + (0..m).map(|i| at[i].1 * y[i]).sum::<DVec3>();
         if next == x {
             break;
         }
@@ -522,7 +533,7 @@ mod tests {
                 });
                 for p in place.lits(Side::A) {
                     for q in place.lits(Side::B) {
-                        let lits = vec![p, q];
+                        let lits: System = smallvec![p, q];
                         if listed.contains(&lits) {
                             continue;
                         }

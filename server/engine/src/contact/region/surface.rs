@@ -5,13 +5,14 @@
 //! one side and B on the other make it a contact. No sector: outside; all: inside the patch; some: on its boundary, and
 //! at a corner unless the boundary goes straight on.
 
-use super::local::{ANGLE, At, Bodies, Lit, holds};
+use super::local::{ANGLE, At, Bodies, Lit, each_once, holds};
 use crate::contact::exclusion::literal::Side;
 use crate::math::any_perpendicular;
 use crate::solid::Sense;
 use crate::solid::local::{LiteralId, Token, Truth};
 use crate::solid::surface::{Axis, Symmetry};
 use glam::DVec3;
+use smallvec::SmallVec;
 use std::f64::consts::{PI, TAU};
 
 /// A face of A and one of B that coincide within the threshold of touching, facing each other.
@@ -34,14 +35,14 @@ impl FacePair {
         let opposite = alpha.1.sense() != beta.1.sense();
         let (face_a, face_b) = (bodies.face(alpha), bodies.face(beta));
         if face_a.is_flat() && face_b.is_flat() {
-            let (a, b) = (bodies.look(alpha, DVec3::ZERO), bodies.look(beta, DVec3::ZERO));
-            let lean = a.normal + b.normal;
+            let ((a, normal_a), (b, normal_b)) = (bodies.slant(alpha, DVec3::ZERO), bodies.slant(beta, DVec3::ZERO));
+            let lean = normal_a + normal_b;
             let tilt = lean.length();
             if tilt * size > LEAN * bodies.lie {
                 return None;
             }
             // gap(x) = a(x) + b(x): both are distances from their bodies.
-            let limit = (tilt * size > 0.25 * tau).then(|| (lean / tilt, (tau - a.value - b.value) / tilt));
+            let limit = (tilt * size > 0.25 * tau).then(|| (lean / tilt, (tau - a - b) / tilt));
             return Some(Self { alpha, beta, limit });
         }
         let found = face_a.deviation(face_b, size).is_some_and(|d| d <= tau);
@@ -50,7 +51,7 @@ impl FacePair {
 
     /// Feet of a point on both faces, and the normal from A to B.
     pub fn feet(&self, bodies: &Bodies, x: DVec3) -> (DVec3, DVec3, DVec3) {
-        (bodies.foot(self.alpha, x), bodies.foot(self.beta, x), bodies.look_out(self.alpha, x).normal)
+        (bodies.foot(self.alpha, x), bodies.foot(self.beta, x), bodies.slant_out(self.alpha, x).1)
     }
 
     /// Separation of the faces at a point.
@@ -61,8 +62,8 @@ impl FacePair {
 
     /// Half way between the faces: value and gradient.
     pub fn middle(&self, bodies: &Bodies, x: DVec3) -> (f64, DVec3) {
-        let (a, b) = (bodies.look_out(self.alpha, x), bodies.look_out(self.beta, x));
-        (0.5 * (a.value - b.value), (a.normal - b.normal) * 0.5)
+        let ((a, normal_a), (b, normal_b)) = (bodies.slant_out(self.alpha, x), bodies.slant_out(self.beta, x));
+        (0.5 * (a - b), (normal_a - normal_b) * 0.5)
     }
 }
 
@@ -75,6 +76,9 @@ pub enum Standing {
     Boundary,
     Corner,
 }
+
+/// Faces of both bodies that pass through a point of a patch, usually: as many need no memory of their own.
+const FEW: usize = 8;
 
 /// A literal's part in the tangent plane of a point.
 struct SurfacePart {
@@ -90,7 +94,7 @@ struct Around<'t> {
     /// Normal of the surface.
     normal: DVec3,
     surface: At,
-    parts: Vec<SurfacePart>,
+    parts: &'t [SurfacePart],
     /// Where faces lean against each other and the point lies on the end of their half-space: its normal, outwards.
     limit: Option<DVec3>,
     /// What is open of both bodies there.
@@ -127,7 +131,7 @@ impl Around<'_> {
         let e1 = any_perpendicular(n);
         let e2 = n.cross(e1);
         let angle = |d: DVec3| d.dot(e2).atan2(d.dot(e1)).rem_euclid(TAU);
-        let mut cuts: Vec<(f64, Option<usize>)> = Vec::new();
+        let mut cuts: SmallVec<[(f64, Option<usize>); 2 * FEW]> = SmallVec::new();
         for (i, part) in self.parts.iter().enumerate().filter(|(_, p)| p.across != DVec3::ZERO) {
             let t = n.cross(part.across);
             cuts.extend([(angle(t), Some(i)), (angle(-t), Some(i))]);
@@ -142,7 +146,7 @@ impl Around<'_> {
             return if self.holds(e1) { Standing::Inside } else { Standing::Outside };
         }
         let count = cuts.len();
-        let inside: Vec<bool> = (0..count)
+        let inside: SmallVec<[bool; 2 * FEW]> = (0..count)
             .map(|i| {
                 let (from, to) = (cuts[i].0, if i + 1 < count { cuts[i + 1].0 } else { cuts[0].0 + TAU });
                 let (s, c) = libm::sincos(0.5 * (from + to));
@@ -154,7 +158,7 @@ impl Around<'_> {
             n if n == count => return Standing::Inside,
             _ => {}
         }
-        let turns: Vec<&(f64, Option<usize>)> =
+        let turns: SmallVec<[&(f64, Option<usize>); 2 * FEW]> =
             (0..count).filter(|i| inside[*i] != inside[(*i + count - 1) % count]).map(|i| &cuts[i]).collect();
         let straight = turns.len() == 2 && ((turns[1].0 - turns[0].0) - PI).abs() <= 10.0 * ANGLE;
         // A line that runs into an arc: as straight, but another curve.
@@ -171,14 +175,21 @@ impl Around<'_> {
 /// What the point `x` of a pair's surface is to its patch.
 pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
     let (x_a, x_b, n) = pair.feet(bodies, x);
-    let ((truth_a, tokens_a), (truth_b, tokens_b)) = (bodies.open(Side::A, x_a), bodies.open(Side::B, x_b));
-    if truth_a != Truth::Open || truth_b != Truth::Open || (x_b - x_a).dot(n) > bodies.tau * (1.0 + 1e-9) {
+    if (x_b - x_a).dot(n) > bodies.tau * (1.0 + 1e-9) {
+        return Standing::Outside;
+    }
+    let (truth_a, tokens_a) = bodies.open(Side::A, x_a);
+    if truth_a != Truth::Open {
+        return Standing::Outside;
+    }
+    let (truth_b, tokens_b) = bodies.open(Side::B, x_b);
+    if truth_b != Truth::Open {
         return Standing::Outside;
     }
     let surface = bodies.look_out(pair.alpha, x_a);
-    let mut parts = Vec::new();
-    for (side, y) in [(Side::A, x_a), (Side::B, x_b)] {
-        for id in bodies.through(side, y) {
+    let mut parts: SmallVec<[SurfacePart; FEW]> = SmallVec::new();
+    for (side, y, tokens) in [(Side::A, x_a, &tokens_a), (Side::B, x_b, &tokens_b)] {
+        for id in each_once(tokens) {
             let at = bodies.look_out((side, id), y);
             let across = at.normal - n * at.normal.dot(n);
             // Leaning faces of a pair count as parallel.
@@ -193,7 +204,7 @@ pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
         return Standing::Outside;
     }
     let limit = limit.filter(|(_, v)| at_limit(*v)).map(|(m, _)| m);
-    Around { normal: n, surface, parts, limit, open: [&tokens_a, &tokens_b], size: bodies.size }.standing()
+    Around { normal: n, surface, parts: &parts, limit, open: [&tokens_a, &tokens_b], size: bodies.size }.standing()
 }
 
 /// The literals of a list by surface: the first one that coincides with each stands for it.
@@ -209,8 +220,8 @@ pub fn same_surface(bodies: &Bodies, p: Lit, q: Lit) -> bool {
     let (face_p, face_q) = (bodies.face(p), bodies.face(q));
     if face_p.is_flat() && face_q.is_flat() {
         // Planes of either sense, by how they look out of the body.
-        let (a, b) = (bodies.look(p, DVec3::ZERO), bodies.look(q, DVec3::ZERO));
-        return near((a.normal - b.normal).length() * size) && near((a.value - b.value).abs());
+        let ((a, normal_a), (b, normal_b)) = (bodies.slant(p, DVec3::ZERO), bodies.slant(q, DVec3::ZERO));
+        return near((normal_a - normal_b).length() * size) && near((a - b).abs());
     }
     p.1.sense() == q.1.sense() && face_p.difference(face_q, size).is_some_and(near)
 }

@@ -18,7 +18,7 @@ use crate::contact::exclusion::literal::{Faces, Side};
 use crate::contact::query::task::Task;
 use crate::motion::{Instant, Relative};
 use crate::solid::local::LiteralId;
-use crate::solid::surface::{Apex, Curvature};
+use crate::solid::surface::{Apex, Curvature, FaceAt};
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -109,7 +109,12 @@ pub struct Row {
 
 /// Hessian of psi of a face at a point, in the face's own frame.
 pub(in crate::contact) fn hessian(face: &Face, x: DVec3) -> DMat3 {
-    face.curvature(x, &face.at(x)).matrix()
+    hessian_at(face, x, &face.at(x))
+}
+
+/// The same where what the face is at `x` is known.
+pub(in crate::contact) fn hessian_at(face: &Face, x: DVec3, at: &FaceAt) -> DMat3 {
+    face.curvature(x, at).matrix()
 }
 
 impl<'a> Problem<'a> {
