@@ -16,7 +16,9 @@
 use super::MeshFault;
 use super::cells;
 use super::edges::NONE;
-use super::growth::{Builder, IN, KIND, Leaf, Node, OUT, Of, PART, Rough, Tree, UNDECIDED, UPPER, upper, written};
+use super::growth::{
+    Builder, IN, KIND, Leaf, Limits, Node, OUT, Of, PART, Rough, Stop, Tree, UNDECIDED, UPPER, upper, written,
+};
 use super::local::Expr;
 use super::planes::area;
 use super::side::crosses;
@@ -34,8 +36,6 @@ use std::sync::{Arc, OnceLock};
 
 /// Part of a cell's size below which a box is small beside it: only then the formula of a part is asked for bounds.
 const SMALL: f64 = 0.25;
-/// Times that a facet is in a part, on average, at most.
-const MOST_TIMES: usize = 64;
 
 /// The formula of a whole mesh.
 #[derive(Debug)]
@@ -61,6 +61,26 @@ impl std::fmt::Debug for Made {
     }
 }
 
+/// The tree with the smallest parts that there may be, and its top.
+fn tree(surface: &Surface, domain: Aabb) -> Result<(Tree, u32), MeshFault> {
+    let count = surface.triangles.len() as u32;
+    for limits in Limits::of(count as usize) {
+        let rough = |i| Rough::of(&Aabb::of_points(surface.corners(i)));
+        let of = Of::All((0..count).into_par_iter().map(rough).collect());
+        match (Builder { surface, limits, of }).grown((0..count).collect(), domain, (usize::MAX, 0)) {
+            Ok(grown) => {
+                let (tree, top) = Tree::of(grown);
+                if !limits.is_beyond(&tree) {
+                    return Ok((tree, top));
+                }
+            }
+            Err(Stop::TooMany) => {}
+            Err(Stop::Fault(fault)) => return Err(fault),
+        }
+    }
+    Err(MeshFault::Intricate(domain.center()))
+}
+
 impl Divided {
     /// Divides the space around a mesh; `leaders` names of each triangle the first one of the part of the surface that it is in.
     ///
@@ -68,15 +88,7 @@ impl Divided {
     /// What is wrong with the mesh, and where.
     pub fn new(surface: Arc<Surface>, leaders: &[u32]) -> Result<Self, MeshFault> {
         let domain = cells::domain(&surface.around);
-        let count = surface.triangles.len() as u32;
-        let rough = |i| Rough::of(&Aabb::of_points(surface.corners(i)));
-        let builder = Builder { surface: &surface, of: Of::All((0..count).into_par_iter().map(rough).collect()) };
-        let grown = builder.grown((0..count).collect(), domain, (usize::MAX, 0))?;
-        drop(builder);
-        let (tree, top) = Tree::of(grown);
-        if tree.facets.len() > MOST_TIMES * count as usize + 10_000 {
-            return Err(MeshFault::Intricate(domain.center()));
-        }
+        let (tree, top) = tree(&surface, domain)?;
         let made = Made((0..tree.leaves.len()).map(|_| OnceLock::new()).collect());
         let Tree { nodes, leaves, facets } = tree;
         let cuts = domain.min.abs().max(domain.max.abs()).max_element();

@@ -15,6 +15,11 @@ use smallvec::SmallVec;
 const FEW_PLANES: usize = 12;
 /// … and facets.
 const FEW_FACETS: usize = 32;
+/// By how much more both may be, at most, of a mesh that smaller parts do not suit (`Limits`).
+const MOST_COARSE: usize = 64;
+/// Times that a facet is in a part, on average, at most: so often, and some thousands of times more of a small mesh.
+const MOST_TIMES: usize = 64;
+const FEW_TIMES: usize = 10_000;
 /// Divisions in a row that leave as many facets in a cell: they all meet in one corner then.
 const STALLED: u32 = 9;
 /// Facets of such a corner.
@@ -193,9 +198,48 @@ impl Rough {
     }
 }
 
+/// How large parts are, and how often facets may be in one. Cells are as wide as they are long, so a fan of n slivers is told by as
+/// many as n²: of small parts there are more than a mesh of so many triangles may have, of parts with n facets there are few.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    planes: usize,
+    facets: usize,
+    /// Facets in all parts together.
+    all: usize,
+}
+
+impl Limits {
+    /// Those of a mesh of so many triangles, parts the smallest first.
+    pub(super) fn of(triangles: usize) -> impl Iterator<Item = Self> {
+        let coarse = std::iter::successors(Some(1), |k| Some(2 * k)).take_while(|k| *k <= MOST_COARSE);
+        let all = MOST_TIMES * triangles + FEW_TIMES;
+        coarse.map(move |k| Self { planes: k * FEW_PLANES, facets: k * FEW_FACETS, all })
+    }
+
+    /// Whether a tree has more facets than it may.
+    pub(super) fn is_beyond(&self, tree: &Tree) -> bool {
+        tree.facets.len() > self.all
+    }
+}
+
+/// Why there is no tree.
+pub(super) enum Stop {
+    /// More facets in all parts together than `Limits` has.
+    TooMany,
+    /// What is wrong with the mesh.
+    Fault(MeshFault),
+}
+
+impl From<MeshFault> for Stop {
+    fn from(fault: MeshFault) -> Self {
+        Stop::Fault(fault)
+    }
+}
+
 /// Makes the tree: of all facets, or of some that lie side by side in memory then.
 pub(super) struct Builder<'s> {
     pub(super) surface: &'s Surface,
+    pub(super) limits: Limits,
     pub(super) of: Of,
 }
 
@@ -253,12 +297,12 @@ impl Builder<'_> {
     }
 
     /// The tree of a cell that some facets reach; `last`: the facets of the one before, and for how long it has been so.
-    pub(super) fn grown(&self, list: Vec<u32>, cell: Aabb, last: (usize, u32)) -> Result<Grown, MeshFault> {
+    pub(super) fn grown(&self, list: Vec<u32>, cell: Aabb, last: (usize, u32)) -> Result<Grown, Stop> {
         if list.len() < SHARED {
             let all = 0..list.len() as u32;
             let corners: Vec<[DVec3; 3]> = list.iter().map(|i| self.surface.corners(*i)).collect();
             let boxes = corners.iter().map(|c| Aabb::of_points(*c)).collect();
-            let near = Builder { surface: self.surface, of: Of::Some(list, corners, boxes) };
+            let near = Builder { of: Of::Some(list, corners, boxes), ..*self };
             let mut tree = Tree::default();
             let top = near.grow(all.collect(), cell, last, NONE, &mut tree)?;
             tree.shrink();
@@ -274,23 +318,19 @@ impl Builder<'_> {
     }
 
     /// The same of few facets into a tree, below the half `parent`; its place.
-    fn grow(
-        &self,
-        list: Vec<u32>,
-        cell: Aabb,
-        last: (usize, u32),
-        parent: u32,
-        tree: &mut Tree,
-    ) -> Result<u32, MeshFault> {
+    fn grow(&self, list: Vec<u32>, cell: Aabb, last: (usize, u32), parent: u32, tree: &mut Tree) -> Result<u32, Stop> {
         let last = stalled(last, list.len());
-        if (list.len() <= FEW_FACETS && self.has_few_planes(&list)) || last.1 > STALLED {
+        if (list.len() <= self.limits.facets && self.has_few_planes(&list)) || last.1 > STALLED {
             if list.len() > MOST_FACETS {
-                return Err(MeshFault::Intricate(self.middle(&list)));
+                return Err(MeshFault::Intricate(self.middle(&list)).into());
             }
             let from = tree.facets.len() as u32;
             if self.is_part(&list, &cell, last.1 > STALLED)? {
                 tree.facets.extend(list.iter().map(|i| self.number(*i)));
                 tree.leaves.push(Leaf { from, to: tree.facets.len() as u32, parent });
+                if self.limits.is_beyond(tree) {
+                    return Err(Stop::TooMany);
+                }
                 return Ok(PART | (tree.leaves.len() as u32 - 1));
             }
         }
@@ -335,7 +375,7 @@ impl Builder<'_> {
             list.iter().map(|i| self.surface.face_of[self.number(*i) as usize]).collect();
         planes.sort_unstable();
         planes.dedup();
-        planes.len() <= FEW_PLANES
+        planes.len() <= self.limits.planes
     }
 
     /// Whether a cell can be a part; where that is not sure its formula is tried, and the last time it must do.

@@ -170,6 +170,52 @@ fn f_has_the_sign_of_the_winding_number_and_at_most_the_distance() {
     }
 }
 
+/// Rings about z, a point on the axis before the first and behind the last: fans of slivers at both ends.
+fn spindle(profile: &[[f64; 2]], sides: u32) -> Mesh {
+    let [first, .., last] = profile else { panic!("a profile has two ends") };
+    let rings = &profile[1..profile.len() - 1];
+    let mut points = vec![DVec3::Z * first[1], DVec3::Z * last[1]];
+    for ([radius, z], k) in rings.iter().flat_map(|ring| (0..sides).map(move |k| (ring, k))) {
+        let u = f64::from(k) / f64::from(sides) * TAU;
+        points.push(DVec3::new(radius * u.cos(), radius * u.sin(), *z));
+    }
+    let id = |ring: u32, k: u32| 2 + ring * sides + k % sides;
+    let mut triangles = Vec::new();
+    for k in 0..sides {
+        triangles.extend([
+            [0, id(0, k + 1), id(0, k)],
+            [1, id(rings.len() as u32 - 1, k), id(rings.len() as u32 - 1, k + 1)],
+        ]);
+        for ring in 1..rings.len() as u32 {
+            let [a, b, c, d] = [id(ring - 1, k), id(ring - 1, k + 1), id(ring, k + 1), id(ring, k)];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    (points, triangles)
+}
+
+/// Fans take as many small parts as the square of their slivers: these would not fit, larger ones do.
+#[test]
+fn fans_of_many_slivers_are_told_by_larger_parts() {
+    let mut r = Random(23);
+    // Points a mesh; long, with more meshes: CONTACTD_POINTS=200.
+    let long = std::env::var("CONTACTD_POINTS").ok().and_then(|n| n.parse().ok());
+    let points = long.unwrap_or(60);
+    for i in 0..if long.is_some() { 12 } else { 3 } {
+        let sides = r.within(502.0, 1400.0) as u32;
+        let (radius, high, low) = (r.within(0.4, 2.0), r.within(0.3, 2.0), r.within(-0.25, 1.0));
+        let ring = [radius, 0.0];
+        let second = [radius * r.within(0.3, 1.5), 0.2];
+        // Cones with a flat base, a dent below (low < 0) or a second tip; in one of two a waist or a collar.
+        let below = [0.0, if i % 3 == 0 { 0.0 } else { -low }];
+        let top = [0.0, 0.2 + high];
+        let mesh =
+            if i % 2 == 0 { spindle(&[below, ring, top], sides) } else { spindle(&[below, ring, second, top], sides) };
+        let single = r.unit() < 0.3;
+        judge(&format!("fan {i} of {sides}, single {single}"), &turned(mesh, &mut r, single), &mut r, points);
+    }
+}
+
 #[test]
 #[ignore = "how long large meshes take"]
 fn large() {
