@@ -17,9 +17,9 @@ use super::nodes::{DEEPEST, Node, cube_of};
 use super::tables::NodeKind;
 use super::{Eco, Model};
 use crate::bound::{Bound, SBounds, Volumes};
-use crate::math::{Aabb, Ball};
+use crate::math::{Aabb, Ball, Moments};
 use crate::solid::primitive::{Checked, Sink, Source};
-use crate::solid::{self, Label, Op, Primitive, Shape, Solid};
+use crate::solid::{self, Label, Measured, Op, Primitive, Shape, Solid};
 use bincode::{BorrowDecode, Encode};
 use contactd_proto::Pose;
 use glam::{DQuat, DVec3};
@@ -80,6 +80,13 @@ impl Snapshot {
             out.tree_node(n);
         }
         out.word(solid.root as usize);
+        out.word(solid.measured.len());
+        for (node, known) in &solid.measured {
+            out.word(*node as usize);
+            out.numbers(known.about.to_array());
+            out.numbers(known.moments.0);
+            out.number(known.doubt);
+        }
         out.number(model.radius);
         out.number(model.bounds.margin());
         out.word(model.bounds.rounds());
@@ -230,7 +237,8 @@ impl SnapshotView<'_> {
         if levels(&nodes) > LEVELS {
             return Err("a tree of fewer levels");
         }
-        Ok(Solid::of_parts(primitives, nodes, root))
+        let measured = from.measured(nodes.len())?;
+        Ok(Solid::of_parts(primitives, nodes, root).with_measured(measured))
     }
 }
 
@@ -363,6 +371,29 @@ impl<'a> Streams<'a> {
             return Err("two operands or more");
         }
         Ok(solid::Node::Op(op, self.words(operands)?.collect()))
+    }
+
+    /// What is known of the moments of some of as many nodes, in their order.
+    fn measured(&mut self, nodes: usize) -> Checked<Vec<(u32, Measured)>> {
+        let count = self.word()? as usize;
+        let mut all: Vec<(u32, Measured)> = Vec::with_capacity(count.min(nodes));
+        for _ in 0..count {
+            let node = self.word()?;
+            if node as usize >= nodes || all.last().is_some_and(|before| before.0 >= node) {
+                return Err("measured nodes in order");
+            }
+            let about = self.vector()?;
+            let mut moments = Moments::default();
+            for x in &mut moments.0 {
+                *x = self.finite()?;
+            }
+            let doubt = self.finite()?;
+            if doubt < 0.0 {
+                return Err("a doubt that is not negative");
+            }
+            all.push((node, Measured { about, moments, doubt }));
+        }
+        Ok(all)
     }
 
     fn octree_node(&mut self, solid: &Solid, center: DVec3, half: f64, path: u64) -> Checked<Node> {

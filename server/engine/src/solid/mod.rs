@@ -27,4 +27,4 @@ pub use parts::Parts;
 pub use primitive::{Primitive, Shape};
 pub use sense::Sense;
 pub use surface::Face;
-pub use tree::{Label, Node, NodeId, Op, Solid, SolidBuilder, write_node, write_tree};
+pub use tree::{Label, Measured, Node, NodeId, Op, Solid, SolidBuilder, write_node, write_tree};

@@ -1,6 +1,6 @@
 //! The CSG tree, in file order and in any arity, and its normal form without complements.
 
-use crate::math::Aabb;
+use crate::math::{Aabb, Moments};
 use crate::solid::alike::Alike;
 use crate::solid::faces::{Faces, Owners};
 use crate::solid::formula;
@@ -49,6 +49,17 @@ pub struct Label {
     pub mirrored: bool,
 }
 
+/// What the maker of a solid knows of a node: its moments in closed form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// A point of the model's frame …
+    pub about: DVec3,
+    /// … about which the node has these moments,
+    pub moments: Moments,
+    /// and a bound of the volume that is in the node or in what was integrated and not in both: rounding of its faces, too.
+    pub doubt: f64,
+}
+
 /// A solid: primitives in file order, and the tree over them. Immutable once built.
 #[derive(Clone, Debug)]
 pub struct Solid {
@@ -75,6 +86,8 @@ pub struct Solid {
     vanishes: bool,
     /// True where the normal form has parts.
     pub(crate) has_parts: bool,
+    /// Nodes of which the maker knows the moments, in order.
+    pub(crate) measured: Vec<(NodeId, Measured)>,
 }
 
 /// Tokens up to which an expression with parts is simplified: all of it is looked at.
@@ -149,6 +162,12 @@ impl Solid {
         decided.or_else(|| local::decided(&self.normal_form, &mut psi)).unwrap_or((f, LiteralId(0)))
     }
 
+    /// What the maker knows of a node.
+    pub fn measured(&self, node: NodeId) -> Option<&Measured> {
+        let place = self.measured.binary_search_by_key(&node, |m| m.0).ok()?;
+        Some(&self.measured[place].1)
+    }
+
     /// The one primitive of a solid that is nothing else.
     pub fn whole(&self) -> Option<&Primitive> {
         match self.nodes[self.root as usize] {
@@ -194,6 +213,7 @@ impl Solid {
             simplified,
             vanishes,
             has_parts,
+            measured: Vec::new(),
         };
         let mut whole = Vec::new();
         write_tree(&solid, &mut whole);
@@ -212,6 +232,11 @@ impl Solid {
         }
         solid.normal_form = whole;
         solid
+    }
+
+    /// The same with what is known of some nodes, in their order.
+    pub(crate) fn with_measured(self, measured: Vec<(NodeId, Measured)>) -> Self {
+        Self { measured, ..self }
     }
 
     /// The box of the solid by the plain upward rule (no pruning); the bound floor does better.
@@ -262,6 +287,7 @@ pub struct SolidBuilder {
     primitives: Vec<Primitive>,
     nodes: Vec<Node>,
     faces: u32,
+    measured: Vec<(NodeId, Measured)>,
 }
 
 impl SolidBuilder {
@@ -306,9 +332,16 @@ impl SolidBuilder {
         }
     }
 
+    /// Says what moments a node has, where that is known without a look at its faces.
+    pub fn measured(&mut self, node: NodeId, measured: Measured) {
+        self.measured.push((node, measured));
+    }
+
     /// Finishes the solid with `root` on top.
-    pub fn finish(self, root: NodeId) -> Solid {
-        Solid::of_parts(self.primitives, self.nodes, root)
+    pub fn finish(mut self, root: NodeId) -> Solid {
+        self.measured.sort_by_key(|m| m.0);
+        self.measured.dedup_by_key(|m| m.0);
+        Solid::of_parts(self.primitives, self.nodes, root).with_measured(self.measured)
     }
 
     fn push(&mut self, node: Node) -> NodeId {

@@ -34,8 +34,8 @@ pub fn lower(file: &File, (facets, attached): (Facets, Option<&[Attachment]>), l
     let shapes = Shapes { facets, limits, parts: Parts::new(limits) };
     let mut lowering = Lowering { file, attached, shapes };
     let root = lowering.tree()?;
-    let Parts { mut notes, list, .. } = lowering.shapes.parts;
-    let solid = emit(list, root, &mut notes);
+    let Parts { mut notes, list, measured, .. } = lowering.shapes.parts;
+    let solid = emit(list, root, &measured, &mut notes);
     let unbounded = solid.primitives.iter().find(|p| is_unbounded(&p.shape));
     if let Some(p) = unbounded
         && !solid.aabb().is_empty()

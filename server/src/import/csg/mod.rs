@@ -26,6 +26,7 @@ mod hull;
 mod imports;
 mod lexer;
 mod lower;
+mod measured;
 mod meshed;
 mod offset;
 mod outlines;

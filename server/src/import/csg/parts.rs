@@ -5,7 +5,7 @@ use super::place::PlacedShape;
 use super::polygon::Formula;
 use super::{Limits, Place, Problem};
 use crate::import::Note;
-use crate::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
+use crate::solid::{Label, Measured, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -60,6 +60,8 @@ pub struct Parts<'a> {
     pub hulls: HashMap<PartId, PartId>,
     /// Of an extruded island of very many sides: what makes its surface, to be cut as a mesh.
     pub prisms: HashMap<PartId, Prism>,
+    /// Of an extrusion of very many sides: its moments.
+    pub measured: HashMap<PartId, Measured>,
     faces: usize,
 }
 
@@ -72,8 +74,8 @@ impl<'a> Parts<'a> {
     /// None yet.
     pub fn new(limits: &'a Limits) -> Self {
         let (pieces, bent, points, hulls) = (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
-        let prisms = HashMap::new();
-        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, bent, points, hulls, prisms, faces: 0 }
+        let (prisms, measured) = (HashMap::new(), HashMap::new());
+        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, bent, points, hulls, prisms, measured, faces: 0 }
     }
 
     /// Adds a part.
@@ -269,8 +271,9 @@ fn empties(parts: &[Part], root: PartId) -> Vec<bool> {
     empty
 }
 
-/// Builds the solid of `root`, leaving out what cannot contribute; where that is more than nothing, a note tells.
-pub fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid {
+/// Builds the solid of `root`, leaving out what cannot contribute; where that is more than nothing, a note tells. `measured`: the
+/// moments of some parts.
+pub fn emit(mut parts: Vec<Part>, root: PartId, measured: &HashMap<PartId, Measured>, notes: &mut Vec<Note>) -> Solid {
     let empty = empties(&parts, root);
     for (i, part) in parts.iter().enumerate() {
         if let Part::Op(op, at, c) = part
@@ -287,7 +290,7 @@ pub fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid 
     }
     enum Visit {
         Enter(PartId),
-        Leave(Op, usize),
+        Leave(PartId, Op, usize),
     }
     let mut builder = SolidBuilder::new();
     let mut built: Vec<NodeId> = Vec::new();
@@ -300,13 +303,17 @@ pub fn emit(mut parts: Vec<Part>, root: PartId, notes: &mut Vec<Note>) -> Solid 
                 Part::Leaf(shape, frame, label) => built.push(builder.primitive(shape, frame, label)),
                 Part::Op(op, _, children) => {
                     let kept: Vec<PartId> = children.into_iter().filter(|c| !empty[*c]).collect();
-                    visits.push(Visit::Leave(op, kept.len()));
+                    visits.push(Visit::Leave(p, op, kept.len()));
                     visits.extend(kept.into_iter().rev().map(Visit::Enter));
                 }
             },
-            Visit::Leave(op, count) => {
+            Visit::Leave(p, op, count) => {
                 let children = built.split_off(built.len() - count);
-                built.push(builder.operation(op, &children));
+                let node = builder.operation(op, &children);
+                if let Some(known) = measured.get(&p) {
+                    builder.measured(node, *known);
+                }
+                built.push(node);
             }
         }
     }

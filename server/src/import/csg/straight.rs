@@ -7,6 +7,7 @@
 use super::extrude::Extrusion;
 use super::facets::prism;
 use super::flat::{Flat, Outline};
+use super::measured::Walls;
 use super::outlines::crossing;
 use super::parts::{Part, PartId, Parts, Signed};
 use super::place::{self, PlacedShape};
@@ -88,41 +89,72 @@ impl Extrusion {
             parts.note(at, format!("a {} without area: left out, as OpenSCAD does", flat.name), None);
             return Ok(Part::Empty);
         }
+        let spanned = self.spanned(flat.overshoot);
+        let heights = [spanned.low, spanned.low + spanned.height];
+        let many = region.rings.iter().map(Vec::len).sum::<usize>() > MANY_SIDES;
+        let mut walls = many.then(|| Walls::new(outer, heights, self.scale, &region.rings));
         let mut made = Vec::with_capacity(region.islands.len());
         for island in &region.islands {
-            let around = if island.wide { around(&island.hull) } else { island.hull.clone() };
-            let base = match self.polygon(outer, &DAffine3::IDENTITY, &around, flat.overshoot) {
-                Err(Problem::Mesh(MeshError::Flat)) => {
-                    parts.note(at, format!("a sliver of a {}: left out", flat.name), None);
-                    continue;
-                }
-                Err(Problem::Mesh(_)) => return Err((at, self.bent())),
-                placed => parts.leaf(&flat.name, at, placed)?,
-            };
-            let base = parts.push(base);
-            let mut all = vec![Signed::In(base)];
-            for cut in &island.cuts {
-                let mut edge = |parts: &mut Parts<'_>, e: usize| self.edge(parts, outer, flat, region.edges[e]);
-                all.push(parts.formula(at, cut, &mut edge)?);
-            }
-            if let Signed::In(part) = parts.many(true, at, all) {
-                // Pockets and holes take no corner away.
-                if island.wide {
-                    let hull = parts.push(Part::Empty);
-                    parts.points.insert(hull, self.corners(outer, &island.hull, flat.overshoot));
-                    parts.hulls.insert(part, hull);
-                } else if part != base {
-                    parts.hulls.insert(part, base);
-                }
-                let rings = &region.rings[island.rings.clone()];
-                if rings.iter().map(Vec::len).sum::<usize>() > MANY_SIDES {
-                    let (outer, spanned, rings) = (*outer, self.spanned(flat.overshoot), rings.to_vec());
-                    parts.prisms.insert(part, Box::new(move || twist::surface(&outer, &spanned, &rings)));
-                }
-                made.push(part);
-            }
+            made.extend(self.island(parts, (outer, flat), (&region, island), &mut walls)?);
         }
-        Ok(Part::Op(Op::Union, at, made))
+        let whole = Part::Op(Op::Union, at, made);
+        let known = walls.map(|walls| walls.measured(&region.rings));
+        // Of walls that the transform leaves hardly apart nothing is known.
+        let Some(known) = known.filter(|known| known.doubt < known.moments.volume()) else { return Ok(whole) };
+        let whole = parts.push(whole);
+        parts.measured.insert(whole, known);
+        Ok(Part::Op(Op::Union, at, vec![whole]))
+    }
+
+    /// An island of a region; its walls are counted, and given up where they are not what its corners say.
+    fn island(
+        &self,
+        parts: &mut Parts<'_>,
+        (outer, flat): (&DAffine3, &Flat),
+        (region, island): (&Region, &Island),
+        walls: &mut Option<Walls>,
+    ) -> Result<Option<PartId>> {
+        let at = flat.at;
+        let around = if island.wide { around(&island.hull) } else { island.hull.clone() };
+        let base = match self.polygon(outer, &DAffine3::IDENTITY, &around, flat.overshoot) {
+            Err(Problem::Mesh(MeshError::Flat)) => {
+                parts.note(at, format!("a sliver of a {}: left out", flat.name), None);
+                *walls = None;
+                return Ok(None);
+            }
+            Err(Problem::Mesh(_)) => return Err((at, self.bent())),
+            placed => {
+                if placed.as_ref().is_ok_and(|placed| !placed.notes.is_empty()) {
+                    *walls = None;
+                }
+                parts.leaf(&flat.name, at, placed)?
+            }
+        };
+        let base = parts.push(base);
+        let mut all = vec![Signed::In(base)];
+        for cut in &island.cuts {
+            let mut edge =
+                |parts: &mut Parts<'_>, e: usize| self.edge(parts, outer, flat, (region.edges[e], walls.as_mut()));
+            all.push(parts.formula(at, cut, &mut edge)?);
+        }
+        let Signed::In(part) = parts.many(true, at, all) else {
+            *walls = None;
+            return Ok(None);
+        };
+        // Pockets and holes take no corner away.
+        if island.wide {
+            let hull = parts.push(Part::Empty);
+            parts.points.insert(hull, self.corners(outer, &island.hull, flat.overshoot));
+            parts.hulls.insert(part, hull);
+        } else if part != base {
+            parts.hulls.insert(part, base);
+        }
+        let rings = &region.rings[island.rings.clone()];
+        if rings.iter().map(Vec::len).sum::<usize>() > MANY_SIDES {
+            let (outer, spanned, rings) = (*outer, self.spanned(flat.overshoot), rings.to_vec());
+            parts.prisms.insert(part, Box::new(move || twist::surface(&outer, &spanned, &rings)));
+        }
+        Ok(Some(part))
     }
 
     /// Corners of both ends over an outline.
@@ -132,8 +164,15 @@ impl Extrusion {
         outline.iter().flat_map(ends).map(|p| outer.transform_point3(p)).collect()
     }
 
-    /// The half-space of an edge with the inside on its left: vertical, or towards where the scale has it at the top.
-    fn edge(&self, parts: &mut Parts<'_>, outer: &DAffine3, flat: &Flat, [p, q]: Edge) -> Result<Signed> {
+    /// The half-space of an edge with the inside on its left: vertical, or towards where the scale has it at the top. It is counted
+    /// among the walls.
+    fn edge(
+        &self,
+        parts: &mut Parts<'_>,
+        outer: &DAffine3,
+        flat: &Flat,
+        ([p, q], walls): (Edge, Option<&mut Walls>),
+    ) -> Result<Signed> {
         let t = q - p;
         let (low, high) = self.span(flat.overshoot);
         let up = (p * self.scale - p).extend(high - low);
@@ -143,6 +182,9 @@ impl Extrusion {
         }
         let normal = t.extend(0.0).cross(up);
         let placed = place::half_space_at(outer, normal, p.extend(low));
+        if let Some(walls) = walls {
+            walls.add([p, q], &placed.frame);
+        }
         let leaf = parts.leaf(&format!("{} edge", flat.name), flat.at, Ok(placed))?;
         let part: PartId = parts.push(leaf);
         Ok(Signed::In(part))

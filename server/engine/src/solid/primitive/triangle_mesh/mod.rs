@@ -218,7 +218,16 @@ impl TriangleMesh {
     /// Its moments, and how far the volume may be off. A plane may lie a few tolerances off its corners.
     fn measured(&self) -> (Moments, f64) {
         let s = &*self.surface;
-        moments::of(&s.vertices, &s.triangles, s.around.center(), 8.0 * s.tolerance)
+        let middle = s.around.center();
+        let (moments, doubt) = moments::of(&s.vertices, &s.triangles, middle, 8.0 * s.tolerance);
+        (moments.moved(middle), doubt)
+    }
+
+    /// Moments about `middle` of what a closed surface of signed triangles encloses, and a bound of the volume's error where corners
+    /// are known to `off` (a length); times the extents it bounds that of the others. Triangles may lie on each other: their
+    /// volumes with `middle`, positive where they run counter-clockwise from outside, are summed.
+    pub fn moments_within(vertices: &[DVec3], triangles: &[[u32; 3]], middle: DVec3, off: f64) -> (Moments, f64) {
+        moments::of(vertices, triangles, middle, off)
     }
 
     /// Plane of a face.

@@ -7,7 +7,7 @@ use glam::DVec3;
 /// Rounding of one tetrahedron's volume, relative to the product of its sides at the middle.
 const TETRAHEDRON: f64 = 32.0 * f64::EPSILON;
 
-/// Moments about the origin, and a bound of what rounding does to the volume, planes being known to `planes` (a length).
+/// Moments about `middle`, and a bound of what rounding does to the volume, planes being known to `planes` (a length).
 ///
 /// Of a tetrahedron with one corner at the origin, the others x₁, x₂, x₃, volume V and sum s of corners: ∫ x = V s/4,
 /// ∫ xxᵀ = V (s sᵀ + Σ xᵢxᵢᵀ)/20.
@@ -27,5 +27,5 @@ pub fn of(vertices: &[DVec3], triangles: &[[u32; 3]], middle: DVec3, planes: f64
         let area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]).length();
         doubt += TETRAHEDRON * x[0].length() * x[1].length() * x[2].length() + planes * area;
     }
-    (Moments(sums.map(|s| s.value())).moved(middle), doubt)
+    (Moments(sums.map(|s| s.value())), doubt)
 }
