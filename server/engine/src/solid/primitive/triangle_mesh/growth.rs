@@ -32,6 +32,10 @@ const OVERLAP: f64 = 1.0 / 128.0;
 const PLACES: usize = 9;
 /// Facets up to which corners are looked at for that: of more the odds are that one is near anyway.
 const LOOKED_AT: usize = 256;
+/// A cut across the longest side that leaves so many times the facets in both halves together parts nothing …
+const IN_BOTH: f64 = 1.9;
+/// … and one across another side that leaves no more than so many times the facets is taken for it.
+const PARTED: f64 = 1.4;
 /// Facets from which on two halves are divided side by side.
 const SHARED: usize = 4096;
 
@@ -236,6 +240,14 @@ impl From<MeshFault> for Stop {
     }
 }
 
+/// A cell cut in two: its node, the two cells and what reaches them.
+type Cut = (Node, [Aabb; 2], [Vec<u32>; 2]);
+
+/// How many facets reach both halves of a cut together.
+fn reaching((_, _, halves): &Cut) -> usize {
+    halves.iter().map(Vec::len).sum()
+}
+
 /// Makes the tree: of all facets, or of some that lie side by side in memory then.
 pub(super) struct Builder<'s> {
     pub(super) surface: &'s Surface,
@@ -408,8 +420,9 @@ impl Builder<'_> {
         }
     }
 
-    /// A cell cut in two: its node, the two cells and what reaches them.
-    fn divided(&self, list: &[u32], cell: &Aabb) -> Result<(Node, [Aabb; 2], [Vec<u32>; 2]), MeshFault> {
+    /// A cell cut in two: its node, the two cells and what reaches them. Across its longest side; where that leaves nearly all facets
+    /// in both halves, as of the tall walls of a prism, across another one that parts them.
+    fn divided(&self, list: &[u32], cell: &Aabb) -> Result<Cut, MeshFault> {
         let size = cell.max - cell.min;
         let axis = if size.x >= size.y && size.x >= size.z {
             0
@@ -418,9 +431,20 @@ impl Builder<'_> {
         } else {
             2
         };
-        let w = OVERLAP * size[axis];
+        let longest = self.divided_across(list, cell, axis).ok_or_else(|| MeshFault::Intricate(self.middle(list)))?;
+        if (reaching(&longest) as f64) < IN_BOTH * list.len() as f64 {
+            return Ok(longest);
+        }
+        let others = [(axis + 1) % 3, (axis + 2) % 3].map(|k| self.divided_across(list, cell, k));
+        let parted = others.into_iter().flatten().min_by_key(reaching);
+        Ok(parted.filter(|cut| reaching(cut) as f64 <= PARTED * list.len() as f64).unwrap_or(longest))
+    }
+
+    /// The same across an axis; `None` where the halves would overlap by roundings.
+    fn divided_across(&self, list: &[u32], cell: &Aabb, axis: usize) -> Option<Cut> {
+        let w = OVERLAP * (cell.max - cell.min)[axis];
         if w <= 1e3 * self.surface.tolerance {
-            return Err(MeshFault::Intricate(self.middle(list)));
+            return None;
         }
         let s = self.place(list, cell, axis, w);
         let (mut below, mut above) = (*cell, *cell);
@@ -438,7 +462,7 @@ impl Builder<'_> {
             }
         }
         let node = Node { s, w, halves: [UNDECIDED; 2], parent: NONE, axis: axis as u8 };
-        Ok((node, [below, above], [low, high]))
+        Some((node, [below, above], [low, high]))
     }
 
     /// True unless a facet and a cell are told apart by an axis (T. Akenine-Möller 2001); its box meets the cell.
