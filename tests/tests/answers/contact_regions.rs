@@ -13,7 +13,9 @@ use contactd::octree::Model;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::ReportedPoint as _;
+use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
 
@@ -455,4 +457,45 @@ fn any_margin_has_its_answer_within_bounded_work() {
         }
         assert!(missing <= incomplete, "{name}: {missing} times incomplete");
     }
+}
+
+/// Boxes lean over a floor by so little that edges leave the margin within their length: every point that is told is as far from the
+/// floor as it says, and the corner that is nearest to it is among them.
+#[test]
+fn what_is_told_of_a_box_that_leans_is_as_far_as_it_says() {
+    let mut r = Random::new(4_711);
+    let (mut told, mut left) = (0, 0);
+    for k in 0..sized("CONTACTD_LEANING", 300) {
+        let half = dvec3(r.within(0.1, 0.6), r.within(0.1, 0.6), r.within(0.1, 0.6));
+        let margin = 10f64.powf(r.within(-3.5, -2.0));
+        let lean = r.vector(1.0) * dvec3(1.0, 1.0, 2.0) * margin * 10f64.powf(r.within(-0.5, 1.0));
+        let rotation = quat_of_rotation_vector(lean);
+        let corners: Vec<DVec3> = (0..8)
+            .map(|i| rotation * (half * DVec3::from_array([0, 1, 2].map(|j| f64::from(i >> j & 1) * 2.0 - 1.0))))
+            .collect();
+        let lowest = corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min);
+        let gap = margin * r.within(0.0, 0.9);
+        let at = dvec3(r.within(-1.0, 1.0), r.within(-1.0, 1.0), gap - lowest);
+        let pair = rest(floor(), Recipe::cuboid(half.x, half.y, half.z), Pose::new(at, rotation));
+        let found = pair.regions(margin);
+        assert!(!found.regions.is_empty(), "{k}: nothing within {margin} of {gap}");
+        let mut nearest = f64::INFINITY;
+        for p in found.regions.iter().flat_map(|region| &region.points) {
+            // The middle of both feet; that on the floor is straight below.
+            assert!(
+                (p.point.z - 0.5 * p.separation).abs() < 1e-9 + p.separation * lean.length_squared(),
+                "{k}: {p:?} in {found:#?}"
+            );
+            let own = (rotation.conjugate() * (p.point + DVec3::Z * 0.5 * p.separation - at)).abs() - half;
+            // Along the normal of a face that leans the foot is aside by that.
+            assert!(own.max_element().abs() < 1e-9 + p.separation * lean.length(), "{k}: {p:?} off by {own}");
+            assert!(p.separation <= margin * (1.0 + 1e-9), "{k}: {p:?} beyond {margin}");
+            nearest = nearest.min(p.separation);
+            told += 1;
+        }
+        assert!((nearest - gap).abs() < 1e-9, "{k}: the nearest is told at {nearest}, and is {gap} away: {found:#?}");
+        left += usize::from(corners.iter().filter(|c| c.z + at.z < margin).count() < 4);
+    }
+    println!("{told} points, {left} boxes of which not all of a side is within the margin");
+    assert!(left > 50);
 }

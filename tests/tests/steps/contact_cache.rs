@@ -9,6 +9,7 @@ use contactd_client::{Object, Session};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Pose, Report, Rule};
 use contactd_tests::random_solids::Random;
+use contactd_tests::sweep::sized;
 use glam::{DVec3, dvec3};
 use std::time::Duration;
 
@@ -78,13 +79,6 @@ impl Shape {
     }
 }
 
-/// Points that were judged, and those among them that are off by more than rounding and the slack allow.
-#[derive(Default)]
-struct Count {
-    points: usize,
-    rough: usize,
-}
-
 /// Bodies over a slab whose upper face is a plane, everything turned somewhere.
 struct Scene {
     session: Session<Embedded>,
@@ -151,7 +145,7 @@ impl Scene {
     }
 
     /// Holds what is told of body `i` against what is true where it stands.
-    fn judge(&self, i: usize, pose: &Pose, slack: f64, what: &str, count: &mut Count) {
+    fn judge(&self, i: usize, pose: &Pose, slack: f64, what: &str, points: &mut usize) {
         let (object, shape) = self.bodies[i];
         let told: Vec<(Manifold, Point)> = self.cache.contacts().filter(|(m, _)| m.b == object).collect();
         let gap = self.gap(i, pose);
@@ -172,19 +166,17 @@ impl Scene {
         let lowest = told.iter().map(|(_, p)| p.separation).fold(f64::INFINITY, f64::min);
         let chosen = CHOICE * 2.0 * shape.reach();
         assert!(lowest >= gap - room && lowest < f64::INFINITY, "{what}: {lowest} told of {gap}: {told:?}");
-        count.rough += usize::from(lowest > gap + room + chosen);
+        assert!(lowest <= gap + room + chosen, "{what}: {lowest} told of {gap}: {told:?}");
         for (m, p) in &told {
             assert_eq!(m.a, self.slab);
-            // Its places are on both surfaces, and as far apart as it is told where the bodies stand. The engine lays the end of an edge
-            // that rises out of the margin where it leaves it but for a margin or two: few points, and no worse.
+            // Its places are on both surfaces, and as far apart as it is told where the bodies stand.
             let (a, b) = (self.floor.point(p.on_a), pose.point(p.on_b));
             let errors = [self.height(a), shape.off(p.on_b), self.height(b) - self.height(a) - p.separation];
             let off = errors.iter().fold(0.0f64, |most, e| most.max(e.abs()));
-            assert!(off < 5.0 * MARGIN, "{what}: {errors:?} off: {p:?}");
-            count.rough += usize::from(off > room);
+            assert!(off <= room, "{what}: {errors:?} off: {p:?}");
             assert!(p.position.distance(0.5 * (a + b)) < 1e-12, "{what}: not in the middle: {p:?}");
         }
-        count.points += told.len();
+        *points += told.len();
     }
 }
 
@@ -196,8 +188,8 @@ fn way(from: &Pose, to: &Pose, reach: f64) -> f64 {
 
 #[test]
 fn contacts_are_true_where_the_bodies_stand() {
-    let scenes = std::env::var("CONTACTD_CACHE_SCENES").map_or(40, |n| n.parse().expect("a number of scenes"));
-    let (mut count, mut resting, mut asked) = (Count::default(), 0, 0);
+    let scenes = sized("CONTACTD_CACHE_SCENES", 40);
+    let (mut points, mut resting, mut asked) = (0, 0, 0);
     for seed in 0..scenes {
         let mut r = Random::new(seed);
         let slack = MARGIN * 10f64.powf(r.within(-4.0, -2.0));
@@ -231,19 +223,17 @@ fn contacts_are_true_where_the_bodies_stand() {
             }
             asked += u64::from(requests > 0);
             for (i, pose) in poses.iter().enumerate() {
-                scene.judge(i, pose, slack, &format!("{what}, {:?}", scene.bodies[i].1), &mut count);
+                scene.judge(i, pose, slack, &format!("{what}, {:?}", scene.bodies[i].1), &mut points);
             }
         }
     }
-    let Count { points, rough } = count;
-    println!("{scenes} scenes: {points} points, {rough} rough ends, {asked} steps that asked, {resting} at rest");
+    println!("{scenes} scenes: {points} points, {asked} steps that asked, {resting} at rest");
     assert!(points > 20 * scenes as usize && resting > scenes / 4 && asked > scenes);
-    assert!(rough * 100 < points, "{rough} of {points} points are off");
 }
 
 #[test]
 fn what_has_crept_by_less_than_the_slack_is_not_asked_about_and_carried_along() {
-    let mut count = Count::default();
+    let mut points = 0;
     for seed in 0..40 {
         let mut r = Random::new(seed);
         let slack = 1e-3 * MARGIN;
@@ -259,20 +249,26 @@ fn what_has_crept_by_less_than_the_slack_is_not_asked_about_and_carried_along() 
             let poses: Vec<Pose> = (0..3).map(&mut near).collect();
             assert_eq!(scene.step(&poses), 0, "scene {seed}, step {step}");
             for (i, pose) in poses.iter().enumerate() {
-                scene.judge(i, pose, slack, &format!("scene {seed}, step {step}, {:?}", scene.bodies[i].1), &mut count);
+                scene.judge(
+                    i,
+                    pose,
+                    slack,
+                    &format!("scene {seed}, step {step}, {:?}", scene.bodies[i].1),
+                    &mut points,
+                );
             }
         }
         scene.cache.forget();
         assert!(scene.step(&home) > 0, "what is unknown is told");
     }
-    assert!(count.points > 1000 && count.rough == 0, "{} of {} points are off", count.rough, count.points);
+    assert!(points > 1000, "{points} points");
 }
 
 /// A box that lies in the floor is moved apart from it for its points, and is where it is for a ball that comes down on it.
 #[test]
 fn what_was_moved_apart_is_put_back_for_others() {
     let slack = 1e-3 * MARGIN;
-    let mut count = Count::default();
+    let mut points = 0;
     for seed in 0..20 {
         let mut r = Random::new(seed);
         let mut scene = Scene::new(&mut r, slack);
@@ -290,7 +286,7 @@ fn what_was_moved_apart_is_put_back_for_others() {
         let told: Vec<Point> = scene.cache.contacts().filter(|(m, _)| (m.a, m.b) == (low, high)).map(|c| c.1).collect();
         let lowest = told.iter().map(|p| p.separation).fold(f64::INFINITY, f64::min);
         assert!((lowest - above).abs() < 1e-8, "scene {seed}: {lowest} told of {above}: {told:?}");
-        scene.judge(0, &poses[0], slack, &format!("scene {seed}, {:?}", scene.bodies[0].1), &mut count);
+        scene.judge(0, &poses[0], slack, &format!("scene {seed}, {:?}", scene.bodies[0].1), &mut points);
     }
-    assert!(count.points > 20 && count.rough == 0);
+    assert!(points > 20);
 }

@@ -201,7 +201,7 @@ pub fn sees(bodies: &Bodies, pair: &FacePair, lits: &[Lit], x: DVec3, y: DVec3) 
     let (curve, length) = (Curve::Line { origin: x, along }, (y - x).length());
     let mut stops = vec![0.0, length];
     for lit in lits {
-        roots(bodies, &curve, *lit, (0.0, length), &mut stops);
+        crossings(bodies, &curve, *lit, (0.0, length), &mut stops);
     }
     stops.sort_by(f64::total_cmp);
     stops
@@ -210,30 +210,35 @@ pub fn sees(bodies: &Bodies, pair: &FacePair, lits: &[Lit], x: DVec3, y: DVec3) 
         .all(|w| standing(bodies, pair, curve.point(0.5 * (w[0] + w[1]))) != Standing::Outside)
 }
 
-/// A literal along a curve. Of a flat one along a line what is farther from zero than rounding is known without a look.
+/// A literal along a curve, less a level. Of a flat one along a line what is farther from zero than rounding is known without a look.
 struct Along<'b, 't, 'a> {
     bodies: &'b Bodies<'t, 'a>,
     curve: &'b Curve,
     lit: Lit,
+    level: f64,
     /// Value at parameter 0, what it gains a unit of length, and by how much rounding may move either way of working it out.
     law: Option<[f64; 3]>,
 }
 
 impl<'b, 't, 'a> Along<'b, 't, 'a> {
-    fn new(bodies: &'b Bodies<'t, 'a>, curve: &'b Curve, lit: Lit, (from, to): (f64, f64)) -> Self {
+    fn new(bodies: &'b Bodies<'t, 'a>, curve: &'b Curve, lit: Lit, level: f64, (from, to): (f64, f64)) -> Self {
         let law = match (*curve, bodies.face(lit).flat()) {
             (Curve::Line { origin, along }, Some((normal, offset))) => {
                 let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
-                let far = origin.length() + from.abs().max(to.abs()) + offset.abs();
-                Some([sign * (normal.dot(origin) - offset), sign * normal.dot(along), SURE * f64::EPSILON * far])
+                let far = origin.length() + from.abs().max(to.abs()) + offset.abs() + level;
+                Some([
+                    sign * (normal.dot(origin) - offset) - level,
+                    sign * normal.dot(along),
+                    SURE * f64::EPSILON * far,
+                ])
             }
             _ => None,
         };
-        Self { bodies, curve, lit, law }
+        Self { bodies, curve, lit, level, law }
     }
 
     fn value(&self, s: f64) -> f64 {
-        self.bodies.value(self.lit, self.curve.point(s))
+        self.bodies.value(self.lit, self.curve.point(s)) - self.level
     }
 
     /// The sign of `value(s) − level` where that is beyond doubt.
@@ -255,53 +260,61 @@ impl<'b, 't, 'a> Along<'b, 't, 'a> {
             _ => self.value(s).abs() > reach,
         }
     }
+
+    /// Roots in [from, to]: a value changes along the curve by as much as its points move, at most.
+    fn roots(&self, (from, to): (f64, f64), out: &mut Vec<f64>) {
+        let (speed, least) = (self.curve.speed(), 1e-4 * self.bodies.size);
+        let mut stack = vec![(from, to)];
+        while let Some((s, e)) = stack.pop() {
+            let m = 0.5 * (s + e);
+            if self.is_beyond(m, 0.5 * (e - s) * speed) || self.bodies.work.is_spent() {
+                continue;
+            }
+            if (e - s) * speed > least {
+                stack.extend([(m, e), (s, m)]);
+                continue;
+            }
+            let below = self.is_negative(s);
+            if below != self.is_negative(e) {
+                let (mut lo, mut hi) = (s, e);
+                for _ in 0..80 {
+                    let m = 0.5 * (lo + hi);
+                    // Neighbours: it stays so.
+                    if m == lo || m == hi {
+                        break;
+                    }
+                    if self.is_negative(m) == below { lo = m } else { hi = m }
+                }
+                out.push(0.5 * (lo + hi));
+            }
+        }
+    }
 }
 
 /// Roundings, of the numbers that a flat literal's value along a line is made of, beyond which its sign is known: some ten are made.
 const SURE: f64 = 64.0;
 
 /// Parameters in [from, to] at which a face passes through the curve.
-fn roots(bodies: &Bodies, curve: &Curve, lit: Lit, (from, to): (f64, f64), out: &mut Vec<f64>) {
-    let along = Along::new(bodies, curve, lit, (from, to));
+fn crossings(bodies: &Bodies, curve: &Curve, lit: Lit, (from, to): (f64, f64), out: &mut Vec<f64>) {
+    let along = Along::new(bodies, curve, lit, 0.0, (from, to));
     // A curve that lies in a face (more common points than a conic and a quadric can have) has no crossing with it.
     let near = bodies.lie + bodies.eps;
     if (0..6).all(|k| !along.is_beyond(from + (to - from) * (0.07 + 0.15 * f64::from(k)), near)) {
         return;
     }
-    let (speed, least) = (curve.speed(), 1e-4 * bodies.size);
-    let mut stack = vec![(from, to)];
-    while let Some((s, e)) = stack.pop() {
-        let m = 0.5 * (s + e);
-        if along.is_beyond(m, 0.5 * (e - s) * speed) || bodies.work.is_spent() {
-            continue;
-        }
-        if (e - s) * speed > least {
-            stack.extend([(m, e), (s, m)]);
-            continue;
-        }
-        let below = along.is_negative(s);
-        if below != along.is_negative(e) {
-            let (mut lo, mut hi) = (s, e);
-            for _ in 0..80 {
-                let m = 0.5 * (lo + hi);
-                // Neighbours: it stays so.
-                if m == lo || m == hi {
-                    break;
-                }
-                if along.is_negative(m) == below { lo = m } else { hi = m }
-            }
-            out.push(0.5 * (lo + hi));
-        }
-    }
+    along.roots((from, to), out);
 }
 
 /// The feet of a point of a candidate on both bodies where they touch there: on faces of each, within the threshold,
 /// confirmed by the whole trees.
 fn touches(bodies: &Bodies, faces: &[Lit; 2], others: &[Lit], x: DVec3) -> Option<[DVec3; 2]> {
-    // An edge lies on its own body; a tangent curve on the face it was taken from.
+    // An edge lies on its own body, and beyond its ends it is none; a tangent curve lies on the face it was taken from.
     let foot_on = |side: Side| {
         if bodies.f(side, x).abs() <= bodies.eps {
             return Some(x);
+        }
+        if faces.iter().all(|l| l.0 == side) {
+            return None;
         }
         faces
             .iter()
@@ -338,11 +351,26 @@ fn runs_among(
     let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
     let Some(stops) = range.and_then(|range| stops(bodies, c, others, range)) else { return Vec::new() };
     let round = matches!(c.curve, Curve::Circle { .. });
-    let pieces = stops.windows(2).map(|w| {
-        let x = c.curve.point(0.5 * (w[0] + w[1]));
-        Piece { from: w[0], to: w[1], feet: touches(bodies, &c.faces, others, x).filter(|_| !in_patch(x)) }
-    });
-    let mut out = joined(&c.curve, pieces.collect());
+    let whole = |s: f64| touches(bodies, &c.faces, others, c.curve.point(s));
+    let mut pieces = Vec::new();
+    for w in stops.windows(2) {
+        let middle = 0.5 * (w[0] + w[1]);
+        let feet = whole(middle);
+        if in_patch(c.curve.point(middle)) {
+            pieces.push(Piece { from: w[0], to: w[1], feet: None });
+            continue;
+        }
+        let mut bounds = departures(bodies, c, others, (w[0], w[1]), feet.is_some(), &whole);
+        if bounds.is_empty() {
+            pieces.push(Piece { from: w[0], to: w[1], feet });
+            continue;
+        }
+        bounds.insert(0, w[0]);
+        bounds.push(w[1]);
+        let part = |w: &[f64]| Piece { from: w[0], to: w[1], feet: whole(0.5 * (w[0] + w[1])) };
+        pieces.extend(bounds.windows(2).map(part));
+    }
+    let mut out = joined(&c.curve, pieces);
     // A curve that only bends close to a face is no line: it would leave it if it went on. One that lies in it stays.
     out.retain(|run| {
         let on = |side: Side| {
@@ -356,7 +384,7 @@ fn runs_among(
     for run in &mut out {
         let corner = |(i, s): (usize, f64)| {
             let x = c.curve.point(s);
-            // Gaps are linear along a line to first order; where its very end has no feet, those of the middle tell.
+            // Where its very end has no feet (an apex, where no face is), those of the middle tell.
             let (x, gap) = touches(bodies, &c.faces, others, x).map_or_else(
                 || (x, (run.feet[1] - run.feet[0]).length()),
                 |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()),
@@ -368,6 +396,33 @@ fn runs_among(
     out
 }
 
+/// Where between two stops a candidate's curve leaves the threshold, in order: it may lean against the face along which it runs.
+/// `inner`: whether the bodies touch in the middle.
+fn departures(
+    bodies: &Bodies,
+    c: &Candidate,
+    others: &[Lit],
+    (from, to): (f64, f64),
+    inner: bool,
+    touches: &dyn Fn(f64) -> Option<[DVec3; 2]>,
+) -> Vec<f64> {
+    // Beyond the end of an edge there is no surface: no gap has been left there.
+    let x = c.curve.point(0.5 * (from + to));
+    if !inner && [Side::A, Side::B].iter().all(|side| bodies.f(*side, x).abs() > bodies.eps) {
+        return Vec::new();
+    }
+    if [from, to].iter().all(|s| touches(*s).is_some() == inner) {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    // Of a face that it runs along: another one it only passes.
+    for lit in c.faces.iter().chain(others).filter(|lit| lies_in(bodies, &c.curve, (from, to), **lit)) {
+        Along::new(bodies, &c.curve, *lit, bodies.tau, (from, to)).roots((from, to), &mut found);
+    }
+    found.sort_by(f64::total_cmp);
+    found
+}
+
 /// Where a candidate's curve may begin or cease to touch, in order; of a circle once around. `None` where the work is spent.
 fn stops(bodies: &Bodies, c: &Candidate, others: &[Lit], range: (f64, f64)) -> Option<Vec<f64>> {
     let mut stops = Vec::new();
@@ -375,7 +430,7 @@ fn stops(bodies: &Bodies, c: &Candidate, others: &[Lit], range: (f64, f64)) -> O
         if bodies.work.is_spent() {
             return None;
         }
-        roots(bodies, &c.curve, *lit, range, &mut stops);
+        crossings(bodies, &c.curve, *lit, range, &mut stops);
     }
     for lit in &c.faces {
         // A ruling ends at its apex.
@@ -514,7 +569,7 @@ mod tests {
                 for c in candidates(bodies, place) {
                     let range = c.curve.range(place);
                     for lit in [Side::A, Side::B].iter().flat_map(|s| place.lits(*s)).filter(|l| !c.faces.contains(l)) {
-                        let along = Along::new(bodies, &c.curve, lit, range);
+                        let along = Along::new(bodies, &c.curve, lit, 0.0, range);
                         let Some([at, gain, _]) = along.law else { panic!("a plane along a line has a law") };
                         for _ in 0..40 {
                             // Anywhere, and next to where the value is the level: from far roundings to none.
