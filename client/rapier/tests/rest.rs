@@ -236,8 +236,8 @@ fn a_stack_stands_as_rapiers_own_does_and_then_asks_nothing() {
         stock.step();
         let found = under(bodies.map(|b| s.pose(b).translation.z));
         let theirs = under(own.map(|b| stock.bodies[b].translation().z));
-        // They fall and settle; then they stand.
-        if step >= 20 {
+        // They fall, a ten thousandth aslant, and settle; then they stand.
+        if step >= 40 {
             for ((worst, p), q) in worst.iter_mut().zip(found).zip(theirs) {
                 *worst = worst.max((p - q).abs());
             }
@@ -246,7 +246,7 @@ fn a_stack_stands_as_rapiers_own_does_and_then_asks_nothing() {
             println!("step {step}: gaps {found:?}, rapier's own {theirs:?}");
         }
     }
-    println!("differ by {worst:?} at most from step 20 on, {} second requests", s.coupling.retracted());
+    println!("differ by {worst:?} at most from step 40 on, {} second requests", s.coupling.retracted());
     assert!(worst.iter().all(|w| *w < 3e-5), "{worst:?}");
     may_sleep_after(&mut s, 0.5);
     for _ in 0..60 {

@@ -499,3 +499,60 @@ fn what_is_told_of_a_box_that_leans_is_as_far_as_it_says() {
     println!("{told} points, {left} boxes of which not all of a side is within the margin");
     assert!(left > 50);
 }
+
+/// The least height of a box's lower side over the rectangle |x|, |y| <= `most` at z = 0, worked out where their edges cross.
+fn least_over(most: [f64; 2], half: DVec3, at: DVec3, rotation: DQuat) -> f64 {
+    let side = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let mut polygon: Vec<DVec3> = side.iter().map(|(x, y)| at + rotation * (half * dvec3(*x, *y, -1.0))).collect();
+    for (k, limit) in most.iter().enumerate() {
+        for sign in [-1.0, 1.0] {
+            let within = |p: &DVec3| limit - sign * p[k];
+            let mut left = Vec::new();
+            for (i, p) in polygon.iter().enumerate() {
+                let q = &polygon[(i + 1) % polygon.len()];
+                if within(p) >= 0.0 {
+                    left.push(*p);
+                }
+                if (within(p) < 0.0) != (within(q) < 0.0) {
+                    left.push(*p + (*q - *p) * (within(p) / (within(p) - within(q))));
+                }
+            }
+            polygon = left;
+        }
+    }
+    polygon.iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
+}
+
+/// Boxes lean over another of about the same sides, nearly flush with it: nothing is told nearer than it is, nor farther than the
+/// margin, and the nearest place is told.
+#[test]
+fn what_is_told_of_a_box_that_leans_on_its_like_is_as_far_as_it_says() {
+    let mut r = Random::new(815);
+    let mut told = 0;
+    for k in 0..sized("CONTACTD_LEANING", 300) {
+        let half = dvec3(r.within(0.2, 0.6), r.within(0.2, 0.6), r.within(0.1, 0.3));
+        let margin = 10f64.powf(r.within(-3.5, -2.0));
+        let lean = r.vector(1.0) * margin * 10f64.powf(r.within(-3.0, 0.8));
+        let rotation = quat_of_rotation_vector(lean);
+        let off = r.vector(1.0) * margin * 10f64.powf(r.within(-3.0, 0.5));
+        let at = dvec3(off.x, off.y, half.z);
+        let gap = margin * r.within(0.0, 0.9);
+        let at = at + DVec3::Z * (gap - least_over([half.x, half.y], half, at, rotation));
+        let below = Recipe::cuboid(half.x, half.y, 0.4).at(0.0, 0.0, -0.4);
+        let found = rest(below, Recipe::cuboid(half.x, half.y, half.z), Pose::new(at, rotation)).regions(margin);
+        let points: Vec<_> = found.regions.iter().flat_map(|region| &region.points).collect();
+        let nearest = points.iter().map(|p| p.separation).fold(f64::INFINITY, f64::min);
+        // What hangs over by `off` is nearer by as much as it leans there.
+        let room = 1e-9 + gap * lean.length_squared() + lean.length() * (off.length() + lean.length());
+        assert!((nearest - gap).abs() < room, "{k}: told {nearest} of {gap}: {found:#?}");
+        for p in points {
+            let own = rotation.conjugate() * (p.point - at);
+            let height = (own.z + half.z).abs() + p.point.z.abs();
+            let aside = p.separation * lean.length() + (off.length() + lean.length() * half.z) * 2.0;
+            assert!((height - p.separation).abs() < 1e-9 + aside, "{k}: {p:?}, {height} in {found:#?}");
+            assert!(p.separation <= margin * (1.0 + 1e-9), "{k}: {p:?} beyond {margin}");
+            told += 1;
+        }
+    }
+    println!("{told} points");
+}
