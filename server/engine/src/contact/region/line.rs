@@ -360,7 +360,7 @@ fn runs_among(
             pieces.push(Piece { from: w[0], to: w[1], feet: None });
             continue;
         }
-        let mut bounds = departures(bodies, c, others, (w[0], w[1]), feet.is_some(), &whole);
+        let mut bounds = departures(bodies, c, others, (w[0], w[1]), feet, &whole);
         if bounds.is_empty() {
             pieces.push(Piece { from: w[0], to: w[1], feet });
             continue;
@@ -376,7 +376,10 @@ fn runs_among(
         let on = |side: Side| {
             // The faces that make it hold it by construction.
             let own = c.faces.iter().any(|l| l.0 == side);
-            own || others.iter().any(|l| l.0 == side && lies_in(bodies, &c.curve, (run.from, run.to), *l))
+            // The face that holds the feet of the middle: another one that the run lies in may end before.
+            let gap = (run.feet[1] - run.feet[0]).length();
+            let near = |l: Lit| (bodies.value(l, run.middle).abs() - gap).abs() <= bodies.eps;
+            own || others.iter().any(|l| l.0 == side && near(*l) && lies_in(bodies, &c.curve, (run.from, run.to), *l))
         };
         on(Side::A) && on(Side::B)
     });
@@ -384,11 +387,16 @@ fn runs_among(
     for run in &mut out {
         let corner = |(i, s): (usize, f64)| {
             let x = c.curve.point(s);
-            // Where its very end has no feet (an apex, where no face is), those of the middle tell.
-            let (x, gap) = touches(bodies, &c.faces, others, x).map_or_else(
-                || (x, (run.feet[1] - run.feet[0]).length()),
-                |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()),
-            );
+            // An end over the brim of the other body has no foot on it: its gap is that from the face that holds the middle's. Where there
+            // is no such face (an apex), that of the middle.
+            let beyond = || {
+                let gap = (run.feet[1] - run.feet[0]).length();
+                let near = |l: &&Lit| (bodies.value(**l, run.middle).abs() - gap).abs() <= bodies.eps;
+                let foot = others.iter().find(near).map(|l| bodies.foot(*l, x));
+                foot.map_or((x, gap), |y| ((x + y) * 0.5, (y - x).length()))
+            };
+            let feet = touches(bodies, &c.faces, others, x);
+            let (x, gap) = feet.map_or_else(beyond, |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()));
             Corner { x, gap, key: [key[0], key[1], i as u64] }
         };
         run.ends = ends(run, round).into_iter().enumerate().map(corner).collect();
@@ -397,27 +405,36 @@ fn runs_among(
 }
 
 /// Where between two stops a candidate's curve leaves the threshold, in order: it may lean against the face along which it runs.
-/// `inner`: whether the bodies touch in the middle.
+/// `inner`: the feet of its middle where the bodies touch there.
 fn departures(
     bodies: &Bodies,
     c: &Candidate,
     others: &[Lit],
     (from, to): (f64, f64),
-    inner: bool,
+    inner: Option<[DVec3; 2]>,
     touches: &dyn Fn(f64) -> Option<[DVec3; 2]>,
 ) -> Vec<f64> {
     // Beyond the end of an edge there is no surface: no gap has been left there.
     let x = c.curve.point(0.5 * (from + to));
-    if !inner && [Side::A, Side::B].iter().all(|side| bodies.f(*side, x).abs() > bodies.eps) {
+    if inner.is_none() && [Side::A, Side::B].iter().all(|side| bodies.f(*side, x).abs() > bodies.eps) {
         return Vec::new();
     }
-    if [from, to].iter().all(|s| touches(*s).is_some() == inner) {
+    let ends = [from, to].map(|s| (s, touches(s)));
+    if ends.iter().all(|(_, feet)| feet.is_some() == inner.is_some()) {
         return Vec::new();
     }
+    let near = inner.map(|feet| (0.5 * (from + to), feet));
+    let Some((s, feet)) = near.or_else(|| ends.into_iter().find_map(|(s, feet)| Some((s, feet?)))) else {
+        return Vec::new();
+    };
+    let gap = (feet[1] - feet[0]).length();
     let mut found = Vec::new();
-    // Of a face that it runs along: another one it only passes.
-    for lit in c.faces.iter().chain(others).filter(|lit| lies_in(bodies, &c.curve, (from, to), **lit)) {
-        Along::new(bodies, &c.curve, *lit, bodies.tau, (from, to)).roots((from, to), &mut found);
+    for lit in c.faces.iter().chain(others) {
+        // Of the face that it is near to and runs along: another one it only passes.
+        let holds = (bodies.value(*lit, c.curve.point(s)) - gap).abs() <= bodies.eps;
+        if holds && lies_in(bodies, &c.curve, (from, to), *lit) {
+            Along::new(bodies, &c.curve, *lit, bodies.tau, (from, to)).roots((from, to), &mut found);
+        }
     }
     found.sort_by(f64::total_cmp);
     found
