@@ -62,7 +62,7 @@ fn no_sample_is_nearer_than_is_proven_and_what_is_told_is_so_near() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(5);
     let (mut clear, mut clashes, mut boxes, mut widest) = (0, 0, 0, 0.0_f64);
-    for k in 0..sized("CONTACTD_ROBOTS", 20usize) {
+    for k in 0..sized("CONTACTD_ROBOTS", 40usize) {
         let arm = arm(&mut r);
         if arm.links.len() < 3 {
             continue;
