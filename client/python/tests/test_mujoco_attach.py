@@ -363,7 +363,7 @@ def test_contacts_that_are_carried_along_are_those_that_a_request_would_tell():
                     assert dist == pytest.approx(other, abs=1e-7 + 2e-3 * abs(min(other, 0))), f"model {seed}: {pair}"
                     assert fields is None or others is None or np.array_equal(fields, others)
                     compared += fields is not None and others is not None
-    assert compared > 5 * MODELS
+    assert compared > 2 * MODELS
 
 
 def test_parameters_are_those_of_the_model_as_it_is():
