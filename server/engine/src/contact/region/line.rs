@@ -328,6 +328,11 @@ fn touches(bodies: &Bodies, faces: &[Lit; 2], others: &[Lit], x: DVec3) -> Optio
     (near && bodies.is_bodily(Side::A, feet[0]) && bodies.is_bodily(Side::B, feet[1])).then_some(feet)
 }
 
+/// True when a face is as far from a point as the feet that the point has on both bodies are from each other: it holds one of them.
+fn is_as_far(bodies: &Bodies, x: DVec3, feet: [DVec3; 2], lit: Lit) -> bool {
+    (bodies.value(lit, x).abs() - (feet[1] - feet[0]).length()).abs() <= bodies.eps
+}
+
 /// The runs of a candidate on which the bodies touch and no patch holds them already.
 pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn(DVec3) -> bool) -> Vec<Run> {
     let mut others: Vec<Lit> = places
@@ -377,9 +382,8 @@ fn runs_among(
             // The faces that make it hold it by construction.
             let own = c.faces.iter().any(|l| l.0 == side);
             // The face that holds the feet of the middle: another one that the run lies in may end before.
-            let gap = (run.feet[1] - run.feet[0]).length();
-            let near = |l: Lit| (bodies.value(l, run.middle).abs() - gap).abs() <= bodies.eps;
-            own || others.iter().any(|l| l.0 == side && near(*l) && lies_in(bodies, &c.curve, (run.from, run.to), *l))
+            let is_held = |l: &Lit| l.0 == side && is_as_far(bodies, run.middle, run.feet, *l);
+            own || others.iter().any(|l| is_held(l) && lies_in(bodies, &c.curve, (run.from, run.to), *l))
         };
         on(Side::A) && on(Side::B)
     });
@@ -391,8 +395,8 @@ fn runs_among(
             // is no such face (an apex), that of the middle.
             let beyond = || {
                 let gap = (run.feet[1] - run.feet[0]).length();
-                let near = |l: &&Lit| (bodies.value(**l, run.middle).abs() - gap).abs() <= bodies.eps;
-                let foot = others.iter().find(near).map(|l| bodies.foot(*l, x));
+                let held = others.iter().find(|l| is_as_far(bodies, run.middle, run.feet, **l));
+                let foot = held.map(|l| bodies.foot(*l, x));
                 foot.map_or((x, gap), |y| ((x + y) * 0.5, (y - x).length()))
             };
             let feet = touches(bodies, &c.faces, others, x);
@@ -427,12 +431,10 @@ fn departures(
     let Some((s, feet)) = near.or_else(|| ends.into_iter().find_map(|(s, feet)| Some((s, feet?)))) else {
         return Vec::new();
     };
-    let gap = (feet[1] - feet[0]).length();
     let mut found = Vec::new();
     for lit in c.faces.iter().chain(others) {
         // Of the face that it is near to and runs along: another one it only passes.
-        let holds = (bodies.value(*lit, c.curve.point(s)) - gap).abs() <= bodies.eps;
-        if holds && lies_in(bodies, &c.curve, (from, to), *lit) {
+        if is_as_far(bodies, c.curve.point(s), feet, *lit) && lies_in(bodies, &c.curve, (from, to), *lit) {
             Along::new(bodies, &c.curve, *lit, bodies.tau, (from, to)).roots((from, to), &mut found);
         }
     }
