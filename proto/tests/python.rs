@@ -64,16 +64,16 @@ fn made() -> String {
 
 #[test]
 fn the_committed_rules_of_python_are_those_that_the_tables_make() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../client/python/contactd/rules.py");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../bindings/python/contactd/rules.py");
     let made = made();
     if std::env::var_os("CONTACTD_WRITE_PYTHON").is_some() {
         std::fs::write(&file, &made).expect("a file that can be written");
     }
-    let committed = std::fs::read_to_string(&file).expect("client/python/contactd/rules.py");
+    let committed = std::fs::read_to_string(&file).expect("bindings/python/contactd/rules.py");
     let differs = made.lines().zip(committed.lines()).position(|(a, b)| a != b);
     assert!(
         made == committed,
-        "client/python/contactd/rules.py is not what the tables make, from line {}: write it anew with \
+        "bindings/python/contactd/rules.py is not what the tables make, from line {}: write it anew with \
          CONTACTD_WRITE_PYTHON=1 cargo test -p contactd-proto --test python",
         differs.unwrap_or(made.lines().count().min(committed.lines().count())) + 1
     );

@@ -30,7 +30,7 @@ NEEDS = {
     "maker": {"openscad": "openscad"},
     "operator": {"curl": "curl"},
 }
-#: Pages that want the environment of client/python/check.
+#: Pages that want the environment of bindings/python/check.
 PYTHON = {"mujoco", "maker", "operator", "measure"}
 
 
@@ -128,10 +128,10 @@ def environment(root, target, home, name, install):
 
 def installed(root, target, home):
     """What the C library's install makes, of what was built."""
-    command = [root / "client/capi/install", home / "contactd-c", "--built", target / "release/deps"]
+    command = [root / "bindings/capi/install", home / "contactd-c", "--built", target / "release/deps"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        raise Wrong(f"client/capi/install: {done.stdout}{done.stderr}")
+        raise Wrong(f"bindings/capi/install: {done.stdout}{done.stderr}")
 
 
 def follow(root, target, page, install, keep):
@@ -201,7 +201,7 @@ def lacks(name, target, install):
         if not shutil.which(tool):
             return f"{tool} is missing (Debian's package {package})"
     if name in PYTHON and not install and not (target / "python/bin/contactd").exists():
-        return "the environment of client/python/check is missing: run it first"
+        return "the environment of bindings/python/check is missing: run it first"
     return None
 
 

@@ -132,7 +132,7 @@ fn imports_are_read_from_lists_and_paths() {
 
 #[test]
 fn only_the_transports_name_iceoryx2_and_no_crate_allows_unsafe() {
-    for folder in ["proto", "server/engine", "server", "client", "client/rapier"] {
+    for folder in ["proto", "server/engine", "server", "client", "bindings/rapier"] {
         let text = std::fs::read_to_string(root().join(folder).join("src/lib.rs")).unwrap();
         assert!(text.contains("#![forbid(unsafe_code)]"), "{folder}");
     }
@@ -378,7 +378,7 @@ fn an_import_that_goes_up_within_a_folder_is_seen() {
 #[test]
 fn no_files_import_each_other_in_a_circle() {
     let [engine, server] = &*MODULES;
-    let others = ["proto", "client", "client/capi", "client/rapier", "client/python"]
+    let others = ["proto", "client", "bindings/capi", "bindings/rapier", "bindings/python"]
         .map(|package| modules(&root().join(package).join("src")));
     let [proto, client, capi, rapier, python] = &others;
     for (package, all, least) in [
@@ -386,9 +386,9 @@ fn no_files_import_each_other_in_a_circle() {
         ("client", client, 20),
         ("server/engine", engine, 200),
         ("server", server, 100),
-        ("client/capi", capi, 10),
-        ("client/rapier", rapier, 1),
-        ("client/python", python, 10),
+        ("bindings/capi", capi, 10),
+        ("bindings/rapier", rapier, 1),
+        ("bindings/python", python, 10),
     ] {
         let (found, count) = circle(all);
         println!("{package}: {count} imports");
@@ -412,7 +412,7 @@ fn python_imports(text: &str, files: &BTreeSet<Module>) -> BTreeSet<Module> {
 
 #[test]
 fn no_python_files_import_each_other_in_a_circle() {
-    let folder = root().join("client/python/contactd");
+    let folder = root().join("bindings/python/contactd");
     let texts: BTreeMap<Module, String> = std::fs::read_dir(&folder)
         .expect("the package")
         .map(|entry| entry.expect("an entry").path())

@@ -22,7 +22,7 @@ fn markdown_files(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 fn documents() -> Vec<PathBuf> {
-    let mut all: Vec<PathBuf> = ["README.md", HISTORY, "client/python/README.md"].map(|f| root().join(f)).into();
+    let mut all: Vec<PathBuf> = ["README.md", HISTORY, "bindings/python/README.md"].map(|f| root().join(f)).into();
     all.extend(super::packages::published().iter().map(|(folder, _)| folder.join("README.md")));
     markdown_files(&root().join("docs"), &mut all);
     all
@@ -123,7 +123,7 @@ impl Known {
         let mut known = Self { paths: BTreeSet::new(), programs: BTreeSet::new(), sources: String::new() };
         paths(&root(), &mut known.paths);
         let mut sources = Vec::new();
-        for folder in ["proto", "client", "server", "tests", "benches"] {
+        for folder in ["proto", "client", "server", "bindings", "tests", "benches"] {
             rust_files(&root().join(folder), &mut sources);
         }
         for path in sources {

@@ -24,7 +24,7 @@ fn packages(metadata: &Value) -> Vec<&Value> {
 
 /// The workspace's packages that are published: folder and manifest.
 pub fn published() -> Vec<(PathBuf, toml::Value)> {
-    ["proto", "client", "server/engine", "server", "client/capi", "client/rapier"]
+    ["proto", "client", "server/engine", "server", "bindings/capi", "bindings/rapier"]
         .map(|folder| {
             let folder = root().join(folder);
             let text = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
@@ -87,6 +87,36 @@ fn every_published_package_is_whole_in_its_folder() {
         included("// include_str!(\"no\")\n  (\"/\", include_str!(\"../../yes\")),\n#[path = \"x.rs\"]\n"),
         ["../../yes", "x.rs"]
     );
+}
+
+/// The table of packages in docs/architecture.md is read: each depends on some of those above it, examples and all but for what
+/// tests alone depend on.
+#[test]
+fn packages_depend_on_those_above_them_in_the_table() {
+    let text = std::fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let table =
+        text.split("\n| package |").nth(1).and_then(|rest| rest.split("\n\n").next()).expect("a table of packages");
+    let links = table.split("](../").skip(1).filter_map(|rest| rest.split(')').next());
+    let folder = |link: &str| normal(&root().join(link.strip_suffix("/src").filter(|f| *f != "tests").unwrap_or(link)));
+    let rows: Vec<PathBuf> = links.map(folder).collect();
+    let known = metadata();
+    let mut read = 0;
+    for package in packages(&known).iter().filter(|p| p["source"].is_null()) {
+        let at = |folder: &Path| rows.iter().position(|row| row == folder);
+        let own = normal(Path::new(package["manifest_path"].as_str().unwrap()).parent().unwrap());
+        // What stands in for a crate of others is none of the packages.
+        let Some(row) = at(&own) else {
+            assert!(own.starts_with(normal(&root().join("vendor"))), "{} is not in the table", own.display());
+            continue;
+        };
+        for dependency in package["dependencies"].as_array().unwrap() {
+            let Some(path) = dependency["path"].as_str().filter(|_| dependency["kind"] != "dev") else { continue };
+            read += 1;
+            let below = at(&normal(Path::new(path))).expect("a package of the table");
+            assert!(below < row, "{} depends on {path}, which stands below it in the table", own.display());
+        }
+    }
+    assert!(read > 15, "only {read} dependencies were found");
 }
 
 /// A path without `.` and `..`.

@@ -1,5 +1,5 @@
 // The shortest useful client: a ball falls on a drilled plate. hello [--embedded] [SERVER]: with an engine of its own, or on a
-// server that runs (contactd serve). The same in Rust: client/examples/hello.rs.
+// server that runs (contactd serve). The same in Rust: server/examples/hello.rs.
 #include <contactd.h>
 #include <stdio.h>
 #include <stdlib.h>

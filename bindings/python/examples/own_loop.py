@@ -1,5 +1,5 @@
 """A loop of one's own: a ball flies from contact to contact in a room with a pillar. The same in Rust
-(client/examples/own_loop.rs) and C (client/capi/examples/loop.c)."""
+(server/examples/own_loop.rs) and C (bindings/capi/examples/loop.c)."""
 
 import numpy as np
 

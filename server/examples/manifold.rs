@@ -1,5 +1,5 @@
 //! Few contact points that stay: a cube that slides on a floor, its points at two steps as MuJoCo's contacts. The same in C:
-//! `client/capi/examples/manifold.c`.
+//! `bindings/capi/examples/manifold.c`.
 
 use contactd::ipc::ServerConfig;
 use contactd_client::manifold::Manifolds;

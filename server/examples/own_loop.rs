@@ -1,5 +1,5 @@
 //! A loop of one's own: a ball flies from contact to contact in a room with a pillar. The same in C:
-//! `client/capi/examples/loop.c`.
+//! `bindings/capi/examples/loop.c`.
 
 use contactd::ipc::ServerConfig;
 use contactd_client::proto::contact_record::CONTACT;

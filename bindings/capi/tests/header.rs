@@ -57,7 +57,7 @@ const HEAD: &str = "\
 // vectors of 3 numbers, `rotation` of 4, as they are in contactd_pose_record and contactd_record. What goes in is read before
 // anything is written. In an engine's contact its body 1 (A, first) is a.
 //
-// Not to be edited: made of the Rust sources by client/capi/tests/header.rs.";
+// Not to be edited: made of the Rust sources by bindings/capi/tests/header.rs.";
 
 /// Lines that state size and offsets of a structure to the C compiler.
 macro_rules! asserts {

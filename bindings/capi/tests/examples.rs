@@ -1,14 +1,14 @@
 //! What the examples print: the same in Rust and through the C functions. The programs in C themselves are compared by
-//! `client/capi/check`, which needs a C compiler.
+//! `bindings/capi/check`, which needs a C compiler.
 
 #[allow(dead_code)]
-#[path = "../../examples/hello.rs"]
+#[path = "../../../server/examples/hello.rs"]
 mod hello;
 #[allow(dead_code)]
-#[path = "../../examples/manifold.rs"]
+#[path = "../../../server/examples/manifold.rs"]
 mod manifold;
 #[allow(dead_code)]
-#[path = "../../examples/own_loop.rs"]
+#[path = "../../../server/examples/own_loop.rs"]
 mod own_loop;
 mod support;
 
@@ -121,9 +121,9 @@ fn the_loops_of_the_documentation_are_those_that_run() {
     let chapter = text.split("\n## ").find(|c| c.starts_with("A loop of one's own")).expect("the chapter of the loops");
     let quoted = blocks(chapter);
     let files = [
-        ("rust", "client/examples/own_loop.rs"),
-        ("c", "client/capi/examples/loop.c"),
-        ("python", "client/python/examples/own_loop.py"),
+        ("rust", "server/examples/own_loop.rs"),
+        ("c", "bindings/capi/examples/loop.c"),
+        ("python", "bindings/python/examples/own_loop.py"),
     ];
     assert_eq!(quoted.iter().map(|q| q.0).collect::<Vec<_>>(), files.map(|f| f.0));
     for ((_, block), (_, path)) in quoted.iter().zip(files) {

@@ -1,5 +1,5 @@
 // A loop of one's own: a ball flies from contact to contact in a room with a pillar. The same in Rust:
-// client/examples/own_loop.rs. To be compiled without contraction (-ffp-contract=off) for the same digits.
+// server/examples/own_loop.rs. To be compiled without contraction (-ffp-contract=off) for the same digits.
 #include <contactd.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // Few contact points that stay: a cube that slides on a floor, its points at two steps as MuJoCo's contacts. The same in Rust:
-// client/examples/manifold.rs.
+// server/examples/manifold.rs.
 #include <contactd.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-"""The shortest useful client: a ball falls on a drilled plate. The same scene and output as client/examples/hello.rs.
+"""The shortest useful client: a ball falls on a drilled plate. The same scene and output as server/examples/hello.rs.
 
 hello.py [--embedded] [SERVER]
 """

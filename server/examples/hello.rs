@@ -1,5 +1,5 @@
 //! The shortest useful client: a ball falls on a drilled plate. `hello [--embedded] [SERVER]`: with an engine of its own, or on
-//! a server that runs (`contactd serve`). The same in C: `client/capi/examples/hello.c`.
+//! a server that runs (`contactd serve`). The same in C: `bindings/capi/examples/hello.c`.
 
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::names::{Address, DEFAULT_NAME};
