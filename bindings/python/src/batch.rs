@@ -96,7 +96,7 @@ impl Batch {
         options: (bool, bool, u32, u64, u64, usize),
     ) -> PyResult<(Columns<'py>, Vec<(usize, String)>)> {
         let bad = |what: &str| PyValueError::new_err(format!("{what} are not what they must be"));
-        if offsets.len() % size_of::<u64>() != 0 || records.len() % size_of::<PoseRecord>() != 0 {
+        if !offsets.len().is_multiple_of(size_of::<u64>()) || !records.len().is_multiple_of(size_of::<PoseRecord>()) {
             return Err(bad("bytes of offsets or records"));
         }
         let offsets: Vec<usize> = read::<u64>(offsets).map(|o| o as usize).collect();
