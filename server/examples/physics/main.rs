@@ -1,5 +1,5 @@
 //! The reference physics loop at work, on an engine in this process:
-//! `cargo run --release -p contactd-client --example physics [-- SCENE|all [FOLDER]]`.
+//! `cargo run --release -p contactd --example physics [-- SCENE|all [FOLDER]]`.
 //!
 //! Prints a table a scene, the cost of a cell with everything on beside the one with only what it calls for, and writes each
 //! scene as a strip of moments into FOLDER (default target/physics), as SVG and PNG.

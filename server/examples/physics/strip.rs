@@ -35,7 +35,7 @@ pub fn write(scene: &Scene, run: &Run, folder: &Path) -> Result<Vec<PathBuf>, Bo
             color: COLORS[a.text % COLORS.len()],
             cut: a.cut.map(|y| vec![(DVec3::NEG_Y, -y)]),
         });
-        let view = View { things: things.collect(), camera, ground: None, samples: 4 };
+        let view = View { things: things.collect(), camera, ground: None, samples: 3 };
         let left = (GAP + k * (panel.0 + GAP)) as f64;
         d.image([left, HEAD as f64], panel.0, view.render());
         d.rectangle([left, HEAD as f64], [panel.0 as f64, panel.1 as f64], None, Some((GREY, 1.0)));

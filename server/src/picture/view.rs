@@ -131,6 +131,8 @@ struct Hit {
 const GROUND: u32 = u32::MAX;
 /// Face number of a cut surface.
 const CUT_FACE: u32 = u32::MAX;
+/// Rows of pixels that one thread makes at a time: their margin's samples, which the next ones find once more, are then few.
+const BAND: usize = 8;
 
 /// What is seen, and how finely it is sampled.
 #[derive(Debug)]
@@ -152,39 +154,36 @@ impl View<'_> {
         let size = Aabb::of_points(boxes.iter().flat_map(|b| b.corners())).half().length().max(1e-12);
         let (w, h, n) = (self.camera.size.0, self.camera.size.1, self.samples.max(1));
         let margin = (n / 2).max(1);
-        let rows: Vec<Vec<[u8; 3]>> = (0..h)
-            .into_par_iter()
-            .map(|row| {
-                // A band of hits with a margin of samples around it, for the edges.
-                let (width, height) = (w * n + 2 * margin, n + 2 * margin);
-                let mut hits: Vec<Option<Hit>> = Vec::with_capacity(width * height);
-                for j in 0..height {
-                    for i in 0..width {
-                        let at = |k: usize| (k as f64 + 0.5 - margin as f64) / n as f64;
-                        let ray = self.camera.ray(at(i), row as f64 + at(j));
-                        hits.push(self.first_hit(&ray, &boxes));
+        let band = |first: usize| {
+            // The hits of a band of rows with a margin of samples around it, for the edges.
+            let rows = BAND.min(h - first);
+            let (width, height) = (w * n + 2 * margin, rows * n + 2 * margin);
+            let mut hits: Vec<Option<Hit>> = Vec::with_capacity(width * height);
+            for j in 0..height {
+                for i in 0..width {
+                    let at = |k: usize| (k as f64 + 0.5 - margin as f64) / n as f64;
+                    let ray = self.camera.ray(at(i), first as f64 + at(j));
+                    hits.push(self.first_hit(&ray, &boxes));
+                }
+            }
+            let pixel = |(row, column): (usize, usize)| {
+                let mut sum = [0.0; 3];
+                for j in 0..n {
+                    for i in 0..n {
+                        let k = (row * n + j + margin) * width + column * n + i + margin;
+                        let jitter = sample_jitter(column * n + i, (first + row) * n + j, n);
+                        let color = self.shade(hits[k].as_ref(), jitter, &boxes, size);
+                        let line = edge_weight(&hits, k, width, margin);
+                        for c in 0..3 {
+                            sum[c] += color[c] * (1.0 - line) + 0.02 * line;
+                        }
                     }
                 }
-                (0..w)
-                    .map(|column| {
-                        let mut sum = [0.0; 3];
-                        for j in 0..n {
-                            for i in 0..n {
-                                let k = (j + margin) * width + column * n + i + margin;
-                                let jitter = sample_jitter(column * n + i, row * n + j, n);
-                                let color = self.shade(hits[k].as_ref(), jitter, &boxes, size);
-                                let line = edge_weight(&hits, k, width, margin);
-                                for c in 0..3 {
-                                    sum[c] += color[c] * (1.0 - line) + 0.02 * line;
-                                }
-                            }
-                        }
-                        sum.map(|c| encode(c / (n * n) as f64))
-                    })
-                    .collect()
-            })
-            .collect();
-        rows.concat()
+                sum.map(|c| encode(c / (n * n) as f64))
+            };
+            (0..rows).flat_map(|row| (0..w).map(move |column| (row, column))).map(pixel).collect::<Vec<_>>()
+        };
+        (0..h.div_ceil(BAND)).into_par_iter().map(|k| band(k * BAND)).collect::<Vec<_>>().concat()
     }
 
     /// True when nothing stands between the camera and a surface point.
