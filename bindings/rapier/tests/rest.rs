@@ -231,7 +231,7 @@ fn a_stack_stands_as_rapiers_own_does_and_then_asks_nothing() {
     may_sleep_after(&mut s, f64::INFINITY);
     let under = |z: [f64; 3]| [z[0] - 0.25, z[1] - z[0] - 0.5, z[2] - z[1] - 0.5];
     let mut worst = [0.0f64; 3];
-    for step in 0..400 {
+    for step in 0..260 {
         s.step();
         stock.step();
         let found = under(bodies.map(|b| s.pose(b).translation.z));

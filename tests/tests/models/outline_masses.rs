@@ -8,6 +8,7 @@ use contactd::octree::Model;
 use contactd::octree::mass::mass_properties;
 use contactd_proto::{MassOptions, MassProperties};
 use contactd_tests::random_solids::Random;
+use contactd_tests::sweep::sized;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::TAU;
 
@@ -163,7 +164,7 @@ fn extrusions_of_very_many_corners_have_the_masses_of_their_outlines() {
 #[test]
 fn what_is_cut_from_them_is_told_by_boxes_that_agree() {
     let mut r = Random::new(0x0a56);
-    for i in 0..2 {
+    for i in 0..sized("CONTACTD_OUTLINES", 1) {
         let corners = 1001 + r.below(100);
         let exact = Extruded::random(&mut r, corners);
         let text = exact.text();
