@@ -15,6 +15,7 @@ mod hard_cases;
 mod judges;
 mod kinds;
 mod laws;
+mod layers;
 mod meshes;
 mod overlap;
 mod planes;

@@ -29,7 +29,7 @@ const CEILING: u64 = 100_000;
 const ROOM: f64 = 0.05;
 
 /// 10 to a power between `lo` and `hi`.
-fn decades(rng: &mut Random, lo: f64, hi: f64) -> f64 {
+pub(super) fn decades(rng: &mut Random, lo: f64, hi: f64) -> f64 {
     10f64.powf(rng.within(lo, hi))
 }
 
@@ -196,9 +196,9 @@ fn screw(rng: &mut Random) -> Scene {
 }
 
 /// The two bodies of a scene with how they move.
-struct Pair<'a> {
-    models: [&'a Model; 2],
-    motions: [Motion; 2],
+pub(super) struct Pair<'a> {
+    pub(super) models: [&'a Model; 2],
+    pub(super) motions: [Motion; 2],
 }
 
 impl Pair<'_> {
@@ -228,7 +228,7 @@ impl Pair<'_> {
 
     /// A descent from `x` that stretches space along the differences of gradients, across a valley's floor (N. Z. Shor,
     /// "Minimization Methods for Non-Differentiable Functions", 1985).
-    fn descend(&self, t: f64, x: DVec3, step: f64) -> (DVec3, f64) {
+    pub(super) fn descend(&self, t: f64, x: DVec3, step: f64) -> (DVec3, f64) {
         let (mut x, mut step, mut space) = (x, step, DMat3::IDENTITY);
         let mut best = (x, self.value(t, x));
         let mut g = self.gradient(t, x);
@@ -267,7 +267,7 @@ impl Pair<'_> {
 }
 
 /// What is wrong with an answer; nothing where it is right.
-fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -> Option<String> {
+pub(super) fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -> Option<String> {
     let depth = o.depth;
     let radius = pair.models.iter().map(|m| m.radius).fold(f64::INFINITY, f64::min);
     let small = if pair.models[0].radius <= pair.models[1].radius { 0 } else { 1 };
@@ -325,7 +325,7 @@ fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -> Option<St
     None
 }
 
-fn ask(scene: &Scene, models: [&Model; 2]) -> Outcome {
+pub(super) fn ask(scene: &Scene, models: [&Model; 2]) -> Outcome {
     ask_with(scene, models, Strategies::default())
 }
 
