@@ -463,6 +463,14 @@ fn like_cones_that_overlap_at_the_start() {
     assert_eq!(decided("cones", &scene, 1_000).status(), Status::Overlap);
 }
 
+/// A peg that spins in a hole with a gap below the resolution, and slides by a little. A climb that leaves the layer between the
+/// like faces is led back to its middle: else twice as many cells do not find the witness.
+#[test]
+fn a_peg_with_hardly_any_gap_meets_its_hole_as_it_spins() {
+    let scene = pocket(&mut Random::new(165));
+    assert_eq!(decided("peg", &scene, 5_000).status(), Status::Contact);
+}
+
 /// A prism spins while it slides into a round hole with a clearance of 1e-4 to 1e-7 of its size: the hole's wall is the same from
 /// all sides, a plane that touches it is not.
 #[test]
