@@ -127,7 +127,7 @@ pub fn compare_told(
 ) -> (f64, u64) {
     let mut r = Random::new(seed);
     let (mut contacts, mut clear, mut overlap, mut undecided, mut worst, mut cells) = (0, 0, 0, 0, 0.0f64, 0);
-    let (mut flagged, mut lies, mut apart) = (0, 0, 0);
+    let (mut flagged, mut lies, mut apart, mut dearest) = (0, 0, 0, (0, 0));
     for i in 0..count {
         let s = make(&mut r);
         let (a, b) = (Model::new(s.a.build()), Model::new(s.b.build()));
@@ -149,6 +149,7 @@ pub fn compare_told(
             continue;
         }
         apart += o.counters.cells;
+        dearest = dearest.max((o.counters.cells, i));
         match (s.first(), o.status()) {
             (_, Status::Undecided) => undecided += 1,
             (None, Status::Clear) => clear += 1,
@@ -178,8 +179,10 @@ pub fn compare_told(
     }
     println!(
         "{name}: {contacts} contacts, {clear} clear, {overlap} overlap, {undecided} undecided, {flagged} not continued; worst {worst:.1e}; \
-         {} cells each",
-        cells / count as u64
+         {} cells each, at most {} (pair {})",
+        cells / count as u64,
+        dearest.0,
+        dearest.1
     );
     assert!(contacts * 5 > count && undecided * 100 <= count && flagged * 100 <= count && lies == 0, "{name}");
     (worst, apart)

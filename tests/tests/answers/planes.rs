@@ -108,6 +108,94 @@ fn bodies_meet_planes_when_their_supports_say_so_without_a_cell() {
     }
 }
 
+/// The same scene with its plane set so that the lowest of the heights before the body comes down for good is `least`; `None`
+/// where the body does not come near, rise and come down again.
+fn nearly_touching(s: Scene, least: f64) -> Option<Scene> {
+    const STEPS: usize = 400;
+    let at = |k: usize| k as f64 / STEPS as f64;
+    let heights: Vec<f64> = (0..=STEPS).map(|k| s.at(at(k))).collect();
+    let lows = (1..STEPS).filter(|k| heights[*k] < heights[k - 1] && heights[*k] <= heights[k + 1]);
+    let k = lows.min_by(|k, l| heights[*k].total_cmp(&heights[*l]))?;
+    let (mut from, mut to) = (at(k - 1), at(k + 1));
+    for _ in 0..60 {
+        let (p, q) = (to - 0.618 * (to - from), from + 0.618 * (to - from));
+        if s.at(p) <= s.at(q) { to = q } else { from = p }
+    }
+    let lowest = s.at(0.5 * (from + to));
+    // Apart before, as far as the step goes: the lowest of all that comes before the plane is met.
+    if heights[..k].iter().any(|h| *h < lowest) || heights[0] < lowest + 0.02 {
+        return None;
+    }
+    let [mut a, b] = s.motions;
+    a.start.position += b.start.rotation * DVec3::Z * (least - lowest);
+    Some(Scene { motions: [a, b], ..s })
+}
+
+#[test]
+fn bodies_that_nearly_touch_a_plane_before_they_meet_it_are_told_without_a_cell() {
+    // A ball comes near but once; corners of a random hull lie off its planes.
+    let kinds = (0..).zip(KINDS).filter(|(_, (name, _))| !["ball", "polyhedron"].contains(name));
+    for (seed, (name, draw)) in kinds {
+        let scene = |r: &mut Random| loop {
+            let shape = draw(r);
+            let mut s = falling(r, vec![(shape, Pose::IDENTITY)], false);
+            // Off-centre, as a body of a robot's link goes around: it comes near, goes and comes again.
+            let spin = r.direction() * r.within(1.0, 5.0);
+            s.motions[0] = Motion { velocity: s.motions[0].velocity * 0.3, spin, ..s.motions[0] };
+            s.speed = speed(&s.motions, 5.0);
+            let least = 10f64.powf(r.within(-7.0, -2.0));
+            if let Some(s) = nearly_touching(s, least) {
+                return s;
+            }
+        };
+        let count = pairs(40);
+        let (mut r, mut contacts, mut most) = (Random::new(100 + seed), 0, 0);
+        for i in 0..count {
+            let s = scene(&mut r);
+            let (a, b) = (Model::new(s.a.build()), Model::new(s.b.build()));
+            let query = question((&a, placed(s.motions[0])), (&b, placed(s.motions[1])), QueryOptions::DEPTH);
+            if s.at(0.0) <= 4.0 * query.resolution {
+                continue;
+            }
+            let o = earliest_contact(&query, &mut Scratch::default());
+            let met = (0..=2000).any(|k| s.at(f64::from(k) / 2000.0) < 0.0);
+            assert!(!met || o.status() == Status::Contact, "{name} {i}: {o:?}");
+            if o.status() == Status::Contact {
+                contacts += 1;
+                let off = s.at(o.time()).abs();
+                assert!(off < 5e-14 * (1.0 + s.speed), "{name} {i}: {off:e} off: {o:?}");
+                let before = (0..2000).map(|k| s.at(o.time() * f64::from(k) / 2000.0)).fold(f64::INFINITY, f64::min);
+                assert!(before > 0.0, "{name} {i}: met before: {before:e}: {o:?}");
+            }
+            most = most.max(o.counters.cells);
+            assert!(o.counters.cells == 0, "{name} {i}: {o:?}");
+        }
+        println!("{name}: {contacts} of {count} meet a plane after they nearly touched it, at most {most} cells");
+    }
+}
+
+#[test]
+fn a_corner_next_to_the_normal_of_its_edge_is_told_without_a_cell() {
+    let mut r = Random::new(0xc0_12e2);
+    let cube = || Shape::from(Polyhedron::platonic(6, 3f64.sqrt()).expect("a platonic solid"));
+    for i in 0..pairs(300) {
+        // The third face of the corner takes part by this much.
+        let part = 10f64.powf(r.within(-8.0, -4.0));
+        let turn = r.within(0.3, 1.2);
+        let down = dvec3(part, turn.sin(), turn.cos()).normalize();
+        let rotation = DQuat::from_rotation_arc(down, DVec3::NEG_Z);
+        let (body, floor) = (alone(cube()), alone(HalfSpace));
+        let fall = dvec3(r.within(-0.5, 0.5), r.within(-0.5, 0.5), -r.within(3.0, 5.0));
+        let motion = Motion { start: Pose::new(dvec3(0.0, 0.0, 3.0), rotation), velocity: fall, spin: DVec3::ZERO };
+        let still = Motion::resting(Pose::IDENTITY);
+        let query = question((&body, placed(motion)), (&floor, placed(still)), QueryOptions::DEPTH);
+        let o = earliest_contact(&query, &mut Scratch::default());
+        let exact = (3.0 - down.element_sum()) / -fall.z;
+        assert!(o.status() == Status::Contact && o.counters.cells == 0, "{i}, {part:e}: {o:?}");
+        assert!((o.time() - exact).abs() < 1e-14, "{i}: {exact}, {o:?}");
+    }
+}
+
 #[test]
 fn trees_meshes_and_elliptic_bodies_meet_planes_when_their_supports_say_so() {
     let count = pairs(90);

@@ -34,14 +34,15 @@ use crate::contact::query::outcome::Outcome;
 use crate::contact::query::question::PlacedModel;
 use crate::contact::query::task::Task;
 use crate::contact::witness::extent::INCIDENT;
-use crate::contact::witness::faces::faces_at;
+use crate::contact::witness::faces::{all_faces_at, faces_at};
 use crate::contact::witness::newton::MAX_ACTIVE;
 use crate::solid::Primitive;
 use crate::solid::primitive::{Convex, Farthest};
 use glam::{DMat3, DVec3};
 
-/// Heights, with the tries of a contact, before a pair is left to others.
-const ROUNDS: usize = 24;
+/// Heights, with the tries of a contact, before a pair is left to others. A body that nearly touches the plane on its way takes the
+/// more of them the nearer it comes, as the logarithm of how near, and the less its height bends there against what it might.
+const ROUNDS: usize = 192;
 /// Newton steps.
 const STEPS: usize = 24;
 /// A body's edge or face lies as flat as this on the plane (radians) where all of it is told to meet.
@@ -179,14 +180,17 @@ impl<'a> PlanePair<'a> {
     /// A time up to which nothing is met after a height, given that at the end: a nearer end tightens the bound.
     fn farther(&self, here: &Gap, end: &Gap) -> Option<f64> {
         let (mut until, mut end) = (here.t, *end);
+        // As far as the bound reaches where the height stays as it is: ½ Q h² / 4 = φ − least.
+        let mut level = (8.0 * (here.phi - self.pace.least) / self.pace.pull).sqrt();
         for _ in 0..6 {
             let proven = self.pace.proven(here, &end);
             until = until.max(proven);
-            let nearer = here.t + 2.0 * (proven - here.t);
-            if proven >= end.t || proven - here.t > 0.25 * (end.t - here.t) || nearer <= here.t {
+            let nearer = here.t + (2.0 * (proven - here.t)).max(level);
+            if proven >= end.t || proven - here.t > 0.25 * (end.t - here.t) || nearer <= here.t || nearer >= end.t {
                 break;
             }
             end = self.gap(nearer);
+            level = 0.0;
         }
         (until > here.t).then_some(until)
     }
@@ -217,14 +221,22 @@ impl<'a> PlanePair<'a> {
         let n = -height.up;
         let parts = [ConvexPart::plain(body, m.axes[0]), ConvexPart::plain(plane, m.axes[1])];
         let mut stand = Stand::new(self.pair, parts, self.models, Some(&self.turns));
-        stand.to(height.t);
-        let (mut active, tol) = (Active::new(), ACTIVE * body.ball.radius);
-        faces_at(Side::A, body, stand.own(0, height.middle), stand.own_vector(0, n), tol, &mut active);
-        let of_a = active.len();
-        let own = stand.own(1, height.middle);
-        faces_at(Side::B, plane, own, stand.own_vector(1, -n), tol, &mut active);
-        let holds = of_a > 0 && active.len() > of_a && active.len() <= MAX_ACTIVE;
-        holds.then(|| stand.confirm_at(height.middle, n, (&active, of_a), true))?
+        let tol = ACTIVE * body.ball.radius;
+        // Near an edge's normal a corner's third face takes hardly part, and yet holds the point.
+        for faces_of_body in [faces_at, all_faces_at] {
+            stand.to(height.t);
+            let mut active = Active::new();
+            faces_of_body(Side::A, body, stand.own(0, height.middle), stand.own_vector(0, n), tol, &mut active);
+            let of_a = active.len();
+            let own = stand.own(1, height.middle);
+            faces_at(Side::B, plane, own, stand.own_vector(1, -n), tol, &mut active);
+            let holds = of_a > 0 && active.len() > of_a && active.len() <= MAX_ACTIVE;
+            let touch = holds.then(|| stand.confirm_at(height.middle, n, (&active, of_a), true)).flatten();
+            if touch.is_some() {
+                return touch;
+            }
+        }
+        None
     }
 }
 

@@ -10,8 +10,26 @@ use smallvec::SmallVec;
 /// Determinant of three faces' normals from which on they are independent.
 const INDEPENDENT: f64 = 1e-9;
 
+/// By how much a set of one more face must be nearer to n: more than rounding.
+const NEARER: f64 = 1e-7;
+
+/// The same where it is known that a smaller set does not hold the point.
+const HARDLY_NEARER: f64 = 1e-11;
+
+/// Faces with the weights with which their normals make a direction.
+type Weighted = SmallVec<[(Constraint, f64); 8]>;
+
 /// The faces of a primitive that pass within `tol` of its point x, and the weights with which their normals make n.
-pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut SmallVec<[(Constraint, f64); 8]>) {
+pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut Weighted) {
+    least_set(side, p, x, n, (tol, NEARER), out);
+}
+
+/// The same with every face that takes part, by however little: where n is nearly that of an edge, a corner's third face.
+pub fn all_faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &mut Weighted) {
+    least_set(side, p, x, n, (tol, HARDLY_NEARER), out);
+}
+
+fn least_set(side: Side, p: &Primitive, x: DVec3, n: DVec3, (tol, nearer): (f64, f64), out: &mut Weighted) {
     let mut near: SmallVec<[(LiteralId, DVec3); 8]> = SmallVec::new();
     for (i, face) in p.faces.listed().iter().enumerate() {
         let id = LiteralId::new(p.first_face + i as u32, Sense::Positive);
@@ -34,7 +52,7 @@ pub fn faces_at(side: Side, p: &Primitive, x: DVec3, n: DVec3, tol: f64, out: &m
         let Some(weights) = weights(set, |i| near[i].1, n, INDEPENDENT) else { return };
         let sum: DVec3 = set.iter().zip(&weights).map(|(i, w)| near[*i].1 * *w).sum();
         // A larger set must be better by more than rounding.
-        let off = (sum - n).length() + 1e-7 * set.len() as f64;
+        let off = (sum - n).length() + nearer * set.len() as f64;
         if off < 0.5 * best.0 || (off < best.0 && set.len() == best.1.len()) {
             best = (off, set.iter().copied().zip(weights).collect());
         }
