@@ -11,7 +11,7 @@ use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::faces::faces_at;
-use crate::contact::witness::found::Ending;
+use crate::contact::witness::found::{Ending, Found};
 use crate::contact::witness::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
 use crate::motion::Instant;
 use crate::solid::Primitive;
@@ -37,6 +37,8 @@ const BALANCED: f64 = 1e-12;
 /// Gap, relative to the pair's scale, or rounds, from which faces that do not hold the contact are mended one by one:
 /// farther off the next round's faces are the cheaper try.
 const MEND: (f64, usize) = (0.01, 4);
+/// How far the bodies may go between a touch and its witness, relative to the pair's scale, before a nearer witness is looked for.
+const LAG: f64 = 1e-3;
 /// How near to a witness, relative to the pair's scale, a face passes that is active there: first and second try.
 const ACTIVE: [f64; 2] = [1e-7, 1e-3];
 
@@ -337,6 +339,17 @@ impl<'a> Advance<'a> {
         until
     }
 
+    /// True for a witness that is far from the touch that it was continued back to: Newton has gone over the one next to it.
+    fn lags(&self, found: &Found) -> bool {
+        found.touch.as_ref().is_some_and(|touch| (found.deep.t - touch.t) * self.pace.speed > LAG * self.task.scale)
+    }
+
+    /// Looks for a witness beside the touch of the contact found.
+    fn catch_up(&self, contacts: &mut Contacts) {
+        let Some(touch) = contacts.found.as_ref().and_then(|f| f.touch.clone()) else { return };
+        contacts.confirm(touch.active, touch.x, touch.t, touch.lambda, false);
+    }
+
     /// Solves for the contact that the witnesses point to, near the time `guess`; its time and normal when both trees
     /// confirm it.
     fn contact(&self, contacts: &mut Contacts, m: &Moment, found: &Nearest, guess: f64, mend: bool) -> Option<Gap> {
@@ -366,6 +379,9 @@ impl<'a> Advance<'a> {
                     // Balanced but for a slight tilt: which end of the line comes first is not told.
                     contacts.found = None;
                     continue;
+                }
+                if contacts.found.as_ref().is_some_and(|f| self.lags(f)) {
+                    self.catch_up(contacts);
                 }
                 let f = contacts.found.as_ref()?;
                 let s = f.touch.as_ref().filter(|s| s.t >= 0.0)?;
