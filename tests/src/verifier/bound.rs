@@ -52,6 +52,8 @@ pub struct Bounder<'a> {
     pub depth: f64,
     /// Evaluations so far.
     pub evaluations: u64,
+    /// Boxes that a combination may take.
+    pub budget: u64,
     /// A budget ran out: what was not shown may hold.
     pub exhausted: bool,
 }
@@ -61,7 +63,7 @@ pub struct Bounder<'a> {
 pub struct Region(pub [(f64, f64); 4]);
 
 /// Evaluations that one combination may cost.
-const BUDGET: u64 = 40_000;
+pub const BUDGET: u64 = 40_000;
 
 impl Bounder<'_> {
     fn face(&self, l: &Literal) -> Option<&Face> {
@@ -105,7 +107,7 @@ impl Bounder<'_> {
         at_corners: &dyn Fn(&Self, Region) -> f64,
     ) -> bool {
         let mut stack = vec![region];
-        let mut left = BUDGET;
+        let mut left = self.budget;
         while let Some(r) = stack.pop() {
             if left == 0 {
                 self.exhausted = true;

@@ -5,6 +5,7 @@
 //! body reaches along a direction by formulas of its own for each primitive, how far bodies have gone from where they stood by
 //! their poses alone. What is added up on the server is not asked for.
 
+use super::bound::BUDGET;
 use super::interval::{Interval, Vector, apply, dot, minus, plus, point, product, times, transpose, vector};
 use super::motion::{Motions, rotation, turned};
 use super::{Bounder, Checked, Region, certain, check_cells, check_level, expression, extent, extent_in, number};
@@ -409,7 +410,8 @@ fn is_deep(bodies: &[Truth; 2], x: DVec3, t: f64, depth: f64, inside_out: [bool;
     let place = a.placed.place.inverse();
     let x = place.point(a.placed.motion.at(t).inverse().point(x));
     let motions = Motions::new(&a.placed, &b.placed);
-    let mut bounder = Bounder { a: a.solid, b: b.solid, motions, depth, evaluations: 0, exhausted: false };
+    let mut bounder =
+        Bounder { a: a.solid, b: b.solid, motions, depth, evaluations: 0, budget: BUDGET, exhausted: false };
     let region = Region([(x.x, x.x), (x.y, x.y), (x.z, x.z), (t, t)]);
     let own = expression(a.solid, a.solid.root, inside_out[0], false);
     let other = expression(b.solid, b.solid.root, inside_out[1], true);
@@ -591,7 +593,8 @@ fn regions(text: &str, (count, threshold): (usize, f64), bodies: &[Truth; 2], re
     }
     let [a, b] = bodies;
     let mut boxes = Vec::new();
-    let checked = check_cells(cells, (0, 1), (a.solid, &a.placed), (b.solid, &b.placed), Some(&mut boxes))?;
+    let sides = ((a.solid, &a.placed), (b.solid, &b.placed));
+    let checked = check_cells(BUDGET, cells, (0, 1), sides, Some(&mut boxes))?;
     if -2.0 * checked.depth < TOLD * threshold * (1.0 - 1e-9) {
         return Err(format!("proven for {:e} alone, the threshold is {threshold:e}", -2.0 * checked.depth));
     }

@@ -174,7 +174,21 @@ pub fn check(
     first: (&Solid, &Placed),
     second: (&Solid, &Placed),
 ) -> Result<Checked, String> {
-    let checked = check_level(text, names, first, second)?;
+    check_within(bound::BUDGET, text, names, first, second)
+}
+
+/// The same with a budget of its own for each combination: how many boxes it may be halved into before it counts as `UNSHOWN`.
+///
+/// # Errors
+/// The first thing that is not certain, by line.
+pub fn check_within(
+    budget: u64,
+    text: &str,
+    names: (usize, usize),
+    first: (&Solid, &Placed),
+    second: (&Solid, &Placed),
+) -> Result<Checked, String> {
+    let checked = check_cells(budget, text, names, (first, second), None)?;
     if checked.depth > 0.0 { Ok(checked) } else { Err("line 1: depth out of range".into()) }
 }
 
@@ -185,15 +199,15 @@ fn check_level(
     first: (&Solid, &Placed),
     second: (&Solid, &Placed),
 ) -> Result<Checked, String> {
-    check_cells(text, names, first, second, None)
+    check_cells(bound::BUDGET, text, names, (first, second), None)
 }
 
 /// The same but for the cells that are left, where that is allowed: their boxes (frame of the reference body) are listed.
 fn check_cells(
+    budget: u64,
     text: &str,
     names: (usize, usize),
-    first: (&Solid, &Placed),
-    second: (&Solid, &Placed),
+    (first, second): ((&Solid, &Placed), (&Solid, &Placed)),
     mut left: Option<&mut Vec<[(f64, f64); 3]>>,
 ) -> Result<Checked, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split(' ').collect::<Vec<_>>())).peekable();
@@ -226,7 +240,7 @@ fn check_cells(
         return Err("line 1: the box does not hold the reference".into());
     }
     let motions = Motions::new(reference.1, other.1);
-    let mut bounder = Bounder { a: reference.0, b: other.0, motions, depth, evaluations: 0, exhausted: false };
+    let mut bounder = Bounder { a: reference.0, b: other.0, motions, depth, evaluations: 0, budget, exhausted: false };
     let a = expression(reference.0, reference.0.root, false, false);
     let b = expression(other.0, other.0.root, false, true);
     if let Some((line, words)) = lines.next_if(|(_, words)| words[0] == "witness") {

@@ -42,8 +42,10 @@ const HASTE: f64 = 0.85;
 const WITNESS: f64 = 0.995;
 /// Room left for a checker: the box of a proof at a distance holds what is so many times as near.
 const ROOM: f64 = 4.0;
-/// Sides of a cell that may be left differ by no more than about this.
+/// Sides of a compact cell differ by no more than about this.
 const SLAB: f64 = 4.0;
+/// Cells that may get as thin as their faces have them; a proof that takes more is begun anew with compact ones. Most take a few.
+const THIN: u64 = 2000;
 /// How much before `time_lower` the proof of an undecided answer may end, in depths over the fastest speed.
 const BACK: [f64; 3] = [0.0, 10.0, 1000.0];
 /// Combinations of a span above which they are not thinned out.
@@ -208,12 +210,37 @@ fn extent(solid: &Solid, node: NodeId, level: f64) -> Aabb {
 }
 
 /// Covers the box with cells, as many as `limit`; those of radius `left` or less may be left.
+///
+/// Along a line of contact a cell costs its bound nothing, however thin it is across. Faces that bend away from their tangents may
+/// tell the same of a long side that holds the bound back all the same: there compact cells are the shorter proof, by factors.
 fn cover(
     task: &Task,
     swapped: bool,
     outcome: &Outcome,
+    made: Certificate,
+    (limit, left): (u64, f64),
+) -> Option<Certificate> {
+    let covered =
+        |limit: u64, compact: bool| cover_with(task, (swapped, outcome), made.clone(), (limit, left), compact);
+    // Along faces that touch no cell is ever thin enough: what is to be left must not become a slab.
+    if left > 0.0 {
+        return covered(limit, true);
+    }
+    covered(limit.min(THIN), false).or_else(|| {
+        if limit <= THIN {
+            return None;
+        }
+        covered(limit, true).or_else(|| covered(limit, false))
+    })
+}
+
+/// The same with cells that may be thin, or compact ones.
+fn cover_with(
+    task: &Task,
+    (swapped, outcome): (bool, &Outcome),
     mut made: Certificate,
     (limit, left): (u64, f64),
+    compact: bool,
 ) -> Option<Certificate> {
     let mut scratch = clause::Scratch::recording();
     let hints = hints(task, swapped, outcome);
@@ -224,7 +251,7 @@ fn cover(
         if made.cells.len() as u64 >= limit {
             return None;
         }
-        let mut maker = Maker { task, end: made.until, left, hints: &hints, scratch: &mut scratch };
+        let mut maker = Maker { task, end: made.until, left, compact, hints: &hints, scratch: &mut scratch };
         let (proof, children) = maker.cell(open);
         made.cells.push(proof);
         stack.extend(children.into_iter().flatten().rev());
@@ -303,6 +330,8 @@ struct Maker<'a> {
     end: f64,
     /// Cells of this radius or less may be left.
     left: f64,
+    /// Cells are halved across their longest side before one of them gets thin.
+    compact: bool,
     hints: &'a [Hint],
     scratch: &'a mut clause::Scratch,
 }
@@ -367,8 +396,7 @@ impl<'a> Maker<'a> {
         // Halves along the axis that costs most.
         let dearest = clause::axis_to_halve(cost, half);
         let longest = half.max_position();
-        // Along faces that touch no cell is ever thin enough: what is to be left must not become a slab.
-        let k = if self.left > 0.0 && half[dearest] * SLAB < half[longest] { longest } else { dearest };
+        let k = if self.compact && half[dearest] * SLAB < half[longest] { longest } else { dearest };
         proof.rest = Rest::Split(k, center[k]);
         let child = |low: bool| {
             let mut region = open.region;

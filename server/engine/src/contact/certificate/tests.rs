@@ -28,7 +28,8 @@ fn every_clause_is_closed_by_a_recorded_proof() {
                 b: task.b.literal_form(),
                 reach: 1.0,
             };
-            let mut maker = Maker { task: &task, end: 1.0, left: 0.0, hints: &[], scratch: &mut scratch };
+            let mut maker =
+                Maker { task: &task, end: 1.0, left: 0.0, compact: false, hints: &[], scratch: &mut scratch };
             let (_, close, ..) = maker.span(&cell, 1.0 - cell.t, region.center(), region.half());
             match close {
                 Some(close) if !close.is_empty() => {
