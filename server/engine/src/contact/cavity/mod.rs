@@ -30,6 +30,7 @@ use glam::DVec3;
 use pierced::{CavityPair, First, Guess, Wall};
 use proof::ProofEnd;
 use smallvec::SmallVec;
+use std::cell::OnceCell;
 
 /// Pairs of parts beyond which the search does better.
 const MOST_PAIRS: usize = 256;
@@ -126,8 +127,8 @@ struct Unions<'s, 'a> {
     of_a: &'s Parts,
     of_b: &'s Parts,
     pairs: Pairs,
-    /// The motion with the bodies exchanged.
-    seen_from_a: Relative,
+    /// The motion with the bodies exchanged, made when a cavity of a is first asked for.
+    seen_from_a: OnceCell<Relative>,
     /// The parts are those of a collision region. There a part is often one end of others, so that not every edge that it has is met,
     /// and lies in several cavities: contacts are solved for at once, and more than one cavity is tried.
     in_region: bool,
@@ -142,8 +143,7 @@ struct Claim<'u> {
 
 impl<'s, 'a> Unions<'s, 'a> {
     fn new(task: &'s Task<'a>, [of_a, of_b]: [&'s Parts; 2], pairs: Pairs, in_region: bool) -> Self {
-        let (placed_a, placed_b) = task.relative.placed();
-        Self { task, of_a, of_b, pairs, seen_from_a: Relative::new(placed_b, placed_a), in_region }
+        Self { task, of_a, of_b, pairs, seen_from_a: OnceCell::new(), in_region }
     }
 
     fn answer(&self, contacts: &mut Contacts) -> Option<Ending> {
@@ -156,19 +156,31 @@ impl<'s, 'a> Unions<'s, 'a> {
     }
 
     /// The body of one part with a cavity of the other, those first that it is in half way of the step, and the one before that it is
-    /// deepest in; then the other way round.
+    /// deepest in; then the other way round, where more are asked for.
     fn cavities(&self, index: usize) -> SmallVec<[CavityPair<'_>; 2]> {
         let (a, b) = self.pairs[index];
-        let Self { task, of_a, of_b, seen_from_a, .. } = self;
+        let Self { task, of_a, of_b, .. } = self;
         let (main_a, main_b) = (&task.a.primitives[a.main as usize], &task.b.primitives[b.main as usize]);
-        let most = if self.in_region { MOST_TRIED } else { 1 };
+        let (most, of_both) = if self.in_region { (MOST_TRIED, 2 * MOST_TRIED) } else { (1, 1) };
         let center = task.relative.at(0.5).b_point(main_a.ball.center);
         let of_b = of_b.holes_at(task.b, b, center, most).into_iter();
         let of_b = of_b.filter_map(|hole| CavityPair::new(task, main_a, (main_b, hole), Side::B, &task.relative));
-        let center = seen_from_a.at(0.5).b_point(main_b.ball.center);
-        let of_a = of_a.holes_at(task.a, a, center, most).into_iter();
-        let of_a = of_a.filter_map(|hole| CavityPair::new(task, main_b, (main_a, hole), Side::A, seen_from_a));
-        of_b.chain(of_a).take(if self.in_region { 2 * MOST_TRIED } else { 1 }).collect()
+        let mut found: SmallVec<[CavityPair; 2]> = of_b.take(of_both).collect();
+        if found.len() < of_both {
+            let seen_from_a = self.seen_from_a();
+            let center = seen_from_a.at(0.5).b_point(main_b.ball.center);
+            let of_a = of_a.holes_at(task.a, a, center, most).into_iter();
+            let of_a = of_a.filter_map(|hole| CavityPair::new(task, main_b, (main_a, hole), Side::A, seen_from_a));
+            found.extend(of_a.take(of_both - found.len()));
+        }
+        found
+    }
+
+    fn seen_from_a(&self) -> &Relative {
+        self.seen_from_a.get_or_init(|| {
+            let (placed_a, placed_b) = self.task.relative.placed();
+            Relative::new(placed_b, placed_a)
+        })
     }
 
     /// Looks for the first contact of each pair, and solves for it; what is left to be proven. `None` where a pair may touch at the
