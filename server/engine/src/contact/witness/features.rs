@@ -19,6 +19,9 @@ use crate::solid::{Face, Sense};
 use glam::DVec3;
 use smallvec::SmallVec;
 
+/// Tokens of most points: what passes there are a few faces.
+const FEW: usize = 16;
+
 /// Both bodies at a point of contact.
 pub struct Features<'t, 'a> {
     task: &'t Task<'a>,
@@ -56,7 +59,7 @@ impl<'t, 'a> Features<'t, 'a> {
     /// The active faces of one side among those within `tolerance` of the point.
     fn active_within(&self, side: Side, tolerance: f64) -> Literals {
         let (task, y) = (self.task, if side == Side::A { self.x } else { self.at.b_point(self.x) });
-        let (model, mut open) = (if side == Side::A { task.model_a } else { task.model_b }, Vec::new());
+        let (model, mut open) = (if side == Side::A { task.model_a } else { task.model_b }, Vec::with_capacity(FEW));
         if model.literals_at(y, tolerance, &mut open) != Truth::Open {
             return Literals::new();
         }
