@@ -366,7 +366,7 @@ fn nothing_that_is_computed_of_a_superellipsoid_differs_by_more_than_the_budget(
     let shapes: Vec<Shape> = (0..48).map(|_| random_solids::superellipsoid(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
     // Logarithms of many digits take their time.
-    evaluate(&mut r, &models, evaluations().div_ceil(12), "superellipsoids");
+    evaluate(&mut r, &models, evaluations().div_ceil(8), "superellipsoids");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.
