@@ -147,6 +147,51 @@ pub fn shape_or_mesh(r: &mut Random, size: f64) -> Shape {
     if r.below(3) == 0 { crate::meshes::solid(&crate::meshes::random(r, size)).into() } else { shape(r, size) }
 }
 
+/// The words for the kinds of primitives, as `of_kind` draws them: elliptic ones are ellipsoids, elliptic cylinders, cones and frustums.
+pub const KINDS: [&str; 12] = [
+    "ball",
+    "cylinder",
+    "frustum",
+    "box",
+    "polyhedron",
+    "capsule",
+    "elliptic",
+    "torus",
+    "superellipsoid",
+    "quadric",
+    "mesh",
+    "half-space",
+];
+
+/// A random primitive of a kind, of size about `size`.
+pub fn of_kind(r: &mut Random, kind: &str, size: f64) -> Shape {
+    let (a, b, c) = (size * r.within(0.25, 1.0), size * r.within(0.25, 1.0), size * r.within(0.25, 1.0));
+    match kind {
+        "ball" => Sphere { radius: a }.into(),
+        "cylinder" => Cylinder { radius: a, half_height: b }.into(),
+        "frustum" => Cone { bottom: a, top: [0.0, 0.4 * a, 1.5 * a][r.below(3)], half_height: b }.into(),
+        "box" => Cuboid { half: DVec3::new(a, b, c) }.into(),
+        "polyhedron" => {
+            let faces = [4, 6, 8, 12, 20][r.below(5)];
+            Polyhedron::platonic(faces, a + 0.25 * size).expect("a platonic count").into()
+        }
+        "capsule" => capsule(r, size).into(),
+        "elliptic" => elliptic(r, size),
+        "torus" => torus(r, size).into(),
+        "superellipsoid" => superellipsoid(r, size).into(),
+        "quadric" => crate::quadrics::random(r, size),
+        "mesh" => crate::meshes::solid(&crate::meshes::random(r, size)).into(),
+        "half-space" => HalfSpace.into(),
+        other => panic!("no kind {other:?}"),
+    }
+}
+
+/// A random primitive of any kind but half-spaces.
+pub fn shape_of_any_kind(r: &mut Random, size: f64) -> Shape {
+    let kind = KINDS[r.below(KINDS.len() - 1)];
+    of_kind(r, kind, size)
+}
+
 /// A random solid whose tree has up to `depth` levels of operations; bounded, its plain box not empty.
 pub fn solid(r: &mut Random, depth: usize) -> Solid {
     solid_of(r, depth, shape)

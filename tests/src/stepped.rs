@@ -4,7 +4,7 @@
 //! fall, slide, turn, rest, tremble, are set back and put elsewhere, come and go, the rules change, and what is asked of a step.
 //! One seed, one play; the only thing it is told is how much of the last step was free, as a loop would take it.
 
-use crate::random_solids::Random;
+use crate::random_solids::{Random, shape_of_any_kind};
 use crate::scenes::{self, Recipe};
 use contactd::solid::Op;
 use contactd::solid::primitive::HalfSpace;
@@ -166,9 +166,32 @@ fn recipe(rng: &mut Random, crowd: bool) -> Recipe {
     }
 }
 
+/// One primitive of any kind, or a few in one tree.
+fn of_any_kind(rng: &mut Random, _: bool) -> Recipe {
+    let mut one = |size: f64| Recipe::of(shape_of_any_kind(rng, size));
+    let (whole, other, small) = (one(0.5), one(0.4), one(0.3));
+    let aside = |rng: &mut Random, recipe: Recipe| recipe.moved(&Pose::new(rng.vector(0.35), rng.rotation()));
+    match rng.below(10) {
+        0 | 1 => whole.minus(aside(rng, small)),
+        2 => whole.union(aside(rng, other)),
+        3 => whole.union(aside(rng, other)).minus(aside(rng, small)),
+        4 => plate(rng).minus(aside(rng, other)),
+        _ => whole,
+    }
+}
+
 impl Play {
     /// The play of a seed.
     pub fn new(seed: u64) -> Self {
+        Self::drawn(seed, recipe)
+    }
+
+    /// The same with primitives of all kinds, and small trees of them.
+    pub fn of_all_kinds(seed: u64) -> Self {
+        Self::drawn(seed, of_any_kind)
+    }
+
+    fn drawn(seed: u64, recipe: fn(&mut Random, bool) -> Recipe) -> Self {
         let mut rng = Random::new(seed);
         let count = if rng.chance(0.85) { 2 + many(&mut rng, 6) - 1 } else { many(&mut rng, 100).max(8) };
         let crowd = count > 8;
@@ -205,7 +228,12 @@ impl Play {
     /// A play of a few bodies that come together, stop where they meet, and then rest on each other or press on: all of their rules ask
     /// where they touch.
     pub fn settling(seed: u64) -> Self {
-        let mut play = Self::new(seed);
+        Self::new(seed).settled()
+    }
+
+    /// The same play, its bodies come together as in one of settling.
+    pub fn settled(self) -> Self {
+        let mut play = self;
         play.settles = true;
         play.stops = true;
         play.unrest = if play.rng.chance(0.3) { 0.05 } else { 0.0 };
@@ -227,7 +255,12 @@ impl Play {
 
     /// A play of settling whose first body is a floor, or a wall, that reaches to infinity.
     pub fn on_floor(seed: u64) -> Self {
-        let mut play = Self::settling(seed);
+        Self::settling(seed).floored()
+    }
+
+    /// The same play of settling with such a floor.
+    pub fn floored(self) -> Self {
+        let mut play = self;
         let model = play.recipes.len();
         play.recipes.push(Recipe::of(HalfSpace));
         let rotation = if play.rng.chance(0.5) { DQuat::IDENTITY } else { play.rng.rotation() };

@@ -9,7 +9,9 @@ use super::bound::BUDGET;
 use super::interval::{Interval, Vector, apply, dot, minus, plus, point, product, times, transpose, vector};
 use super::motion::{Motions, rotation, turned};
 use super::{Bounder, Checked, Region, certain, check_cells, check_level, expression, extent, extent_in, number};
+use contactd::contact::probe::{PointOptions, PosedModel, points as probe};
 use contactd::motion::Placed;
+use contactd::octree::Model;
 use contactd::solid::{Node, NodeId, Op, Shape, Solid};
 use contactd_proto::{Motion, Pose};
 use glam::{DQuat, DVec3};
@@ -616,10 +618,33 @@ fn regions(text: &str, (count, threshold): (usize, f64), bodies: &[Truth; 2], re
         rest = far;
         told.extend::<Vec<_>>(near);
     }
+    // At sharp edges, as of meshes, f says little of the distance: there nothing touches where both bodies are proven too far away, by
+    // `probe`, which has judges of its own.
+    if !rest.is_empty() {
+        let models = bodies.map(|b| Model::new(b.solid.clone()));
+        rest.retain(|cell| !is_far(cell, reference, bodies, &models, threshold));
+    }
     match rest.first() {
         Some(cell) => Err(format!("{UNTOLD}: {} cells, of which one is {cell:?}", rest.len())),
         None => Ok(()),
     }
+}
+
+/// True when no surfaces within a cell (of the reference body's model) are as near to each other as a threshold: from its centre the
+/// distances of both bodies are longer together than that and than the way from there to its corners and back.
+fn is_far(cell: &[(f64, f64); 3], reference: &Truth, bodies: &[Truth; 2], models: &[Model; 2], threshold: f64) -> bool {
+    let pose = |b: &Truth| {
+        let at = b.placed.motion.start;
+        Pose::new(at.point(b.placed.place.position), at.rotation * b.placed.place.rotation)
+    };
+    let [low, high] = [cell.map(|s| s.0), cell.map(|s| s.1)].map(DVec3::from_array);
+    let (center, radius) = (pose(reference).point(0.5 * (low + high)), 0.5 * (high - low).length());
+    let options = PointOptions { surface: 0.0, tolerance: 0.1 * threshold, limit: 20_000 };
+    let off = |k: usize| {
+        let body = PosedModel { model: &models[k], pose: pose(&bodies[k]) };
+        probe(&body, &[center], &options)[0].lower.max(0.0)
+    };
+    off(0) + off(1) > threshold + 2.0 * radius
 }
 
 /// How the error begins of bodies that may touch where nothing is told.

@@ -25,6 +25,7 @@ mod records;
 mod reference;
 mod separations;
 mod superellipsoids;
+mod table;
 mod tight;
 mod tori;
 mod unbounded;

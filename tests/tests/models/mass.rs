@@ -189,7 +189,8 @@ fn bounds_are_true_for_random_trees() {
     for i in 0..count {
         let solid: Solid = solid(&mut r, 1 + i % 3);
         let around = solid.aabb();
-        let (fine, coarse) = (integrals(&solid, &around, 112), integrals(&solid, &around, 71));
+        // Faces along the rays lie between two of them: of grids of three widths one may miss that, not all.
+        let [fine, coarse, other] = [112, 71, 97].map(|n| integrals(&solid, &around, n));
         let model = Model::new(solid);
         if fine[0] < 1e-3 {
             empty += 1;
@@ -197,7 +198,8 @@ fn bounds_are_true_for_random_trees() {
             assert!(m.volume - m.volume_error <= 2e-3, "{m:?}");
             continue;
         }
-        let doubt: Integrals = std::array::from_fn(|k| 4.0 * (fine[k] - coarse[k]).abs() + 2e-3 * fine[0]);
+        let doubt: Integrals =
+            std::array::from_fn(|k| 4.0 * (fine[k] - coarse[k]).abs().max((fine[k] - other[k]).abs()) + 2e-3 * fine[0]);
         for tolerance in [0.2, 0.02] {
             let m = mass(&model, tolerance);
             assert!(m.volume_error <= tolerance * m.volume, "solid {i}: {m:?}");

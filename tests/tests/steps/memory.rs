@@ -118,6 +118,37 @@ fn bodies_on_a_floor_without_bounds_are_told_as_by_a_new_session() {
     assert!(sum(|w| w.contacts) * 10 > steps, "hardly anything meets");
 }
 
+/// Plays of primitives of every kind and of small trees of them: bodies that pass each other, that settle, that lie on a floor.
+#[test]
+fn bodies_of_all_kinds_are_told_as_by_a_session_that_never_saw_a_step() {
+    let (steps, first) = (steps().div_ceil(4), sized("CONTACTD_MEMORY_SEED", 40_000_001));
+    let ways: [(&str, fn(u64) -> Play, usize); 3] = [
+        ("passing", Play::of_all_kinds, STEPS),
+        ("settling", |seed| Play::of_all_kinds(seed).settled(), SETTLING),
+        ("on a floor", |seed| Play::of_all_kinds(seed).settled().floored(), SETTLING),
+    ];
+    for (name, play, length) in ways {
+        let plays = steps.div_ceil(3 * length) as u64;
+        let all: Vec<Work> = (0..plays).into_par_iter().map(|i| run_play(first + i, play(first + i), length)).collect();
+        let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
+        println!(
+            "{name}: {} steps: {} with a contact, {} in overlap alone, {} clear; certificates {:?}; {} without one, {} that the \
+             checker's budget left open",
+            sum(|w| w.steps),
+            sum(|w| w.contacts),
+            sum(|w| w.overlaps),
+            sum(|w| w.clear),
+            std::array::from_fn::<usize, 8, _>(|k| all.iter().map(|w| w.proven[k]).sum()),
+            unproven(&all),
+            sum(|w| w.unshown)
+        );
+        let wrong: Vec<&String> = all.iter().filter_map(|w| w.difference.as_ref().or(w.refused.as_ref())).collect();
+        wrong.iter().take(8).for_each(|w| println!("{w}"));
+        assert!(wrong.is_empty(), "{name}: {} of {plays} plays, see above", wrong.len());
+        assert!(sum(|w| w.contacts) * 20 > sum(|w| w.steps), "{name}: hardly anything meets");
+    }
+}
+
 /// A beam on two ridges has two regions, which are told again, both of them, while it rests.
 #[test]
 fn all_regions_of_bodies_that_rest_are_told_again() {
@@ -153,6 +184,10 @@ fn plays_that_were_told_wrong_once_are_told_right() {
         let work = run(seed, STEPS);
         assert_eq!((work.difference, work.refused, work.steps), (None, None, STEPS), "seed {seed}");
     });
+    // Of bodies of all kinds that settle: regions of faces that pass a sharp rim deep in each other.
+    let settled = 97_000_280;
+    let work = run_play(settled, Play::of_all_kinds(settled).settled(), SETTLING);
+    assert_eq!((work.difference, work.refused, work.steps), (None, None, SETTLING), "seed {settled}, settled");
 }
 
 /// Two objects in a world.

@@ -175,7 +175,8 @@ impl Around<'_> {
 /// What the point `x` of a pair's surface is to its patch.
 pub fn standing(bodies: &Bodies, pair: &FacePair, x: DVec3) -> Standing {
     let (x_a, x_b, n) = pair.feet(bodies, x);
-    if (x_b - x_a).dot(n) > bodies.tau * (1.0 + 1e-9) {
+    // Deeper in each other, too, they are not the surfaces that touch: at a sharp rim planes pass that lie on each other nowhere.
+    if (x_b - x_a).dot(n).abs() > bodies.tau * (1.0 + 1e-9) {
         return Standing::Outside;
     }
     let (truth_a, tokens_a) = bodies.open(Side::A, x_a);
