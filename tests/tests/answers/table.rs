@@ -106,14 +106,14 @@ fn row(kinds: [&str; 2], index: usize, first: usize, count: usize) -> Row {
             row.wider += before - all.len();
             let before = all.len();
             // Of two places at one time either may be told, and either time may be the bracket's end. Of two that meet one after the
-            // other but within the resolution, too: these are counted apart.
+            // other but within the resolution (2δ of the gap), too: these are counted apart.
             let speeds = [p, &told].map(|o| o.at().normal_speed.abs());
             let both_meet = p.status() == Status::Contact && told.status() == Status::Contact;
             let apart = (p.time() - told.time()).abs() * speeds[0].max(speeds[1]);
             if are_tied(p, &told, size) {
                 all.retain(|d| d.starts_with("time_lower") || d.starts_with("status"));
                 row.looser += usize::from(all.len() < before);
-            } else if both_meet && apart <= told.resolution {
+            } else if both_meet && apart <= 2.0 * told.resolution {
                 all.clear();
                 row.within += 1;
                 row.farthest = row.farthest.max(apart / size);
