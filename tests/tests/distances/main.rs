@@ -1,6 +1,7 @@
 //! Distances: their bounds against closed forms and against brute force, at an instant and over a step.
 
 mod brute;
+mod by_hand;
 mod closed;
 mod forms;
 mod moving;

@@ -13,8 +13,6 @@ mod polish;
 pub(in crate::contact) mod polytope;
 mod search;
 mod span;
-#[cfg(test)]
-mod tests;
 
 use crate::contact::exclusion::rounding;
 use crate::contact::query::outcome::NO_FACE;

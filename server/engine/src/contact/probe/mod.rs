@@ -11,8 +11,6 @@ mod foot;
 mod near;
 mod point;
 mod ray;
-#[cfg(test)]
-mod tests;
 
 use crate::contact::query::outcome::NO_FACE;
 use crate::octree::Model;

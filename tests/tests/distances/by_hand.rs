@@ -1,14 +1,16 @@
 //! Distances with a right answer in closed form.
 
-use super::*;
-use crate::math::random::Random;
-use crate::motion::Placed;
-use crate::octree::Model;
-use crate::octree::testing::{pierced, simple};
-use crate::solid::primitive::*;
-use crate::solid::{Label, Op, SolidBuilder};
+use contactd::contact::PlacedModel;
+use contactd::contact::distance::{DEFAULT_LIMIT, Distance, DistanceQuery, at_instant, over_step};
+use contactd::math::random::Random;
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd::solid::primitive::*;
+use contactd::solid::{Label, Op, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::models::{pierced, simple};
+use glam::{DQuat, DVec3};
 
 fn placed(model: &Model, motion: Motion) -> PlacedModel<'_> {
     PlacedModel { model, placed: Placed { place: Pose::IDENTITY, motion } }
@@ -33,7 +35,7 @@ fn expect(name: &str, d: &Distance, truth: f64, most: u64) {
     assert!(d.cells <= most, "{name}: {} cells", d.cells);
 }
 
-fn turned(r: &mut Random) -> glam::DQuat {
+fn turned(r: &mut Random) -> DQuat {
     quat_of_rotation_vector(r.vector(2.0))
 }
 

@@ -1,11 +1,16 @@
 //! Points and rays with a right answer in closed form.
 
-use super::*;
-use crate::math::random::Random;
-use crate::octree::testing::{pierced, simple};
-use crate::solid::primitive::*;
-use crate::solid::{Label, Op, SolidBuilder};
+use contactd::contact::probe::{
+    DEFAULT_LIMIT, PointAnswer, PointOptions, PosedModel, Ray, RayAnswer, RayOptions, RayOutcome, Side, points, rays,
+};
+use contactd::math::random::Random;
+use contactd::octree::Model;
+use contactd::solid::primitive::*;
+use contactd::solid::{Label, Op, SolidBuilder};
+use contactd_proto::Pose;
 use contactd_proto::motion::quat_of_rotation_vector;
+use contactd_tests::models::{pierced, simple};
+use glam::DVec3;
 
 const RAYS: RayOptions = RayOptions { depth: 0.0, limit: DEFAULT_LIMIT };
 
