@@ -44,7 +44,8 @@ struct Arguments {
     /// This family alone.
     #[arg(long, value_name = "NAME")]
     family: Option<String>,
-    /// Writes the answers about random pairs and those of the stepped scenes to a file, a line each, and nothing else: of two builds `diff` tells which have moved.
+    /// Writes the answers about random pairs, those of the stepped scenes and the demo's records to a file, a line each, and nothing else:
+    /// of two builds `diff` tells which have moved.
     #[arg(long, value_name = "FILE")]
     answers: Option<PathBuf>,
     /// One run in this process, on the threads that RAYON_NUM_THREADS says, for the process that compares.
@@ -332,7 +333,8 @@ fn demo() -> Result<Golden, Box<dyn Error>> {
     Ok(together(vec![reported.end()]))
 }
 
-/// Writes the answers about the random pairs of the classes asked for and of the stepped scenes, work left out, a line each.
+/// Writes the answers about the random pairs of the classes asked for, of the stepped scenes and of the demo, work left out, a line
+/// each.
 fn write_answers(arguments: &Arguments, file: &Path) -> Result<(), Box<dyn Error>> {
     let [count, scenes] = [PAIRS, STEPPED].map(|counts| counts[usize::from(arguments.options.quick)]);
     let wanted = |name: &str| arguments.family.as_deref().is_none_or(|only| only == name);
@@ -347,6 +349,10 @@ fn write_answers(arguments: &Arguments, file: &Path) -> Result<(), Box<dyn Error
     for seed in (0..scenes).filter(|_| wanted("stepped")) {
         let reported = stepped(seed, Told { lines: Some(String::new()), ..Told::default() })?;
         text.extend(reported.lines.unwrap_or_default().lines().map(|line| format!("stepped {seed}, {line}\n")));
+    }
+    if wanted("demo") {
+        let run = contactd::demo::play(&mut contactd::embedded(&ServerConfig::default())?, |_, _| {})?;
+        text.extend(run.rows.iter().map(|row| format!("demo {}: {:?} {:?}\n", row.step, row.names, row.record)));
     }
     std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()).into())
 }

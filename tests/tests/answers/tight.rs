@@ -433,6 +433,46 @@ fn a_leaning_peg_on_the_rim_of_its_hole() {
 
 /// A frustum turns in a pocket of its own size, a ball in a socket that is too tight by a few resolutions: no face tells where
 /// they meet first, the climb does.
+/// A ball comes down into the rim of a hole, 1e-8 to 1e-4 beside its axis: it touches first on that side. All along the rim it nearly
+/// touches; where it does first is solved for in a few steps, and few cells are left to look at.
+#[test]
+fn a_ball_that_comes_down_beside_the_axis_of_a_rim_touches_on_that_side() {
+    let mut rng = Random::new(0x0062_616c_6c31);
+    let (mut cells, mut solved) = (0, 0);
+    for i in 0..60 {
+        let (hole, radius) = (rng.within(0.3, 0.7), rng.within(0.8, 1.5));
+        let plate = Recipe::cuboid(1.0, 1.0, 0.5).minus(Recipe::cylinder(hole, 1.0));
+        let (angle, beside) = (rng.within(0.0, TAU), decades(&mut rng, -8.0, -4.0));
+        let way = dvec3(angle.cos(), angle.sin(), 0.0);
+        // The centre's height over the rim at the touch.
+        let touch = (radius * radius - (hole - beside) * (hole - beside)).sqrt();
+        let (above, fall) = (1e-5 * rng.within(0.1, 0.9), 1e-5);
+        let start = Pose::at(way * beside + DVec3::Z * (0.5 + touch + above));
+        let motion = Motion { start, velocity: DVec3::NEG_Z * fall, spin: rng.vector(0.1) };
+        let scene = Scene {
+            class: "rims",
+            a: plate,
+            b: Recipe::sphere(radius),
+            motion_a: still(),
+            motion_b: motion,
+            resolution: None,
+        };
+        let alone = Strategies { cavities: false, ..Strategies::default() };
+        for (name, strategies) in [("in front", Strategies::default()), ("search", alone)] {
+            let o = decided_with(&format!("rim {i}, {name}"), &scene, 400, strategies);
+            assert!((o.time() * fall - above).abs() < 1e-12 && o.time_lower() <= o.time(), "{i}, {name}: {o:?}");
+            let p = o.point().expect("a point").point;
+            let expected = way * hole + DVec3::Z * 0.5;
+            let off = (p - expected).length();
+            assert!(off < 1e-12 / beside + 1e-9, "{i}, {name}, {beside:e} beside: {p} and not {expected}");
+            cells += o.counters.cells;
+            solved += o.counters.newton;
+        }
+    }
+    println!("{cells} cells, {solved} solutions tried");
+    assert!(cells < 400, "{cells} cells");
+}
+
 #[test]
 fn bodies_in_pockets_of_their_own_size_that_turn() {
     let block = || Recipe::cuboid(1.5, 1.5, 0.5);

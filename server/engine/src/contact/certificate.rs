@@ -699,4 +699,3 @@ fn numbers(points: &[DVec3]) -> String {
 
 /// The first line of every certificate.
 pub const HEADER: &str = "contactd-certificate 2";
-

@@ -11,7 +11,7 @@ use crate::contact::cavity;
 use crate::contact::certificate::{self, Certificate};
 use crate::contact::convex::ConvexPair;
 use crate::contact::instant::depth;
-use crate::contact::instant::within::{Within, within};
+use crate::contact::instant::within::{Within, glimpse, within};
 use crate::contact::instant::work::Work;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
@@ -271,11 +271,15 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
         let within = within(&task, &task.relative.at(0.0), level, &work);
         return (within, work.cells());
     }
+    let work = Work::new(task.limit);
+    if let Some(x) = glimpse(&task, &task.relative.at(0.0), level, &work) {
+        return (Within::Witness(x), work.cells());
+    }
     let (ending, counters) = nearing(task, level, scratch);
     let within = match ending {
         Some(Ending::Clear) | None => Within::Apart,
         Some(Ending::Deep(x)) => Within::Witness(x),
         Some(Ending::Contact(_) | Ending::Limit(_) | Ending::Long(..) | Ending::Rounding(_)) => Within::Open,
     };
-    (within, counters.cells)
+    (within, work.cells() + counters.cells)
 }

@@ -19,6 +19,7 @@ use crate::math::Aabb;
 use crate::motion::Instant;
 use crate::solid::local::{self, LiteralId, Token, Truth};
 use glam::DVec3;
+use smallvec::SmallVec;
 
 /// A box of A's frame with what is left there of both trees, for depths and distances below the cover's reach.
 #[derive(Clone, Debug)]
@@ -27,23 +28,20 @@ pub(in crate::contact) struct Place {
     pub half: DVec3,
     pub a: Vec<Token>,
     pub b: Vec<Token>,
+    /// The faces of A and of B that matter here, each once, in order.
+    lits: [Lits; 2],
     /// Where the bounds are lowest.
     pub lowest: DVec3,
     cost: DVec3,
 }
 
+/// Literals of one side, usually few.
+type Lits = SmallVec<[(Side, LiteralId); 6]>;
+
 impl Place {
     /// The faces of a side that matter here, each once, in order.
-    pub fn faces(&self, side: Side) -> Vec<LiteralId> {
-        let mut ids: Vec<LiteralId> = local::literals(if side == Side::A { &self.a } else { &self.b }).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        ids
-    }
-
-    /// The same as literals of their side.
-    pub fn lits(&self, side: Side) -> Vec<(Side, LiteralId)> {
-        self.faces(side).into_iter().map(|id| (side, id)).collect()
+    pub fn lits(&self, side: Side) -> &[(Side, LiteralId)] {
+        &self.lits[usize::from(side == Side::B)]
     }
 
     /// True when `x` lies in the box, or off it by at most `slack`.
@@ -84,20 +82,11 @@ impl<'t, 'a> Cover<'t, 'a> {
             scratch: clause::Scratch::default(),
             work,
         };
-        let (of_a, of_b) = (task.model_a.bounds.root().aabb, task.model_b.bounds.root().aabb);
-        let of_b = if of_b.is_finite() {
-            Aabb::of_points(of_b.corners().iter().map(|c| at.a_point(*c)))
-        } else if of_b.is_empty() {
-            Aabb::EMPTY
-        } else {
-            Aabb::ALL
-        };
-        let reach = far.max(0.0);
-        let region = of_a.grown(reach).intersection(&of_b.grown(reach));
+        let region = common(task, at, far.max(0.0));
         if region.is_finite() {
             let (center, half) = (region.center(), region.half());
             let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
-            cover.stack.push(Place { center, half, a, b, lowest: center, cost: DVec3::ZERO });
+            cover.stack.push(Place { center, half, a, b, lits: Default::default(), lowest: center, cost: DVec3::ZERO });
         }
         cover
     }
@@ -150,6 +139,12 @@ impl<'t, 'a> Cover<'t, 'a> {
             }
             place.a = pool[..middle as usize].to_vec();
             place.b = pool[middle as usize..].to_vec();
+            place.lits = [(Side::A, &place.a), (Side::B, &place.b)].map(|(side, tokens)| {
+                let mut lits: Lits = local::literals(tokens).map(|id| (side, id)).collect();
+                lits.sort_unstable();
+                lits.dedup();
+                lits
+            });
             if end > 0 {
                 let pair = clause::Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
                 let view = self.view(&place, -level);
@@ -180,6 +175,19 @@ impl<'t, 'a> Cover<'t, 'a> {
             }
         }
     }
+}
+
+/// What the bounds of two bodies, each grown by `reach`, have in common; along A's axes.
+pub(in crate::contact) fn common(task: &Task, at: &Instant, reach: f64) -> Aabb {
+    let (of_a, of_b) = (task.model_a.bounds.root().aabb, task.model_b.bounds.root().aabb);
+    let of_b = if of_b.is_finite() {
+        Aabb::of_points(of_b.corners().iter().map(|c| at.a_point(*c)))
+    } else if of_b.is_empty() {
+        Aabb::EMPTY
+    } else {
+        Aabb::ALL
+    };
+    of_a.grown(reach).intersection(&of_b.grown(reach))
 }
 
 /// F at a point of A's frame.

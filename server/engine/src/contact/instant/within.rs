@@ -1,7 +1,7 @@
 //! Whether two bodies come within a distance of each other at an instant: proven, witnessed or open.
 
 use super::depth;
-use super::separation::{Cover, value};
+use super::separation::{Cover, common, value};
 use super::work::Work;
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
@@ -16,6 +16,22 @@ pub enum Within {
     Apart,
     /// The limit ran out before either was found.
     Open,
+}
+
+/// A point with F <= level that is found at once, in the middle of what both bodies' bounds have in common or a few steps downhill
+/// from there; `None`: there may be one all the same.
+pub(in crate::contact) fn glimpse(task: &Task, at: &Instant, level: f64, work: &Work) -> Option<DVec3> {
+    let region = common(task, at, level);
+    if !region.is_finite() {
+        return None;
+    }
+    let middle = region.center();
+    work.look(task.a.faces.len() + task.b.faces.len());
+    if value(task, at, middle) <= level {
+        return Some(middle);
+    }
+    let (x, _, depth, _) = depth::some(task, at, middle, work);
+    (-depth <= level).then_some(x)
 }
 
 /// Decides whether a point with F <= level exists.

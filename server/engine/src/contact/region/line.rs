@@ -143,10 +143,10 @@ fn tangent(bodies: &Bodies, p: Lit, q: Lit) -> Option<Curve> {
 pub fn candidates(bodies: &Bodies, place: &Place) -> Vec<Candidate> {
     let [a, b] = [Side::A, Side::B].map(|s| place.lits(s));
     let mut out = Vec::new();
-    edges(bodies, &a, &mut out);
-    edges(bodies, &b, &mut out);
-    for p in &a {
-        for q in &b {
+    edges(bodies, a, &mut out);
+    edges(bodies, b, &mut out);
+    for p in a {
+        for q in b {
             let curve = tangent(bodies, *p, *q).or_else(|| tangent(bodies, *q, *p));
             out.extend(curve.map(|curve| Candidate { curve, faces: [*p, *q] }));
         }
@@ -264,6 +264,20 @@ impl<'b, 't, 'a> Along<'b, 't, 'a> {
     /// Roots in [from, to]: a value changes along the curve by as much as its points move, at most.
     fn roots(&self, (from, to): (f64, f64), out: &mut Vec<f64>) {
         let (speed, least) = (self.curve.speed(), 1e-4 * self.bodies.size);
+        if let [Some(first), Some(last)] = [from, to].map(|s| self.side(s, 0.0))
+            && first == last
+        {
+            // Linear: nor does it pass zero between them.
+            return;
+        }
+        if self.is_steep(least) {
+            // All but one of the pieces below end on one side of zero.
+            let below = self.is_negative(from);
+            if below != self.is_negative(to) {
+                out.push(self.root((from, to), below, least));
+            }
+            return;
+        }
         let mut stack = vec![(from, to)];
         while let Some((s, e)) = stack.pop() {
             let m = 0.5 * (s + e);
@@ -276,17 +290,30 @@ impl<'b, 't, 'a> Along<'b, 't, 'a> {
             }
             let below = self.is_negative(s);
             if below != self.is_negative(e) {
-                let (mut lo, mut hi) = (s, e);
-                for _ in 0..80 {
-                    let m = 0.5 * (lo + hi);
-                    // Neighbours: it stays so.
-                    if m == lo || m == hi {
-                        break;
-                    }
-                    if self.is_negative(m) == below { lo = m } else { hi = m }
-                }
-                out.push(0.5 * (lo + hi));
+                out.push(self.root((s, e), below, least));
             }
+        }
+    }
+
+    /// True when the value passes zero once and no piece of a curve as long as `least` is within rounding of it.
+    fn is_steep(&self, least: f64) -> bool {
+        self.law.is_some_and(|[_, gain, doubt]| gain.abs() * least > 8.0 * doubt)
+    }
+
+    /// The root between two parameters of which one is below zero: the first one or the last one. Halved until the numbers are
+    /// neighbours, at most 80 times below `least`.
+    fn root(&self, (mut lo, mut hi): (f64, f64), below: bool, least: f64) -> f64 {
+        let mut left = 80;
+        loop {
+            let m = 0.5 * (lo + hi);
+            if (hi - lo) * self.curve.speed() <= least {
+                // Neighbours: it stays so.
+                if left == 0 || m == lo || m == hi {
+                    return m;
+                }
+                left -= 1;
+            }
+            if self.is_negative(m) == below { lo = m } else { hi = m }
         }
     }
 }
@@ -337,8 +364,9 @@ fn is_as_far(bodies: &Bodies, x: DVec3, feet: [DVec3; 2], lit: Lit) -> bool {
 pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn(DVec3) -> bool) -> Vec<Run> {
     let mut others: Vec<Lit> = places
         .iter()
-        .flat_map(|p| [Side::A, Side::B].map(|s| p.lits(s)).concat())
+        .flat_map(|p| [Side::A, Side::B].into_iter().flat_map(|s| p.lits(s)))
         .filter(|l| !c.faces.contains(l))
+        .copied()
         .collect();
     others.sort_unstable();
     others.dedup();
@@ -360,11 +388,11 @@ fn runs_among(
     let mut pieces = Vec::new();
     for w in stops.windows(2) {
         let middle = 0.5 * (w[0] + w[1]);
-        let feet = whole(middle);
         if in_patch(c.curve.point(middle)) {
             pieces.push(Piece { from: w[0], to: w[1], feet: None });
             continue;
         }
+        let feet = whole(middle);
         let mut bounds = departures(bodies, c, others, (w[0], w[1]), feet, &whole);
         if bounds.is_empty() {
             pieces.push(Piece { from: w[0], to: w[1], feet });
@@ -587,7 +615,9 @@ mod tests {
             for place in places {
                 for c in candidates(bodies, place) {
                     let range = c.curve.range(place);
-                    for lit in [Side::A, Side::B].iter().flat_map(|s| place.lits(*s)).filter(|l| !c.faces.contains(l)) {
+                    for lit in
+                        [Side::A, Side::B].iter().flat_map(|s| place.lits(*s)).copied().filter(|l| !c.faces.contains(l))
+                    {
                         let along = Along::new(bodies, &c.curve, lit, 0.0, range);
                         let Some([at, gain, _]) = along.law else { panic!("a plane along a line has a law") };
                         for _ in 0..40 {

@@ -200,20 +200,26 @@ fn find(bodies: &Bodies) -> Regions {
     let mut out = Regions::default();
     let patches = pairs(bodies, &places);
     let mut ends: Vec<DVec3> = Vec::new();
-    for (pair, of) in &patches {
-        for part in parts(bodies, &places, of) {
+    let mut told = Told::default();
+    for Facing { pair, lits, boxes } in &patches {
+        for group in parts(bodies, &places, boxes) {
+            let part: Vec<&Place> = group.iter().map(|i| &places[*i]).collect();
             let corners = patch::corners(bodies, pair, &part);
             if bodies.work.is_spent() {
                 return out;
             }
-            for corners in apart(bodies, pair, &part, corners) {
+            let pieces = apart(bodies, pair, &part, corners);
+            if !pieces.is_empty() {
+                told.add(&group, lits);
+            }
+            for corners in pieces {
                 ends.extend(corners.iter().map(|c| c.x));
                 out.regions.push(patch_region(bodies, pair, &corners));
             }
         }
     }
     let in_patch = |x: DVec3| {
-        patches.iter().any(|(pair, _)| {
+        patches.iter().any(|Facing { pair, .. }| {
             [pair.alpha, pair.beta].iter().all(|l| bodies.value(*l, x).abs() <= bodies.tau + bodies.eps)
                 && surface::standing(bodies, pair, x) != Standing::Outside
         })
@@ -235,7 +241,7 @@ fn find(bodies: &Bodies) -> Regions {
         }
     }
     let mut points: Vec<DVec3> = Vec::new();
-    for m in point::meetings(bodies, &places) {
+    for m in point::meetings(bodies, &places, &told) {
         let x = m.middle();
         let known = points.iter().any(|p| (*p - x).length() <= 1e-6 * bodies.size + bodies.lie)
             || ends.iter().any(|c| (*c - x).length() <= bodies.eps)
@@ -271,12 +277,12 @@ fn cover(bodies: &Bodies) -> (Vec<Place>, bool) {
     while let Some(place) = cover.next(0.5 * tau) {
         let radius = place.half.length();
         let sides = [Side::A, Side::B].map(|s| place.lits(s));
-        if sides.iter().any(Vec::is_empty) {
+        if sides.iter().any(|lits| lits.is_empty()) {
             // Inside one body: no surface of it.
             continue;
         }
         let few = sides[0].len() + sides[1].len() <= FEW_FACES;
-        let is_flat = sides.iter().flatten().all(|l| bodies.face(*l).is_flat());
+        let is_flat = sides.iter().copied().flatten().all(|l| bodies.face(*l).is_flat());
         let simple = few
             && (is_flat
                 || radius <= ROUND * 0.5 * bodies.size
@@ -301,33 +307,63 @@ fn is_simple(bodies: &Bodies, place: &Place) -> bool {
     pairs || line::has_line(bodies, place)
 }
 
-/// The pairs of surfaces that lie on each other, and the boxes in which they do.
-fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<(FacePair, Vec<usize>)> {
+/// Two surfaces that lie on each other.
+struct Facing {
+    pair: FacePair,
+    /// All literals of A and of B that are of these surfaces, as they come together in some box.
+    lits: Vec<[Lit; 2]>,
+    /// The boxes in which they do.
+    boxes: Vec<usize>,
+}
+
+/// The faces whose patches are told, by the boxes of these.
+#[derive(Default)]
+struct Told(BTreeMap<usize, Vec<[Lit; 2]>>);
+
+impl Told {
+    fn add(&mut self, boxes: &[usize], lits: &[[Lit; 2]]) {
+        boxes.iter().for_each(|i| self.0.entry(*i).or_default().extend_from_slice(lits));
+    }
+
+    /// The faces of a box that lie on each other and are told.
+    fn of(&self, place: usize) -> &[[Lit; 2]] {
+        self.0.get(&place).map_or(&[], |lits| lits)
+    }
+}
+
+/// The pairs of surfaces that lie on each other.
+fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<Facing> {
     let mut boxes: BTreeMap<(Lit, Lit), Vec<usize>> = BTreeMap::new();
     for (i, place) in places.iter().enumerate() {
         let b = place.lits(Side::B);
         for p in place.lits(Side::A) {
-            b.iter().for_each(|q| boxes.entry((p, *q)).or_default().push(i));
+            b.iter().for_each(|q| boxes.entry((*p, *q)).or_default().push(i));
         }
     }
-    let mut found: Vec<(FacePair, Vec<usize>)> = Vec::new();
+    let mut found: Vec<Facing> = Vec::new();
     for ((p, q), of) in boxes {
-        let known = found.iter_mut().find(|(k, _)| same_surface(bodies, k.alpha, p) && same_surface(bodies, k.beta, q));
-        match known {
-            Some((_, all)) => all.extend(of),
-            None => found.extend(FacePair::of(bodies, p, q).map(|pair| (pair, of))),
+        let is_same = |k: &FacePair| same_surface(bodies, k.alpha, p) && same_surface(bodies, k.beta, q);
+        match found.iter_mut().find(|f| is_same(&f.pair)) {
+            Some(known) => {
+                known.lits.push([p, q]);
+                known.boxes.extend(of);
+            }
+            None => {
+                let pair = FacePair::of(bodies, p, q);
+                found.extend(pair.map(|pair| Facing { pair, lits: vec![[p, q]], boxes: of }));
+            }
         }
     }
-    for (_, of) in &mut found {
-        of.sort_unstable();
-        of.dedup();
+    for Facing { boxes, .. } in &mut found {
+        boxes.sort_unstable();
+        boxes.dedup();
     }
     found
 }
 
-/// Boxes in groups that hang together.
-fn parts<'p>(bodies: &Bodies, places: &'p [Place], of: &[usize]) -> Vec<Vec<&'p Place>> {
-    let mut groups: Vec<Vec<&Place>> = Vec::new();
+/// Boxes in groups that hang together, as indices.
+fn parts(bodies: &Bodies, places: &[Place], of: &[usize]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, index) in of.iter().enumerate() {
         // Some comparisons make one look.
         bodies.work.look(i / 8);
@@ -335,13 +371,14 @@ fn parts<'p>(bodies: &Bodies, places: &'p [Place], of: &[usize]) -> Vec<Vec<&'p 
             return Vec::new();
         }
         let place = &places[*index];
-        let meets = |o: &&Place| {
+        let meets = |o: &usize| {
+            let o = &places[*o];
             let gap = (o.center - place.center).abs() - (o.half + place.half) * (1.0 + 1e-9);
             gap.max_element() <= 0.0
         };
         let (near, far): (Vec<_>, Vec<_>) = groups.into_iter().partition(|g| g.iter().any(meets));
         groups = far;
-        groups.push(near.into_iter().flatten().chain([place]).collect());
+        groups.push(near.into_iter().flatten().chain([*index]).collect());
     }
     groups
 }

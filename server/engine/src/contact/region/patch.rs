@@ -162,7 +162,7 @@ fn crossings<'p>(bodies: &Bodies, pair: &FacePair, places: &[&'p Place]) -> Vec<
         let mut cuts: Vec<(u64, Cut)> = Vec::new();
         for side in [Side::A, Side::B] {
             let own = if side == Side::A { pair.alpha } else { pair.beta };
-            let others = place.lits(side).into_iter().filter(|lit| !same_surface(bodies, *lit, own));
+            let others = place.lits(side).iter().copied().filter(|lit| !same_surface(bodies, *lit, own));
             cuts.extend(others.map(|lit| (key_of(lit) + 1, Cut::Face(lit))));
         }
         cuts.extend(pair.limit.map(|(normal, offset)| (0, Cut::Plane(normal, offset))));

@@ -6,6 +6,7 @@
 //! followed back from the level to each body's own surface, which gives both feet and their distance. A cone's apex is
 //! a point of its own.
 
+use super::Told;
 use super::local::{Bodies, Lit, has_descent};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth::Deepest;
@@ -44,10 +45,10 @@ const MOST_BALANCED: usize = 4;
 /// How far off its box a meeting may be found, in boxes.
 const SLACK: f64 = 1e-3;
 
-/// The meetings within some boxes.
-pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
+/// The meetings within some boxes, but for those on the rims of what is told.
+pub fn meetings(bodies: &Bodies, places: &[Place], told: &Told) -> Vec<Meeting> {
     let mut out = Vec::new();
-    for (lits, of) in systems(bodies, places) {
+    for (lits, of) in systems(bodies, places, told) {
         // Planes balance nowhere, in one place, or all along a flat of which the trees choose a part.
         let is_flat = lits.iter().all(|l| bodies.face(*l).is_flat());
         let mut last: Option<DVec3> = None;
@@ -73,10 +74,10 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
     }
     for place in places {
         for (side, other) in [(Side::A, Side::B), (Side::B, Side::A)] {
-            for lit in place.lits(side) {
+            for &lit in place.lits(side) {
                 let Some(Apex { point: apex, .. }) = bodies.face(lit).apex() else { continue };
                 if lit.1.sense() == Sense::Positive && place.holds(apex, bodies.tau) {
-                    out.extend(at_apex(bodies, side, apex, &place.lits(other)));
+                    out.extend(at_apex(bodies, side, apex, place.lits(other)));
                 }
             }
         }
@@ -88,13 +89,13 @@ pub fn meetings(bodies: &Bodies, places: &[Place]) -> Vec<Meeting> {
 type System = SmallVec<[Lit; MOST_BALANCED]>;
 
 /// The sets of one to three faces a side that may balance, each once with the boxes in which they may.
-fn systems<'p>(bodies: &Bodies, places: &'p [Place]) -> BTreeMap<System, Vec<&'p Place>> {
+fn systems<'p>(bodies: &Bodies, places: &'p [Place], told: &Told) -> BTreeMap<System, Vec<&'p Place>> {
     let mut found: BTreeMap<System, Vec<&Place>> = BTreeMap::new();
-    for place in places {
+    for (i, place) in places.iter().enumerate() {
         if bodies.work.is_spent() {
             return found;
         }
-        let _ = each_system(bodies, place, |lits| {
+        let _ = each_system(bodies, place, told.of(i), |lits| {
             found.entry(lits).or_default().push(place);
             ControlFlow::Continue(())
         });
@@ -104,12 +105,12 @@ fn systems<'p>(bodies: &Bodies, places: &'p [Place]) -> BTreeMap<System, Vec<&'p
 
 /// False when nothing balances in a box.
 pub fn may_meet(bodies: &Bodies, place: &Place) -> bool {
-    each_system(bodies, place, |_| ControlFlow::Break(())).is_break()
+    each_system(bodies, place, &[], |_| ControlFlow::Break(())).is_break()
 }
 
 /// True when a box has one meeting and it is found.
 pub fn meets_once(bodies: &Bodies, place: &Place) -> bool {
-    is_unique(bodies, place) && !meetings(bodies, std::slice::from_ref(place)).is_empty()
+    is_unique(bodies, place) && !meetings(bodies, std::slice::from_ref(place), &Told::default()).is_empty()
 }
 
 /// True where no more than one point of a box can be a balance: there a ball and one other face are. With a convex one F is strictly
@@ -118,7 +119,7 @@ pub fn meets_once(bodies: &Bodies, place: &Place) -> bool {
 /// line on which the balance lies, and the levels agree there once.
 fn is_unique(bodies: &Bodies, place: &Place) -> bool {
     let [of_a, of_b] = [Side::A, Side::B].map(|side| place.lits(side));
-    let ([p], [q]) = (&of_a[..], &of_b[..]) else { return false };
+    let ([p], [q]) = (of_a, of_b) else { return false };
     let reach = place.half.length() * (1.0 + SLACK) + bodies.eps;
     let with = |ball: Lit, other: Lit| {
         let (Some((center, _)), Sense::Positive) = (bodies.face(ball).ball(), ball.1.sense()) else { return false };
@@ -153,19 +154,26 @@ impl InBox {
 }
 
 /// Hands over the sets that may balance in a box, or some of them where the work runs out. Of others two are on no common level in
-/// it, or some direction leads down all of their literals wherever one is, so that their gradients have no sum zero.
-fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(System) -> ControlFlow<()>) -> ControlFlow<()> {
+/// it, or some direction leads down all of their literals wherever one is, so that their gradients have no sum zero. More than two
+/// faces of which two are `told` to lie on each other there are left out: where they balance both bodies end at the two, on one level,
+/// which is on the rim of their common area.
+fn each_system(
+    bodies: &Bodies,
+    place: &Place,
+    told: &[[Lit; 2]],
+    mut found: impl FnMut(System) -> ControlFlow<()>,
+) -> ControlFlow<()> {
     let reach = place.half.length() * (1.0 + SLACK) + bodies.eps;
     let most = 0.5 * bodies.tau + 2.0 * bodies.eps;
     let [of_a, of_b] = [Side::A, Side::B].map(|side| {
-        let in_box = |lit: Lit| {
+        let in_box = |&lit: &Lit| {
             let face = bodies.face(lit);
             let at = face.at(place.center);
             let sign = if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 };
             let turn = face.turn(place.center, &at, reach);
             InBox { lit, value: at.value * sign, gradient: at.normal * sign, turn }
         };
-        place.lits(side).into_iter().map(in_box).collect::<SmallVec<[InBox; 2 * MOST_BALANCED]>>()
+        place.lits(side).iter().map(in_box).collect::<SmallVec<[InBox; 2 * MOST_BALANCED]>>()
     });
     bodies.work.look(of_a.len() + of_b.len());
     let level = |way: &[usize], of: &[InBox]| {
@@ -173,15 +181,18 @@ fn each_system(bodies: &Bodies, place: &Place, mut found: impl FnMut(System) -> 
     };
     let mut ways_b = choices(of_b.len());
     ways_b.retain(|way| level(way, &of_b));
-    let meets: SmallVec<[bool; 32]> =
-        of_a.iter().flat_map(|p| of_b.iter().map(|q| p.may_level(q, reach, most))).collect();
+    let apart: SmallVec<[bool; 32]> =
+        of_a.iter().flat_map(|p| of_b.iter().map(|q| !p.may_level(q, reach, most))).collect();
+    let lie = |p: &InBox, q: &InBox| told.contains(&[p.lit, q.lit]);
+    let lies: SmallVec<[bool; 32]> = of_a.iter().flat_map(|p| of_b.iter().map(|q| lie(p, q))).collect();
     let mut gradients = SmallVec::<[DVec3; MOST_BALANCED]>::new();
     for way_a in choices(of_a.len()).iter().filter(|way| level(way, &of_a)) {
         if bodies.work.is_spent() {
             break;
         }
         for way_b in ways_b.iter().filter(|way_b| way_a.len() + way_b.len() <= MOST_BALANCED) {
-            if !way_a.iter().all(|i| way_b.iter().all(|j| meets[i * of_b.len() + j])) {
+            let any = |of: &[bool]| way_a.iter().any(|i| way_b.iter().any(|j| of[i * of_b.len() + j]));
+            if any(&apart) || way_a.len() + way_b.len() > 2 && any(&lies) {
                 continue;
             }
             let chosen = || way_a.iter().map(|i| &of_a[*i]).chain(way_b.iter().map(|j| &of_b[*j]));
@@ -491,7 +502,7 @@ mod tests {
             };
             let ball = simple(Sphere { radius: gap * r.within(0.95, 1.05) });
             each_place(&mut r, (ball, center), other, |bodies, place, r| {
-                let lits: Vec<Lit> = [Side::A, Side::B].iter().flat_map(|side| place.lits(*side)).collect();
+                let lits: Vec<Lit> = [Side::A, Side::B].iter().flat_map(|side| place.lits(*side)).copied().collect();
                 if lits.len() != 2 || lits[0].0 == lits[1].0 {
                     return;
                 }
@@ -529,12 +540,12 @@ mod tests {
             };
             each_place(&mut r, (body, center), other, |bodies, place, r| {
                 let mut listed = Vec::new();
-                let _ = each_system(bodies, place, |lits| {
+                let _ = each_system(bodies, place, &[], |lits| {
                     listed.push(lits);
                     ControlFlow::Continue(())
                 });
-                for p in place.lits(Side::A) {
-                    for q in place.lits(Side::B) {
+                for &p in place.lits(Side::A) {
+                    for &q in place.lits(Side::B) {
                         let lits: System = smallvec![p, q];
                         if listed.contains(&lits) {
                             continue;

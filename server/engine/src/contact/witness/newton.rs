@@ -40,6 +40,13 @@ const LEAST_DAMPING: f64 = 1e-14;
 /// A guess from which the squared residual does not fall by `PROGRESS` in so many steps leads nowhere.
 const PATIENCE: usize = 8;
 const PROGRESS: f64 = 0.25;
+/// Damped steps in a row that hardly lower it, after which one without damping is tried: along a rim in another's rim the system is so
+/// nearly singular that the least damping is much …
+const SLOW_STEPS: usize = 3;
+/// Damped steps that follow one without.
+const CORRECTIONS: usize = 4;
+/// … from a squared residual below this.
+const NEAR: f64 = 1e-8;
 pub(in crate::contact) const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
 
 /// Active constraints, in place.
@@ -97,6 +104,9 @@ pub struct Problem<'a> {
     /// Residual of the constraints below which they count as met.
     pub tolerance: f64,
 }
+
+/// Where the steps stand: place and time, multipliers, residual, Jacobian, squared residual.
+type State = ((DVec3, f64), Weights, [f64; MAX_UNKNOWNS], [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS], f64);
 
 /// A constraint's value, gradient, Hessian, time derivatives; A's axes.
 pub struct Row {
@@ -255,9 +265,17 @@ impl Problem<'_> {
         let mut damping = 1.0;
         let far = FARTHEST.max(HARDLY * self.time_scale);
         let mut checked = best;
+        let mut slow = 0;
         for round in 0..60 {
             if best < 1e-30 {
                 break;
+            }
+            if slow == SLOW_STEPS && best < NEAR {
+                slow = 0;
+                if let Some(next) = self.undamped(active, (x, t, &lambda), level, (&f, &jac, best), far) {
+                    ((x, t), lambda, f, jac, best) = next;
+                    continue;
+                }
             }
             if !patient && round % PATIENCE == PATIENCE - 1 {
                 if best > checked * PROGRESS && best > 1e-20 {
@@ -286,6 +304,7 @@ impl Problem<'_> {
             }
             let next = self.fill(active, (nx, nt), &nl, level, (&mut nf, &mut nj));
             if next < best {
+                slow = if next > PROGRESS * best { slow + 1 } else { 0 };
                 let stalled = next > 0.25 * best && best < 1e-26;
                 (x, t, lambda, f, jac, best) = (nx, nt, nl, nf, nj, next);
                 damping = (damping * 0.1).max(1e-6);
@@ -306,6 +325,40 @@ impl Problem<'_> {
         let at = self.relative.at(t);
         let sum = active.iter().zip(&lambda).map(|(c, l)| self.row(c, x, &at, level).gradient * *l).sum::<DVec3>();
         Some(Solution { x, t, active: Actives::from_slice(active), lambda, stationarity: sum.abs().max_element() })
+    }
+
+    /// A step without damping, or a part of it, after which the squared residual is less than `PROGRESS` of what it was, and which comes
+    /// to no later time: along a rim normals balance where it touches first and where it touches last. Damped steps lead back to the
+    /// surfaces where it left them, as a long step along a rim does.
+    fn undamped(
+        &self,
+        active: &[Constraint],
+        (x, t, lambda): (DVec3, f64, &Weights),
+        level: f64,
+        (f, jac, best): (&[f64; MAX_UNKNOWNS], &[[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS], f64),
+        far: f64,
+    ) -> Option<State> {
+        let n = active.len() + 4;
+        let step = eliminate(&mut jac.clone(), *f, n)?;
+        for part in [1.0, 0.25] {
+            let mut step = step.map(|s| -part * s);
+            let (mut x, mut at, mut lambda) = (x, t, lambda.clone());
+            for _ in 0..=CORRECTIONS {
+                x += DVec3::new(step[0], step[1], step[2]) * self.scale;
+                at += step[3] * self.time_scale;
+                if !(x.is_finite() && at.abs() <= far) {
+                    break;
+                }
+                lambda.iter_mut().zip(&step[4..n]).for_each(|(l, s)| *l += s);
+                let (mut nf, mut nj) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
+                let next = self.fill(active, (x, at), &lambda, level, (&mut nf, &mut nj));
+                if next < PROGRESS * best && at <= t {
+                    return Some(((x, at), lambda, nf, nj, next));
+                }
+                step = damped_step(&nj, &nf, n, LEAST_DAMPING)?;
+            }
+        }
+        None
     }
 
     /// True when the multiplied normals of every apex in a solution lie in its normal cone: within the right angle less
