@@ -338,11 +338,22 @@ pub fn run_play(seed: u64, mut play: Play, steps: usize) -> Work {
                         .map_or(f64::INFINITY, |q| q.outcome.time_upper())
                 };
                 let cut = |p: &PairOutcome| options.batch_limit > 0 && is_left(p) && p.outcome.time_lower() <= meets(p);
+                // So does when it comes within its margin: where that is cut short it is told early.
+                let nears = |p: &PairOutcome| {
+                    let same = found.pairs.iter().find(|q| (q.a, q.b) == (p.a, p.b));
+                    same.map_or(f64::INFINITY, |q| q.outcome.margin_time)
+                };
+                let early = |p: &PairOutcome| {
+                    let is_cut = options.batch_limit > 0 && !p.regions_complete;
+                    is_cut && p.outcome.status() == Status::Clear && p.outcome.margin_time <= nears(p)
+                };
                 // Regions that a limit cuts short are those that were looked at first.
                 let (heads, others) = (lines(answer, false), lines(expected, false));
                 let few = |k: usize| !answer.pairs[k].regions_complete && others.contains(&heads[k]);
                 let pairs = mine.iter().zip(&answer.pairs).enumerate();
-                pairs.into_iter().all(|(k, (line, p))| all.contains(line) || other.contains(line) || cut(p) || few(k))
+                pairs
+                    .into_iter()
+                    .all(|(k, (line, p))| all.contains(line) || other.contains(line) || cut(p) || early(p) || few(k))
             };
             if !is_known {
                 let differs = |a: &[String], b: &[String]| {
