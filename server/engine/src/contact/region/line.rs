@@ -14,6 +14,7 @@ use crate::contact::instant::separation::Place;
 use crate::solid::Sense;
 use crate::solid::surface::curve::{self, Nearness, Outward};
 use glam::DVec3;
+use smallvec::SmallVec;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// A straight or circular curve, its parameter a length or an angle.
@@ -362,7 +363,7 @@ fn is_as_far(bodies: &Bodies, x: DVec3, feet: [DVec3; 2], lit: Lit) -> bool {
 
 /// The runs of a candidate on which the bodies touch and no patch holds them already.
 pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn(DVec3) -> bool) -> Vec<Run> {
-    let mut others: Vec<Lit> = places
+    let mut others: SmallVec<[Lit; 16]> = places
         .iter()
         .flat_map(|p| [Side::A, Side::B].into_iter().flat_map(|s| p.lits(s)))
         .filter(|l| !c.faces.contains(l))

@@ -201,7 +201,8 @@ fn find(bodies: &Bodies) -> Regions {
     let patches = pairs(bodies, &places);
     let mut ends: Vec<DVec3> = Vec::new();
     let mut told = Told::default();
-    for Facing { pair, lits, boxes } in &patches {
+    for facing in &patches {
+        let Facing { pair, boxes, .. } = facing;
         for group in parts(bodies, &places, boxes) {
             let part: Vec<&Place> = group.iter().map(|i| &places[*i]).collect();
             let corners = patch::corners(bodies, pair, &part);
@@ -210,7 +211,7 @@ fn find(bodies: &Bodies) -> Regions {
             }
             let pieces = apart(bodies, pair, &part, corners);
             if !pieces.is_empty() {
-                told.add(&group, lits);
+                told.add(&group, facing);
             }
             for corners in pieces {
                 ends.extend(corners.iter().map(|c| c.x));
@@ -226,6 +227,9 @@ fn find(bodies: &Bodies) -> Regions {
     };
     let mut lines: Vec<line::Run> = Vec::new();
     for (candidate, of) in candidates(bodies, &places) {
+        if of.iter().all(|i| told.bounds(*i, &places[*i], &candidate)) {
+            continue;
+        }
         let of: Vec<&Place> = of.iter().map(|i| &places[*i]).collect();
         let runs = line::runs(bodies, &candidate, &of, &in_patch);
         if bodies.work.is_spent() {
@@ -318,16 +322,35 @@ struct Facing {
 
 /// The faces whose patches are told, by the boxes of these.
 #[derive(Default)]
-struct Told(BTreeMap<usize, Vec<[Lit; 2]>>);
+struct Told {
+    all: BTreeMap<usize, Vec<[Lit; 2]>>,
+    /// Those that do not lean apart, so that their patch ends nowhere but where one of them does.
+    level: BTreeMap<usize, Vec<[Lit; 2]>>,
+}
 
 impl Told {
-    fn add(&mut self, boxes: &[usize], lits: &[[Lit; 2]]) {
-        boxes.iter().for_each(|i| self.0.entry(*i).or_default().extend_from_slice(lits));
+    fn add(&mut self, boxes: &[usize], Facing { pair, lits, .. }: &Facing) {
+        for i in boxes {
+            self.all.entry(*i).or_default().extend_from_slice(lits);
+            if pair.limit.is_none() {
+                self.level.entry(*i).or_default().extend_from_slice(lits);
+            }
+        }
+    }
+
+    /// True for an edge that bounds a face whose patch is told in a box, on another one that is all there is of the other body there:
+    /// where the edge touches it is on the patch's rim.
+    fn bounds(&self, i: usize, place: &Place, edge: &Candidate) -> bool {
+        let [p, q] = edge.faces;
+        let other = if p.0 == Side::A { Side::B } else { Side::A };
+        let [face] = place.lits(other)[..] else { return false };
+        let lie = |l: Lit| if other == Side::A { [face, l] } else { [l, face] };
+        p.0 == q.0 && self.level.get(&i).is_some_and(|told| told.iter().any(|two| *two == lie(p) || *two == lie(q)))
     }
 
     /// The faces of a box that lie on each other and are told.
     fn of(&self, place: usize) -> &[[Lit; 2]] {
-        self.0.get(&place).map_or(&[], |lits| lits)
+        self.all.get(&place).map_or(&[], |lits| lits)
     }
 }
 
