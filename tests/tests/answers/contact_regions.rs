@@ -1,6 +1,7 @@
 //! Every kind of contact, with the regions in which two bodies touch: their extent, kind, normal, faces and the points
 //! that bound them, against what elementary geometry says.
 
+use super::tight::prism;
 use contactd::contact::clearance::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::within::Within;
@@ -498,6 +499,50 @@ fn what_is_told_of_a_box_that_leans_is_as_far_as_it_says() {
     }
     println!("{told} points, {left} boxes of which not all of a side is within the margin");
     assert!(left > 50);
+}
+
+/// Prisms lean over a floor by so little that their lower side lies on it within the margin, or a part of it: each corner that is
+/// within the margin is told, be it of a patch or of a line.
+#[test]
+fn every_corner_of_a_prism_that_is_near_a_floor_is_told() {
+    let mut r = Random::new(1_237);
+    let (mut near, mut far) = (0, 0);
+    for k in 0..sized("CONTACTD_LEANING", 300) {
+        let (sides, radius, half) = (3 + r.below(6), r.within(0.2, 0.6), r.within(0.1, 0.4));
+        let margin = 10f64.powf(r.within(-3.5, -1.2));
+        let lean = r.vector(1.0) * dvec3(1.0, 1.0, 2.0) * margin * 10f64.powf(r.within(-2.0, 0.6));
+        let size = 2.0 * radius.hypot(half);
+        // Sides that lean more than that touch along an edge.
+        if lean.truncate().length() * size > 3.9 * margin.min(0.01 * size) {
+            continue;
+        }
+        let rotation = quat_of_rotation_vector(lean);
+        let corner = |i: usize| {
+            let (sin, cos) = (TAU * i as f64 / sides as f64).sin_cos();
+            rotation * dvec3(radius * cos, radius * sin, -half)
+        };
+        let corners: Vec<DVec3> = (0..sides).map(corner).collect();
+        let lowest = corners.iter().map(|c| c.z).fold(f64::INFINITY, f64::min);
+        let at = dvec3(r.within(-1.0, 1.0), r.within(-1.0, 1.0), margin * r.within(0.0, 0.9) - lowest);
+        let found = rest(floor(), prism(sides, radius, half), Pose::new(at, rotation)).regions(margin);
+        for c in corners.iter().map(|c| *c + at) {
+            if c.z > margin * (1.0 - 1e-6) {
+                far += 1;
+                continue;
+            }
+            near += 1;
+            // The middle of the feet: a face that leans has its foot aside by that.
+            let middle = c - DVec3::Z * (0.5 * c.z);
+            let points = found.regions.iter().flat_map(|region| &region.points);
+            let off = points.map(|p| p.point.distance(middle)).fold(f64::INFINITY, f64::min);
+            assert!(
+                off < 1e-9 + c.z * lean.length(),
+                "{k}: {c} is within {margin}, {off} from what is told: {found:#?}"
+            );
+        }
+    }
+    println!("{near} corners within the margin, {far} beyond it");
+    assert!(near > 400 && far > 100, "{near} corners within the margin, {far} beyond it");
 }
 
 /// The least height of a box's lower side over the rectangle |x|, |y| <= `most` at z = 0, worked out where their edges cross.

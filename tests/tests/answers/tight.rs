@@ -33,7 +33,7 @@ pub(super) fn decades(rng: &mut Random, lo: f64, hi: f64) -> f64 {
     10f64.powf(rng.within(lo, hi))
 }
 
-fn prism(sides: usize, radius: f64, half: f64) -> Recipe {
+pub(super) fn prism(sides: usize, radius: f64, half: f64) -> Recipe {
     let corner = |k: usize, z: f64| {
         let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
         dvec3(radius * cos, radius * sin, z)

@@ -3,15 +3,15 @@
 //! The steps are drawn by `stepped`, which knows nothing of what is remembered. 100,000 of them:
 //! `CONTACTD_MEMORY_STEPS=100000 cargo test --release -p contactd-tests --test steps memory:: -- --nocapture`
 
-use contactd::contact::Status;
+use contactd::contact::{Extent, Status};
 use contactd::world::{MeasuredModel, ObjectSpec, StepOptions, World};
 use contactd_proto::{MotionState, Pose, PoseRecord, Report, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::Recipe;
-use contactd_tests::stepped::{Play, block, plate};
+use contactd_tests::stepped::{Act, Play, block, plate};
 use contactd_tests::sweep::sized;
 use glam::DVec3;
-use play::{Work, differing, part, reported, run, run_play, same};
+use play::{Work, apply, differing, part, reported, run, run_play, same};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -169,6 +169,26 @@ fn all_regions_of_bodies_that_rest_are_told_again() {
         told.push(regions.map(|r| format!("{r:?}")).collect::<Vec<_>>());
     }
     assert!(told.iter().all(|regions| regions.len() == 2 && *regions == told[0]), "{told:#?}");
+}
+
+/// A play in which a side leans over a floor so far that its patch ends at the margin: a corner that the patch does not tell is told
+/// as the end of an edge, in every step in which it lies so.
+#[test]
+fn an_edge_of_a_side_that_leans_is_told_beside_its_patch() {
+    let mut play = Play::on_floor(90_000_087);
+    let parts: Vec<Arc<MeasuredModel>> = play.recipes.iter().map(part).collect();
+    let mut world = World::new(256, 256);
+    let (mut free, mut told) = (1.0, Vec::new());
+    for _ in 0..SETTLING {
+        let Act { changes, records, options } = play.next(free);
+        changes.iter().for_each(|change| apply(&mut world, &parts, change));
+        let out = world.step(&records, &options).expect("a step");
+        free = out.safe_time;
+        let of_pair = out.pairs.iter().filter(|p| (p.a, p.b) == (2, 3));
+        told.push(of_pair.flat_map(|p| out.regions_of(p)).map(|r| r.extent).collect::<Vec<_>>());
+        play.follow(&world);
+    }
+    assert!(told[2..].iter().all(|extents| *extents == [Extent::Patch, Extent::Line]), "{told:?}");
 }
 
 /// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,

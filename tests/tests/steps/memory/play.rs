@@ -105,7 +105,7 @@ impl Fresh {
     }
 }
 
-fn apply(world: &mut World, parts: &[Arc<MeasuredModel>], change: &Change) {
+pub fn apply(world: &mut World, parts: &[Arc<MeasuredModel>], change: &Change) {
     match change {
         Change::Add(thing) => world.add_object(thing.spec(parts)).expect("an object"),
         Change::Remove(id) => world.remove_object(*id).expect("an object to remove"),
