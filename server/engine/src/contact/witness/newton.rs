@@ -43,10 +43,10 @@ const PROGRESS: f64 = 0.25;
 /// Damped steps in a row that hardly lower it, after which one without damping is tried: along a rim in another's rim the system is so
 /// nearly singular that the least damping is much …
 const SLOW_STEPS: usize = 3;
-/// Damped steps that follow one without.
-const CORRECTIONS: usize = 4;
 /// … from a squared residual below this.
 const NEAR: f64 = 1e-8;
+/// Damped steps that follow one without.
+const CORRECTIONS: usize = 4;
 pub(in crate::contact) const MAX_UNKNOWNS: usize = MAX_ACTIVE + 4;
 
 /// Active constraints, in place.
@@ -270,6 +270,7 @@ impl Problem<'_> {
             if best < 1e-30 {
                 break;
             }
+            // Where steps were slow before they came so near they are as slow along a face: none is tried in that row.
             if slow == SLOW_STEPS && best < NEAR {
                 slow = 0;
                 if let Some(next) = self.undamped(active, (x, t, &lambda), level, (&f, &jac, best), far) {
