@@ -134,9 +134,13 @@ struct Unions<'s, 'a> {
     in_region: bool,
 }
 
-/// What is to be proven of a pair of parts, by its index, and the direction of a round wall to be looked at first.
-struct Claim<'u> {
-    pair: CavityPair<'u>,
+/// Bodies with cavities that they may be in. They are large, and stay where they are made.
+type Cavities<'u> = SmallVec<[CavityPair<'u>; 2]>;
+
+/// What is to be proven of a pair of parts: which of the cavities shows it, the pair's index, and the direction of a round wall to
+/// be looked at first.
+struct Claim {
+    cavity: usize,
     index: usize,
     toward: Option<DVec3>,
 }
@@ -148,16 +152,17 @@ impl<'s, 'a> Unions<'s, 'a> {
 
     fn answer(&self, contacts: &mut Contacts) -> Option<Ending> {
         let mut solved = 0;
-        let claims = self.look(contacts, &mut solved)?;
+        let mut cavities = Cavities::new();
+        let claims = self.look(contacts, &mut cavities, &mut solved)?;
         for claim in &claims {
-            self.prove(contacts, claim, &mut solved)?;
+            self.prove(contacts, &cavities[claim.cavity], claim, &mut solved)?;
         }
         Some(contacts.end())
     }
 
     /// The body of one part with a cavity of the other, those first that it is in half way of the step, and the one before that it is
-    /// deepest in; then the other way round, where more are asked for.
-    fn cavities(&self, index: usize) -> SmallVec<[CavityPair<'_>; 2]> {
+    /// deepest in; then the other way round, where more are asked for. They are appended.
+    fn add_cavities<'u>(&'u self, index: usize, found: &mut Cavities<'u>) {
         let (a, b) = self.pairs[index];
         let Self { task, of_a, of_b, .. } = self;
         let (main_a, main_b) = (&task.a.primitives[a.main as usize], &task.b.primitives[b.main as usize]);
@@ -165,14 +170,20 @@ impl<'s, 'a> Unions<'s, 'a> {
         let center = task.relative.at(0.5).b_point(main_a.ball.center);
         let of_b = of_b.holes_at(task.b, b, center, most).into_iter();
         let of_b = of_b.filter_map(|hole| CavityPair::new(task, main_a, (main_b, hole), Side::B, &task.relative));
-        let mut found: SmallVec<[CavityPair; 2]> = of_b.take(of_both).collect();
-        if found.len() < of_both {
+        let all = found.len() + of_both;
+        found.extend(of_b.take(of_both));
+        if found.len() < all {
             let seen_from_a = self.seen_from_a();
             let center = seen_from_a.at(0.5).b_point(main_b.ball.center);
             let of_a = of_a.holes_at(task.a, a, center, most).into_iter();
             let of_a = of_a.filter_map(|hole| CavityPair::new(task, main_b, (main_a, hole), Side::A, seen_from_a));
-            found.extend(of_a.take(of_both - found.len()));
+            found.extend(of_a.take(all - found.len()));
         }
+    }
+
+    fn cavities(&self, index: usize) -> Cavities<'_> {
+        let mut found = Cavities::new();
+        self.add_cavities(index, &mut found);
         found
     }
 
@@ -185,17 +196,24 @@ impl<'s, 'a> Unions<'s, 'a> {
 
     /// Looks for the first contact of each pair, and solves for it; what is left to be proven. `None` where a pair may touch at the
     /// start, or is not of the kind.
-    fn look(&self, contacts: &mut Contacts, solved: &mut usize) -> Option<SmallVec<[Claim<'_>; 1]>> {
+    fn look<'u>(
+        &'u self,
+        contacts: &mut Contacts,
+        cavities: &mut Cavities<'u>,
+        solved: &mut usize,
+    ) -> Option<SmallVec<[Claim; 1]>> {
         let mut claims: SmallVec<[Claim; 1]> = SmallVec::new();
         let mut guess: Option<(usize, Guess)> = None;
         // Later ones than what is known are not looked for to their end.
         let mut until: f64 = 1.0;
         'pairs: for index in 0..self.pairs.len() {
-            for pair in self.cavities(index) {
-                let mut toward = None;
+            let first = cavities.len();
+            self.add_cavities(index, cavities);
+            for cavity in first..cavities.len() {
+                let (pair, mut toward) = (&cavities[cavity], None);
                 match pair.first(until, &mut contacts.counters.closed_forms) {
                     // What starts as near as it may be is told where it comes no deeper.
-                    First::Near if proves(contacts, &pair, 1.0, None) == ProofEnd::Proven => continue 'pairs,
+                    First::Near if proves(contacts, pair, 1.0, None) == ProofEnd::Proven => continue 'pairs,
                     First::Near => continue,
                     First::Never => {}
                     First::Guess(g) => {
@@ -212,7 +230,7 @@ impl<'s, 'a> Unions<'s, 'a> {
                         }
                     }
                 }
-                claims.push(Claim { pair, index, toward });
+                claims.push(Claim { cavity, index, toward });
                 continue 'pairs;
             }
             return None;
@@ -220,21 +238,21 @@ impl<'s, 'a> Unions<'s, 'a> {
         if let Some((i, g)) = &guess {
             *solved += 1;
             // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
-            claims[*i].pair.solve(contacts, g);
+            cavities[claims[*i].cavity].solve(contacts, g);
         }
         Some(claims)
     }
 
     /// Proves that a pair does not meet before the first contact, which is found first where the proof meets it; `None` if it cannot.
-    fn prove(&self, contacts: &mut Contacts, claim: &Claim, solved: &mut usize) -> Option<()> {
+    fn prove(&self, contacts: &mut Contacts, pair: &CavityPair, claim: &Claim, solved: &mut usize) -> Option<()> {
         loop {
             let goal = contacts.goal();
-            match proves(contacts, &claim.pair, goal.min(1.0), claim.toward) {
+            match proves(contacts, pair, goal.min(1.0), claim.toward) {
                 ProofEnd::Proven => return Some(()),
                 ProofEnd::Met(t, wall) if *solved < MOST_CONTACTS => {
                     *solved += 1;
-                    let guess = claim.pair.settle(t, wall, 0.0, &mut contacts.counters.closed_forms);
-                    if claim.pair.solve(contacts, &guess) && contacts.goal() < goal {
+                    let guess = pair.settle(t, wall, 0.0, &mut contacts.counters.closed_forms);
+                    if pair.solve(contacts, &guess) && contacts.goal() < goal {
                         continue;
                     }
                 }
@@ -242,7 +260,7 @@ impl<'s, 'a> Unions<'s, 'a> {
             }
             // What one cavity does not show another one may, or the same parts the other way round.
             let end = contacts.goal().min(1.0);
-            let others = if self.in_region { self.cavities(claim.index) } else { SmallVec::new() };
+            let others = if self.in_region { self.cavities(claim.index) } else { Cavities::new() };
             let shown = others.iter().any(|other| proves(contacts, other, end, None) == ProofEnd::Proven);
             return shown.then_some(());
         }

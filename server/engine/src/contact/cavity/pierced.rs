@@ -200,10 +200,8 @@ impl<'a> CavityPair<'a> {
         for round in 0..ROUNDS {
             let m = self.moment(t);
             *looks += 1;
-            let mut walls: SmallVec<[Wall; 16]> = (0..self.flats.len()).map(Wall::Flat).collect();
-            if self.round.is_some() {
-                walls.extend(self.directions.map(Wall::Round));
-            }
+            let around = if self.round.is_some() { &self.directions[..] } else { &[] };
+            let walls = (0..self.flats.len()).map(Wall::Flat).chain(around.iter().copied().map(Wall::Round));
             let mut soonest: Option<(f64, Wall, Best)> = None;
             let mut least: Option<(Wall, Best)> = None;
             for wall in walls {

@@ -93,86 +93,103 @@ enum Worth {
     All,
 }
 
+/// Which of a rectangle's corners differ: one moment's bounds may be taken for both, and a flat wall is one direction.
+#[derive(Clone, Copy, Debug)]
+struct Distinct {
+    rows: usize,
+    columns: usize,
+}
+
+impl Distinct {
+    /// A number of each corner, worked out once for those that are alike.
+    #[inline(always)] // The innermost loops of a proof: what is not asked for again costs a call otherwise.
+    fn spread<T: Copy>(self, of: impl Fn(usize, usize) -> T) -> [[T; 2]; 2] {
+        let row = |e: usize| {
+            let first = of(e, 0);
+            [first, if self.columns == 1 { first } else { of(e, 1) }]
+        };
+        let first = row(0);
+        [first, if self.rows == 1 { first } else { row(1) }]
+    }
+}
+
 impl CavityPair<'_> {
     /// What must be added to φ at each corner so that positive sums exclude a contact: delta times a linear function that is
     /// nowhere above the weight, less rounding. A norm is no less than the part along any one direction, here the corners' mean.
-    fn reserves(&self, bounds: &[[Bound; 2]; 2], w: &[[DVec3; 2]; 2]) -> [[f64; 2]; 2] {
+    fn reserves(&self, bounds: &[[Bound; 2]], w: &[[DVec3; 2]; 2], distinct: Distinct) -> [[f64; 2]; 2] {
         let (mut sums, mut heaviest) = ([DVec3::ZERO; 3], 0.0f64);
-        for (row, ws) in bounds.iter().zip(w) {
-            for (b, w) in row.iter().zip(ws) {
+        for e in 0..distinct.rows {
+            for c in 0..distinct.columns {
+                let b = bounds[e][c];
                 sums[0] += b.u;
-                sums[1] += *w;
+                sums[1] += w[e][c];
                 sums[2] += b.mu;
-                heaviest = heaviest.max(b.u.length() + w.length() + b.mu.length());
+                heaviest = heaviest.max(b.u.length() + w[e][c].length() + b.mu.length());
             }
         }
         let [u, v, m] = sums.map(DVec3::normalize_or_zero);
-        let mut out = [[0.0; 2]; 2];
-        for e in 0..2 {
-            for c in 0..2 {
-                let b = &bounds[e][c];
-                let weight = b.u.dot(u) + w[e][c].dot(v) + b.mu.dot(m);
-                out[e][c] = self.delta * weight * CLAIMED - 2.0 * self.rounding * heaviest;
-            }
-        }
-        out
+        distinct.spread(|e, c| {
+            let b = bounds[e][c];
+            let weight = b.u.dot(u) + w[e][c].dot(v) + b.mu.dot(m);
+            self.delta * weight * CLAIMED - 2.0 * self.rounding * heaviest
+        })
     }
 
-    /// Whether the bounds at the four corners exclude the rectangle.
-    fn worth(&self, moments: [&Moment; 2], bounds: &[[Bound; 2]; 2]) -> Worth {
-        let w = [[bounds[0][0].w(), bounds[0][1].w()], [bounds[1][0].w(), bounds[1][1].w()]];
-        let reserves = self.reserves(bounds, &w);
+    /// Whether bounds at the four corners exclude the rectangle: those of each moment, or one row that is taken for both.
+    fn worth(&self, moments: [&Moment; 2], bounds: &[[Bound; 2]]) -> Worth {
+        let chord = (bounds[0][0].u - bounds[0][1].u).length_squared();
+        let distinct = Distinct { rows: bounds.len(), columns: if chord > 0.0 { 2 } else { 1 } };
+        let w = distinct.spread(|e, c| bounds[e][c].w());
+        let reserves = self.reserves(bounds, &w, distinct);
         // What the motion may take.
         let h = moments[1].at.t - moments[0].at.t;
-        let turned = (w[1][0] - w[0][0]).length().max((w[1][1] - w[0][1]).length());
+        let turns = self.relative.turns();
+        let turned =
+            if bounds.len() == 1 { 0.0 } else { (w[1][0] - w[0][0]).length().max((w[1][1] - w[0][1]).length()) };
         let mut half_q = 0.0;
-        if turned > 0.0 || self.relative.turns() {
+        if turned > 0.0 || turns {
             let motion = self.relative.bounds(moments[0].at.t, h, self.reach);
             let mut pull: f64 = 0.0;
-            for w in w.as_flattened() {
-                let bend = motion.bend * w.length();
-                pull = pull.max(motion.curvature(&moments[0].at, moments[0].at.a_vector(*w)) + bend);
+            for row in &w[..distinct.rows] {
+                for w in &row[..distinct.columns] {
+                    let bend = motion.bend * w.length();
+                    pull = pull.max(motion.curvature(&moments[0].at, moments[0].at.a_vector(*w)) + bend);
+                }
             }
             half_q = (turned * motion.speed + 0.5 * h * pull) * h;
         }
-        let chord = (bounds[0][0].u - bounds[0][1].u).length_squared();
-        // Across the discs' axis.
-        let (mut across, mut lengths) = ([[DVec3::ZERO; 2]; 2], [[0.0; 2]; 2]);
-        for e in 0..2 {
-            for c in 0..2 {
-                across[e][c] = moments[e].across(w[e][c]);
-                lengths[e][c] = across[e][c].length();
-            }
-        }
+        // Across the discs' axis, which stays where nothing turns.
+        let of_axes = if turns { Distinct { rows: 2, ..distinct } } else { distinct };
+        let across = of_axes.spread(|e, c| moments[e].across(w[e][c]));
+        let lengths = of_axes.spread(|e, c| across[e][c].length());
         let mut worth = Worth::All;
         let stays = turned == 0.0 && half_q > 0.0 && moments[0].at.spin_b == DVec3::ZERO;
         for i in 0..moments[0].discs.len() {
             let radius = moments[0].discs[i].1;
-            let mut ends = [[0.0; 2]; 2];
-            for (e, m) in moments.iter().enumerate() {
-                let center = m.discs[i].0;
-                let phi = [0, 1].map(|c| {
-                    let b = &bounds[e][c];
-                    b.base - b.kappa - center.dot(w[e][c]) - radius * lengths[e][c] + reserves[e][c]
-                });
-                let low = phi[0].min(phi[1]);
-                ends[0][e] = low;
-                ends[1][e] = low;
-                if chord > 0.0 {
-                    ends[1][e] = sagging(phi, bend(self.radius(), radius, chord, across[e], lengths[e]));
-                }
-            }
             let mut half_q = half_q;
             // Worked out where the way that points go takes too much, and only then.
             let takes = |ends: [f64; 2], half_q: f64| ends[0].min(ends[1]) > 0.0 && !holds(ends, half_q);
-            if stays && (takes(ends[0], half_q) || takes(ends[1], half_q)) {
+            let each = Distinct { rows: 2, ..distinct };
+            let phi = each.spread(|e, c| {
+                let b = &bounds[e.min(bounds.len() - 1)][c];
+                b.base - b.kappa - moments[e].discs[i].0.dot(w[e][c]) - radius * lengths[e][c] + reserves[e][c]
+            });
+            let corners = [phi[0][0].min(phi[0][1]), phi[1][0].min(phi[1][1])];
+            if stays && takes(corners, half_q) {
                 half_q = half_q.min(self.wobble(moments, i, w[0]));
             }
-            if !holds(ends[0], half_q) {
+            if !holds(corners, half_q) {
                 return Worth::None;
             }
-            if !holds(ends[1], half_q) {
-                worth = Worth::Corners;
+            if chord > 0.0 && worth == Worth::All {
+                let between =
+                    [0, 1].map(|e| sagging(phi[e], bend(self.radius(), radius, chord, across[e], lengths[e])));
+                if stays && takes(between, half_q) {
+                    half_q = half_q.min(self.wobble(moments, i, w[0]));
+                }
+                if !holds(between, half_q) {
+                    worth = Worth::Corners;
+                }
             }
         }
         worth
@@ -212,7 +229,7 @@ impl CavityPair<'_> {
         let both = [&moments[r.times[0]], &moments[r.times[1]]];
         let bounds = r.best.map(|row| row.map(|b| b.bound));
         let mut worth = Worth::None;
-        for bounds in [&[bounds[1], bounds[1]], &[bounds[0], bounds[0]], &bounds] {
+        for bounds in [&bounds[1..], &bounds[..1], &bounds] {
             let this = self.worth(both, bounds);
             if this == Worth::All {
                 return this;
@@ -234,7 +251,7 @@ impl CavityPair<'_> {
     pub(super) fn kept_out(&self, start: &Moment, end: &Moment) -> bool {
         self.planes.iter().any(|plane| {
             let bound = Bound { u: DVec3::ZERO, base: 0.0, mu: plane.normal, kappa: plane.offset };
-            self.worth([start, end], &[[bound; 2]; 2]) == Worth::All
+            self.worth([start, end], &[[bound; 2]]) == Worth::All
         })
     }
 
