@@ -55,7 +55,11 @@ fn point_of(task: &Task, resolution: f64, found: &Found, contact: &Contact) -> C
     let off = if off <= INCIDENT * task.rounding { 0.0 } else { off };
     // Deep in each other bodies show no faces in one point: those of the solution are told.
     let tolerance = BESIDE * off + INCIDENT * task.rounding;
-    let mut features = Features::at(task, x, &at, (task.ignored_depth == 0.0).then_some(tolerance));
+    let mut features = if task.ignored_depth == 0.0 {
+        Features::again(task, x, &at, tolerance, found.seen.as_ref())
+    } else {
+        Features::at(task, x, &at, None)
+    };
     if off > 0.0 && task.ignored_depth == 0.0 && !features.is_balanced(NEARLY) {
         // A face that holds the point with next to no weight may be farther from it than the point is deep: a move of
         // the point changes the depth by that weight of it.
@@ -151,7 +155,7 @@ fn climbed_at_the_start(task: &Task, at: &Instant, x: DVec3, most: f64) -> Optio
     }
     let known = Known::All;
     let held = Climber::new(task, BACK).deepest(0.0, x);
-    fits(values(held.0)).then(|| Touch { task, known }.climbed(0.0, &held))
+    fits(values(held.0)).then(|| Touch::new(task, known).climbed(0.0, &held))
 }
 
 /// What a solution's multipliers say about the contact.

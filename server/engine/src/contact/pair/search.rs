@@ -121,8 +121,10 @@ struct Open {
 enum State<'a> {
     /// Answered without a search, whose memory is given back.
     Reported(Outcome, Scratch),
-    /// Searched; and the ending that a shortcut in front of the search has found.
-    Searching(Search<'a>, Option<Ending>),
+    /// Ended by a kernel in front of the search: how, until it is told; its work; the memory of the search that was not needed.
+    Ended(Option<Ending>, Counters, Scratch),
+    /// Searched. In a place of its own: what a kernel answers is not to be moved with room for a search.
+    Searching(Box<Search<'a>>),
 }
 
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
@@ -156,10 +158,11 @@ pub struct PairSearch<'a> {
 impl<'a> PairSearch<'a> {
     /// Runs as `run` does, but refines at most `cells` more cells: a search that would need more is undecided.
     pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
-        if let State::Searching(search, _) = &mut self.state {
-            let limit =
-                self.limit.saturating_sub(self.spent).min(search.counters().spent(self.limit).saturating_add(cells));
-            search.limit_to(limit);
+        if let Some(counters) = self.under_way() {
+            let limit = self.limit.saturating_sub(self.spent).min(counters.spent(self.limit).saturating_add(cells));
+            if let State::Searching(search) = &mut self.state {
+                search.limit_to(limit);
+            }
             self.task.limit = limit;
         }
         self.run(until)
@@ -201,7 +204,7 @@ impl<'a> PairSearch<'a> {
         task: Task<'a>,
         swapped: bool,
         (quick, before): (Quick, &Outcome),
-        scratch: Scratch,
+        mut scratch: Scratch,
     ) -> Self {
         let (a, b) = (task.a, task.b);
         let counters = Counters {
@@ -230,17 +233,30 @@ impl<'a> PairSearch<'a> {
                 Front::Open => {}
             }
         }
-        let mut search = Search::new(contacts, scratch);
-        if ending.is_none() && overlap.is_none() && some {
-            search.start(from);
+        // What stage 1 leaves nothing of needs no queue.
+        if ending.is_none() && overlap.is_none() && some && from == 0.0 && query.strategies.region {
+            scratch.enter(Stage::Region);
+            if contacts.region(0.0, 1.0).is_none() {
+                ending = Some(contacts.end());
+            }
+            scratch.enter(Stage::Front);
         }
-        if query.strategies.coarser {
-            search.patience = PATIENCE;
-        }
+        let state = if ending.is_some() || overlap.is_some() {
+            State::Ended(ending, contacts.counters, scratch)
+        } else {
+            let mut search = Box::new(Search::new(contacts, scratch));
+            if some {
+                search.start(from);
+            }
+            if query.strategies.coarser {
+                search.patience = PATIENCE;
+            }
+            State::Searching(search)
+        };
         let spins = |(a, b): (Placed, Placed)| [a.motion.spin, b.motion.spin];
         let moving = if swapped { (query.b.placed, query.a.placed) } else { (query.a.placed, query.b.placed) };
         let spun = (spins(moving) != spins(task.relative.placed())).then(|| Box::new([query.a.placed, query.b.placed]));
-        let mut pair = Self::at(query, task, swapped, outcome, State::Searching(search, ending));
+        let mut pair = Self::at(query, task, swapped, outcome, state);
         pair.spun = spun;
         if let Some(x) = overlap
             && !pair.goes_past(x, 0)
@@ -310,7 +326,7 @@ impl<'a> PairSearch<'a> {
     pub fn depth(&self) -> f64 {
         match &self.state {
             State::Reported(reported, _) => reported.depth,
-            State::Searching(..) => self.task.delta,
+            State::Ended(..) | State::Searching(_) => self.task.delta,
         }
     }
 
@@ -324,9 +340,9 @@ impl<'a> PairSearch<'a> {
         match &self.state {
             State::Reported(Outcome { verdict: Verdict::Clear { .. }, .. }, _) => f64::INFINITY,
             State::Reported(reported, _) => reported.time_lower(),
-            State::Searching(_, Some(Ending::Contact(found))) => found.goal,
-            State::Searching(_, Some(_)) => f64::INFINITY,
-            State::Searching(search, None) => search.earliest(),
+            State::Ended(Some(Ending::Contact(found)), ..) => found.goal,
+            State::Ended(..) => f64::INFINITY,
+            State::Searching(search) => search.earliest(),
         }
     }
 
@@ -346,18 +362,21 @@ impl<'a> PairSearch<'a> {
 
     /// How the search ends, and the cells' worth of work that it took; `None` where it comes to `until` first.
     fn ending(&mut self, until: f64) -> Option<(Ending, u64)> {
-        let State::Searching(search, known) = &mut self.state else { return None };
-        let ending = match known {
-            Some(Ending::Contact(found)) if found.goal > until => None,
-            Some(_) => known.take(),
-            None => search.run(until),
-        }?;
-        // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
-        let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
-        let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
-        let cells = search.counters().spent(self.limit);
+        let (ending, counters) = match &mut self.state {
+            State::Reported(..) => return None,
+            State::Ended(Some(Ending::Contact(found)), ..) if found.goal > until => return None,
+            State::Ended(ending, counters, _) => (ending.take()?, std::mem::take(counters)),
+            State::Searching(search) => {
+                let ending = search.run(until)?;
+                // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
+                let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
+                let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
+                (ending, search.take_counters())
+            }
+        };
+        let cells = counters.spent(self.limit);
         self.spent += cells;
-        self.outcome.counters += search.take_counters();
+        self.outcome.counters += counters;
         Some((ending, cells))
     }
 
@@ -464,7 +483,7 @@ impl<'a> PairSearch<'a> {
     /// beside the witness, which lies as deep in the one body as in the other.
     fn continued(&mut self, found: &Found) -> Found {
         let climber = Climber::new(&self.task, BACK);
-        let back = Touch { task: &self.task, known: Known::All };
+        let back = Touch::new(&self.task, Known::All);
         let touch = back.back(&found.deep, &climber);
         let mut deep = found.deep.clone();
         if touch.is_none() && deep.t == found.upper {
@@ -562,46 +581,54 @@ impl<'a> PairSearch<'a> {
         let mut contacts = Contacts::new(self.task);
         let again = self.coarser > 0 && self.task.strategies.cavities;
         let ending = if again { cavity::answer(&mut contacts) } else { None };
-        let mut search = Search::new(contacts, self.take_scratch());
-        if ending.is_none() {
-            search.start(0.0);
+        let scratch = self.take_scratch();
+        if ending.is_some() {
+            self.state = State::Ended(ending, contacts.counters, scratch);
+            return;
         }
+        let mut search = Box::new(Search::new(contacts, scratch));
+        search.start(0.0);
         let tries = self.task.strategies.coarser && self.coarser < COARSENINGS && !self.insists;
         search.patience = if tries { PATIENCE } else { u64::MAX };
-        self.state = State::Searching(search, ending);
+        self.state = State::Searching(search);
     }
 
     /// The memory of what has ended; the state is to be set anew.
     fn take_scratch(&mut self) -> Scratch {
         match std::mem::replace(&mut self.state, State::Reported(self.outcome, Scratch::default())) {
-            State::Reported(_, scratch) => scratch,
-            State::Searching(search, _) => search.into_scratch(),
+            State::Reported(_, scratch) | State::Ended(_, _, scratch) => scratch,
+            State::Searching(search) => search.into_scratch(),
         }
     }
 
     /// Cells' worth of work done so far.
     pub fn spent(&self) -> u64 {
-        self.spent
-            + match &self.state {
-                State::Reported(..) => 0,
-                State::Searching(search, _) => search.counters().spent(self.limit),
-            }
+        self.spent + self.under_way().map_or(0, |counters| counters.spent(self.limit))
     }
 
     /// Work done so far.
     pub fn counters(&self) -> Counters {
         let mut counters = self.outcome.counters;
-        if let State::Searching(search, _) = &self.state {
-            counters += *search.counters();
+        if let Some(more) = self.under_way() {
+            counters += *more;
         }
         counters
+    }
+
+    /// Work whose ending is not told yet.
+    fn under_way(&self) -> Option<&Counters> {
+        match &self.state {
+            State::Reported(..) => None,
+            State::Ended(_, counters, _) => Some(counters),
+            State::Searching(search) => Some(search.counters()),
+        }
     }
 
     /// Ends the search and gives its memory back.
     pub fn into_scratch(self) -> Scratch {
         match self.state {
-            State::Reported(_, scratch) => scratch,
-            State::Searching(search, _) => search.into_scratch(),
+            State::Reported(_, scratch) | State::Ended(_, _, scratch) => scratch,
+            State::Searching(search) => search.into_scratch(),
         }
     }
 }

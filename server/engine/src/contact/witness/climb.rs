@@ -131,9 +131,9 @@ fn keep(contacts: &mut Contacts, (t, x, support): (f64, DVec3, &[(Side, LiteralI
     }
     let (active, lambda) = held(support).unzip();
     let deep = Solution { x, t, active, lambda, stationarity: 0.5 * SETTLED };
-    let touch = Touch { task: &contacts.task, known: Known::All }.back(&deep, climber);
+    let touch = Touch::new(&contacts.task, Known::All).back(&deep, climber);
     let goal = (0.5 * (touch.as_ref().map_or(t, |s| s.t) + t)).max(f64::MIN_POSITIVE);
-    contacts.found = Some(Found { deep, touch, goal, upper: t, witness: x });
+    contacts.found = Some(Found { deep, touch, goal, upper: t, witness: x, seen: None });
 }
 
 /// Looks for a witness where the equations of a contact are too ill-conditioned to be solved, at the edge of a crescent: the

@@ -271,7 +271,7 @@ impl<'a> Contacts<'a> {
         if !self.task.query_options.time() {
             // A witness is all of a hit, once the start is known to be free: what is left to refine is what lies there.
             let goal = self.now.max(f64::MIN_POSITIVE);
-            self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal });
+            self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal, seen: None });
             return true;
         }
         let settled = deep.stationarity < SETTLED;
@@ -279,12 +279,14 @@ impl<'a> Contacts<'a> {
             // A witness, but an earlier one lies beside it: everything before it is still searched, and so is the start.
             let goal = deep.t.max(f64::MIN_POSITIVE);
             if goal < self.goal() {
-                self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal });
+                self.found = Some(Found { upper: deep.t, witness: deep.x, deep, touch: None, goal, seen: None });
             }
             return false;
         }
         let problem = Problem::of(&self.task);
-        let touch = Touch { task: &self.task, known }.of(&deep);
+        let back = Touch::new(&self.task, known);
+        let touch = back.of(&deep);
+        let seen = back.seen();
         let at = self.task.relative.at(deep.t);
         let rates = deep.active.iter().zip(&deep.lambda).map(|(c, l)| l * problem.row(c, deep.x, &at, 0.0).rate);
         let speed = rates.sum::<f64>().abs().max(f64::MIN_POSITIVE);
@@ -299,7 +301,7 @@ impl<'a> Contacts<'a> {
             None => crossing - (0.25 * self.task.delta / speed).clamp(1e-15, 1e-9).max(reserve),
         };
         let goal = goal.max(f64::MIN_POSITIVE);
-        let new = Found { upper: deep.t, witness: deep.x, deep, touch, goal };
+        let new = Found { upper: deep.t, witness: deep.x, deep, touch, goal, seen };
         self.found = Some(match self.found.take() {
             // One that has not settled is only a bound on the time.
             Some(old) if old.deep.stationarity >= SETTLED => {

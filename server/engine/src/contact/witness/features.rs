@@ -32,6 +32,15 @@ pub struct Features<'t, 'a> {
     pub active: [Literals; 2],
 }
 
+/// What was found at a point and an instant, kept for whoever asks for it there again.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    x: DVec3,
+    t: f64,
+    tolerance: f64,
+    active: [Literals; 2],
+}
+
 /// What is left of the gradients' weighted sum where they hold each other.
 const BALANCED: f64 = 1e-9;
 
@@ -54,6 +63,19 @@ impl<'t, 'a> Features<'t, 'a> {
             }
         }
         spot
+    }
+
+    /// The same as `at`, or what is kept of it where that was asked before.
+    pub fn again(task: &'t Task<'a>, x: DVec3, at: &'t Instant, tolerance: f64, seen: Option<&Seen>) -> Self {
+        match seen.filter(|seen| (seen.x, seen.t, seen.tolerance) == (x, at.t, tolerance)) {
+            Some(seen) => Self { task, x, at, tolerance, active: seen.active.clone() },
+            None => Self::at(task, x, at, Some(tolerance)),
+        }
+    }
+
+    /// What is kept of it.
+    pub fn seen(self) -> Seen {
+        Seen { x: self.x, t: self.at.t, tolerance: self.tolerance, active: self.active }
     }
 
     /// The active faces of one side among those within `tolerance` of the point.

@@ -1,5 +1,6 @@
 //! A contact that was found, what stands beside it, and how a search ends.
 
+use super::features::Seen;
 use super::newton::Solution;
 use glam::DVec3;
 
@@ -22,6 +23,8 @@ pub struct Found {
     pub upper: f64,
     /// That witness, in A's frame.
     pub witness: DVec3,
+    /// The faces of the touch, where they were asked for on the way to it.
+    pub seen: Option<Seen>,
 }
 
 impl Found {

@@ -1,7 +1,7 @@
 //! From a confirmed witness of depth delta back to where the surfaces touch.
 
 use super::extent::{ACTIVE, INCIDENT};
-use super::features::Features;
+use super::features::{Features, Seen};
 use super::found::SAME_POINT;
 use super::known::Known;
 use super::newton::{Actives, Constraint, MAX_ACTIVE, Problem, SETTLED, Solution, Weights};
@@ -13,6 +13,7 @@ use crate::contact::query::task::{Task, witness_level};
 use crate::motion::Instant;
 use crate::octree::Model;
 use glam::DVec3;
+use std::cell::Cell;
 
 /// Halvings of the depth on the way from a witness back to its touch.
 const CONTINUATIONS: usize = 40;
@@ -47,11 +48,21 @@ const NOT_FAR: f64 = 1e-2;
 
 /// The way back to the touch.
 pub(in crate::contact) struct Touch<'t, 'a> {
-    pub(in crate::contact) task: &'t Task<'a>,
-    pub(in crate::contact) known: Known<'t>,
+    task: &'t Task<'a>,
+    known: Known<'t>,
+    /// The faces of the touch that was looked at last.
+    seen: Cell<Option<Seen>>,
 }
 
-impl Touch<'_, '_> {
+impl<'t, 'a> Touch<'t, 'a> {
+    pub(in crate::contact) fn new(task: &'t Task<'a>, known: Known<'t>) -> Self {
+        Self { task, known, seen: Cell::new(None) }
+    }
+
+    /// The faces of the touch that was looked at last, if they were asked for.
+    pub(super) fn seen(self) -> Option<Seen> {
+        self.seen.into_inner()
+    }
     /// The contact of a settled witness where the surfaces meet, as both whole trees say; `None` where it could not be continued
     /// back.
     pub(super) fn of(&self, deep: &Solution) -> Option<Solution> {
@@ -116,8 +127,9 @@ impl Touch<'_, '_> {
 
     /// True when a solution's multipliers balance, none pulls, no apex is pressed from within, and its faces are there.
     fn is_held(&self, s: &Solution) -> bool {
+        let on_apexes = s.active.iter().any(|c| matches!(c, Constraint::Apex(..)));
         let tips = || Problem::of(self.task).holds_at_apexes(s, &self.task.relative.at(s.t));
-        holds(s) && tips() && self.is_there(s)
+        holds(s) && (!on_apexes || tips()) && self.is_there(s)
     }
 
     /// True when f depends on each face that pushes, or on another one in its plane. In a thin wall a face that decides
@@ -128,15 +140,16 @@ impl Touch<'_, '_> {
         }
         let at = self.task.relative.at(s.t);
         let features = Features::at(self.task, s.x, &at, Some(INCIDENT * self.task.rounding));
-        if features.active.iter().any(|ids| ids.is_empty()) {
-            return true;
-        }
-        s.active.iter().zip(&s.lambda).all(|(c, l)| match *c {
-            Constraint::Literal(side, id) if *l > ACTIVE => {
-                features.has(side, id) || features.in_plane_of(side, id).is_some()
-            }
-            Constraint::Literal(..) | Constraint::Apex(..) => true,
-        })
+        let unknown = features.active.iter().any(|ids| ids.is_empty());
+        let is_there = unknown
+            || s.active.iter().zip(&s.lambda).all(|(c, l)| match *c {
+                Constraint::Literal(side, id) if *l > ACTIVE => {
+                    features.has(side, id) || features.in_plane_of(side, id).is_some()
+                }
+                Constraint::Literal(..) | Constraint::Apex(..) => true,
+            });
+        self.seen.set(Some(features.seen()));
+        is_there
     }
 
     /// The touch of a witness that its own equations do not lead to: because other faces decide where the bodies are less
