@@ -170,7 +170,7 @@ pub fn meet(pair: &PrimitivePair, radii: [f64; 2], query_options: QueryOptions, 
     let motion = &pair.bodies[0].placed.motion;
     let balls = Balls {
         radii,
-        faces: pair.primitives.map(|p| p.first_face),
+        faces: [pair.primitives[0].first_face, pair.primitives[1].first_face],
         center: motion.start.position + pair.offsets[0],
         own: motion.velocity,
         way: pair.way,

@@ -26,7 +26,8 @@ const CLOSED: f64 = 1e-14;
 /// Fills in the contact of two boxes that do not turn, or leaves `out` clear where they miss each other; `None` leaves them
 /// to others.
 pub fn meet(pair: &PrimitivePair, half: [DVec3; 2], query_options: QueryOptions, out: &mut Outcome) -> Option<()> {
-    let [a, b] = [0, 1].map(|k| pair.frame(k, &pair.axes(k)));
+    // (Arrays of two are written out where they are hot: a map over them stays a call.)
+    let (a, b) = (pair.frame(0, &pair.axes(0)), pair.frame(1, &pair.axes(1)));
     let own = a.transpose();
     let boxes = Boxes { half, turned: own * b, way: own * pair.way, velocity: own * pair.velocity };
     match boxes.pass() {

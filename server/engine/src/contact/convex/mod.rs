@@ -76,21 +76,23 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
     // As `PairQuery::is_swapped` has it for bodies without cavities.
     let swapped = query.b.model.radius < query.a.model.radius;
     let (bodies, primitives) = if swapped { ([&query.b, &query.a], [b, a]) } else { ([&query.a, &query.b], [a, b]) };
-    let Some(pair) = PrimitivePair::new(bodies, primitives, query.resolution) else { return nothing };
+    // What is made here is looked at where it stands: a name of its own would be a copy.
+    let pair = PrimitivePair::new(bodies, primitives, query.resolution);
+    let Some(pair) = &pair else { return nothing };
     let turns = |spins: &[DVec3; 2]| *spins != [DVec3::ZERO; 2];
     let moves_along = || bodies.iter().all(|body| body.placed.motion.spin == DVec3::ZERO);
-    let forms = primitives.map(|p| p.shape.convex());
+    let forms = [primitives[0].shape.convex(), primitives[1].shape.convex()];
     let balls = matches!(forms, [Convex::Ball(_), Convex::Ball(_)]);
     let met = match forms {
         [Convex::Ball(p), Convex::Ball(q)] if !turns(&pair.spins()) => {
-            balls::meet(&pair, [p, q], query.query_options, outcome)
+            balls::meet(pair, [p, q], query.query_options, outcome)
         }
         [Convex::Cuboid(p), Convex::Cuboid(q)] if moves_along() => {
-            boxes::meet(&pair, [p, q], query.query_options, outcome)
+            boxes::meet(pair, [p, q], query.query_options, outcome)
         }
         // Of another body than a half-space, which the first one never is: there is one bounded body at least.
         [_, Convex::HalfSpace] => {
-            return match PlanePair::new(&pair).and_then(|plane| plane.meet(query.query_options, outcome)) {
+            return match PlanePair::new(pair).and_then(|plane| plane.meet(query.query_options, outcome)) {
                 Some(()) => reported(outcome, swapped),
                 None => nothing,
             };
@@ -99,7 +101,8 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         [_, _] => None,
     };
     if met.is_none() {
-        let Some(start) = Start::new(&pair) else { return nothing };
+        let start = Start::new(pair);
+        let Some(start) = &start else { return nothing };
         match start.look(&mut outcome.counters.closed_forms) {
             Look::Overlap(common) => {
                 start.report(&common, query.query_options, outcome);
@@ -113,9 +116,11 @@ pub(super) fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
             Look::Apart(n) => {
                 let spins = pair.spins();
                 let reported = if turns(&spins) {
-                    Turning::new(&start, spins).and_then(|turning| turning.meet(n, query.query_options, outcome))
+                    let turning = Turning::new(start, spins);
+                    turning.as_ref().and_then(|turning| turning.meet(n, query.query_options, outcome))
                 } else if !balls {
-                    Straight::new(&start).and_then(|straight| straight.meet(query.query_options, outcome))
+                    let straight = Straight::new(start);
+                    straight.as_ref().and_then(|straight| straight.meet(query.query_options, outcome))
                 } else {
                     None
                 };

@@ -202,7 +202,8 @@ impl<'a> Straight<'a> {
         if phi - speed > 0.0 {
             return Some(());
         }
-        let touch = Stand::new(pair, self.parts, self.start.axes, None).confirm(n, phi / speed, shown)?;
+        let touch = Stand::new(pair, self.parts, self.start.axes, None).confirm(n, phi / speed, shown);
+        let touch = touch.as_ref()?;
         // The proof and the point are of one time.
         let left = phi - touch.t * speed;
         if !(left > least && left.abs() <= CLOSED * self.size()) {

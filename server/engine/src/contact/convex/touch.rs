@@ -219,7 +219,7 @@ impl<'a> Stand<'a> {
             }
         };
         let t = self.t;
-        let [a, b] = [0, 1].map(|k| self.carried(k, x));
+        let (a, b) = (self.carried(0, x), self.carried(1, x));
         let mut touch = Touch {
             x,
             offset: self.offsets[0],
@@ -232,7 +232,7 @@ impl<'a> Stand<'a> {
             faces: [[NO_FACE; 3]; 2],
         };
         touch.describe(active, of_a, &rows, pair.scale);
-        let noted = [0, 1].map(|k| extent::noted(&touch.faces[k]));
+        let noted = [extent::noted(&touch.faces[0]), extent::noted(&touch.faces[1])];
         // Faces that pass through the point and hold nothing are the search's to tell.
         if touch.kind == ContactKind::VertexVertex || (!any && touch.extent == Extent::Point && passing != noted) {
             return None;

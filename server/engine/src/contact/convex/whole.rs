@@ -72,13 +72,13 @@ impl<'a> PrimitivePair<'a> {
     /// How they turn, spins about their own axes left out.
     pub(super) fn spins(&self) -> [DVec3; 2] {
         let spin = |body: &question::PlacedModel| {
-            let spin = body.placed.motion.spin;
-            if spin == DVec3::ZERO { spin } else { question::without_own_spin(body).motion.spin }
+            if question::spins_in_itself(body) { DVec3::ZERO } else { body.placed.motion.spin }
         };
         [spin(self.bodies[0]), spin(self.bodies[1])]
     }
 
     /// World from model: the rotation.
+    #[inline]
     pub(super) fn axes(&self, k: usize) -> DMat3 {
         let placed = &self.bodies[k].placed;
         let (start, place) = (placed.motion.start.rotation, placed.place.rotation);
@@ -86,6 +86,7 @@ impl<'a> PrimitivePair<'a> {
     }
 
     /// World from primitive: the rotation, from that of the model.
+    #[inline(always)] // Mostly a copy.
     pub(super) fn frame(&self, k: usize, axes: &DMat3) -> DMat3 {
         let frame = self.primitives[k].frame.rotation;
         if frame == DQuat::IDENTITY { *axes } else { *axes * DMat3::from_quat(frame) }

@@ -109,17 +109,25 @@ pub fn default_resolution(a: &Model, b: &Model) -> f64 {
 /// A body's placed model, less a spin about its own axis of revolution: that moves nothing of it.
 pub(in crate::contact) fn without_own_spin(body: &PlacedModel) -> Placed {
     let mut placed = body.placed;
-    let spin = placed.motion.spin;
-    if spin != DVec3::ZERO {
-        let model_from_world = (placed.motion.start.rotation * placed.place.rotation).conjugate();
-        let along = model_from_world * spin;
-        let center = placed.place.inverse().position;
-        let axis = body.model.axis_of_revolution(along);
-        if axis.is_some_and(|a| a.is_along(along) && a.passes(center, body.model.radius)) {
-            placed.motion.spin = DVec3::ZERO;
-        }
+    if spins_in_itself(body) {
+        placed.motion.spin = DVec3::ZERO;
     }
     placed
+}
+
+/// True when a body spins about an axis of revolution of its own.
+pub(in crate::contact) fn spins_in_itself(body: &PlacedModel) -> bool {
+    let (place, motion) = (&body.placed.place, &body.placed.motion);
+    if motion.spin == DVec3::ZERO {
+        return false;
+    }
+    // A ball about its object's origin does, whatever the axis.
+    if body.model.ball.is_some() && place.position == DVec3::ZERO {
+        return true;
+    }
+    let along = (motion.start.rotation * place.rotation).conjugate() * motion.spin;
+    let Some(axis) = body.model.axis_of_revolution(along).filter(|axis| axis.is_along(along)) else { return false };
+    axis.passes(place.inverse().position, body.model.radius)
 }
 
 /// A spin about an axis of revolution of a body, nearly: this much of it, radians, and off the axis by no more than this part.
