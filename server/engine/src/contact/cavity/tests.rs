@@ -114,6 +114,49 @@ fn a_proof_does_not_jump_over_an_arc() {
 }
 
 #[test]
+fn no_point_of_a_body_is_in_the_wall_within_a_proven_span() {
+    let plate = plate();
+    let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+    let mut r = Random(29);
+    let (mut proven, mut met) = (0, 0);
+    for i in 0..6000 {
+        let radius = r.within(0.1, 0.245);
+        let peg = simple(Cylinder { radius, half_height: r.within(0.05, 0.5) });
+        let (at, tilt) = (across(&mut r, 0.5 * (0.25 - radius)), r.vector(1.0));
+        let (by, spin) = (r.vector(0.1), r.vector(2.5));
+        let motion = moving(at, tilt, by, spin);
+        let query = PairQuery {
+            a: PlacedModel { model: &plate, placed: placed(rest()) },
+            b: PlacedModel { model: &peg, placed: placed(motion) },
+            resolution: default_resolution(&plate, &peg),
+            cell_limit: 1000,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
+        };
+        let (task, _) = Task::of(&query);
+        let relative = Relative::new(placed(motion), placed(rest()));
+        let [main, hole] = [0, 1].map(|k| &plate.solid.primitives[k]);
+        let primitive = &peg.solid.primitives[0];
+        let pair = CavityPair::new(&task, primitive, (main, hole), Side::A, &relative).expect("a peg in a hole");
+        if pair.prove(1.0, None).0 != ProofEnd::Proven {
+            met += 1;
+            continue;
+        }
+        proven += 1;
+        for k in 0..=40 {
+            let m = pair.moment(f64::from(k) / 40.0);
+            for j in 0..32 {
+                let u = DVec3::X.rotate_z(std::f64::consts::TAU * f64::from(j) / 32.0);
+                let x = pair.best(&m, Wall::Round(u)).x;
+                let within = pair.planes.iter().all(|p| p.normal.dot(x) <= p.offset);
+                assert!(!within || u.dot(x) <= 0.25, "{i}: {x} at {}", m.at.t);
+            }
+        }
+    }
+    assert!(proven > 200 && met > 2000, "{proven} {met}");
+}
+
+#[test]
 fn a_best_bound_is_the_reach_of_the_cut_body() {
     // Against the farthest of many points of a tilted cylinder, frustum or box below a plane.
     let mut r = Random(5);

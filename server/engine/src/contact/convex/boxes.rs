@@ -25,6 +25,7 @@ const CLOSED: f64 = 1e-14;
 
 /// Fills in the contact of two boxes that do not turn, or leaves `out` clear where they miss each other; `None` leaves them
 /// to others.
+#[inline(never)] // Of what it needs room for the other ways of answering need nothing.
 pub fn meet(pair: &PrimitivePair, half: [DVec3; 2], query_options: QueryOptions, out: &mut Outcome) -> Option<()> {
     // (Arrays of two are written out where they are hot: a map over them stays a call.)
     let (a, b) = (pair.frame(0, &pair.axes(0)), pair.frame(1, &pair.axes(1)));
@@ -127,7 +128,8 @@ impl<'a> Met<'a> {
         }
         let (x, tol) = (self.point(0.0, touch), INCIDENT * pair.rounding);
         let on = self.outside(x, touch);
-        let passing = on.map(|f| f.cmpge(DVec3::splat(-tol)).bitmask().count_ones());
+        let faces_at = |f: DVec3| f.cmpge(DVec3::splat(-tol)).bitmask().count_ones();
+        let passing = [faces_at(on[0]), faces_at(on[1])];
         let of_faces = match self.features {
             Features::FaceOfA(_) => [1, 3],
             Features::FaceOfB(_) => [3, 1],
@@ -177,8 +179,8 @@ impl<'a> Met<'a> {
             }
             faces
         };
-        let one = |k: usize| [0, 1, 2].map(|i| i == k);
-        let others = |k: usize| [0, 1, 2].map(|i| i != k);
+        let one = |k: usize| [k == 0, k == 1, k == 2];
+        let others = |k: usize| [k != 0, k != 1, k != 2];
         let held = match self.features {
             Features::FaceOfA(i) => [one(i), [true; 3]],
             Features::FaceOfB(j) => [[true; 3], one(j)],

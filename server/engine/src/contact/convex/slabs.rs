@@ -72,7 +72,8 @@ impl Boxes {
     pub fn pass(&self) -> Passage {
         let b = &self.turned;
         let r = b.transpose().to_cols_array_2d();
-        let s = r.map(|row| row.map(f64::abs));
+        let abs = |row: [f64; 3]| [row[0].abs(), row[1].abs(), row[2].abs()];
+        let s = [abs(r[0]), abs(r[1]), abs(r[2])];
         let (p, q) = (self.half[0].to_array(), self.half[1].to_array());
         let (c, w) = (self.way.to_array(), self.velocity.to_array());
         let (d, v) = ((b.transpose() * self.way).to_array(), (b.transpose() * self.velocity).to_array());
