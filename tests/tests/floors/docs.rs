@@ -1,8 +1,10 @@
 //! The documents: lines that fit a page, links and paths that lead somewhere, commands and tests that exist.
 
 use super::{root, rust_files};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 const WIDTH: usize = 120;
 /// Every type that it names is one of the sources.
@@ -94,24 +96,28 @@ fn broken_links(path: &Path, text: &str) -> Vec<String> {
 }
 
 /// What the repository has, as far as documents name it.
+#[derive(Default)]
 struct Known {
-    /// Paths of all files and folders, from the root.
-    paths: BTreeSet<PathBuf>,
+    /// Paths of all files and folders, from the root, by their last names.
+    paths: BTreeMap<OsString, Vec<PathBuf>>,
     /// Programs, examples and test binaries.
     programs: BTreeSet<String>,
     /// All Rust sources, one after the other.
     sources: String,
+    /// Their words, and those that a type is declared by.
+    words: BTreeSet<String>,
+    types: BTreeSet<String>,
 }
 
-/// Paths of all files and folders below a folder, from the root.
-fn paths(folder: &Path, found: &mut BTreeSet<PathBuf>) {
+/// Paths of all files and folders below a folder, from the root, by their last names.
+fn paths(folder: &Path, found: &mut BTreeMap<OsString, Vec<PathBuf>>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        if name.starts_with('.') || ["target", "build"].contains(&name) {
+        let name = path.file_name().unwrap();
+        if name.to_str().unwrap().starts_with('.') || name == "target" || name == "build" {
             continue;
         }
-        found.insert(path.strip_prefix(root()).unwrap().to_owned());
+        found.entry(name.to_owned()).or_default().push(path.strip_prefix(root()).unwrap().to_owned());
         if path.is_dir() {
             paths(&path, found);
         }
@@ -119,8 +125,14 @@ fn paths(folder: &Path, found: &mut BTreeSet<PathBuf>) {
 }
 
 impl Known {
+    /// What this repository has, read once.
+    fn of_this() -> &'static Self {
+        static KNOWN: LazyLock<Known> = LazyLock::new(Known::read);
+        &KNOWN
+    }
+
     fn read() -> Self {
-        let mut known = Self { paths: BTreeSet::new(), programs: BTreeSet::new(), sources: String::new() };
+        let mut known = Self::default();
         paths(&root(), &mut known.paths);
         let mut sources = Vec::new();
         for folder in ["proto", "client", "server", "bindings", "tests", "benches"] {
@@ -135,7 +147,24 @@ impl Known {
                 known.programs.insert(folder.to_owned());
             }
         }
+        let mut before = "";
+        let (mut words, mut types) = (HashSet::new(), HashSet::new());
+        for word in known.sources.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')) {
+            if ["struct", "enum", "trait", "type"].contains(&before) {
+                types.insert(word);
+            }
+            words.insert(word);
+            before = word;
+        }
+        let sorted = |set: HashSet<&str>| set.into_iter().map(str::to_owned).collect();
+        (known.words, known.types) = (sorted(words), sorted(types));
         known
+    }
+
+    /// True for the end of a path.
+    fn is_path(&self, end: &str) -> bool {
+        let alike = Path::new(end).file_name().and_then(|name| self.paths.get(name));
+        alike.is_some_and(|paths| paths.iter().any(|path| path.ends_with(end)))
     }
 
     /// Whether a word that stands in a document as code names nothing that is there; `None` for what is no path and no test.
@@ -153,12 +182,12 @@ impl Known {
         let is_path = word.contains('/') && bases.iter().any(|base| base.join(first).is_dir());
         if first != "target" && (is_file || is_path) {
             let module = format!("{}.rs", word.trim_end_matches('/'));
-            return Some(!self.paths.iter().any(|path| path.ends_with(word) || path.ends_with(&module)));
+            return Some(!self.is_path(word) && !self.is_path(&module));
         }
         // A test is told from a field by its length; its name may end in an ellipsis.
         let start = word.trim_end_matches('…');
         let is_test = start.matches('_').count() >= 3 && start.chars().all(|c| plain(c) && c != '.' && c != '-');
-        is_test.then(|| !self.sources.contains(start))
+        is_test.then(|| !self.words.range(start.to_owned()..).next().is_some_and(|found| found.starts_with(start)))
     }
 
     /// Whether a word names a type, or something of a type, that is declared nowhere; `None` for other words.
@@ -167,13 +196,7 @@ impl Known {
         let is_type = name.starts_with(|c: char| c.is_ascii_uppercase())
             && name.contains(|c: char| c.is_ascii_lowercase())
             && word.chars().all(|c| c.is_ascii_alphanumeric() || c == ':' || c == '_');
-        let is_declared = |kind: &str| {
-            let name = format!("{kind} {name}");
-            let rest = self.sources.match_indices(&name).map(|(at, found)| &self.sources[at + found.len()..]);
-            rest.into_iter().any(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_'))
-        };
-        let kinds = ["struct", "enum", "trait", "type"];
-        is_type.then(|| !kinds.into_iter().any(is_declared) || !self.sources.contains(item))
+        is_type.then(|| !self.types.contains(name) || !item.split("::").all(|part| self.words.contains(part)))
     }
 
     /// Paths, tests and programs that a document at `at` names and that are not there; of the glossary, types too.
@@ -192,7 +215,7 @@ impl Known {
             let words: Vec<&str> = line.split(|c: char| c.is_whitespace() || "`()".contains(c)).collect();
             for three in words.windows(3) {
                 if let (["--test", program], Some((file, _))) = (&three[..2], three[2].split_once("::"))
-                    && !self.paths.iter().any(|path| path.ends_with(format!("tests/{program}/{file}.rs")))
+                    && !self.is_path(&format!("tests/{program}/{file}.rs"))
                 {
                     wrong.push(format!("line {n} names --test {program} {file}::, which is not there"));
                 }
@@ -211,7 +234,7 @@ impl Known {
 
 #[test]
 fn documents_fit_a_page_and_what_they_name_is_there() {
-    let known = Known::read();
+    let known = Known::of_this();
     let mut wrong = Vec::new();
     for path in documents() {
         let text = read(&path);
@@ -288,7 +311,7 @@ fn lost_place(patch: &str) -> Option<String> {
 
 #[test]
 fn every_deliberate_fault_has_its_place_and_names_a_test_that_is_there() {
-    let (known, folder) = (Known::read(), root().join("tests/mutants"));
+    let (known, folder) = (Known::of_this(), root().join("tests/mutants"));
     let mut wrong = Vec::new();
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -296,13 +319,13 @@ fn every_deliberate_fault_has_its_place_and_names_a_test_that_is_there() {
         if path.extension().is_some_and(|e| e == "patch") {
             count += 1;
             let patch = read(&path);
-            let lost = lost_test(&known, &patch).into_iter().chain(lost_place(&patch));
+            let lost = lost_test(known, &patch).into_iter().chain(lost_place(&patch));
             wrong.extend(lost.map(|what| format!("{}: {what}", path.file_name().unwrap().display())));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(count > 100, "only {count} faults were found");
-    let of = |test: &str| lost_test(&known, &format!("Test: -p contactd-tests --test {test}\n"));
+    let of = |test: &str| lost_test(known, &format!("Test: -p contactd-tests --test {test}\n"));
     assert_eq!(of("answers -- cases::every_case_is_answered_to_eight_digits"), None);
     assert!(of("answers -- laws::every_case_is_answered_to_eight_digits").is_some());
     assert!(of("answers -- cases::").is_some());
@@ -322,7 +345,7 @@ fn a_long_line_a_dead_link_and_a_lost_path_are_seen() {
         "# A face, or two\n[a](gone.md) [b](adding.md#nowhere) [c](#a-solid) [d](../README.md) [e](https://a.b)\n";
     assert_eq!(broken_links(&at, links).len(), 2);
     assert_eq!(anchor("## In front: two convex, `turning`"), "in-front-two-convex-turning");
-    let known = Known::read();
+    let known = Known::of_this();
     let good = "`server/src/lib.rs` `world/step.rs` `floors.rs` `contact/convex` `time_lower` `target/x/y.rs` `BASE/S/lock`\n\
                 ```\nserver/src/gone.rs\n```\n`no_files_import_…` `cargo run --bin kernels -- --quick` --test floors\n\
                 --test answers laws::\n";
