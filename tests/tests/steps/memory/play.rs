@@ -156,8 +156,8 @@ fn certificates(warm: &World, cold: &World, work: &mut Work) -> Result<(), Strin
             Detect::Discrete => truths[k].moving(Motion::resting(cold.bodies()[k].motion_state.end)),
             _ => truths[k],
         });
-        let resolution = places.map(|k| cold.bodies()[k].part.resolution);
-        Some((bodies, resolution[0].max(resolution[1])))
+        let own = places.map(|k| cold.bodies()[k].part.resolution);
+        Some((bodies, cold.resolution().unwrap_or(own[0].max(own[1]))))
     };
     for (i, a) in ids.iter().enumerate() {
         for (j, b) in ids.iter().enumerate().skip(i + 1) {
