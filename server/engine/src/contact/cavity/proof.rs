@@ -102,7 +102,7 @@ struct Distinct {
 
 impl Distinct {
     /// A number of each corner, worked out once for those that are alike.
-    #[inline(always)] // The innermost loops of a proof: what is not asked for again costs a call otherwise.
+    #[inline(always)] // In the innermost loop of a proof: a call would cost what is saved.
     fn spread<T: Copy>(self, of: impl Fn(usize, usize) -> T) -> [[T; 2]; 2] {
         let row = |e: usize| {
             let first = of(e, 0);

@@ -25,7 +25,7 @@ const CLOSED: f64 = 1e-14;
 
 /// Fills in the contact of two boxes that do not turn, or leaves `out` clear where they miss each other; `None` leaves them
 /// to others.
-#[inline(never)] // Of what it needs room for the other ways of answering need nothing.
+#[inline(never)] // Its variables would widen the frame of every other way of answering.
 pub fn meet(pair: &PrimitivePair, half: [DVec3; 2], query_options: QueryOptions, out: &mut Outcome) -> Option<()> {
     // (Arrays of two are written out where they are hot: a map over them stays a call.)
     let (a, b) = (pair.frame(0, &pair.axes(0)), pair.frame(1, &pair.axes(1)));
