@@ -2,8 +2,9 @@
 //!
 //! One thread leads: it takes requests as they come and runs steps itself. A step that takes long keeps its thread and loses
 //! the lead (`relay`); from then on the session has a thread of its own for its steps, of low priority, until they are
-//! short again. Imports and mass properties are jobs on threads of their own (`jobs`). So a session whose steps or models
-//! take long delays nobody but itself, and what nobody waits for any more is ended. Clients that died are noticed by their
+//! short again. How long is long depends on whom it holds up: while no other session is there, commands alone. Imports and
+//! mass properties are jobs on threads of their own (`jobs`). So a session whose steps or models take long delays nobody but
+//! itself, and what nobody waits for any more is ended. Clients that died are noticed by their
 //! pidfd, those that left unheard by the port that they no longer have; both lose their sessions, and what they held in
 //! shared memory is freed.
 //!
@@ -16,7 +17,7 @@ use super::manager::Manager;
 use super::models::Models;
 use super::port::{CommandCall, Port, StepCall, Wake};
 use super::recordings::Recordings;
-use super::relay::Relay;
+use super::relay::{PERIOD, Relay};
 use super::scene::{CommandOutcome, Scene, refusal, refused};
 use super::session::{Over, Session, fresh_heed};
 use super::tally::{Tally, millis};
@@ -38,8 +39,10 @@ use std::time::{Duration, Instant};
 const BEAT: Duration = Duration::from_millis(50);
 /// Looks for a step for each look at all else, while it polls.
 const LOOKS: usize = 8;
-/// A step on a thread of its session's own is short below this; after so many of them in a row the session has none any more.
-const SHORT: Duration = Duration::from_millis(1);
+/// For how many periods a step may hold up the loop: beside other sessions, and where none is there. A step on a thread of its
+/// session's own is short that takes no longer; after so many of them in a row the session has none any more.
+const PATIENCE: u32 = 1;
+const PATIENCE_ALONE: u32 = 20;
 const CALM: u32 = 16;
 /// How long the end of a server waits for the steps that were asked for before it was to end.
 const DRAINED: Duration = Duration::from_secs(3);
@@ -89,6 +92,8 @@ pub struct Lead<P: Port> {
     last_beat: Instant,
     /// Sessions that have asked something lately, as of the last beat; new ones count.
     active: usize,
+    /// Scenes that steps have taken along. The leader itself runs none when it asks.
+    away: usize,
     cores: usize,
     /// A thread watches, to take the lead; and that none could be started was told.
     watched: bool,
@@ -115,7 +120,7 @@ fn follow<'scope, 'env, P: Port>(
     if let Some((task, ran)) = lead_on(scope, relay, lead, stop, own) {
         yield_to_others();
         let (to, tasks) = channel();
-        task.answer_from_afar(ran, false, Some(to));
+        task.answer_from_afar(ran, Some(to));
         // Until the session has no use for it.
         while !relay.is_over() {
             match tasks.recv_timeout(BEAT) {
@@ -128,9 +133,8 @@ fn follow<'scope, 'env, P: Port>(
 }
 
 fn run_from_afar<P: Port>(mut task: Task<P>) {
-    let began = Instant::now();
     let ran = task.run();
-    task.answer_from_afar(ran, began.elapsed() < SHORT, None);
+    task.answer_from_afar(ran, None);
 }
 
 /// Serves until `stop` is set, or until a step has taken so long that another thread leads: then that step, done.
@@ -156,7 +160,8 @@ fn lead_on<'scope, 'env, P: Port>(
                 worked = true;
                 let Some(mut task) = lead.begin(call) else { continue };
                 let id = task.session;
-                relay.lend(lead, task.heed.clone(), own);
+                let patience = lead.patience();
+                relay.lend(lead, (task.heed.clone(), own), patience);
                 let ran = task.run();
                 match relay.take_back() {
                     Some(back) => lead = back,
@@ -214,6 +219,7 @@ impl<P: Port> Lead<P> {
             last_work: Instant::now(),
             last_beat: Instant::now(),
             active: 0,
+            away: 0,
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             watched: false,
             alone: false,
@@ -255,10 +261,15 @@ impl<P: Port> Lead<P> {
         call
     }
 
-    /// How long to poll before blocking: not at all when the clients that poll need the cores. Who has asked nothing of late
-    /// polls no more.
+    /// For how many periods a step may hold up the loop.
+    fn patience(&self) -> u32 {
+        if self.sessions.len() > 1 { PATIENCE } else { PATIENCE_ALONE }
+    }
+
+    /// How long to poll before blocking: not at all when the clients that poll need the cores, or steps on threads of their
+    /// own. Who has asked nothing of late polls no more.
     fn spin(&self) -> Duration {
-        let spinners = 1 + self.active;
+        let spinners = 1 + self.active + self.away;
         Duration::from_micros(if spinners <= self.cores { self.config.spin_us } else { 0 })
     }
 
@@ -270,9 +281,9 @@ impl<P: Port> Lead<P> {
             match report {
                 Report::Job(finished) => self.finished(session, finished),
                 Report::Recorded(serial, status) => self.recorded(serial, status),
-                Report::Stepped { scene, did, took, short, thread } => {
+                Report::Stepped { scene, did, took, thread } => {
                     self.count(session, &did, took);
-                    self.stepped(session, short, thread);
+                    self.stepped(session, took, thread);
                     self.put_back(session, scene);
                 }
             }
@@ -294,9 +305,10 @@ impl<P: Port> Lead<P> {
     }
 
     /// A session's step is done on another thread.
-    fn stepped(&mut self, id: u64, short: bool, thread: Option<Sender<Task<P>>>) {
+    fn stepped(&mut self, id: u64, took: Duration, thread: Option<Sender<Task<P>>>) {
+        let is_short = thread.is_none() && took < self.patience() * PERIOD;
         let Some(session) = self.sessions.get_mut(&id) else { return };
-        session.calm = if short { session.calm + 1 } else { 0 };
+        session.calm = if is_short { session.calm + 1 } else { 0 };
         if thread.is_some() {
             session.thread = thread;
         } else if session.calm >= CALM {
@@ -308,6 +320,7 @@ impl<P: Port> Lead<P> {
 
     /// A scene comes back to its session.
     fn put_back(&mut self, id: u64, scene: Box<Scene>) {
+        self.away -= 1;
         match self.sessions.get_mut(&id) {
             Some(session) => session.scene = Some(scene),
             None => discard(scene),
@@ -344,6 +357,7 @@ impl<P: Port> Lead<P> {
             }
             return None;
         };
+        self.away += 1;
         let mut scene = scene;
         scene.record(self.recordings.number(), || self.recordings.tap(request.session));
         if self.config.deadline_ms > 0 {

@@ -1,9 +1,9 @@
 //! Who leads: one thread at a time runs the server's loop, and passes it on while it is held up by a step.
 //!
 //! The leader runs steps itself: nothing is faster. While it does so the loop lies here, and a second thread watches: a
-//! step that is still running after a period (`PERIOD`) keeps the thread that runs it, which from then on yields to
-//! all others, and the watcher leads on. So no step stalls the other sessions for longer than two periods,
-//! whatever it is that takes it so long; and nothing of a step has to be interruptible for that.
+//! step that is still running after its patience, a number of periods (`PERIOD`), keeps the thread that runs it, which
+//! from then on yields to all others, and the watcher leads on. So no step stalls the loop for longer than one period
+//! more than that, whatever it is that takes it so long; and nothing of a step has to be interruptible for that.
 //!
 //! Invariant: `lead` is in one place: with the leader, or here while the leader runs a step.
 
@@ -12,8 +12,8 @@ use rustix::process::Pid;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How long a step may hold up the loop, between one and two of it.
-const PERIOD: Duration = Duration::from_millis(1);
+/// Between two looks at a step that runs.
+pub const PERIOD: Duration = Duration::from_millis(1);
 /// Looks without a step after which the watcher sleeps until there is one.
 const IDLE: u32 = 200;
 
@@ -29,6 +29,8 @@ struct Slot<T> {
     serial: u64,
     /// What the step that runs heeds, and the thread that it runs on.
     current: Option<(Arc<Heed>, Pid)>,
+    /// Whole periods for which it may hold up the loop.
+    patience: u32,
     asleep: bool,
     over: bool,
 }
@@ -36,7 +38,7 @@ struct Slot<T> {
 impl<T> Relay<T> {
     /// A relay whose first leader is to take the lead.
     pub fn new(lead: T) -> Self {
-        let slot = Slot { lead: Some(lead), serial: 0, current: None, asleep: false, over: false };
+        let slot = Slot { lead: Some(lead), serial: 0, current: None, patience: 1, asleep: false, over: false };
         Self { slot: Mutex::new(slot), wake: Condvar::new() }
     }
 
@@ -44,12 +46,13 @@ impl<T> Relay<T> {
         self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The leader, on thread `own`, begins a step.
-    pub fn lend(&self, lead: T, heed: Arc<Heed>, own: Pid) {
+    /// The leader, on thread `own`, begins a step that may hold up the loop for so many periods, and for one more at most.
+    pub fn lend(&self, lead: T, (heed, own): (Arc<Heed>, Pid), patience: u32) {
         let mut slot = self.slot();
         slot.lead = Some(lead);
         slot.serial += 1;
         slot.current = Some((heed, own));
+        slot.patience = patience;
         if slot.asleep {
             slot.asleep = false;
             self.wake.notify_one();
@@ -74,7 +77,9 @@ impl<T> Relay<T> {
             if slot.over {
                 return None;
             }
-            if slot.serial == seen && slot.lead.is_some() {
+            // Looks at the same step, or at none, without one in between.
+            idle = if slot.serial == seen { idle + 1 } else { 0 };
+            if idle >= slot.patience && slot.lead.is_some() {
                 if let Some((heed, thread)) = slot.current.take() {
                     heed.leave();
                     // Where the system refuses, it competes like any other.
@@ -82,7 +87,6 @@ impl<T> Relay<T> {
                 }
                 return slot.lead.take();
             }
-            idle = if slot.serial == seen { idle + 1 } else { 0 };
             seen = slot.serial;
             if idle >= IDLE {
                 slot.asleep = true;
@@ -120,6 +124,7 @@ impl<T> Relay<T> {
 mod tests {
     use super::*;
     use crate::world::Crew;
+    use std::time::Instant;
 
     #[test]
     fn a_step_that_takes_long_loses_the_lead_and_leaves_the_shared_threads() {
@@ -129,11 +134,11 @@ mod tests {
         let own = Pid::from_raw(i32::MAX).unwrap();
         std::thread::scope(|scope| {
             // Nobody watches: it is as good as short.
-            relay.lend(relay.take_back().unwrap(), heed(), own);
+            relay.lend(relay.take_back().unwrap(), (heed(), own), 1);
             let lead = relay.take_back().expect("nobody took it");
             let watcher = scope.spawn(|| relay.watch());
             let long = heed();
-            relay.lend(lead, long.clone(), own);
+            relay.lend(lead, (long.clone(), own), 1);
             assert_eq!(watcher.join().unwrap(), Some(5));
             assert!(relay.take_back().is_none() && long.has_left() && !long.is_over());
             // The next watcher, until the end.
@@ -143,5 +148,31 @@ mod tests {
         });
         assert!(relay.is_over());
         assert_eq!(relay.into_lead(), Some(6));
+    }
+
+    /// What a step that delays nobody is allowed, it gets; what is done within keeps the lead.
+    #[test]
+    fn a_step_keeps_the_lead_for_its_patience() {
+        let relay = Relay::new(5);
+        let heed = || Arc::new(Heed::new(None, Arc::new(Crew::new(1))));
+        let own = Pid::from_raw(i32::MAX).unwrap();
+        std::thread::scope(|scope| {
+            let mut lead = relay.take_back().expect("nobody watches");
+            let watcher = scope.spawn(|| relay.watch());
+            let patience = 100;
+            // Many steps, whose times do not add up.
+            for _ in 0..75 {
+                let short = heed();
+                relay.lend(lead, (short.clone(), own), patience);
+                std::thread::sleep(2 * PERIOD);
+                lead = relay.take_back().expect("it was not patient");
+                assert!(!short.has_left());
+            }
+            let (long, from) = (heed(), Instant::now());
+            relay.lend(lead, (long.clone(), own), patience);
+            assert_eq!(watcher.join().unwrap(), Some(5));
+            assert!(long.has_left() && from.elapsed() >= (patience - 1) * PERIOD);
+            relay.end(6);
+        });
     }
 }

@@ -42,8 +42,6 @@ pub enum Report<P: Port> {
         did: Did,
         /// How long it took, from its request to its reply.
         took: Duration,
-        /// It took no longer than the loop may wait.
-        short: bool,
         /// A thread that its session has got for its steps.
         thread: Option<Sender<Task<P>>>,
     },
@@ -97,10 +95,10 @@ impl<P: Port> Task<P> {
     }
 
     /// Answers, on another thread. The scene is back before the client can ask again.
-    pub fn answer_from_afar(self, ran: Ran<P>, short: bool, thread: Option<Sender<Self>>) {
+    pub fn answer_from_afar(self, ran: Ran<P>, thread: Option<Sender<Self>>) {
         let Self { session, scene, request, began, call, wake, mailbox, .. } = self;
         let took = began.elapsed();
-        mailbox.report(session, Report::Stepped { scene, did: ran.0, took, short, thread });
+        mailbox.report(session, Report::Stepped { scene, did: ran.0, took, thread });
         send::<P>(call, ran, &request, &wake);
     }
 }

@@ -203,7 +203,8 @@ fn serve(clients: impl FnOnce(&Clients)) {
         let end = Stop(&stop);
         clients(&Clients { steps, commands, bell, seen });
         drop(end);
-        assert!(server.join().unwrap().is_some(), "the last leader leaves what it holds");
+        let lead = server.join().unwrap().expect("the last leader leaves what it holds");
+        assert_eq!(lead.away, 0, "scenes that no step has");
     });
 }
 
@@ -252,4 +253,25 @@ fn a_session_whose_model_is_being_imported_is_busy_and_no_other_is() {
         let (reply, _) = clients.step(other, EPOCH, vec![PoseRecord::end(2, &Pose::at(DVec3::X * 3.0))]);
         assert_eq!((reply.error, reply.records), (0, 0));
     });
+}
+
+/// A step delays other sessions for a period or two at most, commands for some more; and where a core is wanted by a client or by a
+/// step that has lost the lead, the loop does not poll on it.
+#[test]
+fn who_else_is_there_decides_how_long_the_loop_is_held_up_and_polls() {
+    let ((_steps, at_steps), (_commands, at_commands), (bell, rings)) = (channel(), channel(), channel());
+    let port = Channels { steps: at_steps, commands: at_commands, rings, seen: Arc::default() };
+    let mut lead = Lead::new(ServerConfig::default(), EPOCH, port, bell);
+    lead.cores = 3;
+    let polls = Duration::from_micros(lead.config.spin_us);
+    assert_eq!((lead.patience(), lead.spin()), (PATIENCE_ALONE, polls));
+    let open = |lead: &mut Lead<Channels>| lead.open(PROTOCOL_VERSION, (0, 0)).expect("a session");
+    open(&mut lead);
+    assert_eq!((lead.patience(), lead.spin()), (PATIENCE_ALONE, polls));
+    open(&mut lead);
+    assert_eq!((lead.patience(), lead.spin()), (PATIENCE, polls));
+    lead.away = 1;
+    assert_eq!(lead.spin(), Duration::ZERO);
+    lead.cores = 4;
+    assert_eq!(lead.spin(), polls);
 }
