@@ -84,6 +84,14 @@ impl Proposals<'_, '_> {
                 support.push((side, id, 1.0));
             }
         }
+        // Fits weigh two literals each, so that more may hold a cell than a system takes: then those that weigh most, of both bodies.
+        if support.len() > MAX_ACTIVE {
+            support.sort_by(|l, m| m.2.total_cmp(&l.2));
+            if let Some(other) = support.iter().position(|l| l.0 != support[0].0) {
+                support.swap(other.max(MAX_ACTIVE - 1), MAX_ACTIVE - 1);
+            }
+            support.truncate(MAX_ACTIVE);
+        }
         Some(support)
     }
 

@@ -209,10 +209,12 @@ impl<'a> Search<'a> {
                 return Some(self.impatient(&cell));
             }
             if cell.source == Source::Cell && self.contacts.counters.cells >= self.probe {
-                self.probe = 2 * self.contacts.counters.cells;
-                if let Some(ending) = self.look_for_witness(&cell) {
-                    return Some(ending);
+                let ending = self.look_for_witness(&cell);
+                if ending.is_some() {
+                    return ending;
                 }
+                // The look counts too: as much is searched before the next one.
+                self.probe = 2 * self.contacts.counters.cells;
                 continue;
             }
             self.items.scratch.heap.pop();

@@ -1,17 +1,24 @@
 //! What the queue's cells hold.
 
+use super::cell::Cell;
 use super::items::Items;
+use super::propose::Proposals;
 use super::scratch::Scratch;
 use super::slices::Slices;
+use crate::contact::exclusion::clause::Advance;
+use crate::contact::exclusion::literal::Side;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
 use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
 use crate::contact::query::task::Task;
+use crate::contact::witness::contacts::Contacts;
+use crate::contact::witness::known::Handed;
 use crate::math::Aabb;
 use crate::motion::Placed;
 use crate::octree::testing::pierced;
+use crate::solid::local::LiteralId;
 use crate::solid::primitive::{Cuboid, Cylinder};
-use crate::solid::{Shape, local};
+use crate::solid::{Sense, Shape, local};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use glam::DVec3;
@@ -95,4 +102,35 @@ fn no_cell_holds_where_the_whole_trees_do_not() {
     }
     println!("{held} points in a cell's solids, {kept_out} kept out by clip_planes alone");
     assert!(held > 100 && kept_out > 100, "{held} {kept_out}");
+}
+
+/// Fits weigh two literals each: in large trees eight and more held a cell together. A system takes six of them.
+#[test]
+fn a_cell_that_more_literals_hold_than_a_system_takes_is_tried_with_those_that_weigh_most() {
+    let cube = || pierced(Cuboid { half: v(0.5, 0.5, 0.5) }, Vec::new());
+    let (below, above) = (cube(), cube());
+    let place = Pose::IDENTITY;
+    let falling = Motion { start: Pose::at(v(0.1, 0.2, 1.5)), velocity: v(0.0, 0.0, -1.0), spin: DVec3::ZERO };
+    let query = PairQuery {
+        a: PlacedModel { model: &above, placed: Placed { place, motion: falling } },
+        b: PlacedModel { model: &below, placed: Placed { place, motion: Motion::resting(Pose::IDENTITY) } },
+        resolution: default_resolution(&above, &below),
+        cell_limit: 1000,
+        strategies: Strategies::default(),
+        query_options: QueryOptions::DEPTH,
+    };
+    let (task, _) = Task::of(&query);
+    let (mut items, mut contacts) = (Items::new(Scratch::default()), Contacts::new(task));
+    let own = || std::iter::once(0).collect();
+    items.handed = Handed { primitives: [own(), own()], candidates: std::iter::once((0, 0)).collect() };
+    let faces = |side: Side| (0..6).map(move |f| (side, LiteralId::new(f, Sense::Positive), 0.1));
+    let support = faces(Side::A).chain(faces(Side::B)).collect();
+    let advance = Advance { dt: 0.0, support, y: DVec3::ZERO, cost: DVec3::ONE, now: f64::INFINITY };
+    let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
+    let (a, b) = (items.store(&a), items.store(&b));
+    let cell = Cell::new((0.4, 1.0), &Aabb::around(v(0.0, 0.0, -0.5), v(0.1, 0.1, 0.1)), a, b);
+    let at = task.relative.at(0.4);
+    Proposals { items: &mut items, contacts: &mut contacts, patient: true }.attempt(&cell, &advance, &at);
+    // A system of more would be refused by an assertion where it is solved.
+    assert!(contacts.counters.newton > 0, "a guess is tried");
 }
