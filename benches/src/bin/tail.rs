@@ -15,8 +15,6 @@ use contactd_tests::families::{ask, of_size, write};
 use std::error::Error;
 use std::path::PathBuf;
 
-/// Primitives of a tree.
-const SIZES: [usize; 3] = [5, 20, 60];
 /// How many of the dearest are named.
 const DEAREST: usize = 10;
 
@@ -28,6 +26,9 @@ struct Arguments {
     /// Pairs of each size; 10,000, and 60 in the short form.
     #[arg(long, value_name = "N")]
     pairs: Option<u64>,
+    /// Primitives of a tree, one or more sizes, each of 5 or more.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [5, 20, 60])]
+    primitives: Vec<usize>,
     /// Other pairs for another one.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -49,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pairs = arguments.pairs.unwrap_or(arguments.options.pick(10_000, 60));
     let mut table = Table::new(&["primitives", "pairs", "undecided", "quantity", "p50", "p99", "p99_9", "largest"]);
     let mut dearest = Vec::new();
-    for primitives in SIZES {
+    for primitives in arguments.primitives.iter().copied() {
         let asked = spread(pairs, |index| {
             let answer = ask(&of_size(arguments.seed, primitives, index), 0)?;
             let o = &answer.pair.outcome;
