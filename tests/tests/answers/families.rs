@@ -70,6 +70,14 @@ fn nothing_is_wrong_of_trees_of_a_hundred_primitives_and_more() {
     assert!(of(Status::Contact) > 0 && open * 50 <= verdicts.len());
 }
 
+/// Looks for a witness are charged as cells, and as much is searched before the next one: one after the other they came to 654,487.
+#[test]
+fn looks_for_a_witness_do_not_follow_each_other() {
+    let verdict = examine(&of_size(6, 200, 44), 0, Effort::Quick);
+    assert_eq!(verdict.status, Some(Status::Clear));
+    assert!(verdict.cells < 20_000, "{} cells", verdict.cells);
+}
+
 #[test]
 fn scenes_are_what_their_seed_says() {
     for family in 0..NAMES.len() {
