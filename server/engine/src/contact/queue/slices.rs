@@ -34,8 +34,8 @@ use std::sync::Arc;
 const MOST_ALTERNATIVES: usize = 128;
 /// A pair of nodes with no more terms than this is not decomposed: cells tell apart what is in it for less.
 const FEW_TERMS: usize = 24;
-/// Pairs of nodes that a walk looks at before it stops decomposing. With 8 to 400 of them trees of 5 to 200 primitives take the same
-/// cells but for some in a hundred; with 400 the walk was a third of what the median pair cost (`tail`).
+/// Pairs of nodes that a walk looks at before it stops decomposing. Many more leave the cells of trees (`tail`) what they are but for
+/// a few in a hundred, and the walk takes a third of what the median pair costs.
 const MOST_NODE_PAIRS: usize = 32;
 /// A slice is halved while the bodies move further in it than this part of the region's smaller diagonal …
 const SLICE_TRAVEL: f64 = 0.25;

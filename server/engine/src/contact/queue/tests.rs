@@ -133,4 +133,7 @@ fn a_cell_that_more_literals_hold_than_a_system_takes_is_tried_with_those_that_w
     Proposals { items: &mut items, contacts: &mut contacts, patient: true }.attempt(&cell, &advance, &at);
     // A system of more would be refused by an assertion where it is solved.
     assert!(contacts.counters.newton > 0, "a guess is tried");
+    let (tried, ..) = &items.scratch.tried[0];
+    let of = |side: Side| tried.iter().filter(|l| l.0 == side).count();
+    assert_eq!((of(Side::A), of(Side::B)), (5, 1), "all weigh as much: of both bodies, as many as a system takes");
 }
