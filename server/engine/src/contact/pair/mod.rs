@@ -1,5 +1,6 @@
 //! One pair over one step: the proofs in front of the queue, then the queue; and the answer's fields.
 
+mod front;
 mod report;
 pub mod search;
 pub mod unbounded;

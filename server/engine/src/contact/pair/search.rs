@@ -1,10 +1,11 @@
 //! Earliest contact of one pair over one step: from the question to the answer.
 
+use super::front;
 use super::report::{DEPTHS, NEAR_DEPTH, contact_of, fill_overlap};
 use super::unbounded;
 use crate::contact::cavity;
 use crate::contact::convex::{self, Quick};
-use crate::contact::facets::{self, Front};
+use crate::contact::facets::Front;
 use crate::contact::instant::depth;
 use crate::contact::instant::separation;
 use crate::contact::instant::work::Work;
@@ -58,7 +59,7 @@ fn earliest(query: &PairQuery, scratch: &mut Scratch, outcome: &mut Outcome) {
 
 /// What is told without a search of a pair that is no pair of balls; `outcome` is clear before.
 fn whole(query: &PairQuery, outcome: &mut Outcome) -> Quick {
-    if let Some(reported) = unbounded::answer(query) {
+    if let Some(reported) = unbounded::reported(query) {
         *outcome = reported;
         return Quick::Reported;
     }
@@ -119,12 +120,28 @@ struct Open {
     reason = "one a pair, which stays in its place: a box would be an allocation more"
 )]
 enum State<'a> {
+    /// Not begun; perhaps a direction (world axes) that separates the bodies at the start.
+    Posed(Option<DVec3>, Scratch),
+    /// Not begun, of bodies that overlap at the start: a common point, and what was told of it.
+    Overlap(DVec3, Outcome, Scratch),
     /// Answered without a search, whose memory is given back.
     Reported(Outcome, Scratch),
     /// Ended by a kernel in front of the search: how, until it is told; its work; the memory of the search that was not needed.
     Ended(Option<Ending>, Counters, Scratch),
     /// Searched. In a place of its own: what a kernel answers is not to be moved with room for a search.
     Searching(Box<Search<'a>>),
+}
+
+impl State<'_> {
+    fn into_scratch(self) -> Scratch {
+        match self {
+            State::Posed(_, scratch)
+            | State::Overlap(_, _, scratch)
+            | State::Reported(_, scratch)
+            | State::Ended(_, _, scratch) => scratch,
+            State::Searching(search) => search.into_scratch(),
+        }
+    }
 }
 
 /// The search of one pair, to be run piece by piece: a scene that asks only for its first contact runs each pair no
@@ -158,8 +175,9 @@ pub struct PairSearch<'a> {
 impl<'a> PairSearch<'a> {
     /// Runs as `run` does, but refines at most `cells` more cells: a search that would need more is undecided.
     pub fn run_within(&mut self, until: f64, cells: u64) -> Option<Outcome> {
-        if let Some(counters) = self.under_way() {
-            let limit = self.limit.saturating_sub(self.spent).min(counters.spent(self.limit).saturating_add(cells));
+        if !matches!(self.state, State::Reported(..)) {
+            let done = self.under_way().map_or(0, |counters| counters.spent(self.limit));
+            let limit = self.limit.saturating_sub(self.spent).min(done.saturating_add(cells));
             if let State::Searching(search) = &mut self.state {
                 search.limit_to(limit);
             }
@@ -173,14 +191,31 @@ impl<'a> PairSearch<'a> {
         let (task, swapped) = Task::of(query);
         let mut outcome = clear(query);
         let quick = quick(query, &mut outcome);
-        if let Quick::Reported = quick {
-            return Self::at(query, task, swapped, outcome, State::Reported(outcome, scratch));
-        }
         Self::of_task(query, task, swapped, (quick, &outcome), scratch)
     }
 
-    /// A pair that has come so far, at the resolution of its task.
-    fn at(query: &PairQuery<'a>, task: Task<'a>, swapped: bool, outcome: Outcome, state: State<'a>) -> Self {
+    /// Prepares the search of a task, of which a quick look has told something.
+    fn of_task(
+        query: &PairQuery<'a>,
+        task: Task<'a>,
+        swapped: bool,
+        (quick, before): (Quick, &Outcome),
+        scratch: Scratch,
+    ) -> Self {
+        let counters = Counters {
+            primitives: (task.a.primitives.len() + task.b.primitives.len()) as u64,
+            closed_forms: before.counters.closed_forms,
+            ..Counters::default()
+        };
+        let outcome = Outcome { resolution: task.delta, depth: task.delta, counters, ..Outcome::default() };
+        let state = match quick {
+            Quick::Overlap(x) => State::Overlap(x, *before, scratch),
+            Quick::Open(along) => State::Posed(along, scratch),
+            Quick::Reported => State::Reported(*before, scratch),
+        };
+        let spins = |(a, b): (Placed, Placed)| [a.motion.spin, b.motion.spin];
+        let moving = if swapped { (query.b.placed, query.a.placed) } else { (query.a.placed, query.b.placed) };
+        let spun = (spins(moving) != spins(task.relative.placed())).then(|| Box::new([query.a.placed, query.b.placed]));
         Self {
             task,
             swapped,
@@ -192,78 +227,43 @@ impl<'a> PairSearch<'a> {
             coarser: 0,
             insists: false,
             open: None,
-            spun: None,
+            spun,
             limit: query.cell_limit,
             spent: 0,
         }
     }
 
-    /// Prepares the search of a task, of which a quick look has told something.
-    fn of_task(
-        query: &PairQuery<'a>,
-        task: Task<'a>,
-        swapped: bool,
-        (quick, before): (Quick, &Outcome),
-        mut scratch: Scratch,
-    ) -> Self {
-        let (a, b) = (task.a, task.b);
-        let counters = Counters {
-            primitives: (a.primitives.len() + b.primitives.len()) as u64,
-            closed_forms: before.counters.closed_forms,
-            ..Counters::default()
-        };
-        let outcome = Outcome { resolution: task.delta, depth: task.delta, counters, ..Outcome::default() };
-        let mut contacts = Contacts::new(task);
-        let (mut ending, mut overlap) = (None, None);
-        // Of what has no volume nothing is asked.
-        let some = !a.is_empty() && !b.is_empty();
-        match quick {
-            Quick::Overlap(x) => overlap = Some(x),
-            Quick::Open(along) if query.strategies.convex => ending = convex::answer(&mut contacts, along),
+    /// Begins: with what a quick look has told, or by asking the kernels in front of the queue.
+    fn begin(&mut self) {
+        match &mut self.state {
+            State::Posed(along, scratch) => {
+                let (along, scratch) = (*along, std::mem::take(scratch));
+                self.state = self.begun(along, scratch);
+            }
+            State::Overlap(x, before, _) => {
+                let (x, before) = (*x, *before);
+                if !self.goes_past(x, 0) {
+                    self.state = State::Reported(self.overlaps(x, Some(&before)), self.take_scratch());
+                }
+            }
             _ => {}
         }
-        if ending.is_none() && overlap.is_none() && some && query.strategies.cavities {
-            ending = cavity::answer(&mut contacts);
-        }
-        let mut from = 0.0;
-        if ending.is_none() && overlap.is_none() && some && query.strategies.facets {
-            match facets::answer(&mut contacts) {
-                Front::Ended(told) => ending = Some(told),
-                Front::Free(until) => from = until,
-                Front::Open => {}
-            }
-        }
-        // What stage 1 leaves nothing of needs no queue.
-        if ending.is_none() && overlap.is_none() && some && from == 0.0 && query.strategies.region {
-            scratch.enter(Stage::Region);
-            if contacts.region(0.0, 1.0).is_none() {
-                ending = Some(contacts.end());
-            }
-            scratch.enter(Stage::Front);
-        }
-        let state = if ending.is_some() || overlap.is_some() {
-            State::Ended(ending, contacts.counters, scratch)
-        } else {
-            let mut search = Box::new(Search::new(contacts, scratch));
-            if some {
-                search.start(from);
-            }
-            if query.strategies.coarser {
-                search.patience = PATIENCE;
-            }
-            State::Searching(search)
+    }
+
+    /// How far the kernels come; `along` separates the bodies at the start.
+    fn begun(&self, along: Option<DVec3>, mut scratch: Scratch) -> State<'a> {
+        let mut contacts = Contacts::new(self.task);
+        let from = match front::kernels(&mut contacts, along, &mut scratch) {
+            Front::Ended(ending) => return State::Ended(Some(ending), contacts.counters, scratch),
+            Front::Free(until) => until,
+            Front::Open => 0.0,
         };
-        let spins = |(a, b): (Placed, Placed)| [a.motion.spin, b.motion.spin];
-        let moving = if swapped { (query.b.placed, query.a.placed) } else { (query.a.placed, query.b.placed) };
-        let spun = (spins(moving) != spins(task.relative.placed())).then(|| Box::new([query.a.placed, query.b.placed]));
-        let mut pair = Self::at(query, task, swapped, outcome, state);
-        pair.spun = spun;
-        if let Some(x) = overlap
-            && !pair.goes_past(x, 0)
-        {
-            pair.state = State::Reported(pair.overlaps(x, Some(before)), pair.take_scratch());
+        let mut search = Box::new(Search::new(contacts, scratch));
+        search.start(from);
+        if self.task.strategies.coarser {
+            search.patience = PATIENCE;
         }
-        pair
+        State::Searching(search)
     }
 
     /// The answer for an overlap at the start with the common point x, of which something may have been told.
@@ -326,7 +326,7 @@ impl<'a> PairSearch<'a> {
     pub fn depth(&self) -> f64 {
         match &self.state {
             State::Reported(reported, _) => reported.depth,
-            State::Ended(..) | State::Searching(_) => self.task.delta,
+            _ => self.task.delta,
         }
     }
 
@@ -338,6 +338,7 @@ impl<'a> PairSearch<'a> {
     /// No contact of this pair is earlier; infinite when nothing is left to search.
     pub fn earliest(&self) -> f64 {
         match &self.state {
+            State::Posed(..) | State::Overlap(..) => 0.0,
             State::Reported(Outcome { verdict: Verdict::Clear { .. }, .. }, _) => f64::INFINITY,
             State::Reported(reported, _) => reported.time_lower(),
             State::Ended(Some(Ending::Contact(found)), ..) => found.goal,
@@ -348,6 +349,7 @@ impl<'a> PairSearch<'a> {
 
     /// Runs until the answer is found, or until no contact before or at `until` is left to find: then `None`.
     pub fn run(&mut self, until: f64) -> Option<Outcome> {
+        self.begin();
         if let State::Reported(reported, _) = &self.state {
             return (reported.status() == Status::Clear || reported.time_lower() <= until).then_some(*reported);
         }
@@ -363,7 +365,7 @@ impl<'a> PairSearch<'a> {
     /// How the search ends, and the cells' worth of work that it took; `None` where it comes to `until` first.
     fn ending(&mut self, until: f64) -> Option<(Ending, u64)> {
         let (ending, counters) = match &mut self.state {
-            State::Reported(..) => return None,
+            State::Posed(..) | State::Overlap(..) | State::Reported(..) => return None,
             State::Ended(Some(Ending::Contact(found)), ..) if found.goal > until => return None,
             State::Ended(ending, counters, _) => (ending.take()?, std::mem::take(counters)),
             State::Searching(search) => {
@@ -595,10 +597,7 @@ impl<'a> PairSearch<'a> {
 
     /// The memory of what has ended; the state is to be set anew.
     fn take_scratch(&mut self) -> Scratch {
-        match std::mem::replace(&mut self.state, State::Reported(self.outcome, Scratch::default())) {
-            State::Reported(_, scratch) | State::Ended(_, _, scratch) => scratch,
-            State::Searching(search) => search.into_scratch(),
-        }
+        std::mem::replace(&mut self.state, State::Posed(None, Scratch::default())).into_scratch()
     }
 
     /// Cells' worth of work done so far.
@@ -618,7 +617,7 @@ impl<'a> PairSearch<'a> {
     /// Work whose ending is not told yet.
     fn under_way(&self) -> Option<&Counters> {
         match &self.state {
-            State::Reported(..) => None,
+            State::Posed(..) | State::Overlap(..) | State::Reported(..) => None,
             State::Ended(_, counters, _) => Some(counters),
             State::Searching(search) => Some(search.counters()),
         }
@@ -626,9 +625,6 @@ impl<'a> PairSearch<'a> {
 
     /// Ends the search and gives its memory back.
     pub fn into_scratch(self) -> Scratch {
-        match self.state {
-            State::Reported(_, scratch) | State::Ended(_, _, scratch) => scratch,
-            State::Searching(search) => search.into_scratch(),
-        }
+        self.state.into_scratch()
     }
 }

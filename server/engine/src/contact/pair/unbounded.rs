@@ -19,7 +19,7 @@ const DEEP: f64 = 1e-6;
 const OPPOSITE: f64 = 1e-12;
 
 /// What is told of two unbounded bodies; `None` when one is bounded.
-pub fn answer(query: &PairQuery) -> Option<Outcome> {
+pub fn reported(query: &PairQuery) -> Option<Outcome> {
     let resolution = resolution(query)?;
     let bodies = [Side::new(&query.a), Side::new(&query.b)];
     let mut o = Outcome::clear(resolution);
