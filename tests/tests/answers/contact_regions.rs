@@ -2,7 +2,7 @@
 //! that bound them, against what elementary geometry says.
 
 use super::tight::prism;
-use contactd::contact::clearance::touching;
+use contactd::contact::margin::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::within::Within;
 use contactd::contact::{

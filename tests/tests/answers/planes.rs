@@ -7,7 +7,7 @@
 
 use super::kinds::{Scene, Told, alone, at_rest, compare, compare_told, pairs, past, placed, speed, turning};
 use contactd::contact::region::{regions, threshold};
-use contactd::contact::{ContactKind, Extent, Outcome, QueryOptions, Scratch, Status, clearance, earliest_contact};
+use contactd::contact::{ContactKind, Extent, Outcome, QueryOptions, Scratch, Status, earliest_contact, margin};
 use contactd::octree::Model;
 use contactd::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Shape, Sphere};
 use contactd_proto::{Motion, Pose};
@@ -341,7 +341,7 @@ fn margins_above_planes_end_when_supports_say_so() {
         if s.at(0.0) <= margin {
             continue;
         }
-        let (until, known, counters) = clearance::apart_until(&query, margin, &mut Scratch::default());
+        let (until, known, counters) = margin::apart_until(&query, margin, &mut Scratch::default());
         assert!(known && (tilts || counters.cells == 0), "{i}: {counters:?}");
         let mut t = 0.0;
         while t < 1.0 && s.at(t) > margin * (1.0 + 1e-13) {
@@ -350,7 +350,7 @@ fn margins_above_planes_end_when_supports_say_so() {
         // Never late; early by the slack that a margin has.
         assert!(until <= t + 1e-12, "{i}: {until}, not {t}");
         let slack = if until < 1.0 { s.at(until) / margin - 1.0 } else { 0.0 };
-        assert!(slack <= clearance::MARGIN_SLACK * 1.01 || tilts, "{i}: {until}, not {t}: {slack:e}");
+        assert!(slack <= margin::MARGIN_SLACK * 1.01 || tilts, "{i}: {until}, not {t}: {slack:e}");
         worst = worst.max(slack);
         *if until < 1.0 { &mut within } else { &mut beyond } += 1;
     }

@@ -3,7 +3,7 @@
 
 use contactd::contact::within::Within;
 use contactd::contact::{Counters, DEFAULT_CELL_LIMIT, PairQuery, Scratch, Status};
-use contactd::contact::{clearance, earliest_contact, region};
+use contactd::contact::{earliest_contact, margin, region};
 use contactd::motion::Placed;
 use contactd::world::{self, PairPlan};
 use contactd_proto::{Detect, EffectCounters, Effects, Report, Rule};
@@ -97,11 +97,11 @@ fn alone(bodies: &[world::body::Body], plan: &PairPlan) -> Counters {
     let flagged = outcome.status() == Status::Contact && plan.report >= Report::Time || plan.margin > 0.0;
     if flagged && !outcome.touching && (outcome.status() != Status::Contact || outcome.time() > 0.0) {
         let threshold = region::threshold(outcome.resolution, plan.margin);
-        let (within, cells) = clearance::touching(&query, threshold, &mut Scratch::default());
+        let (within, cells) = margin::touching(&query, threshold, &mut Scratch::default());
         outcome.counters.instant_cells += cells;
         if plan.margin > 0.0 && within == Within::Apart && outcome.status() == Status::Clear {
             let query = PairQuery { cell_limit: region::MOST_CELLS, ..query };
-            let (.., work) = clearance::apart_until(&query, threshold, &mut Scratch::default());
+            let (.., work) = margin::apart_until(&query, threshold, &mut Scratch::default());
             outcome.counters.instant_cells += work.cells + work.instant_cells;
         }
     }

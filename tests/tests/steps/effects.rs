@@ -2,7 +2,7 @@
 //! it is on, and asking for less changes no bit of what remains. Over embedded sessions, so that what is compared is what a
 //! client reads. `CONTACTD_MARGINS` sets the number of random pairs with a margin (`CONTACTD_MARGINS=60`).
 
-use contactd::contact::clearance::{MARGIN_SLACK, apart_until};
+use contactd::contact::margin::{MARGIN_SLACK, apart_until};
 use contactd::contact::{QueryOptions, Scratch, Status, Verdict, earliest_contact};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd::octree::Model;

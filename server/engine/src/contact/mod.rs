@@ -5,12 +5,12 @@
 
 mod cavity;
 pub mod certificate;
-pub mod clearance;
 mod convex;
 pub mod distance;
 pub mod exclusion;
 mod facets;
 pub mod instant;
+pub mod margin;
 pub mod pair;
 pub mod probe;
 pub mod query;

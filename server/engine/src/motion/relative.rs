@@ -3,9 +3,11 @@
 //! Everything a cell needs is expressed along A's model axes at the instant t, where A's faces stand still. The two
 //! origins enter only by their difference d = p_A − p_B, so an offset common to both bodies costs no digits.
 //!
-//! Letters (docs/algorithm.md): u = x − p_A; omega = spin_A − spin_B; v0 = v_A − v_B. A point fixed in A moves against B
+//! Letters (docs/algorithm/queue.md): u = x − p_A; omega = spin_A − spin_B; v0 = v_A − v_B. A point fixed in A moves against B
 //! with v(x) = v0 − spin_B×d + omega×u, and its acceleration seen from B is
-//! omega×(omega×u) + (omega×spin_B)×u + spin_B×(spin_B×d) − 2 spin_B×v0 (both spins are constant in the world).
+//! omega×(omega×u) + (omega×spin_B)×u + spin_B×(spin_B×d) − 2 spin_B×v0 (both spins are constant in the world): v̇ − spin_B×v with
+//! u̇ = spin_A×u and ḋ = v0 is omega×(spin_A×u) − spin_B×(omega×u) + spin_B×(spin_B×d) − 2 spin_B×v0, where spin_A = omega + spin_B,
+//! and a×(b×u) − b×(a×u) = (a×b)×u (Jacobi).
 
 use super::rounding::{NORM, Rounding};
 use contactd_proto::{Motion, Pose};

@@ -5,7 +5,7 @@
 //! leaves the ball of radius |c| around the origin's path, nor goes farther from its start than `travel` tells. The smallest of
 //! these bounds is taken, side by side.
 
-use crate::contact::{Hull, clearance};
+use crate::contact::{Hull, margin};
 use crate::math::{Aabb, tolerance};
 use crate::octree::Model;
 use contactd_proto::{Motion, MotionState, Pose};
@@ -36,7 +36,7 @@ impl MeasuredModel {
         // An unbounded or empty solid has no size of its own: its partner's decides.
         let resolution =
             Some(crate::contact::default_resolution(&model, &model)).filter(|r| r.is_finite()).unwrap_or(0.0);
-        let sharpness = clearance::sharpness(&model.solid);
+        let sharpness = margin::sharpness(&model.solid);
         Self { model, aabb, resolution, smallest, sharpness }
     }
 }

@@ -4,16 +4,16 @@
 //! * clearance: apart by that much when it was measured. While the ways that both bodies have gone since (their path lengths)
 //!   stay below it they cannot meet: one comparison (`neighbours`);
 //! * a predicted motion: both bodies were proven to keep a distance if they go on as they went. While their true motions stray from
-//!   it by less than the distance leaves room for they cannot meet, however far they go (`contact::clearance`);
+//!   it by less than the distance leaves room for they cannot meet, however far they go (`contact::margin`);
 //! * the last question: asked again to the bit, it has the same answer.
 //!
 //! Knowledge only says "clear", or repeats an answer; everything else is searched as if nothing were known. So the
 //! answers are the same bits without it, and what was learned in which step never shows in them.
 //! Source of the path length: B. Mirtich, Impulse-based Dynamic Simulation (1996), section 2.4, its queue of times to impact;
-//! that of a predicted motion is worked out in `contact::clearance` and `PredictedMotion::strays`.
+//! that of a predicted motion is worked out in `contact::margin` and `PredictedMotion::strays`.
 
 use super::body::Body;
-use crate::contact::{Counters, Outcome, PairQuery, QueryOptions, Region, Scratch, Status, clearance};
+use crate::contact::{Counters, Outcome, PairQuery, QueryOptions, Region, Scratch, Status, margin};
 use contactd_proto::Motion;
 use glam::{DQuat, DVec3};
 
@@ -187,7 +187,7 @@ impl PairCache {
         }
         // A pair that was never searched, or that met something, is searched first.
         let work = self.work?;
-        if let Some(clearance) = clearance::at_start(&q.query, q.margin) {
+        if let Some(clearance) = margin::at_start(&q.query, q.margin) {
             counters.closed_forms += 1;
             let travel = q.travel();
             self.via = Via::Clearance;
@@ -259,7 +259,7 @@ impl PairCache {
         let [cells, evaluations] = std::array::from_fn(|k| FACTOR * (BESIDE_CELLS[k] + work[k]));
         query.cell_limit = query.cell_limit.min(cells);
         let limits = (PROOF_SLACK / self.steps, evaluations);
-        let kept = clearance::keep(&query, q.margin, self.clearance, limits, scratch);
+        let kept = margin::keep(&query, q.margin, self.clearance, limits, scratch);
         *counters += kept.counters;
         let until = if kept.until >= 1.0 { f64::INFINITY } else { kept.until * self.steps };
         if until < 1.0 {

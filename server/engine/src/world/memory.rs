@@ -12,7 +12,7 @@ use super::notes::{Clearance, Decided, axis_between};
 use super::scene::World;
 use super::search::{self, PairJob};
 use crate::contact::certificate::{self, Certificate};
-use crate::contact::clearance::{self, Distance};
+use crate::contact::margin::{self, Distance};
 use crate::contact::{self, Outcome, PairQuery, QueryOptions, Region, Scratch, Status, region};
 use crate::motion::Placed;
 use contactd_proto::{Motion, Pose};
@@ -168,7 +168,7 @@ impl World {
                 let share = SHARES.into_iter().find(|share| strays <= share * clearance)?;
                 let part = if until.is_finite() { until / steps } else { 1.0 };
                 let query = over(&q.query, motions, steps, cells);
-                let proof = clearance::certify_kept(&query, q.margin, (share * clearance, clearance), part)?;
+                let proof = margin::certify_kept(&query, q.margin, (share * clearance, clearance), part)?;
                 let _ = write!(out, "pair {a} {b} prediction since {since:e} steps {steps:e} until {until:e}");
                 motions.iter().for_each(|m| write_motion(&mut out, m));
                 out.push('\n');

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::options::StepOptions;
 use super::search::{self, PairJob};
-use crate::contact::{SeparatingAxisTest, clearance};
+use crate::contact::{SeparatingAxisTest, margin};
 use crate::math::Aabb;
 use contactd_proto::Pose;
 use glam::DVec3;
@@ -85,7 +85,7 @@ impl Notes {
     /// of a discrete pair.
     pub fn measured(&mut self, job: &PairJob, bodies: &[Body], options: &StepOptions) {
         let query = search::query(bodies, job, options);
-        if let (Some(along), true) = (clearance::direction_of_clearance(&query), job.found.clearance > 0.0) {
+        if let (Some(along), true) = (margin::direction_of_clearance(&query), job.found.clearance > 0.0) {
             let poses = [&query.a, &query.b].map(|body| body.placed.motion.start);
             let ids = [job.a, job.b].map(|i| bodies[i as usize].id);
             self.clearances.insert(ids.into(), Clearance { poses, along, clearance: job.found.clearance });

@@ -6,7 +6,7 @@
 //! The first rule that names a pair decides (effects of a scene); an exception passes the pair on to the rules behind. A
 //! pair that no rule names is off once there are rules; without rules every pair has the default plan.
 
-use crate::contact::{QueryOptions, clearance};
+use crate::contact::{QueryOptions, margin};
 use contactd_proto::{Detect, Effects, InitialOverlap, Report, Rule};
 use std::collections::HashMap;
 
@@ -37,7 +37,7 @@ impl PairPlan {
 
     /// A distance beyond which nothing of the margin matters.
     pub fn reach(&self) -> f64 {
-        self.margin * (1.0 + 2.0 * clearance::MARGIN_SLACK)
+        self.margin * (1.0 + 2.0 * margin::MARGIN_SLACK)
     }
 
     /// True when it is told of a clear pair that it is near.
@@ -217,7 +217,7 @@ mod tests {
         let [robot, cell, tool] = ["robot", "cell", "tool"].map(|g| plans.group(g));
         let wide = |detect| Rule { margin: 2.0, detect, ..rule("robot", "cell") };
         plans.set(vec![wide(Detect::Continuous), rule("robot", "tool")]);
-        let reach = wide(Detect::Continuous).margin * (1.0 + 2.0 * clearance::MARGIN_SLACK);
+        let reach = wide(Detect::Continuous).margin * (1.0 + 2.0 * margin::MARGIN_SLACK);
         assert_eq!([robot, cell, tool].map(|g| plans.margin_of(g)), [reach, reach, 0.0]);
         plans.set(vec![wide(Detect::Off), rule("robot", "tool")]);
         assert_eq!([robot, cell, tool].map(|g| plans.margin_of(g)), [0.0; 3]);

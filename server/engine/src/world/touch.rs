@@ -12,8 +12,8 @@ use super::options::StepOptions;
 use super::outcome::StepOutcome;
 use super::record;
 use super::search::{self, PairJob};
-use crate::contact::clearance;
 use crate::contact::distance::{self, DistanceQuery};
+use crate::contact::margin;
 use crate::contact::within::Within;
 use crate::contact::{Outcome, PairQuery, Scratch, Status, region};
 use contactd_proto::{Detect, EffectCounters, Report};
@@ -78,7 +78,7 @@ pub(super) fn decide(
     let (within, cells) = if job.found.outcome.apart > threshold + resolution {
         (Within::Apart, 0)
     } else {
-        clearance::touching(&query(bodies, job, options, *left), threshold, scratch)
+        margin::touching(&query(bodies, job, options, *left), threshold, scratch)
     };
     let outcome = &mut job.found.outcome;
     outcome.touching = within != Within::Apart;
@@ -90,7 +90,7 @@ pub(super) fn decide(
     if margin && within == Within::Apart && clear && job.plan.detect != Detect::Discrete {
         let mut query = query(bodies, job, options, *left);
         query.cell_limit = query.cell_limit.min(region::MOST_CELLS);
-        let (until, known, work) = clearance::apart_until(&query, threshold, scratch);
+        let (until, known, work) = margin::apart_until(&query, threshold, scratch);
         let cells = work.cells + work.instant_cells;
         let outcome = &mut job.found.outcome;
         outcome.margin_time = until;

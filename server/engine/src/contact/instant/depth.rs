@@ -8,6 +8,7 @@
 //! Either way its depth g is a proven lower bound: a ball of radius g is common to both bodies, so no translation
 //! shorter than 2g takes them apart.
 
+use super::near::Near;
 use super::separation::{self, Cover};
 use super::work::Work;
 use crate::contact::exclusion::clause::{self, Expressions};
@@ -139,6 +140,9 @@ pub(in crate::contact) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
 /// Half the sides of the first trust box, in scales of the pair.
 const WIDE: f64 = 0.5;
 
+/// Steps one after the other that lead deeper, after which a climb tries to go farther at once.
+const STRIDES: usize = 4;
+
 /// Steps from a point towards where it is as deep in the one body as in the other.
 const LEVELLINGS: usize = 2;
 
@@ -170,9 +174,9 @@ fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
 const OPPOSED: f64 = 1.0;
 
 fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
-    let f = |x: DVec3| separation::value(task, at, x);
-    let (mut x, mut best) = (start, f(start));
-    let mut size = reach;
+    let mut near = Near::new(task, at);
+    let (mut x, mut best) = (start, near.value(start));
+    let (mut size, mut strides) = (reach, 0);
     let mut scratch = clause::Scratch::default();
     let mut support: Vec<(Side, LiteralId, f64)> = Vec::new();
     for _ in 0..rounds {
@@ -180,6 +184,7 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
             break;
         }
         work.bound();
+        near.come_to(x, size, best);
         // Literals decided against the present depth over the trust box fold away.
         let view = View {
             radius: size * 3f64.sqrt(),
@@ -193,9 +198,9 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
             ..task.view((x, DVec3::splat(size)), at, task.relative.bounds(0.0, 0.0, 0.0), &[])
         };
         let mut pool: Vec<Token> = Vec::new();
-        let truth_a = task.a.prune(&task.a.normal_form, &mut pool, &mut |id| view.truth(Side::A, id));
+        let truth_a = near.prune(Side::A, &view, &mut pool);
         let middle = pool.len() as u32;
-        let truth_b = task.b.prune(&task.b.normal_form, &mut pool, &mut |id| view.truth(Side::B, id));
+        let truth_b = near.prune(Side::B, &view, &mut pool);
         let end = pool.len() as u32;
         if truth_a == Truth::False || truth_b == Truth::False || end == 0 {
             size *= 0.5;
@@ -213,15 +218,35 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
         }
         let enough = best - 1e-3 * task.rounding;
         let mut next = x + step.y;
-        let mut value = f(next);
-        if value >= enough && bends {
+        let mut value = near.value(next);
+        let is_levelled = value >= enough && bends;
+        if is_levelled {
             next = levelled(task, at, next);
-            value = f(next);
+            value = near.value(next);
         }
-        if value < enough {
-            (x, best) = (next, value);
-        } else {
-            size *= 0.5;
+        if value >= enough {
+            (size, strides) = (0.5 * size, 0);
+            continue;
+        }
+        let mut way = next - x;
+        (x, best) = (next, value);
+        strides += 1;
+        if !bends || !is_levelled && strides < STRIDES {
+            continue;
+        }
+        // Along a thin layer steps are short: by their planes they lead out of it, or the box is small. Such a step is taken again, twice
+        // as far each time, as long as that leads deeper.
+        strides = 0;
+        loop {
+            way *= 2.0;
+            work.look(task.a.faces.len() + task.b.faces.len());
+            next = levelled(task, at, x + way);
+            value = near.value(next);
+            if value < best - 1e-3 * task.rounding {
+                (x, best) = (next, value);
+            } else {
+                break;
+            }
         }
     }
     (x, -best, support)
@@ -242,4 +267,49 @@ fn normal(task: &Task, at: &Instant, x: DVec3, support: &[(Side, LiteralId, f64)
         let n = task.a.faces[from_a.face() as usize].unit_normal(x);
         if from_a.sense() == Sense::Positive { n } else { -n }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::query::options::QueryOptions;
+    use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
+    use crate::motion::Placed;
+    use crate::octree::testing::{pierced, simple};
+    use crate::solid::Shape;
+    use crate::solid::primitive::{Cuboid, Cylinder};
+    use contactd_proto::motion::quat_of_rotation_vector;
+    use contactd_proto::{Motion, Pose};
+
+    /// A pin that leans a little in a hole hardly larger than it is: what both have in common is a crescent, two long and some
+    /// billionths thick, that is deepest in the middle of its upper end. From far around it a climb creeps, its steps a thousandth of
+    /// the way, and would not come there.
+    #[test]
+    fn a_climb_along_a_thin_layer_comes_to_its_deepest_point() {
+        let hole = Shape::from(Cylinder { radius: 1.0 + 2e-9, half_height: 2.0 });
+        let block = pierced(Cuboid { half: DVec3::new(3.0, 3.0, 1.0) }, vec![(hole, Pose::IDENTITY)]);
+        let pin = simple(Cylinder { radius: 1.0, half_height: 1.5 });
+        let resting = |pose: Pose| Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) };
+        for (off, tilt) in [(4e-9, 1e-9), (1e-8, 5e-9), (3e-9, 2e-7), (1e-7, 2e-7)] {
+            let pose = Pose::new(DVec3::new(off, 0.0, 0.0), quat_of_rotation_vector(DVec3::new(0.0, tilt, 0.0)));
+            let query = PairQuery {
+                a: PlacedModel { model: &block, placed: resting(Pose::IDENTITY) },
+                b: PlacedModel { model: &pin, placed: resting(pose) },
+                resolution: default_resolution(&block, &pin),
+                cell_limit: 1000,
+                strategies: Strategies::default(),
+                query_options: QueryOptions::DEPTH,
+            };
+            let (task, swapped) = Task::of(&query);
+            let at = task.relative.at(0.0);
+            let start = DVec3::new(0.7f64.cos(), 0.7f64.sin(), -0.9);
+            let start = if swapped { at.b_point(start) } else { start };
+            let work = Work::new(u64::MAX);
+            let (_, depth, _) = climb_within(None, &task, &at, start, &work);
+            // In the plane through both axes, at the block's upper face: half of what the wall is passed by there.
+            let deepest = 0.5 * (off + tilt - 2e-9);
+            assert!((depth - deepest).abs() <= 1e-6 * deepest, "{depth:e}, not {deepest:e}");
+            assert!(work.cells() <= 120, "{} cells' worth", work.cells());
+        }
+    }
 }

@@ -2,6 +2,7 @@
 //! that this may cost.
 
 pub mod depth;
+mod near;
 pub mod separation;
 pub mod within;
 pub mod work;

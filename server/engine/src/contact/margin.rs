@@ -1,4 +1,4 @@
-//! How far apart a pair is, and until when it stays so: what coherence over steps rests on.
+//! How far apart a pair is, and until when it stays so: when a margin is first reached, and what coherence over steps rests on.
 //!
 //! The search decides whether a point comes `delta` deep into both bodies. With a negative depth −g it decides whether
 //! max(f_A, f_B) <= g anywhere: what it then proves free stays free when the bodies leave the motion it was proven for. A
