@@ -154,7 +154,7 @@ def test_a_file_is_read_as_its_format_or_its_name_says(session):
         session.load_model("a.bin", text.encode(), format="csg"),
     ]
     assert [session.mass_properties(model).volume for model in models] == [6, 6, 6]
-    with pytest.raises(contactd.Refused, match='expected one of the formats csg, stl, off, obj, 3mf, amf, ply, gltf, dae, msh, found "step"'):
+    with pytest.raises(contactd.Refused, match='expected one of the formats csg, stl, .* found "step"'):
         session.load_model("a.csg", text, format="step")
     with pytest.raises(contactd.Refused, match="a.csg:1:1: expected text in UTF-8, found the byte 0xff"):
         session.load_model("a.csg", b"\xff")

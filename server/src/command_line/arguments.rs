@@ -72,7 +72,7 @@ pub(super) enum Command {
     View(ViewArguments),
     /// What is in a model or scene file, and how it was imported.
     Inspect {
-        /// A model (.scad, .csg, .stl, .off, .obj), a scene (.toml) or a robot (.urdf, .sdf, MJCF's .xml).
+        /// A model (.scad, .csg or a mesh), a scene (.toml) or a robot (.urdf, .sdf, MJCF's .xml).
         file: PathBuf,
         /// How curved primitives are taken: exact, auto (prisms below $fn = 9) or as-written.
         #[arg(long, default_value = "auto", value_parser = facets)]

@@ -24,7 +24,7 @@ mod xml;
 mod zip;
 
 pub use csg::import_csg;
-pub use format::{Attachment, FORMATS, Format, ModelBytes, Named, Source, files_of, read_bytes, read_model};
+pub use format::{Attachment, FORMATS, Format, ModelBytes, Named, Read, Source, files_of, read_bytes, read_model};
 pub use openscad::{Access, Openscad};
 pub use problem::Problem;
 pub use scene::{ModelSource, Scene, SceneError, SceneObject, pose_text, read_scene};

@@ -13,7 +13,7 @@ use super::polygon::{Region, convex_hull};
 use super::revolve::Lathe;
 use super::{Place, Problem};
 use crate::math::{Aabb, any_perpendicular};
-use crate::solid::{Op, Shape};
+use crate::solid::{Face, Op, Shape};
 use contactd_proto::Pose;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -213,7 +213,8 @@ pub fn elements(shape: &Shape, frame: &Pose, pieces: u32) -> Option<Vec<Element>
 /// The pieces of a union of convex solids, as what each is the hull of; `None` where it is no such union.
 pub fn pieces(parts: &Parts<'_>, root: PartId) -> Option<Vec<Vec<Element>>> {
     let (leaves, false) = parts.leaves(root)? else { return None };
-    let hollow = |shape: &Shape| shape.formula().is_some() || matches!(shape, Shape::Torus(_) | Shape::Quadric(_));
+    let bulges = |shape: &Shape| shape.geometry().faces().iter().all(Face::is_convex);
+    let hollow = |shape: &Shape| shape.formula().is_some() || !bulges(shape);
     let convex = |p: &PartId| !matches!(&parts.list[*p], Part::Leaf(shape, ..) if hollow(shape));
     leaves.iter().map(|p| if convex(p) { of_leaf(parts, *p) } else { None }).collect()
 }

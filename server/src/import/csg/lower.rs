@@ -273,7 +273,8 @@ impl<'a> Lowering<'a> {
             "height_field" => imports::height_field(&mut self.shapes, call, hulled),
             "polyhedron" => self.shapes.polyhedron(call, outer, context.hull),
             "superellipsoid" => superellipsoid::superellipsoid(&mut self.shapes, call, outer),
-            _ => quadrics::quadric(&mut self.shapes, call, outer),
+            "paraboloid" | "hyperboloid" | "quadric" => quadrics::quadric(&mut self.shapes, call, outer),
+            other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
         }
     }
 

@@ -51,7 +51,7 @@ mod whole;
 mod written;
 
 use super::problem::Problem;
-use super::{Attachment, Facets, Format, Import, ImportError, Limits, Named, Note, Place, Source};
+use super::{Attachment, Facets, Format, Import, ImportError, Limits, Named, Note, Place, Read, Source};
 
 /// Reads a model from the text of a flattened file; `file` is what errors call it.
 pub fn import_csg(file: &str, text: &str, facets: Facets, limits: &Limits) -> Result<Import, ImportError> {
@@ -83,7 +83,7 @@ fn is_stl(text: &str) -> bool {
 }
 
 /// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: import_bytes, names: named };
+pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: Read::Model(import_bytes), names: named };
 
 /// The files that the text imports and the fonts that it is set in, each once.
 fn named(bytes: &[u8], limits: &Limits) -> Vec<Named> {

@@ -2,21 +2,16 @@
 //!
 //! Colours, materials, textures, normals and curved triangles are not read. An object that no constellation names stands as it is.
 
-use super::{Bodies, Place, Polygons, Result, import};
+use super::{Bodies, MeshFormat, Place, Polygons, Result};
 use crate::import::problem::Problem;
 use crate::import::zip::{Archive, is_archive};
-use crate::import::{Format, Limits, xml};
+use crate::import::{Limits, xml};
 use glam::{DAffine3, DMat3, DVec3};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format {
-    name: "amf",
-    endings: &["amf"],
-    read: |source, _, limits| import(source.name, read(source.bytes, limits), limits),
-    names: |_, _| Vec::new(),
-};
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat = MeshFormat { name: "amf", endings: &["amf"], read: read };
 
 /// Constellations within constellations.
 const DEEPEST: usize = 32;

@@ -4,20 +4,15 @@
 //! metres. A geometry's primitives are one body: they differ in material, and are closed together. Materials, normals, lines,
 //! animations and cameras are not read; skins and what is no mesh are left out, with a note.
 
-use super::{Bodies, Polygons, Result, import};
+use super::{Bodies, MeshFormat, Polygons, Result};
 use crate::import::problem::Problem;
-use crate::import::{Format, Limits, xml};
+use crate::import::{Limits, xml};
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format {
-    name: "dae",
-    endings: &["dae"],
-    read: |source, _, limits| import(source.name, read(source.bytes, limits), limits),
-    names: |_, _| Vec::new(),
-};
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat = MeshFormat { name: "dae", endings: &["dae"], read: read };
 
 /// Nodes within nodes.
 const DEEPEST: usize = 256;

@@ -4,19 +4,14 @@
 //! Materials, textures, normals, animations, skins and morph targets are not read. A mesh's primitives are one body: they
 //! differ in material, and are closed together. glTF's lengths are metres, +y is up; numbers are taken as they stand.
 
-use super::{Bodies, Place, Polygons, Result, import};
+use super::{Bodies, MeshFormat, Place, Polygons, Result};
+use crate::import::Limits;
 use crate::import::problem::Problem;
-use crate::import::{Format, Limits};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde::Deserialize;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format {
-    name: "gltf",
-    endings: &["glb", "gltf"],
-    read: |source, _, limits| import(source.name, read(source.bytes, limits), limits),
-    names: |_, _| Vec::new(),
-};
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat = MeshFormat { name: "gltf", endings: &["glb", "gltf"], read: read };
 
 /// Nodes within nodes.
 const DEEPEST: usize = 256;

@@ -195,21 +195,35 @@ impl Bodies {
     }
 }
 
+/// A format of meshes.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshFormat {
+    /// What it is called, in lower case.
+    pub name: &'static str,
+    /// How names of its files end, without the dot, in lower case.
+    pub endings: &'static [&'static str],
+    /// Reads the meshes of a file.
+    pub read: fn(&[u8], &Limits) -> Result<Bodies>,
+}
+
+/// Every format of meshes that is read.
+pub const FORMATS: [MeshFormat; 9] = [
+    stl::FORMAT,
+    off::FORMAT,
+    obj::FORMAT,
+    threemf::FORMAT,
+    amf::FORMAT,
+    ply::FORMAT,
+    gltf::FORMAT,
+    dae::FORMAT,
+    msh::FORMAT,
+];
+
 /// The meshes of a file whose name ends as one of these formats' do; `None` for another one.
 pub fn of_file(name: &str, bytes: &[u8], limits: &Limits) -> Option<Result<Bodies>> {
     let ending = std::path::Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
-    match ending.as_str() {
-        "stl" => Some(stl::read(bytes, limits).map(|mesh| Bodies::of(mesh, "STL"))),
-        "off" => Some(off::read(bytes, limits).map(|mesh| Bodies::of(mesh, "OFF"))),
-        "obj" => Some(obj::read(bytes, limits).map(|mesh| Bodies::of(mesh, "OBJ"))),
-        "msh" => Some(msh::read(bytes, limits).map(|mesh| Bodies::of(mesh, "MSH"))),
-        "ply" => Some(ply::read(bytes, limits)),
-        "3mf" => Some(threemf::read(bytes, limits)),
-        "amf" => Some(amf::read(bytes, limits)),
-        "dae" => Some(dae::read(bytes, limits)),
-        "glb" | "gltf" => Some(gltf::read(bytes, limits)),
-        _ => None,
-    }
+    let format = FORMATS.iter().find(|f| f.endings.contains(&ending.as_str()))?;
+    Some((format.read)(bytes, limits))
 }
 
 /// A model that is the meshes of a file.
@@ -294,7 +308,7 @@ pub(super) struct Line<'t> {
 
 impl<'t> Line<'t> {
     /// The lines of a text that hold anything but a remark.
-    fn all(text: &'t str) -> impl Iterator<Item = Line<'t>> {
+    pub(super) fn all(text: &'t str) -> impl Iterator<Item = Line<'t>> {
         let lines = text.lines().enumerate().map(|(i, line)| {
             let text = line.split('#').next().unwrap_or_default();
             Line { number: i as u32 + 1, text }
@@ -307,7 +321,7 @@ impl<'t> Line<'t> {
     }
 
     /// The place of a word of it; its end for none.
-    fn at(&self, word: Option<&str>) -> Place {
+    pub(super) fn at(&self, word: Option<&str>) -> Place {
         let offset = match word {
             Some(w) => w.as_ptr() as usize - self.text.as_ptr() as usize,
             None => self.text.trim_end().len(),
@@ -316,7 +330,7 @@ impl<'t> Line<'t> {
         Place { line: self.number, column }
     }
 
-    fn wrong<T>(&self, expected: impl Into<String>, word: Option<&str>) -> Result<T> {
+    pub(super) fn wrong<T>(&self, expected: impl Into<String>, word: Option<&str>) -> Result<T> {
         let found = word.map_or_else(|| "the end of the line".to_owned(), |w| format!("{w:?}"));
         Err((self.at(word), Problem::syntax(expected, found)))
     }

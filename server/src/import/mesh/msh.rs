@@ -3,18 +3,14 @@
 //! Source: mujoco.readthedocs.io, XMLreference, asset/mesh: four integers of 32 bits, then numbers in single precision and indices, all
 //! little endian. Normals and texture coordinates are not read.
 
-use super::{Bodies, Place, Polygons, Result, import};
+use super::{Bodies, MeshFormat, Place, Polygons, Result};
+use crate::import::Limits;
 use crate::import::problem::Problem;
-use crate::import::{Format, Limits};
 use glam::DVec3;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format {
-    name: "msh",
-    endings: &["msh"],
-    read: |source, _, limits| import(source.name, read(source.bytes, limits).map(|m| Bodies::of(m, "MSH")), limits),
-    names: |_, _| Vec::new(),
-};
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat =
+    MeshFormat { name: "msh", endings: &["msh"], read: |bytes, limits| Ok(Bodies::of(read(bytes, limits)?, "MSH")) };
 
 /// Reads a file.
 ///

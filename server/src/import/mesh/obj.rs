@@ -2,15 +2,12 @@
 //!
 //! Normals, texture coordinates, groups, materials and smoothing change no shape and are not read.
 
-use super::{Bodies, Line, Polygons, Result};
-use crate::import::{Facets, Format, Import, ImportError, Limits, Source};
+use super::{Bodies, Line, MeshFormat, Polygons, Result};
+use crate::import::Limits;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format { name: "obj", endings: &["obj"], read: import, names: |_, _| Vec::new() };
-
-fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
-    super::import(source.name, read(source.bytes, limits).map(|mesh| Bodies::of(mesh, "OBJ")), limits)
-}
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat =
+    MeshFormat { name: "obj", endings: &["obj"], read: |bytes, limits| Ok(Bodies::of(read(bytes, limits)?, "OBJ")) };
 
 /// What changes no shape.
 const HARMLESS: [&str; 9] = ["vn", "vt", "vp", "o", "g", "s", "usemtl", "mtllib", "l"];

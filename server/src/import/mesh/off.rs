@@ -1,15 +1,12 @@
 //! OFF: counts, points, faces by their points' numbers from 0; colours are not read.
 
-use super::{Bodies, Line, Polygons, Result};
+use super::{Bodies, Line, MeshFormat, Polygons, Result};
 use crate::import::problem::Problem;
-use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
+use crate::import::{Limits, Place};
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format { name: "off", endings: &["off"], read: import, names: |_, _| Vec::new() };
-
-fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
-    super::import(source.name, read(source.bytes, limits).map(|mesh| Bodies::of(mesh, "OFF")), limits)
-}
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat =
+    MeshFormat { name: "off", endings: &["off"], read: |bytes, limits| Ok(Bodies::of(read(bytes, limits)?, "OFF")) };
 
 /// Reads a mesh.
 ///

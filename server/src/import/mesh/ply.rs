@@ -1,18 +1,13 @@
 //! PLY, in text and in bytes of either order: the corners x, y, z of its element `vertex`, the lists of numbers of its element `face`.
 //! Whatever else stands there (colours, normals, edges, elements of its own) is passed over.
 
-use super::{Bodies, Line, Place, Polygons, Result, import};
+use super::{Bodies, Line, MeshFormat, Place, Polygons, Result};
+use crate::import::Limits;
 use crate::import::problem::Problem;
-use crate::import::{Format, Limits};
 use glam::DVec3;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format {
-    name: "ply",
-    endings: &["ply"],
-    read: |source, _, limits| import(source.name, read(source.bytes, limits), limits),
-    names: |_, _| Vec::new(),
-};
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat = MeshFormat { name: "ply", endings: &["ply"], read: read };
 
 /// Bytes of a head.
 const LONGEST_HEAD: usize = 64 << 10;

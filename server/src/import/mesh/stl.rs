@@ -1,18 +1,15 @@
 //! STL, both kinds: triangles with their corners; normals are not read, the order of corners tells the outside.
 
-use super::{Bodies, Line, Polygons, Result};
+use super::{Bodies, Line, MeshFormat, Polygons, Result};
 use crate::import::problem::Problem;
-use crate::import::{Facets, Format, Import, ImportError, Limits, Place, Source};
+use crate::import::{Limits, Place};
 use crate::math::mix::Mixed;
 use glam::DVec3;
 use std::collections::hash_map::Entry;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format { name: "stl", endings: &["stl"], read: import, names: |_, _| Vec::new() };
-
-fn import(source: &Source, _: Facets, limits: &Limits) -> std::result::Result<Import, ImportError> {
-    super::import(source.name, read(source.bytes, limits).map(|mesh| Bodies::of(mesh, "STL")), limits)
-}
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat =
+    MeshFormat { name: "stl", endings: &["stl"], read: |bytes, limits| Ok(Bodies::of(read(bytes, limits)?, "STL")) };
 
 /// Bytes before the triangles of a binary file: a remark, then their count.
 const HEAD: usize = 84;

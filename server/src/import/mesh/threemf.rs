@@ -3,22 +3,17 @@
 //!
 //! Materials, slices, beams and pictures change no body here. Lengths are the numbers that stand there, in the unit that the file names.
 
-use super::{Bodies, Place, Polygons, Result, import};
+use super::{Bodies, MeshFormat, Place, Polygons, Result};
+use crate::import::Limits;
 use crate::import::problem::Problem;
 use crate::import::xml;
 use crate::import::zip::Archive;
-use crate::import::{Format, Limits};
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// The row of `format::FORMATS`.
-pub const FORMAT: Format = Format {
-    name: "3mf",
-    endings: &["3mf"],
-    read: |source, _, limits| import(source.name, read(source.bytes, limits), limits),
-    names: |_, _| Vec::new(),
-};
+/// The row of `mesh::FORMATS`.
+pub const FORMAT: MeshFormat = MeshFormat { name: "3mf", endings: &["3mf"], read: read };
 
 /// Components within components.
 const DEEPEST: usize = 32;

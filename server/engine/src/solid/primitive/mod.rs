@@ -217,6 +217,8 @@ macro_rules! shapes {
             /// # Errors
             /// What was expected of the bytes.
             pub fn read(tag: u8, from: &mut dyn Source) -> Checked<Self> {
+                // Two kinds of one tag do not compile.
+                #[deny(unreachable_patterns)]
                 match tag {
                     $($tag => Ok($variant::read(from)?.into()),)+
                     _ => Err("a kind of primitive"),

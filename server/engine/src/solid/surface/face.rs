@@ -29,6 +29,19 @@ macro_rules! faces {
             };
         }
 
+        // Two kinds of one rank would be sorted, and kept in models, as one.
+        const _: () = {
+            let (ranks, mut i) = ([$($rank as u32),+], 0);
+            while i < ranks.len() {
+                let mut j = 0;
+                while j < i {
+                    assert!(ranks[i] != ranks[j]);
+                    j += 1;
+                }
+                i += 1;
+            }
+        };
+
         $(impl From<$kind> for Face {
             #[inline]
             fn from(face: $kind) -> Self {
@@ -37,7 +50,7 @@ macro_rules! faces {
         })+
 
         impl Face {
-            /// The place of its kind among the kinds: what faces are sorted by first.
+            /// The place of its kind among the kinds: what faces are sorted by first, and told by in kept models.
             #[inline]
             pub fn rank(&self) -> u32 {
                 match self { $(Face::$kind(_) => $rank),+ }
