@@ -1,7 +1,7 @@
 //! What files of robots have that people publish: hulls of many faces, pairs of geoms, height fields, polylines, texts that are not quite
 //! XML. Random ones, each against what the test knows of it by itself.
 //!
-//! `CONTACTD_REAL_FILES=2000 cargo test --release -p contactd-tests --test models real_files::` sets the number of each (40 by default).
+//! `CONTACTD_REAL_FILES=2000 cargo test --release -p contactd-tests --test models real_files::` sets the number of each (28 by default).
 
 use contactd::import::robot::{Ask, read_robot, scene_of};
 use contactd::import::{Attachment, Facets, Limits, Scene, Source};
@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 fn rounds() -> usize {
-    sized("CONTACTD_REAL_FILES", 40)
+    sized("CONTACTD_REAL_FILES", 28)
 }
 
 /// A file's scene.

@@ -147,7 +147,7 @@ fn certificates_of_the_cases_hold() {
 
 #[test]
 fn certificates_of_random_scenes_hold() {
-    let (count, first) = (sized("CONTACTD_CERTIFICATES", 60), sized("CONTACTD_CERTIFICATE_FIRST", 0));
+    let (count, first) = (sized("CONTACTD_CERTIFICATES", 36), sized("CONTACTD_CERTIFICATE_FIRST", 0));
     let sum = over(count, |i| {
         let scene = scenes::any(&mut Random::new(0x00CE_27F1_0000 + first + i));
         (scene.class.into(), of_scene(&scene, CELLS))

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 #[test]
 fn what_is_told_in_front_of_the_search_is_what_the_search_says() {
-    let count = sized("CONTACTD_FRONTS", 300_u64);
+    let count = sized("CONTACTD_FRONTS", 200_u64);
     let all: Vec<(bool, bool, Option<String>)> = (0..count)
         .into_par_iter()
         .map(|i| {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 #[test]
 fn smaller_cells_change_no_answer_and_are_fewer() {
-    let count = sized("CONTACTD_TIGHTEN", 150_u64);
+    let count = sized("CONTACTD_TIGHTEN", 100_u64);
     let all: Vec<([u64; 2], bool, Option<String>)> = (0..count)
         .into_par_iter()
         .map(|i| {

@@ -399,7 +399,7 @@ fn answer(out: &contactd::world::StepOutcome) -> Vec<(u32, u32, String, u64)> {
 
 #[test]
 fn bodies_stand_where_one_after_the_other_would_and_refused_batches_move_none() {
-    let games = sized("CONTACTD_BODY_STEPS", 6_000usize).div_ceil(STEPS) as u64;
+    let games = sized("CONTACTD_BODY_STEPS", 4_000usize).div_ceil(STEPS) as u64;
     let play = |seed| {
         let mut game = Game::new(seed);
         (0..STEPS).for_each(|k| game.step(k % 5 == 4));

@@ -140,9 +140,6 @@ pub(in crate::contact) type Held = (DVec3, f64, Vec<(Side, LiteralId, f64)>);
 /// Half the sides of the first trust box, in scales of the pair.
 const WIDE: f64 = 0.5;
 
-/// Steps one after the other that lead deeper, after which a climb tries to go farther at once.
-const STRIDES: usize = 4;
-
 /// Steps from a point towards where it is as deep in the one body as in the other.
 const LEVELLINGS: usize = 2;
 
@@ -176,7 +173,7 @@ const OPPOSED: f64 = 1.0;
 fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
     let mut near = Near::new(task, at);
     let (mut x, mut best) = (start, near.value(start));
-    let (mut size, mut strides) = (reach, 0);
+    let mut size = reach;
     let mut scratch = clause::Scratch::default();
     let mut support: Vec<(Side, LiteralId, f64)> = Vec::new();
     for _ in 0..rounds {
@@ -219,34 +216,14 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
         let enough = best - 1e-3 * task.rounding;
         let mut next = x + step.y;
         let mut value = near.value(next);
-        let is_levelled = value >= enough && bends;
-        if is_levelled {
+        if value >= enough && bends {
             next = levelled(task, at, next);
             value = near.value(next);
         }
-        if value >= enough {
-            (size, strides) = (0.5 * size, 0);
-            continue;
-        }
-        let mut way = next - x;
-        (x, best) = (next, value);
-        strides += 1;
-        if !bends || !is_levelled && strides < STRIDES {
-            continue;
-        }
-        // Along a thin layer steps are short: by their planes they lead out of it, or the box is small. Such a step is taken again, twice
-        // as far each time, as long as that leads deeper.
-        strides = 0;
-        loop {
-            way *= 2.0;
-            work.look(task.a.faces.len() + task.b.faces.len());
-            next = levelled(task, at, x + way);
-            value = near.value(next);
-            if value < best - 1e-3 * task.rounding {
-                (x, best) = (next, value);
-            } else {
-                break;
-            }
+        if value < enough {
+            (x, best) = (next, value);
+        } else {
+            size *= 0.5;
         }
     }
     (x, -best, support)
@@ -267,49 +244,4 @@ fn normal(task: &Task, at: &Instant, x: DVec3, support: &[(Side, LiteralId, f64)
         let n = task.a.faces[from_a.face() as usize].unit_normal(x);
         if from_a.sense() == Sense::Positive { n } else { -n }
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::contact::query::options::QueryOptions;
-    use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
-    use crate::motion::Placed;
-    use crate::octree::testing::{pierced, simple};
-    use crate::solid::Shape;
-    use crate::solid::primitive::{Cuboid, Cylinder};
-    use contactd_proto::motion::quat_of_rotation_vector;
-    use contactd_proto::{Motion, Pose};
-
-    /// A pin that leans a little in a hole hardly larger than it is: what both have in common is a crescent, two long and some
-    /// billionths thick, that is deepest in the middle of its upper end. From far around it a climb creeps, its steps a thousandth of
-    /// the way, and would not come there.
-    #[test]
-    fn a_climb_along_a_thin_layer_comes_to_its_deepest_point() {
-        let hole = Shape::from(Cylinder { radius: 1.0 + 2e-9, half_height: 2.0 });
-        let block = pierced(Cuboid { half: DVec3::new(3.0, 3.0, 1.0) }, vec![(hole, Pose::IDENTITY)]);
-        let pin = simple(Cylinder { radius: 1.0, half_height: 1.5 });
-        let resting = |pose: Pose| Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) };
-        for (off, tilt) in [(4e-9, 1e-9), (1e-8, 5e-9), (3e-9, 2e-7), (1e-7, 2e-7)] {
-            let pose = Pose::new(DVec3::new(off, 0.0, 0.0), quat_of_rotation_vector(DVec3::new(0.0, tilt, 0.0)));
-            let query = PairQuery {
-                a: PlacedModel { model: &block, placed: resting(Pose::IDENTITY) },
-                b: PlacedModel { model: &pin, placed: resting(pose) },
-                resolution: default_resolution(&block, &pin),
-                cell_limit: 1000,
-                strategies: Strategies::default(),
-                query_options: QueryOptions::DEPTH,
-            };
-            let (task, swapped) = Task::of(&query);
-            let at = task.relative.at(0.0);
-            let start = DVec3::new(0.7f64.cos(), 0.7f64.sin(), -0.9);
-            let start = if swapped { at.b_point(start) } else { start };
-            let work = Work::new(u64::MAX);
-            let (_, depth, _) = climb_within(None, &task, &at, start, &work);
-            // In the plane through both axes, at the block's upper face: half of what the wall is passed by there.
-            let deepest = 0.5 * (off + tilt - 2e-9);
-            assert!((depth - deepest).abs() <= 1e-6 * deepest, "{depth:e}, not {deepest:e}");
-            assert!(work.cells() <= 120, "{} cells' worth", work.cells());
-        }
-    }
 }
