@@ -1,6 +1,9 @@
-//! The binary as users call it: output, sentences, exit status. `command_line/table.rs` looks at the table, `robots.rs` at joints.
+//! The binary as users call it: output, sentences, exit status. `command_line/table.rs` looks at the table, `robots.rs` at joints, `demo.rs`
+//! at the demo.
 #![allow(missing_docs)]
 
+#[path = "command_line/demo.rs"]
+mod demo;
 #[path = "command_line/robots.rs"]
 mod robots;
 #[path = "command_line/table.rs"]

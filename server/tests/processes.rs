@@ -1,7 +1,10 @@
-//! A server and its clients as processes of their own: the same bits as embedded, death on either side, bad input.
+//! A server and its clients as processes of their own: the same bits as embedded, death on either side, bad input. `operator.rs` looks at
+//! what an operator sees and does, `metrics.rs` at numbers, `service.rs` at a service manager.
 
 #[allow(dead_code, reason = "other tests use the rest of it")]
 mod harness;
+#[path = "processes/operator.rs"]
+mod operator;
 
 use contactd::ipc::ServerConfig;
 use contactd_client::proto::control::{Answer, Command, encode};
@@ -301,7 +304,7 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     let mut session = connect();
     // No import is answered at once, however quick the machine and whether its cache has the model or not.
     session.command_timeout = Duration::ZERO;
-    assert_eq!(session.load_model("large.csg", &spheres(4_000)).map(|m| m.id), Err(Error::Timeout));
+    assert_eq!(session.load_model("large.csg", &spheres(2_000)).map(|m| m.id), Err(Error::Timeout));
     session.command_timeout = PATIENCE;
     session.close().unwrap();
     assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 0);

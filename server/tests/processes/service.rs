@@ -1,7 +1,7 @@
 //! A server as a service: what its manager is told, and how it ends. The manager is the test's own socket.
 
-use super::harness::scene::{Bits, bits, build, fill};
-use super::harness::{PATIENCE, ServerProcess};
+use super::super::harness::scene::{Bits, bits, build, fill};
+use super::super::harness::{PATIENCE, ServerProcess};
 use super::{connect, contactd, printed, refused};
 use contactd_client::proto::{Pose, PoseRecord};
 use contactd_client::{Error, Object, Session, Transport};

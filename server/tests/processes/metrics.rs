@@ -1,7 +1,7 @@
 //! What is scraped from a server, read by a reader of its own: as `status` tells it, in the form that OpenMetrics 1.0 asks for.
 
-use super::harness::runtime_folder;
-use super::harness::scene::build;
+use super::super::harness::runtime_folder;
+use super::super::harness::scene::build;
 use super::{play, printed};
 use contactd_client::Session;
 use contactd_client::proto::names::Address;

@@ -1,18 +1,16 @@
 //! What an operator sees and does: servers and their sessions as they are, a session that is ended, lines on standard error.
 
-#[allow(dead_code, reason = "other tests use the rest of it")]
-mod harness;
-#[path = "operator/metrics.rs"]
+#[path = "metrics.rs"]
 mod metrics;
-#[path = "operator/service.rs"]
+#[path = "service.rs"]
 mod service;
 
+use super::harness::scene::{build, fill, spheres};
+use super::harness::{PATIENCE, ServerProcess, runtime_folder, serve_command};
 use contactd_client::proto::step::STEP_UNDECIDED;
 use contactd_client::proto::{ErrorCode, Pose, PoseRecord};
 use contactd_client::{Error, Object, Session, SharedMemory, Transport};
 use glam::DVec3;
-use harness::scene::{build, fill, spheres};
-use harness::{PATIENCE, ServerProcess, runtime_folder};
 use serde_json::Value;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
@@ -66,7 +64,7 @@ fn play<T: Transport>(session: &mut Session<T>, ids: &[u32], steps: u64, cut: u6
 /// A client process of its own: it makes a few steps, says so, and stays until its input ends.
 fn client(server: &ServerProcess) -> Child {
     let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "a_client_that_stays", "--nocapture", "--test-threads=1"])
+        .args(["--exact", "operator::a_client_that_stays", "--nocapture", "--test-threads=1"])
         .env("CONTACTD_TEST_STAYS", server.address.name())
         .env("XDG_RUNTIME_DIR", server.runtime())
         .stdin(Stdio::piped())
@@ -151,7 +149,7 @@ fn no_server_and_one_that_was_killed_are_told_as_such() {
     let mut server = ServerProcess::start("gone", "");
     let pid = server.pid().as_raw_nonzero().get();
     // Another one of the same user.
-    let mut command = harness::serve_command(server.runtime(), "other");
+    let mut command = serve_command(server.runtime(), "other");
     let mut other = command.stdout(Stdio::piped()).spawn().unwrap();
     BufReader::new(other.stdout.take().unwrap()).read_line(&mut String::new()).unwrap();
     server.kill();
@@ -298,7 +296,7 @@ fn each_session_is_a_line_when_it_is_opened_refused_and_ended() {
         assert!(has("bytes were read as model 2, of "), "{lines:#?}");
     }
     let runtime = runtime_folder();
-    let loud = harness::serve_command(runtime.path(), "loud").env("CONTACTD_LOG", "loud").output().unwrap();
+    let loud = serve_command(runtime.path(), "loud").env("CONTACTD_LOG", "loud").output().unwrap();
     assert_eq!(loud.status.code(), Some(2));
     let sentence = String::from_utf8_lossy(&loud.stderr);
     assert_eq!(sentence, "CONTACTD_LOG: expected warn, info or debug, found \"loud\"\n");
