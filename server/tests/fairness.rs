@@ -176,7 +176,7 @@ fn imports_of_some_keep_no_other_from_its_small_model() {
     let mut small = Session::connect_to(server.address.clone()).unwrap();
     // Each its own text: equal ones would be one model.
     let _staying: Vec<_> = (0..4).map(|i| importing(&server.address, 15_000 + i)).collect();
-    (0..10).for_each(|i| drop(importing(&server.address, 14_000 + i)));
+    (0..6).for_each(|i| drop(importing(&server.address, 14_000 + i)));
     for n in 1..4 {
         small.load_model("small.csg", &format!("sphere(r = {n});")).unwrap();
     }

@@ -170,7 +170,7 @@ fn passing(r: &mut Random) -> [(Model, Placed); 2] {
 
 #[test]
 fn certificates_of_quadrics_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(40);
+    let count = pairs(24);
     certify_all("kinds", (count, KINDS_SEED), passing);
     certify_trees((count, KINDS_SEED), shape_or_quadric);
 }

@@ -460,7 +460,7 @@ fn constructs_hold_what_they_mean_without_seams() {
         assert!(b.is_finite() && !faceted, "{text}: {:?}", import.notes);
         let tell = 1e-9 + off;
         let (mut full, mut near) = (0, 0);
-        for _ in 0..if off > 0.0 { 600 } else { 3000 } {
+        for _ in 0..if off > 0.0 { 400 } else { 2000 } {
             let x = b.center() + (r.vector(1.0) * 1.2) * b.half();
             let f = solid.value(x);
             if f.abs() <= tell {
@@ -511,7 +511,7 @@ fn outlines_of_very_many_corners_hold_what_their_sectors_say() {
     let rounds = std::env::var("CONTACTD_OUTLINES").ok().and_then(|n| n.parse().ok());
     for round in 0..rounds.unwrap_or(3) {
         // Every third is convex: of it all sides are on the hull.
-        let n = if rounds.is_some() { 50_000 } else { 12_000 };
+        let n = if rounds.is_some() { 50_000 } else { 8_000 };
         let ring = if round % 3 == 2 {
             let at = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
             (0..n).map(|i| [9.0 * at(i).1, 9.0 * at(i).0]).collect()

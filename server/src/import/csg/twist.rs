@@ -381,7 +381,7 @@ mod tests {
     #[test]
     fn twisted_and_unevenly_scaled_outlines_are_the_outline_turned_and_scaled_at_each_height() {
         let mut r = Random(31);
-        for round in 0..18 {
+        for round in 0..12 {
             let ring = |size: f64, r: &mut Random| -> Vec<DVec2> {
                 let n = 3 + (r.unit() * 7.0) as usize;
                 let at = |i: usize| libm::sincos(std::f64::consts::TAU * i as f64 / n as f64);

@@ -11,7 +11,7 @@ use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 
 /// The row of `mesh::FORMATS`.
-pub const FORMAT: MeshFormat = MeshFormat { name: "amf", endings: &["amf"], read: read };
+pub const FORMAT: MeshFormat = MeshFormat { name: "amf", endings: &["amf"], read };
 
 /// Constellations within constellations.
 const DEEPEST: usize = 32;

@@ -12,7 +12,7 @@ use roxmltree::Node;
 use std::collections::HashMap;
 
 /// The row of `mesh::FORMATS`.
-pub const FORMAT: MeshFormat = MeshFormat { name: "dae", endings: &["dae"], read: read };
+pub const FORMAT: MeshFormat = MeshFormat { name: "dae", endings: &["dae"], read };
 
 /// Nodes within nodes.
 const DEEPEST: usize = 256;

@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde::Deserialize;
 
 /// The row of `mesh::FORMATS`.
-pub const FORMAT: MeshFormat = MeshFormat { name: "gltf", endings: &["glb", "gltf"], read: read };
+pub const FORMAT: MeshFormat = MeshFormat { name: "gltf", endings: &["glb", "gltf"], read };
 
 /// Nodes within nodes.
 const DEEPEST: usize = 256;

@@ -7,7 +7,7 @@ use crate::import::problem::Problem;
 use glam::DVec3;
 
 /// The row of `mesh::FORMATS`.
-pub const FORMAT: MeshFormat = MeshFormat { name: "ply", endings: &["ply"], read: read };
+pub const FORMAT: MeshFormat = MeshFormat { name: "ply", endings: &["ply"], read };
 
 /// Bytes of a head.
 const LONGEST_HEAD: usize = 64 << 10;

@@ -13,7 +13,7 @@ use roxmltree::Node;
 use std::collections::HashMap;
 
 /// The row of `mesh::FORMATS`.
-pub const FORMAT: MeshFormat = MeshFormat { name: "3mf", endings: &["3mf"], read: read };
+pub const FORMAT: MeshFormat = MeshFormat { name: "3mf", endings: &["3mf"], read };
 
 /// Components within components.
 const DEEPEST: usize = 32;
