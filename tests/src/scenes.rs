@@ -12,7 +12,7 @@ use contactd::solid::primitive::{
 };
 use contactd::solid::{Label, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::{Motion, Pose};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// A solid before it is built.
 #[derive(Clone, Debug)]
@@ -63,6 +63,10 @@ impl Recipe {
     /// An ellipsoid with the given semi-axes.
     pub fn ellipsoid(x: f64, y: f64, z: f64) -> Self {
         Self::of(Ellipsoid { semi: DVec3::new(x, y, z) })
+    }
+    /// Superellipsoid with semi-axes and the exponents of meridians and of the equator, in (0, 1].
+    pub fn superellipsoid(semi: DVec3, exponents: [f64; 2]) -> Self {
+        Self::of(Superellipsoid { semi, exponents: DVec2::from_array(exponents) })
     }
     /// Regular polyhedron with 4, 6, 8, 12 or 20 faces.
     pub fn platonic(faces: usize, radius: f64) -> Self {

@@ -33,7 +33,7 @@ fn leaf(r: &mut Reader, size: f64) -> Recipe {
     // Sizes from a small set: faces, axes and apexes of different leaves fall together.
     let mut s = || size * r.one_of(&[0.5, 1.0, 0.25, 0.75]);
     let (x, y, z) = (s(), s(), s());
-    let shape = match r.below(12) {
+    let shape = match r.below(13) {
         0 => Recipe::sphere(x),
         1 => Recipe::cylinder(x, y),
         2 => Recipe::cone(x, 0.0, y),
@@ -45,6 +45,7 @@ fn leaf(r: &mut Reader, size: f64) -> Recipe {
         8 => Recipe::capsule(x, 0.5 * y),
         9 => Recipe::dome(x, y),
         10 => Recipe::saddle(x, y, z),
+        11 => Recipe::superellipsoid(DVec3::new(x, y, z), [r.one_of(&[0.1, 0.5, 1.0]), r.one_of(&[0.2, 0.5, 1.0])]),
         _ => Recipe::platonic(r.one_of(&[4, 6, 8, 12, 20]), x),
     };
     match r.below(4) {

@@ -453,7 +453,7 @@ fn a_hit_is_told_only_once_the_start_is_free() {
 fn a_margins_time_is_never_late_and_hardly_early() {
     let mut r = Random::new(516);
     let (mut entered, mut never, mut short) = (0, 0, 0);
-    let count = sized("CONTACTD_MARGINS", 28);
+    let count = sized("CONTACTD_MARGINS", 48);
     for i in 0..count {
         let primitives = i / 4 % 2 == 0;
         let mut scene = if primitives { scenes::primitives(&mut r) } else { scenes::trees(&mut r) };

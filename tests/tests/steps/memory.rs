@@ -29,7 +29,7 @@ fn unproven(all: &[Work]) -> String {
 
 /// Steps of the random plays.
 fn steps() -> usize {
-    sized("CONTACTD_MEMORY_STEPS", 1_600)
+    sized("CONTACTD_MEMORY_STEPS", 2_000)
 }
 
 #[test]

@@ -147,12 +147,12 @@ const LEVELLINGS: usize = 2;
 /// like round faces a step along them leaves the thin layer that both bodies have in common by its square over their
 /// radius, on one side or the other: this leads back to the middle of the layer (a second-order correction, as in
 /// sequential quadratic programming).
-fn levelled(task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
+fn levelled(near: &Near, task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
     for _ in 0..LEVELLINGS {
         let decide = |side: Side| {
-            let (model, y) = if side == Side::A { (task.model_a, x) } else { (task.model_b, at.b_point(x)) };
-            let (value, id) = model.deciding(y);
-            let f = model.solid.faces[id.face() as usize].at(y);
+            let (solid, y) = if side == Side::A { (task.a, x) } else { (task.b, at.b_point(x)) };
+            let (value, id) = near.deciding(side, x);
+            let f = solid.faces[id.face() as usize].at(y);
             let n = if id.sense() == Sense::Positive { f.normal } else { -f.normal };
             (value, if side == Side::A { n } else { at.a_vector(n) }, f.slope)
         };
@@ -217,7 +217,7 @@ fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant,
         let mut next = x + step.y;
         let mut value = near.value(next);
         if value >= enough && bends {
-            next = levelled(task, at, next);
+            next = levelled(&near, task, at, next);
             value = near.value(next);
         }
         if value < enough {

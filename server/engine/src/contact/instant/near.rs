@@ -1,16 +1,15 @@
 //! What is left of two trees beside a point: a climb that stays there looks at no other face.
 //!
-//! F falls no faster than the distance (`separation`). So over a box beside a point whose F is known, F lies between that and that
-//! less the box's radius, where it is no higher: literals that hold below the one all over the box, or do not hold at the other
-//! anywhere in it, fold away. What is left has F's own value, to the bit, wherever F is no higher than at the point; where it is, so is
-//! what is left.
+//! F changes no faster than the distance (`separation`). So over a box beside a point whose F is known, F is no farther from that than the
+//! box's radius: literals that hold all over the box below all of that, or nowhere in it up to there, fold away. What is left has F's own
+//! value, to the bit; and a body's own f where that is within the same reach.
 
 use super::separation;
 use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
 use crate::solid::Solid;
-use crate::solid::local::{self, Token, Truth};
+use crate::solid::local::{self, LiteralId, Token, Truth};
 use glam::DVec3;
 
 /// How far it reaches, in half sides of the box that is asked for: a climb takes several steps before it leaves.
@@ -26,6 +25,8 @@ pub(super) struct Near<'t, 'a> {
     center: DVec3,
     /// Half the box's sides: infinite for the whole trees.
     half: f64,
+    /// No F in the box is lower, none higher.
+    levels: (f64, f64),
     /// What is left of each, empty where it holds all over the box; `None` for a whole tree.
     left: [Option<Vec<Token>>; 2],
 }
@@ -33,7 +34,8 @@ pub(super) struct Near<'t, 'a> {
 impl<'t, 'a> Near<'t, 'a> {
     /// Both trees.
     pub fn new(task: &'t Task<'a>, at: &'t Instant) -> Self {
-        Self { task, at, center: DVec3::ZERO, half: f64::INFINITY, left: [None, None] }
+        let levels = (f64::NEG_INFINITY, f64::INFINITY);
+        Self { task, at, center: DVec3::ZERO, half: f64::INFINITY, levels, left: [None, None] }
     }
 
     fn solid(&self, side: Side) -> &'a Solid {
@@ -69,7 +71,19 @@ impl<'t, 'a> Near<'t, 'a> {
         of(Side::A, x).max(of(Side::B, self.at.b_point(x)))
     }
 
-    /// Comes to the box about x with half sides `size`, where F(x) = `value`, which is no more than at the box before.
+    /// A body's f at a point of A's frame, and the literal that decides it.
+    pub fn deciding(&self, side: Side, x: DVec3) -> (f64, LiteralId) {
+        let (model, y) = match side {
+            Side::A => (self.task.model_a, x),
+            Side::B => (self.task.model_b, self.at.b_point(x)),
+        };
+        let is_within = (x - self.center).abs().max_element() <= self.half;
+        let left = self.left[usize::from(side == Side::B)].as_deref().filter(|tokens| is_within && !tokens.is_empty());
+        let of_left = left.map(|tokens| local::deciding(tokens, &mut |face| model.solid.faces[face as usize].value(y)));
+        of_left.filter(|(f, _)| self.levels.0 < *f && *f <= self.levels.1).unwrap_or_else(|| model.deciding(y))
+    }
+
+    /// Comes to the box about x with half sides `size`, where F(x) = `value`.
     pub fn come_to(&mut self, x: DVec3, size: f64, value: f64) {
         let is_within = ((x - self.center).abs() + size).max_element() <= self.half;
         let is_small = self.half <= SMALLER * REACH * size;
@@ -77,7 +91,8 @@ impl<'t, 'a> Near<'t, 'a> {
             return;
         }
         if !is_within {
-            (self.half, self.left) = (f64::INFINITY, [None, None]);
+            self.half = f64::INFINITY;
+            self.left = [None, None];
         }
         let half = REACH * size;
         if SMALLER * half <= self.half.min(self.task.scale) {
@@ -97,7 +112,8 @@ impl<'t, 'a> Near<'t, 'a> {
             curved: false,
             ..self.task.view((x, DVec3::splat(half)), self.at, still, &[])
         };
-        let (highest, lowest) = (at_value(value), at_value(value - radius));
+        let levels = (value - radius, value + radius);
+        let (lowest, highest) = (at_value(levels.0), at_value(levels.1));
         let left = [Side::A, Side::B].map(|side| {
             let mut out = Vec::new();
             let truth = match self.tokens(side) {
@@ -121,7 +137,7 @@ impl<'t, 'a> Near<'t, 'a> {
         if truth_a == Truth::False || truth_b == Truth::False || (truth_a, truth_b) == (Truth::True, Truth::True) {
             return;
         }
-        (self.center, self.half, self.left) = (x, half, [a, b]);
+        (self.center, self.half, self.levels, self.left) = (x, half, levels, [a, b]);
     }
 }
 
@@ -132,8 +148,8 @@ mod tests {
     use crate::math::random::Random;
     use crate::octree::testing::random_tree;
 
-    /// A climb that goes down by chance: what is left has F's value to the bit wherever F is no higher, is higher where it is, and is
-    /// F itself outside of the box.
+    /// A climb that goes down by chance: what is left has F's value, and the bodies' own values and deciding literals, to the bit, within
+    /// the box and beyond.
     #[test]
     fn what_is_left_beside_a_point_has_the_value_of_the_trees() {
         let mut r = Random(9);
@@ -155,14 +171,16 @@ mod tests {
                     whole += near.solid(side).normal_form.len();
                     left += near.tokens(side).len();
                 }
-                let (level, mut next) = (f(x), x);
+                let mut next = x;
                 for k in 0..12 {
                     // The last ones lie outside of the box that was asked for, some of them of the one that is kept.
                     let y = x + r.vector(if k < 8 { size } else { 12.0 * size });
                     let (own, kept) = (f(y), near.value(y));
                     let is_beyond = (y - near.center).abs().max_element() > near.half;
-                    assert!(kept == own || own > level && kept > level && !is_beyond, "{kept} for {own}, {level}");
-                    lower += usize::from(own <= level);
+                    assert!(kept == own, "{kept} for {own}");
+                    assert_eq!(near.deciding(Side::A, y), task.model_a.deciding(y));
+                    assert_eq!(near.deciding(Side::B, y), task.model_b.deciding(at.b_point(y)));
+                    lower += usize::from(own <= f(x));
                     beyond += usize::from(is_beyond);
                     if k < 8 && own < f(next) {
                         next = y;

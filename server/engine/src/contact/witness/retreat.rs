@@ -262,7 +262,10 @@ impl<'t, 'a> Climber<'t, 'a> {
             let common = |s: f64| {
                 let at = relative.at(s);
                 let x = way_of(s, &at);
-                (self.value(&at, x) <= 0.0).then_some((s, x))
+                self.work.look(self.task.a.faces.len() + self.task.b.faces.len());
+                let (model_a, model_b) = (self.task.model_a, self.task.model_b);
+                let is_common = model_a.value_within(x, 0.0) <= 0.0 && model_b.value_within(at.b_point(x), 0.0) <= 0.0;
+                is_common.then_some((s, x))
             };
             let (mut since, mut way, mut apart) = ((t, x), first, None);
             while since.0 > 0.0 && apart.is_none() {
