@@ -148,8 +148,8 @@ fn witness(o: &Outcome, query: &PairQuery) -> Result<(), String> {
         let Placed { place, motion } = body.placed;
         let x = place.inverse().point(motion.at(o.time()).inverse().point(o.at().point));
         let reach = o.at().point.length() + motion.at(o.time()).position.length() + body.model.radius;
-        // Turning by an angle rounds in proportion to it.
-        let slack = 4.0 * query.resolution + 1e-13 * reach * (1.0 + motion.spin.length());
+        // Turning by an angle rounds in proportion to it. What is told is told at a resolution that bodies as fast as these may raise.
+        let slack = 4.0 * o.resolution.max(query.resolution) + 1e-13 * reach * (1.0 + motion.spin.length());
         let f = body.model.solid.value(x);
         if f.is_nan() || f > slack {
             return Err(format!("{} at {}: its point lies {f:e} outside {name} ({o:?})", o.status().name(), o.time()));

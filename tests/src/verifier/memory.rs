@@ -245,6 +245,35 @@ fn primitive_support(solid: &Solid, p: u32, m: Vector) -> f64 {
     (at + own).hi
 }
 
+/// How far those points of a solid that lie in a box are from an origin, at most: no farther than the corners of their box, and those
+/// of a primitive no farther than the corners of its box along its own axes.
+fn farthest(solid: &Solid, node: NodeId, origin: Vector, clip: [Interval; 3]) -> f64 {
+    let Some(all) = extent_in(solid, node, 0.0, clip) else { return 0.0 };
+    let among = |children: &[NodeId], clip| -> Vec<f64> {
+        children.iter().map(|c| farthest(solid, *c, origin, clip)).collect()
+    };
+    let own = match &solid.nodes[node as usize] {
+        Node::Empty => 0.0,
+        Node::Primitive(p) => {
+            let axes = transpose(&rotation(&solid.primitives[*p as usize].frame));
+            let along = |m: Vector| primitive_support(solid, *p, m) - dot(origin, m).lo;
+            let sides = axes.map(|m| along(m).max(along(m.map(|x| -x))));
+            match &solid.primitives[*p as usize].shape {
+                Shape::Sphere(s) => {
+                    let center = vector(solid.primitives[*p as usize].frame.position.to_array());
+                    (point(length(minus(center, origin))) + point(s.radius)).hi
+                }
+                _ => length(sides.map(point)),
+            }
+        }
+        Node::Op(Op::Difference, children) => farthest(solid, children[0], origin, clip),
+        Node::Op(Op::Union, children) => among(children, clip).into_iter().fold(0.0, f64::max),
+        Node::Op(Op::Intersection, children) => among(children, all).into_iter().fold(f64::INFINITY, f64::min),
+    };
+    let corner = length(std::array::from_fn(|k| point((all[k] - origin[k]).mag())));
+    own.min(corner)
+}
+
 fn length(v: Vector) -> f64 {
     (v[0].square() + v[1].square() + v[2].square()).sqrt().hi
 }
@@ -260,6 +289,10 @@ impl<'a> Truth<'a> {
                 let corner: Vector =
                     std::array::from_fn(|k| point(if i >> k & 1 == 0 { all[k].lo } else { all[k].hi }));
                 reach = reach.max(length(plus(apply(&m, corner), vector(placed.place.position.to_array()))));
+            }
+            if reach.is_finite() {
+                let origin = apply(&transpose(&m), vector(placed.place.position.to_array())).map(|x| -x);
+                reach = reach.min(farthest(solid, solid.root, origin, all));
             }
         }
         Self { solid, placed, extent, reach }

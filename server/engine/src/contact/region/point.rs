@@ -526,7 +526,7 @@ mod tests {
         let mut r = Random(0x0073_6574_7300);
         let (mut balanced, mut kept_out) = (0, 0);
         // Long: CONTACTD_SETS=1440.
-        let count = std::env::var("CONTACTD_SETS").ok().and_then(|n| n.parse().ok()).unwrap_or(80);
+        let count = std::env::var("CONTACTD_SETS").ok().and_then(|n| n.parse().ok()).unwrap_or(144);
         for i in 0..count {
             let [p, q, hole] = [i % 6, i / 6 % 6, (i + 1) % 6].map(|kind| shape(&mut r, kind));
             let at = Pose::at(r.vector(0.3));
