@@ -152,7 +152,7 @@ mod tests {
     /// the box and beyond.
     #[test]
     fn what_is_left_beside_a_point_has_the_value_of_the_trees() {
-        let mut r = Random(9);
+        let mut r = Random(10);
         let (mut whole, mut left, mut lower, mut beyond) = (0, 0, 0, 0);
         for _ in 0..60 {
             let (a, b) = (random_tree(&mut r, 3), random_tree(&mut r, 3));
