@@ -7,7 +7,8 @@
 //! `time_upper`, none in a clear pair. The long form: `CONTACTD_TIGHT_SCENES=20000`, `CONTACTD_TIGHT_SEED=7`.
 
 use contactd::contact::{
-    Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Contact, Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, Verdict, default_resolution,
+    earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -312,6 +313,10 @@ pub(super) fn judge(rng: &mut Random, scene: &Scene, o: &Outcome, pair: &Pair) -
     }
     if o.status() == Status::Contact {
         let mut value = deepest(rng, o.time_upper(), near);
+        // Along a crescent between like faces a descent creeps: the point that is told to lie so deep is asked, too.
+        if let Verdict::Contact(Contact { witness: Some(x), .. }) = o.verdict {
+            value = value.min(pair.value(o.time_upper(), pair.motions[0].at(o.time_upper()).point(x)));
+        }
         if value > -(1.0 - ROOM) * depth {
             let (a, b) = (scene.a.build(), scene.b.build());
             let moving = |solid, motion| contactd_tests::reference::Moving { solid, place: Pose::IDENTITY, motion };
