@@ -49,9 +49,13 @@ impl<'t, 'a> Near<'t, 'a> {
 
     /// Appends what is left of a body's tree over a smaller box yet; nothing unless the result is `Open`.
     pub fn prune(&self, side: Side, view: &View, out: &mut Vec<Token>) -> Truth {
+        self.prune_by(side, out, |id| view.truth(side, id))
+    }
+
+    fn prune_by(&self, side: Side, out: &mut Vec<Token>, mut classify: impl FnMut(LiteralId) -> Truth) -> Truth {
         match self.tokens(side) {
             [] => Truth::True,
-            tokens => self.solid(side).prune(tokens, out, &mut |id| view.truth(side, id)),
+            tokens => self.solid(side).prune(tokens, out, &mut classify),
         }
     }
 
@@ -85,16 +89,17 @@ impl<'t, 'a> Near<'t, 'a> {
 
     /// Comes to the box about x with half sides `size`, where F(x) = `value`.
     pub fn come_to(&mut self, x: DVec3, size: f64, value: f64) {
-        let is_within = ((x - self.center).abs() + size).max_element() <= self.half;
-        let is_small = self.half <= SMALLER * REACH * size;
-        if self.half.is_finite() && is_within && is_small {
+        let holds = |half: f64| ((x - self.center).abs() + half).max_element() <= self.half;
+        let half = REACH * size;
+        let is_small = self.half <= SMALLER * half;
+        if self.half.is_finite() && holds(size) && is_small {
             return;
         }
-        if !is_within {
+        // What folds away in a box may hold, or not, beyond it.
+        if !holds(half) {
             self.half = f64::INFINITY;
             self.left = [None, None];
         }
-        let half = REACH * size;
         if SMALLER * half <= self.half.min(self.task.scale) {
             self.shrink(x, half, value);
         }
@@ -116,18 +121,7 @@ impl<'t, 'a> Near<'t, 'a> {
         let (lowest, highest) = (at_value(levels.0), at_value(levels.1));
         let left = [Side::A, Side::B].map(|side| {
             let mut out = Vec::new();
-            let truth = match self.tokens(side) {
-                [] => Truth::True,
-                tokens => self.solid(side).prune(tokens, &mut out, &mut |id| {
-                    if highest.truth(side, id) == Truth::False {
-                        Truth::False
-                    } else if lowest.truth(side, id) == Truth::True {
-                        Truth::True
-                    } else {
-                        Truth::Open
-                    }
-                }),
-            };
+            let truth = self.prune_by(side, &mut out, |id| separation::between(&lowest, &highest, side, id));
             // Of a part that is not written out no value is told, and a tree whose like faces were made one has another.
             let is_whole = self.solid(side).simplified || out.iter().any(|token| local::is_part(*token));
             (truth, (!is_whole).then_some(out))
@@ -174,7 +168,7 @@ mod tests {
                 let mut next = x;
                 for k in 0..12 {
                     // The last ones lie outside of the box that was asked for, some of them of the one that is kept.
-                    let y = x + r.vector(if k < 8 { size } else { 12.0 * size });
+                    let y = x + r.vector(if k < 8 { size } else { 60.0 * size });
                     let (own, kept) = (f(y), near.value(y));
                     let is_beyond = (y - near.center).abs().max_element() > near.half;
                     assert!(kept == own, "{kept} for {own}");

@@ -119,15 +119,7 @@ impl<'t, 'a> Cover<'t, 'a> {
                     return Truth::True;
                 }
                 let solid = if side == Side::A { self.task.a } else { self.task.b };
-                solid.prune(tokens, out, &mut |id| {
-                    if far.truth(side, id) == Truth::False {
-                        Truth::False
-                    } else if near.truth(side, id) == Truth::True {
-                        Truth::True
-                    } else {
-                        Truth::Open
-                    }
-                })
+                solid.prune(tokens, out, &mut |id| between(&near, &far, side, id))
             };
             let mut pool = Vec::new();
             let truth_a = prune(Side::A, &place.a, &mut pool);
@@ -174,6 +166,18 @@ impl<'t, 'a> Cover<'t, 'a> {
                 self.stack.push(child);
             }
         }
+    }
+}
+
+/// What is known of a literal over a box for every level of F between those of two views: the lowest, where it is the hardest to
+/// hold, and the highest.
+pub(super) fn between(lowest: &View, highest: &View, side: Side, id: LiteralId) -> Truth {
+    if highest.truth(side, id) == Truth::False {
+        Truth::False
+    } else if lowest.truth(side, id) == Truth::True {
+        Truth::True
+    } else {
+        Truth::Open
     }
 }
 

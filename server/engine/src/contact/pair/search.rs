@@ -607,6 +607,9 @@ impl<'a> PairSearch<'a> {
 
     /// Work done so far.
     pub fn counters(&self) -> Counters {
+        if let State::Reported(reported, _) = &self.state {
+            return reported.counters;
+        }
         let mut counters = self.outcome.counters;
         if let Some(more) = self.under_way() {
             counters += *more;
