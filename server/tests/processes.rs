@@ -304,7 +304,7 @@ fn a_session_that_is_closed_ends_whatever_is_under_way() {
     let mut session = connect();
     // No import is answered at once, however quick the machine and whether its cache has the model or not.
     session.command_timeout = Duration::ZERO;
-    assert_eq!(session.load_model("large.csg", &spheres(2_000)).map(|m| m.id), Err(Error::Timeout));
+    assert_eq!(session.load_model("large.csg", &spheres(500)).map(|m| m.id), Err(Error::Timeout));
     session.command_timeout = PATIENCE;
     session.close().unwrap();
     assert_eq!(SharedMemory::status(&server.address).unwrap().sessions, 0);

@@ -9,6 +9,7 @@ pub mod formula;
 pub mod fuzz;
 pub mod judge;
 pub mod lanes;
+pub mod least_distance;
 pub mod mesh_files;
 pub mod meshes;
 pub mod models;

@@ -127,13 +127,18 @@ fn add_roots_of_torus(torus: &surface::Torus, at: DVec3, roots: &mut Vec<f64>) {
         (size * c, size * s)
     });
     for _ in 0..200 {
+        let mut moved = 0.0_f64;
         for i in 0..4 {
             let others = (0..4).filter(|j| *j != i);
             let product = others.fold((1.0, 0.0), |q, j| times(q, (all[i].0 - all[j].0, all[i].1 - all[j].1)));
             let step = over(value(all[i]), product);
             if step.0.is_finite() && step.1.is_finite() {
                 all[i] = (all[i].0 - step.0, all[i].1 - step.1);
+                moved = moved.max(step.0.hypot(step.1));
             }
+        }
+        if moved < 1e-15 * size {
+            break;
         }
     }
     roots.extend(all.iter().filter(|z| z.1.abs() < 1e-5 * size).map(|z| start + z.0));
@@ -145,7 +150,8 @@ fn add_roots_of_norm(face: &surface::Superellipsoid, at: DVec3, roots: &mut Vec<
     let level = |z: f64| ball.length(at + DVec3::Z * z) - face.semi.min_element() * Image::WHOLE;
     let (low, high) = (face.origin.z - size, face.origin.z + size);
     let (mut a, mut b) = (low, high);
-    for _ in 0..200 {
+    // (2/3)^80 is 1e-14.
+    for _ in 0..80 {
         let (c, d) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
         if level(c) < level(d) { b = d } else { a = c }
     }

@@ -276,7 +276,9 @@ impl Bounder<'_> {
 
     /// Σ λ_i(t) ℓ_i, the multipliers linear over the span.
     fn sum(&self, terms: &[Term], span: (f64, f64), x: Vector, t: Interval) -> Option<Jet> {
-        let (a, b) = (in_a(x), self.motions.in_b(x, t));
+        let is_on_b = |term: &Term| term.literal.on_b || term.other.is_some();
+        let a = in_a(x);
+        let b = if terms.iter().any(is_on_b) { self.motions.in_b(x, t) } else { a };
         let mut sum = Jet::constant(ZERO);
         for term in terms {
             let y = if term.literal.on_b { &b } else { &a };

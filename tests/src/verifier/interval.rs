@@ -266,19 +266,30 @@ pub fn length(v: Vector) -> Interval {
 }
 
 /// A point as it is seen from `o`.
+#[inline]
 pub fn offsets(y: &[Jet; 3], o: DVec3) -> [Jet; 3] {
-    std::array::from_fn(|i| y[i].plus(point(-o[i])))
+    let of = |i: usize| y[i].plus(point(-o[i]));
+    [of(0), of(1), of(2)]
 }
 
 /// n·y.
 pub fn linear(n: Vector, y: &[Jet; 3]) -> Jet {
-    y[0].scaled(n[0]) + y[1].scaled(n[1]) + y[2].scaled(n[2])
+    let sum = |[a, b, c]: [Interval; 3]| n[0] * a + n[1] * b + n[2] * c;
+    let mut f = Jet::constant(sum([y[0].v, y[1].v, y[2].v]));
+    for (k, g) in f.g.iter_mut().enumerate() {
+        *g = sum([y[0].g[k], y[1].g[k], y[2].g[k]]);
+    }
+    for (k, h) in f.h.iter_mut().enumerate() {
+        *h = sum([y[0].h[k], y[1].h[k], y[2].h[k]]);
+    }
+    f
 }
 
 /// What of y is across an axis.
 pub fn across(y: &[Jet; 3], axis: Vector) -> [Jet; 3] {
     let along = linear(axis, y);
-    std::array::from_fn(|i| y[i] - along.scaled(axis[i]))
+    let of = |i: usize| y[i] - along.scaled(axis[i]);
+    [of(0), of(1), of(2)]
 }
 
 /// |y|².

@@ -15,6 +15,8 @@ use super::interval::{Interval, Jet, Matrix, Vector, ZERO, apply, cross, minus, 
 use super::interval::{times, transpose, vector};
 use contactd::motion::Placed;
 use contactd_proto::Pose;
+use std::cell::RefCell;
+use std::sync::LazyLock;
 
 /// The matrix of a quaternion of about unit length.
 pub(super) fn rotation(pose: &Pose) -> Matrix {
@@ -29,8 +31,23 @@ pub(super) fn rotation(pose: &Pose) -> Matrix {
     ]
 }
 
+/// 1/((n + 1)(n + 2)) for n = `first` + 2k: what the terms of sin θ/θ (of 1) and 2(1 − cos θ)/θ² (of 2) have before the one ahead.
+fn terms(first: f64) -> [Interval; 10] {
+    std::array::from_fn(|k| {
+        let n = first + 2.0 * k as f64;
+        (point(n + 1.0) * point(n + 2.0)).recip()
+    })
+}
+
+/// Both, worked out once: divisions are most of what a rotation costs.
+static TERMS: LazyLock<[[Interval; 10]; 2]> = LazyLock::new(|| [terms(1.0), terms(2.0)]);
+
 /// exp(t·[spin]×).
 pub(super) fn turned(spin: Vector, t: Interval) -> Matrix {
+    let zero = ZERO;
+    if spin == [zero; 3] || t == zero {
+        return std::array::from_fn(|i| std::array::from_fn(|j| point(f64::from(u8::from(i == j)))));
+    }
     let square = spin[0].square() + spin[1].square() + spin[2].square();
     let (mut t, mut doublings) = (t, 0);
     while square.hi * t.mag() * t.mag() > 1.0 {
@@ -39,18 +56,16 @@ pub(super) fn turned(spin: Vector, t: Interval) -> Matrix {
     }
     // z = (|spin| t)²; sin θ/θ = Σ (−z)^k/(2k+1)!, (1 − cos θ)/θ² = Σ (−z)^k/(2k+2)!; the rest is less than 1/21!.
     let z = square * t.square();
-    let series = |first: f64| {
+    let series = |terms: &[Interval; 10]| {
         // What follows the last term taken lies between 0 and 1, as all tails of an alternating series do.
         let mut sum = Interval::new(0.0, 1.0);
-        for k in (0..10).rev() {
-            let n = first + 2.0 * f64::from(k);
+        for term in terms.iter().rev() {
             // Horner: s = 1 − z/((n+1)(n+2))·s of the later terms.
-            sum = point(1.0) - z * (point(n + 1.0) * point(n + 2.0)).recip() * sum;
+            sum = point(1.0) - z * *term * sum;
         }
         sum
     };
-    let (sinc, versine) = (series(1.0), point(0.5) * series(2.0));
-    let zero = ZERO;
+    let (sinc, versine) = (series(&TERMS[0]), point(0.5) * series(&TERMS[1]));
     let k: Matrix = [[zero, -spin[2], spin[1]], [spin[2], zero, -spin[0]], [-spin[1], spin[0], zero]];
     let kk = product(&k, &k);
     let (s, c) = (sinc * t, versine * t.square());
@@ -61,6 +76,16 @@ pub(super) fn turned(spin: Vector, t: Interval) -> Matrix {
         r = product(&r, &r);
     }
     r
+}
+
+/// Rotations over a span of time, and what they make of A's axes and of where A is.
+struct Instant {
+    t: Interval,
+    r_a: Matrix,
+    n: Matrix,
+    along: Matrix,
+    turning: Matrix,
+    d: Vector,
 }
 
 /// The motion of a pair; A carries the cells.
@@ -74,6 +99,8 @@ pub struct Motions {
     spin_a: Vector,
     spin_b: Vector,
     omega: Vector,
+    /// The last span and the last single time.
+    kept: RefCell<[Option<Instant>; 2]>,
 }
 
 impl Motions {
@@ -91,6 +118,7 @@ impl Motions {
             omega: minus(spin_a, spin_b),
             spin_a,
             spin_b,
+            kept: RefCell::default(),
         }
     }
 
@@ -111,41 +139,55 @@ impl Motions {
         apply(&transpose(&self.place_a.0), x)
     }
 
-    /// Coordinates in B's solid of the points `x` of A's over the times `t`.
-    pub fn in_b(&self, x: Vector, t: Interval) -> [Jet; 3] {
+    /// What depends on the time alone.
+    fn at(&self, t: Interval) -> Instant {
         let r_a = product(&turned(self.spin_a, t), &self.a);
         let n = transpose(&product(&product(&turned(self.spin_b, t), &self.b), &self.place_b.0));
-        let u = apply(&r_a, plus(apply(&self.place_a.0, x), self.place_a.1));
-        let axes = product(&r_a, &self.place_a.0);
-        let d = plus(self.d, times(t, self.v0));
-        let (o, s) = (self.omega, self.spin_b);
+        let columns = transpose(&product(&r_a, &self.place_a.0));
+        let [x, y, z] = &columns;
+        let along = [apply(&n, *x), apply(&n, *y), apply(&n, *z)];
+        let o = self.omega;
+        let turning = [apply(&n, cross(o, *x)), apply(&n, cross(o, *y)), apply(&n, cross(o, *z))];
+        Instant { t, r_a, n, along, turning, d: plus(self.d, times(t, self.v0)) }
+    }
+
+    /// Coordinates in B's solid of the points `x` of A's over the times `t`.
+    pub fn in_b(&self, x: Vector, t: Interval) -> [Jet; 3] {
+        // Regions are divided in space more often than in time, and each is asked for in its middle, too.
+        let mut kept = self.kept.borrow_mut();
+        let kept = &mut kept[usize::from(t.lo == t.hi)];
+        if kept.as_ref().is_none_or(|k| k.t != t) {
+            *kept = Some(self.at(t));
+        }
+        let Some(Instant { r_a, n, along, turning, d, .. }) = kept else { unreachable!("made above") };
+        let u = apply(r_a, plus(apply(&self.place_a.0, x), self.place_a.1));
+        let (o, s, d) = (self.omega, self.spin_b, *d);
         let back = apply(&transpose(&self.place_b.0), self.place_b.1);
-        let y = minus(apply(&n, plus(d, u)), back);
-        let rate = apply(&n, plus(minus(self.v0, cross(s, d)), cross(o, u)));
+        let y = minus(apply(n, plus(d, u)), back);
+        let rate = apply(n, plus(minus(self.v0, cross(s, d)), cross(o, u)));
         let pull = plus(
             plus(cross(o, cross(o, u)), cross(cross(o, s), u)),
             minus(cross(s, cross(s, d)), times(point(2.0), cross(s, self.v0))),
         );
-        let pull = apply(&n, pull);
-        let columns = transpose(&axes);
-        let along: [Vector; 3] = columns.map(|c| apply(&n, c));
-        let turning: [Vector; 3] = columns.map(|c| apply(&n, cross(o, c)));
-        std::array::from_fn(|i| {
+        let pull = apply(n, pull);
+        let jet = |i: usize| {
             let mut h = [ZERO; 10];
             for k in 0..3 {
                 h[place(k, 3)] = turning[k][i];
             }
             h[place(3, 3)] = pull[i];
             Jet { v: y[i], g: [along[0][i], along[1][i], along[2][i], rate[i]], h }
-        })
+        };
+        [jet(0), jet(1), jet(2)]
     }
 }
 
 /// A's own coordinates.
 pub fn in_a(x: Vector) -> [Jet; 3] {
-    std::array::from_fn(|i| {
+    let jet = |i: usize| {
         let mut jet = Jet::constant(x[i]);
         jet.g[i] = point(1.0);
         jet
-    })
+    };
+    [jet(0), jet(1), jet(2)]
 }
