@@ -6,7 +6,7 @@
 //! their poses alone. What is added up on the server is not asked for.
 
 use super::bound::BUDGET;
-use super::interval::{Interval, Vector, apply, dot, minus, plus, point, product, times, transpose, vector};
+use super::interval::{Interval, Vector, apply, cross, dot, minus, plus, point, product, times, transpose, vector};
 use super::motion::{Motions, rotation, turned};
 use super::{Bounder, Checked, Region, certain, check_cells, check_level, expression, extent, extent_in, number};
 use contactd::contact::probe::{PointOptions, PosedModel, points as probe};
@@ -328,6 +328,12 @@ impl<'a> Truth<'a> {
         if turn == 0.0 { 0.0 } else { turn * self.reach }
     }
 
+    /// True for a half-space that turns about its own normal: nothing of it goes anywhere by that.
+    fn turns_in_itself(&self, motion: &Motion) -> bool {
+        let spin = vector(motion.spin.to_array());
+        self.plane(motion, 0.0).is_some_and(|(n, _)| length(cross(spin, n)) <= 1e-12 * length(spin))
+    }
+
     /// How far it reaches from its object's origin along a direction of the world at a time of a motion.
     fn support(&self, motion: &Motion, n: Vector, t: f64, by: By) -> f64 {
         let r = product(&turned(vector(motion.spin.to_array()), point(t)), &rotation(&motion.start));
@@ -386,7 +392,7 @@ fn apart_by(
     let omega = motions.map(|m| m.spin.length() * up);
     let way = (motions[0].velocity - motions[1].velocity).length() * up;
     // What turns without bounds has no bound of its own.
-    let swing = [bodies[0].swing(omega[0]), bodies[1].swing(omega[1])];
+    let swing = [0, 1].map(|k| if bodies[k].turns_in_itself(&motions[k]) { 0.0 } else { bodies[k].swing(omega[k]) });
     let speed = way + swing[0] + swing[1];
     let pull = omega[0] * swing[0] + omega[1] * swing[1];
     let longest = n0.length().max(n1.length()) * up;
