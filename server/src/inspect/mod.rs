@@ -48,7 +48,7 @@ pub fn model(file: &str, model: &Model, notes: &[Note]) -> String {
     for (kind, (positive, negative)) in kinds {
         let _ = writeln!(out, "    {:>6} {kind} ({negative} subtracted)", positive + negative);
     }
-    out += &bounds(&solid.aabb());
+    out += &bounds(&if solid.is_empty() { Aabb::EMPTY } else { solid.aabb() });
     out += &mass(model);
     for line in grouped(notes) {
         out += &sentence("  note: ", &line);

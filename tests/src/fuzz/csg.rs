@@ -1,9 +1,12 @@
 //! The parser of `.csg` models: any text is a solid that can be asked, or one sentence with its place.
 
 use super::Target;
+use contactd::contact::probe::{PointOptions, PosedModel, Ray, RayOptions, RayOutcome, points, rays};
 use contactd::import::{Facets, Limits, import_csg};
 use contactd::octree::Model;
+use contactd::octree::mass::mass_properties;
 use contactd::solid::{Node, Solid};
+use contactd_proto::{MassOptions, Pose};
 use glam::DVec3;
 
 pub(super) const TARGET: Target = Target { name: "csg", run, seeds, words: &WORDS, longest: 2000, thorough_every: 64 };
@@ -77,6 +80,9 @@ fn seeds() -> Vec<Vec<u8>> {
         "color([1, 0, 0, 1]) { polyhedron(points = [[1,0,0],[-1,0,0],[0,1,0],[0,-1,0],[0,0,1],[0,0,-1]], faces = \
          [[0,4,2],[0,2,5],[0,3,4],[0,5,3],[1,2,4],[1,5,2],[1,4,3],[1,3,5]], convexity = 1); } // end",
         "hull() { difference() { cube(2); sphere(1); } linear_extrude(height = 1, twist = 40) { square(1); } }",
+        // What is taken from itself.
+        "difference() { cube(1); cube(1); } union() { difference() { sphere(2); sphere(2); cube(1); } sphere(1); }",
+        "difference() { cylinder(h = 3, r1 = 1, r2 = 0.5, center = true); cylinder(h = 3, r1 = 1, r2 = 0.5, center = true); }",
         "minkowski() { difference() { cube(2); cube(1); } cube(0.1); } resize([1, 2, 0]) { sphere(1, $fn = 5); }",
         "linear_extrude(height = 1) { projection() { difference() { cube(1); sphere(0.4); } } text(text = \"a\"); }",
     ]
@@ -126,6 +132,24 @@ pub(super) fn ask_all(solid: &Solid, thorough: bool) -> Result<(), String> {
         let model = Model::new(solid.clone());
         if model.radius.is_nan() || model.margin().is_nan() {
             return Err(format!("radius {}, margin {}", model.radius, model.margin()));
+        }
+        // What `inspect` and the probes ask.
+        if let Ok(m) = mass_properties(&model, &MassOptions { tolerance: 0.1, boxes: 200 })
+            && !(m.volume >= -m.volume_error && m.volume_error >= 0.0)
+        {
+            return Err(format!("a volume of {} ± {}", m.volume, m.volume_error));
+        }
+        let posed = PosedModel { model: &model, pose: Pose::IDENTITY };
+        let options = PointOptions { surface: 1e-9, tolerance: 1e-3, limit: 200 };
+        let told = &points(&posed, &[DVec3::new(0.1, 0.2, 0.3)], &options)[0];
+        if told.lower > told.upper || told.lower.is_nan() || told.upper.is_nan() {
+            return Err(format!("a distance from {} to {}", told.lower, told.upper));
+        }
+        let ray = Ray { origin: DVec3::new(0.1, 0.2, -9.0), direction: DVec3::Z, length: 20.0 };
+        if let RayOutcome::Hit(hit) = rays(&posed, &[ray], &RayOptions { depth: 0.0, limit: 200 })[0].outcome
+            && !(hit.lower <= hit.t && hit.t <= hit.upper)
+        {
+            return Err(format!("a hit at {} between {} and {}", hit.t, hit.lower, hit.upper));
         }
     }
     Ok(())

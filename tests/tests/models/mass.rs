@@ -293,6 +293,13 @@ fn empty_unbounded_and_bad_options() {
         (Sphere { radius: 1.0 }.into(), Pose::at(DVec3::X * 3.0)),
     ];
     assert_eq!(mass(&tree(Op::Intersection, &apart), 1e-6), MassProperties::NOTHING);
+    // What is taken from itself: its bounds are not empty, its normal form is.
+    for shape in [Shape::from(Cuboid { half: DVec3::ONE }), Cylinder { radius: 1.0, half_height: 2.0 }.into()] {
+        let (twice, beside) = ((shape.clone(), Pose::IDENTITY), (Sphere { radius: 1.0 }.into(), Pose::IDENTITY));
+        for parts in [vec![twice.clone(), twice.clone()], vec![twice.clone(), twice.clone(), beside]] {
+            assert_eq!(mass(&tree(Op::Difference, &parts), 1e-6), MassProperties::NOTHING);
+        }
+    }
     let both = mass(&tree(Op::Union, &apart), 1e-6);
     assert!(both.boxes == 0 && (both.volume - 8.0 / 3.0 * PI).abs() <= both.volume_error);
     assert!((both.center.x - 1.5).abs() <= both.center_error.x);

@@ -83,7 +83,7 @@ pub fn mass_properties(model: &Model, options: &MassOptions) -> Result<MassPrope
     let options = options.checked().map_err(MassError::Options)?;
     let solid = &model.solid;
     let around = model.bounds.root().aabb;
-    if around.is_empty() {
+    if around.is_empty() || solid.is_empty() {
         return Ok(MassProperties::NOTHING);
     }
     if !around.is_finite() {
