@@ -128,6 +128,7 @@ class Coupling:
         self.skin = skin
         self.slack = slack
         self.unit = unit
+        self._adheres = bool(np.any(model.actuator_trntype == mj.mjtTrn.mjTRN_BODY))
         self._filter = Filter(model)
         given = self._given(solids)
         if geoms:
@@ -245,6 +246,9 @@ class Coupling:
             # What mj_step1 made of the contacts that it knew is made again with all of them.
             mj.mj_makeConstraint(model, data)
             mj.mj_island(model, data)
+            if self._adheres:
+                # An <adhesion> actuator pulls along the contacts of its body.
+                mj.mj_transmission(model, data)
             mj.mj_projectConstraint(model, data)
             mj.mj_referenceConstraint(model, data)
         mj.mj_step2(model, data)

@@ -290,6 +290,24 @@ def test_a_pair_is_met_by_its_own_parameters_and_given_back():
     assert model.pair_margin[0] == 0 and model.geom_contype.tolist() == [1, 1]
 
 
+def test_an_adhesion_actuator_pulls_along_contacts_of_solids():
+    ceiling = '<geom type="box" size=".2 .2 .01" pos="0 0 .5"/>'
+    actuator = '<actuator><adhesion body="ball" ctrlrange="0 1" gain="50"/></actuator>'
+    stock, model = (scene(ceiling + BALL.format(0, 0, 0.4401), after=actuator) for _ in range(2))
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    theirs.ctrl[:] = data.ctrl[:] = 1
+    with attach(model) as coupling:
+        for _ in range(250):
+            mujoco.mj_step(stock, theirs)
+            coupling.step(data)
+        # It hangs, by the skin nearer to where it touches.
+        assert theirs.qpos[2] - 3e-4 < data.qpos[2] < theirs.qpos[2]
+        data.ctrl[:] = 0
+        for _ in range(100):
+            coupling.step(data)
+        assert data.qpos[2] < 0.43
+
+
 TWENTY = FLOOR + "".join(
     f'<body pos="{0.3 * (i % 5)} {0.3 * (i // 5)} .05"><freejoint/><geom type="{kind}" size=".05 .05 .05"/></body>'
     for i, kind in enumerate(["box", "cylinder"] * 10)
