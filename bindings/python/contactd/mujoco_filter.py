@@ -260,6 +260,9 @@ class Filter:
                 a, b = self._parts[group[0]], self._parts[other[0]]
                 if self._bits(list(a.geoms), list(b.geoms)).any():
                     rules.append(rule((groups[group[0]], groups[other[0]]), self._apart(group, other)))
+        if not rules and groups:
+            # Without any rule everything would meet.
+            rules.append(Rule((groups[0], groups[0]), detect="off"))
         return groups, rules
 
     def _apart(self, group: list[int], other: list[int]) -> list[tuple[str, str]]:

@@ -26,7 +26,9 @@
 //!
 //! Bodies that overlap touch nowhere, so a pair that is told in overlap is asked about once more, moved apart along its
 //! direction until half of the given gap is between its bodies: its points are those of the face it came through, carried
-//! back. Of a pair that overlaps even there the depth is kept, one point. What was moved apart is put back with the next request.
+//! back. All such pairs are moved apart in one request, each with what stands on it; pairs that cannot be apart together, as
+//! those of a body between two walls, are asked about in as many as it takes, up to four. Of a pair that overlaps even there
+//! the depth is kept, one point. What was moved apart is put back with the next request.
 
 use super::{Manifold, Manifolds, Point};
 use crate::Reply;
@@ -51,7 +53,28 @@ struct Followed {
     is_asked: bool,
 }
 
-/// Which of its two requests a step waits for.
+/// A pair in overlap.
+#[derive(Clone, Copy, Debug)]
+struct Overlap {
+    /// Its objects.
+    pair: [u32; 2],
+    /// Places of their bodies.
+    bodies: [usize; 2],
+    /// From the first to the second.
+    normal: DVec3,
+    /// How far they are to be moved apart along it.
+    way: f64,
+}
+
+/// Requests of a step that move pairs apart.
+const MOST_ROUNDS: usize = 4;
+/// How often all pairs are looked at until each is apart. Those that stand on each other are seen from the ground up, so that one look
+/// is enough where no body has two below it.
+const SWEEPS: usize = 16;
+/// Part of the way that may be missing at the end.
+const MISSING: f64 = 1e-3;
+
+/// Which of its requests a step waits for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Phase {
     #[default]
@@ -83,6 +106,10 @@ pub struct ContactCache {
     records: Vec<PoseRecord>,
     /// Pairs in overlap that are asked about again.
     deep: Vec<[u32; 2]>,
+    /// Pairs in overlap that no request has moved apart yet.
+    left: Vec<Overlap>,
+    /// Requests of the step that move pairs apart, so far.
+    rounds: usize,
     phase: Phase,
     asked: Asked,
 }
@@ -91,7 +118,8 @@ impl ContactCache {
     /// Without bodies. `slack`: a length; `gap`: that to which pairs in overlap are moved apart, half of it.
     pub fn new(slack: f64, gap: f64) -> Self {
         let (manifolds, phase, asked) = (Manifolds::default(), Phase::Idle, Asked::default());
-        Self { slack, gap, bodies: Vec::new(), manifolds, records: Vec::new(), deep: Vec::new(), phase, asked }
+        let (bodies, records, deep, left) = Default::default();
+        Self { slack, gap, bodies, manifolds, records, deep, left, rounds: 0, phase, asked }
     }
 
     /// Follows an object that stands where it stands. Objects are added in the order of their ids.
@@ -216,35 +244,93 @@ impl ContactCache {
         }
     }
 
-    /// Plans the second request: each pair in overlap apart along its direction by half the gap, b alone or, where that is fixed, a.
+    /// Plans the request that moves apart what is in overlap.
     fn move_apart(&mut self) {
-        self.deep.clear();
-        let mut ways: Vec<(usize, DVec3)> = Vec::new();
+        self.left.clear();
+        self.rounds = 0;
         for pair in self.manifolds.pairs().filter(|pair| pair.status == OVERLAP) {
             let (Some(p), true) = (pair.points.first(), is_asked(&self.bodies, pair.a, pair.b)) else { continue };
             let (Some(a), Some(b)) = (index(&self.bodies, pair.a), index(&self.bodies, pair.b)) else { continue };
-            self.deep.push([pair.a, pair.b]);
-            // The normal points from a to b: b goes along, a against.
-            let way = p.normal * (0.5 * self.gap - p.separation);
-            let (index, way) = if self.bodies[b].is_fixed { (a, -way) } else { (b, way) };
-            let k = ways.iter().position(|(i, _)| *i == index).unwrap_or_else(|| {
-                ways.push((index, DVec3::ZERO));
-                ways.len() - 1
-            });
-            // What an earlier pair has asked for already need not be gone again.
-            let gone = ways[k].1.dot(way) / way.length_squared();
-            ways[k].1 += way * (1.0 - gone).max(0.0);
+            let (way, normal) = (0.5 * self.gap - p.separation, p.normal);
+            self.left.push(Overlap { pair: [pair.a, pair.b], bodies: [a, b], normal, way });
         }
-        if self.deep.is_empty() {
-            return;
+        if !self.left.is_empty() {
+            self.asked.retracted += 1;
+            self.sort_from_the_ground();
+            self.next_round();
         }
-        for (index, way) in ways {
-            let body = &mut self.bodies[index];
-            let apart = body.told.map(|told| Pose { position: told.position + way, ..told });
+    }
+
+    /// Pairs next to what is fixed first, then those beside these, and so on; the body farther from there second in each: it is the
+    /// one that is moved.
+    fn sort_from_the_ground(&mut self) {
+        const FAR: usize = usize::MAX;
+        let mut above: Vec<usize> = self.bodies.iter().map(|body| if body.is_fixed { 0 } else { FAR }).collect();
+        for level in 1.. {
+            let mut found = false;
+            for pair in &self.left {
+                let [a, b] = pair.bodies;
+                for (below, over) in [(a, b), (b, a)] {
+                    if above[below] == level - 1 && above[over] == FAR {
+                        (above[over], found) = (level, true);
+                    }
+                }
+            }
+            if found {
+                continue;
+            }
+            // What hangs together with nothing fixed begins at its first body.
+            let Some(pair) = self.left.iter().find(|pair| pair.bodies.iter().all(|i| above[*i] == FAR)) else { break };
+            above[pair.bodies[0]] = level;
+        }
+        for pair in &mut self.left {
+            let [a, b] = pair.bodies;
+            if above[a] > above[b] {
+                (pair.bodies, pair.normal) = ([b, a], -pair.normal);
+            }
+        }
+        self.left.sort_by_key(|pair| above[pair.bodies[1]]);
+    }
+
+    /// The request for as many of the pairs that are left as can be apart together: the normal points to the body that is moved.
+    fn next_round(&mut self) {
+        let mut ways = vec![DVec3::ZERO; self.bodies.len()];
+        let short = |ways: &[DVec3], pair: &Overlap| {
+            let [a, b] = pair.bodies;
+            pair.way - pair.normal.dot(ways[b] - ways[a])
+        };
+        for _ in 0..SWEEPS {
+            let mut any = false;
+            for pair in &self.left {
+                let short = short(&ways, pair);
+                if short > MISSING * pair.way && !self.bodies[pair.bodies[1]].is_fixed {
+                    ways[pair.bodies[1]] += pair.normal * short;
+                    any = true;
+                }
+            }
+            if !any {
+                break;
+            }
+        }
+        // Where they cannot, the first is alone: whatever it is, it can.
+        let is_apart = |pair: &Overlap| short(&ways, pair) <= 0.25 * self.gap;
+        if !self.left.iter().any(is_apart) {
+            ways.fill(DVec3::ZERO);
+            let first = &self.left[0];
+            ways[first.bodies[1]] = first.normal * first.way;
+        }
+        let is_apart = |pair: &Overlap| short(&ways, pair) <= 0.25 * self.gap;
+        self.deep = self.left.iter().filter(|pair| is_apart(pair)).map(|pair| pair.pair).collect();
+        self.left.retain(|pair| !self.deep.contains(&pair.pair));
+        for (body, way) in self.bodies.iter_mut().zip(ways).filter(|(body, _)| !body.is_fixed) {
+            let apart = body.told.filter(|_| way != DVec3::ZERO);
+            let apart = apart.map(|told| Pose { position: told.position + way, ..told });
+            // What an earlier request has moved is put back.
+            let told = apart.or(body.told.filter(|_| body.apart.is_some()));
             body.apart = apart;
-            self.records.extend(apart.map(|pose| PoseRecord::start(body.object, &pose)));
+            self.records.extend(told.map(|pose| PoseRecord::start(body.object, &pose)));
         }
-        self.asked.retracted += 1;
+        self.rounds += 1;
         self.phase = Phase::Again;
     }
 
@@ -252,7 +338,9 @@ impl ContactCache {
         let deep = std::mem::take(&mut self.deep);
         self.take(reply, |_, a, b, status| status != OVERLAP && deep.contains(&[a, b]));
         self.manifolds.finish();
-        self.deep = deep;
+        if !self.left.is_empty() && self.rounds < MOST_ROUNDS {
+            self.next_round();
+        }
     }
 }
 

@@ -290,3 +290,84 @@ fn what_was_moved_apart_is_put_back_for_others() {
     }
     assert!(points > 20);
 }
+
+const BLOCK: &str = "cube(size = [1, 1, 1], center = true);";
+
+/// Blocks of side 1 at heights, those of `fixed` fixed, in an order of their own; the contacts of one step, by their places in
+/// `heights`, and how many requests it took.
+fn pile(heights: &[f64], fixed: &[usize], order: &[usize]) -> (Vec<([usize; 2], f64)>, u64) {
+    let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default()).unwrap();
+    let model = session.load_model("block.csg", BLOCK).unwrap().id;
+    let mut cache = ContactCache::new(0.0, MARGIN);
+    let (mut objects, mut poses) = (vec![0; heights.len()], Vec::new());
+    for &i in order {
+        // Each is turned by a little about the axis, so that no corner lies over another one.
+        let pose = Pose::new(DVec3::Z * heights[i], quat_of_rotation_vector(DVec3::Z * 0.1 * i as f64));
+        let object = Object::new(&format!("block {i}"), model).at(pose);
+        objects[i] = session.add_object(if fixed.contains(&i) { object.fixed() } else { object }).unwrap();
+        if fixed.contains(&i) {
+            cache.add_fixed(objects[i], pose);
+        } else {
+            cache.add_moving(objects[i], 1.0);
+            poses.push(pose);
+        }
+    }
+    let mut rule = Rule::new(["default".into(), "default".into()]);
+    (rule.report, rule.margin, rule.penetration) = (Report::Patch, MARGIN, true);
+    session.set_rules(&[rule]).unwrap();
+    session.options.details = true;
+    let mut more = !cache.begin(&poses).is_empty();
+    while more {
+        let records = cache.records();
+        session.begin_step(records.len()).unwrap().copy_from_slice(records);
+        more = !cache.answer(&session.finish(Duration::from_secs(60)).unwrap()).is_empty();
+    }
+    let place = |object: u32| objects.iter().position(|o| *o == object).expect("one of them");
+    let told = cache.contacts().map(|(m, p)| {
+        let [a, b] = [place(m.a), place(m.b)];
+        ([a.min(b), a.max(b)], p.separation)
+    });
+    (told.collect(), cache.asked().requests)
+}
+
+/// Four points for each two neighbours, as deep as they are.
+fn expect_faces(told: &[([usize; 2], f64)], heights: &[f64], what: &str) {
+    for i in 1..heights.len() {
+        let deep = heights[i] - heights[i - 1] - 1.0;
+        let own: Vec<f64> = told.iter().filter(|t| t.0 == [i - 1, i]).map(|t| t.1).collect();
+        assert!(own.len() == 4 && own.iter().all(|s| (s - deep).abs() < 1e-8), "{what}, pair {i}: {own:?}, {deep}");
+    }
+    assert_eq!(told.len(), 4 * (heights.len() - 1), "{what}: {told:?}");
+}
+
+/// In a pile that has sunk into itself every two neighbours are told by their faces, in one further request, whatever order the bodies
+/// were added in, and whether it stands on something fixed or on nothing.
+#[test]
+fn a_pile_in_overlap_is_moved_apart_in_one_request() {
+    for seed in 0..sized("CONTACTD_CACHE_SCENES", 12u64) {
+        let mut r = Random::new(4_000 + seed);
+        let mut heights = vec![0.0];
+        for _ in 0..2 + r.below(6) {
+            heights.push(heights[heights.len() - 1] + 1.0 - MARGIN * r.within(0.01, 0.9));
+        }
+        let mut order: Vec<usize> = (0..heights.len()).collect();
+        for k in (1..order.len()).rev() {
+            order.swap(k, r.below(k + 1));
+        }
+        let fixed: &[usize] = if r.chance(0.7) { &[0] } else { &[] };
+        let (told, requests) = pile(&heights, fixed, &order);
+        expect_faces(&told, &heights, &format!("seed {seed}, {order:?}"));
+        assert_eq!(requests, 2, "seed {seed}, {order:?}");
+    }
+}
+
+/// Of a body between two that are fixed, and in both, one side is told after the other.
+#[test]
+fn a_body_that_is_held_from_both_sides_is_told_by_both_faces() {
+    for order in [[0, 1, 2], [1, 0, 2], [2, 1, 0]] {
+        let heights = [0.0, 1.0 - 0.5 * MARGIN, 2.0 - 1.2 * MARGIN];
+        let (told, requests) = pile(&heights, &[0, 2], &order);
+        expect_faces(&told, &heights, &format!("{order:?}"));
+        assert_eq!(requests, 3, "{order:?}");
+    }
+}
