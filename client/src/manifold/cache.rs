@@ -26,9 +26,10 @@
 //!
 //! Bodies that overlap touch nowhere, so a pair that is told in overlap is asked about once more, moved apart along its
 //! direction until half of the given gap is between its bodies: its points are those of the face it came through, carried
-//! back. All such pairs are moved apart in one request, each with what stands on it; pairs that cannot be apart together, as
-//! those of a body between two walls, are asked about in as many as it takes, up to four. Of a pair that overlaps even there
-//! the depth is kept, one point. What was moved apart is put back with the next request.
+//! back. All such pairs are moved apart in one request, each with what stands on it. Pairs that cannot be apart together, as
+//! those of a body between two walls, and pairs that overlap even there, as an edge in a face by more than the ball within it,
+//! are asked about again, up to eight times in all; of what is left then the depth is kept, one point. What was moved apart is
+//! put back with the next request.
 
 use super::{Manifold, Manifolds, Point};
 use crate::Reply;
@@ -58,21 +59,18 @@ struct Followed {
 struct Overlap {
     /// Its objects.
     pair: [u32; 2],
-    /// Places of their bodies.
+    /// Places of their bodies; the second is the one that is moved, being the farther one from what is fixed.
     bodies: [usize; 2],
-    /// From the first to the second.
-    normal: DVec3,
-    /// How far they are to be moved apart along it.
-    way: f64,
+    /// How the second is to be moved against the first, for the face by which they met to be in sight.
+    way: DVec3,
+    /// Pairs between it and what is fixed.
+    level: usize,
 }
 
 /// Requests of a step that move pairs apart.
-const MOST_ROUNDS: usize = 4;
-/// How often all pairs are looked at until each is apart. Those that stand on each other are seen from the ground up, so that one look
-/// is enough where no body has two below it.
-const SWEEPS: usize = 16;
-/// Part of the way that may be missing at the end.
-const MISSING: f64 = 1e-3;
+const MOST_ROUNDS: usize = 8;
+/// Of the gap, how far a pair that is moved by others may be from where it would be moved itself.
+const ASIDE: f64 = 0.25;
 
 /// Which of its requests a step waits for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,7 +103,7 @@ pub struct ContactCache {
     manifolds: Manifolds,
     records: Vec<PoseRecord>,
     /// Pairs in overlap that are asked about again.
-    deep: Vec<[u32; 2]>,
+    deep: Vec<Overlap>,
     /// Pairs in overlap that no request has moved apart yet.
     left: Vec<Overlap>,
     /// Requests of the step that move pairs apart, so far.
@@ -251,8 +249,8 @@ impl ContactCache {
         for pair in self.manifolds.pairs().filter(|pair| pair.status == OVERLAP) {
             let (Some(p), true) = (pair.points.first(), is_asked(&self.bodies, pair.a, pair.b)) else { continue };
             let (Some(a), Some(b)) = (index(&self.bodies, pair.a), index(&self.bodies, pair.b)) else { continue };
-            let (way, normal) = (0.5 * self.gap - p.separation, p.normal);
-            self.left.push(Overlap { pair: [pair.a, pair.b], bodies: [a, b], normal, way });
+            let way = p.normal * (0.5 * self.gap - p.separation);
+            self.left.push(Overlap { pair: [pair.a, pair.b], bodies: [a, b], way, level: 0 });
         }
         if !self.left.is_empty() {
             self.asked.retracted += 1;
@@ -261,8 +259,7 @@ impl ContactCache {
         }
     }
 
-    /// Pairs next to what is fixed first, then those beside these, and so on; the body farther from there second in each: it is the
-    /// one that is moved.
+    /// Pairs next to what is fixed first, then those beside these, and so on.
     fn sort_from_the_ground(&mut self) {
         const FAR: usize = usize::MAX;
         let mut above: Vec<usize> = self.bodies.iter().map(|body| if body.is_fixed { 0 } else { FAR }).collect();
@@ -286,43 +283,34 @@ impl ContactCache {
         for pair in &mut self.left {
             let [a, b] = pair.bodies;
             if above[a] > above[b] {
-                (pair.bodies, pair.normal) = ([b, a], -pair.normal);
+                (pair.bodies, pair.way) = ([b, a], -pair.way);
             }
+            let [a, b] = pair.bodies.map(|i| above[i]);
+            // Two of one height: once both are placed.
+            pair.level = 2 * b + usize::from(a == b);
         }
-        self.left.sort_by_key(|pair| above[pair.bodies[1]]);
+        self.left.sort_by_key(|pair| pair.level);
     }
 
-    /// The request for as many of the pairs that are left as can be apart together: the normal points to the body that is moved.
+    /// The request for as many of the pairs that are left as can be apart together, each by its own way: a round body that others had
+    /// moved aside would touch elsewhere.
     fn next_round(&mut self) {
-        let mut ways = vec![DVec3::ZERO; self.bodies.len()];
-        let short = |ways: &[DVec3], pair: &Overlap| {
+        let still = |body: &Followed| body.is_fixed.then_some(DVec3::ZERO);
+        let mut ways: Vec<Option<DVec3>> = self.bodies.iter().map(still).collect();
+        let near = ASIDE * self.gap;
+        let mut later = Vec::new();
+        for pair in std::mem::take(&mut self.left) {
             let [a, b] = pair.bodies;
-            pair.way - pair.normal.dot(ways[b] - ways[a])
-        };
-        for _ in 0..SWEEPS {
-            let mut any = false;
-            for pair in &self.left {
-                let short = short(&ways, pair);
-                if short > MISSING * pair.way && !self.bodies[pair.bodies[1]].is_fixed {
-                    ways[pair.bodies[1]] += pair.normal * short;
-                    any = true;
-                }
-            }
-            if !any {
-                break;
+            let wanted = *ways[a].get_or_insert(DVec3::ZERO) + pair.way;
+            if ways[b].get_or_insert(wanted).distance(wanted) <= near {
+                self.deep.push(pair);
+            } else {
+                later.push(pair);
             }
         }
-        // Where they cannot, the first is alone: whatever it is, it can.
-        let is_apart = |pair: &Overlap| short(&ways, pair) <= 0.25 * self.gap;
-        if !self.left.iter().any(is_apart) {
-            ways.fill(DVec3::ZERO);
-            let first = &self.left[0];
-            ways[first.bodies[1]] = first.normal * first.way;
-        }
-        let is_apart = |pair: &Overlap| short(&ways, pair) <= 0.25 * self.gap;
-        self.deep = self.left.iter().filter(|pair| is_apart(pair)).map(|pair| pair.pair).collect();
-        self.left.retain(|pair| !self.deep.contains(&pair.pair));
+        self.left = later;
         for (body, way) in self.bodies.iter_mut().zip(ways).filter(|(body, _)| !body.is_fixed) {
+            let way = way.unwrap_or_default();
             let apart = body.told.filter(|_| way != DVec3::ZERO);
             let apart = apart.map(|told| Pose { position: told.position + way, ..told });
             // What an earlier request has moved is put back.
@@ -334,12 +322,34 @@ impl ContactCache {
         self.phase = Phase::Again;
     }
 
+    /// Takes the pairs that are apart now. The depth that was told may be less than the way out, as of an edge in a face: what is in
+    /// overlap still goes on from there.
     fn again(&mut self, reply: &Reply) {
         let deep = std::mem::take(&mut self.deep);
-        self.take(reply, |_, a, b, status| status != OVERLAP && deep.contains(&[a, b]));
+        self.take(reply, |_, a, b, status| status != OVERLAP && deep.iter().any(|pair| pair.pair == [a, b]));
         self.manifolds.finish();
+        let moved = |i: usize| {
+            let body = &self.bodies[i];
+            body.apart.zip(body.told).map_or(DVec3::ZERO, |(apart, told)| apart.position - told.position)
+        };
+        for record in reply.records().iter().filter(|record| record.status == OVERLAP) {
+            let Some(pair) = deep.iter().find(|pair| pair.pair == [record.a, record.b]) else { continue };
+            let Some(detail) = reply.detail(record).filter(|detail| detail.penetration > 0.0) else { continue };
+            let [a, b] = pair.bodies;
+            // The direction is from the record's first object to its second.
+            let direction = DVec3::from_array(detail.direction);
+            let direction = if self.bodies[b].object == record.b { direction } else { -direction };
+            let way = moved(b) - moved(a) + direction * (0.5 * self.gap + detail.penetration);
+            self.left.push(Overlap { way, ..*pair });
+        }
+        self.left.sort_by_key(|pair| pair.level);
         if !self.left.is_empty() && self.rounds < MOST_ROUNDS {
             self.next_round();
+        }
+        // Its memory is for the next.
+        if self.deep.is_empty() {
+            self.deep = deep;
+            self.deep.clear();
         }
     }
 }

@@ -11,6 +11,7 @@ use contactd_proto::{Pose, Report, Rule};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
 use glam::{DVec3, dvec3};
+use std::f64::consts::FRAC_PI_4;
 use std::time::Duration;
 
 /// Pairs are told within this of each other; bodies are about 1 in size.
@@ -369,5 +370,27 @@ fn a_body_that_is_held_from_both_sides_is_told_by_both_faces() {
         let (told, requests) = pile(&heights, &[0, 2], &order);
         expect_faces(&told, &heights, &format!("{order:?}"));
         assert_eq!(requests, 3, "{order:?}");
+    }
+}
+
+/// An edge or a corner deeper in a floor than the ball within it: told as deep as it is, by all points that are.
+#[test]
+fn edges_and_corners_are_told_as_deep_as_they_are() {
+    for (lean, points) in [(DVec3::X * FRAC_PI_4, 2), (DVec3::Y * 0.2, 2), (dvec3(0.3, 0.5, 0.0), 1)] {
+        for deep in [0.1, 1.0, 10.0, 30.0] {
+            let mut r = Random::new(77);
+            let mut scene = Scene::new(&mut r, 0.0);
+            while !matches!(scene.bodies[0].1, Shape::Cuboid(_)) {
+                scene = Scene::new(&mut r, 0.0);
+            }
+            let poses: Vec<Pose> = (0..3)
+                .map(|i| if i == 0 { scene.over(0, -deep * MARGIN, lean) } else { scene.over(i, 9.0, lean) })
+                .collect();
+            scene.step(&poses);
+            let told: Vec<f64> = scene.cache.contacts().map(|c| c.1.separation).collect();
+            let least = told.iter().copied().fold(f64::INFINITY, f64::min);
+            let what = format!("{deep} margins, {lean}: {told:?}");
+            assert!((least + deep * MARGIN).abs() < 1e-8 && told.len() == points, "{what}");
+        }
     }
 }
