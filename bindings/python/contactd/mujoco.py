@@ -33,7 +33,7 @@ import ctypes
 import os
 import pathlib
 import warnings
-from typing import Any, Container, Mapping, NamedTuple
+from typing import Any, Mapping, NamedTuple
 
 import mujoco as mj
 import numpy as np
@@ -60,6 +60,7 @@ def attach(
     replace: Mapping[str, Given] | None = None,
     *,
     meshes: str = "hull",
+    keep_exact: bool = True,
     skin: float = 2e-4,
     slack: float = 1e-2,
     unit: float = 1.0,
@@ -67,12 +68,18 @@ def attach(
 ) -> Coupling:
     """contactd's contacts for a whole ``MjModel``: each geom that collides meets others as the exact solid that it is.
 
+    Contacts that MuJoCo has in closed form stay MuJoCo's own (``keep_exact``): of a plane with balls, capsules, boxes, cylinders and
+    ellipsoids, of a ball with balls, capsules and boxes, of two capsules, of two boxes. They cost what they cost without a
+    coupling, and have the ``margin`` and ``gap`` of their geoms.
+
     ``replace``: for bodies by name, a solid in place of all geoms of the body, as for ``Coupling``. ``meshes``: "hull", as in
     MuJoCo's own collisions, or "exact". Contacts are those that MuJoCo's rules ask for, geom by geom: ``contype``,
     ``conaffinity``, ``<exclude>``, ``<pair>``, parents, ``condim``, friction, solver parameters. What has no solid (a signed distance
     function of a plugin) is refused by name. The rest is ``Coupling``'s.
     """
-    return Coupling(model, replace or {}, geoms=True, meshes=meshes, skin=skin, slack=slack, unit=unit, session=session)
+    return Coupling(
+        model, replace or {}, geoms=True, meshes=meshes, keep_exact=keep_exact, skin=skin, slack=slack, unit=unit, session=session
+    )
 
 
 class Asked(NamedTuple):
@@ -92,13 +99,14 @@ class Coupling:
     ``solids``: for each body by name, its solid in the body's frame: OpenSCAD CSG text, a solid that was built
     (``contactd.solid``), or the path of a file; its unit is ``unit`` lengths of MuJoCo (0.001: models in millimetres in a scene in
     metres). ``geoms``: every other geom that collides gets its own solid, too (``attach``); ``meshes``: what a mesh then stands
-    for, "hull" or "exact". Bodies welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
+    for, "hull" or "exact"; ``keep_exact``: what MuJoCo has in closed form stays its own. Bodies welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
     unit, at which contacts begin to act, in place of the geoms' ``margin``. ``slack``: the part of it by which any point of a body
     may go until contactd is asked about it anew; until then its contacts are carried along, and a gap is off by about the
     square of that way over the radius of the surfaces (0: not at all where they are flat). ``session``: to use one that is open (by
     default an embedded one is opened, and closed with the coupling); its rules are replaced.
 
-    Geoms that have a solid get ``contype`` and ``conaffinity`` 0 until the coupling is closed, and no contact of a ``<pair>``. What
+    Geoms that have a solid get ``contype`` and ``conaffinity`` 0 until the coupling is closed, or those by which they meet what they
+    have MuJoCo's own contacts with alone; so do those of a ``<pair>``, which has no reach. What
     makes contacts (friction, ``solref``, ``condim`` …) is that of the geoms, of a body with a solid that of its first colliding
     geom, combined as MuJoCo does. The filters are read once: what is changed in the model later is not seen.
 
@@ -113,6 +121,7 @@ class Coupling:
         *,
         geoms: bool = False,
         meshes: str = "hull",
+        keep_exact: bool = True,
         skin: float = 2e-4,
         slack: float = 1e-2,
         unit: float = 1.0,
@@ -129,10 +138,10 @@ class Coupling:
         self.slack = slack
         self.unit = unit
         self._adheres = bool(np.any(model.actuator_trntype == mj.mjtTrn.mjTRN_BODY))
-        self._filter = Filter(model)
+        self._filter = Filter(model, geoms and keep_exact)
         given = self._given(solids)
         if geoms:
-            given += self._own_solids(meshes, {part.body for part, _ in given})
+            given += self._own_solids(meshes, [part for part, _ in given])
         self._filter.take([part for part, _ in given])
         for sentence in self._filter.warnings:
             warnings.warn(sentence, CouplingWarning, stacklevel=2 + geoms)
@@ -175,17 +184,19 @@ class Coupling:
             found.append((self._filter.whole(name, body), solid))
         return found
 
-    def _own_solids(self, meshes: str, taken: Container[int]) -> list[tuple[StandIn, Given]]:
-        """The solids of all geoms that collide, or that a ``<pair>`` names, but those of bodies that have one already."""
+    def _own_solids(self, meshes: str, wholes: list[StandIn]) -> list[tuple[StandIn, Given]]:
+        """The solids of all geoms that collide, or that a ``<pair>`` names, but those of bodies that have one already, and those that
+        MuJoCo alone has contacts of."""
+        taken = {part.body for part in wholes}
+        meeting = [geom for body in range(self.model.nbody) if body not in taken for geom in self._filter.meeting(body)]
         found = []
-        for body in range(self.model.nbody):
-            for geom in () if body in taken else self._filter.meeting(body):
-                called = self._filter.geom(geom)
-                try:
-                    solid = solid_of(self.model, geom, self.unit, meshes)
-                except ValueError as e:
-                    raise ValueError(f"{called}: {e}: give its body a solid by replace=, or contype and conaffinity 0") from None
-                found.append((StandIn(called, body, [geom], False), solid))
+        for geom in self._filter.keep_exact(meeting, wholes):
+            called = self._filter.geom(geom)
+            try:
+                solid = solid_of(self.model, geom, self.unit, meshes)
+            except ValueError as e:
+                raise ValueError(f"{called}: {e}: give its body a solid by replace=, or contype and conaffinity 0") from None
+            found.append((StandIn(called, int(self.model.geom_bodyid[geom]), [geom], False), solid))
         return found
 
     def _load(self, part: StandIn, given: Given) -> sessions.Model:
@@ -228,9 +239,10 @@ class Coupling:
             (template, offsets),
         )
         # Last, so that what is refused before has changed nothing.
-        for geom in sorted(g for part, _ in given for g in part.geoms):
+        own = self._filter.own_bits
+        for geom in sorted({g for part, _ in given for g in part.geoms} | set(own)):
             self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
-            model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
+            model.geom_contype[geom], model.geom_conaffinity[geom] = own.get(geom, (0, 0))
         for (g1, g2), pair in self._filter.pairs.items():
             self._unpaired.append((pair, float(model.pair_margin[pair])))
             # With this margin MuJoCo's test of bounding balls leaves the pair out; planes have none, and no distance is so small.

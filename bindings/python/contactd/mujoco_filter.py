@@ -47,11 +47,29 @@ _OPTIONS = {
 }
 
 
-class Filter:
-    """What MuJoCo lets meet in ``model``: ``take`` says which solids are to stand in for which of its geoms."""
+_G = mj.mjtGeom
+#: Kinds of geoms of which MuJoCo has all contacts in closed form, exact as contactd's are (engine_collision_primitive.c,
+#: engine_collision_box.c).
+_EXACT = {
+    *(frozenset({_G.mjGEOM_PLANE, k}) for k in (_G.mjGEOM_SPHERE, _G.mjGEOM_CAPSULE, _G.mjGEOM_ELLIPSOID, _G.mjGEOM_CYLINDER, _G.mjGEOM_BOX)),
+    *(frozenset({_G.mjGEOM_SPHERE, k}) for k in (_G.mjGEOM_SPHERE, _G.mjGEOM_CAPSULE, _G.mjGEOM_BOX)),
+    frozenset({_G.mjGEOM_CAPSULE}),
+    frozenset({_G.mjGEOM_BOX}),
+}  # fmt: skip
+#: Bits of contype and conaffinity.
+_BITS = 31
 
-    def __init__(self, model: mj.MjModel) -> None:
+
+class Filter:
+    """What MuJoCo lets meet in ``model``: ``take`` says which solids are to stand in for which of its geoms. ``keep_exact``: contacts
+    that MuJoCo has in closed form stay its own, between two geoms of which each has a solid for itself."""
+
+    def __init__(self, model: mj.MjModel, keep_exact: bool = False) -> None:
         self._model = model
+        #: The contype and conaffinity of geoms by which they meet what they have MuJoCo's own contacts with, and nothing else.
+        self.own_bits: dict[int, tuple[int, int]] = {}
+        # The bits that are given anew might be those of a flex.
+        self._keeps_exact = keep_exact and not getattr(model, "nflex", 0)
         self._excluded = {int(s) for s in model.exclude_signature}
         self._parents = not model.opt.disableflags & mj.mjtDisableBit.mjDSBL_FILTERPARENT
         self.warnings: list[str] = []
@@ -87,6 +105,8 @@ class Filter:
         if (min(a, b) << 16) + max(a, b) in self._excluded:
             return False
         weld = [int(model.body_weldid[body]) for body in (a, b)]
+        if not any(model.body_dofnum[w] for w in weld):
+            return False
         above = [int(model.body_weldid[model.body_parentid[w]]) for w in weld]
         kin = weld[0] == above[1] or weld[1] == above[0]
         return weld[0] != weld[1] and not (self._parents and 0 not in weld and kin)
@@ -112,6 +132,46 @@ class Filter:
         """The geoms of a body that collide, or that a ``<pair>`` names."""
         named = {int(g) for g in (*self._model.pair_geom1, *self._model.pair_geom2)}
         return sorted({*self.colliding(body), *named.intersection(self._all_geoms(body))})
+
+    def _kind(self, geom: int) -> tuple[int, int, int]:
+        model = self._model
+        return int(model.geom_type[geom]), int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])
+
+    def keep_exact(self, geoms: Sequence[int], wholes: Sequence[StandIn]) -> list[int]:
+        """Leaves to MuJoCo what it has in closed form, of geoms that would each have a solid for itself beside ``wholes``; returns those
+        that meet something else, too."""
+        if not self._keeps_exact:
+            return list(geoms)
+        model = self._model
+        kinds = sorted({self._kind(g) for g in geoms})
+        if len(kinds) > _BITS:
+            self._keeps_exact = False
+            return list(geoms)
+        meets = lambda a, b: bool(a[1] & b[2] or b[1] & a[2])  # noqa: E731
+        partners = [[j for j, b in enumerate(kinds) if meets(a, b) and frozenset({a[0], b[0]}) in _EXACT] for a in kinds]
+        for g in geoms:
+            i = kinds.index(self._kind(g))
+            # A bit for each kind: one meets those whose bits it has. What meets none so must not by its old bits.
+            self.own_bits[g] = (1 << i, sum(1 << j for j in partners[i])) if partners[i] else (0, 0)
+        others = {self._kind(g) for part in wholes for g in part.geoms}
+        needed = {
+            a for i, a in enumerate(kinds)
+            if any(meets(a, b) for b in others) or any(meets(a, b) and j not in partners[i] for j, b in enumerate(kinds))
+        }  # fmt: skip
+        named = set()
+        for k in range(model.npair):
+            pair = int(model.pair_geom1[k]), int(model.pair_geom2[k])
+            if not self._is_exact(*pair):
+                named.update(pair)
+        return [g for g in geoms if self._kind(g) in needed or g in named]
+
+    def _is_exact(self, g1: int, g2: int) -> bool:
+        """Whether the contacts of two geoms stay MuJoCo's own."""
+        types = frozenset({int(self._model.geom_type[g1]), int(self._model.geom_type[g2])})
+        return self._keeps_exact and types in _EXACT
+
+    def _are_exact(self, a: StandIn, b: StandIn) -> bool:
+        return not a.is_whole and not b.is_whole and self._is_exact(a.geoms[0], b.geoms[0])
 
     def _bits(self, geoms: Any, others: Any) -> np.ndarray:
         """For each of ``geoms`` (rows) and ``others`` (columns) whether their bits let them meet."""
@@ -160,11 +220,16 @@ class Filter:
                 raise ValueError(f"contacts of solids do not know {word}, which {self._names(some)} has: take it out")
         for field in ("margin", "gap"):
             some = [g for g in part.geoms if getattr(model, f"geom_{field}")[g]]
-            if some:
+            if some and (part.is_whole or any(self._may_meet(part, other) for other in self._parts)):
                 self.warnings.append(
                     f"the {field} of {self._names(some)} has no effect: contacts of {self.body(part.body)} act from the coupling's skin on; take "
                     "it out and choose skin"
                 )
+
+    def _may_meet(self, a: StandIn, b: StandIn) -> bool:
+        """Whether two solids may have contacts with each other."""
+        is_bodies = a is not b and self.bodies_meet(a.body, b.body) and not self._are_exact(a, b)
+        return is_bodies and bool(self._bits(list(a.geoms), list(b.geoms)).any())
 
     def _names(self, geoms: Iterable[int]) -> str:
         """Some geoms in a sentence, the first three by name."""
@@ -176,6 +241,8 @@ class Filter:
         model = self._model
         for k in range(model.npair):
             geoms = int(model.pair_geom1[k]), int(model.pair_geom2[k])
+            if self._is_exact(*geoms) and not any(part.is_whole for part in self._parts if set(geoms) & set(part.geoms)):
+                continue
             parts = [self._parts[self._part_of[g]] if g in self._part_of else None for g in geoms]
             if all(part is not None and not part.is_whole for part in parts):
                 self.pairs[min(geoms), max(geoms)] = k
@@ -197,7 +264,7 @@ class Filter:
     def _others(self) -> None:
         """Refuses contacts that the coupling would take away: between a coupled body and one without a solid."""
         model = self._model
-        others = np.array([g for g in range(model.ngeom) if g not in self._part_of], dtype=int)
+        others = np.array([g for g in range(model.ngeom) if g not in self._part_of and g not in self.own_bits], dtype=int)
         for part in self._parts:
             body, lost = part.body, {}
             for k, j in zip(*np.nonzero(self._bits(list(part.geoms), others))):
@@ -247,7 +314,8 @@ class Filter:
         keys: dict[Any, list[int]] = {}
         for i, part in enumerate(self._parts):
             bits = tuple(sorted({(int(model.geom_contype[g]), int(model.geom_conaffinity[g])) for g in part.geoms}))
-            keys.setdefault((bits, i if part.geoms[0] in paired else -1), []).append(i)
+            kind = -1 if part.is_whole else int(model.geom_type[part.geoms[0]])
+            keys.setdefault((bits, kind, i if part.geoms[0] in paired else -1), []).append(i)
         members = list(keys.values())
         groups = [""] * len(self._parts)
         for number, group in enumerate(members):
@@ -258,7 +326,7 @@ class Filter:
         for number, group in enumerate(members):
             for other in members[number:]:
                 a, b = self._parts[group[0]], self._parts[other[0]]
-                if self._bits(list(a.geoms), list(b.geoms)).any():
+                if self._bits(list(a.geoms), list(b.geoms)).any() and not self._are_exact(a, b):
                     rules.append(rule((groups[group[0]], groups[other[0]]), self._apart(group, other)))
         if not rules and groups:
             # Without any rule everything would meet.

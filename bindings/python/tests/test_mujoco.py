@@ -128,8 +128,8 @@ def test_contacts_of_a_body_at_rest_keep_their_ids():
                 assert model.body(b).name == "body" and np.allclose(point.on_b, first[point.id], atol=1e-6)
 
 
-def test_a_pair_that_stays_in_overlap_keeps_its_depth_and_ids():
-    # A box of 100 mm jammed between walls 98 mm apart: out of one is into the other.
+def test_a_body_between_two_walls_is_told_by_both_faces_and_keeps_its_ids():
+    # A box of 100 mm jammed between walls 98 mm apart: out of one is into the other, so it is moved out of each by itself.
     wall = '<body name="{0}" pos="{1} 0 0"><geom type="box" size=".05 .2 .2"/></body>'
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><worldbody>{wall.format("left", -0.099)}{wall.format("right", 0.099)}
@@ -143,19 +143,19 @@ def test_a_pair_that_stays_in_overlap_keeps_its_depth_and_ids():
             # By more than the slack, so that it is asked about.
             data.qpos[2] += 1e-5
             mujoco.mj_step1(model, data)
-            assert coupling.add_contacts(data) == data.ncon == 5
+            assert coupling.add_contacts(data) == data.ncon == 8
             by_wall = {}
             for a, b, point in coupling.contacts:
                 assert point.separation == pytest.approx(-1.0, abs=1e-2)
                 by_wall.setdefault(model.body(a).name, []).append(point.id)
-            assert sorted(map(len, by_wall.values())) == [1, 4]
+            assert sorted(map(len, by_wall.values())) == [4, 4]
             assert all(min(ids) >= 0 and len(set(ids)) == len(ids) for ids in by_wall.values())
             seen.append(by_wall)
         assert seen[0] == seen[1] == seen[2] and coupling.retracted == 3
         asked, kept = coupling.asked, coupling.contacts
-        assert asked == (6, 6, 3)
+        assert asked == (9, 9, 3)
         mujoco.mj_step1(model, data)
-        assert coupling.add_contacts(data) == data.ncon == 5 and coupling.asked == asked, "nothing has moved"
+        assert coupling.add_contacts(data) == data.ncon == 8 and coupling.asked == asked, "nothing has moved"
         assert [p.id for *_, p in coupling.contacts] == [p.id for *_, p in kept] and coupling.contacts is not kept
 
 

@@ -111,7 +111,7 @@ def shuffled(model, data, rng):
             data.qpos[at] = rng.uniform(-np.pi, np.pi)
 
 
-def judged(seed):
+def judged(seed, keep_exact):
     """Compares all contacts of some states of a random model; tells how many pairs were told by both."""
     text = Maker(seed).text()
     stock, model = (mujoco.MjModel.from_xml_string(text) for _ in range(2))
@@ -119,14 +119,18 @@ def judged(seed):
     rng = np.random.default_rng(seed)
     common = 0
     kind = lambda g: mujoco.mjtGeom(stock.geom_type[g]).name.removeprefix("mjGEOM_").lower()  # noqa: E731
-    with attach(model, skin=SKIN) as coupling:
+    with attach(model, skin=SKIN, keep_exact=keep_exact) as coupling:
         for state in range(STATES):
             shuffled(stock, theirs, rng)
             data.qpos[:] = theirs.qpos
             mujoco.mj_forward(stock, theirs)
             mujoco.mj_step1(model, data)
-            assert data.ncon == 0, "MuJoCo's own contacts are off"
+            kept = {frozenset(kind(g) for g in contact.geom) for contact in data.contact}
+            assert kept <= EXACT if keep_exact else not kept, f"MuJoCo's own contacts: {kept}"
+            before = data.ncon
             coupling.add_contacts(data)
+            added = {frozenset(kind(g) for g in contact.geom) for contact in list(data.contact)[before:]}
+            assert not keep_exact or not added & EXACT
             own, stocks = contacts(model, data), contacts(stock, theirs)
             for pair in own.keys() | stocks.keys():
                 what = f"model {seed}, state {state}, {[kind(g) for g in pair]} {pair}"
@@ -143,8 +147,15 @@ def judged(seed):
     return common
 
 
-def test_random_models_have_the_contacts_that_mujoco_gives_them():
-    common = sum(judged(seed) for seed in range(MODELS))
+#: What MuJoCo has in closed form.
+EXACT = {frozenset(pair.split()) for pair in [
+    "plane sphere", "plane capsule", "plane ellipsoid", "plane cylinder", "plane box", "sphere", "sphere capsule", "sphere box", "capsule", "box",
+]}  # fmt: skip
+
+
+@pytest.mark.parametrize("keep_exact", [True, False])
+def test_random_models_have_the_contacts_that_mujoco_gives_them(keep_exact):
+    common = sum(judged(seed, keep_exact) for seed in range(MODELS))
     print(f"{MODELS} models, {STATES} states each: {common} pairs told by both")
     assert common > 5 * MODELS
 
@@ -157,7 +168,7 @@ def test_distances_are_mujocos_where_it_has_closed_forms(kinds):
     theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
     rng = np.random.default_rng(11)
     worst, met = 0.0, 0
-    with attach(model, skin=SKIN) as coupling:
+    with attach(model, keep_exact=False, skin=SKIN) as coupling:
         for _ in range(100 * MODELS // 40):
             shuffled(stock, theirs, rng)
             theirs.qpos[:3] *= 0.3 / np.linalg.norm(theirs.qpos[:3]) * rng.uniform(0.2, 1.0)
@@ -188,7 +199,7 @@ BALL = '<body name="ball" pos="{} {} {}"><freejoint/><geom name="ball" size=".05
 def after(model, steps, **options):
     """The state after some steps, and the contacts of the last by name."""
     data = mujoco.MjData(model)
-    with attach(model, **options) as coupling:
+    with attach(model, keep_exact=False, **options) as coupling:
         for _ in range(steps):
             coupling.step(data)
         return data, coupling.contact_geoms
@@ -281,7 +292,7 @@ def test_a_pair_is_met_by_its_own_parameters_and_given_back():
     pair = '<contact><pair name="grip" geom1="floor" geom2="ball" condim="4" friction=".5 .4 .3 .2 .1"/></contact>'
     model = scene(FLOOR + BALL.format(0, 0, 0.0501), after=pair)
     data = mujoco.MjData(model)
-    with attach(model) as coupling:
+    with attach(model, keep_exact=False) as coupling:
         mujoco.mj_step1(model, data)
         assert data.ncon == 0 and coupling.add_contacts(data) == 1
         contact = data.contact[0]
@@ -296,7 +307,7 @@ def test_an_adhesion_actuator_pulls_along_contacts_of_solids():
     stock, model = (scene(ceiling + BALL.format(0, 0, 0.4401), after=actuator) for _ in range(2))
     theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
     theirs.ctrl[:] = data.ctrl[:] = 1
-    with attach(model) as coupling:
+    with attach(model, keep_exact=False) as coupling:
         for _ in range(250):
             mujoco.mj_step(stock, theirs)
             coupling.step(data)
@@ -330,7 +341,7 @@ def test_a_settled_scene_stays_as_still_as_mujocos_own():
 def test_what_rests_is_not_asked_about():
     model = scene(TWENTY)
     data = mujoco.MjData(model)
-    with attach(model) as coupling:
+    with attach(model, keep_exact=False) as coupling:
         for _ in range(1000):
             coupling.step(data)
         settled = coupling.asked
@@ -387,7 +398,7 @@ def test_contacts_that_are_carried_along_are_those_that_a_request_would_tell():
 def test_parameters_are_those_of_the_model_as_it_is():
     model = scene(FLOOR + BALL.format(0, 0, 0.0501))
     data = mujoco.MjData(model)
-    with attach(model) as coupling:
+    with attach(model, keep_exact=False) as coupling:
         for friction in (0.3, 0.7):
             model.geom_friction[:, 0] = friction
             mujoco.mj_step1(model, data)
@@ -398,7 +409,7 @@ def test_parameters_are_those_of_the_model_as_it_is():
 def test_what_others_have_moved_in_the_session_is_told_anew():
     model = scene(FLOOR + BALL.format(0, 0, 0.0501))
     data = mujoco.MjData(model)
-    with contactd.embedded() as session, attach(model, session=session) as coupling:
+    with contactd.embedded() as session, attach(model, keep_exact=False, session=session) as coupling:
         mujoco.mj_step1(model, data)
         assert coupling.add_contacts(data) == 1
         # The plane is the session's first object, the ball its second one.
@@ -411,7 +422,7 @@ def test_what_others_have_moved_in_the_session_is_told_anew():
 def test_the_slack_may_be_none_and_is_checked():
     model = scene(FLOOR + BALL.format(0, 0, 0.0501))
     data = mujoco.MjData(model)
-    with attach(model, slack=0.0) as coupling:
+    with attach(model, keep_exact=False, slack=0.0) as coupling:
         for k in range(3):
             data.qpos[0] = k * 1e-12
             mujoco.mj_step1(model, data)
@@ -426,7 +437,7 @@ def test_an_arena_without_room_is_told():
     text = f'<mujoco><size memory="20K"/><worldbody>{TWENTY}</worldbody></mujoco>'
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    with attach(model) as coupling:
+    with attach(model, keep_exact=False) as coupling:
         mujoco.mj_kinematics(model, data)
         with pytest.raises(MemoryError, match="enlarge <size memory>"):
             coupling.add_contacts(data)
@@ -435,7 +446,7 @@ def test_an_arena_without_room_is_told():
 def test_data_of_another_model_is_refused():
     model = scene(FLOOR + BALL.format(0, 0, 0.0501))
     other = mujoco.MjData(scene(FLOOR))
-    with attach(model) as coupling, pytest.raises(ValueError, match="the data of the coupling's own model"):
+    with attach(model, keep_exact=False) as coupling, pytest.raises(ValueError, match="the data of the coupling's own model"):
         coupling.add_contacts(other)
 
 
@@ -443,5 +454,62 @@ def test_a_model_without_anything_to_warn_of_warns_of_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error", CouplingWarning)
         attach(scene(FLOOR + BALL.format(0, 0, 1))).close()
+    wide = FLOOR + BALL.format(0, 0, 0.055).replace('size=".05"', 'size=".05" margin=".01"')
     with pytest.warns(CouplingWarning, match="the margin of geom 'ball' has no effect"):
-        attach(scene(FLOOR + BALL.format(0, 0, 1).replace('size=".05"', 'size=".05" margin=".01"'))).close()
+        attach(scene(wide), keep_exact=False).close()
+
+
+def test_what_mujoco_has_in_closed_form_stays_its_own_with_its_margin():
+    model = scene(FLOOR + BALL.format(0, 0, 0.055).replace('size=".05"', 'size=".05" margin=".01" gap=".002"'))
+    stock = scene(FLOOR + BALL.format(0, 0, 0.055).replace('size=".05"', 'size=".05" margin=".01" gap=".002"'))
+    data, theirs = mujoco.MjData(model), mujoco.MjData(stock)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CouplingWarning)
+        with attach(model) as coupling:
+            for _ in range(300):
+                mujoco.mj_step(stock, theirs)
+                coupling.step(data)
+            assert data.ncon == 1 and np.array_equal(data.qpos, theirs.qpos) and coupling.asked.requests == 0
+            assert data.contact[0].includemargin == theirs.contact[0].includemargin
+    assert model.geom_contype.tolist() == [1, 1] and model.geom_conaffinity.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("keep_exact", [True, False])
+@pytest.mark.parametrize("kind", ["box", "cylinder"])
+def test_a_stack_stays_as_still_as_stock(kind, keep_exact):
+    body = '<body pos="0 0 {}"><freejoint/><geom type="{}" size=".05 .05 .05"/></body>'
+    inner = FLOOR + "".join(body.format(round(0.05 + 0.1 * i, 2), kind) for i in range(5))
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{inner}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    with attach(model, keep_exact=keep_exact) as coupling:
+        for _ in range(1500):
+            coupling.step(data)
+    assert abs(data.qvel).max() < 1e-9 and np.abs(data.qpos[2::7] - model.qpos0[2::7]).max() < 3e-3
+
+
+def test_where_nothing_may_meet_nothing_does():
+    ball = BALL.replace("<geom", '<geom contype="0" conaffinity="1"')
+    model = scene(FLOOR.replace("<geom", '<geom contype="0" conaffinity="1"') + ball.format(0, 0, 0.04))
+    fixed = '<body mocap="true" pos="{} 0 .04"><geom size=".05"/></body>'
+    mocap = scene(FLOOR + fixed.format(0) + fixed.format(0.05) + BALL.format(1, 0, 1))
+    for model in (model, mocap):
+        data = mujoco.MjData(model)
+        with attach(model, keep_exact=False) as coupling:
+            mujoco.mj_step1(model, data)
+            assert coupling.add_contacts(data) == 0 and data.ncon == 0
+
+
+def test_edges_and_corners_are_as_deep_as_mujoco_says():
+    for euler, points in (("0 0 0", 4), ("45 0 0", 2), ("30 20 0", 1)):
+        inner = FLOOR + f'<body pos="0 0 .07"><freejoint/><geom type="box" size=".05 .05 .05" euler="{euler}"/></body>'
+        stock, model = scene(inner), scene(inner)
+        theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+        with attach(model, keep_exact=False) as coupling:
+            for z in np.linspace(0.03, 0.06, 7):
+                theirs.qpos[2] = data.qpos[2] = z
+                mujoco.mj_forward(stock, theirs)
+                mujoco.mj_step1(model, data)
+                coupling.add_contacts(data)
+                own, stocks = (min((c.dist for c in d.contact), default=1.0) for d in (data, theirs))
+                assert own == pytest.approx(stocks, abs=1e-8) or min(own, stocks) > 0, (euler, z)
+                assert data.ncon == points or own > -1e-3, (euler, z, data.ncon)
