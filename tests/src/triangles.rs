@@ -152,8 +152,9 @@ fn between(
         if halves[0].0 < halves[1].0 {
             halves.swap(0, 1);
         }
-        // A box without triangles is infinitely far, or nowhere.
-        stack.extend(halves.into_iter().filter(|h| h.0 <= best));
+        // A box without triangles has no place that could be moved.
+        let held = |(low, _): (DVec3, DVec3)| low.is_finite();
+        stack.extend(halves.into_iter().filter(|h| h.0 <= best && held(a.boxes[h.1]) && held(b.boxes[h.2])));
     }
     best
 }

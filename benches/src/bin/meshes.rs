@@ -12,6 +12,9 @@
 //!
 //! Two further tables: pegs in a plate that is a mesh beside the same plate as a tree, and what a load takes.
 //!
+//! `--files DIR` takes the meshes of files in a folder, such as scans and links of robots, in place of those made by formulas: each
+//! about the origin, and by a power of two as large as these. What is refused is told, and what is convex, which is no mesh to us.
+//!
 //! `--export DIR` writes the meshes and the questions for `benches/coal/meshes.py`, which asks coal the same.
 
 use clap::Parser;
@@ -48,6 +51,9 @@ struct Arguments {
     /// Only the meshes whose name holds this.
     #[arg(long, default_value = "")]
     only: String,
+    /// Folder with files of meshes, in place of those made by formulas.
+    #[arg(long, value_name = "DIR")]
+    files: Option<PathBuf>,
     /// Folder for the meshes (OFF) and the questions with our answers (scenes.csv), for other programs.
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
@@ -55,7 +61,7 @@ struct Arguments {
 
 /// A body in the terms of all three: ours, the peer's, the judge's.
 struct Body {
-    name: &'static str,
+    name: String,
     model: Model,
     peer: peer::Body,
     judge: triangles::Body,
@@ -66,10 +72,10 @@ struct Body {
 }
 
 impl Body {
-    fn of_mesh(name: &'static str, mesh: Mesh) -> Self {
+    fn of_mesh(name: &str, mesh: Mesh) -> Self {
         let (points, corners) = (mesh.0.iter().map(|p| peer::vector(*p)).collect(), mesh.1.clone());
         Self {
-            name,
+            name: name.into(),
             model: Model::new(Recipe::of(meshes::solid(&mesh)).build()),
             peer: peer::Body::new(SharedShape::new(TriMesh::new(points, corners).expect("a mesh has triangles"))),
             judge: triangles::Body::mesh(&mesh),
@@ -79,9 +85,10 @@ impl Body {
         }
     }
 
-    fn of_shape(name: &'static str, shape: impl Into<Shape>, judge: triangles::Body, text: String, reach: f64) -> Self {
+    fn of_shape(name: &str, shape: impl Into<Shape>, judge: triangles::Body, text: String, reach: f64) -> Self {
         let shape = shape.into();
         let peer = peer::Body::of(&shape, &Pose::IDENTITY);
+        let name = name.into();
         Self { name, model: Model::new(Recipe::of(shape).build()), peer, judge, mesh: None, shape: text, reach }
     }
 
@@ -132,6 +139,35 @@ fn all(quick: bool) -> Vec<(&'static str, Mesh)> {
         ),
         ("foam, sampled", shells::sampled(foam, box_of(0.9), n(35, 120) as f64 * 1e-3)),
     ]
+}
+
+/// The meshes of the files in a folder, in the order of their names.
+fn read(folder: &Path) -> std::io::Result<Vec<(String, Mesh)>> {
+    let mut paths = std::fs::read_dir(folder)?.map(|e| Ok(e?.path())).collect::<std::io::Result<Vec<_>>>()?;
+    paths.sort();
+    let mut meshes = Vec::new();
+    for path in paths {
+        let import = match read_model(&path, Facets::Auto, &Limits::default()) {
+            Ok(import) => import,
+            Err(error) => {
+                eprintln!("# {error}");
+                continue;
+            }
+        };
+        let Some(Shape::TriangleMesh(mesh)) = import.solid.whole().map(|p| &p.shape) else {
+            eprintln!("# {}: no single mesh, or a convex one", path.display());
+            continue;
+        };
+        let points = mesh.vertices();
+        let (low, high) = points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |b, p| (b.0.min(*p), b.1.max(*p)));
+        // Numbers of single precision stay as they are but for what they are from a middle of single precision.
+        let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
+        let scale = (0.5 * (high - low).length()).log2().ceil().exp2().recip();
+        let points = points.iter().map(|p| (*p - middle) * scale).collect();
+        meshes
+            .push((path.file_name().unwrap_or_default().to_string_lossy().into(), (points, mesh.triangles().to_vec())));
+    }
+    Ok(meshes)
 }
 
 /// What each mesh meets in turn.
@@ -194,7 +230,7 @@ const TOUCHING: f64 = 1e-8;
 const PEER: f64 = 1e-6;
 
 impl Judged {
-    fn judge(&mut self, [a, b]: [&Body; 2], step: &[Motion; 2], own: &Outcome, peer: Option<f64>) {
+    fn judge(&mut self, [a, b]: [&Body; 2], step: &[Motion; 2], own: &Outcome, peer: Option<Option<f64>>) {
         let size = own.resolution * 1e9;
         let apart =
             |t: f64, most: f64| triangles::distance((&a.judge, &step[0].at(t)), (&b.judge, &step[1].at(t)), most);
@@ -210,8 +246,9 @@ impl Judged {
             println!("# own answer is wrong: {} against {}, {step:?}: {own:?}", a.name, b.name);
         }
         match peer {
-            None => self.missed += usize::from(met),
-            Some(t) => {
+            None => {}
+            Some(None) => self.missed += usize::from(met),
+            Some(Some(t)) => {
                 self.early += usize::from(apart(t, 2.0 * PEER * size) > PEER * size && t < end + PEER * size / speed);
                 self.late += usize::from(met && (t - own.time()) * speed > PEER * size);
                 if met {
@@ -221,6 +258,9 @@ impl Judged {
         }
     }
 }
+
+/// How many triangles two meshes that turn have at most for the peer to be asked.
+const MOST: usize = 30_000;
 
 /// Writes meshes and questions for other programs.
 struct Export {
@@ -288,8 +328,9 @@ fn class(
     let answers: Vec<Outcome> = own.iter().map(|q| q.ask(&mut scratch)).collect();
     let other: Vec<peer::Question> =
         steps.iter().map(|[m, n]| peer::Question::new(a.peer.clone(), m, b.peer.clone(), n)).collect();
-    // A row takes the peer so long, with fewer questions if need be.
-    let mut left = options.pick(3.0, 0.5);
+    // A row takes the peer so long, with fewer questions if need be; none where one may take it minutes.
+    let heavy = turning && a.mesh.is_some() && b.mesh.is_some() && a.triangles() + b.triangles() > MOST;
+    let mut left = if heavy { 0.0 } else { options.pick(3.0, 0.5) };
     let mut theirs = Vec::new();
     while left > 0.0 && theirs.len() < own.len() {
         let from = Instant::now();
@@ -300,8 +341,8 @@ fn class(
     }
     let count = theirs.len();
     let mut judged = Judged::default();
-    for i in 0..count {
-        judged.judge([a, b], &steps[i], &answers[i], theirs[i].0);
+    for (i, answer) in answers.iter().enumerate() {
+        judged.judge([a, b], &steps[i], answer, theirs.get(i).map(|t| t.0));
     }
     let laps = if theirs.iter().map(|t| t.1).sum::<f64>() < options.pick(0.5, 0.05) {
         let plan = Plan { blocks: options.pick(3, 2), least: Duration::from_micros(20) };
@@ -316,24 +357,36 @@ fn class(
         };
         (0..count).map(&mut once).collect()
     };
+    let alone = own[count..].iter().map(|q| {
+        let from = Instant::now();
+        std::hint::black_box(q.ask(&mut scratch));
+        from.elapsed().as_secs_f64()
+    });
+    let seconds: Vec<f64> = laps.iter().map(|l| l.own).chain(alone).collect();
     if let Some(export) = export {
-        for i in 0..count {
-            export.question([a, b], &steps[i], &answers[i], laps[i].own);
+        for i in 0..own.len() {
+            export.question([a, b], &steps[i], &answers[i], seconds[i]);
         }
     }
     let cells = || answers.iter().map(|o| o.counters.cells as f64);
     let ratios: Vec<f64> = laps.iter().map(|l| l.ratio).collect();
     let turns = if turning { "turning" } else { "straight" };
-    eprintln!("# {} - {}, {turns}: {count} questions, ratio {:.3}", a.name, b.name, median(ratios.iter().copied()));
-    table.push(row![
+    eprintln!(
+        "# {} - {}, {turns}: {count} questions of both, ratio {:.3}",
         a.name,
-        a.triangles(),
         b.name,
+        median(ratios.iter().copied())
+    );
+    table.push(row![
+        a.name.as_str(),
+        a.triangles(),
+        b.name.as_str(),
         turns,
+        own.len(),
         count,
-        answers[..count].iter().filter(|o| o.status() == Status::Contact).count(),
+        answers.iter().filter(|o| o.status() == Status::Contact).count(),
         1e3 * first,
-        1e6 * median(laps.iter().map(|l| l.own)),
+        1e6 * median(seconds),
         1e6 * median(laps.iter().map(|l| l.peer)),
         median(ratios.iter().copied()),
         worst(ratios.iter().copied()),
@@ -478,13 +531,14 @@ fn loads(options: &Options) -> std::io::Result<()> {
 }
 
 fn main() -> std::io::Result<()> {
-    let Arguments { options, only, export } = Arguments::parse();
+    let Arguments { options, only, files, export } = Arguments::parse();
     let mut table = Table::new(&[
         "mesh",
         "triangles",
         "other",
         "motion",
         "cases",
+        "peer_cases",
         "met",
         "first_ms",
         "own_us",
@@ -500,7 +554,10 @@ fn main() -> std::io::Result<()> {
         "missed",
         "peer_off",
     ]);
-    let bodies: Vec<Body> = all(options.quick).into_iter().map(|(name, mesh)| Body::of_mesh(name, mesh)).collect();
+    let bodies: Vec<Body> = match &files {
+        Some(folder) => read(folder)?.into_iter().map(|(name, mesh)| Body::of_mesh(&name, mesh)).collect(),
+        None => all(options.quick).into_iter().map(|(name, mesh)| Body::of_mesh(name, mesh)).collect(),
+    };
     let others = others();
     let mut export = export.map(|folder| Export::to(&folder)).transpose()?;
     let mut ratios = [Vec::new(), Vec::new()];
@@ -536,10 +593,11 @@ fn main() -> std::io::Result<()> {
         let (count, median) = (ratios.len(), median(ratios.iter().copied()));
         println!("{name}: median ratio {median:.3}, ours ahead in {ahead} of {count}");
     }
-    if only.is_empty() || "pegs".contains(&only) {
+    let asked = |table: &str| if only.is_empty() { files.is_none() } else { table.contains(&only) };
+    if asked("pegs") {
         pegs(&options)?;
     }
-    if only.is_empty() || "loads".contains(&only) {
+    if asked("loads") {
         loads(&options)?;
     }
     if let Some(export) = export {
