@@ -22,7 +22,9 @@
 //! until then the engine has it there. So a pair of which neither body was told keeps its points. Each is carried: its place on
 //! a with a, that on b with b ([`Point::carried`]). The separation along the normal is then exact where a face is flat; where
 //! both are round, with radii R, it is off by (2 slack)²/R at most. Places that come within the margin meanwhile are found at
-//! most twice the slack late. A slack of 0 asks whenever a bit has changed.
+//! most twice the slack late. A slack of 0 asks whenever a bit has changed. A body that touches another by fewer than three points
+//! of each direction, as a ball or a lying cylinder does, is told after a millionth of the slack: its points do not go along with
+//! it.
 //!
 //! Bodies that overlap touch nowhere, so a pair that is told in overlap is asked about once more, moved apart along its
 //! direction until half of the given gap is between its bodies: its points are those of the face it came through, carried
@@ -50,9 +52,14 @@ struct Followed {
     /// Where the engine has it for a pair that was moved apart.
     apart: Option<Pose>,
     is_fixed: bool,
+    /// It touches something by less than three points of one direction: where, depends on how it stands.
+    rolls: bool,
     /// It is told anew.
     is_asked: bool,
 }
+
+/// Of the slack, how far a body that rolls may go.
+const ROLLING: f64 = 1e-6;
 
 /// A pair in overlap.
 #[derive(Clone, Copy, Debug)]
@@ -129,6 +136,7 @@ impl ContactCache {
             told: Some(pose),
             apart: None,
             is_fixed: true,
+            rolls: false,
             is_asked: false,
         });
     }
@@ -136,7 +144,7 @@ impl ContactCache {
     /// Follows an object that moves; `reach`: how far its points are from its origin, infinite for one without bounds.
     pub fn add_moving(&mut self, object: u32, reach: f64) {
         let (now, told, apart) = (Pose::IDENTITY, None, None);
-        self.add(Followed { object, reach, now, told, apart, is_fixed: false, is_asked: false });
+        self.add(Followed { object, reach, now, told, apart, is_fixed: false, rolls: false, is_asked: false });
     }
 
     fn add(&mut self, body: Followed) {
@@ -148,11 +156,13 @@ impl ContactCache {
     /// to the engine, whose reply `answer` takes; none where everything rests.
     pub fn begin(&mut self, poses: &[Pose]) -> &[PoseRecord] {
         self.records.clear();
+        self.mark_what_rolls();
         let mut any = false;
         for (body, pose) in self.bodies.iter_mut().filter(|body| !body.is_fixed).zip(poses) {
             body.now = *pose;
             // What is no number has gone, too: the engine says so.
-            let rests = body.told.is_some_and(|told| displacement(&told, pose, body.reach) <= self.slack);
+            let slack = if body.rolls { ROLLING * self.slack } else { self.slack };
+            let rests = body.told.is_some_and(|told| displacement(&told, pose, body.reach) <= slack);
             body.is_asked = !rests;
             any |= body.is_asked;
         }
@@ -166,6 +176,21 @@ impl ContactCache {
         }
         self.phase = Phase::First;
         &self.records
+    }
+
+    /// A ball's point that is carried along stays behind when it rolls: what presses there drives it on.
+    fn mark_what_rolls(&mut self) {
+        self.bodies.iter_mut().for_each(|body| body.rolls = false);
+        for pair in self.manifolds.pairs() {
+            let of = |group: u32| pair.points.iter().filter(|p| p.group == group).count();
+            if !pair.points.iter().any(|p| of(p.group) >= 3) {
+                for object in [pair.a, pair.b] {
+                    if let Some(i) = index(&self.bodies, object) {
+                        self.bodies[i].rolls = true;
+                    }
+                }
+            }
+        }
     }
 
     /// The records that are to be sent.
