@@ -380,12 +380,12 @@ fn a_slow_disk_costs_whole_steps_which_are_counted_and_no_step_waits_for_it() {
         }
         session.finish(PATIENCE).map(|_| ()).unwrap();
     };
-    // The queue takes 4,096 items: the disk has taken nothing when it is full.
+    // The queue takes 16,384 items: the disk has taken nothing when it is full.
     let mut k = 0;
     while session.recording().unwrap().dropped < 20 {
         step(&mut session, k);
         k += 1;
-        assert!(k < 6_000, "nothing was left out");
+        assert!(k < 20_000, "nothing was left out");
     }
     disk.open.store(true, Ordering::Relaxed);
     let first = session.recording().unwrap().steps;

@@ -16,8 +16,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Most bytes on their way.
 pub const LIMIT: usize = 64 << 20;
-/// Most items on their way.
-pub const LENGTH: usize = 1 << 12;
+/// Most items on their way: the steps of some seconds, for which the writer is at the pictures of an opening.
+pub const LENGTH: usize = 1 << 14;
 /// Messages of a session that are kept to be used again.
 const SPARE: usize = 64;
 /// What an object takes in an opening, about.
