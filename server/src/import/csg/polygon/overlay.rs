@@ -4,12 +4,16 @@
 use super::rings::{Owned, bits, cut, simple, traced};
 use super::{order, turn};
 use glam::DVec2;
+use smallvec::SmallVec;
 use std::collections::HashMap;
 
 /// Corners are moved to a grid of this times the largest coordinate, so that edges meant to lie on each other do so to the bit.
 const GRID: f64 = 1.0 / (1u64 << 40) as f64;
 /// Rounds of cutting.
 const ROUNDS: usize = 8;
+
+/// The numbers of the operands that an edge is a side of.
+type Among = SmallVec<[u32; 4]>;
 
 /// Paths around what `inside` says of some operands, each filled by the even-odd rule: it is given whether a point lies in each of
 /// them. `None` where edges make no closed ring.
@@ -36,27 +40,45 @@ pub fn overlay(operands: &[Vec<Vec<DVec2>>], inside: &dyn Fn(&[bool]) -> bool) -
             break;
         }
     }
-    let pieces = pieces(&edges, operands.len());
+    let pieces = pieces(&edges);
     let columns = [false, true].map(|steep| Columns::of(&pieces, steep));
-    let kept: Vec<[DVec2; 2]> =
-        pieces.iter().filter(|(e, own)| bounds(*e, own, (&pieces, &columns), inside)).map(|(e, _)| *e).collect();
+    let mut beside = vec![false; operands.len()];
+    let mut is_bound = |(e, own): &&([DVec2; 2], Among)| bounds(*e, own, (&pieces, &columns), inside, &mut beside);
+    let kept: Vec<[DVec2; 2]> = pieces.iter().filter(|piece| is_bound(piece)).map(|(e, _)| *e).collect();
     let (rings, open) = traced(&kept);
     (!open).then(|| simple(rings))
 }
 
-/// Every edge once, with whether it is a side of each operand: there an odd number of times.
-fn pieces(edges: &[Owned], operands: usize) -> Vec<([DVec2; 2], Vec<bool>)> {
+/// Every edge once, with the operands that it is a side of: those in which it is there an odd number of times.
+fn pieces(edges: &[Owned]) -> Vec<([DVec2; 2], Among)> {
     let mut place: HashMap<[[u64; 2]; 2], usize> = HashMap::with_capacity(edges.len());
-    let mut pieces: Vec<([DVec2; 2], Vec<bool>)> = Vec::with_capacity(edges.len());
+    let mut pieces: Vec<([DVec2; 2], Among)> = Vec::with_capacity(edges.len());
     for ([a, b], owner) in edges {
         let e = if order(*a, *b).is_lt() { [*a, *b] } else { [*b, *a] };
         let at = *place.entry(e.map(bits)).or_insert_with(|| {
-            pieces.push((e, vec![false; operands]));
+            pieces.push((e, Among::new()));
             pieces.len() - 1
         });
-        pieces[at].1[*owner] ^= true;
+        pieces[at].1.push(*owner as u32);
     }
+    pieces.iter_mut().for_each(|(_, owners)| keep_odd(owners));
     pieces
+}
+
+/// Sorts numbers, and leaves those that are there an odd number of times, once.
+fn keep_odd(numbers: &mut Among) {
+    numbers.sort_unstable();
+    let mut kept = 0;
+    let mut i = 0;
+    while i < numbers.len() {
+        let same = numbers[i..].iter().take_while(|n| **n == numbers[i]).count();
+        if same % 2 == 1 {
+            numbers[kept] = numbers[i];
+            kept += 1;
+        }
+        i += same;
+    }
+    numbers.truncate(kept);
 }
 
 /// The edges over each of some intervals of x, of y where they are taken `steep`.
@@ -67,7 +89,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(pieces: &[([DVec2; 2], Vec<bool>)], steep: bool) -> Self {
+    fn of(pieces: &[([DVec2; 2], Among)], steep: bool) -> Self {
         let ends = |e: &[DVec2; 2]| if steep { (e[0].y, e[1].y) } else { (e[0].x, e[1].x) };
         let spans = || pieces.iter().map(|(e, _)| ends(e));
         let (low, high) = spans()
@@ -90,16 +112,18 @@ impl Columns {
 }
 
 /// True when the result lies on one side of an edge: counted along a ray from its middle, up or, from a steep one, to the right.
+/// `beside`: room for a truth of each operand.
 fn bounds(
     e: [DVec2; 2],
-    own: &[bool],
-    (pieces, columns): (&[([DVec2; 2], Vec<bool>)], &[Columns; 2]),
+    own: &Among,
+    (pieces, columns): (&[([DVec2; 2], Among)], &[Columns; 2]),
     inside: &dyn Fn(&[bool]) -> bool,
+    beside: &mut [bool],
 ) -> bool {
     let steep = (e[1].y - e[0].y).abs() > (e[1].x - e[0].x).abs();
     let flip = |p: DVec2| if steep { DVec2::new(p.y, p.x) } else { p };
     let middle = flip((e[0] + e[1]) * 0.5);
-    let mut beside = vec![false; own.len()];
+    beside.fill(false);
     let columns = &columns[usize::from(steep)];
     for (other, owners) in columns.edges[columns.column(middle.x)].iter().map(|i| &pieces[*i as usize]) {
         if *other == e {
@@ -109,12 +133,13 @@ fn bounds(
         if (a.x > middle.x) != (b.x > middle.x) {
             let (a, b) = if a.x < b.x { (a, b) } else { (b, a) };
             if turn(a, b, middle) < 0.0 {
-                beside.iter_mut().zip(owners).for_each(|(x, o)| *x ^= o);
+                owners.iter().for_each(|o| beside[*o as usize] ^= true);
             }
         }
     }
-    let beyond: Vec<bool> = beside.iter().zip(own).map(|(x, o)| x ^ o).collect();
-    inside(&beside) != inside(&beyond)
+    let is_in = inside(beside);
+    own.iter().for_each(|o| beside[*o as usize] ^= true);
+    is_in != inside(beside)
 }
 
 #[cfg(test)]
