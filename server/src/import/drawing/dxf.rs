@@ -1,7 +1,7 @@
 //! DXF drawings, in text, as OpenSCAD 2021.01 reads them (DxfData): LINE, LWPOLYLINE, CIRCLE, ARC, ELLIPSE and INSERT of blocks.
 //!
-//! Points are moved to a grid of about a thousandth, as OpenSCAD does, so that ends that nearly meet do. Lines that meet are one path;
-//! a path that is open is closed. Bulges of polylines and other entities are left out, which is told.
+//! Points are moved to a grid of 1/1024, as OpenSCAD does, so that ends that nearly meet do. Lines that meet are one path; a path that
+//! is open is closed. All paths together are filled by the even-odd rule: a line that is drawn twice is none. Bulges of polylines and other entities are left out, which is told.
 
 use super::{Drawing, Frame};
 use crate::import::Place;
@@ -13,7 +13,7 @@ type Result<T> = std::result::Result<T, (Place, Problem)>;
 type Line = [DVec2; 2];
 
 /// OpenSCAD's coarse grid.
-const GRID: f64 = 1.0 / 1_048.576;
+const GRID: f64 = 1.0 / 1024.0;
 /// Lines of one drawing.
 const MOST_LINES: usize = 200_000;
 
@@ -229,14 +229,12 @@ fn joined(lines: &[Line]) -> Vec<Vec<DVec2>> {
             points.len() - 1
         })
     };
-    let mut edges: Vec<[usize; 2]> = Vec::new();
-    let mut seen = std::collections::HashSet::new();
-    for [a, b] in lines {
-        let edge = [number(*a), number(*b)];
-        if edge[0] != edge[1] && seen.insert([edge[0].min(edge[1]), edge[0].max(edge[1])]) {
-            edges.push(edge);
-        }
-    }
+    let mut edges: Vec<[usize; 2]> = lines.iter().map(|line| line.map(&mut number)).collect();
+    let undirected = |e: &[usize; 2]| [e[0].min(e[1]), e[0].max(e[1])];
+    let mut odd: HashMap<[usize; 2], bool> = HashMap::with_capacity(edges.len());
+    edges.iter().for_each(|e| *odd.entry(undirected(e)).or_default() ^= true);
+    // By the even-odd rule two of a line are none, and three are one.
+    edges.retain(|e| e[0] != e[1] && odd.insert(undirected(e), false) == Some(true));
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); points.len()];
     for (e, ends) in edges.iter().enumerate() {
         ends.iter().for_each(|p| at[*p].push(e));
@@ -307,6 +305,29 @@ mod tests {
         assert!((area(&drawing.shapes[0]) - 12.5).abs() < 0.02, "{:?}", drawing.shapes);
         assert!((area(&read_text(&text, "a").shapes[0]) - 12.0).abs() < 0.02);
         assert!(read_text(&text, "none").shapes[0].is_empty());
+    }
+
+    /// The expected areas are those of OpenSCAD 2021.01.
+    #[test]
+    fn corners_lie_on_the_grid_of_openscad_and_lines_that_are_drawn_twice_are_none() {
+        let outline = |corners: &[[f64; 2]]| -> Vec<String> {
+            let n = corners.len();
+            (0..n).map(|i| line(corners[i], corners[(i + 1) % n], "0")).collect()
+        };
+        let filled = |lines: &[Vec<String>]| {
+            let text = entities(&lines.concat().iter().map(String::as_str).collect::<Vec<_>>());
+            area(&read_text(&text, "").shapes[0])
+        };
+        let triangle = outline(&[[0.5, 0.0], [10.5, 0.0], [0.5, 10.0]]);
+        assert_eq!(filled(std::slice::from_ref(&triangle)), 50.0);
+        assert_eq!(filled(&[triangle.clone(), triangle.clone()]), 0.0);
+        assert_eq!(filled(&[triangle.clone(), triangle.clone(), triangle]), 50.0);
+        // What two squares share is within one outline; of a side that is drawn twice the other sides are closed by a line.
+        let left = outline(&[[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]);
+        let right = outline(&[[8.0, 0.0], [16.0, 0.0], [16.0, 8.0], [8.0, 8.0]]);
+        assert_eq!(filled(&[left.clone(), right]), 128.0);
+        let side = vec![left[1].clone()];
+        assert_eq!(filled(&[left, side]), 64.0);
     }
 
     #[test]
