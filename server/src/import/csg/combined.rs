@@ -1,11 +1,11 @@
 //! What calls make of what is inside of them, that being lowered already: of solids hulls, Minkowski sums and projections, of outlines
 //! what turns about an axis; and which of their operands OpenSCAD takes. What stays flat: `outlines`.
 
-use super::convex;
+use super::convex::{self, Element};
 use super::flat::{Flat, Outline, Plane};
 use super::meshed::Meshed;
 use super::outlines::{self, flat_of, flats};
-use super::parts::{Part, PartId, Parts};
+use super::parts::{Around, Part, PartId, Parts};
 use super::place;
 use super::polygon::Region;
 use super::revolve::{Lathe, Turn};
@@ -18,6 +18,9 @@ use crate::solid::Op;
 use glam::{DAffine3, DVec2, DVec3};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
+
+/// What to do about what is flat and cannot be summed.
+const THICK: &str = " (give it a thickness)";
 
 /// Of operands in space and in the plane those that OpenSCAD takes: as many dimensions as the first has, at the top solids.
 /// Whatever else is there is left out with a note. The place and name of the first in the plane where these are taken.
@@ -104,25 +107,103 @@ pub fn projection(
     Ok(id)
 }
 
-/// The convex hull of some solids.
-pub fn hull(parts: &mut Parts<'_>, at: Place, built: &[PartId]) -> Result<Part> {
+/// A set operation, with what is known of it below a hull or a sum: of several, OpenSCAD leaves out faces that enclose nothing.
+pub fn set(parts: &mut Parts<'_>, op: Op, at: Place, built: Vec<PartId>, around: Around) -> PartId {
+    if around == Around::Other {
+        return parts.push(Part::Op(op, at, built));
+    }
+    let operands: Vec<usize> = built.iter().map(|p| parts.operands(*p)).filter(|n| *n > 0).collect();
+    if operands.len() > 1 && !parts.loose.is_empty() {
+        let mut stack: Vec<PartId> = built.iter().copied().filter(|p| parts.operands(*p) == 1).collect();
+        while let Some(p) = stack.pop() {
+            if let Part::Op(_, _, of) = &parts.list[p] {
+                stack.extend(of);
+            } else if parts.loose.contains(&p) && parts.points.remove(&p).is_some() {
+                parts.note(at, "faces without volume, beside others: left out, as OpenSCAD does", None);
+            }
+        }
+    }
+    let id = parts.push(Part::Op(op, at, built));
+    parts.operands.insert(id, if let [one] = operands[..] { one } else { operands.len() });
+    id
+}
+
+/// What a matrix flattens below a hull or a sum, as OpenSCAD has it: the points of one solid, nothing of several. `None` for nothing
+/// that counts, though something is there.
+///
+/// # Errors
+/// Below a sum what is not convex; whatever a mesh fails for.
+pub fn flattened(
+    parts: &mut Parts<'_>,
+    at: Place,
+    built: &[PartId],
+    by: &DAffine3,
+    around: Around,
+) -> Result<Option<PartId>> {
+    let some: Vec<PartId> = built.iter().copied().filter(|p| parts.operands(*p) > 0).collect();
+    let [one] = some[..] else { return Ok(some.is_empty().then(|| parts.push(Part::Empty))) };
+    if parts.operands(one) > 1 {
+        return Ok(None);
+    }
+    let elements = if around == Around::Sum {
+        let pieces = convex::pieces(parts, one).filter(|pieces| pieces.len() == 1);
+        pieces.map(|pieces| pieces.concat()).ok_or_else(|| {
+            let construct = "minkowski of something that is not convex and that a matrix flattens".to_owned();
+            (at, Problem::Unsupported { construct, hint: THICK })
+        })?
+    } else {
+        extremes(parts, at, one)?
+    };
+    let points = elements.iter().flat_map(|e| e.flattened(by)).collect();
+    let id = parts.push(Part::Empty);
+    parts.points.insert(id, points);
+    Ok(Some(id))
+}
+
+/// Elements with the hull of a part: of one that is cut the corners of what is left of it.
+fn extremes(parts: &mut Parts<'_>, at: Place, p: PartId) -> Result<Vec<Element>> {
+    if let Some(all) = convex::extremes(parts, p) {
+        return Ok(all);
+    }
+    let mesh = Meshed::of(parts, at, p)?;
+    if mesh.off > 0.0 {
+        parts.faceted(at, "what a hull holds, cut", mesh.triangles(), mesh.off);
+    }
+    Ok([mesh.elements(), parts.flat_points(p)].concat())
+}
+
+/// True for points of which OpenSCAD makes a hull, though without volume: four or more that lie on no line.
+fn is_area(points: &[Element]) -> bool {
+    let mut all: Vec<DVec3> = points.iter().map(Element::center).collect();
+    all.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap_or(std::cmp::Ordering::Equal));
+    all.dedup();
+    let Some(first) = all.first().copied() else { return false };
+    let far = all.iter().map(|p| *p - first).fold(DVec3::ZERO, |m, d| if d.length() > m.length() { d } else { m });
+    all.len() > 3 && all.iter().any(|p| far.cross(*p - first).length() > ROUNDING * far.length_squared())
+}
+
+/// The convex hull of some solids. What has no volume counts by its points below another hull or a sum.
+pub fn hull(parts: &mut Parts<'_>, at: Place, built: &[PartId], around: Around) -> Result<PartId> {
     let mut elements = Vec::new();
     for p in built {
-        if let Some(more) = convex::extremes(parts, *p) {
-            elements.extend(more);
-            continue;
-        }
-        // The corners of what is left of it.
-        let mesh = Meshed::of(parts, at, *p)?;
-        if mesh.off > 0.0 {
-            parts.faceted(at, "what a hull holds, cut", mesh.triangles(), mesh.off);
-        }
-        elements.extend(mesh.elements());
+        elements.extend(extremes(parts, at, *p)?);
     }
     if elements.is_empty() {
-        return Ok(Part::Empty);
+        return Ok(parts.push(Part::Empty));
     }
-    convex::hull(parts, "hull", at, &elements)
+    let part = convex::hull(parts, "hull", at, &elements)?;
+    let is_flat = matches!(part, Part::Empty);
+    let id = parts.push(part);
+    if is_flat {
+        let points: Vec<Element> = elements.iter().flat_map(|e| e.flattened(&DAffine3::IDENTITY)).collect();
+        if around != Around::Other && is_area(&points) {
+            parts.points.insert(id, points);
+            parts.note(at, "a hull without volume: its points count to what is around it, as in OpenSCAD", None);
+        } else {
+            parts.note(at, "a hull without volume: left out, as OpenSCAD does", None);
+        }
+    }
+    Ok(id)
 }
 
 /// The sum of operands that were each moved by `origin`.
@@ -153,6 +234,9 @@ pub fn minkowski(parts: &mut Parts<'_>, at: Place, built: &[PartId], origin: DVe
         for sum in convex::sums(parts, at, &operands)? {
             let sum: Vec<convex::Element> = sum.into_iter().map(|e| e.moved(back)).collect();
             let part = convex::hull(parts, "minkowski", at, &sum)?;
+            if matches!(part, Part::Empty) {
+                parts.note(at, "a minkowski without volume: left out, as OpenSCAD does", None);
+            }
             made.push(parts.push(part));
         }
     }
@@ -163,6 +247,10 @@ pub fn minkowski(parts: &mut Parts<'_>, at: Place, built: &[PartId], origin: DVe
 fn minkowski_of_meshes(parts: &mut Parts<'_>, at: Place, built: &[PartId], origin: DVec3) -> Result<Part> {
     let mut sum: Option<Meshed> = None;
     for p in built {
+        if !parts.flat_points(*p).is_empty() {
+            let construct = "minkowski of something without volume with what is not convex".to_owned();
+            return Err((at, Problem::Unsupported { construct, hint: THICK }));
+        }
         let mesh = Meshed::of(parts, at, *p)?;
         sum = match sum {
             _ if mesh.is_empty() => sum,
@@ -262,4 +350,72 @@ fn side_of_axis(parts: &mut Parts<'_>, at: Place, leaves: &[PartId], built: &[Pa
         return Ok(-1.0);
     }
     Err((at, Problem::syntax("an outline on one side of the axis of rotate_extrude", "one on both")))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::import::{Facets, Limits, import_csg};
+    use crate::octree::Model;
+    use crate::octree::mass::mass_properties;
+    use contactd_proto::MassOptions;
+
+    const SQUARE: &str =
+        "polyhedron(points = [[0, -5, 0], [4, -5, 0], [4, -5, 4], [0, -5, 4]], faces = [[0, 1, 2, 3]]);";
+    const FLATTENED: &str = "multmatrix([[1, 0, 0, 0], [0, 0, 0, -5], [0, 0, 1, 0], [0, 0, 0, 1]])";
+    const ASIDE: &str = "multmatrix([[1, 0, 0, 9], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) { cube(1); }";
+
+    /// The expected volumes are those of OpenSCAD 2021.01.
+    #[test]
+    fn what_has_no_volume_counts_by_its_points_to_hulls_and_sums() {
+        let flat = format!("hull() {{ {SQUARE} }}");
+        let scaled = format!("{FLATTENED} cube(4);");
+        let joined = format!("{FLATTENED} {{ cube(4); {ASIDE} }}");
+        let cut = format!("{FLATTENED} difference() {{ cube(4); cube(1); }}");
+        let line =
+            "hull() { polyhedron(points = [[0, -5, 0], [1, -5, 0], [2, -5, 0], [4, -5, 0]], faces = [[0, 1, 2, 3]]); }";
+        let nook = "linear_extrude(height = 2) { polygon([[0, 0], [9, 0], [9, 1], [1, 1], [1, 9], [0, 9]]); }";
+        let ring = "rotate_extrude($fn = 4) { polygon([[1, 0], [3, 0], [2, 4]]); }";
+        for (text, volume) in [
+            (format!("hull() {{ {SQUARE} cube(4); }}"), 144.0),
+            (format!("hull() {{ {flat} cube(4); }}"), 144.0),
+            (format!("hull() {{ {scaled} cube(4); }}"), 144.0),
+            (format!("hull() {{ group() {{ group(); {flat} }} cube(4); }}"), 144.0),
+            (format!("hull() {{ minkowski() {{ {flat} }} cube(4); }}"), 144.0),
+            (format!("hull() {{ {FLATTENED} {ring} cube(4); }}"), 536.0 / 3.0),
+            (format!("hull() {{ {FLATTENED} {nook} cube(4); }}"), 572.0 / 3.0),
+            (format!("hull() {{ {FLATTENED} cylinder(r1 = 2, r2 = 2, h = 3, $fn = 6); cube(4); }}"), 446.0 / 3.0),
+            (format!("minkowski() {{ {flat} cube(4); }}"), 256.0),
+            (format!("minkowski() {{ {scaled} cube(4); }}"), 256.0),
+            (format!("minkowski() {{ hull() {{ {scaled} }} cube(4); }}"), 256.0),
+            (format!("minkowski() {{ union() {{ {flat} {ASIDE} }} cube(4); }}"), 381.0),
+            // Beside others in a union faces alone are nothing, hulls and what is flattened are something.
+            (format!("hull() {{ union() {{ {SQUARE} {ASIDE} }} cube(4); }}"), 106.0),
+            (format!("hull() {{ union() {{ {scaled} {ASIDE} }} cube(4); }}"), 231.0),
+            // What several make is nothing when it is flattened, nor is a sum without volume, nor a line.
+            (format!("hull() {{ {joined} cube(4); }}"), 64.0),
+            (format!("hull() {{ {cut} cube(4); }}"), 64.0),
+            (format!("hull() {{ minkowski() {{ {flat} {flat} }} cube(4); }}"), 64.0),
+            (format!("hull() {{ {line} cube(4); }}"), 64.0),
+            (format!("cube(4); {flat} {scaled}"), 64.0),
+        ] {
+            let import = import_csg("m.csg", &text, Facets::Auto, &Limits::default());
+            let import = import.unwrap_or_else(|e| panic!("{text}: {e}"));
+            let found = mass_properties(&Model::new(import.solid), &MassOptions::default()).expect("a solid").volume;
+            assert!((found - volume).abs() < 1e-9, "{text}: {found}, not {volume}");
+        }
+        for (operands, sentence) in [
+            (
+                format!("{flat} difference() {{ cube(4); cube(1); }}"),
+                "minkowski of something without volume with what is not convex",
+            ),
+            (
+                format!("{FLATTENED} {nook} cube(4);"),
+                "minkowski of something that is not convex and that a matrix flattens",
+            ),
+        ] {
+            let text = format!("minkowski() {{ {operands} }}");
+            let error = import_csg("m.csg", &text, Facets::Auto, &Limits::default()).expect_err("refused").to_string();
+            assert!(error.contains(sentence), "{error}");
+        }
+    }
 }

@@ -107,6 +107,14 @@ impl Element {
         Some(Self { center, radius, axes, round, pieces, off: self.off + other.off })
     }
 
+    /// The points that stand for it under a matrix that flattens it.
+    pub fn flattened(&self, by: &DAffine3) -> Vec<Self> {
+        let m = by.matrix3;
+        let size = (m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared()).sqrt();
+        let off = self.deviation() * size;
+        self.facets().into_iter().map(|p| Self::facet(by.transform_point3(p), off)).collect()
+    }
+
     /// How far its facets lie inside of it at most.
     pub fn deviation(&self) -> f64 {
         self.off + (self.radius + self.round) * sagitta(self.pieces)
@@ -225,10 +233,7 @@ fn of_leaf(parts: &Parts<'_>, p: PartId) -> Option<Vec<Element>> {
     }
     match &parts.list[p] {
         Part::Leaf(shape, frame, _) => elements(shape, frame, parts.pieces.get(&p).copied().unwrap_or(PIECES)),
-        Part::Empty => {
-            let points = parts.points.get(&p);
-            Some(points.into_iter().flatten().map(|p| Element::point(*p)).collect())
-        }
+        Part::Empty => Some(parts.points.get(&p).cloned().unwrap_or_default()),
         Part::Flat(_) | Part::Stray(..) | Part::Op(..) => Some(Vec::new()),
     }
 }
@@ -277,7 +282,7 @@ fn clearance(parts: &Parts<'_>, root: PartId, x: DVec3) -> f64 {
     }
 }
 
-/// The hull of elements, from the call `name`.
+/// The hull of elements, from the call `name`; nothing where it has no volume.
 pub fn hull(parts: &mut Parts<'_>, name: &str, at: Place, elements: &[Element]) -> Result<Part> {
     let around = Aabb::of_points(elements.iter().map(|e| e.center));
     let reach = elements.iter().map(|e| e.radius + e.round).fold(0.0, f64::max);
@@ -355,17 +360,11 @@ struct Hull<'n> {
 
 impl Hull<'_> {
     fn polyhedron(&self, parts: &mut Parts<'_>, points: &[DVec3]) -> Result<Part> {
-        let Some(faces) = point_hull(points) else {
-            parts.note(self.at, format!("a {} without volume: left out, as OpenSCAD does", self.name), None);
-            return Ok(Part::Empty);
-        };
+        let Some(faces) = point_hull(points) else { return Ok(Part::Empty) };
         parts.hullable(self.at, faces.len())?;
         let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
         match place::polyhedron(&DAffine3::IDENTITY, points, &faces) {
-            Err(Problem::Mesh(crate::solid::primitive::MeshError::Flat)) => {
-                parts.note(self.at, format!("a {} without volume: left out, as OpenSCAD does", self.name), None);
-                Ok(Part::Empty)
-            }
+            Err(Problem::Mesh(crate::solid::primitive::MeshError::Flat)) => Ok(Part::Empty),
             placed => parts.leaf(self.name, self.at, placed.map(|p| p.0)),
         }
     }

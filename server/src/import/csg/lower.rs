@@ -12,7 +12,7 @@ use super::flat::{Flat, Outline, Plane};
 use super::imports;
 use super::offset::Offset;
 use super::outlines::{self, flat_of, flats};
-use super::parts::{Part, PartId, Parts, emit, is_unbounded};
+use super::parts::{Around, Part, PartId, Parts, emit, is_unbounded};
 use super::place;
 use super::quadrics;
 use super::revolve::Turn;
@@ -59,8 +59,19 @@ struct Context {
     outer: DAffine3,
     /// Inside of an extrusion: its plane.
     plane: Option<Plane>,
-    /// Below a hull with nothing but unions in between: points are all that counts.
-    hull: bool,
+    /// What is made of the call, with nothing but unions in between.
+    around: Around,
+}
+
+/// Why a matrix leaves nothing.
+const FLAT: &str = "that flattens what is inside of it";
+
+/// What is below a matrix.
+enum Moved {
+    /// The same, elsewhere.
+    Kept(Context),
+    /// Points in a plane or on a line, moved so.
+    Flat(DAffine3),
 }
 
 /// What a call makes of what is inside of it.
@@ -78,6 +89,8 @@ enum CallKind {
         cut: bool,
     },
     Offset(Offset, u32),
+    /// Solids whose points alone count, moved so.
+    Flattened(DAffine3),
 }
 
 /// A call whose children are being lowered.
@@ -126,7 +139,7 @@ impl<'a> Lowering<'a> {
         if let Some(root) = root {
             self.roots(root);
         }
-        self.all(top, root, Context { outer: DAffine3::IDENTITY, plane: None, hull: false })
+        self.all(top, root, Context { outer: DAffine3::IDENTITY, plane: None, around: Around::Other })
     }
 
     /// The union of some calls, of which `root` alone counts where there is one.
@@ -187,8 +200,13 @@ impl<'a> Lowering<'a> {
 
     fn step(&mut self, call: &'a Call, context: Context) -> Result<Step> {
         let inside = |kind| {
-            let hull = matches!(kind, CallKind::Hull) || context.hull && matches!(kind, CallKind::Set(Op::Union));
-            Ok(Step::open(kind, Context { hull, ..context }))
+            let around = match kind {
+                CallKind::Hull => Around::Hull,
+                CallKind::Minkowski => Around::Sum,
+                CallKind::Set(Op::Union) => context.around,
+                _ => Around::Other,
+            };
+            Ok(Step::open(kind, Context { around, ..context }))
         };
         // A 2D shape within its plane, or by itself.
         let placed = || context.plane.map_or((DAffine3::IDENTITY, 0), |plane| (plane.inner, plane.overshoot));
@@ -199,7 +217,10 @@ impl<'a> Lowering<'a> {
             "render" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "color" => Arguments::new(call, &["c", "alpha"]).and_then(|_| inside(CallKind::Set(Op::Union))),
             "multmatrix" | "translate" | "rotate" | "scale" | "mirror" => Ok(match self.multmatrix(call, context)? {
-                Ok(context) => Step::open(CallKind::Set(Op::Union), context),
+                Ok(Moved::Kept(context)) => Step::open(CallKind::Set(Op::Union), context),
+                Ok(Moved::Flat(by)) => {
+                    Step::open(CallKind::Flattened(by), Context { outer: DAffine3::IDENTITY, ..context })
+                }
                 Err(why) => Step::Leaf(self.shapes.nothing(call, why)),
             }),
             "hull" => Arguments::new(call, &[]).and_then(|_| inside(CallKind::Hull)),
@@ -207,7 +228,7 @@ impl<'a> Lowering<'a> {
             "minkowski" => Arguments::new(call, &["convexity"]).and_then(|_| inside(CallKind::Minkowski)),
             "projection" => {
                 let cut = Arguments::new(call, &["cut", "convexity"])?.bool_or("cut", false)?;
-                let inside = Context { outer: DAffine3::IDENTITY, plane: None, hull: false };
+                let inside = Context { outer: DAffine3::IDENTITY, plane: None, around: Around::Other };
                 Ok(Step::open(CallKind::Projection { cut }, inside))
             }
             "resize" => self.resized(call, context),
@@ -247,7 +268,8 @@ impl<'a> Lowering<'a> {
     /// A solid that has no operands; what is none of these is a construct that is not known.
     fn solid(&mut self, call: &Call, context: Context) -> Result<PartId> {
         let (outer, attached) = (&context.outer, self.attached);
-        let hulled = (outer, context.hull);
+        let hull = context.around == Around::Hull;
+        let hulled = (outer, hull);
         match call.name.as_str() {
             "import" => {
                 let id = imports::import(&mut self.shapes, call, hulled, attached)?;
@@ -271,7 +293,7 @@ impl<'a> Lowering<'a> {
             "cube" => self.shapes.cube(call, outer),
             "half_space" => self.shapes.half_space(call, outer),
             "height_field" => imports::height_field(&mut self.shapes, call, hulled),
-            "polyhedron" => self.shapes.polyhedron(call, outer, context.hull),
+            "polyhedron" => self.shapes.polyhedron(call, outer, hull),
             "superellipsoid" => superellipsoid::superellipsoid(&mut self.shapes, call, outer),
             "paraboloid" | "hyperboloid" | "quadric" => quadrics::quadric(&mut self.shapes, call, outer),
             other => Err((call.at, Problem::Unsupported { construct: call.short(), hint: hint(other) })),
@@ -325,12 +347,12 @@ impl<'a> Lowering<'a> {
                 return Ok(Step::Leaf(self.shapes.nothing(call, "of no height")));
             };
             let outer = extrusion.slanted(&context.outer);
-            return Ok(Step::open(CallKind::Extrude(extrusion), Context { outer, plane, hull: false }));
+            return Ok(Step::open(CallKind::Extrude(extrusion), Context { outer, plane, around: Around::Other }));
         }
         let Some(turn) = Turn::new(call)? else {
             return Ok(Step::Leaf(self.shapes.nothing(call, "by no angle")));
         };
-        Ok(Step::open(CallKind::Revolve(turn), Context { plane, hull: false, ..context }))
+        Ok(Step::open(CallKind::Revolve(turn), Context { plane, around: Around::Other, ..context }))
     }
 
     /// An extrusion of a drawing in another file.
@@ -348,7 +370,7 @@ impl<'a> Lowering<'a> {
             (CallKind::Revolve(turn), context.outer)
         };
         let flat = imports::flat(&mut self.shapes, call, (DAffine3::IDENTITY, 0), self.attached)?;
-        let inside = Context { outer, plane, hull: false };
+        let inside = Context { outer, plane, around: Around::Other };
         let open = Open {
             call: Some(call),
             children: &[],
@@ -367,7 +389,7 @@ impl<'a> Lowering<'a> {
         let shapes = Shapes { facets: self.shapes.facets, limits: self.shapes.limits, parts };
         let mut inside = Lowering { file: self.file, attached: self.attached, shapes };
         let plane = context.plane.map(|_| Plane { inner: DAffine3::IDENTITY, overshoot: 0 });
-        let own = Context { outer: DAffine3::IDENTITY, plane, hull: false };
+        let own = Context { outer: DAffine3::IDENTITY, plane, around: Around::Other };
         let root = inside.all(&call.children, None, own)?;
         resize::bounds(&mut inside.shapes.parts, call.at, root, plane.is_some())
     }
@@ -392,9 +414,24 @@ impl<'a> Lowering<'a> {
             }
             let parts = &mut self.shapes.parts;
             let part = match open.kind {
-                CallKind::Set(op) => Part::Op(op, at, built),
+                CallKind::Set(op) => return Ok(combined::set(parts, op, at, built, open.outside.around)),
+                CallKind::Hull => return combined::hull(parts, at, &built, open.outside.around),
+                CallKind::Flattened(by) => {
+                    let made = combined::flattened(parts, at, &built, &by, open.outside.around)?;
+                    if made.is_some_and(|p| parts.operands(p) > 0) {
+                        parts.note(
+                            at,
+                            "a matrix that flattens: points count to what is around it, as in OpenSCAD",
+                            None,
+                        );
+                    }
+                    return Ok(match (made, open.call) {
+                        (Some(made), _) => made,
+                        (None, Some(call)) => self.shapes.nothing(call, FLAT),
+                        (None, None) => parts.push(Part::Empty),
+                    });
+                }
                 CallKind::Fill => Part::Op(Op::Union, at, built),
-                CallKind::Hull => combined::hull(parts, at, &built)?,
                 CallKind::Minkowski => combined::minkowski(parts, at, &built, open.outside.outer.translation)?,
                 CallKind::Extrude(_) | CallKind::Revolve(_) | CallKind::Offset(..) | CallKind::Projection { .. } => {
                     Part::Empty
@@ -415,7 +452,7 @@ impl<'a> Lowering<'a> {
         let parts = &mut self.shapes.parts;
         let part = match (&open.kind, open.call) {
             (CallKind::Set(op), _) => Part::Op(*op, at, open.built),
-            (_, None) | (CallKind::Projection { .. }, _) => Part::Empty,
+            (_, None) | (CallKind::Projection { .. } | CallKind::Flattened(_), _) => Part::Empty,
             (CallKind::Extrude(extrusion), _)
                 if extrusion.bends(flats(parts, &open.built).into_iter().filter_map(|f| flat_of(parts, f))) =>
             {
@@ -456,8 +493,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// The context below a matrix; else why nothing is there.
-    fn multmatrix(&mut self, call: &Call, context: Context) -> Result<std::result::Result<Context, &'static str>> {
-        const FLAT: &str = "that flattens what is inside of it";
+    fn multmatrix(&mut self, call: &Call, context: Context) -> Result<std::result::Result<Moved, &'static str>> {
         let arguments = Arguments::new(call, &["m"])?;
         let value = arguments.required("m", "a 4×4 matrix")?;
         if holds_no_finite(value) {
@@ -474,12 +510,13 @@ impl<'a> Lowering<'a> {
         let linear = DMat3::from_cols(columns(0), columns(1), columns(2));
         let Some(flat) = context.plane else {
             if place::is_flat(linear) {
-                return Ok(Err(FLAT));
+                let by = context.outer * DAffine3::from_mat3_translation(linear, shift);
+                return Ok(if context.around == Around::Other { Err(FLAT) } else { Ok(Moved::Flat(by)) });
             }
             let (linear, off) = place::snapped(linear);
             self.snapped(value.at, off);
             let outer = context.outer * DAffine3::from_mat3_translation(linear, shift);
-            return Ok(Ok(Context { outer, ..context }));
+            return Ok(Ok(Moved::Kept(Context { outer, ..context })));
         };
         // In 2D only x and y count. With z scaled as they are, a plane similarity is one in space, and snaps as one.
         let aside = [m[0][2], m[1][2], m[2][0], m[2][1], m[2][3]].iter().fold(0.0, |a: f64, x| a.max(x.abs()));
@@ -496,7 +533,7 @@ impl<'a> Lowering<'a> {
         linear.z_axis = DVec3::Z;
         self.snapped(value.at, off);
         let inner = flat.inner * DAffine3::from_mat3_translation(linear, shift.with_z(0.0));
-        Ok(Ok(Context { plane: Some(Plane { inner, ..flat }), ..context }))
+        Ok(Ok(Moved::Kept(Context { plane: Some(Plane { inner, ..flat }), ..context })))
     }
 
     fn snapped(&mut self, at: Place, off: Option<f64>) {

@@ -10,7 +10,8 @@
 //! note tells of it). What a modifier leaves out, an extrusion of nothing, and what is subtracted from or cut with nothing
 //! are notes. A test goes through all kinds of nodes with all their arguments.
 //!
-//! What has no size, no area or no volume is left out, as OpenSCAD does, and a note names its line.
+//! What has no size, no area or no volume is left out, as OpenSCAD does, and a note names its line; below a hull or a sum points
+//! of what is flat count, where they do in OpenSCAD.
 
 mod arguments;
 mod combined;

@@ -1,5 +1,6 @@
 //! What calls have become before it is known which primitives stay: a list of parts, and the solid made of it.
 
+use super::convex::Element;
 use super::flat::Flat;
 use super::place::PlacedShape;
 use super::polygon::Formula;
@@ -8,7 +9,7 @@ use crate::import::Note;
 use crate::solid::{Label, Measured, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -43,6 +44,17 @@ pub enum Signed {
     Known(bool),
 }
 
+/// What is made of a call, with nothing but unions in between.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Around {
+    /// A hull, to which points are all that counts.
+    Hull,
+    /// A Minkowski sum, to which points of what has no volume count, too.
+    Sum,
+    /// Anything else, to which what has no volume is nothing.
+    Other,
+}
+
 /// Parts and notes as they come.
 pub struct Parts<'a> {
     limits: &'a Limits,
@@ -54,8 +66,12 @@ pub struct Parts<'a> {
     pub pieces: HashMap<PartId, u32>,
     /// Of an elliptic primitive: the corners of OpenSCAD's polyhedron of it, and how far off they are at most.
     pub bent: HashMap<PartId, (Vec<DVec3>, f64)>,
-    /// Below a hull: the corners of what has no volume, by the empty part that it is.
-    pub points: HashMap<PartId, Vec<DVec3>>,
+    /// Below a hull or a sum: what counts of something without volume, by the empty part that it is.
+    pub points: HashMap<PartId, Vec<Element>>,
+    /// Of these the faces that enclose nothing, of which a union of several makes nothing.
+    pub loose: HashSet<PartId>,
+    /// Of a set operation below a hull or a sum: how many operands are something; of one those of what it is.
+    pub operands: HashMap<PartId, usize>,
     /// Of an extruded island: the part that is its convex hull.
     pub hulls: HashMap<PartId, PartId>,
     /// Of an extruded island of very many sides: what makes its surface, to be cut as a mesh.
@@ -74,8 +90,10 @@ impl<'a> Parts<'a> {
     /// None yet.
     pub fn new(limits: &'a Limits) -> Self {
         let (pieces, bent, points, hulls) = (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
+        let (loose, operands) = (HashSet::new(), HashMap::new());
         let (prisms, measured) = (HashMap::new(), HashMap::new());
-        Self { limits, notes: Vec::new(), list: Vec::new(), pieces, bent, points, hulls, prisms, measured, faces: 0 }
+        let (notes, list) = (Vec::new(), Vec::new());
+        Self { limits, notes, list, pieces, bent, points, loose, operands, hulls, prisms, measured, faces: 0 }
     }
 
     /// Adds a part.
@@ -229,12 +247,35 @@ impl<'a> Parts<'a> {
         Ok(made.pop().unwrap_or(Signed::Known(true)))
     }
 
-    /// The leaves below a part of which it is the union, and whether something is taken from any of them; `None` where it is cut
+    /// How many operands a set operation has that are something; 1 for anything else that is something.
+    pub fn operands(&self, p: PartId) -> usize {
+        match &self.list[p] {
+            Part::Empty => usize::from(self.points.contains_key(&p)),
+            Part::Op(..) => self.operands.get(&p).copied().unwrap_or(1),
+            Part::Leaf(..) | Part::Flat(_) | Part::Stray(..) => 1,
+        }
+    }
+
+    /// What counts of all without volume below a part of which it is the union.
+    pub fn flat_points(&self, root: PartId) -> Vec<Element> {
+        let (mut found, mut stack) = (Vec::new(), vec![root]);
+        while let Some(p) = stack.pop() {
+            match &self.list[p] {
+                Part::Empty => found.extend(self.points.get(&p).into_iter().flatten().copied()),
+                Part::Op(Op::Union, _, of) => stack.extend(of),
+                Part::Leaf(..) | Part::Flat(_) | Part::Stray(..) | Part::Op(..) => {}
+            }
+        }
+        found
+    }
+
+    /// The leaves below a part of which it is the union, what has no volume but counts among them, and whether something is taken from any of them; `None` where it is cut
     /// in another way.
     pub fn leaves(&self, root: PartId) -> Option<(Vec<PartId>, bool)> {
         let (mut found, mut cut, mut stack) = (Vec::new(), false, vec![root]);
         while let Some(p) = stack.pop() {
             match &self.list[p] {
+                Part::Empty if self.points.contains_key(&p) => found.push(p),
                 Part::Empty | Part::Stray(..) => {}
                 Part::Leaf(..) | Part::Flat(_) => found.push(p),
                 Part::Op(Op::Union, _, of) => stack.extend(of.iter().rev()),

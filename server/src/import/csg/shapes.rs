@@ -3,6 +3,7 @@
 //! What has no size is nothing, with a note, as in OpenSCAD.
 
 use super::arguments::{Arguments, IndexLists, vector};
+use super::convex::Element;
 use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
 use super::hull::{corners_of, point_hull};
@@ -242,7 +243,11 @@ impl Shapes<'_> {
         if hull && matches!(mesh, Err(Problem::Mesh(_))) {
             let used: Vec<DVec3> = faces.iter().flatten().map(|i| points[*i as usize]).collect();
             // What is flat has corners, too.
-            let Some(faces) = point_hull(&used) else { return Ok(self.corners(outer, used)) };
+            let Some(faces) = point_hull(&used) else {
+                let id = self.corners(outer, used);
+                self.parts.loose.insert(id);
+                return Ok(id);
+            };
             self.parts.hullable(call.at, faces.len())?;
             let faces: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().rev().map(|i| *i as u32).collect()).collect();
             mesh = place::polyhedron(outer, &used, &faces);
@@ -270,7 +275,8 @@ impl Shapes<'_> {
     /// What has no inside of its own, below a hull: points of it.
     fn corners(&mut self, outer: &DAffine3, points: Vec<DVec3>) -> PartId {
         let id = self.parts.push(Part::Empty);
-        self.parts.points.insert(id, points.into_iter().map(|p| outer.transform_point3(p)).collect());
+        let points = points.into_iter().map(|p| Element::point(outer.transform_point3(p)));
+        self.parts.points.insert(id, points.collect());
         id
     }
 

@@ -4,6 +4,7 @@
 //! (`polygon`). Where the hull has too many sides to be one shape, or sides that nearly lie in one plane, half-spaces tell all of the
 //! ring. Where no formula tells it, the prism is a mesh.
 
+use super::convex::Element;
 use super::extrude::Extrusion;
 use super::facets::prism;
 use super::flat::{Flat, Outline};
@@ -144,7 +145,8 @@ impl Extrusion {
         // Pockets and holes take no corner away.
         if island.wide {
             let hull = parts.push(Part::Empty);
-            parts.points.insert(hull, self.corners(outer, &island.hull, flat.overshoot));
+            let corners = self.corners(outer, &island.hull, flat.overshoot).into_iter().map(Element::point);
+            parts.points.insert(hull, corners.collect());
             parts.hulls.insert(part, hull);
         } else if part != base {
             parts.hulls.insert(part, base);
