@@ -29,6 +29,7 @@ const CURVES: [(&str, Fate); 4] = [("$fn", Read("3", "4")), ("$fa", Harmless), (
 /// Of texts an eighth of the pieces counts.
 const TEXT: [(&str, Fate); 4] =
     [("$fn", Read("8", "80")), ("$fa", Read("10", "60")), ("$fs", Read("1", "20")), ("$fe", Harmless)];
+const ARCS: [(&str, Fate); 4] = [("$fn", Read("4", "7")), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
 const FLAT: [(&str, Fate); 4] = [("$fn", Harmless), ("$fa", Harmless), ("$fs", Harmless), ("$fe", Harmless)];
 const BALL: &str = "{ sphere(r = 1); cube(size = [1, 1, 1]); }";
 const SQUARE: &str = "{ square(size = [1, 2]); }";
@@ -258,6 +259,8 @@ fn every_argument_is_read_without_effect_or_refused() {
             TEXT
         } else if curved {
             CURVES
+        } else if kind.name == "offset" {
+            ARCS
         } else {
             FLAT
         };

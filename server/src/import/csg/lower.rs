@@ -233,11 +233,12 @@ impl<'a> Lowering<'a> {
             }
             "resize" => self.resized(call, context),
             "offset" => {
-                let Some(offset) = Offset::new(call)? else {
+                let Some(mut offset) = Offset::new(call)? else {
                     return Ok(Step::Leaf(self.shapes.nothing(call, "by no finite distance")));
                 };
                 let pieces = self.shapes.pieces(&Offset::arguments(call)?, offset.by().abs())?;
                 let Some(plane) = context.plane else { return inside(CallKind::Set(Op::Union)) };
+                offset.cut(&mut self.shapes, call)?;
                 // Distances are those of the call's own coordinates.
                 let local = Plane { inner: DAffine3::IDENTITY, ..plane };
                 Ok(Step::open(CallKind::Offset(offset, pieces), Context { plane: Some(local), ..context }))

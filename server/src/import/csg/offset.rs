@@ -4,6 +4,8 @@
 //! point in which the moved edges meet (`delta`) or to a cut at the distance (`chamfer`); where it closes, at the point in which they
 //! meet. That is the offset where the moved rings are simple and no edge has turned round. Where they are not, the rounded one is
 //! the shape with a rectangle over every edge and a disc at every corner, added or taken away.
+//!
+//! Where arcs are to be OpenSCAD's pieces (`Facets`), they are those of Clipper 6, which it uses: not those of a circle's polygon.
 
 use super::arguments::Arguments;
 use super::flat::{Flat, Outline};
@@ -12,10 +14,14 @@ use super::meshed::guarded;
 use super::outlines::{Grid, crossing, flat, flat_of, hull_parts, paths};
 use super::parts::{Part, PartId, Parts};
 use super::polygon::{Region, turn};
+use super::shapes::Shapes;
 use super::syntax::Call;
 use super::{Place, Problem};
 use crate::solid::Op;
+use clipper2_rust::clipper::union_subjects_64;
+use clipper2_rust::core::{FillRule, Path64, Paths64, Point64};
 use glam::DVec2;
+use std::f64::consts::PI;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -24,6 +30,8 @@ const SQUARE: i32 = 0;
 const ROUND: i32 = 1;
 const MITER: i32 = 2;
 const LONGEST_MITER: f64 = 1e6;
+/// The grid, in a unit, on which OpenSCAD's Clipper tells that two edges run on straight.
+const CLIPPER_GRID: f64 = 65536.0;
 
 /// How corners are joined where the ring opens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +46,8 @@ enum Join {
 pub struct Offset {
     by: f64,
     join: Join,
+    /// OpenSCAD's pieces of a turn, where arcs are cut into these.
+    arcs: Option<u32>,
 }
 
 impl Offset {
@@ -57,7 +67,18 @@ impl Offset {
         };
         // OpenSCAD's own, where neither is given.
         let by = arguments.setting(name, 1.0)?;
-        Ok(by.is_finite().then_some(Self { by, join }))
+        Ok(by.is_finite().then_some(Self { by, join, arcs: None }))
+    }
+
+    /// Cuts its arcs into pieces where the text's `$fn` says so, with a note.
+    ///
+    /// # Errors
+    /// More pieces than the limit says.
+    pub fn cut(&mut self, shapes: &mut Shapes<'_>, call: &Call) -> Result<()> {
+        if self.join == Join::Round && self.by != 0.0 {
+            self.arcs = shapes.fragments(&Self::arguments(call)?, self.by.abs())?;
+        }
+        Ok(())
     }
 
     /// How far it reaches.
@@ -79,7 +100,8 @@ impl Offset {
             }
         }
         // The rounded offset outwards of a union is the union of the offsets.
-        let one_by_one = plain && (leaves.len() <= 1 || self.by > 0.0 && self.join == Join::Round);
+        let whole_arcs = self.join == Join::Round && self.arcs.is_none();
+        let one_by_one = plain && (leaves.len() <= 1 || self.by > 0.0 && whole_arcs);
         if !one_by_one {
             let all = paths(parts, at, roots, "offset of shapes together")?;
             return self.of_paths(parts, at, like, &all);
@@ -106,6 +128,12 @@ impl Offset {
         let region = Region::of_paths(paths);
         if region.open {
             return Err((at, crossing()));
+        }
+        if let Some(pieces) = self.arcs
+            && !(self.by < 0.0 && region.is_convex())
+        {
+            let paths = self.arced(at, &region.rings, pieces)?;
+            return Ok(if paths.is_empty() { Part::Empty } else { flat(like, Outline::Paths(paths), DVec2::ZERO) });
         }
         let corners: usize = region.rings.iter().map(Vec::len).sum();
         if parts.affordable(at, corners).is_err() {
@@ -159,6 +187,51 @@ impl Offset {
         };
         let pieces = pieces.max(3) as i32;
         guarded(at, || grid.paths(&section.offset_with_params(grid.length(self.by), join, LONGEST_MITER, pieces)))
+    }
+
+    /// Rings with arcs in the pieces of Clipper 6 (`DoOffset`, `DoRound`): steps of one angle from the first edge's normal on, as many as
+    /// fit best, and the last one ends at the other edge's. What the rings go round more often than not is inside.
+    fn arced(&self, at: Place, rings: &[Vec<DVec2>], pieces: u32) -> Result<Vec<Vec<DVec2>>> {
+        let by = self.by.abs();
+        let half = 180.0 / f64::from(pieces);
+        // Of this angle OpenSCAD has the cosine as it is; whether one step and a half are one or two hangs on the last digit.
+        let cos = if half == 30.0 { 0.75_f64.sqrt() } else { libm::cos(half.to_radians()) };
+        let tolerance = (by * (1.0 - cos)).min(by * 0.25);
+        let steps = PI / libm::acos(1.0 - tolerance / by);
+        let (sin, cos) = libm::sincos(2.0 * PI / steps);
+        let step = DVec2::new(cos, if self.by < 0.0 { -sin } else { sin });
+        let size = rings.iter().flatten().fold(by, |m, p| m.max(p.abs().max_element() + by));
+        // A power of two rounds nothing.
+        let grid = (2_f64.powi(40) / size).log2().floor().exp2();
+        let on_grid = |p: DVec2| Point64::new((p.x * grid).round() as i64, (p.y * grid).round() as i64);
+        let mut moved = Paths64::new();
+        for ring in rings {
+            let mut path: Vec<DVec2> = Vec::with_capacity(2 * ring.len());
+            for i in 0..ring.len() {
+                let [before, p, after] = around(ring, i);
+                let (m1, m2) = (outwards(before, p), outwards(p, after));
+                let (sin, cos) = (m1.perp_dot(m2), m1.dot(m2));
+                path.push(p + m1 * self.by);
+                if (sin * by).abs() * CLIPPER_GRID < 1.0 && cos > 0.0 {
+                    continue;
+                }
+                if sin * self.by < 0.0 {
+                    path.push(p);
+                } else {
+                    let count = (steps / (2.0 * PI) * libm::atan2(sin, cos).abs() + 0.5).floor().max(1.0) as u32;
+                    let mut m = m1;
+                    for _ in 1..count {
+                        m = step.rotate(m);
+                        path.push(p + m * self.by);
+                    }
+                }
+                path.push(p + m2 * self.by);
+            }
+            moved.push(path.into_iter().map(on_grid).collect());
+        }
+        let made = guarded(at, || union_subjects_64(&moved, FillRule::Positive))?;
+        let path = |path: &Path64| path.iter().map(|p| DVec2::new(p.x as f64, p.y as f64) / grid).collect();
+        Ok(made.iter().map(path).collect())
     }
 
     /// The shape with discs at the corners where it opens, and with rectangles over its edges; added or taken away.
@@ -265,4 +338,43 @@ fn area(rings: &[Vec<DVec2>]) -> f64 {
         (0..ring.len()).map(|i| (ring[i] - ring[0]).perp_dot(ring[(i + 1) % ring.len()] - ring[0])).sum()
     };
     rings.iter().map(of).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::import::{Facets, Import, Limits, import_csg};
+    use crate::octree::Model;
+    use crate::octree::mass::mass_properties;
+    use contactd_proto::MassOptions;
+
+    /// The expected volumes are those of the STL files that OpenSCAD 2021.01 writes, of six digits.
+    #[test]
+    fn arcs_in_pieces_are_those_of_openscad() {
+        let square = "square([20, 20], center = true);";
+        let cross = "square([3, 250], center = true); square([250, 3], center = true);";
+        let nook = "polygon([[0, 0], [30, 0], [30, 10], [12, 10], [10, 30], [0, 27]]);";
+        let holed = "difference() { square([40, 30]); polygon([[8, 8], [22, 9], [20, 20], [15, 14], [9, 21]]); }";
+        let (auto, written) = (Facets::Auto, Facets::AsWritten);
+        for (arguments, inner, facets, volume) in [
+            ("r = 7, $fn = 4", square, auto, 1058.0),
+            ("r = -7, $fn = 7", &*format!("offset(r = 7, $fn = 4) {{ {cross} }}"), auto, 1523.4785),
+            // Three halves of a step are two.
+            ("r = 2, $fn = 6", nook, auto, 743.4195994),
+            ("r = -2.5, $fn = 5", holed, auto, 612.1113570),
+            ("r = 6.5, $fn = 0, $fa = 12, $fs = 2", square, written, 1050.4983011),
+            ("r = 7, $fn = 30", square, written, 1112.5354923),
+        ] {
+            let text = format!("linear_extrude(height = 1) {{ offset({arguments}) {{ {inner} }} }}");
+            let Import { solid, notes } =
+                import_csg("m.csg", &text, facets, &Limits::default()).unwrap_or_else(|e| panic!("{text}: {e}"));
+            let found = mass_properties(&Model::new(solid), &MassOptions::default()).expect("a solid").volume;
+            assert!((found - volume).abs() < 1e-5 * volume, "{text}: {found}, not {volume}");
+            assert!(notes.iter().any(|n| n.text.starts_with("offset taken with OpenSCAD's arcs, of ")), "{notes:?}");
+        }
+        // Of nine pieces on arcs are whole.
+        let text = format!("linear_extrude(height = 1) {{ offset(r = 7, $fn = 9) {{ {square} }} }}");
+        let whole = import_csg("m.csg", &text, auto, &Limits::default()).expect("a solid");
+        assert_eq!(whole.notes[0].text, "offset with $fn = 9: taken as exact");
+        assert_eq!(whole.solid.primitives.len(), 5);
+    }
 }

@@ -401,7 +401,11 @@ impl Shapes<'_> {
             let problem = Problem::Limit { what: "faces of a primitive", limit: self.limits.polyhedron_faces };
             return Err((arguments.at(), problem));
         }
-        self.parts.note(arguments.at(), format!("{name} taken as OpenSCAD's polyhedron of {n} sides"), None);
+        let text = match name {
+            "offset" => format!("offset taken with OpenSCAD's arcs, of {n} pieces a turn"),
+            _ => format!("{name} taken as OpenSCAD's polyhedron of {n} sides"),
+        };
+        self.parts.note(arguments.at(), text, None);
         Ok(Some(n as u32))
     }
 
