@@ -1,7 +1,8 @@
 //! What calls make of what is inside of them, that being lowered already: of solids hulls, Minkowski sums and projections, of outlines
 //! what turns about an axis; and which of their operands OpenSCAD takes. What stays flat: `outlines`.
 
-use super::convex::{self, Element};
+use super::convex;
+use super::element::Element;
 use super::flat::{Flat, Outline, Plane};
 use super::meshed::Meshed;
 use super::outlines::{self, flat_of, flats};
@@ -232,7 +233,7 @@ pub fn minkowski(parts: &mut Parts<'_>, at: Place, built: &[PartId], origin: DVe
     let mut made = Vec::new();
     if !operands.is_empty() {
         for sum in convex::sums(parts, at, &operands)? {
-            let sum: Vec<convex::Element> = sum.into_iter().map(|e| e.moved(back)).collect();
+            let sum: Vec<Element> = sum.into_iter().map(|e| e.moved(back)).collect();
             let part = convex::hull(parts, "minkowski", at, &sum)?;
             if matches!(part, Part::Empty) {
                 parts.note(at, "a minkowski without volume: left out, as OpenSCAD does", None);

@@ -3,7 +3,8 @@
 //! Primitives are taken in OpenSCAD's pieces, and set operations are those of Manifold (manifold-rust), which OpenSCAD uses, too. What
 //! has flat faces alone is exact but for rounding; of anything else it is told how far the pieces lie off at most.
 
-use super::convex::{Element, elements};
+use super::convex::elements;
+use super::element::Element;
 use super::facets::ring;
 use super::parts::{Part, PartId, Parts};
 use super::place;

@@ -20,6 +20,7 @@ mod constructs;
 mod convex;
 #[cfg(test)]
 pub(crate) mod dialect;
+mod element;
 mod extrude;
 mod facets;
 mod flat;

@@ -1,6 +1,6 @@
 //! What calls have become before it is known which primitives stay: a list of parts, and the solid made of it.
 
-use super::convex::Element;
+use super::element::Element;
 use super::flat::Flat;
 use super::place::PlacedShape;
 use super::polygon::Formula;

@@ -4,7 +4,8 @@
 //! where discs lie flat or stand upright. A section goes through set operations as it is: that of a ball and of an upright cylinder
 //! is a circle, that of a polyhedron a polygon. Anything else is taken as a mesh (`meshed`).
 
-use super::convex::{Element, elements, pieces};
+use super::convex::{elements, pieces};
+use super::element::Element;
 use super::flat::{Flat, Outline};
 use super::hull::Disc;
 use super::meshed::Meshed;

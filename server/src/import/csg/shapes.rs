@@ -3,7 +3,7 @@
 //! What has no size is nothing, with a note, as in OpenSCAD.
 
 use super::arguments::{Arguments, IndexLists, vector};
-use super::convex::Element;
+use super::element::Element;
 use super::facets::{faceted_sphere, prism, ring};
 use super::flat::{Flat, Outline};
 use super::hull::{corners_of, point_hull};

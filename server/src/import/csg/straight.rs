@@ -4,7 +4,7 @@
 //! (`polygon`). Where the hull has too many sides to be one shape, or sides that nearly lie in one plane, half-spaces tell all of the
 //! ring. Where no formula tells it, the prism is a mesh.
 
-use super::convex::Element;
+use super::element::Element;
 use super::extrude::Extrusion;
 use super::facets::prism;
 use super::flat::{Flat, Outline};
