@@ -77,7 +77,7 @@ struct Overlap {
 /// Requests of a step that move pairs apart.
 const MOST_ROUNDS: usize = 8;
 /// Of the gap, how far a pair that is moved by others may be from where it would be moved itself.
-const ASIDE: f64 = 0.25;
+const ASIDE: f64 = 0.01;
 
 /// Which of its requests a step waits for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -309,17 +309,16 @@ fn what_was_moved_apart_is_put_back_for_others() {
 
 const BLOCK: &str = "cube(size = [1, 1, 1], center = true);";
 
-/// Blocks of side 1 at heights, those of `fixed` fixed, in an order of their own; the contacts of one step, by their places in
-/// `heights`, and how many requests it took.
-fn pile(heights: &[f64], fixed: &[usize], order: &[usize]) -> (Vec<([usize; 2], f64)>, u64) {
+/// Bodies of one text at places, those of `fixed` fixed, in an order of their own; the contacts of one step, by their numbers, and how
+/// many requests it took.
+fn told_once(text: &str, places: &[Pose], fixed: &[usize], order: &[usize]) -> (Vec<([usize; 2], f64)>, u64) {
     let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default()).unwrap();
-    let model = session.load_model("block.csg", BLOCK).unwrap().id;
+    let model = session.load_model("body.csg", text).unwrap().id;
     let mut cache = ContactCache::new(0.0, MARGIN);
-    let (mut objects, mut poses) = (vec![0; heights.len()], Vec::new());
+    let (mut objects, mut poses) = (vec![0; places.len()], Vec::new());
     for &i in order {
-        // Each is turned by a little about the axis, so that no corner lies over another one.
-        let pose = Pose::new(DVec3::Z * heights[i], quat_of_rotation_vector(DVec3::Z * 0.1 * i as f64));
-        let object = Object::new(&format!("block {i}"), model).at(pose);
+        let pose = places[i];
+        let object = Object::new(&format!("body {i}"), model).at(pose);
         objects[i] = session.add_object(if fixed.contains(&i) { object.fixed() } else { object }).unwrap();
         if fixed.contains(&i) {
             cache.add_fixed(objects[i], pose);
@@ -344,6 +343,36 @@ fn pile(heights: &[f64], fixed: &[usize], order: &[usize]) -> (Vec<([usize; 2], 
         ([a.min(b), a.max(b)], p.separation)
     });
     (told.collect(), cache.asked().requests)
+}
+
+/// The same of blocks of side 1 over each other at heights.
+fn pile(heights: &[f64], fixed: &[usize], order: &[usize]) -> (Vec<([usize; 2], f64)>, u64) {
+    // Each is turned by a little about the axis, so that no corner lies over another one.
+    let turn = |i: usize| quat_of_rotation_vector(DVec3::Z * 0.1 * i as f64);
+    let places: Vec<Pose> = heights.iter().enumerate().map(|(i, z)| Pose::new(DVec3::Z * *z, turn(i))).collect();
+    told_once(BLOCK, &places, fixed, order)
+}
+
+/// Balls in overlap with each other, in chains and in rings: each pair is told as if it were alone.
+#[test]
+fn balls_in_overlap_are_told_as_each_pair_by_itself() {
+    for seed in 0..sized("CONTACTD_CACHE_SCENES", 12u64) {
+        let mut r = Random::new(5_000 + seed);
+        let mut deep = || 1.0 - MARGIN * r.within(0.05, 1.0);
+        // A triangle, whose third side closes it, and a chain from there.
+        let (p, q, s) = (deep(), deep(), deep());
+        let x = (p * p + q * q - s * s) / (2.0 * p);
+        let mut centers = vec![DVec3::ZERO, dvec3(p, 0.0, 0.0), dvec3(x, (q * q - x * x).sqrt(), 0.0)];
+        centers.push(centers[2] + dvec3(0.3, 0.8, 0.4).normalize() * deep());
+        centers.push(centers[3] + dvec3(-0.5, 0.7, -0.4).normalize() * deep());
+        let places: Vec<Pose> = centers.iter().map(|c| Pose::at(*c)).collect();
+        let (told, _) = told_once("sphere(r = 0.5);", &places, &[], &[0, 1, 2, 3, 4]);
+        assert_eq!(told.len(), 5, "seed {seed}: {told:?}");
+        for ([a, b], separation) in told {
+            let truth = centers[a].distance(centers[b]) - 1.0;
+            assert!((separation - truth).abs() < 1e-8, "seed {seed}, {a} and {b}: {separation}, {truth}");
+        }
+    }
 }
 
 /// Four points for each two neighbours, as deep as they are.
