@@ -63,6 +63,9 @@ fn segments([p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> f64 {
 }
 
 /// The distance at a time of the step; 0 where they meet.
+///
+/// # Panics
+/// Of two boxes.
 pub fn distance(a: &Way, b: &Way, t: f64) -> f64 {
     let ((ra, pa), (rb, pb)) = (a.at(t), b.at(t));
     match (&a.shape, &b.shape) {
@@ -85,7 +88,7 @@ pub fn distance(a: &Way, b: &Way, t: f64) -> f64 {
             };
             balls.iter().map(of_ball).fold(f64::INFINITY, f64::min).max(0.0)
         }
-        (Shape::Box(_), Shape::Box(_)) => unimplemented!("two boxes"),
+        (Shape::Box(_), Shape::Box(_)) => panic!("the distance of two boxes has no closed form here"),
     }
 }
 

@@ -17,8 +17,8 @@ request to contactd, ``mj_addContact`` for each point of the answer, the constra
 
 MuJoCo's contacts are soft: bodies at rest sink into each other a little, and solids that overlap touch nowhere. So each contact
 acts from ``skin`` on (its ``includemargin``) while its ``dist`` is the true gap: bodies rest a fraction of the skin apart, where contactd
-knows all their regions. A pair that was driven into overlap is asked about once more, moved back by its depth, so that its
-points are those of the face it came through; this second request happens in the steps after a hard impact alone.
+knows all their regions. A pair in overlap is asked about once more, moved apart, so that its points are those of the face it came
+through: all such pairs in one further request where they can be apart together, in up to eight where they cannot.
 
 A step that raises has not moved ``data`` on: it may be repeated. Where the wait for a server was interrupted, the next step first
 waits for the answer that is still under way.
@@ -99,14 +99,15 @@ class Coupling:
     ``solids``: for each body by name, its solid in the body's frame: OpenSCAD CSG text, a solid that was built
     (``contactd.solid``), or the path of a file; its unit is ``unit`` lengths of MuJoCo (0.001: models in millimetres in a scene in
     metres). ``geoms``: every other geom that collides gets its own solid, too (``attach``); ``meshes``: what a mesh then stands
-    for, "hull" or "exact"; ``keep_exact``: what MuJoCo has in closed form stays its own. Bodies welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
+    for, "hull" or "exact"; ``keep_exact``: what MuJoCo has in closed form stays its own, as ``attach`` says. Bodies
+    welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
     unit, at which contacts begin to act, in place of the geoms' ``margin``. ``slack``: the part of it by which any point of a body
     may go until contactd is asked about it anew; until then its contacts are carried along, and a gap is off by about the
     square of that way over the radius of the surfaces (0: not at all where they are flat). ``session``: to use one that is open (by
     default an embedded one is opened, and closed with the coupling); its rules are replaced.
 
-    Geoms that have a solid get ``contype`` and ``conaffinity`` 0 until the coupling is closed, or those by which they meet what they
-    have MuJoCo's own contacts with alone; so do those of a ``<pair>``, which has no reach. What
+    Until the coupling is closed geoms that have a solid get ``contype`` and ``conaffinity`` 0, or those by which they meet nothing but
+    what they have MuJoCo's own contacts with; a ``<pair>`` of two that have solids has no reach. What
     makes contacts (friction, ``solref``, ``condim`` …) is that of the geoms, of a body with a solid that of its first colliding
     geom, combined as MuJoCo does. The filters are read once: what is changed in the model later is not seen.
 

@@ -269,6 +269,8 @@ impl ContactCache {
 
     /// Plans the request that moves apart what is in overlap.
     fn move_apart(&mut self) {
+        // Of a step whose request failed something may be left.
+        self.deep.clear();
         self.left.clear();
         self.rounds = 0;
         for pair in self.manifolds.pairs().filter(|pair| pair.status == OVERLAP) {
@@ -370,11 +372,6 @@ impl ContactCache {
         self.left.sort_by_key(|pair| pair.level);
         if !self.left.is_empty() && self.rounds < MOST_ROUNDS {
             self.next_round();
-        }
-        // Its memory is for the next.
-        if self.deep.is_empty() {
-            self.deep = deep;
-            self.deep.clear();
         }
     }
 }

@@ -89,6 +89,24 @@ struct Scene {
     bodies: Vec<(u32, Shape)>,
 }
 
+/// Every pair is told with all of its regions.
+fn ask_for_patches(session: &mut Session<Embedded>) {
+    let mut rule = Rule::new(["default".into(), "default".into()]);
+    (rule.report, rule.margin, rule.penetration) = (Report::Patch, MARGIN, true);
+    session.set_rules(&[rule]).unwrap();
+    session.options.details = true;
+}
+
+/// One step, in as many requests as it takes.
+fn ask(session: &mut Session<Embedded>, cache: &mut ContactCache, poses: &[Pose]) {
+    let mut more = !cache.begin(poses).is_empty();
+    while more {
+        let records = cache.records();
+        session.begin_step(records.len()).unwrap().copy_from_slice(records);
+        more = !cache.answer(&session.finish(Duration::from_secs(60)).unwrap()).is_empty();
+    }
+}
+
 impl Scene {
     fn new(r: &mut Random, slack: f64) -> Self {
         let mut session = contactd::embedded(&contactd::ipc::ServerConfig::default()).unwrap();
@@ -108,22 +126,14 @@ impl Scene {
             cache.add_moving(object, shape.reach());
             bodies.push((object, shape));
         }
-        let mut rule = Rule::new(["default".into(), "default".into()]);
-        (rule.report, rule.margin, rule.penetration) = (Report::Patch, MARGIN, true);
-        session.set_rules(&[rule]).unwrap();
-        session.options.details = true;
+        ask_for_patches(&mut session);
         Self { session, cache, floor, slab, bodies }
     }
 
     /// One step; how many requests it took.
     fn step(&mut self, poses: &[Pose]) -> u64 {
         let before = self.cache.asked().requests;
-        let mut more = !self.cache.begin(poses).is_empty();
-        while more {
-            let records = self.cache.records();
-            self.session.begin_step(records.len()).unwrap().copy_from_slice(records);
-            more = !self.cache.answer(&self.session.finish(Duration::from_secs(60)).unwrap()).is_empty();
-        }
+        ask(&mut self.session, &mut self.cache, poses);
         self.cache.asked().requests - before
     }
 
@@ -327,16 +337,8 @@ fn told_once(text: &str, places: &[Pose], fixed: &[usize], order: &[usize]) -> (
             poses.push(pose);
         }
     }
-    let mut rule = Rule::new(["default".into(), "default".into()]);
-    (rule.report, rule.margin, rule.penetration) = (Report::Patch, MARGIN, true);
-    session.set_rules(&[rule]).unwrap();
-    session.options.details = true;
-    let mut more = !cache.begin(&poses).is_empty();
-    while more {
-        let records = cache.records();
-        session.begin_step(records.len()).unwrap().copy_from_slice(records);
-        more = !cache.answer(&session.finish(Duration::from_secs(60)).unwrap()).is_empty();
-    }
+    ask_for_patches(&mut session);
+    ask(&mut session, &mut cache, &poses);
     let place = |object: u32| objects.iter().position(|o| *o == object).expect("one of them");
     let told = cache.contacts().map(|(m, p)| {
         let [a, b] = [place(m.a), place(m.b)];
