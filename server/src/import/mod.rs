@@ -8,6 +8,7 @@
 //!
 //! Floor 7: imports `solid`, `math`, `proto`.
 
+mod arrangement;
 pub mod csg;
 pub mod drawing;
 pub mod font;

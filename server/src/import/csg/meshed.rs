@@ -153,10 +153,14 @@ impl Meshed {
         let points: Vec<DVec3> = (0..mesh.num_vert()).map(|i| DVec3::from_array(mesh.get_vert_pos(i))).collect();
         let clockwise = |t: &[u64]| vec![t[2] as u32, t[1] as u32, t[0] as u32];
         let faces: Vec<Vec<u32>> = mesh.tri_verts.chunks_exact(3).map(clockwise).collect();
-        match place::mesh(&DAffine3::IDENTITY, &points, &faces) {
-            Err(Problem::Surface(MeshFault::Flat)) => Ok(Part::Empty),
-            placed => parts.leaf(name, at, placed.map(|p| p.0)),
+        let placed = match place::wound(&DAffine3::IDENTITY, &points, &faces) {
+            Err(Problem::Surface(MeshFault::Flat)) => return Ok(Part::Empty),
+            placed => placed,
+        };
+        if let Some(text) = placed.as_ref().ok().and_then(|(_, done)| done.crossing(&format!("a {name}"))) {
+            parts.note(at, text, None);
         }
+        parts.leaf(name, at, placed.map(|p| p.0))
     }
 }
 

@@ -9,11 +9,12 @@
 //! (`snapped`), with the orthogonal polar factor from Newton's iteration Q ← (Q + Q⁻ᵀ)/2 (Higham 1986).
 
 use super::Problem;
+use crate::import::arrangement::{self, Done};
 use crate::import::mesh::Polygons;
 use crate::math::tolerance::{ROUNDING, SAME_RADIUS, SIMILARITY};
 use crate::solid::primitive::{
-    Capsule, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, Polyhedron, Repair,
-    Shape, Sphere, Superellipsoid, Torus, TriangleMesh,
+    Capsule, Closed, Cone, Cuboid, Cylinder, Ellipsoid, EllipticFrustum, Fit, Geometry as _, HalfSpace, MeshFault,
+    Polyhedron, Repair, Shape, Sphere, Superellipsoid, Torus, TriangleMesh,
 };
 use crate::solid::surface::elliptic::squared;
 use contactd_proto::Pose;
@@ -246,22 +247,33 @@ pub fn polyhedron(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<
 
 /// The solid within a mesh, faces clockwise from outside, its corners where the transform puts them.
 pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(PlacedShape, Repair), Problem> {
-    let points: Vec<DVec3> = points.iter().map(|p| a.transform_point3(*p)).collect();
-    let mirrored = a.matrix3.determinant() < 0.0;
-    let turned = |f: &Vec<u32>| if mirrored { f.clone() } else { f.iter().rev().copied().collect() };
-    let (shape, repair) =
-        TriangleMesh::of_polygons(&points, faces.iter().map(turned).collect::<Vec<_>>().iter().map(Vec::as_slice))?;
+    let (shape, repair) = TriangleMesh::of_closed(closed(a, points, faces)?)?;
     Ok((PlacedShape::new(shape, Pose::IDENTITY), repair))
 }
 
-/// The solid within polygons that run counter-clockwise as seen from outside, their corners where the transform puts them.
-pub fn polygons(a: &DAffine3, polygons: Polygons) -> Result<(PlacedShape, Repair), Problem> {
+/// The same of a mesh that may cross itself: what it winds around, and what was done to it.
+pub fn wound(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(PlacedShape, Done), Problem> {
+    let (shape, done) = arrangement::mesh(closed(a, points, faces)?)?;
+    Ok((PlacedShape::new(shape, Pose::IDENTITY), done))
+}
+
+/// The closed surface of faces clockwise from outside, its corners where the transform puts them.
+fn closed(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<Closed, MeshFault> {
+    let points: Vec<DVec3> = points.iter().map(|p| a.transform_point3(*p)).collect();
+    let mirrored = a.matrix3.determinant() < 0.0;
+    let turned = |f: &Vec<u32>| if mirrored { f.clone() } else { f.iter().rev().copied().collect() };
+    TriangleMesh::closed(&points, faces.iter().map(turned).collect::<Vec<_>>().iter().map(Vec::as_slice))
+}
+
+/// What polygons wind around that run counter-clockwise as seen from outside, their corners where the transform puts them; and what
+/// was done to them.
+pub fn polygons(a: &DAffine3, polygons: Polygons) -> Result<(PlacedShape, Done), Problem> {
     let polygons = polygons.placed(a);
     let closed = TriangleMesh::closed(&polygons.points, polygons.faces())?;
     // Of many triangles they take as much as all the rest.
     drop(polygons);
-    let (shape, repair) = TriangleMesh::of_closed(closed)?;
-    Ok((PlacedShape::new(shape, Pose::IDENTITY), repair))
+    let (shape, done) = arrangement::mesh(closed)?;
+    Ok((PlacedShape::new(shape, Pose::IDENTITY), done))
 }
 
 /// The half-space n·x <= d.

@@ -11,8 +11,9 @@ use super::parts::{Part, PartId, Parts};
 use super::place::{self, PlacedShape};
 use super::syntax::Call;
 use super::{Facets, Limits, Place, Problem};
+use crate::import::arrangement::Done;
 use crate::import::mesh::{Polygons, oriented};
-use crate::solid::primitive::{MeshError, MeshFault, Repair};
+use crate::solid::primitive::{MeshError, MeshFault};
 use crate::solid::{Op, Shape};
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -293,7 +294,7 @@ impl Shapes<'_> {
             let problem = Problem::Limit { what: "triangles of a mesh", limit: self.limits.mesh_facets };
             return Err((call.at, problem));
         }
-        let made = place::mesh(outer, points, faces).map_err(|fault| by_faces(fault, outer, (points, faces)));
+        let made = place::wound(outer, points, faces).map_err(|fault| by_faces(fault, outer, (points, faces)));
         self.meshed(call, made, before)
     }
 
@@ -306,17 +307,17 @@ impl Shapes<'_> {
     fn meshed(
         &mut self,
         call: &Call,
-        made: std::result::Result<(PlacedShape, Repair), Problem>,
+        made: std::result::Result<(PlacedShape, Done), Problem>,
         before: Option<Problem>,
     ) -> Result<PartId> {
-        let (placed, repair) = match made {
+        let (placed, done) = match made {
             Err(Problem::Surface(MeshFault::Flat)) => return Ok(self.nothing(call, "without volume")),
             Err(Problem::Surface(MeshFault::Open(..) | MeshFault::Mixed(..))) if before.is_some() => {
                 return Err((call.at, before.unwrap_or_else(|| Problem::syntax("a mesh", "none"))));
             }
             placed => placed.map_err(|p| (call.at, p))?,
         };
-        for (text, amount) in repair.notes("a polyhedron") {
+        for (text, amount) in done.notes("a polyhedron") {
             self.parts.note(call.at, text, amount);
         }
         self.leaf(call, Ok(placed))

@@ -300,8 +300,11 @@ fn infinite_primitives_are_half_spaces() {
 fn every_refusal_is_a_sentence_with_its_place() {
     let cube_faces = "[[2,6,4,0],[5,7,3,1],[4,5,1,0],[3,7,6,2],[1,3,2,0],[6,7,5,4]]";
     let cube_points = "[[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1,1]]";
-    let crossed = cube_points.replace("[1,1,1]", "[-0.5,-0.5,-0.5]");
-    let triangles = "[[2,6,4],[2,4,0],[5,7,3],[5,3,1],[4,5,1],[4,1,0],[3,7,6],[3,6,2],[1,3,2],[1,2,0],[6,7,5],[6,5,4]]";
+    // Shells that run the same way, one within the other.
+    let smaller = cube_points.replace('0', "0.3").replace('1', "0.7");
+    let within = format!("{},{}", cube_points.trim_end_matches("]]").to_owned() + "]", &smaller[1..]);
+    let others = "[[10,14,12,8],[13,15,11,9],[12,13,9,8],[11,15,14,10],[9,11,10,8],[14,15,13,12]]";
+    let shells = format!("{},{}", cube_faces.trim_end_matches("]]").to_owned() + "]", &others[1..]);
     let table: Vec<(String, &str)> = vec![
         (
             "union() {\n  roof() { }\n}".into(),
@@ -367,8 +370,8 @@ fn every_refusal_is_a_sentence_with_its_place() {
              face only",
         ),
         (
-            format!("polyhedron(points = {crossed}, faces = {triangles});"),
-            "1:1: expected a closed mesh, found one that crosses itself near [",
+            format!("polyhedron(points = {within}, faces = {shells});"),
+            "1:1: expected a closed mesh, found one that crosses itself, lies on itself or is inside out near [",
         ),
         (
             under("[1e99, 0, 0, 0], [0, 1e99, 0, 0], [0, 0, 1e99, 0]", "cube(1e250);"),
@@ -381,6 +384,31 @@ fn every_refusal_is_a_sentence_with_its_place() {
         let expected = format!("m.csg:{sentence}");
         assert!(error.starts_with(&expected), "{text}\n  said    {error}\n  not     {expected}");
         assert!(!error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn a_polyhedron_that_crosses_itself_is_what_it_winds_around() {
+    // A cube one corner of which is pulled through the opposite one: along their line it winds around what is between them alone,
+    // and the other way round. A box with walls that cross each other below its lid.
+    let cube = "[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[-0.5,-0.5,-0.5]";
+    let triangles = "[2,6,4],[2,4,0],[5,7,3],[5,3,1],[4,5,1],[4,1,0],[3,7,6],[3,6,2],[1,3,2],[1,2,0],[6,7,5],[6,5,4]";
+    let box_of = |z: &str| format!("[0,0,0],[4,0,0],[4,4,0],[0,4,0],{z},[0,0,4],[4,0,4.5],[4,4,4.5],[0,4,4]");
+    let lid = "[0,1,2,3],[11,10,9,8],[0,4,5],[0,5,1],[1,5,6],[1,6,2],[2,6,7],[2,7,3],[3,7,4],[3,4,0],[4,8,9],[4,9,5],\
+               [5,9,10],[5,10,6],[6,10,11],[6,11,7],[7,11,8],[7,8,4]";
+    let texts = [
+        (cube.to_owned(), triangles, None, [-0.25, 0.1]),
+        (box_of("[0,0,3],[4,0,5],[4,4,5],[0,4,3]"), lid, Some(68.0), [0.9, 5.0]),
+    ];
+    for (points, faces, volume, [inside, outside]) in texts {
+        let import = import(&format!("\n  polyhedron(points = [{points}], faces = [{faces}]);"));
+        let [note] = import.notes.as_slice() else { panic!("{:?}", import.notes) };
+        assert!(note.text.starts_with("a polyhedron that crosses itself (") && note.at.line == 2, "{note:?}");
+        let primitive = &import.solid.primitives[0];
+        let measured = primitive.shape.geometry().moments().expect("closed").volume();
+        assert!(volume.is_none_or(|v: f64| (measured - v).abs() < 1e-12), "{measured}");
+        let value = |x: f64| import.solid.value(DVec3::splat(x));
+        assert!(value(inside) < 0.0 && value(outside) > 0.0);
     }
 }
 

@@ -13,6 +13,7 @@ pub mod ply;
 pub mod stl;
 pub mod threemf;
 
+use super::arrangement;
 use super::problem::Problem;
 use super::{Import, ImportError, Limits, Note, Place};
 use crate::solid::primitive::{MeshFault, Polyhedron, Shape, TriangleMesh};
@@ -279,8 +280,8 @@ fn solid(polygons: Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec
     };
     // Of many triangles they take as much as all the rest.
     drop(polygons);
-    let (mesh, repair) = TriangleMesh::of_closed(closed)?;
-    Ok((mesh.into(), repair.notes("a mesh")))
+    let (mesh, done) = arrangement::mesh(closed)?;
+    Ok((mesh.into(), done.notes("a mesh")))
 }
 
 /// Text of a file.

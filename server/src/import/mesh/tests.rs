@@ -98,6 +98,30 @@ fn every_format_tells_the_same_solid() {
 }
 
 #[test]
+fn a_mesh_that_crosses_itself_is_what_it_winds_around() {
+    // Cubes of side 2 and 3 that have a cube of side 1 in common, as one body; the second one either way round.
+    let corners = |at: i32, side: i32| {
+        let corner = |i: i32| [i & 1, i >> 1 & 1, i >> 2].map(|k| (at + side * k).to_string()).join(" ") + "\n";
+        (0..8).map(corner).collect::<String>()
+    };
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    for (reversed, volume) in [(false, 34.0), (true, 33.0)] {
+        let second = sides.map(|s| {
+            let s = s.map(|i| i + 8);
+            if reversed { [s[3], s[2], s[1], s[0]] } else { s }
+        });
+        let face = |s: &[i32; 4]| format!("4 {} {} {} {}\n", s[0], s[1], s[2], s[3]);
+        let faces: String = sides.iter().chain(&second).map(face).collect();
+        let text = format!("OFF 16 12 0\n{}{}{faces}", corners(0, 2), corners(1, 3));
+        let import = read("two.off", text.as_bytes()).expect("two cubes");
+        let last = &import.notes.last().expect("a note").text;
+        assert!(last.starts_with("a mesh that crosses itself ("), "{last}");
+        let measured = import.solid.primitives[0].shape.geometry().moments().expect("closed").volume();
+        assert!((measured - volume).abs() < 1e-12, "{measured}");
+    }
+}
+
+#[test]
 fn what_is_wrong_with_a_file_is_told_with_its_place() {
     let (stl, off, obj) = (ascii_stl(), off(), obj());
     let mut short = binary_stl();

@@ -40,7 +40,7 @@ pub use quadric::Quadric;
 pub use sphere::Sphere;
 pub use superellipsoid::Superellipsoid;
 pub use torus::Torus;
-pub use triangle_mesh::{Below, FacetTree, MeshFault, Repair, TriangleMesh, WELD};
+pub use triangle_mesh::{Below, Closed, Crossed, FacetTree, MeshFault, Repair, TriangleMesh, WELD};
 
 /// What every primitive answers about itself, in its own frame.
 pub trait Geometry {

@@ -83,6 +83,22 @@ pub struct Closed {
     repair: Repair,
 }
 
+/// Closed triangles that are not the surface of a solid.
+#[derive(Debug)]
+pub struct Crossed {
+    /// Why not.
+    pub fault: MeshFault,
+    /// Their corners.
+    pub vertices: Vec<DVec3>,
+    /// The triangles, every edge run along as often one way as the other.
+    pub triangles: Vec<[u32; 3]>,
+    /// What was repaired in them.
+    pub repair: Repair,
+}
+
+/// Why triangles are not the surface of a solid, their corners, and the triangles.
+type Unfit = (MeshFault, Vec<DVec3>, Vec<[u32; 3]>);
+
 /// All points within a closed mesh of triangles.
 #[derive(Clone, Debug)]
 pub struct TriangleMesh {
@@ -115,7 +131,7 @@ impl TriangleMesh {
     /// What is wrong with the mesh, and where.
     pub fn divided_from(few: usize, points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(Self, Repair), MeshFault> {
         let (shell, repair) = shell::Shell::of(points, triangles)?;
-        Ok((Self::of_shell(shell, few)?, repair))
+        Ok((Self::of_shell(shell, few).map_err(|unfit| unfit.0)?, repair))
     }
 
     /// The same of polygons, each a list of indices of points that runs counter-clockwise as seen from outside. Those that are not
@@ -159,10 +175,22 @@ impl TriangleMesh {
     /// # Errors
     /// What is wrong with the mesh, and where.
     pub fn of_closed(closed: Closed) -> Result<(Self, Repair), MeshFault> {
-        Ok((Self::of_shell(closed.shell, FEW_TRIANGLES)?, closed.repair))
+        Self::of_closed_or(closed).map_err(|crossed| crossed.fault)
     }
 
-    fn of_shell(shell: shell::Shell, few: usize) -> Result<Self, MeshFault> {
+    /// The same, with the triangles back where they are not the surface of a solid.
+    ///
+    /// # Errors
+    /// What is wrong with the mesh, and its triangles.
+    pub fn of_closed_or(closed: Closed) -> Result<(Self, Repair), Box<Crossed>> {
+        let Closed { shell, repair } = closed;
+        match Self::of_shell(shell, FEW_TRIANGLES) {
+            Ok(mesh) => Ok((mesh, repair)),
+            Err((fault, vertices, triangles)) => Err(Box::new(Crossed { fault, vertices, triangles, repair })),
+        }
+    }
+
+    fn of_shell(shell: shell::Shell, few: usize) -> Result<Self, Unfit> {
         let shell::Shell { vertices, triangles, edges } = shell;
         let around = Aabb::of_points(vertices.iter().copied());
         let tolerance = tolerance(&around);
@@ -176,7 +204,17 @@ impl TriangleMesh {
             // A third of what the neighbours take, which nothing else asks for.
             let leaders = edges::leaders(&opposite);
             drop(opposite);
-            let division = Arc::new(Divided::new(Arc::new(surface), &leaders)?);
+            let surface = Arc::new(surface);
+            let division = match Divided::new(surface.clone(), &leaders) {
+                Ok(division) => Arc::new(division),
+                Err(fault) => {
+                    let (vertices, triangles) = match Arc::try_unwrap(surface) {
+                        Ok(surface) => (surface.vertices, surface.triangles),
+                        Err(shared) => (shared.vertices.clone(), shared.triangles.clone()),
+                    };
+                    return Err((fault, vertices, triangles));
+                }
+            };
             let formula = Formula::Divided(division.clone());
             return Ok(Self {
                 surface: division.surface().clone(),
@@ -193,8 +231,13 @@ impl TriangleMesh {
             MeshFault::Crossing(_) | MeshFault::Intricate(_) => apart::first_through(&surface).unwrap_or(fault),
             MeshFault::Flat | MeshFault::Open(..) | MeshFault::Mixed(..) | MeshFault::Through { .. } => fault,
         };
-        let (expr, mut planes) = formula.map_err(named)?;
-        let Expr::Open(tokens) = expr else { return Err(MeshFault::Flat) };
+        let (expr, mut planes) = match formula.map_err(named) {
+            Ok(formula) => formula,
+            Err(fault) => return Err((fault, surface.vertices, surface.triangles)),
+        };
+        let Expr::Open(tokens) = expr else {
+            return Err((MeshFault::Flat, surface.vertices, surface.triangles));
+        };
         let cuts = planes.split_off(faces);
         surface.planes = planes;
         Ok(Self { surface: Arc::new(surface), cuts, formula: Formula::new(tokens), division: None })
