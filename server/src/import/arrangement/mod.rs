@@ -1,4 +1,4 @@
-//! Meshes that cross themselves, by what they wind around.
+//! Meshes that cross themselves, or whose parts do not run round as those of a solid, by what they wind around.
 //!
 //! Of a closed mesh of triangles every point beside it has a winding number: how often the mesh goes around it. What is kept is the
 //! boundary of all points whose number is not 0, so that parts which overlap are their union, and a part that is inside out is a part
@@ -23,12 +23,16 @@ mod outcome;
 mod pieces;
 mod snap;
 #[cfg(test)]
+mod soups;
+#[cfg(test)]
 mod tests;
 mod winding;
 
-use crate::solid::primitive::{Closed, Crossed, MeshFault, Repair, TriangleMesh};
+use crate::math::Aabb;
+use crate::solid::primitive::{Closed, Crossed, Geometry as _, MeshFault, Repair, TriangleMesh};
 use facets::{DIGITS, Facets};
 use glam::DVec3;
+use outcome::Kept;
 use pieces::Pieces;
 
 /// Digits of the grid, and steps of it that are taken as none, tried one after the other until a mesh comes of it that does not cross
@@ -40,23 +44,24 @@ struct Resolved {
     facets: Facets,
     pieces: Pieces,
     /// By the numbers of the points of `pieces`.
-    faces: Vec<Vec<u32>>,
+    kept: Kept,
 }
 
 impl Resolved {
-    /// That of a mesh on a grid. `None` where no two triangles meet elsewhere than where they join, where more do than are looked at,
-    /// and where nothing is left.
+    /// That of a mesh on a grid. `None` where it is the mesh as it is, where more triangles meet than are looked at, and where nothing is
+    /// left.
     fn of(vertices: &[DVec3], triangles: &[[u32; 3]], digits: i32) -> Option<Self> {
         let facets = Facets::of(vertices, triangles, digits)?;
         let pieces = Pieces::of(&facets)?;
-        let faces = outcome::kept(&facets, &pieces)?;
-        Some(Self { facets, pieces, faces })
+        let kept = outcome::kept(&facets, &pieces)?;
+        let is_other = pieces.pairs + kept.turned + kept.left_out > 0;
+        is_other.then_some(Self { facets, pieces, kept })
     }
 
     /// The solid within. `None` where doubles cannot tell it.
     fn mesh(&self, steps: &[f64]) -> Option<TriangleMesh> {
         steps.iter().find_map(|reach| {
-            let (points, faces) = outcome::rounded(&self.facets, &self.pieces, &self.faces, *reach);
+            let (points, faces) = outcome::rounded(&self.facets, &self.pieces, &self.kept.faces, *reach);
             TriangleMesh::of_polygons(&points, faces.iter().map(Vec::as_slice)).ok().map(|made| made.0)
         })
     }
@@ -67,20 +72,27 @@ fn resolved(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Option<(TriangleMesh,
     for (digits, steps) in TRIES {
         let resolved = Resolved::of(vertices, triangles, digits)?;
         if let Some(mesh) = resolved.mesh(steps) {
-            let Pieces { pairs, cut, .. } = resolved.pieces;
-            return Some((mesh, Crossing { pairs, cut }));
+            let Resolved { pieces: Pieces { pairs, cut, .. }, kept: Kept { turned, others, left_out, .. }, .. } =
+                resolved;
+            return Some((mesh, Crossing { pairs, cut, turned, others, left_out }));
         }
     }
     None
 }
 
-/// How a mesh crossed itself.
+/// How a mesh crossed itself, or ran round its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Crossing {
     /// Pairs of its triangles that met elsewhere than where they join.
     pairs: usize,
     /// Triangles that were cut.
     cut: usize,
+    /// Parts of triangles that were turned …
+    turned: usize,
+    /// … that were kept as they ran …
+    others: usize,
+    /// … and that have the same on both sides.
+    left_out: usize,
 }
 
 /// What was done to a mesh.
@@ -97,9 +109,16 @@ impl Done {
         self.repair.notes(what).into_iter().chain(crossing).collect()
     }
 
-    /// What was done where it crossed itself, as a sentence.
+    /// What was done where it crossed itself, or where its parts did not run round as those of a solid, as a sentence.
     pub fn crossing(&self, what: &str) -> Option<String> {
-        self.crossing.map(|Crossing { pairs, cut }| {
+        self.crossing.map(|Crossing { pairs, cut, turned, left_out, .. }| {
+            // Where none was cut they do no more than touch.
+            if cut == 0 && turned + left_out > 0 {
+                return format!(
+                    "{what} with parts inside out, or within others that run the same way ({turned} facets were turned, \
+                     {left_out} left out): taken as what it winds around"
+                );
+            }
             let pairs = if pairs == 1 {
                 "1 pair of its facets meets".into()
             } else {
@@ -108,6 +127,15 @@ impl Done {
             format!("{what} that crosses itself ({pairs}, {cut} were cut): taken as what it winds around")
         })
     }
+}
+
+/// Volume of a solid that is no sheet, as a part of the cube of its size.
+const THICK: f64 = 1e-9;
+
+/// True for a solid that roundings cannot have made.
+fn is_thick(mesh: &TriangleMesh) -> bool {
+    let size = 2.0 * Aabb::of_points(mesh.vertices().iter().copied()).half().length();
+    mesh.moments().is_some_and(|m| m.volume() > THICK * size * size * size)
 }
 
 /// The solid within a closed mesh, what it winds around if it crosses itself; and what was done to it.
@@ -119,11 +147,18 @@ pub fn mesh(closed: Closed) -> Result<(TriangleMesh, Done), MeshFault> {
         Ok((mesh, repair)) => return Ok((mesh, Done { repair, crossing: None })),
         Err(crossed) => crossed,
     };
-    let Crossed { fault, vertices, triangles, repair } = *crossed;
+    let Crossed { fault, vertices, triangles, mut repair } = *crossed;
     let made = match fault {
         MeshFault::Crossing(_) | MeshFault::Through { .. } | MeshFault::Intricate(_) => resolved(&vertices, &triangles),
-        MeshFault::Flat | MeshFault::Open(..) | MeshFault::Mixed(..) => None,
+        // What encloses as much one way round as the other; no sheet, and nothing that roundings have left.
+        MeshFault::Flat => resolved(&vertices, &triangles).filter(|(mesh, _)| is_thick(mesh)),
+        MeshFault::Open(..) | MeshFault::Mixed(..) => None,
     };
-    let (mesh, crossing) = made.ok_or(fault)?;
+    let (mesh, mut crossing) = made.ok_or(fault)?;
+    if repair.flipped && crossing.turned > 0 {
+        // Some of it ran as it should, some did not: told by what was turned in the end.
+        repair.flipped = false;
+        crossing.turned = crossing.others;
+    }
     Ok((mesh, Done { repair, crossing: Some(crossing) }))
 }

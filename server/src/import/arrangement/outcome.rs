@@ -29,13 +29,25 @@ struct Part {
 /// What runs along each side: which part, and whether from its lower corner to the higher.
 type Sides = Mixed<[u32; 2], SmallVec<[(u32, bool); 2]>>;
 
-/// The faces of the boundary of what a mesh winds around. `None` where there are none, and where a winding number could not be told.
-pub fn kept(facets: &Facets, pieces: &Pieces) -> Option<Vec<Loop>> {
+/// The boundary of what a mesh winds around.
+pub struct Kept {
+    /// Its faces.
+    pub faces: Vec<Loop>,
+    /// How many parts it has, the other way round than in the mesh …
+    pub turned: usize,
+    /// … and as there.
+    pub others: usize,
+    /// How many of the mesh have the same on both sides of them.
+    pub left_out: usize,
+}
+
+/// The boundary of what a mesh winds around. `None` where there is none, and where a winding number could not be told.
+pub fn kept(facets: &Facets, pieces: &Pieces) -> Option<Kept> {
     let same = joints::unified(&pieces.points);
     let loops = joints::joined(&pieces.points, &pieces.all, &same);
     let leaders = leaders(pieces, &loops);
     let mut known: Vec<Option<Winding>> = vec![None; pieces.all.len()];
-    let mut parts: Vec<Part> = Vec::new();
+    let (mut parts, mut left_out) = (Vec::<Part>::new(), 0);
     for ((i, piece), mut around) in pieces.all.iter().enumerate().zip(loops) {
         let leader = leaders[i] as usize;
         if known[leader].is_none() {
@@ -43,6 +55,7 @@ pub fn kept(facets: &Facets, pieces: &Pieces) -> Option<Vec<Loop>> {
         }
         let winding = known[leader]?;
         if (winding.front != 0) == (winding.behind != 0) || covered_by_another(pieces, piece, &winding) {
+            left_out += 1;
             continue;
         }
         let turned = winding.front != 0;
@@ -51,9 +64,11 @@ pub fn kept(facets: &Facets, pieces: &Pieces) -> Option<Vec<Loop>> {
         }
         parts.push(Part { facet: piece.facet, turned, around });
     }
+    let turned = parts.iter().filter(|p| p.turned).count();
+    let others = parts.len() - turned;
     let mut faces = joined(facets, &pieces.points, parts);
     straighten(facets.points.len(), &pieces.points, &mut faces);
-    (!faces.is_empty()).then_some(faces)
+    (!faces.is_empty()).then_some(Kept { faces, turned, others, left_out })
 }
 
 /// True for a part of which another triangle in its plane has the same one.

@@ -86,10 +86,10 @@ struct Cutter<'f> {
 }
 
 impl Pieces {
-    /// The triangles of a mesh, each cut where others meet it. `None` where none do, and where too many do.
+    /// The triangles of a mesh, each cut where others meet it. `None` where too many do, and of too many that none does.
     pub fn of(facets: &Facets) -> Option<Self> {
         let meetings = Meetings::of(facets)?;
-        if meetings.pairs == 0 {
+        if meetings.pairs == 0 && facets.all.len() > MOST {
             return None;
         }
         let mut cutter = Cutter {

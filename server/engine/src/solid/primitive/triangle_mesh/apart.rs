@@ -118,6 +118,28 @@ impl Facet {
         Self { ids, at, area, length: area.length(), thin }
     }
 
+    /// True where a side of another one runs through it, farther than `near` from whatever it could only touch.
+    fn is_pierced(&self, by: &Facet, near: f64) -> bool {
+        let t = self.at;
+        let heights = by.at.map(|x| self.area.dot(x - t[0]));
+        let least = near * self.length;
+        (0..3).any(|m| {
+            let n = (m + 1) % 3;
+            let [v, w] = [heights[m], heights[n]];
+            if v.min(w) >= -least || v.max(w) <= least {
+                return false;
+            }
+            let (p, q) = (by.at[m], by.at[n]);
+            let around: [f64; 3] = std::array::from_fn(|k| {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                let least = near * p.distance(q) * a.distance(b);
+                let volume = side([p, q, a], b);
+                if volume.abs() > least { volume.signum() } else { 0.0 }
+            });
+            around.iter().sum::<f64>().abs() == 3.0
+        })
+    }
+
     /// True where some points all lie farther than `far` beyond one of its sides, of these the ones that count.
     fn is_beside(&self, sides: [bool; 3], points: impl Iterator<Item = DVec3> + Clone, far: f64) -> bool {
         (0..3).filter(|m| sides[*m]).any(|m| {
@@ -218,6 +240,25 @@ pub fn first_through(surface: &Surface) -> Option<MeshFault> {
         around.meets(beside) && pair(surface.tolerance, [one, other]) == FacetPair::Crossing
     };
     pairs.into_iter().find(cross).map(|facets| through(surface, facets))
+}
+
+/// Two facets of few of which an edge runs through the other, clear of its ends, its rim and roundings: solids that only touch each
+/// other have none.
+pub fn clearly_through(surface: &Surface) -> Option<MeshFault> {
+    let count = surface.triangles.len() as u32;
+    let mut all: Vec<(u32, Facet, Aabb)> =
+        (0..count).map(|i| (i, Facet::of(surface, i), Aabb::of_points(surface.corners(i)))).collect();
+    all.sort_by(|(i, _, one), (j, _, other)| one.min.x.total_cmp(&other.min.x).then(i.cmp(j)));
+    let near = NEAR * surface.tolerance;
+    for (k, (i, one, around)) in all.iter().enumerate() {
+        let beside = all[k + 1..].iter().take_while(|(_, _, b)| b.min.x <= around.max.x);
+        let met = beside.filter(|(_, _, b)| b.meets(around));
+        let found = met.into_iter().find(|(_, other, _)| one.is_pierced(other, near) || other.is_pierced(one, near));
+        if let Some((j, ..)) = found {
+            return Some(through(surface, [*i.min(j), *i.max(j)]));
+        }
+    }
+    None
 }
 
 /// True where two triangles run along an edge that they share in opposite directions.

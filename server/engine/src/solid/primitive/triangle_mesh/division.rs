@@ -20,7 +20,7 @@ use super::growth::{
     Builder, IN, KIND, Leaf, Limits, Node, OUT, Of, PART, Rough, Stop, Tree, UNDECIDED, UPPER, upper, written,
 };
 use super::local::Expr;
-use super::planes::area;
+use super::outward;
 use super::side::crosses;
 use super::surface::Surface;
 use crate::math::Aabb;
@@ -31,7 +31,6 @@ use crate::solid::surface::Plane;
 use glam::DVec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 /// Part of a cell's size below which a box is small beside it: only then the formula of a part is asked for bounds.
@@ -113,35 +112,11 @@ impl Divided {
         }
     }
 
-    /// Each part of the surface that edges connect has its inside on its inner side: one facet of it tells.
+    /// Each part of the surface has its inside on its inner side.
     fn is_outward(&self, leaders: &[u32]) -> Result<(), MeshFault> {
-        let surface = &*self.surface;
-        let step = 1e2 * surface.tolerance;
-        let outward = |i: u32| {
-            let [a, b, c] = surface.corners(i);
-            let (middle, n) = ((a + b + c) / 3.0, area(a, b, c).normalize_or_zero());
-            if self.is_inside(middle - n * step) && !self.is_inside(middle + n * step) {
-                Ok(())
-            } else {
-                Err(MeshFault::Crossing(middle))
-            }
-        };
-        // The largest facet of each part.
-        let size = |i: u32| {
-            let [a, b, c] = surface.corners(i);
-            (b - a).cross(c - a).length_squared()
-        };
-        let mut largest: HashMap<u32, (u32, f64)> = HashMap::new();
-        for (i, leader) in leaders.iter().enumerate() {
-            let one = largest.entry(*leader).or_insert((NONE, -1.0));
-            let own = size(i as u32);
-            if own > one.1 {
-                *one = (i as u32, own);
-            }
-        }
-        let mut largest: Vec<u32> = largest.into_values().map(|one| one.0).collect();
-        largest.sort_unstable();
-        let tried: Vec<Result<(), MeshFault>> = largest.par_iter().map(|i| outward(*i)).collect();
+        let all = outward::largest(&self.surface, leaders);
+        let of = |i: &u32| outward::is_outward(&self.surface, *i, |p| self.is_inside(p));
+        let tried: Vec<Result<(), MeshFault>> = all.par_iter().map(of).collect();
         tried.into_iter().collect()
     }
 

@@ -1,6 +1,7 @@
 //! Edges of a mesh and what meets in them.
 
 use super::MeshFault;
+use crate::math::mix::Mixed;
 use glam::DVec3;
 
 /// In place of a neighbour that is not there.
@@ -17,6 +18,9 @@ pub struct Edges {
 
 /// Corners of an edge, the smaller number first.
 type Edge = [u32; 2];
+
+/// Edges of more than two triangles.
+pub type Crowded = Mixed<Edge, ()>;
 
 fn edge(a: u32, b: u32) -> Edge {
     [a.min(b), a.max(b)]
@@ -72,6 +76,11 @@ impl Edges {
         Err(if first.len() == 1 { MeshFault::Open(a, b) } else { MeshFault::Mixed(a, b) })
     }
 
+    /// Those at which more than two triangles meet.
+    pub fn crowded(&self) -> Crowded {
+        self.groups().filter(|(_, group)| group.len() > 2).map(|(edge, _)| (edge, ())).collect()
+    }
+
     /// Of each triangle the one beyond each of its sides: of several the last that runs along it the other way.
     pub fn opposite(&self, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let mut out = vec![[NONE; 3]; triangles.len()];
@@ -88,8 +97,9 @@ impl Edges {
     }
 }
 
-/// Of each triangle the first one of the part of the surface that it is in, by the neighbours of each along its sides.
-pub fn leaders(opposite: &[[u32; 3]]) -> Vec<u32> {
+/// Of each triangle the first one of the part of the surface that it is in, by the neighbours of each along its sides. Edges of more
+/// than two triangles connect none: what is in front of one of these need not be in front of the others.
+pub fn leaders(opposite: &[[u32; 3]], triangles: &[[u32; 3]], crowded: &Crowded) -> Vec<u32> {
     let mut leader: Vec<u32> = (0..opposite.len() as u32).collect();
     fn find(leader: &mut [u32], mut i: u32) -> u32 {
         while leader[i as usize] != i {
@@ -98,8 +108,12 @@ pub fn leaders(opposite: &[[u32; 3]]) -> Vec<u32> {
         }
         i
     }
+    let connects = |i: usize, k: usize| {
+        let t = triangles[i];
+        crowded.is_empty() || !crowded.contains_key(&edge(t[k], t[(k + 1) % 3]))
+    };
     for (i, others) in opposite.iter().enumerate() {
-        for j in others.iter().filter(|j| **j != NONE) {
+        for (_, j) in others.iter().enumerate().filter(|(k, j)| **j != NONE && connects(i, *k)) {
             let (p, q) = (find(&mut leader, i as u32), find(&mut leader, *j));
             leader[p.max(q) as usize] = p.min(q);
         }

@@ -19,6 +19,7 @@ mod edges;
 mod growth;
 mod local;
 mod moments;
+mod outward;
 mod piece;
 mod planes;
 mod polygons;
@@ -191,19 +192,23 @@ impl TriangleMesh {
     }
 
     fn of_shell(shell: shell::Shell, few: usize) -> Result<Self, Unfit> {
-        let shell::Shell { vertices, triangles, edges } = shell;
+        let shell::Shell { vertices, triangles, edges, is_flat } = shell;
+        if is_flat {
+            return Err((MeshFault::Flat, vertices, triangles));
+        }
         let around = Aabb::of_points(vertices.iter().copied());
         let tolerance = tolerance(&around);
         let opposite = edges.opposite(&triangles);
+        let crowded = edges.crowded();
         drop(edges);
         let (mut planes, face_of) = planes::of(&vertices, &triangles, &opposite, tolerance);
         planes.shrink_to_fit();
         let mut surface = Surface { vertices, triangles, planes, face_of, around, tolerance, tree: OnceLock::new() };
         let count = surface.triangles.len();
+        // A third of what the neighbours take, which nothing else asks for.
+        let leaders = edges::leaders(&opposite, &surface.triangles, &crowded);
+        drop(opposite);
         if count > few {
-            // A third of what the neighbours take, which nothing else asks for.
-            let leaders = edges::leaders(&opposite);
-            drop(opposite);
             let surface = Arc::new(surface);
             let division = match Divided::new(surface.clone(), &leaders) {
                 Ok(division) => Arc::new(division),
@@ -238,6 +243,11 @@ impl TriangleMesh {
         let Expr::Open(tokens) = expr else {
             return Err((MeshFault::Flat, surface.vertices, surface.triangles));
         };
+        // The formula of a cell that a part alone reaches knows nothing of what is around that part.
+        let whole = apart::clearly_through(&surface).map_or_else(|| outward::are_outward(&surface, &leaders), Err);
+        if let Err(fault) = whole {
+            return Err((fault, surface.vertices, surface.triangles));
+        }
         let cuts = planes.split_off(faces);
         surface.planes = planes;
         Ok(Self { surface: Arc::new(surface), cuts, formula: Formula::new(tokens), division: None })

@@ -63,6 +63,8 @@ pub struct Shell {
     pub triangles: Vec<[u32; 3]>,
     /// Its edges.
     pub edges: Edges,
+    /// It encloses as much one way round as the other.
+    pub is_flat: bool,
 }
 
 impl Shell {
@@ -86,10 +88,8 @@ impl Shell {
             repair = Repair { dropped: repair.dropped + rough.dropped, ..rough };
         }
         let volume = shell.volume();
-        if volume.abs() <= 1e-14 * size * size * size {
-            return Err(MeshFault::Flat);
-        }
-        if volume < 0.0 {
+        shell.is_flat = volume.abs() <= 1e-14 * size * size * size;
+        if volume < 0.0 && !shell.is_flat {
             shell.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             repair.flipped = true;
         }
@@ -118,7 +118,7 @@ impl Shell {
         vertices.shrink_to_fit();
         kept.shrink_to_fit();
         let edges = Edges::of(&kept, vertices.len());
-        Self { vertices, triangles: kept, edges }
+        Self { vertices, triangles: kept, edges, is_flat: false }
     }
 
     /// Enclosed volume, negative inside out.

@@ -315,3 +315,64 @@ fn two_facets_that_cross_are_told_with_where_they_do() {
         }
     }
 }
+
+/// Two stars, in the order and the ways round that `turned` says, the second one moved and scaled.
+fn two(r: &mut Random, turned: [bool; 2], (scale, by): (f64, DVec3)) -> Mesh {
+    let (mut points, mut triangles) = (Vec::new(), Vec::<[u32; 3]>::new());
+    for (is_turned, (scale, by)) in turned.into_iter().zip([(1.0, DVec3::ZERO), (scale, by)]) {
+        let radii: Vec<f64> = (0..5 + (r.unit() * 12.0) as usize).map(|_| r.within(0.8, 1.2)).collect();
+        let (corners, faces) = star(&radii, 1.0);
+        let first = points.len() as u32;
+        points.extend(corners.into_iter().map(|p| (p - DVec3::Z * 0.5) * scale + by));
+        triangles.extend(faces.into_iter().map(|[a, b, c]| {
+            let t = [a, b, c].map(|v| v + first);
+            if is_turned { [t[0], t[2], t[1]] } else { t }
+        }));
+    }
+    (points, triangles)
+}
+
+#[test]
+fn parts_that_run_round_otherwise_than_those_of_a_solid_are_refused() {
+    let mut r = Random(37);
+    for round in 0..60 {
+        let turned = [round % 2 == 1, round / 2 % 2 == 1];
+        let apart = (r.within(0.3, 2.0), DVec3::X * r.within(4.0, 6.0));
+        let within = (r.within(0.1, 0.4), r.vector(0.1));
+        for (stands, is_solid) in [(apart, turned[0] == turned[1]), (within, turned[0] != turned[1])] {
+            let (points, triangles) = two(&mut r, turned, stands);
+            for few in [0, usize::MAX] {
+                let made = TriangleMesh::divided_from(few, &points, &triangles);
+                assert_eq!(made.is_ok(), is_solid, "round {round}, few {few}: {made:?}");
+                assert!(is_solid || matches!(made, Err(MeshFault::Crossing(_))), "round {round}, few {few}: {made:?}");
+            }
+        }
+    }
+}
+
+/// An edge that two solids share tells nothing of one by the other.
+#[test]
+fn parts_that_share_an_edge_are_looked_at_one_by_one() {
+    let (mut points, mut triangles) = star(&[1.0; 4], 1.0);
+    let count = points.len() as u32;
+    let (more, others) = (points.clone(), triangles.clone());
+    points.extend(more.into_iter().map(|p| p + DVec3::X * 2.0));
+    for is_turned in [false, true] {
+        triangles.truncate(others.len());
+        triangles.extend(others.iter().map(|t| {
+            let [a, b, c] = t.map(|v| v + count);
+            if is_turned { [a, c, b] } else { [a, b, c] }
+        }));
+        // A third one, for as much one way round as the other is refused before it is looked at.
+        let mut all = triangles.clone();
+        let tip = points.len() as u32;
+        let at = DVec3::new(-3.0, 0.0, 0.0);
+        let corners = [at, at + DVec3::X, at + DVec3::Y, at + DVec3::Z];
+        all.extend([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(|t: [u32; 3]| t.map(|v| v + tip)));
+        let all_points: Vec<DVec3> = points.iter().copied().chain(corners).collect();
+        for few in [0, usize::MAX] {
+            let made = TriangleMesh::divided_from(few, &all_points, &all);
+            assert_eq!(made.is_ok(), !is_turned, "few {few}: {made:?}");
+        }
+    }
+}
