@@ -8,6 +8,7 @@ mod certificate;
 mod fits;
 mod fronts;
 mod octree;
+mod round_faces;
 mod rounding;
 mod stages;
 mod tighten;

@@ -522,7 +522,11 @@ impl Run<'_, '_> {
         let mut added = false;
         self.scratch.evaluations += self.scratch.lits.len() as u64;
         for i in 0..self.scratch.lits.len() {
-            if let Some(t) = self.touched(i, &low)
+            let rises = |t: &Linear| t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * self.view.delta;
+            if let Some(t) = self.balanced(i, s, look).filter(rises) {
+                self.push(Some(t), self.scratch.notes[i].uses, Touch::Never);
+                added = true;
+            } else if let Some(t) = self.touched(i, &low)
                 && t.ahead(look) + t.normal_ahead(look).dot(s.y) > s.z + 1e-3 * self.view.delta
             {
                 self.push(Some(t), self.scratch.notes[i].uses, Touch::Never);
@@ -530,6 +534,25 @@ impl Run<'_, '_> {
             }
         }
         added
+    }
+
+    /// A fit that weighs in a solution, touched where it is lowest against the others of that: as its curvature says, where the program's
+    /// own lowest point is a corner of what tangents leave (a step of sequential quadratic programming). `None` for others.
+    fn balanced(&self, i: usize, s: &Solution, look: f64) -> Option<Linear> {
+        let Touch::Fit(at) = self.scratch.notes[i].touch else { return None };
+        let fit = &self.scratch.lits[i];
+        let (mut weight, mut others) = (0.0, DVec3::ZERO);
+        for &(k, lambda) in &s.support[..s.count] {
+            let l = &self.scratch.lits[k as usize];
+            if (l.side, l.id, l.other, l.weights) == (fit.side, fit.id, fit.other, fit.weights) {
+                weight += lambda;
+            } else {
+                others += lambda * l.normal_ahead(look);
+            }
+        }
+        let touchable = &self.scratch.touchables[at as usize];
+        let y = touchable.lowest(fit.normal_ahead(look) + others / weight, self.view.half);
+        (weight > 0.0).then(|| fit::touch(self.view, fit, touchable, y))
     }
 
     /// A bound touched at a low point instead, where another point of touch makes another bound.

@@ -68,6 +68,17 @@ pub fn advance_or_tighten(
     Ok(run.weakest())
 }
 
+/// What all clauses of `pair` leave of the cell, where that is no more than `worth` of it; nothing is bounded.
+pub fn left(view: &View, pair: &Expressions, rounding: f64, worth: f64, scratch: &mut Scratch) -> Option<Left> {
+    let mut run = begin(Run { view, pair, hints: &[], rounding, useless: 0.0, left: MAX_CLAUSES, scratch });
+    if run.scratch.clash.is_some() {
+        return None;
+    }
+    let left = run.left();
+    run.scratch.evaluations += std::mem::take(&mut run.scratch.checked).div_ceil(CHECKED);
+    (Left::part(&left.span, view.half) <= worth).then_some(left)
+}
+
 /// Takes the literals that all clauses share.
 fn begin<'a, 'p>(run: Run<'a, 'p>) -> Run<'a, 'p> {
     let mut run = run;

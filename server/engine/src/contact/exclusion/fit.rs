@@ -10,7 +10,7 @@
 //! and Q_q >= 0 with R_q + delta, or the apex moved outwards (where z_q >= 0, which is asked of the whole cell), hence
 //!
 //! ```text
-//! G = μ_p Q_p − μ_q Q_q <= 0 for any μ > 0; here both 1/2(ρ_p + ρ_q), or 1/4ρ_p and 1/4ρ_q.
+//! G = μ_p Q_p − μ_q Q_q <= 0 for any μ > 0; here both 1/2(ρ_p + ρ_q), or cos α_p/4ρ_p and cos α_q/4ρ_q.
 //! ```
 //!
 //! Even weights let what is round about a common axis cancel wholly; with the others the two gradients cancel where the
@@ -192,13 +192,13 @@ impl Bend {
 }
 
 /// The weights of the two quadrics: even, so that what is round about a common axis cancels wholly, or as steep as each
-/// other, so that a contact off the axis is the lowest point of G.
+/// other (|∇Q| = 2ρ/cos α), so that a contact off the axis is the lowest point of G.
 fn weights(p: &Around, q: &Around, even: bool) -> [f64; 2] {
     if even {
         return [0.5 / (p.rho.max(0.0) + q.rho); 2];
     }
-    let of_q = 0.25 / q.rho;
-    [if p.rho > 0.0 { (0.25 / p.rho).clamp(of_q, 4.0 * of_q) } else { of_q }, of_q]
+    let [of_p, of_q] = [p, q].map(|f| 0.25 / (f.rho * (1.0 + f.slope * f.slope).sqrt()));
+    [if p.rho > 0.0 { of_p.clamp(of_q, 4.0 * of_q) } else { of_q }, of_q]
 }
 
 /// The convex part of a fit's second order, for tangents at other points.
@@ -208,6 +208,31 @@ pub struct Touchable {
     /// How steep the two quadrics are at most, weighed.
     steep: f64,
 }
+
+impl Touchable {
+    /// Where a·y + yᵀCy is lowest over a cell, about: the lowest point of all, or what the axes lead to from there one after the
+    /// other.
+    pub fn lowest(&self, a: DVec3, half: DVec3) -> DVec3 {
+        let c = &self.convex;
+        let free = c.inverse() * a * -0.5;
+        let mut y = if free.is_finite() { free.clamp(-half, half) } else { DVec3::ZERO };
+        if y == free {
+            return y;
+        }
+        for _ in 0..SWEEPS {
+            for k in 0..3 {
+                let bends = 2.0 * c.col(k)[k];
+                let slope = a[k] + 2.0 * c.row(k).dot(y) - bends * y[k];
+                let lowest = if bends > 0.0 { -slope / bends } else { -slope.signum() * half[k] };
+                y[k] = lowest.clamp(-half[k], half[k]);
+            }
+        }
+        y
+    }
+}
+
+/// Sweeps over the axes in search of where a fit is lowest.
+const SWEEPS: usize = 4;
 
 /// A fit's bound, and what it is touched by at other points; `None` for cones taken by their tips, and within one body.
 pub type Fit = (Linear, Option<Touchable>);

@@ -44,6 +44,24 @@ impl Left {
     }
 }
 
+/// Part of a box that may be left at most where that is bounded in its stead.
+pub const WORTH: f64 = 0.7;
+
+/// How often a box is made smaller before it is bounded as it is.
+pub const TIGHTENINGS: u32 = 4;
+
+/// Makes a box what is left of it (offsets from its centre), where that is less.
+pub fn shrink(center: &mut DVec3, half: &mut DVec3, left: &Aabb) {
+    let (offset, rest) = (left.center(), left.half());
+    let rounding = (center.abs() + offset.abs() + *half) * f64::EPSILON;
+    for k in 0..3 {
+        if left.min[k] > -half[k] || left.max[k] < half[k] {
+            center[k] += offset[k];
+            half[k] = rest[k] + rounding[k];
+        }
+    }
+}
+
 impl Run<'_, '_> {
     /// What the literals taken so far and the open lists leave of the cell.
     pub(super) fn left(&mut self) -> Left {

@@ -14,6 +14,7 @@ use super::work::Work;
 use crate::contact::exclusion::clause;
 use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Side, View};
+use crate::contact::exclusion::tighten::{self, Left, TIGHTENINGS, WORTH};
 use crate::contact::query::task::Task;
 use crate::math::Aabb;
 use crate::motion::Instant;
@@ -33,6 +34,9 @@ pub(in crate::contact) struct Place {
     /// Where the bounds are lowest.
     pub lowest: DVec3,
     cost: DVec3,
+    /// The level for which it was bounded, and how often it was made smaller since it was halved.
+    level: f64,
+    tightenings: u32,
 }
 
 /// Literals of one side, usually few.
@@ -86,7 +90,17 @@ impl<'t, 'a> Cover<'t, 'a> {
         if region.is_finite() {
             let (center, half) = (region.center(), region.half());
             let (a, b) = (task.a.normal_form.clone(), task.b.normal_form.clone());
-            cover.stack.push(Place { center, half, a, b, lits: Default::default(), lowest: center, cost: DVec3::ZERO });
+            cover.stack.push(Place {
+                center,
+                half,
+                a,
+                b,
+                lits: Default::default(),
+                lowest: center,
+                cost: DVec3::ZERO,
+                level: far,
+                tightenings: 0,
+            });
         }
         cover
     }
@@ -111,50 +125,84 @@ impl<'t, 'a> Cover<'t, 'a> {
     /// The next box that may hold a point with F <= level; `None` at the end and where the work ran out.
     pub fn next(&mut self, level: f64) -> Option<Place> {
         while !self.work.is_spent() {
-            let mut place = self.stack.pop()?;
-            self.work.bound();
-            let (near, far) = (self.view(&place, self.deep), self.view(&place, -level.max(self.far)));
-            let prune = |side: Side, tokens: &[Token], out: &mut Vec<Token>| {
-                if tokens.is_empty() {
-                    return Truth::True;
-                }
-                let solid = if side == Side::A { self.task.a } else { self.task.b };
-                solid.prune(tokens, out, &mut |id| between(&near, &far, side, id))
-            };
-            let mut pool = Vec::new();
-            let truth_a = prune(Side::A, &place.a, &mut pool);
-            let middle = pool.len() as u32;
-            let truth_b = prune(Side::B, &place.b, &mut pool);
-            let end = pool.len() as u32;
-            if truth_a == Truth::False || truth_b == Truth::False {
-                continue;
+            let place = self.stack.pop()?;
+            let bounded = self.bounded(place, level);
+            if bounded.is_some() {
+                return bounded;
             }
-            place.a = pool[..middle as usize].to_vec();
-            place.b = pool[middle as usize..].to_vec();
-            place.lits = [(Side::A, &place.a), (Side::B, &place.b)].map(|(side, tokens)| {
-                let mut lits: Lits = local::literals(tokens).map(|id| (side, id)).collect();
-                lits.sort_unstable();
-                lits.dedup();
-                lits
-            });
-            if end > 0 {
-                let pair = clause::Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
-                let view = self.view(&place, -level);
-                let found = enumeration::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch);
-                if found.dt >= 0.0 {
-                    continue;
-                }
-                place.lowest = place.center + found.y;
-                place.cost = found.cost;
-            }
-            return Some(place);
         }
         None
     }
 
+    /// A box with what is left there of both trees, where its bounds let it hold such a point.
+    fn bounded(&mut self, mut place: Place, level: f64) -> Option<Place> {
+        self.work.bound();
+        let (pool, middle) = self.pruned(&place, level)?;
+        let end = pool.len() as u32;
+        place.a = pool[..middle as usize].to_vec();
+        place.b = pool[middle as usize..].to_vec();
+        place.level = level;
+        if end > 0 {
+            let pair = clause::Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
+            let view = self.view(&place, -level);
+            let found = enumeration::advance(&view, &pair, &[], self.task.rounding, 0.0, &mut self.scratch);
+            if found.dt >= 0.0 {
+                return None;
+            }
+            place.lowest = place.center + found.y;
+            place.cost = found.cost;
+        }
+        place.lits = [(Side::A, &place.a), (Side::B, &place.b)].map(|(side, tokens)| {
+            let mut lits: Lits = local::literals(tokens).map(|id| (side, id)).collect();
+            lits.sort_unstable();
+            lits.dedup();
+            lits
+        });
+        Some(place)
+    }
+
+    /// What all clauses leave of a box that was handed out, where that is so little that it is worth to be bounded in its stead.
+    fn left(&mut self, place: &Place) -> Option<Left> {
+        if !self.task.strategies.tighten || place.tightenings >= TIGHTENINGS {
+            return None;
+        }
+        let pool = [&place.a[..], &place.b[..]].concat();
+        let (middle, end) = (place.a.len() as u32, pool.len() as u32);
+        // A look at each face, and no program.
+        self.work.look(pool.len());
+        let pair = clause::Expressions { pool: &pool, a: (0, middle), b: (middle, end) };
+        let view = self.view(place, -place.level);
+        enumeration::left(&view, &pair, self.task.rounding, WORTH, &mut self.scratch)
+    }
+
+    /// What is left of both trees in a box, and where B's begins; `None` where one of the bodies is nowhere in it.
+    fn pruned(&self, place: &Place, level: f64) -> Option<(Vec<Token>, u32)> {
+        let (near, far) = (self.view(place, self.deep), self.view(place, -level.max(self.far)));
+        let mut pool = Vec::new();
+        let mut middle = 0;
+        for (side, solid, tokens) in [(Side::A, self.task.a, &place.a), (Side::B, self.task.b, &place.b)] {
+            middle = if side == Side::A { 0 } else { pool.len() as u32 };
+            let is_all = tokens.is_empty();
+            if !is_all && solid.prune(tokens, &mut pool, &mut |id| between(&near, &far, side, id)) == Truth::False {
+                return None;
+            }
+        }
+        Some((pool, middle))
+    }
+
     /// Puts the halves of a box back that are to be looked at: cut across the axis that costs its bound most, as the search does,
-    /// unless that would make a slab of it.
-    pub fn split(&mut self, place: Place, is_open: impl Fn(&Place) -> bool) {
+    /// unless that would make a slab of it. Where much of the box is cut off by what all clauses share, the rest is put back in their
+    /// stead.
+    pub fn split(&mut self, mut place: Place, is_open: impl Fn(&Place) -> bool) {
+        if let Some(left) = self.left(&place) {
+            if !left.span.is_empty() {
+                tighten::shrink(&mut place.center, &mut place.half, &left.span);
+                place.tightenings += 1;
+                self.stack.push(place);
+            }
+            return;
+        }
+        place.tightenings = 0;
         let dearest = clause::axis_to_halve(place.cost, place.half);
         let longest = place.half.max_position();
         let k = if place.half[dearest] * SLAB < place.half[longest] { longest } else { dearest };

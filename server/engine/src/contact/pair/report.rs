@@ -2,9 +2,11 @@
 
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth;
+use crate::contact::instant::separation;
 use crate::contact::instant::work::Work;
 use crate::contact::query::outcome::{Contact, ContactKind, ContactPoint, Extent, NO_FACE, Outcome, Overlap, Verdict};
 use crate::contact::query::task::{Task, witness_level};
+use crate::contact::witness::balance;
 use crate::contact::witness::extent::{ACTIVE, INCIDENT, extent, note, noted, rank_of};
 use crate::contact::witness::features::Features;
 use crate::contact::witness::found::Found;
@@ -296,7 +298,18 @@ pub(super) fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     o.counters.contacts += 1;
     let at = task.relative.at(0.0);
     let work = Work::new(task.limit.min(depth::MOST_CELLS));
-    let (x, normal, depth, faces) = depth::some(task, &at, x, &work);
+    let (mut x, mut normal, mut depth, mut faces) = depth::some(task, &at, x, &work);
+    // Where the faces that hold it, or those that decide there, are deepest in each other: a short climb does not come to that in a
+    // thin overlap.
+    let deciding = vec![(Side::A, task.a.deciding(x).1), (Side::B, task.b.deciding(at.b_point(x)).1)];
+    for held in [faces.clone(), deciding] {
+        let Some(((y, ..), way)) = balance::of_literals(task, &at, &held, x) else { continue };
+        work.look(task.a.faces.len() + task.b.faces.len());
+        let deeper = -separation::value(task, &at, y);
+        if deeper > depth {
+            (x, normal, depth, faces) = (y, way, deeper, held);
+        }
+    }
     o.counters.instant_cells += work.cells();
     let [mut faces_a, mut faces_b] = [[NO_FACE; 3]; 2];
     for (side, id) in faces {

@@ -425,7 +425,13 @@ impl<'a> PairSearch<'a> {
     /// The answer where x is deep in both bodies at the start: `None` where a search begins anew, at a larger depth.
     fn answer_within(&mut self, x: DVec3, cells: u64) -> Option<Outcome> {
         self.outcome.touching = true;
-        if self.doubles_depth() || self.raises_depth(x) {
+        let doubled = self.doubles_depth();
+        if doubled {
+            self.task.delta = self.level * self.resolution;
+        }
+        // A point that is as deep as that already tells what a search for it would.
+        let is_open = doubled && !self.task.is_deep(x, &self.task.relative.at(0.0), 0.0);
+        if is_open || self.raises_depth(x) {
             self.restart(cells);
             return None;
         }

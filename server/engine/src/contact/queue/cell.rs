@@ -1,5 +1,6 @@
 //! A cell of the search: a box over a span of time.
 
+use crate::contact::exclusion::tighten;
 use crate::math::Aabb;
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -60,14 +61,7 @@ impl Cell {
 
     /// Leaves of the box what lies in `left`, offsets from its centre, rounded outwards.
     pub(super) fn shrink(&mut self, left: &Aabb) {
-        let (offset, half) = (left.center(), left.half());
-        let rounding = (self.center.abs() + offset.abs() + self.half) * f64::EPSILON;
-        for k in 0..3 {
-            if left.min[k] > -self.half[k] || left.max[k] < self.half[k] {
-                self.center[k] += offset[k];
-                self.half[k] = half[k] + rounding[k];
-            }
-        }
+        tighten::shrink(&mut self.center, &mut self.half, left);
     }
 
     pub(super) fn source(t: f64, until: f64, source: Source) -> Self {

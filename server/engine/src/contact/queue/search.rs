@@ -27,8 +27,9 @@ use super::slices::Slices;
 use crate::contact::exclusion::clause::{self, Advance, Hint};
 use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Side, View};
-use crate::contact::exclusion::tighten::Left;
+use crate::contact::exclusion::tighten::{Left, TIGHTENINGS, WORTH};
 use crate::contact::query::outcome::Counters;
+use crate::contact::witness::balance::{self, MOST_BALANCED};
 use crate::contact::witness::climb;
 use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
@@ -37,6 +38,7 @@ use crate::motion::{Bounds, Instant};
 use crate::solid::Solid;
 use crate::solid::local::{self, LiteralId, Truth};
 use glam::DVec3;
+use smallvec::SmallVec;
 use std::ops::ControlFlow;
 
 /// Cells after which a witness is looked for; again whenever as many more were refined.
@@ -44,12 +46,6 @@ const FIRST_PROBE: u64 = 2_000;
 
 /// Cells beyond the goal that are asked whether another contact touches earlier.
 const MAX_RIVALS: u32 = 16;
-
-/// Part of a cell that may be left at most where that is bounded in its stead.
-const WORTH: f64 = 0.7;
-
-/// How often a cell is made smaller before it is bounded as it is.
-const TIGHTENINGS: u32 = 4;
 
 /// Time, fraction of the step, below which an advance is no progress: at a contact a bound runs out in ever smaller ones.
 const LEAST_ADVANCE: f64 = 1e-15;
@@ -82,6 +78,12 @@ const LAST: u64 = 16_000;
 
 /// A bracket this wide, a fraction of the step, is told where no coarser resolution has a narrower one.
 const WIDE: f64 = 1e-3;
+
+/// Sets of faces that are asked where they are deepest in each other at the start.
+const MOST_ASKED: usize = 8;
+
+/// Faces of both bodies, in order.
+type BalancedLits = SmallVec<[(Side, LiteralId); MOST_BALANCED]>;
 
 /// How far a cell's bounds look ahead: not beyond `h` of the `end` that is left of its time, within which a point of the cell, at
 /// most `x_max` from A's centre, moves like `motion`.
@@ -123,6 +125,8 @@ pub struct Search<'a> {
     pub(in crate::contact) patience: u64,
     /// Where the search came to its end without an answer: time and place.
     stuck: Option<(f64, DVec3)>,
+    /// Faces that were asked where they are deepest in each other at the start.
+    balanced: SmallVec<[BalancedLits; 2]>,
 }
 
 impl<'a> Search<'a> {
@@ -137,6 +141,7 @@ impl<'a> Search<'a> {
             probe: FIRST_PROBE,
             patience: u64::MAX,
             stuck: None,
+            balanced: SmallVec::new(),
         }
     }
 
@@ -286,17 +291,38 @@ impl<'a> Search<'a> {
             return None;
         }
         // Bodies that stand still to each other meet at the start or never.
-        if !bounded.is_one_sided(&cell) && span.motion.speed > 0.0 {
+        let may_meet = !bounded.is_one_sided(&cell) && span.motion.speed > 0.0;
+        if may_meet {
             self.propose(&cell, &bounded.found, &at, false);
             if cell.t >= self.contacts.goal() {
                 return None;
             }
-            if let ControlFlow::Break(ending) = self.look_closer(&cell, &span, &bounded, &at) {
-                return ending;
-            }
+        }
+        if cell.t == 0.0
+            && self.contacts.found.is_none()
+            && let Some(x) = self.deep_balance(&cell, &bounded.found, &at)
+        {
+            return Some(Ending::Deep(x));
+        }
+        if may_meet && let ControlFlow::Break(ending) = self.look_closer(&cell, &span, &bounded, &at) {
+            return ending;
         }
         self.split(cell, bounded.found.cost);
         None
+    }
+
+    /// A point deep in both bodies at the start, where the faces that hold a cell are deepest in each other. What a small overlap
+    /// leaves in common is thin: cells that find it by halving must become as small.
+    fn deep_balance(&mut self, cell: &Cell, found: &Advance, at: &Instant) -> Option<DVec3> {
+        let mut lits: BalancedLits = found.support.iter().map(|l| (l.0, l.1)).collect();
+        lits.sort_unstable();
+        if self.balanced.len() >= MOST_ASKED || self.balanced.contains(&lits) {
+            return None;
+        }
+        let task = &self.contacts.task;
+        let balance = balance::of_literals(task, at, &lits, cell.center + found.y);
+        self.balanced.push(lits);
+        balance.map(|((x, ..), _)| x).filter(|x| task.is_deep_at_start(*x, at))
     }
 
     /// How far a cell's bounds are to look ahead.

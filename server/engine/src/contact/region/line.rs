@@ -648,7 +648,7 @@ mod tests {
     #[test]
     fn a_candidate_that_leaves_all_faces_has_no_run() {
         let (mut left, mut stayed, mut ran) = (0, 0, 0);
-        each_pair(0x6c65_6176_6573, 240, |bodies, places, _| {
+        each_pair(0x6c65_6176_6573, 360, |bodies, places, _| {
             for place in places {
                 let lits = [Side::A, Side::B].map(|s| place.lits(s)).concat();
                 for c in candidates(bodies, place) {

@@ -81,6 +81,11 @@ const ROUND: f64 = 1.0 / 24.0;
 /// … and those in which many faces run together down to this one, or to where all that is left in them is near.
 const SMALLEST: f64 = 1e-3;
 
+/// Diameters of the smaller body within which two points are one …
+const SAME_POINT: f64 = 1e-6;
+/// … and those of the same faces.
+const SAME_FACES: f64 = 1e-4;
+
 /// The threshold of touching for a pair: its margin, at least twice the resolution.
 pub fn threshold(resolution: f64, margin: f64) -> f64 {
     margin.max(2.0 * resolution)
@@ -244,16 +249,23 @@ fn find(bodies: &Bodies) -> Regions {
             }
         }
     }
-    let mut points: Vec<DVec3> = Vec::new();
+    let mut points: Vec<(DVec3, [u32; 3], [u32; 3])> = Vec::new();
     for m in point::meetings(bodies, &places, &told) {
         let x = m.middle();
-        let known = points.iter().any(|p| (*p - x).length() <= 1e-6 * bodies.size + bodies.lie)
+        let region = point_region(bodies, &m);
+        let faces = (region.faces_a, region.faces_b);
+        let is_same = |(p, of_a, of_b): &(DVec3, [u32; 3], [u32; 3])| {
+            // Where the curvature vanishes equations tell a point to a part of their digits.
+            let part = if (*of_a, *of_b) == faces { SAME_FACES } else { SAME_POINT };
+            (*p - x).length() <= part * bodies.size + bodies.lie
+        };
+        let known = points.iter().any(is_same)
             || ends.iter().any(|c| (*c - x).length() <= bodies.eps)
             || lines.iter().any(|l| on_run(bodies, l, x))
             || in_patch(x);
         if !known {
-            out.regions.push(point_region(bodies, &m));
-            points.push(x);
+            points.push((x, faces.0, faces.1));
+            out.regions.push(region);
         }
     }
     let rank = |r: &Region| (2 - r.extent as u8, r.faces_a, r.faces_b);

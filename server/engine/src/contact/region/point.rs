@@ -11,9 +11,10 @@ use super::local::{Bodies, Lit, has_descent};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth::Deepest;
 use crate::contact::instant::separation::Place;
-use crate::contact::witness::newton::{MAX_UNKNOWNS, cholesky_solve, damped_step};
+use crate::contact::witness::balance::{self, BALANCE, Balance, Equations, MOST_BALANCED};
+use crate::contact::witness::newton::{MAX_UNKNOWNS, cholesky_solve};
 use crate::solid::Sense;
-use crate::solid::surface::{Apex, Symmetry};
+use crate::solid::surface::{Apex, Quadric, Symmetry};
 use glam::DVec3;
 use smallvec::{SmallVec, smallvec};
 use std::collections::BTreeMap;
@@ -35,12 +36,6 @@ impl Meeting {
         (self.feet[0] + self.feet[1]) * 0.5
     }
 }
-
-/// Multipliers below this, and sums of gradients above it, are no balance.
-const BALANCE: f64 = 1e-7;
-
-/// Faces of both sides together that balance, at most.
-const MOST_BALANCED: usize = 4;
 
 /// How far off its box a meeting may be found, in boxes.
 const SLACK: f64 = 1e-3;
@@ -116,7 +111,9 @@ pub fn meets_once(bodies: &Bodies, place: &Place) -> bool {
 /// True where no more than one point of a box can be a balance: there a ball and one other face are. With a convex one F is strictly
 /// convex. Out of a hollow one the ball's centre c must be seen along the face's normal, and a gradient of length 1 is the same all
 /// along a normal up to the face's focus: while that is farther than c from everywhere in the box, the normal through c is the one
-/// line on which the balance lies, and the levels agree there once.
+/// line on which the balance lies, and the levels agree there once. Normals of a round face lie in planes through its axis: where
+/// the box lies on c's side of the axis, and the face is straight in these planes, its normals there are parallel, and one goes
+/// through c.
 fn is_unique(bodies: &Bodies, place: &Place) -> bool {
     let [of_a, of_b] = [Side::A, Side::B].map(|side| place.lits(side));
     let ([p], [q]) = (of_a, of_b) else { return false };
@@ -127,6 +124,9 @@ fn is_unique(bodies: &Bodies, place: &Place) -> bool {
         if other.1.sense() == Sense::Positive {
             return face.is_convex();
         }
+        if is_beside_axis(face.quadric(0.0).as_ref(), center, place, bodies.eps) {
+            return true;
+        }
         let at = face.at(place.center);
         let far = (place.center - center).length() + reach;
         // Of elliptic faces and quadrics, which have no symmetry, no gradient is of length 1.
@@ -134,6 +134,15 @@ fn is_unique(bodies: &Bodies, place: &Place) -> bool {
     };
     bodies.work.look(2);
     with(*p, *q) || with(*q, *p)
+}
+
+/// True where a box lies on a point's side of the axis of a cylinder or cone: no plane through the axis shows both sides of it there.
+fn is_beside_axis(round: Option<&Quadric>, point: DVec3, place: &Place, eps: f64) -> bool {
+    let Some(&Quadric { origin, axis: Some(axis), .. }) = round else { return false };
+    let off = |x: DVec3| (x - origin) - axis * (x - origin).dot(axis);
+    let Some(way) = off(point).try_normalize() else { return false };
+    let grown = place.half * (1.0 + SLACK) + DVec3::splat(SLACK * place.half.max_element() + eps);
+    off(place.center).dot(way) > way.abs().dot(grown)
 }
 
 /// A literal in a box: its value and gradient at the centre, how far the gradient turns on the way through the box.
@@ -226,12 +235,6 @@ fn choices(count: usize) -> Vec<SmallVec<[usize; 3]>> {
 /// Steps to and fro between two surfaces.
 const MOST_PACES: usize = 32;
 
-/// A place where literals balance: point, level, multipliers.
-type Balance = (DVec3, f64, Multipliers);
-
-/// One for each face that balances.
-type Multipliers = SmallVec<[f64; MOST_BALANCED]>;
-
 /// What a balance within a box is to the bodies.
 fn meeting(bodies: &Bodies, place: &Place, lits: &[Lit], (x, level, lambda): Balance) -> Option<Meeting> {
     let eps = bodies.eps;
@@ -294,67 +297,10 @@ pub fn nearest(bodies: &Bodies, (x, normal, depth, lits): &Deepest) -> Meeting {
     })
 }
 
-/// Solves literal_i = level, Σ λ g = 0, Σ λ = 1 with λ >= 0 for x, level, λ.
-fn balance(bodies: &Bodies, lits: &[Lit], mut x: DVec3) -> Option<Balance> {
-    let m = lits.len();
-    let n = m + 4;
-    let size = bodies.size;
-    let mut level = 0.0;
-    let mut lambda: Multipliers = smallvec![1.0 / m as f64; m];
-    let fill = |x: DVec3, level: f64, lambda: &[f64]| {
-        let (mut f, mut jac) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
-        let mut total = -1.0;
-        for (i, lit) in lits.iter().enumerate() {
-            let (value, normal, hessian) = bodies.bent(*lit, x);
-            f[i] = (value - level) / size;
-            jac[i][3] = -1.0;
-            for k in 0..3 {
-                jac[i][k] = normal[k];
-                jac[m + k][4 + i] = normal[k];
-                f[m + k] += lambda[i] * normal[k];
-            }
-            if let Some(hessian) = hessian {
-                for (k, j) in (0..9).map(|n| (n / 3, n % 3)) {
-                    jac[m + k][j] += lambda[i] * hessian.col(j)[k] * size;
-                }
-            }
-            total += lambda[i];
-            jac[m + 3][4 + i] = 1.0;
-        }
-        f[m + 3] = total;
-        let square: f64 = f[..n].iter().map(|v| v * v).sum();
-        (f, jac, square)
-    };
-    let (mut f, mut jac, mut best) = fill(x, level, &lambda);
-    let mut damping = 1e-3;
-    for _ in 0..40 {
-        if best < 1e-32 {
-            break;
-        }
-        let step = damped_step(&jac, &f, n, (damping * best.min(1e-2)).max(1e-15))?;
-        let nx = x + DVec3::new(step[0], step[1], step[2]) * size;
-        let nlevel = level + step[3] * size;
-        let nlambda: Multipliers = lambda.iter().zip(&step[4..n]).map(|(l, s)| l + s).collect();
-        let next = fill(nx, nlevel, &nlambda);
-        if next.2 < best {
-            let slow = next.2 > 0.25 * best && best < 1e-26;
-            (x, level, lambda) = (nx, nlevel, nlambda);
-            (f, jac, best) = next;
-            damping = (damping * 0.1).max(1e-9);
-            if slow {
-                break;
-            }
-        } else {
-            damping *= 16.0;
-            if damping > 1e12 || best < 1e-26 {
-                break;
-            }
-        }
-    }
-    let balanced = f[m..m + 3].iter().all(|v| v.abs() <= BALANCE);
-    let held = lambda.iter().all(|l| *l >= -BALANCE);
-    (balanced && held && x.is_finite() && f[..m].iter().all(|v| v.abs() * size <= bodies.eps))
-        .then_some((x, level, lambda))
+/// Where some literals balance, looked for from `x` on.
+fn balance(bodies: &Bodies, lits: &[Lit], x: DVec3) -> Option<Balance> {
+    let literal = |i: usize, x: DVec3| bodies.bent(lits[i], x);
+    balance::balance(&Equations { count: lits.len(), size: bodies.size, tolerance: bodies.eps, literal }, x)
 }
 
 /// The nearest point to `x` at which some literals vanish.

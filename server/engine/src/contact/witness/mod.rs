@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `contacts` | from a guess to a confirmed contact; which of several is kept |
 //! | `newton` | the contact's equations, solved for a few literals |
+//! | `balance` | the same equations at one instant: where faces are deepest in each other |
 //! | `known` | which faces a contact may be solved for |
 //! | `faces` | the faces that hold a point of a primitive along a direction |
 //! | `found` | a contact that was found, and how a search ends |
@@ -15,6 +16,7 @@
 //! | `sides` | which literals of two bodies decide |
 //! | `extent` | whether the faces leave a point, a line or a patch |
 
+pub mod balance;
 pub mod climb;
 pub mod contacts;
 mod dependence;
