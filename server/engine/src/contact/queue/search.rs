@@ -15,8 +15,9 @@
 //! A cell inside one body may be dropped only at t > 0: once the start is known to be free of overlap and containment,
 //! the first contact lies on both surfaces (f_A = f_B = −delta). Were x deeper in A and just at −delta in B, the same
 //! point of B was there before, still deeper in A: nothing of this asks for the sign of delta, so it holds for
-//! distances that are kept, too. At t = 0 such cells are refined like any other, and a witness found there restarts the
-//! search at 2 delta, then means overlap.
+//! distances that are kept, too. At t = 0 such cells are refined like any other. A witness found there restarts the
+//! search at 2 delta, unless it is as deep as that already: then it means overlap. Where a small overlap leaves next to no
+//! room, its faces lead to one (`deep_balance`).
 
 use super::cell::{Cell, Range, Source};
 use super::clock::Stage;
