@@ -3,13 +3,14 @@
 //! A session has a `Tap`, which hands each accepted command and each step on to a `Recorder`: a bounded queue and a thread that
 //! writes. The tap never waits. Where the queue is full whole steps are left out and counted, and the next one that is taken
 //! begins with an `Opening`: the session as it stands, from which it can be repeated without what came before. `file` reads a
-//! recording up to its end, or to where it was cut. `scene` writes one step as a scene folder, `view` and `surface` make what
-//! viewers draw.
+//! recording up to its end, or to where it was cut. `scene` writes one step as a scene folder, `view` follows a session and makes what
+//! viewers draw of it, in the messages of `foxglove`.
 //!
 //! Floor 9: imports `import`, `world` and below.
 
 mod content;
 mod file;
+mod foxglove;
 mod message;
 mod queue;
 mod scene;
@@ -18,10 +19,10 @@ mod writer;
 
 pub use content::{Content, Key, Part};
 pub use file::{Entry, FileError, Recording};
+pub use foxglove::schemas;
 pub use message::{About, Change, FORMAT, Opening, StepMessage, topic};
 pub use queue::{LIMIT, Recorder, Tap};
 pub use scene::{SceneFolder, Standing};
-pub use view::schemas;
 
 /// An error of the library's, with its cause: of a disk that is full its own sentence says "I/O error" alone.
 fn with_cause(error: &mcap::McapError) -> String {

@@ -4,6 +4,9 @@
 //! the contacts. Objects stand where the step ends.
 
 use super::content::Part;
+use super::foxglove::{
+    Arrow, Color, Deletion, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Sphere, TriangleList, text,
+};
 use super::message::{Opening, StepMessage};
 use crate::math::Aabb;
 use crate::octree::Model;
@@ -13,28 +16,37 @@ use contactd_proto::control::{Command, ObjectSpec};
 use contactd_proto::step::STEP_REFUSED;
 use contactd_proto::{ContactRecord, MotionState, Pose, Tracks};
 use glam::{DQuat, DVec3};
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-
-/// The names of the schemas.
-pub const SCENE_UPDATE: &str = "foxglove.SceneUpdate";
-/// See `SCENE_UPDATE`.
-pub const FRAME_TRANSFORMS: &str = "foxglove.FrameTransforms";
 
 /// Contacts of a step that are drawn, the earliest.
 const CONTACTS: usize = 200;
 /// The frame that all others stand in.
 const WORLD: &str = "world";
 
-/// Of a solid that is no mesh: 2 to this power cells along each side.
-const LEVELS: u32 = 5;
 /// Facets of a mesh that is told as it is, at most.
 const FACETS: usize = 20_000;
+/// The same of all objects that are such a mesh.
+const ALL_FACETS: usize = 16 * FACETS;
+/// Bytes of an update of the scene, about, and of a point and a triangle in it.
+const UPDATE: usize = 1 << 20;
+const POINT: usize = 50;
+const TRIANGLE: usize = 16;
 
-/// The surface of a model; what reaches to infinity is cut off at `reach`.
-fn surface(model: &Model, reach: f64) -> Triangles {
-    if let Some(own) = tessellation::of_mesh(&model.solid).filter(|own| own.indices.len() <= FACETS) {
+/// How fine a model is drawn that so many objects have: 2 to this power cells along each side of its box. Each object tells its
+/// own triangles, for so the viewers' messages are.
+const fn levels(objects: usize) -> u32 {
+    match objects {
+        0..=16 => 5,
+        17..=128 => 4,
+        _ => 3,
+    }
+}
+
+/// The surface of a model that so many `objects` have; what reaches to infinity is cut off at `reach`.
+fn surface(model: &Model, objects: usize, reach: f64) -> Triangles {
+    let few = |own: &Triangles| own.indices.len() <= FACETS && own.indices.len() * objects <= ALL_FACETS;
+    if let Some(own) = tessellation::of_mesh(&model.solid).filter(few) {
         return own;
     }
     let own = model.solid.aabb();
@@ -43,17 +55,45 @@ fn surface(model: &Model, reach: f64) -> Triangles {
     if model.solid.is_empty() || around.is_empty() {
         return Triangles::default();
     }
-    tessellation::of_solid(&model.solid, &around, LEVELS)
+    tessellation::of_solid(&model.solid, &around, levels(objects))
+}
+
+/// A model as it is drawn.
+struct Drawn {
+    part: Part,
+    /// Radius; 0 where it reaches to infinity.
+    radius: f64,
+    /// How far it is drawn where it reaches to infinity.
+    reach: f64,
+    /// Objects that have it.
+    objects: usize,
+    /// As it is drawn of so many objects.
+    surface: Option<(usize, Arc<Triangles>)>,
+}
+
+impl Drawn {
+    fn surface(&mut self) -> Arc<Triangles> {
+        if let Some((objects, surface)) = &self.surface
+            && levels(*objects) == levels(self.objects)
+        {
+            return surface.clone();
+        }
+        let surface = Arc::new(surface(&self.part.model.model, self.objects, self.reach));
+        self.surface = Some((self.objects, surface.clone()));
+        surface
+    }
 }
 
 /// A session's objects as they are drawn.
 pub struct Stage {
     session: u64,
-    models: BTreeMap<u32, Arc<Triangles>>,
-    /// Radius of each model; 0 of one that reaches to infinity.
-    radii: BTreeMap<u32, f64>,
+    models: BTreeMap<u32, Drawn>,
     objects: BTreeMap<u32, ObjectSpec>,
     tracks: Tracks,
+    /// Objects that are not drawn as they are.
+    undrawn: BTreeSet<u32>,
+    /// What is drawn and is no more.
+    gone: Vec<String>,
     /// Objects whose frames were not told since they moved.
     moved: Vec<u32>,
     /// Contacts are drawn.
@@ -61,71 +101,116 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A session at its opening, what is drawn of it, and where it stands; `stale` are entities that were drawn of it before.
-    pub fn open(
-        (session, time): (u64, u64),
-        opening: &Opening,
-        parts: Vec<(u32, Part)>,
-        stale: &[String],
-    ) -> (Self, Vec<u8>, Vec<u8>) {
+    /// A session at its opening: nothing is drawn of it yet but what was drawn `before` and is the same now.
+    pub fn open(session: u64, opening: &Opening, parts: Vec<(u32, Part)>, before: Option<Self>) -> Self {
         let mut stage = Self {
             session,
             models: BTreeMap::new(),
-            radii: BTreeMap::new(),
-            objects: opening.objects.iter().map(|o| (o.id, o.clone())).collect(),
+            objects: BTreeMap::new(),
             tracks: Tracks::default(),
+            undrawn: BTreeSet::new(),
+            gone: Vec::new(),
             moved: Vec::new(),
             has_contacts: false,
         };
         // Bounded ones first: they say how far the others reach.
         let (bounded, others): (Vec<_>, Vec<_>) = parts.into_iter().partition(|(_, part)| part.model.aabb.is_finite());
         bounded.into_iter().chain(others).for_each(|(id, part)| stage.model(id, part));
+        opening.objects.iter().for_each(|o| stage.insert(o.clone()));
         for track in &opening.tracks {
             if let Ok(motion_state) = track.checked() {
                 stage.tracks.put(track.object, motion_state);
             }
         }
         stage.moved = stage.objects.keys().copied().collect();
-        let entities: Vec<Value> = stage.objects.values().map(|o| stage.entity(time, o)).collect();
-        let ids = stage.entities();
-        let gone: Vec<Value> = stale.iter().filter(|id| !ids.contains(id)).map(|id| deletion(time, id)).collect();
-        let transforms = stage.transforms(time).unwrap_or_else(|| bytes(&json!({ "transforms": [] })));
-        (stage, update(gone, entities), transforms)
+        if let Some(before) = before {
+            stage.follow(before);
+        }
+        stage
     }
 
-    /// Ids of all entities of the session.
-    pub fn entities(&self) -> Vec<String> {
-        self.objects.values().map(|o| self.name(o)).chain([self.contacts_name()]).collect()
+    /// Takes over what was drawn before.
+    fn follow(&mut self, before: Self) {
+        let stays = |o: &&ObjectSpec| self.objects.get(&o.id).is_some_and(|now| now.name == o.name);
+        let gone = before.objects.values().filter(|o| !stays(o)).map(|o| before.name(o));
+        self.gone = before.gone.iter().cloned().chain(gone).collect();
+        self.has_contacts = before.has_contacts;
+        for (id, old) in before.models {
+            let Some(model) = self.models.get_mut(&id) else { continue };
+            if !Arc::ptr_eq(&old.part.content, &model.part.content) || old.reach.to_bits() != model.reach.to_bits() {
+                continue;
+            }
+            model.surface = old.surface;
+            let as_before =
+                |o: &&ObjectSpec| o.model == id && self.objects.get(&o.id).is_some_and(|now| drawn_alike(now, o));
+            for object in before.objects.values().filter(as_before).filter(|o| !before.undrawn.contains(&o.id)) {
+                self.undrawn.remove(&object.id);
+            }
+        }
     }
 
     /// Nothing is drawn of it any more.
     pub fn strike(&self, time: u64) -> Vec<u8> {
-        update(self.entities().iter().map(|id| deletion(time, id)).collect(), vec![])
+        let all = self.objects.values().map(|o| self.name(o)).chain([self.contacts_name()]);
+        let all: Vec<String> = self.gone.iter().cloned().chain(all).collect();
+        text(&SceneUpdate { deletions: deletions(time, &all), entities: vec![] })
     }
 
     /// A model that was loaded.
     pub fn model(&mut self, id: u32, part: Part) {
         let radius = if part.model.aabb.is_finite() { part.model.aabb.half().length() } else { 0.0 };
-        let reach = 8.0 * self.radii.values().copied().fold(if radius > 0.0 { radius } else { 1.0 }, f64::max);
-        self.radii.insert(id, radius);
-        self.models.insert(id, Arc::new(surface(&part.model.model, reach)));
+        let known = self.models.values().map(|drawn| drawn.radius);
+        let reach = 8.0 * known.fold(if radius > 0.0 { radius } else { 1.0 }, f64::max);
+        self.models.insert(id, Drawn { part, radius, reach, objects: 0, surface: None });
     }
 
-    /// What a command changes of what is drawn.
-    pub fn command(&mut self, time: u64, command: &Command) -> Option<Vec<u8>> {
+    fn insert(&mut self, object: ObjectSpec) {
+        if let Some(drawn) = self.models.get_mut(&object.model) {
+            drawn.objects += 1;
+        }
+        self.undrawn.insert(object.id);
+        self.objects.insert(object.id, object);
+    }
+
+    /// Objects that are not drawn as they are, some of them, as a message; `None` once all are.
+    pub fn draw(&mut self, time: u64) -> Option<Vec<u8>> {
+        let gone = std::mem::take(&mut self.gone);
+        let mut next = Vec::new();
+        let mut bytes = 0;
+        while bytes < UPDATE
+            && let Some(id) = self.undrawn.pop_first()
+        {
+            let Some(object) = self.objects.get(&id) else { continue };
+            let surface = self.models.get_mut(&object.model).map(Drawn::surface);
+            bytes += surface.as_ref().map_or(0, |s| POINT * s.points.len() + TRIANGLE * s.indices.len());
+            next.push((self.name(object), object, surface));
+        }
+        let entities: Vec<Entity> =
+            next.iter().map(|(name, object, surface)| entity(time, name, object, surface.as_deref())).collect();
+        let deletions = deletions(time, &gone);
+        (!entities.is_empty() || !deletions.is_empty()).then(|| text(&SceneUpdate { deletions, entities }))
+    }
+
+    /// Takes a command.
+    pub fn command(&mut self, command: &Command) {
         match command {
             Command::AddObject(spec) => {
-                self.objects.insert(spec.id, spec.clone());
+                self.insert(spec.clone());
                 if let Ok(pose) = spec.pose.checked() {
                     self.tracks.put(spec.id, MotionState::resting(pose));
                 }
                 self.moved.push(spec.id);
-                Some(update(vec![], vec![self.entity(time, spec)]))
             }
             Command::RemoveObject(id) => {
-                let spec = self.objects.remove(id)?;
+                let Some(spec) = self.objects.remove(id) else { return };
+                if let Some(drawn) = self.models.get_mut(&spec.model) {
+                    drawn.objects -= 1;
+                }
+                // What was never drawn cannot be taken away.
+                if !self.undrawn.remove(id) {
+                    self.gone.push(self.name(&spec));
+                }
                 self.tracks.removed(*id);
-                Some(update(vec![deletion(time, &self.name(&spec))], vec![]))
             }
             Command::Restore(tracks) => {
                 for track in tracks {
@@ -134,10 +219,8 @@ impl Stage {
                         self.moved.push(track.object);
                     }
                 }
-                None
             }
             Command::Reframe(frames) => {
-                let mut drawn = Vec::with_capacity(frames.len());
                 for frame in frames {
                     let Some((spec, Ok((place, pose)))) =
                         self.objects.get_mut(&frame.object).zip(Some(frame.checked()))
@@ -145,12 +228,10 @@ impl Stage {
                         continue;
                     };
                     spec.place = place.into();
-                    let spec = spec.clone();
+                    self.undrawn.insert(spec.id);
                     self.tracks.put(spec.id, MotionState::resting(pose));
                     self.moved.push(spec.id);
-                    drawn.push(self.entity(time, &spec));
                 }
-                Some(update(vec![], drawn))
             }
             Command::Open { .. }
             | Command::Close
@@ -164,7 +245,7 @@ impl Stage {
             | Command::Recording { .. }
             | Command::SaveStep(_)
             | Command::Carry { .. }
-            | Command::Ask(_) => None,
+            | Command::Ask(_) => {}
         }
     }
 
@@ -186,22 +267,22 @@ impl Stage {
         let mut moved = std::mem::take(&mut self.moved);
         moved.sort_unstable();
         moved.dedup();
-        let frames: Vec<Value> = moved
+        let transforms: Vec<FrameTransform> = moved
             .iter()
             .filter_map(|id| {
                 let (object, track) = (self.objects.get(id)?, self.tracks.get(*id)?);
-                Some(json!({
-                    "timestamp": stamp(time),
-                    "parent_frame_id": WORLD,
-                    "child_frame_id": self.name(object),
-                    "translation": vector(track.end.position),
-                    "rotation": quaternion(track.end.rotation),
-                }))
+                Some(FrameTransform {
+                    timestamp: time.into(),
+                    parent_frame_id: WORLD,
+                    child_frame_id: self.name(object),
+                    translation: track.end.position.into(),
+                    rotation: track.end.rotation.into(),
+                })
             })
             .collect();
         moved.clear();
         self.moved = moved;
-        (!frames.is_empty()).then(|| bytes(&json!({ "transforms": frames })))
+        (!transforms.is_empty()).then(|| text(&FrameTransforms { transforms }))
     }
 
     /// The contacts of a step; `None` where there are none, as before.
@@ -213,40 +294,25 @@ impl Stage {
             return None;
         }
         self.has_contacts = !met.is_empty();
-        let spheres: Vec<Value> = met
-            .iter()
-            .map(|r| {
-                let size = 0.06 * self.size(r);
-                json!({
-                    "pose": pose(&Pose::at(r.point.into())),
-                    "size": vector(DVec3::splat(size)),
-                    "color": color([0.9, 0.1, 0.1], 1.0),
-                })
-            })
-            .collect();
-        let arrows: Vec<Value> = met.iter().filter(|r| r.valid & VALID_NORMAL != 0).map(|r| self.arrow(r)).collect();
-        let mut entity = bare(step.time, WORLD, &self.contacts_name());
-        (entity["spheres"], entity["arrows"]) = (spheres.into(), arrows.into());
-        Some(update(vec![], vec![entity]))
-    }
-
-    /// The normal of a contact.
-    fn arrow(&self, r: &ContactRecord) -> Value {
-        let size = self.size(r);
-        let turned = DQuat::from_rotation_arc(DVec3::X, DVec3::from(r.normal).normalize_or(DVec3::X));
-        json!({
-            "pose": pose(&Pose::new(r.point.into(), turned)),
-            "shaft_length": 0.3 * size,
-            "shaft_diameter": 0.02 * size,
-            "head_length": 0.08 * size,
-            "head_diameter": 0.05 * size,
-            "color": color([0.9, 0.5, 0.1], 1.0),
-        })
+        let name = self.contacts_name();
+        let mut entity = Entity::new(step.time, WORLD, &name);
+        for r in met {
+            let size = self.size(r);
+            entity.spheres.push(Sphere {
+                pose: (&Pose::at(r.point.into())).into(),
+                size: DVec3::splat(0.06 * size).into(),
+                color: Color::new([0.9, 0.1, 0.1], 1.0),
+            });
+            if r.valid & VALID_NORMAL != 0 {
+                entity.arrows.push(arrow(r, size));
+            }
+        }
+        Some(text(&SceneUpdate { entities: vec![entity], deletions: vec![] }))
     }
 
     /// Radius of the smaller one of a pair.
     fn size(&self, r: &ContactRecord) -> f64 {
-        let radius = |id| self.objects.get(&id).and_then(|o| self.radii.get(&o.model)).copied().filter(|r| *r > 0.0);
+        let radius = |id| self.models.get(&self.objects.get(&id)?.model).map(|drawn| drawn.radius).filter(|r| *r > 0.0);
         let smaller = [r.a, r.b].into_iter().filter_map(radius).fold(f64::INFINITY, f64::min);
         if smaller.is_finite() { smaller } else { 1.0 }
     }
@@ -259,142 +325,41 @@ impl Stage {
     fn contacts_name(&self) -> String {
         format!("{}/contacts", self.session)
     }
+}
 
-    fn entity(&self, time: u64, object: &ObjectSpec) -> Value {
-        let name = self.name(object);
-        let mut entity = bare(time, &name, &name);
-        entity["metadata"] =
-            json!([{ "key": "object", "value": object.name }, { "key": "group", "value": object.group }]);
-        let (Some(surface), Ok(place)) = (self.models.get(&object.model), object.place.checked()) else {
-            return entity;
-        };
-        let points: Vec<Value> = surface.points.iter().map(|x| vector(x.as_vec3().as_dvec3())).collect();
+/// True when nothing that is drawn of an object differs.
+fn drawn_alike(a: &ObjectSpec, b: &ObjectSpec) -> bool {
+    let of = |o: &ObjectSpec| (o.id, o.model, o.name.clone(), o.group.clone(), o.is_static);
+    of(a) == of(b) && a.place == b.place
+}
+
+/// An object in its frame.
+fn entity<'a>(time: u64, name: &'a str, object: &'a ObjectSpec, surface: Option<&'a Triangles>) -> Entity<'a> {
+    let mut entity = Entity::new(time, name, name);
+    entity.metadata =
+        vec![KeyValue { key: "object", value: &object.name }, KeyValue { key: "group", value: &object.group }];
+    if let (Some(surface), Ok(place)) = (surface, object.place.checked()) {
         let hue = f64::from(object.id).mul_add(0.381_966, 0.1).fract();
         let shade = |offset: f64| 0.55 + 0.35 * ((hue + offset) * std::f64::consts::TAU).cos();
-        entity["triangles"] = json!([{
-            "pose": pose(&place),
-            "points": points,
-            "color": color([shade(0.0), shade(1.0 / 3.0), shade(2.0 / 3.0)], if object.is_static { 0.6 } else { 1.0 }),
-            "colors": [],
-            "indices": surface.indices.as_flattened(),
-        }]);
-        entity
+        let color = Color::new([0.0, 1.0 / 3.0, 2.0 / 3.0].map(shade), if object.is_static { 0.6 } else { 1.0 });
+        entity.triangles.push(TriangleList::new(&place, &surface.points, &surface.indices, color));
+    }
+    entity
+}
+
+/// The normal of a contact of bodies of this size.
+fn arrow(r: &ContactRecord, size: f64) -> Arrow {
+    let turned = DQuat::from_rotation_arc(DVec3::X, DVec3::from(r.normal).normalize_or(DVec3::X));
+    Arrow {
+        pose: (&Pose::new(r.point.into(), turned)).into(),
+        shaft_length: 0.3 * size,
+        shaft_diameter: 0.02 * size,
+        head_length: 0.08 * size,
+        head_diameter: 0.05 * size,
+        color: Color::new([0.9, 0.5, 0.1], 1.0),
     }
 }
 
-/// An entity in which nothing is drawn.
-fn bare(time: u64, frame: &str, id: &str) -> Value {
-    json!({
-        "timestamp": stamp(time),
-        "frame_id": frame,
-        "id": id,
-        "lifetime": { "sec": 0, "nsec": 0 },
-        "frame_locked": true,
-        "metadata": [],
-        "arrows": [],
-        "cubes": [],
-        "spheres": [],
-        "cylinders": [],
-        "lines": [],
-        "triangles": [],
-        "texts": [],
-        "models": [],
-    })
-}
-
-fn update(deletions: Vec<Value>, entities: Vec<Value>) -> Vec<u8> {
-    bytes(&json!({ "deletions": deletions, "entities": entities }))
-}
-
-fn deletion(time: u64, id: &str) -> Value {
-    json!({ "timestamp": stamp(time), "type": 0, "id": id })
-}
-
-fn bytes(value: &Value) -> Vec<u8> {
-    value.to_string().into_bytes()
-}
-
-fn stamp(time: u64) -> Value {
-    json!({ "sec": time / 1_000_000_000, "nsec": time % 1_000_000_000 })
-}
-
-fn vector(v: DVec3) -> Value {
-    json!({ "x": v.x, "y": v.y, "z": v.z })
-}
-
-fn quaternion(q: DQuat) -> Value {
-    json!({ "x": q.x, "y": q.y, "z": q.z, "w": q.w })
-}
-
-fn pose(p: &Pose) -> Value {
-    json!({ "position": vector(p.position), "orientation": quaternion(p.rotation) })
-}
-
-fn color([r, g, b]: [f64; 3], a: f64) -> Value {
-    json!({ "r": r, "g": g, "b": b, "a": a })
-}
-
-/// A schema: an object that has all of some properties.
-fn object(title: &str, properties: Value) -> Value {
-    let required: Vec<&String> = properties.as_object().map(|all| all.keys().collect()).unwrap_or_default();
-    json!({ "title": title, "type": "object", "required": required, "properties": properties })
-}
-
-/// A schema: a list.
-fn list(items: Value) -> Value {
-    json!({ "type": "array", "items": items })
-}
-
-/// A schema: numbers by name.
-fn numbers(title: &str, names: &[&str]) -> Value {
-    object(title, names.iter().map(|name| ((*name).to_owned(), json!({ "type": "number" }))).collect())
-}
-
-/// The JSON schemas of both kinds of messages, as far as they are used: by name.
-pub fn schemas() -> [(&'static str, String); 2] {
-    let word = || json!({ "type": "string" });
-    let number = || json!({ "type": "number" });
-    let whole = || json!({ "type": "integer" });
-    let time = |title| object(title, json!({ "sec": whole(), "nsec": whole() }));
-    let xyz = || numbers("foxglove.Vector3", &["x", "y", "z"]);
-    let turn = || numbers("foxglove.Quaternion", &["x", "y", "z", "w"]);
-    let color = || numbers("foxglove.Color", &["r", "g", "b", "a"]);
-    let pose = || object("foxglove.Pose", json!({ "position": xyz(), "orientation": turn() }));
-    let solid = |title| object(title, json!({ "pose": pose(), "size": xyz(), "color": color() }));
-    let any = |title: &str| list(json!({ "title": title, "type": "object" }));
-    let arrow = json!({
-        "pose": pose(), "shaft_length": number(), "shaft_diameter": number(),
-        "head_length": number(), "head_diameter": number(), "color": color(),
-    });
-    let triangles = json!({
-        "pose": pose(), "points": list(numbers("foxglove.Point3", &["x", "y", "z"])), "color": color(),
-        "colors": list(color()), "indices": list(whole()),
-    });
-    let entity = json!({
-        "timestamp": time("time"), "frame_id": word(), "id": word(), "lifetime": time("duration"),
-        "frame_locked": json!({ "type": "boolean" }),
-        "metadata": list(object("foxglove.KeyValuePair", json!({ "key": word(), "value": word() }))),
-        "arrows": list(object("foxglove.ArrowPrimitive", arrow)),
-        "cubes": list(solid("foxglove.CubePrimitive")),
-        "spheres": list(solid("foxglove.SpherePrimitive")),
-        "cylinders": any("foxglove.CylinderPrimitive"),
-        "lines": any("foxglove.LinePrimitive"),
-        "triangles": list(object("foxglove.TriangleListPrimitive", triangles)),
-        "texts": any("foxglove.TextPrimitive"),
-        "models": any("foxglove.ModelPrimitive"),
-    });
-    let deletion = json!({ "timestamp": time("time"), "type": whole(), "id": word() });
-    let update = json!({
-        "deletions": list(object("foxglove.SceneEntityDeletion", deletion)),
-        "entities": list(object("foxglove.SceneEntity", entity)),
-    });
-    let frame = json!({
-        "timestamp": time("time"), "parent_frame_id": word(), "child_frame_id": word(),
-        "translation": xyz(), "rotation": turn(),
-    });
-    let frames = json!({ "transforms": list(object("foxglove.FrameTransform", frame)) });
-    [
-        (SCENE_UPDATE, object(SCENE_UPDATE, update).to_string()),
-        (FRAME_TRANSFORMS, object(FRAME_TRANSFORMS, frames).to_string()),
-    ]
+fn deletions(time: u64, ids: &[String]) -> Vec<Deletion<'_>> {
+    ids.iter().map(|id| Deletion::new(time, id)).collect()
 }

@@ -5,11 +5,12 @@
 //! where the queue grows.
 
 use super::content::{Content, Key, Part};
+use super::foxglove::schemas;
 use super::message::{ABOUT, About, Change, END, Opening, StepMessage, encode, encoding, topic};
 use super::queue::{Item, Load, Recorder, now};
-use super::view::{Stage, schemas};
+use super::view::Stage;
 use crate::world::yield_to_others;
-use contactd_proto::control::{Command, RecordingStatus};
+use contactd_proto::control::RecordingStatus;
 use mcap::records::MessageHeader;
 use mcap::write::{Metadata, NoSeek};
 use mcap::{McapResult, WriteOptions, Writer};
@@ -132,8 +133,12 @@ fn write(sink: Counted, from: &Receiver<Item>, load: &Load, about: BTreeMap<Stri
                 let written = file.item(item, busy.then_some(load));
                 load.taken(size);
                 written?;
+                if !busy {
+                    file.draw()?;
+                }
                 is_fresh = true;
             }
+            Err(TryRecvError::Empty) if file.draw()? => is_fresh = true,
             Err(TryRecvError::Empty) if load.stop.load(Relaxed) => break,
             Err(TryRecvError::Empty) => std::thread::sleep(LOOK),
             Err(TryRecvError::Disconnected) => break,
@@ -239,10 +244,8 @@ impl File {
             opening.models.push((*id, key));
         }
         self.message(topic::OPENING, time, &encode(&(session, &opening)))?;
-        let stale = self.sessions.get(&session).map(|followed| followed.stage.entities()).unwrap_or_default();
-        let (stage, update, transforms) = Stage::open((session, time), &opening, parts, &stale);
-        self.message(topic::SCENE, time, &update)?;
-        self.message(topic::TRANSFORMS, time, &transforms)?;
+        let before = self.sessions.remove(&session).map(|followed| followed.stage);
+        let stage = Stage::open(session, &opening, parts, before);
         self.sessions.insert(session, Followed { stage, back });
         Ok(())
     }
@@ -254,24 +257,30 @@ impl File {
         }
         self.message(topic::CHANGE, time, &encode(&(session, &change)))?;
         let Some(followed) = self.sessions.get_mut(&session) else { return Ok(()) };
-        let drawn = match (&change, part) {
-            (Change::Model(id, _), Some(part)) => {
-                followed.stage.model(*id, part);
-                None
-            }
-            (Change::Command(command), _) => followed.stage.command(time, command),
-            (Change::Model(..), None) => None,
-        };
-        let is_moved =
-            matches!(change, Change::Command(Command::AddObject(_) | Command::Restore(_) | Command::Reframe(_)));
-        let transforms = is_moved.then(|| followed.stage.transforms(time)).flatten();
-        if let Some(update) = drawn {
-            self.message(topic::SCENE, time, &update)?;
+        match (&change, part) {
+            (Change::Model(id, _), Some(part)) => followed.stage.model(*id, part),
+            (Change::Command(command), _) => followed.stage.command(command),
+            (Change::Model(..), None) => {}
+        }
+        Ok(())
+    }
+
+    /// Draws some of what is not drawn as it is; true when there was something.
+    fn draw(&mut self) -> McapResult<bool> {
+        let time = now();
+        let mut stages = self.sessions.values_mut().map(|followed| &mut followed.stage);
+        let next = stages.find_map(|stage| {
+            let next = (stage.draw(time), stage.transforms(time));
+            (next.0.is_some() || next.1.is_some()).then_some(next)
+        });
+        let Some((scene, transforms)) = next else { return Ok(false) };
+        if let Some(scene) = scene {
+            self.message(topic::SCENE, time, &scene)?;
         }
         if let Some(transforms) = transforms {
             self.message(topic::TRANSFORMS, time, &transforms)?;
         }
-        Ok(())
+        Ok(true)
     }
 
     fn step(&mut self, step: Box<StepMessage>, busy: Option<&Load>) -> McapResult<()> {

@@ -1,9 +1,9 @@
 //! What viewers draw: held against what their schemas require, by a table of its own.
 
 use super::{MODELS, PATIENCE, runtime_folder};
-use contactd::ipc::ServerConfig;
-use contactd_client::Object;
+use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::{Pose, PoseRecord};
+use contactd_client::{Object, Session};
 use glam::DVec3;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -159,4 +159,56 @@ fn pictures_have_all_that_their_schemas_require() {
     assert_eq!(drawn, framed, "every object stands in a frame that is told");
     assert_eq!(spheres, contacts);
     assert!(contacts > 0);
+}
+
+/// A viewer's message tells each object's own triangles: of many objects they are coarser, and told in parts.
+#[test]
+fn many_objects_are_drawn_in_messages_of_bounded_length() {
+    let folder = runtime_folder();
+    let path = folder.path().join("many.mcap");
+    let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
+    let ball = session.load_model("ball.csg", "sphere(r = 1);").unwrap().id;
+    let peg = session.load_model("peg.csg", "cylinder(h = 1, r = 1);").unwrap().id;
+    let at = |k: u32| Pose::at(DVec3::new(f64::from(4 * k), 0.0, 0.0));
+    for k in 0..400 {
+        session.add_object(Object::new("ball", ball).at(at(k))).unwrap();
+    }
+    session.record(&path).unwrap();
+    let step = |session: &mut Session<Embedded>| {
+        session.begin_step(1).unwrap()[0] = PoseRecord::end(1, &at(500));
+        session.finish(PATIENCE).unwrap();
+    };
+    step(&mut session);
+    for k in 400..600 {
+        session.add_object(Object::new("peg", peg).at(at(k))).unwrap();
+    }
+    step(&mut session);
+    let status = session.stop_recording().unwrap();
+    assert_eq!((status.steps, status.dropped, status.failure.as_str()), (2, 0, ""));
+    let bytes = std::fs::read(&path).unwrap();
+    let mut drawn = BTreeSet::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert!(message.data.len() < 3 << 20, "a message of {} bytes", message.data.len());
+        if message.channel.topic != "/scene" {
+            continue;
+        }
+        let value: Value = serde_json::from_slice(&message.data).unwrap();
+        for entity in value["entities"].as_array().unwrap() {
+            for list in entity["triangles"].as_array().unwrap() {
+                let corners: Vec<DVec3> = list["points"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|p| DVec3::new(p["x"].as_f64().unwrap(), p["y"].as_f64().unwrap(), p["z"].as_f64().unwrap()))
+                    .collect();
+                assert!(corners.iter().all(|x| x.length() < 1.6), "of the model's own size");
+                assert!(corners.iter().any(|x| x.length() > 0.9));
+                assert!(drawn.insert(entity["id"].as_str().unwrap().to_owned()), "{} is drawn once", entity["id"]);
+            }
+        }
+    }
+    assert_eq!(drawn.len(), 600);
+    // Each as fine as one alone would be: ten times as much.
+    assert!(bytes.len() < 36 << 20, "{} bytes", bytes.len());
 }
