@@ -601,3 +601,47 @@ fn what_is_told_of_a_box_that_leans_on_its_like_is_as_far_as_it_says() {
     }
     println!("{told} points");
 }
+
+/// A capsule beside a block's face or edge, a cylinder or another capsule, less than a margin off: the line ends where either of them
+/// does, however far within the margin the ball at an end of the capsule stays.
+#[test]
+fn the_line_along_a_capsule_ends_with_its_side() {
+    let mut r = Random::new(0x0063_6170_7375_6c65);
+    let (mut lines, mut short) = ([0; 4], 0);
+    for i in 0..sized("CONTACTD_REGIONS", 120) {
+        let (radius, half) = (r.within(0.1, 1.0), r.within(0.2, 2.0));
+        let margin = radius * 10f64.powf(r.within(-4.0, -0.5));
+        let gap = margin * [0.0, r.within(0.0, 0.9)][i % 2];
+        let (other, other_half, off) = (r.within(0.1, 1.0), r.within(0.2, 2.0), r.within(-2.0, 2.0));
+        let (partner, distance) = match i / 2 % 4 {
+            0 => (Recipe::cuboid(other, 3.0, other_half), other),
+            1 => (Recipe::cylinder(other, other_half), other),
+            2 => (Recipe::capsule(other_half, other), other),
+            _ => {
+                let edge = Pose::new(DVec3::ZERO, DQuat::from_rotation_z(FRAC_PI_4));
+                (Recipe::cuboid(other / SQRT_2, other / SQRT_2, other_half).moved(&edge), other)
+            }
+        };
+        let ends = [(-half).max(off - other_half), half.min(off + other_half)];
+        if ends[1] - ends[0] < 0.1 {
+            continue;
+        }
+        let frame = Pose::new(r.vector(3.0), r.rotation());
+        let at = frame.compose(&Pose::at(dvec3(radius + distance + gap, 0.0, off)));
+        let s = Rest::new(Recipe::capsule(half, radius), frame, partner, at);
+        let found = s.regions(margin);
+        let place =
+            format!("{i}: radius {radius}, half {half}, {other}, {other_half}, off {off}, gap {gap}, margin {margin}");
+        assert!(found.regions.len() == 1, "{place}: {found:?}");
+        let region = &found.regions[0];
+        assert!(region.extent == Extent::Line && region.points.len() == 2, "{place}: {region:?}");
+        let mut told = [0, 1].map(|k| frame.inverse().point(region.points[k].point));
+        told.sort_by(|p, q| p.z.total_cmp(&q.z));
+        for (x, z) in told.into_iter().zip(ends) {
+            assert!((x - dvec3(radius + 0.5 * gap, 0.0, z)).length() < 1e-8, "{place}: {x} of {z}");
+        }
+        lines[i / 2 % 4] += 1;
+        short += usize::from(ends[0] == -half || ends[1] == half);
+    }
+    assert!(lines.iter().all(|n| *n > 10) && short > 30, "{lines:?}, {short} end with the capsule");
+}

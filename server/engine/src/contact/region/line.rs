@@ -167,6 +167,21 @@ pub fn has_line(bodies: &Bodies, place: &Place) -> bool {
     })
 }
 
+/// The point of a curve at `s`; of a straight one along a capsule the point from which its side looks as its prolongation does from
+/// there. What a line does along the side it would do if both went on.
+fn beside(bodies: &Bodies, curve: &Curve, lit: Lit, s: f64) -> DVec3 {
+    let (x, face) = (curve.point(s), bodies.face(lit));
+    let (Curve::Line { along, .. }, [Some(a), Some(b)], Some(axis)) = (*curve, face.ends(), face.axis()) else {
+        return x;
+    };
+    let d = axis.direction;
+    if along.dot(d).abs() < 0.5 {
+        return x;
+    }
+    let (z, a, b) = (x.dot(d), a.dot(d), b.dot(d));
+    x - d * (z - z.clamp(a.min(b), a.max(b)))
+}
+
 /// True when a piece of a curve lies in a face, or runs along it within the threshold, and would if it went on: more points
 /// than a conic and a quadric can have in common, some of them so far beyond its ends that a curve which only bends close
 /// has left.
@@ -175,7 +190,8 @@ fn lies_in(bodies: &Bodies, curve: &Curve, (from, to): (f64, f64), lit: Lit) -> 
     let slack = 4.0 * bodies.lie + bodies.eps;
     let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
     (0..7).all(|k| {
-        let v = bodies.value(lit, curve.point(from - pad + (to - from + 2.0 * pad) * f64::from(k) / 6.0));
+        let v =
+            bodies.value(lit, beside(bodies, curve, lit, from - pad + (to - from + 2.0 * pad) * f64::from(k) / 6.0));
         (lo, hi) = (lo.min(v), hi.max(v));
         hi - lo <= 2.0 * slack && v.abs() <= (bodies.tau + bodies.eps).max(slack)
     })
@@ -330,6 +346,12 @@ fn crossings(bodies: &Bodies, curve: &Curve, lit: Lit, (from, to): (f64, f64), o
     if (0..6).all(|k| !along.is_beyond(from + (to - from) * (0.07 + 0.15 * f64::from(k)), near)) {
         return;
     }
+    // Nor has one that lies in a capsule's side, but where that ends.
+    let aside =
+        |k: u32| bodies.value(lit, beside(bodies, curve, lit, from + (to - from) * (0.07 + 0.15 * f64::from(k))));
+    if bodies.face(lit).ends()[0].is_some() && (0..6).all(|k| aside(k).abs() <= near) {
+        return;
+    }
     along.roots((from, to), out);
 }
 
@@ -341,12 +363,9 @@ fn touches(bodies: &Bodies, faces: &[Lit; 2], others: &[Lit], x: DVec3) -> Optio
         if bodies.f(side, x).abs() <= bodies.eps {
             return Some(x);
         }
-        if faces.iter().all(|l| l.0 == side) {
-            return None;
-        }
-        faces
-            .iter()
-            .chain(others)
+        // Over the brim of a face that makes it the curve runs along that face no more, though the brim is near.
+        let from = if faces.iter().any(|l| l.0 == side) { faces } else { others };
+        from.iter()
             .filter(|l| l.0 == side && bodies.value(**l, x).abs() <= bodies.tau + bodies.eps)
             .map(|l| bodies.foot(*l, x))
             .find(|y| bodies.f(side, *y).abs() <= bodies.eps)
@@ -359,6 +378,19 @@ fn touches(bodies: &Bodies, faces: &[Lit; 2], others: &[Lit], x: DVec3) -> Optio
 /// True when a face is as far from a point as the feet that the point has on both bodies are from each other: it holds one of them.
 fn is_as_far(bodies: &Bodies, x: DVec3, feet: [DVec3; 2], lit: Lit) -> bool {
     (bodies.value(lit, x).abs() - (feet[1] - feet[0]).length()).abs() <= bodies.eps
+}
+
+/// True where a straight candidate has left the face along which it runs: a capsule's side ends where its balls begin, which are no
+/// part of the line though they are within the threshold for a while.
+fn is_past_ends(bodies: &Bodies, c: &Candidate, others: &[Lit], x: DVec3, feet: [DVec3; 2]) -> bool {
+    let Curve::Line { .. } = c.curve else { return false };
+    let is_past = |lit: &Lit| {
+        let face = bodies.face(*lit);
+        let ([Some(a), Some(b)], Some(axis)) = (face.ends(), face.axis()) else { return false };
+        (x - a).dot(axis.direction) * (x - b).dot(axis.direction) > 0.0
+    };
+    let holds = |lit: &Lit| is_as_far(bodies, x, feet, *lit);
+    c.faces.iter().any(is_past) || others.iter().any(|lit| is_past(lit) && holds(lit))
 }
 
 /// The runs of a candidate on which the bodies touch and no patch holds them already.
@@ -385,7 +417,10 @@ fn runs_among(
     let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
     let Some(stops) = range.and_then(|range| stops(bodies, c, others, range)) else { return Vec::new() };
     let round = matches!(c.curve, Curve::Circle { .. });
-    let whole = |s: f64| touches(bodies, &c.faces, others, c.curve.point(s));
+    let whole = |s: f64| {
+        let x = c.curve.point(s);
+        touches(bodies, &c.faces, others, x).filter(|feet| !is_past_ends(bodies, c, others, x, *feet))
+    };
     let mut pieces = Vec::new();
     for w in stops.windows(2) {
         let middle = 0.5 * (w[0] + w[1]);
@@ -486,7 +521,7 @@ fn stops(bodies: &Bodies, c: &Candidate, others: &[Lit], range: (f64, f64)) -> O
             stops.push(c.curve.nearest(apex.point).0);
         }
     }
-    for lit in &c.faces {
+    for lit in c.faces.iter().chain(others) {
         let face = bodies.face(*lit);
         for end in face.ends().into_iter().flatten() {
             c.curve.crossings(end, face.axis().map_or(DVec3::ZERO, |a| a.direction), &mut stops);
