@@ -118,20 +118,21 @@ pub fn climb(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
 }
 
 fn climb_for(rounds: usize, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
-    let (x, depth, support) = ascend((rounds, WIDE * task.scale), false, task, at, start, work);
+    let (x, depth, support) = ascend((rounds, WIDE * task.scale, 0.0), false, task, at, start, work);
     (x, normal(task, at, x, &support), depth, support.iter().map(|s| (s.0, s.1)).collect())
 }
 
 /// A locally deepest point near `start`, its depth and the literals that hold it with their weights. The first trust
-/// box reaches as far as `reach` (a length), by default half the pair's scale.
+/// box reaches as far as `reach` (a length), by default half the pair's scale; the climb ends once no point of its box is deeper
+/// by more than `part` of the depth.
 pub(in crate::contact) fn climb_within(
-    reach: Option<f64>,
+    (reach, part): (Option<f64>, f64),
     task: &Task,
     at: &Instant,
     start: DVec3,
     work: &Work,
 ) -> Held {
-    ascend((ROUNDS, reach.unwrap_or(WIDE * task.scale)), true, task, at, start, work)
+    ascend((ROUNDS, reach.unwrap_or(WIDE * task.scale), part), true, task, at, start, work)
 }
 
 /// A point, its depth, what holds it there.
@@ -170,14 +171,22 @@ fn levelled(near: &Near, task: &Task, at: &Instant, mut x: DVec3) -> DVec3 {
 /// |g_A − g_B|² below which two gradients do not oppose each other, over their lengths.
 const OPPOSED: f64 = 1.0;
 
-fn ascend((rounds, reach): (usize, f64), bends: bool, task: &Task, at: &Instant, start: DVec3, work: &Work) -> Held {
+fn ascend(
+    (rounds, reach, part): (usize, f64, f64),
+    bends: bool,
+    task: &Task,
+    at: &Instant,
+    start: DVec3,
+    work: &Work,
+) -> Held {
     let mut near = Near::new(task, at);
     let (mut x, mut best) = (start, near.value(start));
     let mut size = reach;
     let mut scratch = clause::Scratch::default();
     let mut support: Vec<(Side, LiteralId, f64)> = Vec::new();
     for _ in 0..rounds {
-        if size < 1e-13 * task.scale {
+        // F is no lower by more than the box's radius, anywhere in it.
+        if size < 1e-13 * task.scale || size * 3f64.sqrt() < part * -best {
             break;
         }
         work.bound();

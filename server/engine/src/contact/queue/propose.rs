@@ -8,7 +8,7 @@ use super::items::Items;
 use crate::contact::exclusion::clause::Advance;
 use crate::contact::exclusion::fit;
 use crate::contact::exclusion::literal::{Faces, Side};
-use crate::contact::witness::contacts::{Contacts, Guess};
+use crate::contact::witness::contacts::{Contacts, Guess, Visited};
 use crate::contact::witness::known::Known;
 use crate::contact::witness::newton::{Constraint, MAX_ACTIVE};
 use crate::motion::Instant;
@@ -28,6 +28,8 @@ pub(super) struct Proposals<'s, 'a> {
     pub(super) contacts: &'s mut Contacts<'a>,
     /// Guesses that do not converge steadily are followed to their ends.
     pub(super) patient: bool,
+    /// From where the guesses of this attempt came to nothing.
+    pub(super) visited: Visited,
 }
 
 impl Proposals<'_, '_> {
@@ -180,6 +182,7 @@ impl Proposals<'_, '_> {
     }
 
     fn solve(&mut self, active: Vec<Constraint>, x: DVec3, t: f64, lambda: Vec<f64>) -> bool {
-        self.contacts.polish(Known::Handed(&self.items.handed), self.patient, Guess { active, x, t, lambda })
+        let guess = Guess { active, x, t, lambda };
+        self.contacts.polish_beside(&mut self.visited, Known::Handed(&self.items.handed), self.patient, guess)
     }
 }

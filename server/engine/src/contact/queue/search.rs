@@ -32,7 +32,7 @@ use crate::contact::exclusion::tighten::{Left, TIGHTENINGS, WORTH};
 use crate::contact::query::outcome::Counters;
 use crate::contact::witness::balance::{self, MOST_BALANCED};
 use crate::contact::witness::climb;
-use crate::contact::witness::contacts::Contacts;
+use crate::contact::witness::contacts::{Contacts, Visited};
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
 use crate::motion::{Bounds, Instant};
@@ -538,7 +538,8 @@ impl<'a> Search<'a> {
     /// cells are few, unless one is to be `patient`: a smaller cell's are better.
     fn propose(&mut self, cell: &Cell, advance: &Advance, at: &Instant, patient: bool) {
         let patient = patient || self.contacts.counters.cells >= FEW;
-        Proposals { items: &mut self.items, contacts: &mut self.contacts, patient }.attempt(cell, advance, at);
+        let visited = Visited::default();
+        Proposals { items: &mut self.items, contacts: &mut self.contacts, patient, visited }.attempt(cell, advance, at);
     }
 
     /// Looks for a witness at a thin wall, beside x.

@@ -11,7 +11,7 @@ use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::Counters;
 use crate::contact::query::question::{PairQuery, PlacedModel, Strategies, default_resolution};
 use crate::contact::query::task::Task;
-use crate::contact::witness::contacts::Contacts;
+use crate::contact::witness::contacts::{Contacts, Visited};
 use crate::contact::witness::known::Handed;
 use crate::math::Aabb;
 use crate::motion::Placed;
@@ -130,7 +130,8 @@ fn a_cell_that_more_literals_hold_than_a_system_takes_is_tried_with_those_that_w
     let (a, b) = (items.store(&a), items.store(&b));
     let cell = Cell::new((0.4, 1.0), &Aabb::around(v(0.0, 0.0, -0.5), v(0.1, 0.1, 0.1)), a, b);
     let at = task.relative.at(0.4);
-    Proposals { items: &mut items, contacts: &mut contacts, patient: true }.attempt(&cell, &advance, &at);
+    let visited = Visited::default();
+    Proposals { items: &mut items, contacts: &mut contacts, patient: true, visited }.attempt(&cell, &advance, &at);
     // A system of more would be refused by an assertion where it is solved.
     assert!(contacts.counters.newton > 0, "a guess is tried");
     let (tried, ..) = &items.scratch.tried[0];

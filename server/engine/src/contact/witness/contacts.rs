@@ -36,6 +36,22 @@ pub struct Guess {
     pub lambda: Vec<f64>,
 }
 
+/// From where Newton has been started without a contact: from there it comes to none again, so long as none is found elsewhere. Faces
+/// that enter and leave in turn lead there, and so do guesses of one cell.
+#[derive(Debug, Default)]
+pub struct Visited(Vec<(Actives, Weights, DVec3, f64)>);
+
+impl Visited {
+    /// Adds a start; true when it was there.
+    fn has(&mut self, active: &[Constraint], lambda: &[f64], x: DVec3, t: f64) -> bool {
+        let is_there = self.0.iter().any(|v| (&v.0[..], &v.1[..], v.2, v.3) == (active, lambda, x, t));
+        if !is_there {
+            self.0.push((active.into(), lambda.into(), x, t));
+        }
+        is_there
+    }
+}
+
 /// The contacts of a task that were confirmed so far, of which the one to report is kept.
 pub struct Contacts<'a> {
     /// What is searched.
@@ -177,6 +193,11 @@ impl<'a> Contacts<'a> {
     /// Newton from a guess, patient or not, with the active set mended by what the trees say; true when a contact with settled
     /// multipliers was confirmed.
     pub fn polish(&mut self, known: Known, patient: bool, guess: Guess) -> bool {
+        self.polish_beside(&mut Visited::default(), known, patient, guess)
+    }
+
+    /// The same for one of several guesses that are no less patient, after those that `visited` has seen come to nothing.
+    pub fn polish_beside(&mut self, visited: &mut Visited, known: Known, patient: bool, guess: Guess) -> bool {
         let Guess { mut active, x, t, mut lambda } = guess;
         self.again = false;
         let level = witness_level(self.task.delta, self.task.rounding);
@@ -185,6 +206,9 @@ impl<'a> Contacts<'a> {
                 active.iter().all(|c| known.holds(&self.task, c)),
                 "stage 3 asks for a primitive that stage 2 has not handed over: {active:?}"
             );
+            if visited.has(&active, &lambda, x, t) {
+                return false;
+            }
             self.counters.newton += 1;
             let Some(s) = Problem::of(&self.task).solve(&active, x, t, &lambda, level, patient) else { return false };
             // Where only an unsettled witness is known, a settled one of the same time is still worth having.

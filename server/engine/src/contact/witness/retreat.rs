@@ -24,6 +24,9 @@ const RETREATS: usize = 64;
 /// Cells' worth of work that the way back to a touch may take.
 pub(in crate::contact) const BACK: u64 = 20_000;
 
+/// On the way back a point counts as the deepest if none beside it is deeper by more than this part: the way leads back from any.
+const ON_THE_WAY: f64 = 0.05;
+
 /// How far a climb looks first, in depths, where bodies are thin.
 const BESIDE: f64 = 64.0;
 
@@ -138,27 +141,43 @@ impl<'t, 'a> Climber<'t, 'a> {
 
     /// The deepest common point beside x at a time, what holds it and how deep it is.
     pub(in crate::contact) fn deepest(&self, t: f64, x: DVec3) -> depth::Held {
+        self.deepest_by(t, x, 0.0)
+    }
+
+    /// The same but for a part of the depth.
+    fn deepest_by(&self, t: f64, x: DVec3, part: f64) -> depth::Held {
         let at = self.task.relative.at(t);
         // Between two like faces the way along them is long and hardly leads down: where they part is told outright.
         let guesses = self.fits.iter().flat_map(|fit| fit.guesses(self.task, &at, x));
         let (mut best, mut least) = (x, separation::value(self.task, &at, x));
         for guess in guesses {
+            // What is not common is not deeper than what is.
+            if least <= 0.0 && !self.is_common(&at, guess) {
+                continue;
+            }
             let v = self.value(&at, guess);
             if v < least {
                 (best, least) = (guess, v);
             }
         }
-        depth::climb_within(None, self.task, &at, best, &self.work)
+        depth::climb_within((None, part), self.task, &at, best, &self.work)
+    }
+
+    /// True for a point of both bodies.
+    fn is_common(&self, at: &Instant, x: DVec3) -> bool {
+        self.work.look(self.task.a.faces.len() + self.task.b.faces.len());
+        let (model_a, model_b) = (self.task.model_a, self.task.model_b);
+        model_a.value_within(x, 0.0) <= 0.0 && model_b.value_within(at.b_point(x), 0.0) <= 0.0
     }
 
     /// The same, not far from x. Elsewhere a thin wall may be deeper, but no part of what both bodies have in common
     /// there.
     fn deepest_beside(&self, t: f64, x: DVec3, depth: f64) -> depth::Held {
         if !self.fits.is_empty() && !self.task.has_walls() {
-            return self.deepest(t, x);
+            return self.deepest_by(t, x, ON_THE_WAY);
         }
         let reach = (BESIDE * depth).min(0.5 * self.task.scale);
-        depth::climb_within(Some(reach), self.task, &self.task.relative.at(t), x, &self.work)
+        depth::climb_within((Some(reach), ON_THE_WAY), self.task, &self.task.relative.at(t), x, &self.work)
     }
 
     /// Back to where the common depth of x begins. At each time on the way `solve` may name the touch; else it is where
@@ -177,7 +196,13 @@ impl<'t, 'a> Climber<'t, 'a> {
                 return Some(Ok(solved));
             }
             if t == 0.0 || found.1 <= least {
-                return (found.1 >= -least).then_some(Err((t, found)));
+                // The end of the way is told itself: as deep as it is.
+                let at = self.task.relative.at(t);
+                let found = depth::climb_within((Some(found.1.abs()), 0.0), self.task, &at, found.0, &self.work);
+                return match solve(t, &found) {
+                    Some(solved) => Some(Ok(solved)),
+                    None => (found.1 >= -least).then_some(Err((t, found))),
+                };
             }
             // How it moves in the frames of both.
             let in_b = self.task.relative.at(t).b_point(found.0);
@@ -262,10 +287,7 @@ impl<'t, 'a> Climber<'t, 'a> {
             let common = |s: f64| {
                 let at = relative.at(s);
                 let x = way_of(s, &at);
-                self.work.look(self.task.a.faces.len() + self.task.b.faces.len());
-                let (model_a, model_b) = (self.task.model_a, self.task.model_b);
-                let is_common = model_a.value_within(x, 0.0) <= 0.0 && model_b.value_within(at.b_point(x), 0.0) <= 0.0;
-                is_common.then_some((s, x))
+                self.is_common(&at, x).then_some((s, x))
             };
             let (mut since, mut way, mut apart) = ((t, x), first, None);
             while since.0 > 0.0 && apart.is_none() {
