@@ -61,16 +61,16 @@ def attach(
     *,
     meshes: str = "hull",
     keep_exact: bool = True,
-    skin: float = 2e-4,
+    skin: float | None = None,
     slack: float = 1e-2,
     unit: float = 1.0,
     session: Session | None = None,
 ) -> Coupling:
     """contactd's contacts for a whole ``MjModel``: each geom that collides meets others as the exact solid that it is.
 
-    Contacts that MuJoCo has in closed form stay MuJoCo's own (``keep_exact``): of a plane with balls, capsules, boxes, cylinders and
-    ellipsoids, of a ball with balls, capsules and boxes, of two capsules, of two boxes. They cost what they cost without a
-    coupling, and have the ``margin`` and ``gap`` of their geoms.
+    Contacts that MuJoCo has in closed form stay MuJoCo's own (``keep_exact``): of a plane with balls, capsules, boxes, cylinders,
+    ellipsoids and the hulls of meshes, of a ball with balls, capsules and boxes, of two capsules, of two boxes. They cost what they cost
+    without a coupling, and have the ``margin`` and ``gap`` of their geoms.
 
     ``replace``: for bodies by name, a solid in place of all geoms of the body, as for ``Coupling``. ``meshes``: "hull", as in
     MuJoCo's own collisions, or "exact". Contacts are those that MuJoCo's rules ask for, geom by geom: ``contype``,
@@ -101,7 +101,8 @@ class Coupling:
     metres). ``geoms``: every other geom that collides gets its own solid, too (``attach``); ``meshes``: what a mesh then stands
     for, "hull" or "exact"; ``keep_exact``: what MuJoCo has in closed form stays its own, as ``attach`` says. Bodies
     welded to the world are fixed, unless they hang on a mocap body. ``skin``: the gap, in MuJoCo's
-    unit, at which contacts begin to act, in place of the geoms' ``margin``. ``slack``: the part of it by which any point of a body
+    unit, at which contacts begin to act, in place of the geoms' ``margin``; by default 2e-4, and no more than four thousandths of the
+    model's ``<statistic meansize>``. ``slack``: the part of it by which any point of a body
     may go until contactd is asked about it anew; until then its contacts are carried along, and a gap is off by about the
     square of that way over the radius of the surfaces (0: not at all where they are flat). ``session``: to use one that is open (by
     default an embedded one is opened, and closed with the coupling); its rules are replaced.
@@ -123,11 +124,13 @@ class Coupling:
         geoms: bool = False,
         meshes: str = "hull",
         keep_exact: bool = True,
-        skin: float = 2e-4,
+        skin: float | None = None,
         slack: float = 1e-2,
         unit: float = 1.0,
         session: Session | None = None,
     ) -> None:
+        if skin is None:
+            skin = _skin_of(model)
         if not 0.0 < skin < np.inf or not 0.0 < unit < np.inf:
             raise ValueError(f"expected a finite skin and unit above 0, found {skin} and {unit}")
         if not 0.0 <= slack < 1.0:
@@ -139,7 +142,7 @@ class Coupling:
         self.slack = slack
         self.unit = unit
         self._adheres = bool(np.any(model.actuator_trntype == mj.mjtTrn.mjTRN_BODY))
-        self._filter = Filter(model, geoms and keep_exact)
+        self._filter = Filter(model, geoms and keep_exact, hulls=meshes == "hull")
         given = self._given(solids)
         if geoms:
             given += self._own_solids(meshes, [part for part, _ in given])
@@ -318,6 +321,12 @@ class Coupling:
 def _names_a_file(text: str) -> bool:
     """Whether a string is a path, not a CSG text: texts have calls."""
     return "(" not in text and ";" not in text and bool(pathlib.PurePath(text).suffix)
+
+
+def _skin_of(model: mj.MjModel) -> float:
+    """The skin where none is told: what is held without play is pressed apart by it, which must be little beside its size."""
+    size = float(model.stat.meansize)
+    return min(2e-4, 4e-3 * size) if size > 0.0 else 2e-4
 
 
 def _contact_layout(model: mj.MjModel, data: mj.MjData, skin: float) -> tuple[int, bytes, dict[str, int]]:

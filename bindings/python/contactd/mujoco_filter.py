@@ -56,16 +56,20 @@ _EXACT = {
     frozenset({_G.mjGEOM_CAPSULE}),
     frozenset({_G.mjGEOM_BOX}),
 }  # fmt: skip
+#: Of a plane and a mesh's hull MuJoCo has the hull's corners (mjc_PlaneConvex, engine_collision_convex.c), exact too.
+_EXACT_OF_HULLS = frozenset({_G.mjGEOM_PLANE, _G.mjGEOM_MESH})
 #: Bits of contype and conaffinity.
 _BITS = 31
 
 
 class Filter:
     """What MuJoCo lets meet in ``model``: ``take`` says which solids are to stand in for which of its geoms. ``keep_exact``: contacts
-    that MuJoCo has in closed form stay its own, between two geoms of which each has a solid for itself."""
+    that MuJoCo has in closed form stay its own, between two geoms of which each has a solid for itself. ``hulls``: meshes stand for
+    their convex hulls."""
 
-    def __init__(self, model: mj.MjModel, keep_exact: bool = False) -> None:
+    def __init__(self, model: mj.MjModel, keep_exact: bool = False, hulls: bool = True) -> None:
         self._model = model
+        self._exact = {*_EXACT, _EXACT_OF_HULLS} if hulls else _EXACT
         #: The contype and conaffinity of geoms by which they meet what they have MuJoCo's own contacts with, and nothing else.
         self.own_bits: dict[int, tuple[int, int]] = {}
         # The bits that are given anew might be those of a flex.
@@ -148,7 +152,7 @@ class Filter:
             self._keeps_exact = False
             return list(geoms)
         meets = lambda a, b: bool(a[1] & b[2] or b[1] & a[2])  # noqa: E731
-        partners = [[j for j, b in enumerate(kinds) if meets(a, b) and frozenset({a[0], b[0]}) in _EXACT] for a in kinds]
+        partners = [[j for j, b in enumerate(kinds) if meets(a, b) and frozenset({a[0], b[0]}) in self._exact] for a in kinds]
         for g in geoms:
             i = kinds.index(self._kind(g))
             # A bit for each kind: one meets those whose bits it has. What meets none so must not by its old bits.
@@ -168,7 +172,7 @@ class Filter:
     def _is_exact(self, g1: int, g2: int) -> bool:
         """Whether the contacts of two geoms stay MuJoCo's own."""
         types = frozenset({int(self._model.geom_type[g1]), int(self._model.geom_type[g2])})
-        return self._keeps_exact and types in _EXACT
+        return self._keeps_exact and types in self._exact
 
     def _are_exact(self, a: StandIn, b: StandIn) -> bool:
         return not a.is_whole and not b.is_whole and self._is_exact(a.geoms[0], b.geoms[0])

@@ -149,7 +149,7 @@ def judged(seed, keep_exact):
 
 #: What MuJoCo has in closed form.
 EXACT = {frozenset(pair.split()) for pair in [
-    "plane sphere", "plane capsule", "plane ellipsoid", "plane cylinder", "plane box", "sphere", "sphere capsule", "sphere box", "capsule", "box",
+    "plane sphere", "plane capsule", "plane ellipsoid", "plane cylinder", "plane box", "plane mesh", "sphere", "sphere capsule", "sphere box", "capsule", "box",
 ]}  # fmt: skip
 
 
@@ -158,6 +158,87 @@ def test_random_models_have_the_contacts_that_mujoco_gives_them(keep_exact):
     common = sum(judged(seed, keep_exact) for seed in range(MODELS))
     print(f"{MODELS} models, {STATES} states each: {common} pairs told by both")
     assert common > 5 * MODELS
+
+
+def uneven(corners, rise):
+    """A disc of a mesh whose bottom's corners lie within ``rise`` above a plane, none of four in one: as a scan or a rounding leaves it."""
+    rng = np.random.default_rng(4)
+    turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    rings = [np.stack([r * np.cos(turn), r * np.sin(turn)], axis=1) for r in (0.1, 0.2, 0.3)]
+    bottom = np.concatenate(rings)
+    # Bent a little outwards, so that all of them are on the hull.
+    below = rise * (1.0 + (bottom**2).sum(axis=1)) + rise * 1e-3 * rng.uniform(size=len(bottom))
+    points = np.concatenate([np.column_stack([bottom, below]), np.column_stack([rings[-1], np.full(corners, 0.2)])])
+    return " ".join(f"{x:.12g}" for x in points.ravel())
+
+
+def test_a_mesh_on_a_plane_has_mujocos_own_contacts():
+    """The lowest corner of each hull is where the mesh's corners say, whatever the coupling does, and so are margin and gap."""
+    text = (
+        f'<mujoco><asset><mesh name="disc" vertex="{uneven(64, 1e-6)}"/><mesh name="rock" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1 .1 .1 .1"/>'
+        '</asset><worldbody><geom name="floor" type="plane" size="1 1 1" margin=".001"/><body pos="0 0 .05"><freejoint/>'
+        '<geom name="disc" type="mesh" mesh="disc"/></body><body pos="2 0 .1"><freejoint/><geom name="rock" type="mesh" '
+        'mesh="rock"/></body></worldbody></mujoco>'
+    )
+    stock, model = (mujoco.MjModel.from_xml_string(text) for _ in range(2))
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    disc = stock.geom("disc").id
+    mujoco.mj_forward(stock, theirs)
+    first = stock.mesh_vertadr[0]
+    corners = stock.mesh_vert[first : first + stock.mesh_vertnum[0]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        coupling = attach(model)
+    with coupling:
+        for gap in (-1e-4, 8e-7, 5e-5, 9e-4, 3e-3):
+            lowest = (theirs.geom_xmat[disc].reshape(3, 3) @ corners.T)[2].min() + theirs.geom_xpos[disc][2]
+            theirs.qpos[2] += gap - lowest
+            data.qpos[2] = theirs.qpos[2]
+            mujoco.mj_step1(stock, theirs)
+            mujoco.mj_step1(model, data)
+            coupling.add_contacts(data)
+            told = contacts(model, data)
+            assert told.keys() == contacts(stock, theirs).keys()
+            ours = [float(c.dist) for c in data.contact if disc in c.geom]
+            assert (min(ours) == pytest.approx(gap, abs=1e-9)) if gap < 1e-3 else not ours
+            assert sorted(c.dist for c in data.contact) == sorted(c.dist for c in theirs.contact)
+        assert not coupling.contacts
+    # A mesh that stands for itself may meet the plane elsewhere than its hull does: contactd has all of it.
+    rock = stock.geom("rock").id
+    corners = stock.mesh_vert[stock.mesh_vertadr[1] :][: stock.mesh_vertnum[1]]
+    lowest = (theirs.geom_xmat[rock].reshape(3, 3) @ corners.T)[2].min() + theirs.geom_xpos[rock][2]
+    with pytest.warns(CouplingWarning, match="the margin of geom 'floor'"), attach(model, meshes="exact") as coupling:
+        data.qpos[9] += 5e-5 - lowest
+        mujoco.mj_step1(model, data)
+        assert data.ncon == 0 and coupling.add_contacts(data) > 0
+        assert min(c.dist for c in data.contact) == pytest.approx(5e-5, abs=1e-9)
+
+
+def test_small_bodies_without_play_are_not_thrown_apart_by_the_skin():
+    """26 cubes of 6 mm around a core, as in MuJoCo's own model of Rubik's cube: its own contacts let them lie still, and those of
+    contactd press each from its neighbours by the skin, which is to be little beside them."""
+    n = 0.003
+    places = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)]
+    cubes = "".join(
+        '<body><joint type="ball" damping="5e-4" armature="1e-4" frictionloss="1e-3"/>'
+        f'<geom type="box" size="{n} {n} {n}" pos="{2 * n * x} {2 * n * y} {2 * n * z}" mass=".0025" condim="1"/></body>'
+        for x, y, z in places
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep=".01" integrator="implicitfast"/><worldbody><body><freejoint/><geom size="{n}" contype="0" conaffinity="0"/>'
+        f"{cubes}</body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    with attach(model, keep_exact=False) as coupling:
+        assert coupling.skin == pytest.approx(4e-3 * model.stat.meansize)
+        fastest = 0.0
+        for _ in range(12):
+            coupling.step(data)
+            fastest = max(fastest, np.abs(data.qvel[6:]).max())
+    assert fastest < 0.1, f"{fastest} rad/s"
+    # What is large has the skin that it had.
+    with attach(scene('<body><freejoint/><geom size="1"/></body>')) as coupling:
+        assert coupling.skin == 2e-4
 
 
 @pytest.mark.parametrize("kinds", [("sphere", "sphere"), ("sphere", "capsule"), ("capsule", "capsule"), ("plane", "sphere"), ("plane", "capsule")])
