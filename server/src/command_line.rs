@@ -296,6 +296,7 @@ fn seconds(word: &str) -> Result<Duration, String> {
 
 /// The scene of a file, or of models as they stand.
 fn scene_of(files: &[PathBuf], access: &AccessArguments, joints: &JointArguments) -> Result<Scene, Box<dyn Error>> {
+    files.iter().try_for_each(|file| no_geometry(file))?;
     let scene = match files {
         [file] if is_scene(file) => read_scene(file, joints)?,
         files => match files.iter().find(|f| is_scene(f)) {
@@ -431,6 +432,17 @@ fn say(sentence: &str) {
     let _ = writeln!(std::io::stderr(), "{sentence}");
 }
 
+/// Refuses a GDML geometry where its volumes are no scene.
+fn no_geometry(file: &Path) -> Result<(), String> {
+    if overlaps::is_gdml(file) {
+        let file = file.display();
+        return Err(format!(
+            "{file}: expected a scene, a robot or a model, found a GDML geometry, which contactd overlaps takes"
+        ));
+    }
+    Ok(())
+}
+
 fn inspect_file(
     file: &Path,
     facets: Facets,
@@ -443,6 +455,7 @@ fn inspect_file(
             format!("expected a scene beside --camera, found {}: a model's picture has none", file.display()).into()
         );
     }
+    no_geometry(file)?;
     let text = if is_scene(file) {
         let scene = read_scene(file, joints)?;
         let scene = Scene { access: access.with(scene.access.clone())?, ..scene };

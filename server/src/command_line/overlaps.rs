@@ -7,7 +7,7 @@ use crate::overlaps::{self, Found, Pair, Verdict};
 use crate::terminal::{clean, number, sentence};
 use serde_json::{Value, json};
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(super) struct OverlapsArguments {
@@ -28,9 +28,13 @@ pub(super) struct OverlapsArguments {
     cache: CacheArguments,
 }
 
+/// Is it a GDML geometry, by its name?
+pub(super) fn is_gdml(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("gdml"))
+}
+
 /// Asks of all pairs.
 pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Error>> {
-    let is_gdml = |file: &PathBuf| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("gdml"));
     let (found, unit) = match arguments.files.as_slice() {
         [file] if is_gdml(file) => {
             arguments.joints.none(file)?;

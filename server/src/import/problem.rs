@@ -62,6 +62,15 @@ impl Problem {
         Self::Syntax { expected: expected.into(), found: found.into() }
     }
 
+    /// Is it a mesh that is no surface of a solid?
+    pub(super) fn is_of_a_mesh(&self) -> bool {
+        match self {
+            Self::Mesh(_) | Self::Surface(_) | Self::Body { .. } => true,
+            Self::Named { problem, .. } => problem.is_of_a_mesh(),
+            Self::Syntax { .. } | Self::Unsupported { .. } | Self::Limit { .. } => false,
+        }
+    }
+
     pub(super) fn unsupported(construct: impl Into<String>) -> Self {
         Self::Unsupported { construct: construct.into(), hint: "" }
     }

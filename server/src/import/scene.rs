@@ -267,11 +267,18 @@ impl Scene {
                     found: format!("{file}: {reason}"),
                 },
                 // Places in a text that nobody has written help nobody.
-                ImportError::Content { problem, .. } if m.text.is_some() => SceneError::Format {
-                    file: self.file.clone(),
-                    at: m.at,
-                    message: format!("the geometry of {:?}: {problem}", m.name),
-                },
+                ImportError::Content { problem, .. } if m.text.is_some() => {
+                    let is_hull = m.text.as_deref().is_some_and(|text| text.contains("hull()"));
+                    let hint = match problem.is_of_a_mesh() && !is_hull {
+                        true => "; its convex hull needs no closed mesh (--hulls)",
+                        false => "",
+                    };
+                    SceneError::Format {
+                        file: self.file.clone(),
+                        at: m.at,
+                        message: format!("the geometry of {:?}: {problem}{hint}", m.name),
+                    }
+                }
                 other => other.into(),
             })
         });

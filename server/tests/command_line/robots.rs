@@ -88,6 +88,24 @@ fn what_a_setup_leaves_out_is_told() {
 }
 
 #[test]
+fn a_geometry_is_no_scene_and_the_sentence_says_what_takes_it() {
+    let geometry = "<gdml><solids><orb name=\"s\" r=\"1\"/></solids><structure><volume name=\"v\"><solidref ref=\"s\"/></volume></structure>\
+                    <setup name=\"Default\"><world ref=\"v\"/></setup></gdml>";
+    let folder = folder(&[("g.gdml", geometry), ("r.urdf", ROBOT)]);
+    for arguments in
+        [vec!["inspect", "g.gdml"], vec!["check", "g.gdml"], vec!["view", "g.gdml"], vec!["check", "r.urdf", "g.gdml"]]
+    {
+        let out = run(folder.path(), &arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        let said = text(&out.stderr);
+        let words =
+            "g.gdml: expected a scene, a robot or a model, found a GDML geometry, which contactd overlaps takes";
+        assert!(said.contains(words) && said.lines().count() == 1, "{arguments:?}: {said}");
+    }
+    assert_eq!(run(folder.path(), &["overlaps", "g.gdml"]).status.code(), Some(0));
+}
+
+#[test]
 fn a_step_begins_at_a_keyframe() {
     let model = "<mujoco><worldbody><geom size=\"0.5\"/><body name=\"a\" pos=\"3 0 0\"><joint name=\"p\" type=\"slide\" axis=\"1 0 0\" \
                  range=\"-3 3\"/><geom size=\"0.5\"/></body></worldbody><keyframe><key name=\"near\" qpos=\"-1.5\"/><key name=\"far\" \

@@ -377,6 +377,71 @@ fn included_files_have_their_own_meshes_names_and_sentences() {
 }
 
 #[test]
+fn a_mesh_that_is_open_is_told_with_what_takes_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    // A tetrahedron without one of its sides: it has a hull, and no inside.
+    let open = "OFF 4 3 0\n0 0 0\n4 0 0\n0 4 0\n0 0 4\n3 0 2 1\n3 0 1 3\n3 1 2 3\n";
+    std::fs::write(folder.join("t.off"), open).expect("written");
+    let mesh = "<collision name=\"c\"><geometry><mesh><uri>t.off</uri></mesh></geometry></collision>";
+    let text = format!("<sdf version=\"1.7\"><model name=\"m\">\n<link name=\"l\">{mesh}</link></model></sdf>");
+    let told = sentence(folder, &text);
+    assert!(told.contains("w.sdf:2:1: the geometry of \"m\": ") && told.contains("expected a closed "), "{told}");
+    assert!(told.ends_with("; its convex hull needs no closed mesh (--hulls)"), "{told}");
+    let (_, scene) = read(folder, "w.sdf", &text, &Ask { hulls: true, ..Ask::default() });
+    let hull = scene.load_models(Facets::Auto, &Limits::default()).expect("a hull");
+    assert_eq!(hull.len(), 1);
+    // What has no hull either is told without.
+    std::fs::write(folder.join("t.off"), "OFF 4 2 0\n0 0 0\n4 0 0\n0 4 0\n4 4 0\n3 0 2 1\n3 1 2 3\n").expect("written");
+    let path = folder.join("w.sdf");
+    let ask = Ask { hulls: true, ..Ask::default() };
+    let robot = read_robot(&path, &ask).expect("a robot");
+    let flat = scene_of(&path, &robot, &ask).expect("a scene").load_models(Facets::Auto, &Limits::default());
+    let told = flat.map_or_else(|e| e.to_string(), |_| String::new());
+    assert!(!told.contains("--hulls"), "{told}");
+}
+
+/// What sdformat.org/spec lets a file that is included hold: a model, a light or an actor. Gazebo's `model://sun` is the light of nearly
+/// every world.
+#[test]
+fn included_lights_have_no_geometry_and_actors_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    for (name, inner) in [
+        ("sun", "<light type=\"directional\" name=\"sun\"><pose>0 0 10 0 0 0</pose></light>"),
+        ("walker", "<actor name=\"walker\"><pose>0 0 1 0 0 0</pose></actor>"),
+        ("nothing", ""),
+        (
+            "ball",
+            "<model name=\"ball\"><link name=\"l\"><collision name=\"c\"><geometry><sphere><radius>1</radius></sphere></geometry>\
+             </collision></link></model>",
+        ),
+    ] {
+        std::fs::create_dir_all(folder.join(name)).expect("folders");
+        std::fs::write(folder.join(name).join("model.sdf"), format!("<sdf version=\"1.5\">{inner}</sdf>"))
+            .expect("written");
+    }
+    let world = |uris: &[&str]| {
+        let includes: String = uris.iter().map(|uri| format!("\n<include><uri>{uri}</uri></include>")).collect();
+        format!("<sdf version=\"1.5\"><world name=\"w\">{includes}</world></sdf>")
+    };
+    let (robot, scene) =
+        read(folder, "w.sdf", &world(&["model://sun", "model://ball", "model://walker"]), &Ask::default());
+    let names: Vec<&str> = scene.objects.iter().map(|o| o.name.as_str()).collect();
+    assert_eq!(names, ["ball"]);
+    let notes: Vec<String> = robot.notes.iter().map(ToString::to_string).collect();
+    assert!(notes.len() == 1 && notes[0].contains("the actor model://walker is left out"), "{notes:?}");
+    assert!(sentence(folder, &world(&["model://nothing"])).ends_with("found no model in it"));
+    // What is not there is told with what to do about it.
+    let told = sentence(folder, &world(&["model://moon"]));
+    assert!(told.contains("w.sdf:2:1: expected the model model://moon beside the file,"), "{told}");
+    assert!(told.ends_with("or in one of packages (--packages DIR), found none"), "{told}");
+    let told = sentence(folder, &world(&["https://fuel.example.org/models/Ground Plane"]));
+    assert!(told.contains("w.sdf:2:1: expected a model of this machine (download it, and say model://NAME"), "{told}");
+    assert!(told.ends_with("found https://fuel.example.org/models/Ground Plane"), "{told}");
+}
+
+#[test]
 fn frames_that_lead_nowhere_are_one_sentence() {
     let folder = tempfile::tempdir().expect("a folder");
     let of = |inner: &str| {

@@ -117,7 +117,7 @@ impl World {
             inner.push(self.model(model, file, &Placement::of(model, name, file)?, (scope, &mut frames))?);
         }
         for include in xml::inside(node, "include") {
-            inner.push(self.include(include, file, scope, &mut frames)?);
+            inner.extend(self.include(include, file, scope, &mut frames)?);
         }
         if is_model {
             let first = links.first().map(|l| l.1.to_owned()).or_else(|| inner.first().map(|i| i.frame.clone()));
@@ -165,8 +165,14 @@ impl World {
         Ok(())
     }
 
-    /// A model of another file.
-    fn include(&mut self, node: Node<'_, '_>, file: &File<'_>, scope: &Scope, frames: &mut Frames) -> Result<Inner> {
+    /// A model of another file; none where that has a light or an actor instead.
+    fn include(
+        &mut self,
+        node: Node<'_, '_>,
+        file: &File<'_>,
+        scope: &Scope,
+        frames: &mut Frames,
+    ) -> Result<Option<Inner>> {
         let uri = text(node, "uri").ok_or_else(|| xml::wrong(node, "the uri of what is included", None))?.trim();
         let named = file.reader.file(uri);
         let path = file.reader.main_folder().join(&named);
@@ -180,6 +186,9 @@ impl World {
             let sentence = Problem::syntax(format!("the model {uri}, as {}", path.display()), e);
             (xml::place(node), sentence)
         };
+        if !path.exists() {
+            return Err((xml::place(node), absent(uri)));
+        }
         let bytes =
             super::super::read_bytes(&path, &super::super::Limits::default()).map_err(|e| found(e.to_string()))?;
         let told = |(at, problem): (Place, Problem)| {
@@ -192,7 +201,16 @@ impl World {
         let within = Some(file.reader.place(node));
         let reader = Reader { path: &path, base, within, ..*file.reader };
         let inner = File { reader: &reader, version: version_of(root).unwrap_or(file.version) };
-        let model = xml::inside(root, "model").next().ok_or_else(|| found("no model in it".into()))?;
+        let Some(model) = xml::inside(root, "model").next() else {
+            // A file may hold a light or an actor in a model's place (sdformat.org/spec, include): `model://sun` of nearly every
+            // world is a light, which has no geometry.
+            if xml::inside(root, "actor").next().is_some() {
+                file.reader.note(&mut self.robot, node, format!("the actor {uri} is left out: it is not read"));
+            } else if xml::inside(root, "light").next().is_none() {
+                return Err(found("no model in it".into()));
+            }
+            return Ok(None);
+        };
         let name = text(node, "name").map(str::trim).unwrap_or(model.attribute("name").unwrap_or("model"));
         let mut place = Placement::of(model, name, file).map_err(told)?;
         let frame = text(node, "placement_frame").map(|frame| frame.trim().to_owned());
@@ -208,11 +226,12 @@ impl World {
         }
         let scope = &Scope { is_static: scope.is_static || is_true(node, "static"), ..scope.clone() };
         place.asker = Some(file.reader.place(node));
-        self.model(model, &inner, &place, (scope, frames)).map_err(|(at, e)| match place.asker {
+        let placed = self.model(model, &inner, &place, (scope, frames)).map_err(|(at, e)| match place.asker {
             // What is wrong with the name or the place of the include itself.
             Some(asker) if asker == at && matches!(e, Problem::Syntax { .. }) => (at, e),
             _ => told((at, e)),
-        })
+        })?;
+        Ok(Some(placed))
     }
 
     /// A model, whose frames are added to those around it.
@@ -494,6 +513,18 @@ fn mimic(node: Node<'_, '_>) -> Result<(String, f64, f64)> {
     let factor = number("multiplier")?.ok_or_else(|| xml::wrong(node, "a multiplier of the mimic", None))?;
     let (offset, reference) = (number("offset")?.unwrap_or(0.0), number("reference")?.unwrap_or(0.0));
     Ok((leader(node)?, factor, offset - factor * reference))
+}
+
+/// The sentence for a model that is in no folder: what may be done depends on whether it is one of this machine at all.
+fn absent(uri: &str) -> Problem {
+    if uri.contains("://") && !["model://", "package://", "file://"].iter().any(|way| uri.starts_with(way)) {
+        let expected = "a model of this machine (download it, and say model://NAME with its folder among the packages)";
+        return Problem::syntax(expected, uri);
+    }
+    Problem::syntax(
+        format!("the model {uri} beside the file, in the folders above it or in one of packages (--packages DIR)"),
+        "none",
+    )
 }
 
 /// The file of a model's folder: what `model.config` says for the newest version, else `model.sdf`.
