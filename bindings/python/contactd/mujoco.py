@@ -51,6 +51,8 @@ from .solid import Solid
 __all__ = ["Asked", "Coupling", "CouplingWarning", "attach"]
 
 
+#: Option flags with which MuJoCo has no contacts.
+_OFF = int(mj.mjtDisableBit.mjDSBL_CONTACT) | int(mj.mjtDisableBit.mjDSBL_CONSTRAINT)
 #: A solid as it is given: OpenSCAD CSG text, a solid that was built, or the path of a file (CSG, STL, OFF …).
 Given = str | os.PathLike | Solid
 
@@ -153,8 +155,11 @@ class Coupling:
         self._contact_geoms: list[tuple[str, str]] | None = None
         self._own = session is None
         self.session = embedded() if session is None else session
-        #: What no longer collides: geoms with their contype and conaffinity, pairs with their margin.
+        #: What no longer collides: geoms with their contype and conaffinity, flexes likewise, pairs with their margin.
         self._silenced: list[tuple[int, int, int]] = []
+        self._silenced_flexes: list[tuple[int, int, int]] = []
+        #: What the bits of all geoms of each body were together, where they are other ones meanwhile.
+        self._body_bits: tuple[np.ndarray, np.ndarray] | None = None
         self._unpaired: list[tuple[int, float]] = []
         try:
             self._add(given)
@@ -172,9 +177,13 @@ class Coupling:
         """Lets the geoms collide again as they did; closes the session, if the coupling opened it."""
         for geom, contype, conaffinity in self._silenced:
             self.model.geom_contype[geom], self.model.geom_conaffinity[geom] = contype, conaffinity
+        for flex, contype, conaffinity in self._silenced_flexes:
+            self.model.flex_contype[flex], self.model.flex_conaffinity[flex] = contype, conaffinity
         for pair, margin in self._unpaired:
             self.model.pair_margin[pair] = margin
-        self._silenced, self._unpaired = [], []
+        if self._body_bits is not None:
+            self.model.body_contype[:], self.model.body_conaffinity[:] = self._body_bits
+        self._silenced, self._silenced_flexes, self._unpaired, self._body_bits = [], [], [], None
         if self._own:
             self.session.close()
 
@@ -247,6 +256,14 @@ class Coupling:
         for geom in sorted({g for part, _ in given for g in part.geoms} | set(own)):
             self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
             model.geom_contype[geom], model.geom_conaffinity[geom] = own.get(geom, (0, 0))
+        for flex, bits in self._filter.own_flex_bits.items():
+            self._silenced_flexes.append((flex, int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])))
+            model.flex_contype[flex], model.flex_conaffinity[flex] = bits
+        if self._filter.own_flex_bits and hasattr(model, "body_contype"):
+            # Before it looks at geoms MuJoCo asks whether any of a body's has a bit of the flex.
+            self._body_bits = model.body_contype.copy(), model.body_conaffinity.copy()
+            np.bitwise_or.at(model.body_contype, model.geom_bodyid, model.geom_contype)
+            np.bitwise_or.at(model.body_conaffinity, model.geom_bodyid, model.geom_conaffinity)
         for (g1, g2), pair in self._filter.pairs.items():
             self._unpaired.append((pair, float(model.pair_margin[pair])))
             # With this margin MuJoCo's test of bounding balls leaves the pair out; planes have none, and no distance is so small.
@@ -271,7 +288,12 @@ class Coupling:
         return n
 
     def add_contacts(self, data: mj.MjData) -> int:
-        """Asks contactd about the bodies as they stand in ``data`` and adds its contacts; for loops that stage their own steps."""
+        """Asks contactd about the bodies as they stand in ``data`` and adds its contacts; for loops that stage their own steps.
+
+        None are asked for while the model's option flags switch contacts or constraints off, as MuJoCo then has none."""
+        if self.model.opt.disableflags & _OFF:
+            self._contacts, self._contact_geoms = [], []
+            return 0
         n = self._coupled.add_contacts(data.xpos, data.xquat, data._address)
         self._contacts = self._contact_geoms = None
         return n

@@ -58,6 +58,8 @@ _EXACT = {
 }  # fmt: skip
 #: Of a plane and a mesh's hull MuJoCo has the hull's corners (mjc_PlaneConvex, engine_collision_convex.c), exact too.
 _EXACT_OF_HULLS = frozenset({_G.mjGEOM_PLANE, _G.mjGEOM_MESH})
+#: What stands for a flex where kinds of geoms are told.
+_FLEX = -1
 #: Bits of contype and conaffinity.
 _BITS = 31
 
@@ -72,8 +74,9 @@ class Filter:
         self._exact = {*_EXACT, _EXACT_OF_HULLS} if hulls else _EXACT
         #: The contype and conaffinity of geoms by which they meet what they have MuJoCo's own contacts with, and nothing else.
         self.own_bits: dict[int, tuple[int, int]] = {}
-        # The bits that are given anew might be those of a flex.
-        self._keeps_exact = keep_exact and not getattr(model, "nflex", 0)
+        #: The same of flexes, which have no solids: all of their contacts are MuJoCo's.
+        self.own_flex_bits: dict[int, tuple[int, int]] = {}
+        self._keeps_exact = keep_exact
         self._excluded = {int(s) for s in model.exclude_signature}
         self._parents = not model.opt.disableflags & mj.mjtDisableBit.mjDSBL_FILTERPARENT
         self.warnings: list[str] = []
@@ -137,6 +140,10 @@ class Filter:
         named = {int(g) for g in (*self._model.pair_geom1, *self._model.pair_geom2)}
         return sorted({*self.colliding(body), *named.intersection(self._all_geoms(body))})
 
+    def _flex_kind(self, flex: int) -> tuple[int, int, int]:
+        model = self._model
+        return _FLEX, int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])
+
     def _kind(self, geom: int) -> tuple[int, int, int]:
         model = self._model
         return int(model.geom_type[geom]), int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])
@@ -147,16 +154,20 @@ class Filter:
         if not self._keeps_exact:
             return list(geoms)
         model = self._model
-        kinds = sorted({self._kind(g) for g in geoms})
+        flexes = range(getattr(model, "nflex", 0))
+        kinds = sorted({self._kind(g) for g in geoms} | {self._flex_kind(f) for f in flexes})
         if len(kinds) > _BITS:
             self._keeps_exact = False
             return list(geoms)
         meets = lambda a, b: bool(a[1] & b[2] or b[1] & a[2])  # noqa: E731
-        partners = [[j for j, b in enumerate(kinds) if meets(a, b) and frozenset({a[0], b[0]}) in self._exact] for a in kinds]
+        stays = lambda a, b: _FLEX in (a[0], b[0]) or frozenset({a[0], b[0]}) in self._exact  # noqa: E731
+        partners = [[j for j, b in enumerate(kinds) if meets(a, b) and stays(a, b)] for a in kinds]
+        bits = lambda i: (1 << i, sum(1 << j for j in partners[i])) if partners[i] else (0, 0)  # noqa: E731
+        for f in flexes:
+            self.own_flex_bits[f] = bits(kinds.index(self._flex_kind(f)))
         for g in geoms:
-            i = kinds.index(self._kind(g))
             # A bit for each kind: one meets those whose bits it has. What meets none so must not by its old bits.
-            self.own_bits[g] = (1 << i, sum(1 << j for j in partners[i])) if partners[i] else (0, 0)
+            self.own_bits[g] = bits(kinds.index(self._kind(g)))
         others = {self._kind(g) for part in wholes for g in part.geoms}
         needed = {
             a for i, a in enumerate(kinds)
@@ -187,10 +198,6 @@ class Filter:
         model = self._model
         if model.opt.integrator == mj.mjtIntegrator.mjINT_RK4:
             raise ValueError("the staged step has no Runge-Kutta: choose Euler, implicit or implicitfast")
-        for bit in ("mjDSBL_CONTACT", "mjDSBL_CONSTRAINT"):
-            if model.opt.disableflags & getattr(mj.mjtDisableBit, bit):
-                flag = bit.removeprefix("mjDSBL_").lower()
-                raise ValueError(f"the model's option flag {flag} is off, a coupling adds contacts: switch it on, or step without a coupling")
         for bit, what in _OPTIONS.items():
             if model.opt.enableflags & int(getattr(mj.mjtEnableBit, bit, 0)):
                 raise ValueError(f"contacts of solids do not know {what}: switch it off")
@@ -289,6 +296,8 @@ class Filter:
         for flex in range(getattr(model, "nflex", 0)):
             contype, conaffinity = int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])
             for g, part in self._part_of.items():
+                if g in self.own_bits:
+                    continue  # It meets the flex by its own bits.
                 if model.geom_contype[g] & conaffinity or model.geom_conaffinity[g] & contype:
                     name = mj.mj_id2name(model, mj.mjtObj.mjOBJ_FLEX, flex)
                     raise ValueError(

@@ -345,10 +345,28 @@ def test_geoms_of_one_body_that_differ_are_told(words):
         Coupling(bodies(("a", "", FREE + box(name="block") + other)), {"a": CUBE}).close()
 
 
+@pytest.mark.parametrize("flag", ["contact", "constraint"])
+def test_a_model_whose_contacts_are_off_has_none_until_they_are_on(flag):
+    inside = FREE + box()
+    off, on = (bodies(("a", "", inside), ("b", 'pos="0 0 .1001"', inside), option=f'<flag {flag}="{word}"/>') for word in ("disable", "enable"))
+    stock, data = mujoco.MjData(off), mujoco.MjData(off)
+    for _ in range(20):
+        mujoco.mj_step(off, stock)
+    with Coupling(off, {"a": CUBE, "b": CUBE}) as coupling:
+        for _ in range(20):
+            assert coupling.step(data) == 0 and data.ncon == 0 and coupling.contacts == [] and coupling.contact_geoms == []
+        assert data.qpos.tolist() == stock.qpos.tolist() and coupling.asked.requests == 0
+        # Switched on while it runs it is a model in which they are on.
+        off.opt.disableflags = on.opt.disableflags
+        mujoco.mj_resetData(off, data)
+        other = mujoco.MjData(on)
+        with Coupling(on, {"a": CUBE, "b": CUBE}) as another:
+            assert coupling.step(data) == another.step(other) > 0
+        assert data.qvel.tolist() == other.qvel.tolist()
+
+
 def test_options_that_change_contacts_are_refused():
     for flag, sentence in [
-        ('contact="disable"', "flag contact is off"),
-        ('constraint="disable"', "flag constraint is off"),
         ('override="enable"', "option flag override"),
         ('sleep="enable"', "bodies that sleep"),
     ]:

@@ -214,6 +214,47 @@ def test_a_mesh_on_a_plane_has_mujocos_own_contacts():
         assert min(c.dist for c in data.contact) == pytest.approx(5e-5, abs=1e-9)
 
 
+def cloths_among_geoms(seed):
+    """How many contacts of flexes a random model has, which are those of stock MuJoCo; the bits are given back."""
+    rng = np.random.default_rng(seed)
+    bits = lambda: f'contype="{rng.integers(8)}" conaffinity="{rng.integers(8)}"'  # noqa: E731
+    kinds = ['type="plane" size="1 1 1"', 'type="box" size=".1 .1 .1"', 'size=".1"', 'type="capsule" size=".05 .1"', 'type="cylinder" size=".1 .05"']
+    geoms = "".join(
+        f'<body pos="{.1 * (i % 3)} {.1 * (i // 3)} 0"><freejoint/><geom {kinds[k]} {bits()}/></body>' for i, k in enumerate([1, 2, 3, 4, 1, 2])
+    )
+    cloths = "".join(
+        f'<flexcomp name="c{i}" type="grid" count="4 4 1" spacing=".08 .08 .1" mass=".1" radius=".02" dim="2" pos=".1 .05 {.05 * i}">'
+        f'<contact selfcollide="none" {bits()}/></flexcomp>'
+        for i in range(2)
+    )
+    make = lambda: scene(f"<geom {kinds[0]} {bits()}/>" + geoms + cloths)  # noqa: E731
+    state = rng.bit_generator.state
+    stock = make()
+    rng.bit_generator.state = state
+    model = make()
+    before = [a.copy() for a in (model.geom_contype, model.flex_contype, model.flex_conaffinity, model.body_contype)]
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    of_flexes = lambda d: sorted((*c.geom, *c.flex, *c.elem, *c.vert, float(c.dist)) for c in d.contact if max(c.flex) >= 0)  # noqa: E731
+    met = 0
+    with attach(model) as coupling:
+        for _ in range(20):
+            mujoco.mj_step(stock, theirs)
+            data.qpos[:], data.qvel[:] = theirs.qpos, theirs.qvel
+            mujoco.mj_forward(stock, theirs)
+            mujoco.mj_step1(model, data)
+            coupling.add_contacts(data)
+            told = of_flexes(data)
+            assert told == of_flexes(theirs)
+            met += len(told)
+    assert all(np.array_equal(a, b) for a, b in zip(before, (model.geom_contype, model.flex_contype, model.flex_conaffinity, model.body_contype)))
+    return met
+
+
+def test_contacts_of_flexes_stay_mujocos_own():
+    """Whatever bits geoms and flexes have."""
+    assert sum(cloths_among_geoms(seed) for seed in range(6)) > 100
+
+
 def test_small_bodies_without_play_are_not_thrown_apart_by_the_skin():
     """26 cubes of 6 mm around a core, as in MuJoCo's own model of Rubik's cube: its own contacts let them lie still, and those of
     contactd press each from its neighbours by the skin, which is to be little beside them."""
