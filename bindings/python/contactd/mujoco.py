@@ -149,6 +149,8 @@ class Coupling:
         if geoms:
             given += self._own_solids(meshes, [part for part, _ in given])
         self._filter.take([part for part, _ in given])
+        #: All contacts are MuJoCo's own.
+        self._is_idle = not given
         for sentence in self._filter.warnings:
             warnings.warn(sentence, CouplingWarning, stacklevel=2 + geoms)
         self._contacts: list[tuple[int, int, Point]] | None = None
@@ -252,14 +254,17 @@ class Coupling:
             (template, offsets),
         )
         # Last, so that what is refused before has changed nothing.
-        own = self._filter.own_bits
+        own, own_of_flexes = self._filter.own_bits, self._filter.own_flex_bits
+        if not given:
+            # What is left to MuJoCo is all that there is: by the model's own bits.
+            own, own_of_flexes = {}, {}
         for geom in sorted({g for part, _ in given for g in part.geoms} | set(own)):
             self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
             model.geom_contype[geom], model.geom_conaffinity[geom] = own.get(geom, (0, 0))
-        for flex, bits in self._filter.own_flex_bits.items():
+        for flex, bits in own_of_flexes.items():
             self._silenced_flexes.append((flex, int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])))
             model.flex_contype[flex], model.flex_conaffinity[flex] = bits
-        if self._filter.own_flex_bits and hasattr(model, "body_contype"):
+        if own_of_flexes and hasattr(model, "body_contype"):
             # Before it looks at geoms MuJoCo asks whether any of a body's has a bit of the flex.
             self._body_bits = model.body_contype.copy(), model.body_conaffinity.copy()
             np.bitwise_or.at(model.body_contype, model.geom_bodyid, model.geom_contype)
@@ -273,6 +278,10 @@ class Coupling:
     def step(self, data: mj.MjData) -> int:
         """One step of MuJoCo with contactd's contacts; returns how many there were."""
         model = self.model
+        if self._is_idle:
+            # Nothing to add, so nothing to stage: the step may be one that has no stages (Runge-Kutta).
+            mj.mj_step(model, data)
+            return 0
         mj.mj_step1(model, data)
         n = self.add_contacts(data)
         if n:

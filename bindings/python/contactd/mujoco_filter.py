@@ -9,6 +9,7 @@ lose, or could not keep, is refused before anything is changed.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, Iterable, NamedTuple, Sequence
 
 import mujoco as mj
@@ -55,6 +56,10 @@ _EXACT = {
     *(frozenset({_G.mjGEOM_SPHERE, k}) for k in (_G.mjGEOM_SPHERE, _G.mjGEOM_CAPSULE, _G.mjGEOM_BOX)),
     frozenset({_G.mjGEOM_CAPSULE}),
     frozenset({_G.mjGEOM_BOX}),
+    # Of these it has none (mjCOLLISIONFUNC, engine_collision_driver.c).
+    frozenset({_G.mjGEOM_PLANE}),
+    frozenset({_G.mjGEOM_HFIELD}),
+    frozenset({_G.mjGEOM_PLANE, _G.mjGEOM_HFIELD}),
 }  # fmt: skip
 #: Of a plane and a mesh's hull MuJoCo has the hull's corners (mjc_PlaneConvex, engine_collision_convex.c), exact too.
 _EXACT_OF_HULLS = frozenset({_G.mjGEOM_PLANE, _G.mjGEOM_MESH})
@@ -82,13 +87,14 @@ class Filter:
         self.warnings: list[str] = []
         #: ``<pair>`` by its two geoms, the smaller id first, where solids stand in for both.
         self.pairs: dict[tuple[int, int], int] = {}
-        self._options()
 
     def take(self, parts: Sequence[StandIn]) -> None:
         """Raises ``ValueError`` where solids in place of these geoms would make other physics; ``warnings`` are the sentences for what
         is taken in another way."""
         self._parts = parts
         self._part_of = {g: i for i, part in enumerate(parts) for g in part.geoms}
+        if parts:
+            self._options()
         for part in parts:
             self._check(part)
         self._find_pairs()
@@ -169,9 +175,12 @@ class Filter:
             # A bit for each kind: one meets those whose bits it has. What meets none so must not by its old bits.
             self.own_bits[g] = bits(kinds.index(self._kind(g)))
         others = {self._kind(g) for part in wholes for g in part.geoms}
+        many = Counter(self._kind(g) for g in geoms)
+        # A geom that is the only one of its kind does not meet that.
+        left = lambda i, j: j not in partners[i] and (i != j or many[kinds[i]] > 1)  # noqa: E731
         needed = {
             a for i, a in enumerate(kinds)
-            if any(meets(a, b) for b in others) or any(meets(a, b) and j not in partners[i] for j, b in enumerate(kinds))
+            if any(meets(a, b) for b in others) or any(meets(a, b) and left(i, j) for j, b in enumerate(kinds))
         }  # fmt: skip
         named = set()
         for k in range(model.npair):

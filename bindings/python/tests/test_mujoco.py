@@ -410,8 +410,10 @@ def test_a_mocap_body_moves():
 
 
 def test_misuse_is_named():
+    model = bodies(("a", "", FREE + box()))
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.raises(ValueError, match="Runge-Kutta"):
-        Coupling(scene(box(), option='integrator="RK4"'), {})
+        Coupling(model, {"a": CUBE})
     with pytest.raises(ValueError, match="no body called 'nobody'"):
         Coupling(scene(box()), {"nobody": BOX})
     with pytest.raises(ValueError, match="skin"):

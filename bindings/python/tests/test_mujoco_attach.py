@@ -214,6 +214,30 @@ def test_a_mesh_on_a_plane_has_mujocos_own_contacts():
         assert min(c.dist for c in data.contact) == pytest.approx(5e-5, abs=1e-9)
 
 
+@pytest.mark.parametrize("option", ['integrator="RK4"', 'integrator="implicitfast"><flag sleep="enable"/></option><option '])
+def test_a_model_whose_contacts_all_stay_mujocos_may_step_as_it_likes(option):
+    """Its steps are mj_step's, to the bit; with one contact of contactd's the same options are refused."""
+    inner = (
+        '<geom type="plane" size="1 1 1"/><body pos="0 0 .3"><freejoint/><geom size=".1"/><body pos=".3 0 0"><joint axis="0 1 0"/>'
+        '<geom type="box" size=".1 .1 .1"/></body></body>{}'
+    )
+    make = lambda more="": mujoco.MjModel.from_xml_string(  # noqa: E731
+        f"<mujoco><option {option}/><worldbody>{inner.format(more)}</worldbody></mujoco>"
+    )
+    stock, model = make(), make()
+    theirs, data = mujoco.MjData(stock), mujoco.MjData(model)
+    with attach(model) as coupling:
+        met = 0
+        for _ in range(300):
+            mujoco.mj_step(stock, theirs)
+            assert coupling.step(data) == 0 and data.ncon == theirs.ncon
+            met += data.ncon
+        assert met > 0 and coupling.asked.requests == 0
+        assert data.qpos.tolist() == theirs.qpos.tolist() and data.qvel.tolist() == theirs.qvel.tolist()
+    with pytest.raises(ValueError, match="Runge-Kutta|bodies that sleep"):
+        attach(make(2 * '<body pos="1 0 1"><freejoint/><geom type="cylinder" size=".1 .1"/></body>'))
+
+
 def cloths_among_geoms(seed):
     """How many contacts of flexes a random model has, which are those of stock MuJoCo; the bits are given back."""
     rng = np.random.default_rng(seed)

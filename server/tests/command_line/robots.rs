@@ -51,6 +51,18 @@ fn values_have_units_that_their_joints_take() {
     }
 }
 
+/// As MuJoCo 4.0 compiles it: `jnt_limited` is false of such a joint.
+#[test]
+fn joints_without_a_limit_have_none_and_are_told() {
+    let bare = ROBOT.replace("<limit lower=\"-1\" upper=\"1\"/>", "");
+    let folder = folder(&[("r.urdf", &bare)]);
+    let out = run(folder.path(), &["inspect", "r.urdf", "--joints", "s\nlide=30"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let told = text(&out.stderr);
+    let notes = told.lines().filter(|l| l.ends_with("has no limit: it is taken without limits")).count();
+    assert!(notes == 2 && told.contains("r.urdf:3:"), "{told}");
+}
+
 #[test]
 fn names_break_no_line() {
     let folder = folder(&[("r.urdf", ROBOT)]);

@@ -137,19 +137,23 @@ fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
         Some(axis) => vector(axis, "xyz", DVec3::X)?,
     };
     let limit = xml::inside(node, "limit").next();
-    if limit.is_none() && matches!(node.attribute("type"), Some("revolute" | "prismatic")) {
-        return Err(xml::wrong(node, "a limit of the joint, which may be continuous", None));
-    }
-    let bound = |key, none: f64| Ok(limit.map_or(Ok(None), |l| xml::number(l, key))?.unwrap_or(none));
     let endless = [f64::NEG_INFINITY, f64::INFINITY];
+    let limits = || match limit {
+        None => Ok(endless),
+        Some(limit) => Ok([xml::number(limit, "lower")?.unwrap_or(0.0), xml::number(limit, "upper")?.unwrap_or(0.0)]),
+    };
+    if limit.is_none() && matches!(node.attribute("type"), Some("revolute" | "prismatic")) {
+        // wiki.ros.org/urdf/XML wants one; MuJoCo, Drake and pybullet take such a joint as one without limits.
+        robot.note(xml::place(node), format!("the joint {name} has no limit: it is taken without limits"));
+    }
     let anchor = DVec3::ZERO;
     let along =
         || axis.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some(&axis.to_string())));
     let (kind, mut range) = match needed(node, "type")? {
         "fixed" => return Ok(vec![]),
-        "revolute" => (DofKind::Hinge { anchor, axis: along()? }, [bound("lower", 0.0)?, bound("upper", 0.0)?]),
+        "revolute" => (DofKind::Hinge { anchor, axis: along()? }, limits()?),
         "continuous" => (DofKind::Hinge { anchor, axis: along()? }, endless),
-        "prismatic" => (DofKind::Slide { axis: along()? }, [bound("lower", 0.0)?, bound("upper", 0.0)?]),
+        "prismatic" => (DofKind::Slide { axis: along()? }, limits()?),
         // The last one is pybullet's.
         "floating" | "planar" | "spherical" => {
             robot.note(xml::place(node), format!("the joint {name} is taken as fixed where it stands"));
