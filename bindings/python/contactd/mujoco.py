@@ -366,6 +366,8 @@ def _contact_layout(model: mj.MjModel, data: mj.MjData, skin: float) -> tuple[in
     add_contact = ctypes.CDLL(mj._functions.__file__).mj_addContact
     add_contact.argtypes = [ctypes.c_void_p] * 3
     blank = mj.MjContact()
+    # What begins asleep has been looked at for contacts already.
+    data.ncon = 0
     # Numbers that differ, so that a field in another's place is seen below; the first three are each contact's own.
     blank.dist, blank.pos, blank.frame = 0.5, [1.0, 2.0, 3.0], np.arange(4.0, 13.0)
     blank.includemargin = skin

@@ -238,6 +238,23 @@ def test_a_model_whose_contacts_all_stay_mujocos_may_step_as_it_likes(option):
         attach(make(2 * '<body pos="1 0 1"><freejoint/><geom type="cylinder" size=".1 .1"/></body>'))
 
 
+def test_a_model_that_begins_asleep_is_taken():
+    """MuJoCo looks for contacts when it makes such a model's data, the box's on the plane."""
+    text = (
+        '<mujoco><option><flag sleep="enable"/></option><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .0999" sleep="init">'
+        '<freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>'
+    )
+    try:
+        model = mujoco.MjModel.from_xml_string(text)
+    except ValueError:
+        pytest.skip("this MuJoCo knows no bodies that begin asleep")
+    data = mujoco.MjData(model)
+    assert data.ncon > 0
+    with attach(model) as coupling:
+        coupling.step(data)
+    assert data.qpos[2] == 0.0999
+
+
 def cloths_among_geoms(seed):
     """How many contacts of flexes a random model has, which are those of stock MuJoCo; the bits are given back."""
     rng = np.random.default_rng(seed)
