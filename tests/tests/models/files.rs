@@ -304,6 +304,33 @@ fn lengths_with_units_are_what_they_are_to_openscad() {
     ] {
         is(&format!("<svg width='100' height='50'>{element}</svg>"), expected);
     }
+    // Shapes count wherever they are, but for those that are only defined: elements that OpenSCAD does not know are as if they
+    // were not there, with their transforms.
+    let rect = "<rect x='1' y='1' width='3' height='5'/>";
+    let as_it_is = Some([0.352768, 33.1611, 1.4111, 34.925]);
+    for (text, expected) in [
+        (rect.to_owned(), as_it_is),
+        (format!("<switch><g>{rect}</g></switch>"), as_it_is),
+        (format!("<a transform='scale(2)'>{rect}</a>"), as_it_is),
+        (format!("<symbol id='s'>{rect}</symbol><use href='#s' x='20'/>"), as_it_is),
+        (format!("<clipPath id='c'>{rect}</clipPath>"), as_it_is),
+        (format!("<text><tspan>{rect}</tspan></text>"), as_it_is),
+        (
+            format!(
+                "<g transform='scale(2)'><a transform='scale(3)'><g transform='translate(1, 0)'>{rect}</g></a></g>"
+            ),
+            Some([1.4111, 31.0444, 3.52777, 34.5722]),
+        ),
+        (
+            format!("<rect x='30' y='30' width='1' height='1' transform='scale(2)'>{rect}</rect>"),
+            Some([0.352768, 13.4055, 21.8722, 34.925]),
+        ),
+        (format!("<defs>{rect}</defs>"), None),
+        (format!("<defs><symbol id='s'>{rect}</symbol></defs><use href='#s' x='20'/>"), None),
+        (format!("<g><defs><g>{rect}</g></defs></g>"), None),
+    ] {
+        is(&format!("<svg width='100' height='100' viewBox='0 0 100 100'>{text}</svg>"), expected);
+    }
     // At random: as if 0 stood there, and counted.
     let mut r = Random::new(41);
     for _ in 0..200 {

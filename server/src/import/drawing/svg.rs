@@ -141,6 +141,9 @@ struct Reader<'f> {
     zeros: Zeros,
 }
 
+/// The elements that are shapes.
+const SHAPES: [&str; 7] = ["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"];
+
 /// The first attribute that is no plain number, and how many there are.
 type Zeros = Option<(String, usize)>;
 
@@ -162,10 +165,13 @@ impl Reader<'_> {
         layer |= frame.layer.is_empty() || label() == Some(frame.layer);
         chosen |= layer && (frame.id.is_empty() || node.attribute("id") == Some(frame.id));
         let name = node.tag_name().name();
+        // OpenSCAD knows these elements. It looks for shapes inside of any other one as if that were not there: `a`, `switch`,
+        // `symbol`, `clipPath`; but for `defs`.
         let own = match node.attribute("transform") {
-            Some(text) if name != "svg" => transform(node, text)?,
+            Some(text) if name == "g" || SHAPES.contains(&name) => transform(node, text)?,
             _ => DAffine2::IDENTITY,
         };
+        let outer = to_page;
         let to_page = to_page * own;
         let mut pen = Pen { paths: Vec::new(), off: 0.0, stroke: Stroke::of(node), zeros: None };
         match name {
@@ -195,9 +201,14 @@ impl Reader<'_> {
                 let points: Path = numbers.chunks_exact(2).map(|c| DVec2::new(c[0], c[1])).collect();
                 if name == "polyline" { pen.stroke(&points) } else { pen.paths.push(points) }
             }
-            "use" | "text" | "image" | "switch" | "symbol" | "foreignObject" => self.leave(name),
+            "use" | "text" | "image" => self.leave(name),
             // What changes no shape: gradients, styles, titles, the data of editors; and what is only defined.
             _ => {}
+        }
+        if !["svg", "defs"].contains(&name) {
+            for child in node.children().filter(Node::is_element) {
+                self.element(child, outer, (chosen, layer), depth + 1)?;
+            }
         }
         if !chosen {
             return Ok(());
