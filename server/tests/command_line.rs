@@ -224,10 +224,10 @@ fn inspect_tells_what_was_imported_and_how() {
         lines[..end].join("\n")
     };
     let line = mass(&out.stdout);
-    assert!(line.starts_with("  mass volume 13.401924 ± ") && line.contains("centre [0, 0, 0]"), "{line}");
+    assert!(line.starts_with("  mass volume 13.4019237886") && line.contains("centre [0, 0, 0]"), "{line}");
     assert!(line.contains("inertia [") && text(&out.stdout).lines().all(|l| l.chars().count() <= 80), "{line}");
     let ball = mass(&run(folder.path(), &["inspect", "ball.csg"]).stdout);
-    assert!(ball.contains("at density 1, closed form"), "{ball}");
+    assert!(ball.contains("at density 1,") && ball.ends_with("closed form"), "{ball}");
     let exact = run(folder.path(), &["inspect", "m.csg", "--facets", "exact"]);
     assert!(text(&exact.stdout).contains("1 cylinder r 1, h 2 at 3:3"), "{}", text(&exact.stdout));
     let scene = run(folder.path(), &["inspect", "s.toml"]);

@@ -139,17 +139,32 @@ fn mass(model: &Model) -> String {
         boxes => format!("{boxes} boxes: the limit of their work, short of ± {:.0e} of the volume", MASS.tolerance),
     };
     let (i, spread) = (m.inertia, m.inertia_error[..3].iter().copied().fold(0.0, f64::max));
-    let off = m.center_error.max_element();
-    // One digit more than the bound's first.
-    let known = |error: f64| error / 10.0;
+    let volume = told(&[m.volume], m.volume_error);
+    let (centre, inertia) = (told(&m.center.to_array(), m.center_error.max_element()), told(&i[..3], spread));
     let pieces = [
-        format!("mass volume {} ± {:.1e}", number(m.volume, known(m.volume_error), DIGITS), m.volume_error),
-        format!("centre {} ± {off:.1e}", vector(m.center, known(off))),
-        format!("inertia {} ± {spread:.1e}", vector(DVec3::new(i[0], i[1], i[2]), known(spread))),
+        format!("mass volume {} ± {}", volume.0, volume.1),
+        format!("centre [{}] ± {}", centre.0, centre.1),
+        format!("inertia [{}] ± {}", inertia.0, inertia.1),
         "at density 1".into(),
         how,
     ];
     fold("  ", ", ", &pieces.map(|text| (None, text)), Paint::default())
+}
+
+/// Numbers that are known to within `error` to the second digit of it, and how far off they are at most as they stand there: what
+/// rounding adds counts, and the bound's own last digit is rounded up.
+fn told(values: &[f64], error: f64) -> (String, String) {
+    let quantum = if error > 0.0 { 10f64.powf(error.log10().floor() - 1.0) } else { 0.0 };
+    let texts: Vec<String> = values.iter().map(|x| number(*x, quantum, 12)).collect();
+    // What stands there is a number, but for one that is none: that is no nearer to anything.
+    let off = |(text, x): (&String, &f64)| text.parse::<f64>().map_or(f64::INFINITY, |t| (t - x).abs());
+    let bound = error + texts.iter().zip(values).map(off).fold(0.0, f64::max);
+    let text = format!("{bound:.1e}");
+    let up = match text.parse::<f64>() {
+        Ok(t) if t < bound => format!("{:.1e}", bound + 0.05 * 10f64.powf(bound.log10().floor())),
+        _ => text,
+    };
+    (texts.join(", "), up)
 }
 
 /// Sizes in words, their numbers without the last digits, which are rounding.
@@ -209,4 +224,37 @@ fn tree(solid: &Solid) -> String {
         };
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    #[test]
+    fn what_is_told_holds_all_that_is_proven() {
+        // Half of a box of 312,140 is all that is known; and a plate whose volume is 19979.5991, as OpenSCAD tells it.
+        for (x, error, text, bound) in [
+            (156_070.0, 156_070.0, "160000", "1.6e5"),
+            (19_978.45, 1.199, "19978.5", "1.3e0"),
+            (13.401_923_788, 1.5e-11, "13.401923788", "1.5e-11"),
+            (8.0, 0.0, "8", "0.0e0"),
+            (1e-9, 2e-3, "0", "2.1e-3"),
+        ] {
+            assert_eq!(told(&[x], error), (text.into(), bound.into()), "{x} {error}");
+        }
+        let mut r = Random(11);
+        for _ in 0..20_000 {
+            let x = (r.unit() - 0.5) * 10f64.powf(12.0 * r.unit() - 6.0);
+            let error = x.abs() * 10f64.powf(12.0 * r.unit() - 11.0);
+            let (text, bound) = told(&[x], error);
+            let (middle, within): (f64, f64) = (text.parse().expect("a number"), bound.parse().expect("a number"));
+            // But for the rounding of these sums.
+            let spare = 1e-14 * (x.abs() + within);
+            assert!(
+                middle - within <= x - error + spare && x + error <= middle + within + spare,
+                "{text} ± {bound} of {x} ± {error}"
+            );
+        }
+    }
 }
