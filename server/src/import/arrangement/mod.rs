@@ -36,8 +36,9 @@ use outcome::Kept;
 use pieces::Pieces;
 
 /// Digits of the grid, and steps of it that are taken as none, tried one after the other until a mesh comes of it that does not cross
-/// itself: what lies on each other but for roundings does so exactly on a coarser grid (2⁻⁴⁵ and 2⁻³⁸ of the largest coordinate).
-const TRIES: [(i32, &[f64]); 3] = [(DIGITS, &[0.0, 8.0]), (45, &[0.0, 2.0]), (38, &[0.0, 2.0])];
+/// itself: what lies on each other but for roundings does so exactly on a coarser grid (2⁻⁴⁵, 2⁻³⁸ and 2⁻³⁰ of the largest
+/// coordinate; files in single precision have 24 digits).
+const TRIES: [(i32, &[f64]); 4] = [(DIGITS, &[0.0, 8.0]), (45, &[0.0, 2.0]), (38, &[0.0, 2.0]), (30, &[0.0, 2.0])];
 
 /// The boundary of what a closed mesh of triangles winds around.
 struct Resolved {
@@ -49,12 +50,17 @@ struct Resolved {
 
 impl Resolved {
     /// That of a mesh on a grid. `None` where it is the mesh as it is, where more triangles meet than are looked at, and where nothing is
-    /// left.
+    /// left. On a coarse grid corners moved: a mesh of which nothing meets there is another one.
+    #[cfg(test)]
     fn of(vertices: &[DVec3], triangles: &[[u32; 3]], digits: i32) -> Option<Self> {
-        let facets = Facets::of(vertices, triangles, digits)?;
-        let pieces = Pieces::of(&facets)?;
+        let (facets, pieces) = cut(vertices, triangles, digits)?;
+        Self::kept(facets, pieces, digits)
+    }
+
+    /// That of a mesh that was cut.
+    fn kept(facets: Facets, pieces: Pieces, digits: i32) -> Option<Self> {
         let kept = outcome::kept(&facets, &pieces)?;
-        let is_other = pieces.pairs + kept.turned + kept.left_out > 0;
+        let is_other = digits < DIGITS || pieces.pairs + kept.turned + kept.left_out > 0;
         is_other.then_some(Self { facets, pieces, kept })
     }
 
@@ -67,10 +73,20 @@ impl Resolved {
     }
 }
 
+/// The triangles of a mesh on a grid, cut where they meet. `None` of one without size, and where more of them meet than are
+/// looked at.
+fn cut(vertices: &[DVec3], triangles: &[[u32; 3]], digits: i32) -> Option<(Facets, Pieces)> {
+    let facets = Facets::of(vertices, triangles, digits)?;
+    let pieces = Pieces::of(&facets)?;
+    Some((facets, pieces))
+}
+
 /// The solid that a closed mesh of triangles winds around, and what was done for it.
-fn resolved(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Option<(TriangleMesh, Crossing)> {
-    for (digits, steps) in TRIES {
-        let resolved = Resolved::of(vertices, triangles, digits)?;
+fn resolved(vertices: &[DVec3], triangles: &[[u32; 3]], tries: &[(i32, &[f64])]) -> Option<(TriangleMesh, Crossing)> {
+    for &(digits, steps) in tries {
+        let (facets, pieces) = cut(vertices, triangles, digits)?;
+        // What crosses in roundings alone is left as it is on the finest grid, and is another mesh on the next.
+        let Some(resolved) = Resolved::kept(facets, pieces, digits) else { continue };
         if let Some(mesh) = resolved.mesh(steps) {
             let Resolved { pieces: Pieces { pairs, cut, .. }, kept: Kept { turned, others, left_out, .. }, .. } =
                 resolved;
@@ -112,6 +128,11 @@ impl Done {
     /// What was done where it crossed itself, or where its parts did not run round as those of a solid, as a sentence.
     pub fn crossing(&self, what: &str) -> Option<String> {
         self.crossing.map(|Crossing { pairs, cut, turned, left_out, .. }| {
+            if pairs + turned + left_out == 0 {
+                return format!(
+                    "{what} of which facets nearly lie on each other: its corners were put on a grid on which none cross"
+                );
+            }
             // Where none was cut they do no more than touch.
             if cut == 0 && turned + left_out > 0 {
                 return format!(
@@ -149,9 +170,12 @@ pub fn mesh(closed: Closed) -> Result<(TriangleMesh, Done), MeshFault> {
     };
     let Crossed { fault, vertices, triangles, mut repair } = *crossed;
     let made = match fault {
-        MeshFault::Crossing(_) | MeshFault::Through { .. } | MeshFault::Intricate(_) => resolved(&vertices, &triangles),
-        // What encloses as much one way round as the other; no sheet, and nothing that roundings have left.
-        MeshFault::Flat => resolved(&vertices, &triangles).filter(|(mesh, _)| is_thick(mesh)),
+        MeshFault::Crossing(_) | MeshFault::Through { .. } | MeshFault::Intricate(_) => {
+            resolved(&vertices, &triangles, &TRIES)
+        }
+        // What encloses as much one way round as the other; no sheet, and nothing that roundings have left: the coarsest grid makes
+        // solids of sheets.
+        MeshFault::Flat => resolved(&vertices, &triangles, &TRIES[..3]).filter(|(mesh, _)| is_thick(mesh)),
         MeshFault::Open(..) | MeshFault::Mixed(..) => None,
     };
     let (mesh, mut crossing) = made.ok_or(fault)?;

@@ -207,6 +207,82 @@ fn parts_either_way_round_are_solid_apart_and_cavities_within() {
     assert!(matches!(whole(&ball(1.0).with(&ball(1.0).reversed())), Err(MeshFault::Flat)));
 }
 
+/// A wedge of a sweep about an axis, of six digits on one side of it, and with what sines leave of 0 on the other, so that the
+/// facets there are in one plane but for roundings: exactly so they are on a grid of 30 digits alone.
+#[test]
+fn facets_in_one_plane_but_for_roundings_are_so_on_a_coarse_grid() {
+    let points = [
+        [0.0, 0.0, 17.0833],
+        [0.0, 0.0, 27.0833],
+        [1.423504, -5.312592, 27.0833],
+        [1.319977, -4.926222, 26.5833],
+        [0.95763, -3.573926, 25.5833],
+        [1.035276, -3.863703, 23.7833],
+        [1.061158, -3.960296, 21.7833],
+        [1.552914, -5.795555, 20.5833],
+        [0.698811, -2.608, 18.9833],
+        [0.776457, -2.897778, 17.4833],
+        [0.905866, -3.38074, 17.4833],
+        [0.0, 0.0, 17.5],
+        [0.0, 0.0, 27.5],
+        [-2.5e-15, -5.5, 27.5],
+        [-6.5e-15, -5.1, 27.0],
+        [1.7e-15, -3.7, 26.0],
+        [-4.9e-15, -4.0, 24.2],
+        [-4.9e-15, -4.1, 22.2],
+        [4.5e-16, -6.0, 21.0],
+        [-1.2e-15, -2.7, 19.4],
+        [5.7e-16, -3.0, 17.9],
+        [3.8e-16, -3.5, 17.9],
+    ];
+    let faces = [
+        [0, 12, 1],
+        [0, 11, 12],
+        [1, 13, 2],
+        [1, 12, 13],
+        [2, 14, 3],
+        [2, 13, 14],
+        [3, 15, 4],
+        [3, 14, 15],
+        [4, 16, 5],
+        [4, 15, 16],
+        [5, 17, 6],
+        [5, 16, 17],
+        [6, 18, 7],
+        [6, 17, 18],
+        [7, 19, 8],
+        [7, 18, 19],
+        [8, 20, 9],
+        [8, 19, 20],
+        [9, 21, 10],
+        [9, 20, 21],
+        [10, 11, 0],
+        [10, 21, 11],
+        [1, 2, 3],
+        [1, 3, 4],
+        [0, 1, 4],
+        [0, 4, 5],
+        [0, 5, 6],
+        [6, 7, 8],
+        [0, 6, 8],
+        [0, 8, 9],
+        [0, 9, 10],
+        [12, 14, 13],
+        [12, 15, 14],
+        [11, 15, 12],
+        [11, 16, 15],
+        [11, 17, 16],
+        [17, 19, 18],
+        [11, 19, 17],
+        [11, 20, 19],
+        [11, 21, 20],
+    ];
+    let soup = Soup { points: points.map(DVec3::from).to_vec(), faces: faces.map(|f: [u32; 3]| f.to_vec()).to_vec() };
+    assert_eq!(judged(&soup, &mut Random(3), "a wedge"), Came::Wound);
+    let reversed = soup.reversed();
+    assert_eq!(judged(&reversed, &mut Random(4), "a wedge inside out"), Came::Wound);
+}
+
 /// `cargo test --release -p contactd --lib arrangement -- --ignored --nocapture`
 #[test]
 #[ignore = "how long threads take"]
