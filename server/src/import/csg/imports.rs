@@ -53,6 +53,11 @@ pub fn file_of(call: &Call) -> Option<String> {
     }
 }
 
+/// The angle that stands where a `rotate_extrude` of OpenSCAD 2021.01 has a file's name; later versions have it there.
+fn angle_as_name(call: &Call) -> Option<String> {
+    file_of(call).filter(|name| call.name == "rotate_extrude" && name.parse::<f64>().is_ok_and(f64::is_finite))
+}
+
 /// True for a call with an empty name, where files can be named at all.
 fn names_none(call: &Call, attached: Option<&[Attachment]>) -> bool {
     let is_empty = |v: &ValueKind| matches!(v, ValueKind::Text(name) if name.is_empty());
@@ -61,6 +66,14 @@ fn names_none(call: &Call, attached: Option<&[Attachment]>) -> bool {
 
 /// The bytes of a file that a call names, and its name.
 fn bytes_of<'b>(call: &Call, attached: Option<&'b [Attachment]>) -> Result<(String, &'b [u8])> {
+    let found = |attached: &'b [Attachment]| {
+        let name = file_of(call)?;
+        attached.iter().find(|a| a.name == name).and_then(|a| a.bytes.as_deref().ok())
+    };
+    if let Some(angle) = angle_as_name(call).filter(|_| attached.and_then(found).is_none()) {
+        let taken = format!("{angle:?} as the name of a file (which OpenSCAD 2021.01 takes a first argument for)");
+        return Err((call.at, Problem::syntax(format!("rotate_extrude(angle = {angle})"), taken)));
+    }
     let Some(attached) = attached else {
         let hint = " (a text that is sent names no files: send the mesh itself, by its format)";
         return Err((call.at, Problem::Unsupported { construct: call.short(), hint }));
@@ -375,7 +388,7 @@ mod tests {
             ("linear_extrude(height = 3) { import(\"x.dxf\"); }", "m.csg:1:30: expected"),
             (
                 "rotate_extrude(file = \"360\", angle = 360);",
-                "m.csg:1:1: expected a readable file, found \"360\": No such",
+                "m.csg:1:1: expected rotate_extrude(angle = 360), found \"360\" as the name of a file (",
             ),
             ("linear_extrude(height = 1) { import(file = \"m.csg\"); }", "which is not supported (of other files"),
         ] {
