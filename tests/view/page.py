@@ -466,7 +466,9 @@ class Running:
         command = [program, "view", "--server", "default"]
         self.view = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.env)
         line = self.view.stdout.readline()
-        check("waiting for a step" in line, f"expected a page that waits, found {line!r}")
+        found = re.search(r"http://127\.0\.0\.1:\d+/", line)
+        check(found and "waits for the first step" in line, f"expected a page that waits and its address, found {line!r}")
+        self.address = found.group()
 
     def client(self, name, *arguments):
         example = os.path.join(os.path.dirname(self.program), "examples", name)
@@ -515,11 +517,11 @@ def live(program, browser, keep):
     """A server's steps as they are taken."""
     rnd = random.Random(11)
     with Running(program) as running:
+        # Before there is a step the page says so, and asks again.
+        with urllib.request.urlopen(running.address, timeout=60) as answer:
+            page = answer.read().decode()
+        check("Waits for the first step" in page and "refresh" in page, f"the page does not say that it waits: {page!r}")
         check(running.client("hello", "default").wait(60) == 0, "the client hello failed")
-        line = running.view.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:\d+/", line)
-        check(found, f"expected the page's address, found {line!r}")
-        running.address = found.group()
         left = [name for name in os.listdir(running.folder) if name.endswith(".mcap")]
         check(not left, f"the recording still has a name: {left}")
         opened(browser, running)
@@ -574,7 +576,7 @@ def main():
 
     passed = 0
     try:
-        for part in (own_scene, assembly, demo, thousand):
+        for part in (own_scene, assembly, demo, thousand, live):
             from_ = time.monotonic()
             told = part(program, browser, keep)
             print(f"tests/view: {part.__name__.replace('_', ' ')}: {told} ({time.monotonic() - from_:.1f} s)", flush=True)

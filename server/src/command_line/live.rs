@@ -69,12 +69,7 @@ struct Follower {
 /// One sentence: no such server, one that cannot be recorded, a port that is taken.
 pub(super) fn view(name: &str, port: u16, cache: &CacheArguments) -> Result<(), String> {
     let mut follower = Follower::begin(name, cache.open())?;
-    print(&format!("contactd view: waiting for a step on \"{name}\"\n")).map_err(|e| e.to_string())?;
     let live = Arc::new(Live::default());
-    while live.show().is_none() {
-        follower.look(&live)?;
-        std::thread::sleep(LOOK);
-    }
     let followed = live.clone();
     let follow = move || {
         loop {
@@ -89,7 +84,9 @@ pub(super) fn view(name: &str, port: u16, cache: &CacheArguments) -> Result<(), 
     let thread = std::thread::Builder::new().name("contactd-follow".into()).spawn(follow);
     thread.map_err(|e| format!("no thread can be started: {e}"))?;
     live::serve(&live, port, |address| {
-        let _ = print(&format!("contactd view: open {address} in a browser; Ctrl+C ends it\n"));
+        let _ = print(&format!(
+            "contactd view: open {address} in a browser; it waits for the first step on \"{name}\"; Ctrl+C ends it\n"
+        ));
     })
 }
 

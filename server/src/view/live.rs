@@ -53,6 +53,17 @@ impl Live {
         self.now().show.clone()
     }
 
+    /// What a browser sees before there is a show: it asks again each second.
+    fn waiting(&self) -> String {
+        let ended = &self.now().ended;
+        let sentence = if ended.is_empty() { "Waits for the first step." } else { ended };
+        let sentence = sentence.replace('&', "&amp;").replace('<', "&lt;");
+        format!(
+            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"1\">\
+             <title>contactd view</title><p>{sentence}\n"
+        )
+    }
+
     /// The news, as JSON: which show, the steps of its acts, why nothing more will come.
     fn news(now: &Now) -> String {
         let growing = now.show.as_ref().and_then(|show| show.growing.as_ref());
@@ -90,6 +101,7 @@ pub fn answer(live: &Arc<Live>, path: &str) -> Answer {
     match (path, live.show()) {
         ("/live", _) => Answer::stream(live.events()),
         (_, Some(show)) => super::answer(&show, path),
+        ("/", None) => Answer::of("text/html; charset=utf-8", live.waiting()),
         (_, None) => Answer::refused(503, "there is nothing to show yet: ask again"),
     }
 }
