@@ -11,6 +11,7 @@ use contactd::contact::{
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
+use contactd::solid::primitive::Polyhedron;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::ReportedPoint as _;
@@ -644,4 +645,34 @@ fn the_line_along_a_capsule_ends_with_its_side() {
         short += usize::from(ends[0] == -half || ends[1] == half);
     }
     assert!(lines.iter().all(|n| *n > 10) && short > 30, "{lines:?}, {short} end with the capsule");
+}
+
+/// A hull whose bottom is nearly flat in many facets, on a face within a margin: whatever the work allows, where they touch is told.
+#[test]
+fn hulls_of_many_nearly_coplanar_facets_have_a_region() {
+    let mut r = Random::new(0x0063_6f70_6c61_6e61);
+    let mut cut = 0;
+    for i in 0..sized("CONTACTD_REGIONS", 6) {
+        let bow = 10f64.powf(r.within(-9.0, -4.0));
+        let count = [40, 120, 300][i % 3];
+        let mut points = vec![dvec3(0.0, 0.0, 1.5)];
+        for _ in 0..count {
+            let (rho, phi) = (r.within(0.0, 1.0).sqrt(), r.within(0.0, TAU));
+            points.push(dvec3(rho * phi.cos(), rho * phi.sin(), bow * rho * rho));
+        }
+        let hull = Polyhedron::hull(points).expect("a hull");
+        let lowest = hull.vertices.iter().map(|v| v.z).fold(f64::INFINITY, f64::min);
+        let gap = r.within(0.0, 1e-4);
+        let turned = Pose::new(dvec3(0.1, 0.2, gap - lowest), DQuat::from_rotation_z(r.within(0.0, TAU)));
+        let s = Rest::new(Recipe::cuboid(2.0, 2.0, 0.5).at(0.0, 0.0, -0.5), Pose::IDENTITY, Recipe::of(hull), turned);
+        let query = s.query();
+        let found = regions(&query, 0.0, threshold(query.resolution, 2e-4));
+        let place = format!("{i}: {count} points, bow {bow:e}, gap {gap:e}");
+        assert!(found.cells <= 21_000, "{place}: {} cells", found.cells);
+        // The lowest corner is over the face: how far they are apart is how far it is above.
+        let least = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
+        assert!((least - gap).abs() <= 1e-9, "{place}: {} regions, {least:e} apart", found.regions.len());
+        cut += usize::from(!found.complete);
+    }
+    assert!(cut > 0, "no search was cut");
 }

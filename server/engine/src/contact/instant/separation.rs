@@ -71,6 +71,10 @@ pub(in crate::contact) struct Cover<'t, 'a> {
     work: &'t Work,
 }
 
+/// Pairs of a box's faces that cost as much as a look at one, and so many such looks that bounding it counts already.
+const PAIRS_PER_LOOK: usize = 256;
+const FREE_LOOKS: usize = 16;
+
 impl<'t, 'a> Cover<'t, 'a> {
     /// A cover of what two bodies have in common, as far as the work goes. The boxes are those of the bodies' bounds grown by
     /// `far`: they hold what lies within that distance of both, not all of {F <= far}. Their trees are kept for depths up to `deep` and
@@ -139,6 +143,8 @@ impl<'t, 'a> Cover<'t, 'a> {
         self.work.bound();
         let (pool, middle) = self.pruned(&place, level)?;
         let end = pool.len() as u32;
+        // What many faces bound costs by their pairs.
+        self.work.look((pool.len() * pool.len() / PAIRS_PER_LOOK).saturating_sub(FREE_LOOKS));
         place.a = pool[..middle as usize].to_vec();
         place.b = pool[middle as usize..].to_vec();
         place.level = level;

@@ -81,6 +81,9 @@ const ROUND: f64 = 1.0 / 24.0;
 /// … and those in which many faces run together down to this one, or to where all that is left in them is near.
 const SMALLEST: f64 = 1e-3;
 
+/// Pairs of faces of a box that cost as much as a look at one.
+const PAIRS_PER_LOOK: usize = 4;
+
 /// Diameters of the smaller body within which two points are one …
 const SAME_POINT: f64 = 1e-6;
 /// … and those of the same faces.
@@ -371,12 +374,21 @@ fn pairs(bodies: &Bodies, places: &[Place]) -> Vec<Facing> {
     let mut boxes: BTreeMap<(Lit, Lit), Vec<usize>> = BTreeMap::new();
     for (i, place) in places.iter().enumerate() {
         let b = place.lits(Side::B);
+        // In a box in which many faces run together they are many pairs.
+        bodies.work.look(place.lits(Side::A).len() * b.len() / PAIRS_PER_LOOK);
+        if bodies.work.is_spent() {
+            return Vec::new();
+        }
         for p in place.lits(Side::A) {
             b.iter().for_each(|q| boxes.entry((*p, *q)).or_default().push(i));
         }
     }
     let mut found: Vec<Facing> = Vec::new();
     for ((p, q), of) in boxes {
+        bodies.work.look(1 + found.len() / PAIRS_PER_LOOK);
+        if bodies.work.is_spent() {
+            break;
+        }
         let is_same = |k: &FacePair| same_surface(bodies, k.alpha, p) && same_surface(bodies, k.beta, q);
         match found.iter_mut().find(|f| is_same(&f.pair)) {
             Some(known) => {
@@ -452,6 +464,11 @@ fn candidates(bodies: &Bodies, places: &[Place]) -> Vec<(Candidate, Vec<usize>)>
     let mut found: Vec<(Candidate, Vec<usize>)> = Vec::new();
     let mut index: BTreeMap<([Lit; 2], usize), usize> = BTreeMap::new();
     for (i, place) in places.iter().enumerate() {
+        let faces: usize = [Side::A, Side::B].iter().map(|side| place.lits(*side).len()).sum();
+        bodies.work.look(faces * faces / 2 / PAIRS_PER_LOOK);
+        if bodies.work.is_spent() {
+            return Vec::new();
+        }
         let mut count: BTreeMap<[Lit; 2], usize> = BTreeMap::new();
         for c in line::candidates(bodies, place) {
             // Two faces may have two curves in common.
