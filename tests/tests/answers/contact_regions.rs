@@ -664,11 +664,16 @@ fn hulls_of_many_nearly_coplanar_facets_have_a_region() {
         let lowest = hull.vertices.iter().map(|v| v.z).fold(f64::INFINITY, f64::min);
         let gap = r.within(0.0, 1e-4);
         let turned = Pose::new(dvec3(0.1, 0.2, gap - lowest), DQuat::from_rotation_z(r.within(0.0, TAU)));
-        let s = Rest::new(Recipe::cuboid(2.0, 2.0, 0.5).at(0.0, 0.0, -0.5), Pose::IDENTITY, Recipe::of(hull), turned);
+        // Alone they are told by their corners; with something beside it one of them is looked for in boxes.
+        let alone = i % 2 == 1;
+        let hull = Recipe::of(hull);
+        let hull = if alone { hull } else { hull.union(Recipe::cuboid(0.1, 0.1, 0.1).at(0.0, 0.0, 2.0)) };
+        let s = Rest::new(Recipe::cuboid(2.0, 2.0, 0.5).at(0.0, 0.0, -0.5), Pose::IDENTITY, hull, turned);
         let query = s.query();
         let found = regions(&query, 0.0, threshold(query.resolution, 2e-4));
         let place = format!("{i}: {count} points, bow {bow:e}, gap {gap:e}");
-        assert!(found.cells <= 21_000, "{place}: {} cells", found.cells);
+        let few = alone && s.a.solid.faces.len() + s.b.solid.faces.len() > 64;
+        assert!(found.cells <= if few { 1_000 } else { 21_000 }, "{place}: {} cells", found.cells);
         // The lowest corner is over the face: how far they are apart is how far it is above.
         let least = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
         assert!((least - gap).abs() <= 1e-9, "{place}: {} regions, {least:e} apart", found.regions.len());

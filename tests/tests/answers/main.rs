@@ -12,6 +12,7 @@ mod contact_regions;
 mod elliptics;
 mod families;
 mod hard_cases;
+mod hull_regions;
 mod judges;
 mod kinds;
 mod laws;

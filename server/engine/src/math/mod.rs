@@ -7,6 +7,7 @@ pub mod ball;
 pub mod ball_tree;
 pub mod bound_queue;
 pub mod f64x2;
+pub mod gjk;
 pub mod halt;
 pub mod mix;
 pub mod moments;

@@ -2,7 +2,7 @@
 //!
 //! See `convex`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
 
-use super::gjk::{GOOD, Nearest, nearest};
+use super::gjk::{Nearest, nearest};
 use super::plane::{self, Floor, is_half_space};
 use super::proof::{Gap, Pace};
 use super::support::ConvexBody;
@@ -13,6 +13,7 @@ use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::faces::faces_at;
 use crate::contact::witness::found::{Ending, Found};
 use crate::contact::witness::newton::{Actives, Constraint, MAX_ACTIVE, Weights};
+use crate::math::gjk::GOOD;
 use crate::motion::Instant;
 use crate::solid::Primitive;
 use glam::{DMat3, DVec3};

@@ -44,7 +44,7 @@ use crate::contact::query::question::PairQuery;
 use crate::solid::primitive::Convex;
 pub(super) use advance::{ConvexPair, answer};
 pub(super) use balls::quick as balls;
-pub(super) use gjk::{Cores, GOOD, Nearest, SupportMapping, least_of, nearest, of_supports};
+pub(super) use gjk::{Nearest, SupportMapping, nearest};
 use glam::DVec3;
 use overlap::{Look, Start};
 use plane::PlanePair;

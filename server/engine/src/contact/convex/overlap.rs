@@ -16,6 +16,7 @@ use super::whole::PrimitivePair;
 use crate::contact::query::options::QueryOptions;
 use crate::contact::query::outcome::{ContactPoint, NO_FACE, Outcome, Overlap, Verdict};
 use crate::contact::query::task::most_raised;
+use crate::math::gjk::{GOOD, least_of};
 use crate::solid::primitive::Slope;
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -92,7 +93,7 @@ impl<'a> Start<'a> {
         let (mut x, mut slopes) = self.descend(middle, (far - near) / square.sqrt(), least);
         if depth(&slopes) < least {
             *count += 1;
-            for good in [ROUGH, gjk::GOOD] {
+            for good in [ROUGH, GOOD] {
                 let p = match gjk::meeting(&self.bodies[0], &self.bodies[1], way, good) {
                     // Cores that are apart, in balls that are not: halfway between the nearest points.
                     Meeting::Apart(found) if found.distance < -2.0 * least => 0.5 * (found.a + found.b),
@@ -245,7 +246,7 @@ impl<'a> Start<'a> {
             let faces = self.pair.primitives[k].faces.listed().iter().filter(|f| f.value(own) > -near);
             outward.extend(faces.map(|f| self.axes[k] * f.at(own).unit()));
         }
-        Some(-gjk::least_of(&outward)?.try_normalize()?)
+        Some(-least_of(&outward)?.try_normalize()?)
     }
 }
 

@@ -6,9 +6,9 @@
 
 use super::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause, eliminated};
 use super::part::{Parts, literal_at};
-use crate::contact::convex::least_of;
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::witness::newton::hessian;
+use crate::math::gjk::least_of;
 use crate::motion::Instant;
 use crate::octree::Model;
 use crate::solid::local::{LiteralId, Token};

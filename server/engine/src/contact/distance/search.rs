@@ -5,7 +5,7 @@ use super::polish::{Pair, Polish, Side};
 use super::polytope::support;
 use super::span::{Span, Stray};
 use super::{Distance, DistanceQuery, NearPoint};
-use crate::contact::convex::{Cores, of_supports};
+use crate::math::gjk::{Cores, of_supports};
 use crate::math::{Aabb, BoundQueue};
 use crate::motion::{Instant, Relative, Sweep};
 use crate::octree::Model;

@@ -152,6 +152,8 @@ pub(super) struct Taken {
     id: LiteralId,
     /// Its index in `Scratch::made`.
     made: u32,
+    /// The last in order of those of A, and of B, up to it: what comes after them all is new.
+    last: [Option<LiteralId>; 2],
 }
 
 /// Two literals of one body that contradict each other.
@@ -285,8 +287,11 @@ impl Run<'_, '_> {
 
     /// Adds a literal's bound, with the tangents and fits it brings along.
     pub fn add(&mut self, side: Side, id: LiteralId, at: u32, list: Lists) {
-        // What stands twice in a clause brings along nothing new.
-        let again = self.scratch.taken.iter().any(|t| (t.side, t.id) == (side, id));
+        // What stands twice in a clause brings along nothing new. (Hulls have thousands of literals, mostly in order.)
+        let mut last = self.scratch.taken.last().map_or([None; 2], |t| t.last);
+        let own = &mut last[usize::from(side == Side::B)];
+        let again = *own >= Some(id) && self.scratch.taken.iter().any(|t| (t.side, t.id) == (side, id));
+        *own = (*own).max(Some(id));
         let mut touch = if !again && self.view.is_curved_convex(side, id) { Touch::Face } else { Touch::Never };
         for h in self.hints {
             if (h.side, h.id) == (side, id) {
@@ -303,7 +308,7 @@ impl Run<'_, '_> {
         if self.view.fits && !again {
             self.fit_with_others(side, id, made as u32, list);
         }
-        self.scratch.taken.push(Taken { lit: before as u32, side, id, made: made as u32 });
+        self.scratch.taken.push(Taken { lit: before as u32, side, id, made: made as u32, last });
         if side == Side::B && self.view.fits && self.view.curved && !again && !self.view.b.is_guard(id.face()) {
             let touch = if id.sense() == Sense::Positive { Touch::Spun } else { Touch::Never };
             self.push(spun(self.view, id), list, touch);
@@ -317,7 +322,7 @@ impl Run<'_, '_> {
             return;
         }
         for i in 0..self.scratch.taken.len() {
-            let Taken { lit, side: other_side, id: other, made: other_made } = self.scratch.taken[i];
+            let Taken { lit, side: other_side, id: other, made: other_made, .. } = self.scratch.taken[i];
             if other_side == side || other.sense() == id.sense() {
                 continue;
             }
@@ -346,8 +351,9 @@ impl Run<'_, '_> {
         let end = self.scratch.lits.len();
         if side == Side::A {
             let wall = self.scratch.lits[before];
-            let spun = self.scratch.lits[..before].iter().position(is_spun);
-            if let Some(i) = spun.filter(|_| wall.id == id && is_wall(self.view, &wall)) {
+            let is_wall = wall.id == id && is_wall(self.view, &wall);
+            let spun = || self.scratch.lits[..before].iter().position(is_spun);
+            if let Some(i) = if is_wall { spun() } else { None } {
                 let touched = fit::touch_spun_against(self.view, &self.scratch.lits[i], wall.normal);
                 self.push(touched, list | self.scratch.notes[i].uses, Touch::Never);
             }

@@ -14,11 +14,12 @@
 use super::Front;
 use super::body::{ALL, Body, Cover, Moment, Place};
 use super::touch::{ACTIVE, holding};
-use crate::contact::convex::{APART, GOOD, Gap, Nearest, Pace, excluded, nearest};
+use crate::contact::convex::{APART, Gap, Nearest, Pace, excluded, nearest};
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::{Contacts, Guess};
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
+use crate::math::gjk::GOOD;
 use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

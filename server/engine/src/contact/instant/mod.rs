@@ -3,6 +3,7 @@
 
 pub mod depth;
 mod near;
+pub(in crate::contact) mod polytopes;
 pub mod separation;
 pub mod within;
 pub mod work;

@@ -4,9 +4,9 @@
 //! them (`contact/distance/active_set`). As two points of two bodies are made nearest (`contact/distance/polish`), with one of them fixed.
 
 use super::{Sought, literal_at};
-use crate::contact::convex::least_of;
 use crate::contact::distance::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause, eliminated};
 use crate::contact::witness::newton::hessian;
+use crate::math::gjk::least_of;
 use crate::octree::Model;
 use crate::solid::Sense;
 use crate::solid::local::{LiteralId, Token};

@@ -6,9 +6,9 @@
 
 use super::foot::Ground;
 use super::{Sought, children, has_octree, open_voxel, worthwhile};
-use crate::contact::convex::{Cores, of_supports};
 use crate::contact::distance::part::{Cut, Part, Parts};
 use crate::contact::distance::polytope::support;
+use crate::math::gjk::{Cores, of_supports};
 use crate::math::{Aabb, BoundQueue};
 use crate::octree::Node;
 use crate::solid::Sense;

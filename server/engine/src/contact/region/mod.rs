@@ -19,6 +19,7 @@ mod line;
 mod local;
 mod patch;
 mod point;
+mod polytopes;
 mod surface;
 
 use crate::contact::exclusion::literal::Side;
@@ -204,8 +205,13 @@ fn normal_speed(query: &PairQuery, point: DVec3, normal: DVec3) -> f64 {
 
 /// All regions along A's axes; those found until the work ran out.
 fn find(bodies: &Bodies) -> Regions {
-    let (places, covered) = cover(bodies);
     let mut out = Regions::default();
+    if let Some(regions) = polytopes::regions(bodies) {
+        (out.regions, out.complete) = (regions, true);
+        out.regions.sort_by_key(rank);
+        return out;
+    }
+    let (places, covered) = cover(bodies);
     let patches = pairs(bodies, &places);
     let mut ends: Vec<DVec3> = Vec::new();
     let mut told = Told::default();
@@ -271,10 +277,14 @@ fn find(bodies: &Bodies) -> Regions {
             out.regions.push(region);
         }
     }
-    let rank = |r: &Region| (2 - r.extent as u8, r.faces_a, r.faces_b);
     out.regions.sort_by_key(rank);
     out.complete = covered && !bodies.work.is_spent();
     out
+}
+
+/// The order of regions.
+fn rank(r: &Region) -> (u8, [u32; 3], [u32; 3]) {
+    (2 - r.extent as u8, r.faces_a, r.faces_b)
 }
 
 /// True when a point lies on a run, its ends included.

@@ -26,7 +26,7 @@ pub struct FacePair {
 
 /// Faces that lean apart further than this many thresholds of lying on each other across a body touch along an edge, not
 /// over an area.
-const LEAN: f64 = 4.0;
+pub const LEAN: f64 = 4.0;
 
 impl FacePair {
     /// The pair of two literals, if they lie on each other.
