@@ -128,7 +128,7 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     let mut found = Vec::new();
     match region.len() {
         0 => {}
-        1 => found.push(sight.point(bodies, region[0].u)),
+        1 => found.push(sight.point(bodies, near.unwrap_or(&region[0]).u)),
         2 => found.push(sight.line(bodies, [region[0].u, region[1].u])),
         _ if is_patch => found.push(sight.patch(bodies, &mut region)),
         _ => found.extend(some(&region).into_iter().map(|c| sight.point(bodies, c.u))),
