@@ -198,6 +198,7 @@ fn judge(found: &Regions, [a, b]: [&Body; 2], tau: f64, lean: f64, place: &str, 
             let slack = if p.separation < 4e-9 { 1e-8 } else { 1e-9 + 1e-3 * tau };
             assert!(off.iter().all(|f| *f <= slack), "{place}: {off:?} off the surfaces at {p:?} of {region:?}");
         }
+        assert!([region.faces_a[0], region.faces_b[0]].iter().all(|f| *f != u32::MAX), "{place}: no face: {region:?}");
         match region.extent {
             Extent::Patch => seen.patches += 1,
             Extent::Line => seen.lines += 1,

@@ -17,7 +17,7 @@ use super::{Region, RegionPoint, SAME_POINT, faces_at, three};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::polytopes::{Plane, Polytope, Polytopes};
 use crate::contact::instant::separation::common;
-use crate::contact::query::outcome::{ContactKind, Extent};
+use crate::contact::query::outcome::{ContactKind, Extent, NO_FACE};
 use crate::contact::region::surface::LEAN;
 use crate::math::gjk::{Cores, of_supports};
 use glam::{DVec2, DVec3};
@@ -50,8 +50,8 @@ const WALL: u32 = u32::MAX - 2 * MOST_CUTS as u32;
 const MOST_POINTS: usize = 8;
 /// Cuts of a region at its threshold.
 const MOST_CUTS: usize = 64;
-/// Corners within so many roundings of the foremost one are as far ahead.
-const FOREMOST: f64 = 4.0;
+/// Corners within so many roundings of the foremost one are as far ahead: more where the normal has few digits.
+const FOREMOST: [f64; 3] = [4.0, 64.0, 1024.0];
 /// Points within this many sizes are one, as of other patches.
 const MERGED: f64 = 1e-9;
 
@@ -92,10 +92,11 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     bodies.work.look(pair.a.planes.len() + pair.b.planes.len());
     let ([of_a, of_b], are_faces) = outlines(bodies, &pair, normal, flat);
     let common = of_a.common(&of_b, bodies);
-    let near = foremost(bodies, &pair, normal, flat).into_iter().chain(near.iter().map(|x| flat(*x)));
-    let near: SmallVec<[Corner; 3]> = near.map(|u| Corner { u, key: [0; 2] }).collect();
+    let foremost = FOREMOST.iter().filter_map(|slack| foremost(bodies, &pair, normal, *slack, flat));
+    let near = foremost.chain(near.iter().map(|x| flat(*x)));
+    let near: SmallVec<[Corner; 5]> = near.map(|u| Corner { u, key: [0; 2] }).collect();
     let missed = common.is_empty();
-    let mut ends = if missed { near.to_vec() } else { common };
+    let ends = if missed { near.to_vec() } else { common };
     let mut region = ends.clone();
     // Corners told one by one are as far apart as other points are; those of an edge of a mesh are often two that nearly coincide.
     let is_area = hull(&mut region, if are_faces { MERGED } else { SAME_POINT } * bodies.size).len() > 2;
@@ -115,13 +116,14 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     let near = standing.min_by(|p, q| width(p).total_cmp(&width(q)));
     if missed {
         region = vec![*near?];
-        ends = region.clone();
     }
-    let corners = of_a.1.len() + of_b.1.len();
-    bodies.work.look(corners * (pair.a.planes.len() + pair.b.planes.len()) / 8);
-    ends.extend(of_a.1.iter().chain(&of_b.1).filter(|c| stands(c, bodies.eps)).chain(near));
     if !are_faces {
-        region.extend(&ends);
+        if is_area {
+            region.retain(|c| stands(c, APART * bodies.size));
+        }
+        let corners = of_a.1.len() + of_b.1.len();
+        bodies.work.look(corners * (pair.a.planes.len() + pair.b.planes.len()) / 8);
+        region.extend(of_a.1.iter().chain(&of_b.1).filter(|c| stands(c, bodies.eps)).chain(near));
     }
     region.retain(|c| sight.gap(c.u).width <= bodies.tau * (1.0 + MERGED));
     hull(&mut region, if is_patch { MERGED } else { SAME_POINT } * bodies.size);
@@ -312,12 +314,12 @@ fn hull(points: &mut Vec<Corner>, merged: f64) -> &mut Vec<Corner> {
 }
 
 /// Where two polytopes are nearest to each other along their normal: what the corners that are foremost there have in common.
-fn foremost(bodies: &Bodies, pair: &Polytopes, n: DVec3, flat: impl Fn(DVec3) -> DVec2) -> Option<DVec2> {
+fn foremost(bodies: &Bodies, pair: &Polytopes, n: DVec3, slack: f64, flat: impl Fn(DVec3) -> DVec2) -> Option<DVec2> {
     let outline = |body: &Polytope, n: DVec3| {
         if body.is_unbounded() {
             return Outline(None, Vec::new());
         }
-        let farthest = n.dot(body.support(n)) - FOREMOST * bodies.eps;
+        let farthest = n.dot(body.support(n)) - slack * bodies.eps;
         let all = body.corners.iter().filter(|v| n.dot(**v) >= farthest);
         Outline::of(all.map(|v| Corner { u: flat(*v), key: [0; 2] }).collect(), bodies.eps)
     };
@@ -552,12 +554,17 @@ impl Sight {
         let [on_a, on_b] = self.feet(middle);
         let (rank_a, rank_b) = (bodies.rank(Side::A, on_a), bodies.rank(Side::B, on_b));
         let most = if extent == Extent::Line { 2 } else { 3 };
+        // A foot that a wall has cut off by more than rounding has the face that made its height.
+        let faces = |side: Side, at: usize, foot: DVec3| match faces_at(bodies, side, foot) {
+            [NO_FACE, ..] => three([self.surfaces[at].planes[self.surfaces[at].at(middle).1].2]),
+            faces => faces,
+        };
         Region {
             kind: ContactKind::of_active(rank_a.min(most), rank_b.min(most)),
             extent,
             normal: self.normal,
-            faces_a: faces_at(bodies, Side::A, on_a),
-            faces_b: faces_at(bodies, Side::B, on_b),
+            faces_a: faces(Side::A, 0, on_a),
+            faces_b: faces(Side::B, 1, on_b),
             points,
         }
     }
