@@ -54,11 +54,28 @@ def _height_field(model: mj.MjModel, field: int, unit: float) -> Solid:
 def _mesh(model: mj.MjModel, mesh: int, unit: float, meshes: str) -> Solid:
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     points = model.mesh_vert[first : first + count].astype(float) / unit
-    first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
-    faces = model.mesh_face[first : first + count]
+    faces = _hull_faces(model, mesh) if meshes == "hull" else None
+    if faces is None:
+        first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        faces = model.mesh_face[first : first + count]
+    else:
+        corners, index = np.unique(faces, return_inverse=True)
+        points, faces = points[corners], index.reshape(-1, 3)
     # MuJoCo lists a corner once for each normal or texture that it has there.
     points, index = np.unique(points, axis=0, return_inverse=True)
     faces = index.reshape(-1)[faces]
     faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     whole = solid.polyhedron(points.tolist(), faces.tolist())
     return solid.hull(whole) if meshes == "hull" else whole
+
+
+def _hull_faces(model: mj.MjModel, mesh: int) -> np.ndarray | None:
+    """The triangles of the hull that MuJoCo collides, of which ``maxhullvert`` may have cut corners off; ``None`` where it made none.
+
+    Its graph holds the numbers of corners and of faces, then two lists of corners, the edges, the faces (mjModel, ``mesh_graph``)."""
+    at = int(model.mesh_graphadr[mesh])
+    if at < 0:
+        return None
+    corners, faces = (int(n) for n in model.mesh_graph[at : at + 2])
+    first = at + 2 + 2 * corners + (corners + 3 * faces)
+    return model.mesh_graph[first : first + 3 * faces].reshape(-1, 3)

@@ -13,6 +13,7 @@ mujoco = pytest.importorskip("mujoco")
 
 import contactd  # noqa: E402
 from contactd.mujoco import CouplingWarning, attach  # noqa: E402
+from contactd.mujoco_geoms import _hull_faces, solid_of  # noqa: E402
 
 MODELS = int(os.environ.get("CONTACTD_MUJOCO_MODELS", 40))
 STATES = 5
@@ -419,6 +420,32 @@ def test_a_mesh_is_its_hull_or_itself():
     assert own.ncon > 0, "stock MuJoCo meets the hull"
     with pytest.raises(ValueError, match="expected one of 'hull', 'exact' for meshes, found 'convex'"):
         attach(make(), meshes="convex")
+
+
+@pytest.mark.parametrize("most", [None, 12])
+def test_the_hull_of_a_mesh_is_mujocos(most):
+    """``maxhullvert`` cuts corners off a hull: what MuJoCo does not collide, contactd does not."""
+    rng = np.random.default_rng(7)
+    points = rng.normal(size=(200, 3))
+    points /= 10 * np.linalg.norm(points, axis=1)[:, None]
+    limit = "" if most is None else f' maxhullvert="{most}"'
+    mesh = f'<mesh name="round" vertex="{numbers(points.ravel())}"{limit}/>'
+    geoms = '<geom name="round" type="mesh" mesh="round" pos="0 0 0"/>'
+    model = scene(geoms, assets=mesh)
+    corners = model.mesh_vert[np.unique(_hull_faces(model, 0))].astype(float)
+    assert len(corners) == (len(points) if most is None else most)
+    with contactd.embedded() as session:
+        hull = session.add_object("hull", session.load_model("hull", solid_of(model, 0, 1.0, "hull")))
+        session.begin_step(1)[0] = contactd.end(hull, (0, 0, 0))
+        session.finish()
+        middle = corners.mean(axis=0)
+        beyond = session.points(middle + (corners - middle) * (1 + 1e-6))
+        within = session.points(middle + (corners - middle) * (1 - 1e-6))
+        left_out = session.points(model.mesh_vert.astype(float) * (1 + 1e-6))
+    side = [contactd.SIDE_NAMES[k] for k in np.concatenate([beyond, within, left_out])["side"]]
+    assert set(side[: len(corners)]) == {"outside"}, "its corners are the hull's"
+    assert set(side[len(corners) : 2 * len(corners)]) == {"inside"}
+    assert set(side[2 * len(corners) :]) == {"outside"}, "no corner of the mesh is deeper than the hull"
 
 
 def test_a_ball_on_a_height_field_stands_where_mujocos_own_does():

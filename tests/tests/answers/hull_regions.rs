@@ -247,7 +247,7 @@ fn judge(found: &Regions, [a, b]: [&Body; 2], tau: f64, lean: f64, place: &str, 
 fn hulls_touch_where_their_corners_and_planes_say() {
     let first = sized("CONTACTD_HULLS_SEED", 0x6875_6c6c_u64);
     let mut seen = Seen::default();
-    let count = sized("CONTACTD_HULLS", 150);
+    let count = sized("CONTACTD_HULLS", 80);
     for i in 0..count {
         let mut r = Random::new(first + i);
         let (of_a, of_b) = (Polytope::random(&mut r), Polytope::random(&mut r));
@@ -311,7 +311,7 @@ fn hulls_touch_where_their_corners_and_planes_say() {
 fn the_deepest_point_of_hulls_has_none_deeper_near_it() {
     let first = sized("CONTACTD_HULLS_SEED", 0x6465_6570_u64);
     let (mut deep, mut cells) = (0, 0);
-    let count = sized("CONTACTD_HULLS", 150);
+    let count = sized("CONTACTD_HULLS", 80);
     for i in 0..count {
         let mut r = Random::new(first + i);
         let (of_a, of_b) = (Polytope::random(&mut r), Polytope::random(&mut r));
