@@ -106,24 +106,26 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
         sight.cut(&mut region, bodies);
     }
     sight.wall_in(&mut region, &pair, bodies);
-    let stands = |c: &Corner, slack: f64| {
+    // (As far as corners are on their faces.)
+    let slack = APART * bodies.size;
+    let stands = |c: &Corner| {
         let [on_a, on_b] = sight.feet(c.u);
         pair.a.value(on_a) <= slack && pair.b.value(on_b) <= slack
     };
     // The nearest points of thin differences may be anywhere.
     let width = |c: &&Corner| sight.gap(c.u).width;
-    let standing = near.iter().filter(|c| stands(c, APART * bodies.size));
+    let standing = near.iter().filter(|c| stands(c));
     let near = standing.min_by(|p, q| width(p).total_cmp(&width(q)));
     if missed {
         region = vec![*near?];
     }
     if !are_faces {
         if is_area {
-            region.retain(|c| stands(c, APART * bodies.size));
+            region.retain(stands);
         }
         let corners = of_a.1.len() + of_b.1.len();
         bodies.work.look(corners * (pair.a.planes.len() + pair.b.planes.len()) / 8);
-        region.extend(of_a.1.iter().chain(&of_b.1).filter(|c| stands(c, bodies.eps)).chain(near));
+        region.extend(of_a.1.iter().chain(&of_b.1).filter(|c| stands(c)).chain(near));
     }
     region.retain(|c| sight.gap(c.u).width <= bodies.tau * (1.0 + MERGED));
     hull(&mut region, if is_patch { MERGED } else { SAME_POINT } * bodies.size);
@@ -431,7 +433,7 @@ fn some(corners: &[Corner]) -> Vec<Corner> {
         let way = DVec2::new(x, y);
         let farther = |p: &&Corner, q: &&Corner| way.dot(p.u).total_cmp(&way.dot(q.u));
         if let Some(c) = corners.iter().max_by(farther)
-            && !found.iter().any(|f| f.key == c.key)
+            && !found.iter().any(|f| f.u == c.u)
         {
             found.push(*c);
         }
