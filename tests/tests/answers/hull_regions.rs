@@ -347,5 +347,5 @@ fn the_deepest_point_of_hulls_has_none_deeper_near_it() {
         cells += o.counters.instant_cells;
     }
     println!("{deep} pairs, {cells} cells");
-    assert!(deep >= count / 3 && cells <= 200 * deep, "{deep} pairs, {cells} cells");
+    assert!(deep >= count / 3 && cells <= 20 * deep, "{deep} pairs, {cells} cells");
 }
