@@ -250,17 +250,20 @@ fn judge(found: &Regions, [a, b]: [&Body; 2], tau: f64, lean: f64, place: &str, 
     }
 }
 
+/// Two polytopes of many faces, the first one bounded, and the generator that drew them; `None` where they have few.
+fn drawn(seed: u64) -> Option<(Random, Polytope, Polytope)> {
+    let mut r = Random::new(seed);
+    let (a, b) = (Polytope::random(&mut r), Polytope::random(&mut r));
+    (a.planes.len() > 1 && a.planes.len() + b.planes.len() > 64).then_some((r, a, b))
+}
+
 #[test]
 fn hulls_touch_where_their_corners_and_planes_say() {
     let first = sized("CONTACTD_HULLS_SEED", 0x6875_6c6c_u64);
     let mut seen = Seen::default();
     let count = sized("CONTACTD_HULLS", 80);
     for i in 0..count {
-        let mut r = Random::new(first + i);
-        let (of_a, of_b) = (Polytope::random(&mut r), Polytope::random(&mut r));
-        if of_a.planes.len() == 1 || of_a.planes.len() + of_b.planes.len() <= 64 {
-            continue;
-        }
+        let Some((mut r, of_a, of_b)) = drawn(first + i) else { continue };
         let turn = r.rotation();
         let pose_b = Pose::new(r.vector(0.3), r.rotation());
         // Face to face, or not quite, or any way.
@@ -313,18 +316,15 @@ fn hulls_touch_where_their_corners_and_planes_say() {
     assert!(counts.iter().all(|n| *n as u64 >= enough) && seen.covered > 0, "{seen:?}");
 }
 
-/// F is convex, so a point below which none lies near is the lowest of all. A thousandth is promised; what the program leaves is less.
+/// F is convex, so a point below which none lies near is the lowest of all. A thousandth is promised; what the program
+/// leaves is less.
 #[test]
 fn the_deepest_point_of_hulls_has_none_deeper_near_it() {
     let first = sized("CONTACTD_HULLS_SEED", 0x6465_6570_u64);
     let (mut deep, mut cells) = (0, 0);
     let count = sized("CONTACTD_HULLS", 80);
     for i in 0..count {
-        let mut r = Random::new(first + i);
-        let (of_a, of_b) = (Polytope::random(&mut r), Polytope::random(&mut r));
-        if of_a.planes.len() == 1 || of_a.planes.len() + of_b.planes.len() <= 64 {
-            continue;
-        }
+        let Some((mut r, of_a, of_b)) = drawn(first + i) else { continue };
         let poses = [Pose::new(r.vector(0.8), r.rotation()), Pose::new(r.vector(0.8), r.rotation())];
         let [a, b] = [&of_a, &of_b].map(|p| Model::new(p.recipe().build()));
         let [p, q] = poses.map(|pose| Placed { place: Pose::IDENTITY, motion: Motion::resting(pose) });

@@ -23,11 +23,11 @@ use crate::math::gjk::{Cores, of_supports};
 use glam::{DVec2, DVec3};
 use smallvec::{SmallVec, smallvec};
 
-/// Sizes apart from which on the way between the nearest points is the normal; nearer ones tell it to few digits, and what balances
-/// there does.
+/// Sizes of the smaller body: where bodies are farther apart, the way between the nearest points is the normal; where they
+/// are nearer it has few digits, and the planes that balance tell it.
 const APART: f64 = 1e-9;
-/// Relative gap to which the nearest points are looked for: on polytopes they end at theirs, and any other gap leaves its root in the
-/// direction.
+/// Relative gap to which the nearest points are looked for. On polytopes the search ends by itself; a gap would leave its
+/// square root in the direction.
 const GOOD: f64 = 0.0;
 /// Times that it is looked for, each from the last direction.
 const STARTS: usize = 4;
@@ -70,8 +70,8 @@ struct Surface {
     sign: f64,
 }
 
-/// A pair seen along its normal.
-struct Sight {
+/// A pair along its normal: both surfaces as heights over the plane across it.
+struct Projection {
     normal: DVec3,
     across: [DVec3; 2],
     surfaces: [Surface; 2],
@@ -101,19 +101,19 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     // Corners told one by one are as far apart as other points are; those of an edge of a mesh are often two that nearly coincide.
     let is_area = hull(&mut region, if are_faces { MERGED } else { SAME_POINT } * bodies.size).len() > 2;
     let is_patch = is_area && are_faces;
-    let sight = Sight::new(&pair, normal, across, ends.iter().chain(&near).chain(&of_a.1).chain(&of_b.1));
+    let projection = Projection::new(&pair, normal, across, ends.iter().chain(&near).chain(&of_a.1).chain(&of_b.1));
     if is_patch || !is_area {
-        sight.cut(&mut region, bodies);
+        projection.cut(&mut region, bodies);
     }
-    sight.wall_in(&mut region, &pair, bodies);
-    // (As far as corners are on their faces.)
+    projection.wall_in(&mut region, &pair, bodies);
+    // Corners of a hull are on their faces as far as this.
     let slack = APART * bodies.size;
     let stands = |c: &Corner| {
-        let [on_a, on_b] = sight.feet(c.u);
+        let [on_a, on_b] = projection.feet(c.u);
         pair.a.value(on_a) <= slack && pair.b.value(on_b) <= slack
     };
     // The nearest points of thin differences may be anywhere.
-    let width = |c: &&Corner| sight.gap(c.u).width;
+    let width = |c: &&Corner| projection.gap(c.u).width;
     let standing = near.iter().filter(|c| stands(c));
     let near = standing.min_by(|p, q| width(p).total_cmp(&width(q)));
     if missed {
@@ -127,20 +127,20 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
         bodies.work.look(corners * (pair.a.planes.len() + pair.b.planes.len()) / 8);
         region.extend(of_a.1.iter().chain(&of_b.1).filter(|c| stands(c)).chain(near));
     }
-    region.retain(|c| sight.gap(c.u).width <= bodies.tau * (1.0 + MERGED));
+    region.retain(|c| projection.gap(c.u).width <= bodies.tau * (1.0 + MERGED));
     hull(&mut region, if is_patch { MERGED } else { SAME_POINT } * bodies.size);
     let mut found = Vec::new();
     match region.len() {
         0 => {}
-        1 => found.push(sight.point(bodies, near.unwrap_or(&region[0]).u)),
-        2 => found.push(sight.line(bodies, [region[0].u, region[1].u])),
-        _ if is_patch => found.push(sight.patch(bodies, &mut region)),
-        _ => found.extend(some(&region).into_iter().map(|c| sight.point(bodies, c.u))),
+        1 => found.push(projection.point(bodies, near.unwrap_or(&region[0]).u)),
+        2 => found.push(projection.line(bodies, [region[0].u, region[1].u])),
+        _ if is_patch => found.push(projection.patch(bodies, &mut region)),
+        _ => found.extend(some(&region).into_iter().map(|c| projection.point(bodies, c.u))),
     }
     let told = found.iter().map(Region::separation).fold(bodies.tau * (1.0 + MERGED), f64::min);
-    let is_lower = |c: &Corner| sight.gap(c.u).width < told - if found.is_empty() { 0.0 } else { bodies.eps };
+    let is_lower = |c: &Corner| projection.gap(c.u).width < told - if found.is_empty() { 0.0 } else { bodies.eps };
     if let Some(c) = near.filter(|c| is_lower(c)) {
-        found.push(sight.point(bodies, c.u));
+        found.push(projection.point(bodies, c.u));
     }
     Some(found)
 }
@@ -469,7 +469,7 @@ impl Surface {
     }
 }
 
-impl Sight {
+impl Projection {
     /// Over a box that holds some points.
     fn new<'c>(pair: &Polytopes, normal: DVec3, across: [DVec3; 2], over: impl Iterator<Item = &'c Corner>) -> Self {
         let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
