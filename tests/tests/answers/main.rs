@@ -9,6 +9,7 @@ mod cases;
 mod closed_forms;
 mod coincident;
 mod contact_regions;
+mod convex_pairs;
 mod elliptics;
 mod families;
 mod hard_cases;

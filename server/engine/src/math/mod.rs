@@ -9,6 +9,7 @@ pub mod bound_queue;
 pub mod f64x2;
 pub mod gjk;
 pub mod halt;
+pub mod linear;
 pub mod mix;
 pub mod moments;
 pub mod oriented;

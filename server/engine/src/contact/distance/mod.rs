@@ -9,7 +9,7 @@
 
 pub(in crate::contact) mod active_set;
 pub(in crate::contact) mod part;
-mod polish;
+pub(in crate::contact) mod polish;
 pub(in crate::contact) mod polytope;
 mod search;
 mod span;

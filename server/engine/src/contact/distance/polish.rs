@@ -4,11 +4,12 @@
 //! Kuhn and Tucker with an active set of literals (`active_set`). What comes out is a guess; both points are then moved inwards by as much
 //! as rounding may hide, and both trees are asked whether they are inside.
 
-use super::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause, eliminated};
+use super::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause};
 use super::part::{Parts, literal_at};
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::witness::newton::hessian;
 use crate::math::gjk::least_of;
+use crate::math::linear::eliminated;
 use crate::motion::Instant;
 use crate::octree::Model;
 use crate::solid::local::{LiteralId, Token};

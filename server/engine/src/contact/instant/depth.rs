@@ -5,12 +5,12 @@
 //! shrink the box otherwise. That ends in a local optimum, so branch and bound goes on from there: boxes in which a point
 //! deeper by more than `BETTER` may lie are halved, and each deeper point found is climbed from. With all boxes dropped
 //! the point is the deepest of all up to that tolerance; should `MOST_CELLS` run out, it is the deepest found.
-//! Two polytopes of many faces are one linear program (`polytopes`) in place of all that.
+//! Two convex bodies are one convex program (`program`) in place of all that.
 //! Either way its depth g is a proven lower bound: a ball of radius g is common to both bodies, so no translation
 //! shorter than 2g takes them apart.
 
 use super::near::Near;
-use super::polytopes::{Polytopes, ROUNDINGS};
+use super::program::{Lowest, Program, ROUNDINGS};
 use super::separation::{self, Cover};
 use super::work::Work;
 use crate::contact::exclusion::clause::{self, Expressions};
@@ -42,7 +42,7 @@ pub type Deepest = (DVec3, DVec3, f64, Vec<(Side, LiteralId)>);
 
 /// The deepest common point: no other is deeper by more than the tolerance, unless the work runs out.
 pub fn deepest(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Deepest {
-    if let Some(found) = of_polytopes(task, at, 0.0, BETTER, work) {
+    if let Some(found) = of_program(task, at, 0.0, BETTER, work) {
         return found;
     }
     let mut best = climb(task, at, start, work);
@@ -65,20 +65,19 @@ fn deepen(task: &Task, at: &Instant, work: &Work, part: f64, best: &mut Deepest)
 
 /// A depth that no common point exceeds, and hardly more than the deepest has; `None` when the work allows no proof of it.
 pub fn at_most(task: &Task, at: &Instant, start: DVec3, work: &Work) -> Option<f64> {
-    if let Some((_, _, depth, _)) = of_polytopes(task, at, 0.0, FINE, work) {
+    if let Some((_, _, depth, _)) = of_program(task, at, 0.0, FINE, work) {
         return Some(better(task, depth, FINE));
     }
     let mut best = climb(task, at, start, work);
     deepen(task, at, work, FINE, &mut best).then(|| better(task, best.2, FINE))
 }
 
-/// Where two bodies that have nothing in common are nearest to it: F at its lowest, if no more than half of `reach`; no other
-/// point is nearer by more than `part` of that, once proven.
+/// Where two bodies that have nothing in common are nearest to it: F at its lowest, if no more than half of `reach` as far as that is
+/// known; no other point is nearer by more than `part` of that, once proven.
 pub fn nearest(task: &Task, at: &Instant, reach: f64, part: f64, work: &Work) -> (Option<Deepest>, bool) {
-    if let Some(found) = of_polytopes(task, at, 0.5 * reach, part, work)
-        && -found.2 <= 0.5 * reach
-    {
-        return (Some(found), true);
+    if let Some(found) = of_program(task, at, 0.5 * reach, part, work) {
+        let lowest = -found.2 - slack(task, found.2, part) - ROUNDINGS * task.rounding;
+        return ((lowest <= 0.5 * reach).then_some(found), true);
     }
     let mut best: Option<Deepest> = None;
     let proven = lower(task, at, 0.5 * reach, work, |x| {
@@ -93,18 +92,23 @@ pub fn nearest(task: &Task, at: &Instant, reach: f64, part: f64, work: &Work) ->
     (best, proven)
 }
 
-/// The deepest common point of two polytopes of many faces, or where they are nearest to have one: no other is deeper by more than the
+/// The deepest common point of two convex bodies, or where they are nearest to have one: no other is deeper by more than the
 /// slack that `part` of its depth gives. `None` for other bodies, and where the program's multipliers do not prove it.
-fn of_polytopes(task: &Task, at: &Instant, reach: f64, part: f64, work: &Work) -> Option<Deepest> {
-    let within = separation::common(task, at, reach);
-    if !within.is_finite() || within.is_empty() {
-        return None;
-    }
-    let found = Polytopes::of(task, at)?.lowest(&within, work);
+fn of_program(task: &Task, at: &Instant, reach: f64, part: f64, work: &Work) -> Option<Deepest> {
+    let found = lowest(task, at, reach, work)?;
     let depth = -separation::value(task, at, found.x);
     let proven = found.bound - ROUNDINGS * task.rounding >= -depth - slack(task, depth, part);
     let literals = || found.support.iter().map(|s| (s.0, s.1)).collect();
     proven.then(|| (found.x, normal(task, at, found.x, &found.support), depth, literals()))
+}
+
+/// Where F of two convex bodies is lowest within some reach of both.
+fn lowest(task: &Task, at: &Instant, reach: f64, work: &Work) -> Option<Lowest> {
+    let within = separation::common(task, at, reach);
+    if !within.is_finite() || within.is_empty() {
+        return None;
+    }
+    Some(Program::of(task, at)?.lowest(&within, |value, bound| value - bound <= task.rounding, work))
 }
 
 /// The least depth that is worth another climb.

@@ -3,7 +3,7 @@
 
 pub mod depth;
 mod near;
-pub(in crate::contact) mod polytopes;
+pub(in crate::contact) mod program;
 pub mod separation;
 pub mod within;
 pub mod work;

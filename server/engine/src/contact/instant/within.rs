@@ -1,7 +1,7 @@
 //! Whether two bodies come within a distance of each other at an instant: proven, witnessed or open.
 
 use super::depth;
-use super::polytopes::{Polytopes, ROUNDINGS};
+use super::program::{Program, ROUNDINGS};
 use super::separation::{Cover, common, value};
 use super::work::Work;
 use crate::contact::query::task::Task;
@@ -37,7 +37,7 @@ pub(in crate::contact) fn glimpse(task: &Task, at: &Instant, level: f64, work: &
 
 /// Decides whether a point with F <= level exists.
 pub(in crate::contact) fn within(task: &Task, at: &Instant, level: f64, work: &Work) -> Within {
-    if let Some(decided) = of_polytopes(task, at, level, work) {
+    if let Some(decided) = of_program(task, at, level, work) {
         return decided;
     }
     let mut cover = Cover::new(task, at, 2.0 * level, 2.0 * level, work);
@@ -65,16 +65,17 @@ pub(in crate::contact) fn within(task: &Task, at: &Instant, level: f64, work: &W
     if cover.is_done() { Within::Apart } else { Within::Open }
 }
 
-/// Decides whether two polytopes of many faces have a point with F <= level; `None` for other bodies, and for what is nearer to the
+/// Decides whether two convex bodies have a point with F <= level; `None` for other bodies, and for what is nearer to the
 /// level than rounding.
-fn of_polytopes(task: &Task, at: &Instant, level: f64, work: &Work) -> Option<Within> {
+fn of_program(task: &Task, at: &Instant, level: f64, work: &Work) -> Option<Within> {
     let region = common(task, at, 2.0 * level);
-    if !region.is_finite() {
+    if !region.is_finite() || region.is_empty() {
         return None;
     }
-    let found = Polytopes::of(task, at)?.lowest(&region, work);
+    let apart = level + ROUNDINGS * task.rounding;
+    let found = Program::of(task, at)?.lowest(&region, |value, bound| value <= level || bound > apart, work);
     if value(task, at, found.x) <= level {
         return Some(Within::Witness(found.x));
     }
-    (found.bound > level + ROUNDINGS * task.rounding).then_some(Within::Apart)
+    (found.bound > apart).then_some(Within::Apart)
 }

@@ -4,9 +4,10 @@
 //! them (`contact/distance/active_set`). As two points of two bodies are made nearest (`contact/distance/polish`), with one of them fixed.
 
 use super::{Sought, literal_at};
-use crate::contact::distance::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause, eliminated};
+use crate::contact::distance::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause};
 use crate::contact::witness::newton::hessian;
 use crate::math::gjk::least_of;
+use crate::math::linear::eliminated;
 use crate::octree::Model;
 use crate::solid::Sense;
 use crate::solid::local::{LiteralId, Token};

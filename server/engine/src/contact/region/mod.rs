@@ -8,6 +8,9 @@
 //! * lines: an edge lies on a face or an edge, or round faces touch along a ruling or a circle (`line`);
 //! * points: what touches nowhere else (`point`).
 //!
+//! Two polytopes are told by their corners (`polytopes`), two convex bodies that touch in one point by that (`single`), both without
+//! these boxes.
+//!
 //! All points are roots of the faces' own equations and are confirmed by both whole trees: nothing is sampled. Faces that
 //! make up one surface (abutting operands of a union) count as one. Regions and their points are ordered by face ids and
 //! by directions fixed in the bodies, never by position, so that a body at rest has the same list from step to step.
@@ -19,8 +22,12 @@ mod line;
 mod local;
 mod patch;
 mod point;
+mod polytope;
 mod polytopes;
+mod single;
 mod surface;
+#[cfg(test)]
+mod tests;
 
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth;
@@ -117,7 +124,9 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
     if found.regions.is_empty() {
         let rest = Work::new(limit.saturating_sub(found.cells));
         let (nearest, proven) = depth::nearest(&task, &at, threshold, depth::BETTER, &rest);
-        found.regions.extend(nearest.map(|lowest| point_region(&bodies, &point::nearest(&bodies, &lowest))));
+        let nearest = nearest.map(|lowest| point::nearest(&bodies, &lowest));
+        let near = nearest.filter(|m| m.gap <= threshold * (1.0 + SAME_POINT) + bodies.eps);
+        found.regions.extend(near.map(|m| point_region(&bodies, &m)));
         found.complete &= proven;
         found.cells += rest.cells();
     }
@@ -211,6 +220,24 @@ fn find(bodies: &Bodies) -> Regions {
         out.regions.sort_by_key(rank);
         return out;
     }
+    if let Some(regions) = single::regions(bodies) {
+        (out.regions, out.complete) = (regions, true);
+        return out;
+    }
+    let mut found = in_boxes(bodies);
+    // Boxes follow curves that nearly run along each other to a part of the threshold.
+    if let [only] = &mut found.regions[..]
+        && only.extent == Extent::Point
+        && let Some(nearest) = single::nearest_point(bodies)
+    {
+        *only = nearest;
+    }
+    found
+}
+
+/// All regions of any bodies.
+fn in_boxes(bodies: &Bodies) -> Regions {
+    let mut out = Regions::default();
     let (places, covered) = cover(bodies);
     let patches = pairs(bodies, &places);
     let mut ends: Vec<DVec3> = Vec::new();

@@ -13,6 +13,8 @@ use crate::contact::instant::depth::Deepest;
 use crate::contact::instant::separation::Place;
 use crate::contact::witness::balance::{self, BALANCE, Balance, Equations, MOST_BALANCED};
 use crate::contact::witness::newton::{MAX_UNKNOWNS, cholesky_solve};
+use crate::math::any_perpendicular;
+use crate::math::linear::eliminated;
 use crate::solid::Sense;
 use crate::solid::surface::{Apex, Quadric, Symmetry};
 use glam::DVec3;
@@ -232,6 +234,10 @@ fn choices(count: usize) -> Vec<SmallVec<[usize; 3]>> {
     out
 }
 
+/// Newton's steps to where two faces are nearest to each other.
+const MOST_STEPS: usize = 8;
+/// How far from where they began, in sizes of the smaller body.
+const ASIDE: f64 = 1e-2;
 /// Steps to and fro between two surfaces.
 const MOST_PACES: usize = 32;
 
@@ -269,7 +275,14 @@ fn on_feet(bodies: &Bodies, lits: &[Lit], x: DVec3, normal: DVec3) -> Option<Mee
         let on = |side: Side, y: DVec3| bodies.f(side, y).abs() <= bodies.eps && bodies.is_bodily(side, y);
         on(Side::A, feet[0]) && on(Side::B, feet[1])
     };
-    // F is lowest where the faces' levels agree, the distance a little beside it: to and fro until the feet stay.
+    // F is lowest where the faces' levels agree, the distance a little beside it.
+    if let ([a], [b]) = (&of_a[..], &of_b[..])
+        && let Some(feet) = facing(bodies, [*a, *b], feet)
+        && on(feet)
+    {
+        return Some(met(bodies, feet, normal));
+    }
+    // To and fro until the feet stay.
     let mut closer = feet;
     for _ in 0..MOST_PACES {
         let on_a = follow(bodies, &of_a, closer[1]);
@@ -281,20 +294,73 @@ fn on_feet(bodies: &Bodies, lits: &[Lit], x: DVec3, normal: DVec3) -> Option<Mee
         }
     }
     let feet = [closer, feet].into_iter().find(|feet| on(*feet))?;
+    Some(met(bodies, feet, normal))
+}
+
+/// The meeting of two feet, along a normal.
+pub fn met(bodies: &Bodies, feet: [DVec3; 2], normal: DVec3) -> Meeting {
     let way = feet[1] - feet[0];
     // From some distance on the way itself tells the normal best.
     let is_apart = way.dot(normal) > bodies.eps / SLACK;
     let normal = if is_apart { way.normalize() } else { normal };
-    Some(Meeting { feet, normal, gap: way.dot(normal) })
+    Meeting { feet, normal, gap: way.dot(normal) }
+}
+
+/// Where two faces are nearest to each other, from feet that are near to it: each face's normal along the way to the other one. Newton's
+/// method on that, along two tangents, which holds however small the gap is. `None` where it does not end, as of faces that lie
+/// along each other.
+fn facing(bodies: &Bodies, [a, b]: [Lit; 2], from: [DVec3; 2]) -> Option<[DVec3; 2]> {
+    let [mut p, mut q] = from;
+    let aside = |x: DVec3, from: DVec3| x.distance(from) > ASIDE * bodies.size;
+    if [a, b].iter().all(|l| bodies.face(*l).is_flat()) {
+        return None;
+    }
+    for _ in 0..MOST_STEPS {
+        let (on_a, on_b) = (bodies.look_out(a, p), bodies.look_out(b, q));
+        let n = on_a.normal;
+        let u = any_perpendicular(n);
+        let (way, turned) = (q - p, n + on_b.normal);
+        let gap = way.dot(n);
+        // The unknowns are the steps of both feet.
+        let (mut rows, mut f) = ([[0.0; 6]; 6], [0.0; 6]);
+        let mut row = |i: usize, of_p: DVec3, of_q: DVec3, value: f64| {
+            rows[i][..3].copy_from_slice(&of_p.to_array());
+            rows[i][3..].copy_from_slice(&of_q.to_array());
+            f[i] = -value;
+        };
+        row(0, n, DVec3::ZERO, on_a.value);
+        row(1, DVec3::ZERO, on_b.normal, on_b.value);
+        for (k, t) in [u, n.cross(u)].into_iter().enumerate() {
+            let (bend_a, bend_b) = (on_a.hessian * t, on_b.hessian * t);
+            row(2 + k, bend_a * bodies.size, bend_b * bodies.size, t.dot(turned) * bodies.size);
+            row(4 + k, -t - bend_a * gap, t, t.dot(way));
+        }
+        let step = eliminated(&mut rows, f, 6)?;
+        let (dp, dq) = (DVec3::from_slice(&step[..3]), DVec3::from_slice(&step[3..]));
+        (p, q) = (p + dp, q + dq);
+        if !p.is_finite() || !q.is_finite() || aside(p, from[0]) || aside(q, from[1]) {
+            return None;
+        }
+        if dp.length().max(dq.length()) <= bodies.eps {
+            return Some([p, q]);
+        }
+    }
+    None
 }
 
 /// The meeting at the lowest point of F. Where its faces cannot be followed, what F itself proves: no less than 2F apart.
-pub fn nearest(bodies: &Bodies, (x, normal, depth, lits): &Deepest) -> Meeting {
-    on_feet(bodies, lits, *x, *normal).unwrap_or_else(|| Meeting {
+pub fn nearest(bodies: &Bodies, lowest: &Deepest) -> Meeting {
+    let (x, normal, depth, _) = lowest;
+    followed(bodies, lowest).unwrap_or_else(|| Meeting {
         feet: [*x + *normal * *depth, *x - *normal * *depth],
         normal: *normal,
         gap: -2.0 * depth,
     })
+}
+
+/// The same where its faces can be followed.
+pub fn followed(bodies: &Bodies, (x, normal, _, lits): &Deepest) -> Option<Meeting> {
+    on_feet(bodies, lits, *x, *normal)
 }
 
 /// Where some literals balance, looked for from `x` on.

@@ -1,4 +1,4 @@
-//! The region of two convex polytopes of many faces, such as hulls of meshes: by their corners, without boxes.
+//! The region of two convex polytopes, boxes and hulls of meshes among them: by their corners, without boxes that are halved.
 //!
 //! Two convex bodies touch in one place. Along its normal n the surface of A is the lower envelope of its planes, that of B
 //! the upper one, and the gap between them is convex. What faces the other body is told by its outline: the hull of the
@@ -10,15 +10,17 @@
 //! * a point, or an area of corners without faces: points, eight of them at most.
 //!
 //! Where they are nearest within it is a point of its own, since a hull that bows touches there before it does on its rim:
-//! what the foremost corners of both have in common. Boxes with all faces that run together in a place would have them all in pairs.
+//! what the foremost corners of both have in common. Boxes would have all faces that run together in a place in pairs.
 
 use super::local::Bodies;
+use super::polytope::{Plane, Polytope, Polytopes};
 use super::{Region, RegionPoint, SAME_POINT, faces_at, three};
 use crate::contact::exclusion::literal::Side;
-use crate::contact::instant::polytopes::{Plane, Polytope, Polytopes};
+use crate::contact::instant::program::{Lowest, Program};
 use crate::contact::instant::separation::common;
 use crate::contact::query::outcome::{ContactKind, Extent, NO_FACE};
 use crate::contact::region::surface::LEAN;
+use crate::math::Aabb;
 use crate::math::gjk::{Cores, of_supports};
 use glam::{DVec2, DVec3};
 use smallvec::{SmallVec, smallvec};
@@ -83,16 +85,37 @@ struct Gap {
     planes: [usize; 2],
 }
 
-/// All regions of two polytopes of many faces; `None` for other bodies, and where no direction between them is found.
+/// All regions of two polytopes; `None` for other bodies, and where no direction between them is found.
 pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     let pair = Polytopes::of(bodies.task, bodies.at)?;
     let (normal, near) = normal(bodies, &pair)?;
+    let found = along(bodies, &pair, normal, &near)?;
+    match mean_normal(bodies, &pair, normal, &found) {
+        Some(mean) => along(bodies, &pair, mean, &near),
+        None => Some(found),
+    }
+}
+
+/// Where edges or corners meet many directions are normals: the mean of the adjacent faces' normals, if it is one of them.
+fn mean_normal(bodies: &Bodies, pair: &Polytopes, n: DVec3, found: &[Region]) -> Option<DVec3> {
+    let [region] = found else { return None };
+    let with_face = matches!(region.kind, ContactKind::FaceFace | ContactKind::EdgeFace | ContactKind::VertexFace);
+    if with_face || region.separation().abs() > APART * bodies.size {
+        return None;
+    }
+    let middle = region.points.iter().map(|p| p.point).sum::<DVec3>() / region.points.len() as f64;
+    let mean = (bodies.average(Side::A, middle) - bodies.average(Side::B, middle)).try_normalize()?;
+    (pair.apart(mean) >= pair.apart(n) - bodies.eps).then_some(mean)
+}
+
+/// The regions along a normal, of bodies that are nearest to each other at one of some points.
+fn along(bodies: &Bodies, pair: &Polytopes, normal: DVec3, near: &[DVec3]) -> Option<Vec<Region>> {
     let across = [bodies.material(Side::A, normal), normal.cross(bodies.material(Side::A, normal))];
     let flat = |x: DVec3| DVec2::new(across[0].dot(x), across[1].dot(x));
     bodies.work.look(pair.a.planes.len() + pair.b.planes.len());
-    let ([of_a, of_b], are_faces) = outlines(bodies, &pair, normal, flat);
+    let ([of_a, of_b], are_faces) = outlines(bodies, pair, normal, flat);
     let common = of_a.common(&of_b, bodies);
-    let foremost = FOREMOST.iter().filter_map(|slack| foremost(bodies, &pair, normal, *slack, flat));
+    let foremost = FOREMOST.iter().filter_map(|slack| foremost(bodies, pair, normal, *slack, flat));
     let near = foremost.chain(near.iter().map(|x| flat(*x)));
     let near: SmallVec<[Corner; 5]> = near.map(|u| Corner { u, key: [0; 2] }).collect();
     let missed = common.is_empty();
@@ -101,11 +124,11 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     // Corners told one by one are as far apart as other points are; those of an edge of a mesh are often two that nearly coincide.
     let is_area = hull(&mut region, if are_faces { MERGED } else { SAME_POINT } * bodies.size).len() > 2;
     let is_patch = is_area && are_faces;
-    let projection = Projection::new(&pair, normal, across, ends.iter().chain(&near).chain(&of_a.1).chain(&of_b.1));
+    let projection = Projection::new(pair, normal, across, ends.iter().chain(&near).chain(&of_a.1).chain(&of_b.1));
     if is_patch || !is_area {
         projection.cut(&mut region, bodies);
     }
-    projection.wall_in(&mut region, &pair, bodies);
+    projection.wall_in(&mut region, pair, bodies);
     // Corners of a hull are on their faces as far as this.
     let slack = APART * bodies.size;
     let stands = |c: &Corner| {
@@ -150,7 +173,7 @@ fn normal(bodies: &Bodies, pair: &Polytopes) -> Option<(DVec3, SmallVec<[DVec3; 
     let box_of_both = common(bodies.task, bodies.at, bodies.tau);
     // Of two polytopes that nearly lie along each other it has as few digits as their difference is thin. A face, two edges,
     // an edge and a corner that keep them farther apart have it to all digits.
-    let apart = |n: DVec3| n.dot(pair.b.support(-n)) - n.dot(pair.a.support(n));
+    let apart = |n: DVec3| pair.apart(n);
     let sharpened = |n: DVec3, most: usize| {
         let near = |normals: &mut dyn Iterator<Item = DVec3>| -> Vec<DVec3> {
             let all = normals.map(|m| ((m - n).length(), m)).filter(|(off, _)| *off <= SAME);
@@ -187,6 +210,10 @@ fn normal(bodies: &Bodies, pair: &Polytopes) -> Option<(DVec3, SmallVec<[DVec3; 
             let most = if v.length() > THIN * bodies.size { 1 } else { MANY_FACES };
             let n = sharpened(v.normalize(), most);
             let gap = apart(n);
+            // Of bodies that overlap a little it may end beside where it should, in a direction that is none.
+            if gap < 0.0 {
+                break;
+            }
             if best.is_none_or(|b| gap > b.0) {
                 best = Some((gap, n, a + v * 0.5));
             }
@@ -199,7 +226,7 @@ fn normal(bodies: &Bodies, pair: &Polytopes) -> Option<(DVec3, SmallVec<[DVec3; 
         if let Some((gap, n, near)) = best {
             let mut all = smallvec![near];
             if gap < THIN * bodies.size && box_of_both.is_finite() {
-                all.push(pair.lowest(&box_of_both, bodies.work).x);
+                all.push(lowest(bodies, &box_of_both)?.x);
             }
             return Some((n, all));
         }
@@ -212,14 +239,22 @@ fn normal(bodies: &Bodies, pair: &Polytopes) -> Option<(DVec3, SmallVec<[DVec3; 
     if !box_of_both.is_finite() {
         return None;
     }
-    let found = pair.lowest(&box_of_both, bodies.work);
+    let found = lowest(bodies, &box_of_both)?;
     let sum = |side: Side, planes: &[Plane]| {
         let own = found.support.iter().filter(|s| s.0 == side);
         own.map(|s| planes[s.1.face() as usize].normal * s.2).sum::<DVec3>()
     };
     let (of_a, of_b) = (sum(Side::A, &pair.a.planes), sum(Side::B, &pair.b.planes));
-    ((of_a + of_b).length() <= BALANCED * of_a.length())
-        .then(|| (sharpened(of_a.normalize(), MANY_FACES), smallvec![found.x]))
+    if (of_a + of_b).length() > BALANCED * of_a.length() {
+        return None;
+    }
+    Some((sharpened(of_a.normalize(), MANY_FACES), smallvec![found.x]))
+}
+
+/// Where F is lowest in a box.
+fn lowest(bodies: &Bodies, within: &Aabb) -> Option<Lowest> {
+    let program = Program::of(bodies.task, bodies.at).filter(|_| !within.is_empty())?;
+    Some(program.lowest(within, |value, bound| value - bound <= bodies.task.rounding, bodies.work))
 }
 
 /// Unit directions near to n that two edges between some corners of each body have as their common perpendicular, or an edge and

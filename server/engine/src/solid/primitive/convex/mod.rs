@@ -68,6 +68,9 @@ pub struct Slope {
 /// Discs about one axis, or balls, whose hull a shape is: centres and radii, corners with radius 0.
 pub type Discs = SmallVec<[(DVec3, f64); 8]>;
 
+/// How many times deeper than looked at a rim has to fall off across the body, for what is near of it to be near one point.
+const RIM: f64 = 8.0;
+
 impl Convex<'_> {
     /// A point inside a bounded one.
     pub fn middle(&self) -> DVec3 {
@@ -304,6 +307,34 @@ impl Convex<'_> {
             | Convex::Superellipsoid(_)
             | Convex::HalfSpace
             | Convex::Other => 0,
+        }
+    }
+
+    /// True where all of it that is within `depth` of its farthest plane along the unit direction n, both in its own frame, is near
+    /// one point: no face and no edge leans against that plane by less than an angle whose sine is `lean`.
+    pub fn is_pointed(&self, n: DVec3, depth: f64, lean: f64) -> bool {
+        match self {
+            Convex::Ball(_) | Convex::Ellipsoid(_) => true,
+            Convex::Round { bottom, top, half } => {
+                let across = n.truncate().length();
+                let ends = [(-half, *bottom), (*half, *top)];
+                let reach = |(z, radius): (f64, f64)| n.z * z + radius * across;
+                let falls = (reach(ends[1]) - reach(ends[0])).abs();
+                let rim = if reach(ends[1]) > reach(ends[0]) { *top } else { *bottom };
+                let side = (2.0 * half).hypot(top - bottom);
+                // A rim falls off by the square of the way along it.
+                falls > depth.max(lean * side) && (rim == 0.0 || across > lean && rim * across > RIM * depth)
+            }
+            Convex::Capsule { half, .. } => n.z.abs() > lean && 2.0 * half * n.z.abs() > depth,
+            Convex::Cuboid(half) => n.abs().min_element() > lean && (*half * n).abs().min_element() * 2.0 > depth,
+            Convex::Corners(corners) => {
+                let Some(far) = corners.iter().copied().max_by(|v, w| n.dot(*v).total_cmp(&n.dot(*w))) else {
+                    return false;
+                };
+                let falls = |v: &DVec3| n.dot(far - *v) > depth.max(lean * far.distance(*v));
+                corners.iter().all(|v| *v == far || falls(v))
+            }
+            Convex::Elliptic(_) | Convex::Superellipsoid(_) | Convex::HalfSpace | Convex::Other => false,
         }
     }
 

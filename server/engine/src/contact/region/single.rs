@@ -1,0 +1,153 @@
+//! The one point in which two convex bodies touch, where one of them has no other near: without boxes.
+//!
+//! Two convex bodies are nearest to each other along one direction, and touch in what the faces farthest along it have in common. Where
+//! one of them stands out there (`Convex::is_pointed`), as an ellipsoid does, a rim or a corner, that is a point. Both feet are followed
+//! from where F is lowest, or found by Newton's method on the distance itself. That they are nearest is proven: between the planes
+//! through them across the normal neither body reaches.
+
+use super::local::Bodies;
+use super::point::{self, Meeting};
+use super::{Region, SAME_FACES, SAME_POINT, point_region, surface};
+use crate::contact::distance::part::Parts;
+use crate::contact::distance::polish::{self, Polish};
+use crate::contact::exclusion::literal::Side;
+use crate::contact::instant::depth::{self, Deepest};
+use crate::solid::Face;
+use crate::solid::primitive::Primitive;
+use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
+
+/// Thresholds by which all that is near one point of a body stands out, where it touches another one there alone: areas are told of
+/// what leans by `surface::LEAN` thresholds at most …
+const POINTED: f64 = 2.0 * surface::LEAN;
+/// … and lines of what leans by some roots of the threshold over the size (`line`).
+const LEAN: f64 = 2.0;
+/// Thresholds to which it is enough to know that feet are nearest where boxes know them to less.
+const ROUGH: f64 = 1e-3;
+/// Cosines from 1 within which two ways are one: of feet that nearly touch.
+const SAME_WAY: f64 = 0.1;
+
+/// The region of two convex bodies that touch in one point, none where they are apart; `None` for other bodies, and where it may be more
+/// than a point.
+pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
+    let both = convex(bodies)?;
+    let (lowest, proven) = depth::nearest(bodies.task, bodies.at, bodies.tau, depth::BETTER, bodies.work);
+    if !proven {
+        return None;
+    }
+    let Some(lowest) = lowest else { return Some(Vec::new()) };
+    // An apex has no normal, and is told beside what touches next to it.
+    let (depth, lean) = (POINTED * bodies.tau, LEAN * (bodies.lie / bodies.size).sqrt());
+    let stands_out = |whole: &Primitive, n: DVec3, foot: DVec3| {
+        let is_behind = |apex: DVec3| n.dot(foot - apex) > depth || whole.value(apex) > bodies.eps;
+        let mut apexes = whole.faces.listed().iter().filter_map(Face::apex);
+        let is_pointed = whole.shape.convex().is_pointed(whole.frame.rotation.inverse() * n, depth, lean);
+        apexes.all(|apex| is_behind(apex.point)).then_some(is_pointed)
+    };
+    let is_single = |m: &Meeting| {
+        let of_a = stands_out(both[0], m.normal, m.feet[0]);
+        let of_b = stands_out(both[1], bodies.at.b_from_a * -m.normal, bodies.at.b_point(m.feet[1]));
+        matches!((of_a, of_b), (Some(a), Some(b)) if a || b)
+    };
+    // Where F is lowest the bodies face each other nearly as where they are nearest.
+    if !is_single(&Meeting { feet: [lowest.0; 2], normal: lowest.1, gap: 0.0 }) {
+        return None;
+    }
+    let m = meeting(bodies, both, &lowest, bodies.eps).filter(is_single)?;
+    let is_near = m.gap <= bodies.tau * (1.0 + SAME_POINT) + bodies.eps;
+    Some(if is_near { vec![point_region(bodies, &m)] } else { Vec::new() })
+}
+
+/// The point that boxes told of two bodies as their only region, where they are proven to be nearest if they are convex.
+pub fn nearest_point(bodies: &Bodies) -> Option<Region> {
+    let both = convex(bodies)?;
+    let (lowest, _) = depth::nearest(bodies.task, bodies.at, bodies.tau, depth::BETTER, bodies.work);
+    let slack = bodies.eps.max(ROUGH * bodies.tau);
+    Some(point_region(bodies, &meeting(bodies, both, &lowest?, slack)?))
+}
+
+/// Both bodies, if they are convex and one of them is round: of polytopes corners tell more (`polytopes`).
+fn convex<'a>(bodies: &Bodies<'_, 'a>) -> Option<[&'a Primitive; 2]> {
+    let both = [bodies.task.a.whole()?, bodies.task.b.whole()?];
+    let is_flat = |whole: &&Primitive| whole.faces.listed().iter().all(Face::is_flat);
+    (both.iter().all(|whole| whole.is_convex()) && !both.iter().all(is_flat)).then_some(both)
+}
+
+/// Where the bodies are nearest to each other, proven to a slack, from where F is lowest.
+fn meeting(bodies: &Bodies, both: [&Primitive; 2], lowest: &Deepest, slack: f64) -> Option<Meeting> {
+    let near = |m: Meeting| nearest(bodies, both, m, slack);
+    let polished = |feet: [DVec3; 2]| polished(bodies, feet, lowest.1).and_then(near);
+    // Two faces are followed at once, what has edges by the distance itself.
+    if lowest.3.len() > 2
+        && let Some(m) = polished([lowest.0; 2])
+    {
+        return Some(m);
+    }
+    let followed = point::followed(bodies, lowest);
+    let feet = followed.as_ref().map_or([lowest.0; 2], |m| m.feet);
+    followed.and_then(near).or_else(|| polished(feet))
+}
+
+/// The meeting, if no points of the bodies are nearer to each other than its feet, but for a slack.
+fn nearest(bodies: &Bodies, [a, b]: [&Primitive; 2], mut m: Meeting, slack: f64) -> Option<Meeting> {
+    let own = |side: Side, n: DVec3| if side == Side::A { n } else { bodies.at.b_from_a * -n };
+    let n = sharpened(bodies, &m);
+    m = Meeting { gap: (m.feet[1] - m.feet[0]).dot(n), normal: n, ..m };
+    // A half-space reaches on without end, but along its own normal.
+    for (side, whole) in [(Side::A, a), (Side::B, b)] {
+        if let Some(h) = half_space(whole) {
+            let h = if side == Side::A { h.0 } else { -bodies.at.a_vector(h.0) };
+            if h.dot(m.normal) < 1.0 - SAME_FACES {
+                return None;
+            }
+            m = Meeting { gap: (m.feet[1] - m.feet[0]).dot(h), normal: h, ..m };
+        }
+    }
+    let reach = |side: Side, whole: &Primitive| match half_space(whole) {
+        Some((_, offset)) => offset,
+        None => {
+            let (axes, n) = (DMat3::from_quat(whole.frame.rotation), own(side, m.normal));
+            n.dot(whole.frame.position) + whole.shape.convex().reach(&axes, n)
+        }
+    };
+    let of_b = reach(Side::B, b) - m.normal.dot(bodies.at.a_point(DVec3::ZERO));
+    let aside = (m.feet[1] - m.feet[0] - m.normal * m.gap).length();
+    (aside <= slack && m.gap + of_b + reach(Side::A, a) <= slack).then_some(m)
+}
+
+/// The normal of a meeting as the faces tell it that pass through its feet: the way between these has as few digits as it is short.
+fn sharpened(bodies: &Bodies, m: &Meeting) -> DVec3 {
+    let through = |side: Side, foot: DVec3| -> SmallVec<[DVec3; 4]> {
+        let all = bodies.through(side, foot);
+        all.iter().map(|id| bodies.slant_out((side, *id), foot).1).collect()
+    };
+    let n = match (&through(Side::A, m.feet[0])[..], &through(Side::B, m.feet[1])[..]) {
+        ([p], _) => *p,
+        (_, [q]) => -*q,
+        ([p, q], [r, s]) => p.cross(*q).cross(r.cross(*s)).normalize_or_zero(),
+        _ => m.normal,
+    };
+    let n = if n.dot(m.normal) < 0.0 { -n } else { n };
+    if n.dot(m.normal) > 1.0 - SAME_WAY { n } else { m.normal }
+}
+
+/// Outward unit normal and offset of a half-space, in the model's frame.
+fn half_space(whole: &Primitive) -> Option<(DVec3, f64)> {
+    match whole.faces.listed() {
+        [face] => face.flat(),
+        _ => None,
+    }
+}
+
+/// The feet by Newton's method on the distance.
+fn polished(bodies: &Bodies, [x, y]: [DVec3; 2], normal: DVec3) -> Option<Meeting> {
+    let (task, at) = (bodies.task, bodies.at);
+    let parts = [task.a, task.b].map(|solid| Parts::none(solid, task.rounding));
+    let side = |k: usize, model| polish::Side { parts: &parts[k], model, tokens: &parts[k].solid.normal_form };
+    let sides = [side(0, task.model_a), side(1, task.model_b)];
+    let polish = Polish { sides, at, scale: task.scale, rounding: task.rounding };
+    let pair = polish.run(x, at.b_point(y))?;
+    bodies.work.bound();
+    let feet = [pair.x, at.a_point(pair.y)];
+    Some(point::met(bodies, feet, normal))
+}
