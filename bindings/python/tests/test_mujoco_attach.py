@@ -573,7 +573,8 @@ def test_contacts_that_are_carried_along_are_those_that_a_request_would_tell():
                 coupling.refresh()
                 mujoco.mj_step1(model, data)
                 coupling.add_contacts(data)
-                assert coupling.asked.requests > asked.requests
+                # Where all contacts stay MuJoCo's nothing is asked, ever.
+                assert coupling.asked.requests > asked.requests or not coupling.asked.requests
                 anew = contacts(model, data)
                 for pair in carried.keys() | anew.keys():
                     (dist, fields), (other, others) = (found.get(pair, (SKIN, None)) for found in (carried, anew))
