@@ -73,9 +73,7 @@ impl Polytope {
         };
         self.corners.iter().fold(first, farther).1
     }
-}
 
-impl Polytope {
     /// Its corners that are farthest along n, the farthest first: as many as bound a face or an edge.
     pub fn outermost(&self, n: DVec3) -> SmallVec<[DVec3; OUTERMOST]> {
         let mut found: SmallVec<[(f64, DVec3); OUTERMOST]> = SmallVec::new();
