@@ -34,18 +34,39 @@ pub(super) fn find(roster: &Roster, state: &mut StepState, options: &StepOptions
     *glanced = sieve.glanced;
 }
 
+/// What met mostly does so again: no look is worth its while before it is known what a search finds.
+fn is_asked_unseen(hint: &PairHint) -> bool {
+    hint.met && !hint.discrete
+}
+
 /// What tells pairs that are apart from those to ask about.
-struct Sieve<'a> {
-    roster: &'a Roster,
-    neighbours: &'a mut Neighbours,
-    boxes: &'a mut SweptBoxes,
-    swept_shapes: &'a mut SweptShapes,
-    notes: Option<&'a mut Notes>,
+pub(super) struct Sieve<'a> {
+    pub(super) roster: &'a Roster,
+    pub(super) neighbours: &'a mut Neighbours,
+    pub(super) boxes: &'a mut SweptBoxes,
+    pub(super) swept_shapes: &'a mut SweptShapes,
+    pub(super) notes: Option<&'a mut Notes>,
     /// How many pairs a direction has proved apart.
-    glanced: u32,
+    pub(super) glanced: u32,
 }
 
 impl Sieve<'_> {
+    /// True when a pair that a limit left open is apart, as a session that does not know that it met before would have seen without a
+    /// search; it is clear then.
+    pub(super) fn sees_apart(&mut self, job: &mut PairJob, options: &StepOptions) -> bool {
+        // A pair of which something is told in any case is asked about by boxes alone.
+        if options.clear || job.plan.reports_clearance() {
+            return false;
+        }
+        let Some(pair) = job.pair else { return false };
+        let hint = *self.neighbours.pair_hint(pair);
+        let apart = is_asked_unseen(&hint) && !self.seems_to_meet(pair, &hint);
+        if apart {
+            job.take_for_apart();
+        }
+        apart
+    }
+
     /// A job for every pair of some bodies that has a plan of which something is told in any case; the excluded ones are listed too.
     fn all_pairs(
         &mut self,
@@ -103,21 +124,29 @@ impl Sieve<'_> {
     #[inline]
     fn may_meet(&mut self, pair: usize) -> bool {
         let hint = *self.neighbours.pair_hint(pair);
-        // What met mostly does so again: no look is worth its while.
-        let look = !hint.met && !hint.discrete;
+        is_asked_unseen(&hint) && self.goes_unseen(pair, &hint) || self.seems_to_meet(pair, &hint)
+    }
+
+    /// True when nothing shows whether a pair that met before is apart, but what is known of it or a search. Where nothing is glanced at
+    /// the swept boxes decide what is asked about, whether the bodies have met or not: trees are near each other by f, whose levels
+    /// reach beyond turned boxes, and what is told of that must not depend on what is remembered. Without a margin or regions nothing is.
+    fn goes_unseen(&self, pair: usize, hint: &PairHint) -> bool {
+        let plan = self.roster.plans.plan(self.neighbours.plan(pair));
+        !plan.reports_nearness() || self.can_glance(self.neighbours.bodies(pair), hint)
+    }
+
+    /// False where a direction or, of bodies without a hull, the swept boxes prove a pair apart. Of discrete pairs those are counted that
+    /// may have passed through each other: by their boxes alone.
+    #[inline]
+    fn seems_to_meet(&mut self, pair: usize, hint: &PairHint) -> bool {
         let bodies = self.neighbours.bodies(pair);
-        if look && let Some(axis_test) = self.axis_test(bodies, &hint) {
-            self.take_axis_test(pair, &hint, &axis_test);
+        if !hint.discrete
+            && let Some(axis_test) = self.axis_test(bodies, hint)
+        {
+            self.take_axis_test(pair, hint, &axis_test);
             return !axis_test.apart;
         }
-        // Where nothing is glanced at the swept boxes decide what is asked about, whether the bodies have met or not: trees are
-        // near each other by f, whose levels reach beyond turned boxes, and what is told of that must not depend on what is
-        // remembered. Without a margin or regions nothing is. Of discrete pairs those are counted that may have passed
-        // through each other: by their boxes alone.
         let plan = self.roster.plans.plan(self.neighbours.plan(pair));
-        if hint.met && !hint.discrete && (!plan.reports_nearness() || self.can_glance(bodies, &hint)) {
-            return true;
-        }
         self.boxes_meet(pair, plan.reach(), hint.discrete)
     }
 

@@ -73,6 +73,13 @@ impl PairJob {
         Self { a, b, plan, plan_index, resolution, near, pair, pair_cache, is_blank, is_done, is_left, found }
     }
 
+    /// It is proven clear by what is no search.
+    pub(super) fn take_for_apart(&mut self) {
+        let counters = self.found.outcome.counters;
+        let outcome = Outcome { counters, ..Outcome::clear(self.resolution) };
+        self.found = Finding { outcome, clearance: 0.0, known: false, apart: true };
+    }
+
     pub(super) fn question<'a>(&self, bodies: &'a [Body], options: &StepOptions, clock: f64) -> Question<'a> {
         let query = query(bodies, self, options);
         let pair = [self.a, self.b].map(|i| &bodies[i as usize]);

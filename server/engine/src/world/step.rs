@@ -8,7 +8,7 @@ use super::body::Body;
 use super::heed::Heed;
 use super::options::{StepError, StepOptions};
 use super::outcome::{PairOutcome, StepOutcome};
-use super::pairs;
+use super::pairs::{self, Sieve};
 use super::plan::PairPlan;
 use super::roster::{Head, Roster};
 use super::scene::World;
@@ -175,7 +175,8 @@ impl World {
 
     /// Searches the jobs and orders what they found.
     fn search(&mut self, options: &StepOptions, heed: Option<&Heed>) {
-        let Self { roster: Roster { bodies, .. }, state, .. } = self;
+        let Self { roster, state, .. } = self;
+        let bodies = &roster.bodies;
         search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches, heed);
         state.scratch.halt = heed.map(|heed| heed.halt.clone());
         state.outcome.clear();
@@ -184,9 +185,9 @@ impl World {
         (out.box_tests, out.busiest_cells) = (state.neighbours.box_tests, state.searches.busiest());
         // What is told of touching has a budget of its own, so that it does not depend on what searches have cost.
         let mut left = search::batch_limit(options);
-        decide(bodies, state, options, &mut left, heed);
+        decide(roster, state, options, &mut left, heed);
         report(state, options);
-        if self.roster.plans.measures() {
+        if roster.plans.measures() {
             touch::measure(bodies, &state.jobs, options, (&mut state.distances, &mut state.outcome), heed);
         }
         touch::find_regions(bodies, &mut state.jobs, options, left, &mut state.outcome, heed);
@@ -195,8 +196,10 @@ impl World {
 }
 
 /// Decides what is told of each job, sums up, and notes the keys of those that are told.
-fn decide(bodies: &[Body], state: &mut StepState, options: &StepOptions, left: &mut u64, heed: Option<&Heed>) {
-    let StepState { jobs, outcome: out, reported, scratch, .. } = state;
+fn decide(roster: &Roster, state: &mut StepState, options: &StepOptions, left: &mut u64, heed: Option<&Heed>) {
+    let StepState { jobs, outcome: out, reported, scratch, neighbours, boxes, swept_shapes, notes, .. } = state;
+    let bodies = &roster.bodies;
+    let mut sieve = Sieve { roster, neighbours, boxes, swept_shapes, notes: notes.as_deref_mut(), glanced: 0 };
     reported.clear();
     let mut earliest = f64::INFINITY;
     let mut before = 0;
@@ -208,7 +211,11 @@ fn decide(bodies: &[Body], state: &mut StepState, options: &StepOptions, left: &
                 *left = 0;
             }
             let effects = &mut out.effect_counters;
-            let complete = touch::decide(bodies, job, options, left, effects, scratch);
+            if job.found.outcome.status() == Status::Undecided {
+                sieve.sees_apart(job, options);
+            }
+            let complete =
+                touch::decide(bodies, job, options, left, effects, scratch) || sieve.sees_apart(job, options);
             count_effects(job, bodies, effects);
             let outcome = &job.found.outcome;
             out.counters += outcome.counters;

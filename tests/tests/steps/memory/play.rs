@@ -60,15 +60,17 @@ pub fn differing(a: &(String, Vec<ContactRecord>), b: &(String, Vec<ContactRecor
     format!("{} {} {slots:?}", a.0, b.0)
 }
 
-/// Every pair with all that is told of it but the work that it took, `regions` or not. A field that is not told may be 0 or -0.
+/// A pair with all that is told of it but the work that it took, `regions` or not. A field that is not told may be 0 or -0.
+fn line(out: &StepOutcome, p: &PairOutcome, regions: bool) -> String {
+    let outcome = Outcome { counters: Counters::default(), apart: 0.0, ..p.outcome };
+    let regions = if regions { out.regions_of(p) } else { &[] };
+    let text = format!("{:?} {} {outcome:?} {regions:?}", (p.a, p.b), p.regions_complete);
+    text.replace("-0.0,", "0.0,").replace("-0.0)", "0.0)")
+}
+
+/// Every pair of a step, as `line` has it.
 fn lines(out: &StepOutcome, regions: bool) -> Vec<String> {
-    let text = |p: &PairOutcome| {
-        let outcome = Outcome { counters: Counters::default(), apart: 0.0, ..p.outcome };
-        let regions = if regions { out.regions_of(p) } else { &[] };
-        let text = format!("{:?} {} {outcome:?} {regions:?}", (p.a, p.b), p.regions_complete);
-        text.replace("-0.0,", "0.0,").replace("-0.0)", "0.0)")
-    };
-    out.pairs.iter().map(text).collect()
+    out.pairs.iter().map(|p| line(out, p, regions)).collect()
 }
 
 /// A world that has never been asked anything: objects, rules and the tracks of the step before.
@@ -329,6 +331,11 @@ pub fn run_play(seed: u64, mut play: Play, steps: usize) -> Work {
             let mut whole = fresh.world();
             let found = whole.step(&records, &wide).expect("a step");
             let all = lines(found, true);
+            // Where the first contact is left open clear pairs are told beside it, which are left out once it is known.
+            let mut whole = fresh.world();
+            let beside = whole.step(&records, &StepOptions { first: false, ..wide }).expect("a step");
+            let is_clear = |p: &&PairOutcome| p.outcome.status() == Status::Clear && answer.undecided;
+            let clear: Vec<String> = beside.pairs.iter().filter(is_clear).map(|p| line(beside, p, true)).collect();
             let is_known = open && {
                 // What the whole step's limit leaves for a pair depends on what others took, of which some may be known: such a
                 // pair stays undecided from a time on before which it is free.
@@ -351,9 +358,10 @@ pub fn run_play(seed: u64, mut play: Play, steps: usize) -> Work {
                 let (heads, others) = (lines(answer, false), lines(expected, false));
                 let few = |k: usize| !answer.pairs[k].regions_complete && others.contains(&heads[k]);
                 let pairs = mine.iter().zip(&answer.pairs).enumerate();
-                pairs
-                    .into_iter()
-                    .all(|(k, (line, p))| all.contains(line) || other.contains(line) || cut(p) || early(p) || few(k))
+                pairs.into_iter().all(|(k, (line, p))| {
+                    let told = [&all, &other, &clear].iter().any(|lines| lines.contains(line));
+                    told || cut(p) || early(p) || few(k)
+                })
             };
             if !is_known {
                 let differs = |a: &[String], b: &[String]| {
