@@ -409,13 +409,19 @@ fn pairs_of<'a>(scene: &Scene, files: &'a [String], check: &'a Check, outcome: &
 
 /// The models of a scene, with a word on standard error where the cache is in trouble.
 fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
-    let prepared = cache::prepare_scene(cache.open().as_ref(), scene, facets, &Limits::default())?;
-    prepared.iter().filter_map(|p| p.trouble.as_deref()).for_each(warn);
-    scene.notes.iter().for_each(|n| warn(&format!("{}:{}", scene.file, clean(&n.to_string()))));
+    let prepared = prepare_parts(scene, facets, cache)?;
     for (source, _) in scene.models.iter().zip(&prepared).filter(|(_, p)| p.model.solid.is_empty()) {
         let at = if scene.file.is_empty() { String::new() } else { format!("{}:{}: ", scene.file, source.at) };
         warn(&format!("{at}the model \"{}\" is empty: nothing can touch it", source.name));
     }
+    Ok(prepared)
+}
+
+/// The same of models that may well be empty.
+fn prepare_parts(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
+    let prepared = cache::prepare_scene(cache.open().as_ref(), scene, facets, &Limits::default())?;
+    prepared.iter().filter_map(|p| p.trouble.as_deref()).for_each(warn);
+    scene.notes.iter().for_each(|n| warn(&format!("{}:{}", scene.file, clean(&n.to_string()))));
     Ok(prepared)
 }
 
@@ -432,15 +438,15 @@ fn say(sentence: &str) {
     let _ = writeln!(std::io::stderr(), "{sentence}");
 }
 
-/// Refuses a GDML geometry where its volumes are no scene.
+/// Refuses a geometry of volumes or cells where they are no scene.
 fn no_geometry(file: &Path) -> Result<(), String> {
-    if overlaps::is_gdml(file) {
-        let file = file.display();
-        return Err(format!(
-            "{file}: expected a scene, a robot or a model, found a GDML geometry, which contactd overlaps takes"
-        ));
-    }
-    Ok(())
+    let kind = match () {
+        () if overlaps::is_gdml(file) => "a GDML",
+        () if overlaps::is_openmc(file) => "an OpenMC",
+        () => return Ok(()),
+    };
+    let file = file.display();
+    Err(format!("{file}: expected a scene, a robot or a model, found {kind} geometry, which contactd overlaps takes"))
 }
 
 fn inspect_file(

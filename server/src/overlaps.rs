@@ -6,7 +6,13 @@
 //! from the surface, and in a union of parts that touch at most that from the surface of a part. What touches is no overlap. A daughter
 //! sticks out of its mother where it overlaps what is around the mother: a block less the mother's solid.
 //!
+//! Of OpenMC's universes (`cells`): cells of one universe against each other, and what is in none of them, where it is seen.
+//!
 //! Floor 10: imports `import`, `contact`, `cache`.
+
+mod cells;
+
+pub use cells::{Suspect, decide, of_cells, scene_of_cells, scene_of_uses};
 
 use crate::contact::{
     Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
@@ -36,6 +42,27 @@ pub enum Verdict {
     NotProven(Option<f64>),
 }
 
+/// What a volume is asked against.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Beside {
+    /// Another one.
+    Other(String),
+    /// What is around the volume that it is in: it sticks out.
+    Around,
+    /// What is in no cell of a universe: it has a gap.
+    Nothing,
+}
+
+impl Beside {
+    /// The other one's name.
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Other(name) => Some(name),
+            Self::Around | Self::Nothing => None,
+        }
+    }
+}
+
 /// Two volumes, or a volume and the one that it is in.
 #[derive(Clone, Debug)]
 pub struct Pair {
@@ -43,8 +70,8 @@ pub struct Pair {
     pub within: String,
     /// The first one.
     pub a: String,
-    /// The second one; `None`: what is around the volume that the first one is in.
-    pub b: Option<String>,
+    /// The second one.
+    pub b: Beside,
     /// What became of them.
     pub verdict: Verdict,
 }
@@ -54,8 +81,9 @@ pub struct Pair {
 pub struct Found {
     /// Those that are not separate, deepest first.
     pub pairs: Vec<Pair>,
-    /// How many are proven separate: by their boxes, and by a search.
-    pub separate: [u64; 2],
+    /// How many are proven separate: by their boxes, by a search, and by what follows from the sides of
+    /// surfaces alone.
+    pub separate: [u64; 3],
 }
 
 /// Something that stands.
@@ -159,7 +187,7 @@ pub fn of_volumes(
         let verdicts: Vec<Verdict> =
             standing.par_iter().map_init(Scratch::default, |s, d| ask([d, &outside], tolerance, s)).collect();
         for (d, verdict) in standing.iter().zip(verdicts) {
-            found.add(Pair { within: volume.name.clone(), a: d.name.clone(), b: None, verdict });
+            found.add(Pair { within: volume.name.clone(), a: d.name.clone(), b: Beside::Around, verdict });
         }
     }
     found.order();
@@ -168,6 +196,20 @@ pub fn of_volumes(
 
 /// All pairs of what stands in the same place: those whose boxes meet are asked of.
 fn siblings(within: &str, standing: &[Standing<'_>], tolerance: Option<f64>, found: &mut Found) {
+    let (near, by_boxes) = near(standing);
+    found.separate[0] += by_boxes;
+    let verdicts: Vec<Verdict> = near
+        .par_iter()
+        .map_init(Scratch::default, |scratch, [i, j]| ask([&standing[*i], &standing[*j]], tolerance, scratch))
+        .collect();
+    for ([i, j], verdict) in near.iter().zip(verdicts) {
+        let [a, b] = [i, j].map(|k| standing[*k].name.clone());
+        found.add(Pair { within: within.to_owned(), a, b: Beside::Other(b), verdict });
+    }
+}
+
+/// The pairs of what stands in the same place whose boxes meet, the first one first; and how many others there are.
+fn near(standing: &[Standing<'_>]) -> (Vec<[usize; 2]>, u64) {
     let mut order: Vec<usize> = (0..standing.len()).filter(|i| !standing[*i].model.solid.is_empty()).collect();
     order.sort_by(|i, j| standing[*i].around.min.x.total_cmp(&standing[*j].around.min.x));
     let mut near = Vec::new();
@@ -184,15 +226,8 @@ fn siblings(within: &str, standing: &[Standing<'_>], tolerance: Option<f64>, fou
     }
     near.sort_unstable();
     let all = order.len() as u64 * (order.len() as u64).saturating_sub(1) / 2;
-    found.separate[0] += all - near.len() as u64;
-    let verdicts: Vec<Verdict> = near
-        .par_iter()
-        .map_init(Scratch::default, |scratch, [i, j]| ask([&standing[*i], &standing[*j]], tolerance, scratch))
-        .collect();
-    for ([i, j], verdict) in near.iter().zip(verdicts) {
-        let [a, b] = [i, j].map(|k| standing[*k].name.clone());
-        found.add(Pair { within: within.to_owned(), a, b: Some(b), verdict });
-    }
+    let by_boxes = all - near.len() as u64;
+    (near, by_boxes)
 }
 
 fn ask(pair: [&Standing<'_>; 2], tolerance: Option<f64>, scratch: &mut Scratch) -> Verdict {

@@ -1,20 +1,22 @@
-//! `contactd overlaps`: what is in each other of a GDML geometry or a scene.
+//! `contactd overlaps`: what is in each other of a GDML or OpenMC geometry or a scene.
 
 use super::joints::JointArguments;
-use super::{AccessArguments, CacheArguments, Done, models_of, prepare_scene, print, scene_of, warn};
-use crate::import::{Facets, gdml};
-use crate::overlaps::{self, Found, Pair, Verdict};
+use super::{AccessArguments, CacheArguments, Done, models_of, prepare_parts, prepare_scene, print, scene_of, warn};
+use crate::import::{Facets, Limits, Scene, gdml, openmc, read_bytes};
+use crate::octree::Model;
+use crate::overlaps::{self, Beside, Found, Pair, Verdict};
 use crate::terminal::{clean, number, sentence};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 #[derive(clap::Args)]
 pub(super) struct OverlapsArguments {
-    /// A GDML geometry (.gdml), a scene (.toml), a robot; or models, which are taken as they stand.
+    /// A GDML geometry (.gdml), an OpenMC geometry (.xml), a scene (.toml), a robot; or models, which are taken as they stand.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// How deep two may be in each other, in the file's unit (millimetres of GDML); else 2e-9 of the larger one's radius.
+    /// How deep two may be in each other, in the file's unit (millimetres of GDML, centimetres of OpenMC); else 2e-9 of the larger one's radius.
     #[arg(long, value_name = "LENGTH", value_parser = super::length)]
     tolerance: Option<f64>,
     /// One JSON object instead of text.
@@ -46,6 +48,10 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
             let outsides = models_of(&prepare_scene(&outside, Facets::Auto, &arguments.cache)?);
             (overlaps::of_volumes(&volumes, &models, (&outsides, &of), arguments.tolerance), "mm".to_owned())
         }
+        [file] if is_openmc(file) => {
+            arguments.joints.none(file)?;
+            (of_openmc(file, arguments)?, "cm".to_owned())
+        }
         files => {
             if let Some(file) = files.iter().find(|f| is_gdml(f)) {
                 return Err(format!("expected one GDML file alone, found {} among others", file.display()).into());
@@ -63,22 +69,42 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
     })
 }
 
+/// Is it an OpenMC geometry? Robots' files (MJCF) end in the same way.
+pub(super) fn is_openmc(file: &Path) -> bool {
+    let is_xml = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("xml"));
+    is_xml && read_bytes(file, &Limits::default()).is_ok_and(|bytes| openmc::is_openmc(&bytes))
+}
+
+fn of_openmc(file: &Path, arguments: &OverlapsArguments) -> Result<Found, Box<dyn Error>> {
+    let universes = openmc::read_openmc(file)?;
+    universes.notes.iter().for_each(|n| warn(&format!("{}:{}", file.display(), clean(&n.to_string()))));
+    let models = |scene: &Scene| -> Result<Vec<Arc<Model>>, Box<dyn Error>> {
+        Ok(models_of(&prepare_parts(scene, Facets::Auto, &arguments.cache)?))
+    };
+    let whole = models(&overlaps::scene_of_cells(file, &universes))?;
+    let (found, suspects) = overlaps::of_cells(&universes, &whole, arguments.tolerance);
+    let cut = models(&overlaps::scene_of_uses(file, &universes, &suspects))?;
+    Ok(overlaps::decide(&universes, (&whole, &cut), (found, suspects), arguments.tolerance))
+}
+
 fn text(found: &Found, unit: &str) -> String {
     let [overlaps, open] = found.counts();
-    let [by_boxes, searched] = found.separate;
+    let [by_boxes, searched, by_surfaces] = found.separate;
+    let surfaces = if by_surfaces > 0 { format!(", {by_surfaces} by their surfaces alone") } else { String::new() };
     let many = |n: usize, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
     let mut out = format!(
-        "{}, {open} not proven, {} pairs proven separate ({by_boxes} by their boxes)\n",
+        "{}, {open} not proven, {} pairs proven separate ({by_boxes} by their boxes{surfaces})\n",
         many(overlaps, "overlap"),
-        by_boxes + searched
+        by_boxes + searched + by_surfaces
     );
     for pair in &found.pairs {
         let (a, mother) = (clean(&pair.a), clean(&pair.within));
         let two = match &pair.b {
-            Some(b) => format!("{a} and {}", clean(b)),
-            None => format!("{a} sticks out of {mother}"),
+            Beside::Other(b) => format!("{a} and {}", clean(b)),
+            Beside::Around => format!("{a} sticks out of {mother}"),
+            Beside::Nothing => format!("{a} has a gap, where no cell is"),
         };
-        let is_told = !mother.is_empty() && pair.b.is_some();
+        let is_told = !mother.is_empty() && matches!(pair.b, Beside::Other(_));
         let within = if is_told { format!(", in {mother}") } else { String::new() };
         let what = match pair.verdict {
             Verdict::Overlap(x, depth) => {
@@ -103,12 +129,17 @@ fn as_json(found: &Found) -> String {
             Verdict::NotProven(bound) => ("not proven", None, bound),
             Verdict::Separate(depth) => ("separate", None, Some(depth)),
         };
-        json!({ "within": p.within, "a": p.a, "b": p.b, "status": status, "point": point, "depth": depth })
+        let (other, kind) = match &p.b {
+            Beside::Other(name) => (Some(name), "overlap"),
+            Beside::Around => (None, "sticks out"),
+            Beside::Nothing => (None, "gap"),
+        };
+        json!({ "kind": kind, "within": p.within, "a": p.a, "b": other, "status": status, "point": point, "depth": depth })
     };
     let [overlaps, open] = found.counts();
     json!({
-        "overlaps": overlaps, "not_proven": open, "separate": found.separate[0] + found.separate[1],
-        "separate_by_boxes": found.separate[0], "pairs": found.pairs.iter().map(pair).collect::<Vec<_>>(),
+        "overlaps": overlaps, "not_proven": open, "separate": found.separate.iter().sum::<u64>(),
+        "separate_by_boxes": found.separate[0], "separate_by_surfaces": found.separate[2], "pairs": found.pairs.iter().map(pair).collect::<Vec<_>>(),
     })
     .to_string()
         + "\n"

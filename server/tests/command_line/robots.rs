@@ -118,6 +118,40 @@ fn a_geometry_is_no_scene_and_the_sentence_says_what_takes_it() {
 }
 
 #[test]
+fn cells_of_openmc_that_overlap_and_gaps_are_told() {
+    let fuel = include_str!("../../models/fuel.xml");
+    // The rod is as wide as its tube, and a pin's water begins too far out.
+    let wide = fuel.replace("0 0 0.433", "0 0 0.5625");
+    let far = fuel.replace("material=\"3\" region=\"3\"", "material=\"3\" region=\"3 6\"");
+    let folder = folder(&[("fuel.xml", fuel), ("wide.xml", &wide), ("far.xml", &far)]);
+    let of = |file: &str, more: &[&str]| {
+        let out = run(folder.path(), &[&["overlaps", file, "--tolerance", "1e-6"], more].concat());
+        (out.status.code(), text(&out.stdout).to_owned(), text(&out.stderr).to_owned())
+    };
+    let (status, said, wrong) = of("fuel.xml", &[]);
+    assert_eq!((status, wrong.as_str()), (Some(0), ""), "{said}");
+    assert!(said.starts_with("0 overlaps, 0 not proven, 12 pairs proven separate"), "{said}");
+    let (status, said, _) = of("wide.xml", &[]);
+    let words = "cell 5 \"rod\" and cell 7 \"tube\", in universe 2: at least 0.00075 cm deep at (";
+    assert!(status == Some(1) && said.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{said}");
+    let (status, said, _) = of("far.xml", &["--json"]);
+    let answer: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let pair = &answer["pairs"][0];
+    assert_eq!(
+        (status, &pair["kind"], &pair["a"], &pair["b"]),
+        (Some(1), &"gap".into(), &"universe 1".into(), &().into())
+    );
+    // Between 0.475 and 0.602.
+    assert!((pair["depth"].as_f64().expect("a depth") - 0.0635).abs() < 1e-3, "{said}");
+    for word in ["inspect", "check", "view"] {
+        let out = run(folder.path(), &[word, "fuel.xml"]);
+        let said = text(&out.stderr);
+        let words = "found an OpenMC geometry, which contactd overlaps takes";
+        assert!(out.status.code() == Some(2) && said.contains(words) && said.lines().count() == 1, "{word}: {said}");
+    }
+}
+
+#[test]
 fn a_step_begins_at_a_keyframe() {
     let model = "<mujoco><worldbody><geom size=\"0.5\"/><body name=\"a\" pos=\"3 0 0\"><joint name=\"p\" type=\"slide\" axis=\"1 0 0\" \
                  range=\"-3 3\"/><geom size=\"0.5\"/></body></worldbody><keyframe><key name=\"near\" qpos=\"-1.5\"/><key name=\"far\" \

@@ -167,7 +167,7 @@ fn what_was_planted_is_found_and_nothing_else() {
         for pair in &found.pairs {
             let Verdict::Overlap(_, depth) = pair.verdict else { panic!("{k}: {pair:?}") };
             let bare = |name: &str| name.rsplit('/').next().expect("a name").to_owned();
-            let [a, b] = [bare(&pair.a), pair.b.as_deref().map(bare).unwrap_or_default()];
+            let [a, b] = [bare(&pair.a), pair.b.name().map(bare).unwrap_or_default()];
             let is_it = |(p, q, _): &(String, Option<String>, f64)| {
                 let q = q.clone().unwrap_or_default();
                 (*p == a && q == b) || (*p == b && q == a)

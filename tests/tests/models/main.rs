@@ -18,6 +18,7 @@ mod load;
 mod mass;
 mod mjcf;
 mod models;
+mod openmc;
 mod outline_masses;
 mod real_files;
 mod robot_files;
