@@ -132,7 +132,7 @@ fn scaled(shape: &Shape, k: f64) -> Shape {
         Shape::Cone(c) => Cone { bottom: c.bottom * k, top: c.top * k, half_height: c.half_height * k }.into(),
         Shape::Cuboid(c) => Cuboid { half: c.half * k }.into(),
         Shape::Polyhedron(p) => Polyhedron {
-            vertices: p.vertices.iter().map(|v| *v * k).collect(),
+            vertices: p.vertices.iter().map(|v| *v * k).collect::<Vec<_>>().into(),
             planes: p.planes.iter().map(|(n, d)| (*n, d * k)).collect(),
         }
         .into(),

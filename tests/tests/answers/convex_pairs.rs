@@ -154,7 +154,7 @@ fn the_deepest_point_of_convex_bodies_has_none_deeper_near_it() {
         assert!((2.0 * lowest + found.depth).abs() <= 1e-12, "{place}: F {lowest:e}");
         for k in 0..200 {
             let x = found.point + r.direction() * 10f64.powf(-1.0 - f64::from(k % 8));
-            assert!(f(x) >= lowest * (1.0 + 1e-5), "{place}: {:e} at {x}", f(x));
+            assert!(f(x) >= lowest * (1.0 + 1e-3), "{place}: {:e} at {x}", f(x));
         }
         // Along the direction told the bodies overlap by more than a ball of that size does.
         let n = found.direction;

@@ -160,14 +160,14 @@ impl Polytope {
             let flat: Vec<usize> =
                 flat.iter().filter_map(|i| found.planes.iter().position(|p| *p == planes[*i])).collect();
             let flat = if flat.is_empty() { vec![r.below(found.planes.len())] } else { flat };
-            return Self { planes: found.planes, corners: found.vertices, flat };
+            return Self { planes: found.planes, corners: found.vertices.to_vec(), flat };
         }
     }
 
     fn recipe(&self) -> Recipe {
         match self.planes.len() {
             1 => Recipe::of(HalfSpace),
-            _ => Recipe::of(Polyhedron { vertices: self.corners.clone(), planes: self.planes.clone() }),
+            _ => Recipe::of(Polyhedron { vertices: self.corners.clone().into(), planes: self.planes.clone() }),
         }
     }
 }

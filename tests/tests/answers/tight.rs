@@ -39,13 +39,13 @@ pub(super) fn prism(sides: usize, radius: f64, half: f64) -> Recipe {
         let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
         dvec3(radius * cos, radius * sin, z)
     };
-    let vertices = (0..sides).flat_map(|k| [corner(k, -half), corner(k, half)]).collect();
+    let vertices: Vec<_> = (0..sides).flat_map(|k| [corner(k, -half), corner(k, half)]).collect();
     let side = |k: usize| {
         let (sin, cos) = (TAU * (k as f64 + 0.5) / sides as f64).sin_cos();
         (dvec3(cos, sin, 0.0), radius * (PI / sides as f64).cos())
     };
     let planes = (0..sides).map(side).chain([(DVec3::Z, half), (DVec3::NEG_Z, half)]).collect();
-    Recipe::of(Polyhedron { vertices, planes })
+    Recipe::of(Polyhedron { vertices: vertices.into(), planes })
 }
 
 /// A resolution: mostly the default, else up to 1e-5 of the given size.

@@ -114,7 +114,7 @@ fn convex(r: &mut Random, size: f64, turn: DQuat) -> (Shape, Vec<DVec3>) {
         _ => {
             let p = Polyhedron::platonic([4, 8, 12, 20][r.below(4)], a + 0.3 * size).expect("a platonic count");
             let corners = p.vertices.clone();
-            (p.into(), corners)
+            (p.into(), corners.to_vec())
         }
     }
 }

@@ -272,7 +272,9 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
         return (within, work.cells());
     }
     let work = Work::new(task.limit);
-    if let Some(x) = glimpse(&task, &task.relative.at(0.0), level, &work) {
+    // Of two convex primitives a point between the nearest, or a common one, mostly is as near as that.
+    let between = || ConvexPair::between(task);
+    if let Some(x) = glimpse(&task, &task.relative.at(0.0), level, between, &work) {
         return (Within::Witness(x), work.cells());
     }
     let (ending, counters) = nearing(task, level, scratch);

@@ -2,7 +2,7 @@
 //!
 //! See `convex`; source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996).
 
-use super::gjk::{Nearest, nearest};
+use super::gjk::{Meeting, Nearest, meeting, nearest};
 use super::plane::{self, Floor, is_half_space};
 use super::proof::{Gap, Pace};
 use super::support::ConvexBody;
@@ -118,6 +118,19 @@ impl<'a> ConvexPair<'a> {
         let m = advance.moment(0.0);
         let start = advance.widest(&m, m.b.support(DVec3::ZERO) - a.ball.center)?;
         Some(Self { bodies: Bodies::Two(advance), start })
+    }
+
+    /// A point of A's frame that is as near to both of two convex primitives at the start as any, or common to both, but for rounding;
+    /// `None` for other solids and where none is found.
+    pub fn between(task: Task<'a>) -> Option<DVec3> {
+        let (a, b) = (task.a.whole()?, task.b.whole()?);
+        let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
+        let m = advance.moment(0.0);
+        match meeting(&advance.a.1, &m.b, m.b.support(DVec3::ZERO) - a.ball.center, GOOD) {
+            Meeting::Apart(found) => Some(0.5 * (found.a + found.b)),
+            Meeting::Common(x) => Some(x),
+            Meeting::Open => None,
+        }
     }
 
     /// True for two solids that are one convex primitive each, whether a direction separates them or not.

@@ -172,9 +172,7 @@ impl<'a> Start<'a> {
     #[cold]
     fn slope_of_faces(&self, k: usize, x: DVec3) -> Slope {
         let (own, p) = (self.own(k, x), self.pair.primitives[k]);
-        let values = p.faces.listed().iter().map(|face| face.value(own));
-        let first = (0, f64::NEG_INFINITY);
-        let (face, f) = values.enumerate().fold(first, |best, (i, f)| if f > best.1 { (i, f) } else { best });
+        let (face, f) = p.highest(own);
         Slope { f, normal: self.axes[k] * p.faces[face].at(own).unit(), face: face as u32 }
     }
 

@@ -19,17 +19,31 @@ pub enum Within {
     Open,
 }
 
-/// A point with F <= level that is found at once, in the middle of what both bodies' bounds have in common or a few steps downhill
-/// from there; `None`: there may be one all the same.
-pub(in crate::contact) fn glimpse(task: &Task, at: &Instant, level: f64, work: &Work) -> Option<DVec3> {
+/// Whether F <= level in a point of A's frame.
+fn is_within(task: &Task, at: &Instant, level: f64, x: DVec3, work: &Work) -> bool {
+    work.look(task.a.faces.len() + task.b.faces.len());
+    value(task, at, x) <= level
+}
+
+/// A point with F <= level that is found at once: in the middle of what both bodies' bounds have in common, one that `other` knows, or
+/// a few steps downhill from that middle; `None`: there may be one all the same.
+pub(in crate::contact) fn glimpse(
+    task: &Task,
+    at: &Instant,
+    level: f64,
+    other: impl FnOnce() -> Option<DVec3>,
+    work: &Work,
+) -> Option<DVec3> {
     let region = common(task, at, level);
     if !region.is_finite() {
         return None;
     }
     let middle = region.center();
-    work.look(task.a.faces.len() + task.b.faces.len());
-    if value(task, at, middle) <= level {
+    if is_within(task, at, level, middle, work) {
         return Some(middle);
+    }
+    if let Some(x) = other().filter(|x| is_within(task, at, level, *x, work)) {
+        return Some(x);
     }
     let (x, _, depth, _) = depth::some(task, at, middle, work);
     (-depth <= level).then_some(x)

@@ -228,10 +228,25 @@ impl<'t, 'a> Bodies<'t, 'a> {
         let solid = if side == Side::A { self.task.a } else { self.task.b };
         self.work.look(solid.faces.len());
         let mut out = Vec::with_capacity(solid.normal_form.len().min(ROOM));
-        let truth = solid.prune(&solid.normal_form, &mut out, &mut |id| {
+        let mut truth_of = |id: LiteralId| {
             let v = self.face((side, id)).value(x);
             local::truth_of(id.sense(), (v, v), 0.0, self.eps)
-        });
+        };
+        // Of a polytope those planes that are well above the point fold away unseen.
+        let own = if side == Side::A { x } else { self.at.b_point(x) };
+        let whole = solid.whole().filter(|whole| whole.is_convex());
+        let some = whole.and_then(|p| Some((p.first_face, p.not_below(own, -2.0 * self.eps)?)));
+        let truth = match some {
+            None => solid.prune(&solid.normal_form, &mut out, &mut truth_of),
+            Some((first, faces)) => local::fold(local::AND, faces.into_iter(), &mut out, |face, out| {
+                let id = LiteralId::new(first + face, Sense::Positive);
+                let known = truth_of(id);
+                if known == Truth::Open {
+                    out.push(local::literal_token(id));
+                }
+                known
+            }),
+        };
         (truth, out)
     }
 

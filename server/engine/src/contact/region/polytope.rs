@@ -2,8 +2,9 @@
 
 use crate::contact::query::task::Task;
 use crate::motion::Instant;
+use crate::solid::primitive::{Convex, Corners};
 use crate::solid::{Face, Solid};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
 /// Corners between which the nearest edge of a polytope is looked for.
@@ -19,23 +20,25 @@ pub struct Plane {
 
 /// A polytope along A's axes.
 #[derive(Clone, Debug)]
-pub struct Polytope {
+pub struct Polytope<'a> {
     /// Its faces in order.
     pub planes: Vec<Plane>,
     /// Its corners in order; none of a half-space.
     pub corners: Vec<DVec3>,
+    /// The same in its own frame where they are a hull's, and that frame's axes.
+    own: Option<(&'a Corners, DMat3)>,
 }
 
 /// Two polytopes along A's axes.
 #[derive(Clone, Debug)]
-pub struct Polytopes {
-    pub a: Polytope,
-    pub b: Polytope,
+pub struct Polytopes<'a> {
+    pub a: Polytope<'a>,
+    pub b: Polytope<'a>,
 }
 
-impl Polytope {
+impl<'a> Polytope<'a> {
     /// A whole solid as a polytope, its points and directions carried along; `None` for another one.
-    fn of(solid: &Solid, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Option<Self> {
+    fn of(solid: &'a Solid, point: impl Fn(DVec3) -> DVec3, vector: impl Fn(DVec3) -> DVec3) -> Option<Self> {
         let whole = solid.whole()?;
         let faces = whole.faces.listed();
         if faces.len() != solid.faces.len() || !faces.iter().all(Face::is_flat) {
@@ -51,7 +54,14 @@ impl Polytope {
             None if faces.len() == 1 => Vec::new(),
             None => return None,
         };
-        Some(Self { planes: planes.collect(), corners })
+        let own = match whole.shape.convex() {
+            Convex::Corners(own) => {
+                let axes = whole.frame.matrix();
+                Some((own, DMat3::from_cols(vector(axes.x_axis), vector(axes.y_axis), vector(axes.z_axis))))
+            }
+            _ => None,
+        };
+        Some(Self { planes: planes.collect(), corners, own })
     }
 
     /// True for a half-space.
@@ -71,7 +81,10 @@ impl Polytope {
             let reach = n.dot(*v);
             if reach > best.0 { (reach, *v) } else { best }
         };
-        self.corners.iter().fold(first, farther).1
+        match self.own.and_then(|(own, axes)| own.foremost(axes.transpose() * n)) {
+            Some(some) => some.iter().map(|i| &self.corners[*i as usize]).fold(first, farther).1,
+            None => self.corners.iter().fold(first, farther).1,
+        }
     }
 
     /// Its corners that are farthest along n, the farthest first: as many as bound a face or an edge.
@@ -89,9 +102,9 @@ impl Polytope {
     }
 }
 
-impl Polytopes {
+impl<'a> Polytopes<'a> {
     /// Both bodies of a pair at an instant; `None` where one is no polytope.
-    pub fn of(task: &Task, at: &Instant) -> Option<Self> {
+    pub fn of(task: &Task<'a>, at: &Instant) -> Option<Self> {
         let a = Polytope::of(task.a, |x| x, |v| v)?;
         let b = Polytope::of(task.b, |x| at.a_point(x), |v| at.a_vector(v))?;
         Some(Self { a, b })

@@ -10,6 +10,7 @@ use crate::solid::local::{self, LiteralId, Token, Truth};
 use crate::solid::{Face, Label, Sense};
 use contactd_proto::Pose;
 use glam::DVec3;
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 mod capsule;
@@ -35,7 +36,7 @@ pub use cylinder::Cylinder;
 pub use ellipsoid::Ellipsoid;
 pub use elliptic_frustum::EllipticFrustum;
 pub use half_space::HalfSpace;
-pub use polyhedron::{Fit, MeshError, Polyhedron};
+pub use polyhedron::{Corners, Fit, MeshError, Polyhedron};
 pub use quadric::Quadric;
 pub use sphere::Sphere;
 pub use superellipsoid::Superellipsoid;
@@ -52,6 +53,10 @@ pub trait Geometry {
     }
     /// The same faces where they are too many to be listed: planes.
     fn many_faces(&self) -> Option<Arc<dyn Planes>> {
+        None
+    }
+    /// The planes of its faces in their order, where they lie in a row: outward unit normals and offsets.
+    fn planes(&self) -> Option<&[(DVec3, f64)]> {
         None
     }
     /// What it is of its faces, where it is not their intersection.
@@ -267,10 +272,32 @@ pub struct Primitive {
     pub ball: Ball,
 }
 
+/// Planes up to which all faces are looked at.
+const FEW_PLANES: usize = 16;
+/// What placing a plane changes of its value at most, over the sizes that are in it: some tens of roundings.
+const PLACED: f64 = 1e-14;
+
+/// Planes and a point in their frame.
+struct PlanesAt<'a> {
+    planes: &'a [(DVec3, f64)],
+    own: DVec3,
+    /// What placing them may change of a value, but for what the value itself adds.
+    slack: f64,
+}
+
+impl PlanesAt<'_> {
+    fn values(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.planes.iter().map(|(normal, offset)| normal.dot(self.own) - offset).enumerate()
+    }
+}
+
 impl Primitive {
     /// Places `shape` in a model; `first_face` is the number of faces of the primitives before it.
     pub fn new(shape: Shape, frame: Pose, label: Label, first_face: u32) -> Self {
         let g = shape.geometry();
+        if let Convex::Corners(corners) = g.convex() {
+            corners.prepare();
+        }
         let faces = match g.many_faces() {
             Some(planes) => Faces::made(planes, frame),
             None => g.faces().iter().map(|f| f.placed(&frame)).collect::<Vec<Face>>().into(),
@@ -299,8 +326,41 @@ impl Primitive {
     pub fn value(&self, x: DVec3) -> f64 {
         match self.shape.formula() {
             Some(formula) => formula.value(&mut |f| self.faces[f as usize].value(x)),
-            None => self.faces.listed().iter().fold(f64::NEG_INFINITY, |m, f| m.max(f.value(x))),
+            None => self.highest(x).1,
         }
+    }
+
+    /// Of its faces the one with the largest psi, the first of equals, and that: of an intersection of faces its f. Of many planes those
+    /// are looked at that may be it as they stand in the primitive's own frame, where they lie in a row.
+    pub fn highest(&self, x: DVec3) -> (usize, f64) {
+        let faces = self.faces.listed();
+        let none = (0, f64::NEG_INFINITY);
+        let higher = |best: (usize, f64), (i, f): (usize, f64)| if f > best.1 { (i, f) } else { best };
+        let Some(own) = self.planes_at(x) else {
+            return faces.iter().map(|face| face.value(x)).enumerate().fold(none, higher);
+        };
+        let (mut least, mut some) = (f64::NEG_INFINITY, SmallVec::<[(usize, f64); 16]>::new());
+        for (i, value) in own.values() {
+            if value >= least {
+                some.push((i, value));
+                least = least.max(value - own.slack - PLACED * value.abs());
+            }
+        }
+        some.iter().filter(|(_, v)| *v >= least).map(|(i, _)| (*i, faces[*i].value(x))).fold(none, higher)
+    }
+
+    /// Of a solid of many planes the numbers of faces whose psi may be `least` or more; `None` for another one.
+    pub fn not_below(&self, x: DVec3, least: f64) -> Option<SmallVec<[u32; 16]>> {
+        let own = self.planes_at(x)?;
+        let least = least - own.slack - PLACED * least.abs();
+        Some(own.values().filter(|(_, value)| *value >= least).map(|(i, _)| i as u32).collect())
+    }
+
+    /// Its planes and a point in its own frame, if they are many.
+    fn planes_at(&self, x: DVec3) -> Option<PlanesAt<'_>> {
+        let planes = self.shape.geometry().planes().filter(|planes| planes.len() > FEW_PLANES)?;
+        let own = self.frame.rotation.conjugate() * (x - self.frame.position);
+        Some(PlanesAt { planes, own, slack: PLACED * (x.length() + self.frame.position.length()) })
     }
 
     /// Appends it as and/or of its literals (`local`), complemented where `sense` is negative, with what `truth` says of each: the
@@ -346,5 +406,51 @@ impl Primitive {
             Truth::Open => formula::open_few(start, out, &mut |part, out| self.open(part, out, truth)),
             known => known,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+    use glam::DQuat;
+
+    /// Of hulls in any place, at points anywhere, on faces, edges and corners: the face with the largest psi is the one that a look at all
+    /// of them finds, to the bit, and none that is not below a value is left out.
+    #[test]
+    fn the_highest_of_many_planes_is_the_highest_face() {
+        let mut r = Random(7);
+        let mut ties = 0;
+        for k in 0..40 {
+            let points: Vec<DVec3> = (0..20).map(|_| r.vector(1.0).normalize()).collect();
+            let Some(hull) = Polyhedron::hull(points) else { continue };
+            let corners = hull.vertices.to_vec();
+            let turn = DQuat::from_scaled_axis(r.vector(3.0));
+            let frame = Pose::new(r.vector(if k % 2 == 0 { 1.0 } else { 100.0 }), turn);
+            let label = Label { name: "hull".into(), line: 1, column: 1, mirrored: false };
+            let placed = Primitive::new(hull.into(), frame, label, 0);
+            let faces = placed.faces.listed();
+            assert!(faces.len() > FEW_PLANES, "{}", faces.len());
+            for n in 0..300 {
+                let own = match n % 4 {
+                    0 => r.vector(2.0),
+                    1 => corners[n % corners.len()],
+                    2 => 0.5 * (corners[n % corners.len()] + corners[(n + 1) % corners.len()]),
+                    _ => r.vector(1e-3),
+                };
+                let x = frame.point(own);
+                let values: Vec<f64> = faces.iter().map(|face| face.value(x)).collect();
+                let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let first = values.iter().position(|v| *v == highest).expect("one");
+                assert_eq!(placed.highest(x), (first, highest), "{k} {n}");
+                assert_eq!(placed.value(x), highest, "{k} {n}");
+                let least = highest - 1e-13;
+                let some = placed.not_below(x, least).expect("many planes");
+                let above = (0_u32..).zip(&values).filter(|(_, v)| **v >= least).map(|(i, _)| i);
+                ties += some.len().saturating_sub(1);
+                assert!(above.into_iter().all(|i| some.contains(&i)), "{k} {n}: {some:?}");
+            }
+        }
+        assert!(ties > 1000, "{ties}");
     }
 }

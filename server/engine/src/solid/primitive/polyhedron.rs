@@ -10,15 +10,17 @@ use contactd_proto::Pose;
 use glam::DVec3;
 
 mod clip;
+mod corners;
 mod mesh;
 
+pub use corners::Corners;
 pub use mesh::{Fit, MeshError};
 
 /// A bounded convex polyhedron with an interior.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyhedron {
     /// Corners, each on three planes or more.
-    pub vertices: Vec<DVec3>,
+    pub vertices: Corners,
     /// Outward unit normals and offsets n·x <= d, one per face, no two the same.
     pub planes: Vec<(DVec3, f64)>,
 }
@@ -84,7 +86,7 @@ impl Polyhedron {
             .into_iter()
             .filter(|p| planes.iter().filter(|(n, d)| (n.dot(*p) - d).abs() <= 1e-9 * size).count() >= 3)
             .collect();
-        (planes.len() >= 4 && vertices.len() >= 4).then_some(Self { vertices, planes })
+        (planes.len() >= 4 && vertices.len() >= 4).then_some(Self { vertices: vertices.into(), planes })
     }
 }
 
@@ -96,6 +98,9 @@ pub(super) fn middle(vertices: &[DVec3]) -> DVec3 {
 impl Geometry for Polyhedron {
     fn faces(&self) -> Vec<Face> {
         self.planes.iter().map(|&(normal, offset)| Plane { normal, offset }.into()).collect()
+    }
+    fn planes(&self) -> Option<&[(DVec3, f64)]> {
+        Some(&self.planes)
     }
     fn face_name(&self, index: usize) -> String {
         format!("face {index}")
@@ -151,6 +156,6 @@ impl Geometry for Polyhedron {
         }
         let vertices = (0..corners).map(|_| read_vector(from)).collect::<Checked<_>>()?;
         let planes = (0..faces).map(|_| Ok((read_vector(from)?, from.finite()?))).collect::<Checked<_>>()?;
-        Ok(Self { vertices, planes })
+        Ok(Self { vertices: Vec::into(vertices), planes })
     }
 }

@@ -7,7 +7,7 @@ mod farthest;
 mod feature;
 
 use super::elliptic_frustum::EllipticFrustum;
-use super::polyhedron::middle;
+use super::polyhedron::{Corners, middle};
 use super::superellipsoid::Superellipsoid;
 use crate::math::Lanes;
 use glam::{DMat3, DVec3};
@@ -47,7 +47,7 @@ pub enum Convex<'a> {
     /// The unit ball of a norm of two exponents, scaled along the axes.
     Superellipsoid(&'a Superellipsoid),
     /// The corners.
-    Corners(&'a [DVec3]),
+    Corners(&'a Corners),
     /// All of z <= 0: it reaches 0 along z, and to infinity along any other direction.
     HalfSpace,
     /// None of these: of a kind that those who compute with forms do not know. They leave it to the search.
@@ -133,10 +133,12 @@ impl Convex<'_> {
     /// Largest n·x over the shape where it stands with these axes; n is a unit vector.
     #[inline]
     pub fn reach(&self, axes: &DMat3, n: DVec3) -> f64 {
-        if let Convex::Ball(radius) = self {
-            return *radius;
+        let m = DVec3::new(axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n));
+        match self {
+            Convex::Ball(radius) => *radius,
+            Convex::Corners(corners) => corners.farthest(m).0,
+            _ => self.extent(m.to_array()),
         }
-        self.extent([axes.x_axis.dot(n), axes.y_axis.dot(n), axes.z_axis.dot(n)])
     }
 
     /// The same along n of any length.
@@ -204,16 +206,7 @@ impl Convex<'_> {
             }
             Convex::Elliptic(f) => f.support(m),
             Convex::Superellipsoid(s) => s.support(m),
-            Convex::Corners(corners) => {
-                let mut best = (f64::NEG_INFINITY, corners[0]);
-                for v in corners {
-                    let d = m.dot(*v);
-                    if d > best.0 {
-                        best = (d, *v);
-                    }
-                }
-                best.1
-            }
+            Convex::Corners(corners) => corners.farthest(m).1,
         };
         origin + *axes * local
     }

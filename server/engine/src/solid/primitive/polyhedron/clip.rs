@@ -76,7 +76,7 @@ impl Polyhedron {
         let mut used: Vec<usize> = facets.iter().filter_map(|f| f.plane).collect();
         used.sort_unstable();
         let vertices = apart(facets.iter().flat_map(|f| f.corners.iter()), eps);
-        Some(Self { vertices, planes: used.into_iter().map(|k| planes[k]).collect() })
+        Some(Self { vertices: vertices.into(), planes: used.into_iter().map(|k| planes[k]).collect() })
     }
 }
 

@@ -116,7 +116,7 @@ impl Polyhedron {
             if planes.len() < 4 || vertices.len() < 4 {
                 return Err(MeshError::Flat);
             }
-            return Ok((Self { vertices, planes }, fit));
+            return Ok((Self { vertices: vertices.into(), planes }, fit));
         }
         let around = Aabb::of_points(used.iter().map(|c| points[*c as usize]));
         let hull = Self::from_planes(&planes, &around).ok_or(MeshError::Flat)?;
@@ -279,7 +279,7 @@ mod tests {
         for faces in [cube_faces(), split(cube_faces())] {
             let (p, fit) = Polyhedron::from_faces(&points, &faces).expect("nearly a cube");
             assert!(fit.moved > 1e-7 && fit.moved < 1e-4, "{fit:?}");
-            for v in &p.vertices {
+            for v in p.vertices.iter() {
                 let on = p.planes.iter().filter(|(n, d)| (n.dot(*v) - d).abs() < 1e-12).count();
                 assert!(on >= 3 && p.planes.iter().all(|(n, d)| n.dot(*v) <= d + 1e-12));
             }
