@@ -416,6 +416,10 @@ fn a_slow_disk_costs_whole_steps_which_are_counted_and_no_step_waits_for_it() {
     assert_eq!(gaps, [status.dropped]);
     let replayed = replay(&path, |_| {}).unwrap();
     assert_eq!((replayed.difference, replayed.steps, replayed.dropped), (None, status.steps, status.dropped));
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_contactd"));
+    let out = command.arg("replay").arg(&path).output().unwrap();
+    let said = String::from_utf8(out.stdout).unwrap();
+    assert!(out.status.code() == Some(3) && said.contains("were left out when it was recorded"), "{said}");
 }
 
 /// A disk that has room for some bytes and then refuses so many times.
