@@ -14,9 +14,10 @@ const MOST_SPLITS: usize = 2_000;
 pub(super) fn have_nothing_in_common(regions: &[&Region], surfaces: &[Surface]) -> bool {
     let mut named = Vec::new();
     regions.iter().for_each(|region| region.surfaces(&mut named));
-    let mut proof = Proof { surfaces, sides: Vec::new(), splits: 0 };
-    let highest = named.into_iter().max().map_or(0, |most| most + 1);
-    let mut open = vec![vec![None; highest]];
+    named.sort_unstable();
+    named.dedup();
+    let mut open = vec![vec![None; named.len()]];
+    let mut proof = Proof { surfaces, named, sides: Vec::new(), splits: 0 };
     // Depth first: each case is one in which the sides of some surfaces are chosen.
     while let Some(sides) = open.pop() {
         proof.sides = sides;
@@ -30,7 +31,7 @@ pub(super) fn have_nothing_in_common(regions: &[&Region], surfaces: &[Surface]) 
                 }
                 for outside in [false, true] {
                     let mut sides = proof.sides.clone();
-                    sides[surface] = Some(outside);
+                    sides[proof.place(surface)] = Some(outside);
                     open.push(sides);
                 }
             }
@@ -42,7 +43,9 @@ pub(super) fn have_nothing_in_common(regions: &[&Region], surfaces: &[Surface]) 
 /// A case of a proof.
 struct Proof<'a> {
     surfaces: &'a [Surface],
-    /// Whether a point is outside of each surface, where that is chosen.
+    /// The surfaces that the regions name, in order.
+    named: Vec<usize>,
+    /// Whether a point is outside of each of them, where that is chosen.
     sides: Vec<Option<bool>>,
     splits: usize,
 }
@@ -58,10 +61,20 @@ enum Case {
 }
 
 impl Proof<'_> {
+    /// Where a surface stands among those that are named.
+    fn place(&self, surface: usize) -> usize {
+        self.named.partition_point(|named| *named < surface)
+    }
+
+    /// The side of a surface, where it is chosen.
+    fn side(&self, surface: usize) -> Option<bool> {
+        self.sides[self.place(surface)]
+    }
+
     /// What a region is in this case.
     fn value(&self, region: &Region) -> Option<bool> {
         match region {
-            Region::Side { surface, outside } => self.sides[*surface].map(|side| side == *outside),
+            Region::Side { surface, outside } => self.side(*surface).map(|side| side == *outside),
             Region::All(parts) => self.of(parts, false),
             Region::Any(parts) => self.of(parts, true),
         }
@@ -104,7 +117,7 @@ impl Proof<'_> {
     /// Chooses what a region that holds asks for; whether anything was chosen, `None` where it cannot hold.
     fn hold(&mut self, region: &Region) -> Option<bool> {
         match region {
-            Region::Side { surface, outside } => match self.sides[*surface] {
+            Region::Side { surface, outside } => match self.side(*surface) {
                 Some(side) => (side == *outside).then_some(false),
                 None => self.choose(*surface, *outside).then_some(true),
             },
@@ -132,16 +145,18 @@ impl Proof<'_> {
     /// Chooses a side of a surface; false where one that is chosen has nothing in common with it.
     fn choose(&mut self, surface: usize, outside: bool) -> bool {
         let own = &self.surfaces[surface];
-        let chosen = self.sides.iter().zip(self.surfaces).filter_map(|(side, of)| side.map(|side| (of, side)));
-        let is_possible = !chosen.into_iter().any(|(other, side)| own.parts_from(outside, (other, side)));
-        self.sides[surface] = Some(outside);
+        let chosen = self.sides.iter().zip(&self.named).filter_map(|(side, of)| side.map(|side| (*of, side)));
+        let is_possible =
+            !chosen.into_iter().any(|(other, side)| own.parts_from(outside, (&self.surfaces[other], side)));
+        let place = self.place(surface);
+        self.sides[place] = Some(outside);
         is_possible
     }
 
     /// A surface that a region depends on.
     fn first_open(&self, region: &Region) -> Option<usize> {
         match region {
-            Region::Side { surface, .. } => self.sides[*surface].is_none().then_some(*surface),
+            Region::Side { surface, .. } => self.side(*surface).is_none().then_some(*surface),
             Region::All(parts) | Region::Any(parts) => {
                 let open = parts.iter().filter(|part| self.value(part).is_none());
                 open.into_iter().find_map(|part| self.first_open(part))
