@@ -269,16 +269,16 @@ fn drawn(seed: u64) -> Option<(Random, Polytope, Polytope)> {
     (a.planes.len() > 1).then_some((r, a, b))
 }
 
-/// The seed of a pair whose program loses its way.
-const LOST: u64 = 9_104_926;
+/// Seeds of pairs whose programs lose their way: forty planes that all but meet in one point, and some of which the simplex method goes
+/// in a circle.
+const LOST: [u64; 2] = [9_104_926, 9_303_011];
 
 #[test]
 fn hulls_touch_where_their_corners_and_planes_say() {
     let first = sized("CONTACTD_HULLS_SEED", 0x6875_6c6c_u64);
     let mut seen = Seen::default();
     let count = sized("CONTACTD_HULLS", 80);
-    // The last one has forty planes that all but meet in one point.
-    for i in (0..count).chain([LOST.wrapping_sub(first)]) {
+    for i in (0..count).chain(LOST.map(|seed| seed.wrapping_sub(first))) {
         let Some((mut r, of_a, of_b)) = drawn(first.wrapping_add(i)) else { continue };
         let turn = r.rotation();
         let pose_b = Pose::new(r.vector(0.3), r.rotation());

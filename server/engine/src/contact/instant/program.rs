@@ -25,6 +25,9 @@ const PLANES_PER_LOOK: usize = 8;
 const SHORT: f64 = 1e-13;
 /// Planes that are taken in one after the other.
 const MOST_ADDED: usize = 96;
+/// Times that another way is tried, and how much larger the box is then along each axis.
+const MOST_TURNS: usize = 8;
+const WIDER: DVec3 = DVec3::new(1.0625, 1.1, 1.03);
 /// A bound is trusted up to so many roundings.
 pub(super) const ROUNDINGS: f64 = 64.0;
 /// Programs before it ends where it is.
@@ -317,21 +320,31 @@ fn solve(cuts: &[Cut], half: DVec3, work: &Work) -> Solved {
     }
     // Among many planes that all but meet in one point the simplex method loses its digits: of the fewest that tell, one more at a
     // time, it keeps most of them.
-    let mut some = vec![highest(DVec3::ZERO).0];
+    let (mut some, mut around, mut turns) = (vec![highest(DVec3::ZERO).0], half, 0);
     for _ in 0..MOST_ADDED {
-        let solved = solve_some(cuts, &some, half, work);
+        let solved = solve_some(cuts, &some, around, work);
         work.look(cuts.len().div_ceil(PLANES_PER_LOOK));
         let (over, height) = highest(solved.y);
-        if height < lowest.0 {
+        if height < lowest.0 && solved.y.abs().cmple(half).all() {
             lowest = (height, solved.y);
         }
         if solved.bound > best.bound {
             best = solved;
         }
-        if lowest.0 <= best.bound + SHORT * size || some.contains(&over) {
+        if lowest.0 <= best.bound + SHORT * size {
             break;
         }
-        some.push(over);
+        if some.contains(&over) {
+            // The simplex method went in a circle, as it may where several planes are as good. It takes another way over a box that is a
+            // little larger, not the same along each axis; what holds there holds here.
+            turns += 1;
+            around *= WIDER;
+            if turns > MOST_TURNS {
+                break;
+            }
+        } else {
+            some.push(over);
+        }
     }
     Solved { y: lowest.1, ..best }
 }
