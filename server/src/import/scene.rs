@@ -11,6 +11,7 @@ mod rules;
 use self::raw::{RawObject, RawPose, RawScene};
 use super::format::{ModelBytes, Source};
 use super::openscad::Access;
+use super::problem::Problem;
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Motion, MotionState, Pose, Report, Rule};
@@ -139,6 +140,16 @@ pub enum SceneError {
     /// One of its models.
     #[error(transparent)]
     Model(#[from] ImportError),
+}
+
+impl SceneError {
+    /// What is wrong with a file in which others read the same problems as in a model's text.
+    pub(super) fn of_problem(file: String, at: Place, problem: Problem) -> Self {
+        match problem {
+            Problem::Syntax { expected, found } => Self::Value { file, at, expected, found },
+            other => Self::Format { file, at, message: other.to_string() },
+        }
+    }
 }
 
 /// Reads a scene file.

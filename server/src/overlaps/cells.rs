@@ -77,7 +77,7 @@ pub fn of_cells(universes: &Universes, models: &[Arc<Model>], tolerance: Option<
     (found, suspects)
 }
 
-/// A suspect and the uses that cut off something where it may be; `None`: one of them is the whole box, or they are too many.
+/// The uses of a suspect's universe; `None` where one of them is the whole box, so that what is found there is seen.
 fn cut<'a>(universes: &'a Universes, suspect: &Suspect) -> Option<Vec<&'a Use>> {
     let uses = &universes.universes[suspect.universe].uses;
     (!uses.iter().any(|u| u.text.is_empty())).then(|| uses.iter().collect())

@@ -76,10 +76,7 @@ struct Geometry<'a, 'i> {
 pub fn read_gdml(path: &Path) -> std::result::Result<Volumes, SceneError> {
     let file = path.display().to_string();
     let bytes = read_bytes(path, &Limits::default())?;
-    read(&bytes).map_err(|(at, problem)| match problem {
-        Problem::Syntax { expected, found } => SceneError::Value { file, at, expected, found },
-        other => SceneError::Format { file, at, message: other.to_string() },
-    })
+    read(&bytes).map_err(|(at, problem)| SceneError::of_problem(file, at, problem))
 }
 
 fn read(bytes: &[u8]) -> Result<Volumes> {

@@ -151,12 +151,11 @@ impl Geometry {
         for Tile { universe, center, around } in tiles {
             let mut cuts = seen.cuts.clone();
             cuts.push(Cut { by: By::Region(lattice.prism.clone()), pose: Pose::at(center) });
-            let tile = Seen { around, cuts };
+            let mut tile = Seen { around, cuts };
             let Some(universe) = universe else {
                 self.add(Room::Around(fill), tile, rooms);
                 continue;
             };
-            let mut tile = tile;
             tile.cuts.iter_mut().for_each(|cut| cut.pose.position -= center);
             tile.around = Aabb { min: around.min - center, max: around.max - center };
             self.add(Room::Universe(universe), tile, rooms);

@@ -232,7 +232,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
             let v = self.face((side, id)).value(x);
             local::truth_of(id.sense(), (v, v), 0.0, self.eps)
         };
-        // Of a polytope those planes that are well above the point fold away unseen.
+        // Of a polytope those faces that a point is well below hold there, and fold away unseen.
         let own = if side == Side::A { x } else { self.at.b_point(x) };
         let whole = solid.whole().filter(|whole| whole.is_convex());
         let some = whole.and_then(|p| Some((p.first_face, p.not_below(own, -2.0 * self.eps)?)));
