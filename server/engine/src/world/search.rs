@@ -23,8 +23,12 @@ use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
-/// With fewer pairs to ask about than this one thread is done before others wake up.
+/// With fewer pairs to ask about than this one thread is done before others wake up …
 const WORTH_SHARING: usize = 8;
+/// … and where the last step's have taken less work than this, in evaluations of a literal: some tenth of a millisecond.
+const WORTH_WAKING: u64 = 8192;
+/// So many of them is what a cell costs beside its own, what a closed form does, and what a pair does that is asked about.
+const BESIDE: [u64; 3] = [256, 64, 16];
 
 /// A pair of the step: indices of its bodies, the one with the smaller id first.
 #[derive(Debug)]
@@ -102,13 +106,25 @@ impl PairJob {
 pub struct Memory {
     /// One for each thread.
     thread_scratches: Vec<Mutex<ThreadScratch>>,
+    /// Work of the last step (`WORTH_WAKING`); `None` before the first one.
+    last: Option<u64>,
 }
 
-/// A thread's scratch, and the cells that it has refined in this step.
+/// A thread's scratch, and what it has done in this step: cells that it has refined, and all of its work (`WORTH_WAKING`).
 #[derive(Debug, Default)]
 struct ThreadScratch {
     scratch: Scratch,
     cells: u64,
+    work: u64,
+}
+
+impl ThreadScratch {
+    /// Takes note of what a pair has cost.
+    fn count(&mut self, counters: &Counters) {
+        self.cells += counters.cells;
+        let [cell, closed_form, pair] = BESIDE;
+        self.work += counters.evaluations + cell * counters.cells + closed_form * counters.closed_forms + pair;
+    }
 }
 
 impl Memory {
@@ -119,11 +135,21 @@ impl Memory {
         work(&mut thread_scratch)
     }
 
-    /// A step begins: nobody has refined a cell.
+    /// A step begins: nobody has done anything.
     fn begin(&mut self) {
+        let mut last = 0;
         for thread_scratch in &mut self.thread_scratches {
-            thread_scratch.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner()).cells = 0;
+            let thread_scratch = thread_scratch.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
+            last += std::mem::take(&mut thread_scratch.work);
+            thread_scratch.cells = 0;
         }
+        self.last = (!self.thread_scratches.is_empty()).then_some(last);
+    }
+
+    /// True when so many pairs are to be shared among the threads. An answer does not depend on it, only when it is there: what a step
+    /// costs is mostly what the one before it did.
+    fn is_worth_sharing(&self, pairs: usize) -> bool {
+        rayon::current_num_threads() > 1 && pairs >= WORTH_SHARING && self.last.is_none_or(|work| work >= WORTH_WAKING)
     }
 
     /// Makes a scratch for each thread.
@@ -210,7 +236,7 @@ impl Searches<'_> {
     fn share(&self, jobs: &mut [PairJob], memory: &mut Memory, halt: Option<&Arc<Halt>>) {
         memory.ready();
         let memory = &*memory;
-        if rayon::current_num_threads() > 1 && jobs.len() >= WORTH_SHARING {
+        if memory.is_worth_sharing(jobs.len()) {
             jobs.par_iter_mut().for_each(|job| self.answer(job, memory, halt));
         } else {
             jobs.iter_mut().for_each(|job| self.answer(job, memory, halt));
@@ -230,7 +256,7 @@ impl Searches<'_> {
             if let Some(finding) = pair_cache.and_then(|k| k.ask(&q, &mut thread_scratch.scratch, &mut counters)) {
                 job.found = finding;
                 finish(&job.plan, &mut job.found.outcome);
-                thread_scratch.cells += job.found.outcome.counters.cells;
+                thread_scratch.count(&job.found.outcome.counters);
                 job.is_done = true;
                 return 0;
             }
@@ -276,7 +302,7 @@ impl Searches<'_> {
             self.beyond.store(true, Relaxed);
         }
         outcome.counters += asked;
-        thread_scratch.cells += outcome.counters.cells;
+        thread_scratch.count(&outcome.counters);
         job.take(&q, q.query.cell_limit);
         job.is_done = true;
         cells

@@ -84,6 +84,8 @@ pub struct Regions {
 pub const MOST_CELLS: u64 = 20_000;
 /// A box with no more faces than this, of both sides together, is not halved for their number: 132 sets of them may balance.
 const FEW_FACES: usize = 8;
+/// So many boxes of few faces show whether two convex bodies touch in a point alone, or not at all.
+const FEW_PLACES: usize = 8;
 /// Boxes in which curved faces may touch at several points are halved down to this part of the smaller body's radius …
 const ROUND: f64 = 1.0 / 24.0;
 /// … and those in which many faces run together down to this one, or to where all that is left in them is near.
@@ -354,6 +356,35 @@ fn cover(bodies: &Bodies) -> (Vec<Place>, bool) {
         }
     }
     (places, cover.is_done())
+}
+
+/// False where it is known that two convex bodies, of few faces where they are near, touch over no area and along no line: no two faces
+/// lie on each other, and no candidate for a line has a run.
+fn may_extend(bodies: &Bodies) -> bool {
+    let tau = bodies.tau;
+    let mut cover = Cover::new(bodies.task, bodies.at, tau, tau, bodies.work);
+    let mut places = Vec::new();
+    while let Some(place) = cover.next(0.5 * tau) {
+        let [a, b] = [Side::A, Side::B].map(|s| place.lits(s).len());
+        if a == 0 || b == 0 {
+            continue;
+        }
+        if a + b <= FEW_FACES {
+            places.push(place);
+        } else if places.len() < FEW_PLACES {
+            cover.split(place, |_| true);
+        } else {
+            return true;
+        }
+    }
+    let is_line = |(c, of): (Candidate, Vec<usize>)| {
+        let of: Vec<&Place> = of.iter().map(|i| &places[*i]).collect();
+        !line::runs(bodies, &c, &of, &|_| false).is_empty()
+    };
+    !cover.is_done()
+        || !pairs(bodies, &places).is_empty()
+        || candidates(bodies, &places).into_iter().any(is_line)
+        || bodies.work.is_spent()
 }
 
 /// True when faces touch in a box over an area or along a line: halving it would only cut that up.

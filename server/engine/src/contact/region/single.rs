@@ -1,9 +1,10 @@
 //! The one point in which two convex bodies touch, where one of them has no other near: without boxes.
 //!
 //! Two convex bodies are nearest to each other along one direction, and touch in what the faces farthest along it have in common. Where
-//! one of them stands out there (`Convex::is_pointed`), as an ellipsoid does, a rim or a corner, that is a point. Both feet are followed
-//! from where F is lowest, or found by Newton's method on the distance itself. That they are nearest is proven: between the planes
-//! through them across the normal neither body reaches.
+//! one of them stands out there (`Convex::is_pointed`), as an ellipsoid does, a rim or a corner, that is a point; and where none of their
+//! faces lie on each other and no curve of one runs along the other (`super::may_extend`), as of two cylinders that cross. Both feet are
+//! followed from where F is lowest, or found by Newton's method on the distance itself. That they are nearest is proven: between the
+//! planes through them across the normal neither body reaches.
 
 use super::local::Bodies;
 use super::point::{self, Meeting};
@@ -44,16 +45,22 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
         let is_pointed = whole.shape.convex().is_pointed(whole.frame.rotation.inverse() * n, depth, lean);
         apexes.all(|apex| is_behind(apex.point)).then_some(is_pointed)
     };
-    let is_single = |m: &Meeting| {
-        let of_a = stands_out(both[0], m.normal, m.feet[0]);
-        let of_b = stands_out(both[1], bodies.at.b_from_a * -m.normal, bodies.at.b_point(m.feet[1]));
-        matches!((of_a, of_b), (Some(a), Some(b)) if a || b)
+    // Whether one of them stands out; `None` at an apex.
+    let one_stands_out = |m: &Meeting| {
+        let of_a = stands_out(both[0], m.normal, m.feet[0])?;
+        let of_b = stands_out(both[1], bodies.at.b_from_a * -m.normal, bodies.at.b_point(m.feet[1]))?;
+        Some(of_a || of_b)
     };
     // Where F is lowest the bodies face each other nearly as where they are nearest.
-    if !is_single(&Meeting { feet: [lowest.0; 2], normal: lowest.1, gap: 0.0 }) {
+    let stands_out = one_stands_out(&Meeting { feet: [lowest.0; 2], normal: lowest.1, gap: 0.0 })?;
+    if !stands_out && super::may_extend(bodies) {
         return None;
     }
-    let m = meeting(bodies, both, &lowest, bodies.eps).filter(is_single)?;
+    let m = meeting(bodies, both, &lowest, bodies.eps)?;
+    let still_does = one_stands_out(&m)?;
+    if stands_out && !still_does {
+        return None;
+    }
     let is_near = m.gap <= bodies.tau * (1.0 + SAME_POINT) + bodies.eps;
     Some(if is_near { vec![point_region(bodies, &m)] } else { Vec::new() })
 }
