@@ -152,6 +152,37 @@ def primitives(friction):
         <geom type="plane" size="1 1 .1"/>{bodies}</worldbody></mujoco>"""
 
 
+def thrown(geom):
+    """Twelve bodies of a kind, falling in any attitude into a bin of boxes."""
+    draw, bodies = np.random.default_rng(3), ""
+    for i in range(12):
+        (x, y), turn = draw.uniform(-0.1, 0.1, 2), draw.normal(size=4)
+        place = f'pos="{x} {y} {0.15 + 0.14 * i}" quat="{" ".join(map(str, turn))}"'
+        bodies += f"<body {place}><freejoint/><geom {geom}/></body>"
+    walls = "".join(
+        f'<geom type="box" size="{size}" pos="{at}"/>'
+        for size, at in (
+            (".3 .3 .05", "0 0 -.05"),
+            (".02 .3 .2", ".22 0 .2"),
+            (".02 .3 .2", "-.22 0 .2"),
+            (".3 .02 .2", "0 .22 .2"),
+            (".3 .02 .2", "0 -.22 .2"),
+        )
+    )
+    corners = "0 0 .08 .08 0 -.04 -.05 .07 -.04 -.05 -.07 -.04"
+    return f"""<mujoco><asset><mesh name="tetrahedron" vertex="{corners}"/></asset><worldbody>{walls}{bodies}</worldbody></mujoco>"""
+
+
+# Kinds that are thrown; of boxes all contacts are MuJoCo's own.
+KINDS = {
+    "cylinders": 'type="cylinder" size=".05 .06"',
+    "discs": 'type="cylinder" size=".08 .02"',
+    "capsules": 'type="capsule" size=".04 .06"',
+    "ellipsoids": 'type="ellipsoid" size=".05 .07 .04"',
+    "tetrahedra": 'type="mesh" mesh="tetrahedron"',
+}
+
+
 def coupled(name, make, couple, settle, speed, count):
     """A line of the table: medians in microseconds."""
     import mujoco
@@ -217,6 +248,9 @@ def contacts(quick):
     coupled("all asked, sliding", sliding, alone, settle, 0.2, count)
     peg = lambda model: attach(model, mujoco_peg.SOLIDS, unit=1e-3)  # noqa: E731
     coupled("peg and plate at rest", mujoco_peg.scene, peg, settle, 0.0, count)
+    for kind, geom in KINDS.items():
+        into_bin = lambda geom=geom: mujoco.MjModel.from_xml_string(thrown(geom))  # noqa: E731
+        coupled(f"12 {kind} in a bin", into_bin, attach, 200, 0.0, 100 if quick else 400)
 
 
 if __name__ == "__main__":

@@ -30,8 +30,8 @@
 //! direction until half of the given gap is between its bodies: its points are those of the face it came through, carried
 //! back. All such pairs are moved apart in one request, each with what stands on it. Pairs that cannot be apart together, as
 //! those of a body between two walls, and pairs that overlap even there, as an edge in a face by more than the ball within it,
-//! are asked about again, up to eight times in all; of what is left then the depth is kept, one point. What was moved apart is
-//! put back with the next request.
+//! are asked about again, these as far out as the depth has fallen on the way so far lets expect, up to eight times in all; of
+//! what is left then the depth is kept, one point. What was moved apart is put back with the next request.
 
 use super::{Manifold, Manifolds, Point};
 use crate::Reply;
@@ -70,12 +70,17 @@ struct Overlap {
     bodies: [usize; 2],
     /// How the second is to be moved against the first, for the face by which they met to be in sight.
     way: DVec3,
+    /// How deep it was before it was moved by that, and after how much of a way.
+    depth: f64,
+    moved: f64,
     /// Pairs between it and what is fixed.
     level: usize,
 }
 
 /// Requests of a step that move pairs apart.
 const MOST_ROUNDS: usize = 8;
+/// How much of a way the depth falls by, at least, where it is followed to its end: of a needle's point it is less.
+const LEAST_FALL: f64 = 0.05;
 /// Of the gap, how far a pair that is moved by others may be from where it would be moved itself.
 const ASIDE: f64 = 0.01;
 
@@ -276,8 +281,9 @@ impl ContactCache {
         for pair in self.manifolds.pairs().filter(|pair| pair.status == OVERLAP) {
             let (Some(p), true) = (pair.points.first(), is_asked(&self.bodies, pair.a, pair.b)) else { continue };
             let (Some(a), Some(b)) = (index(&self.bodies, pair.a), index(&self.bodies, pair.b)) else { continue };
-            let way = p.normal * (0.5 * self.gap - p.separation);
-            self.left.push(Overlap { pair: [pair.a, pair.b], bodies: [a, b], way, level: 0 });
+            let depth = -p.separation;
+            let way = p.normal * (0.5 * self.gap + depth);
+            self.left.push(Overlap { pair: [pair.a, pair.b], bodies: [a, b], way, depth, moved: 0.0, level: 0 });
         }
         if !self.left.is_empty() {
             self.asked.retracted += 1;
@@ -366,8 +372,13 @@ impl ContactCache {
             // The direction is from the record's first object to its second.
             let direction = DVec3::from_array(detail.direction);
             let direction = if self.bodies[b].object == record.b { direction } else { -direction };
-            let way = moved(b) - moved(a) + direction * (0.5 * self.gap + detail.penetration);
-            self.left.push(Overlap { way, ..*pair });
+            let (way, depth) = (moved(b) - moved(a), detail.penetration);
+            let went = way.length();
+            // What sticks in by an edge or a corner is as much deeper than the ball within it as it is deep: the depth falls evenly.
+            let falls = (pair.depth - depth) / (went - pair.moved);
+            let rest = if falls > LEAST_FALL { (depth / falls).max(depth) } else { depth };
+            let way = way + direction * (0.5 * self.gap + rest);
+            self.left.push(Overlap { way, depth, moved: went, ..*pair });
         }
         self.left.sort_by_key(|pair| pair.level);
         if !self.left.is_empty() && self.rounds < MOST_ROUNDS {

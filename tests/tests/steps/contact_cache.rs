@@ -419,7 +419,8 @@ fn a_body_that_is_held_from_both_sides_is_told_by_both_faces() {
     }
 }
 
-/// An edge or a corner deeper in a floor than the ball within it: told as deep as it is, by all points that are.
+/// An edge or a corner deeper in a floor than the ball within it: told as deep as it is, by all points that are, and in two requests
+/// more: one in which it is out by that ball alone, and one that follows how its depth has fallen.
 #[test]
 fn edges_and_corners_are_told_as_deep_as_they_are() {
     for (lean, points) in [(DVec3::X * FRAC_PI_4, 2), (DVec3::Y * 0.2, 2), (dvec3(0.3, 0.5, 0.0), 1)] {
@@ -435,8 +436,10 @@ fn edges_and_corners_are_told_as_deep_as_they_are() {
             scene.step(&poses);
             let told: Vec<f64> = scene.cache.contacts().map(|c| c.1.separation).collect();
             let least = told.iter().copied().fold(f64::INFINITY, f64::min);
-            let what = format!("{deep} margins, {lean}: {told:?}");
+            let requests = scene.cache.asked().requests;
+            let what = format!("{deep} margins, {lean}: {told:?}, {requests} requests");
             assert!((least + deep * MARGIN).abs() < 1e-8 && told.len() == points, "{what}");
+            assert!(requests <= 3, "{what}");
         }
     }
 }
