@@ -220,10 +220,27 @@ fn modules(source: &Path) -> BTreeMap<Module, Names> {
             continue;
         }
         let mut names = Names::default();
-        names.visit_file(&syn::parse_file(&std::fs::read_to_string(&file).unwrap()).unwrap());
+        names.visit_file(&syn::parse_file(&shipped(&std::fs::read_to_string(&file).unwrap())).unwrap());
         all.insert(path, names);
     }
     all
+}
+
+/// A file's text without its comments and the tests at its end: nothing of them is an import, and they are most of what there is
+/// to parse.
+fn shipped(text: &str) -> String {
+    let mut kept = String::new();
+    let mut lines = text.lines().peekable();
+    while let Some(line) = lines.next() {
+        if line == "#[cfg(test)]" && lines.peek().is_some_and(|next| next.starts_with("mod ") && next.ends_with('{')) {
+            // Up to the brace in the first column that ends them.
+            lines.by_ref().find(|line| *line == "}").expect("an end of the tests");
+        } else if !line.trim_start().starts_with("//") {
+            kept.push_str(line);
+            kept.push('\n');
+        }
+    }
+    kept
 }
 
 /// Those of the engine and of the server: both tests that read them parse them once.

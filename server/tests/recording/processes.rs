@@ -132,11 +132,16 @@ fn a_server_that_is_killed_leaves_a_file_that_reads_up_to_there() {
     let (mut child, _out) = recorder(&server, &file);
     let mut session = Session::connect_to(server.address.clone()).unwrap();
     let ids = build(&mut session, 3);
-    let mut k = 0;
-    // Until something of it is in the file.
-    while !replay(&file, |_| {}).is_ok_and(|replayed| replayed.steps > 20) {
+    let (mut k, mut length) = (0, 0);
+    // Until something of it is in the file, which is read when it has grown.
+    loop {
         play(&mut session, &ids, k..k + 20);
         k += 20;
+        let now = std::fs::metadata(&file).map_or(0, |m| m.len());
+        if now != length && replay(&file, |_| {}).is_ok_and(|replayed| replayed.steps > 20) {
+            break;
+        }
+        length = now;
     }
     server.kill();
     let replayed = repeated(&file);
