@@ -159,7 +159,7 @@ fn capsules_are_answered_in_front_of_the_search_as_by_it() {
 
 #[test]
 fn certificates_of_capsules_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(50);
+    let count = pairs(20);
     certify_all("kinds", (count, 0xca_9501), |r| {
         let other = if r.chance(0.3) { capsule(r, 0.8).into() } else { shape(r, 0.8) };
         [(alone(capsule(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.4)))]

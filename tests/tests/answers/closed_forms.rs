@@ -167,7 +167,7 @@ fn at_rest(model: Recipe) -> (Model, Placed) {
 
 /// Two positive primitives.
 fn family(a: usize, b: usize) {
-    let count = pairs(120);
+    let count = pairs(60);
     let mut r = Random::new(1000 + 10 * a as u64 + b as u64);
     let mut tally = Tally::default();
     for i in 0..count {
@@ -183,7 +183,7 @@ fn family(a: usize, b: usize) {
 
 /// A body in a cavity of a block; hollow, if `hole` is a kind.
 fn in_cavity(kind: usize, cavity: usize, hole: Option<usize>) {
-    let count = pairs(if hole.is_some() { 30 } else { 60 });
+    let count = pairs(if hole.is_some() { 15 } else { 30 });
     let seed = 2000 + 100 * hole.map_or(0, |h| h as u64 + 1) + 10 * kind as u64 + cavity as u64;
     let mut r = Random::new(seed);
     let mut tally = Tally::default();

@@ -175,7 +175,7 @@ fn the_witness_of_an_elliptic_contact_is_next_to_its_touch() {
 
 #[test]
 fn certificates_of_elliptic_solids_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(40);
+    let count = pairs(16);
     certify_all("kinds", (count, 0xe1_1195), |r| {
         let other = if r.chance(0.3) { elliptic(r, 0.8) } else { shape(r, 0.8) };
         [(alone(elliptic(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]

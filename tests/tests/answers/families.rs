@@ -1,6 +1,6 @@
 //! Thirteen families of random scenes: nothing is wrong by judges that share no code with the engine, and nothing undecided.
 //!
-//! In the command 40 scenes of each; `CONTACTD_FAMILY_SCENES` says how many in the long form, `CONTACTD_FAMILY_SEED` which
+//! In the command 10 scenes of each; `CONTACTD_FAMILY_SCENES` says how many in the long form, `CONTACTD_FAMILY_SEED` which
 //! (1 by default). `cargo run --release -p contactd-benches --bin families` tells what they cost.
 
 use contactd::contact::{Contact, ContactKind, ContactPoint, Outcome, Overlap, Status, Verdict};
@@ -17,7 +17,7 @@ const CELLS: u64 = 20_000;
 
 #[test]
 fn nothing_is_wrong_and_nothing_undecided() {
-    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 20), sized("CONTACTD_FAMILY_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 10), sized("CONTACTD_FAMILY_SEED", 1));
     let cells = if scenes > 40 { 0 } else { CELLS };
     let of_family = |family: usize| {
         let verdicts: Vec<_> = (0..scenes)
@@ -47,7 +47,7 @@ fn nothing_is_wrong_and_nothing_undecided() {
 /// engine's limit and be left undecided.
 #[test]
 fn nothing_is_wrong_of_trees_of_a_hundred_primitives_and_more() {
-    let (scenes, seed) = (sized("CONTACTD_SIZED_SCENES", 6), sized("CONTACTD_FAMILY_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_SIZED_SCENES", 4), sized("CONTACTD_FAMILY_SEED", 1));
     let verdicts: Vec<_> = (0..scenes)
         .into_par_iter()
         .map(|index| {

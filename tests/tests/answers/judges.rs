@@ -8,6 +8,7 @@ use contactd_tests::reference::linear::least_squares;
 use contactd_tests::shells::{
     arm, chain_link, cup, elbow, filleted, flange, gear, knot, nut, perforated, sampled, screw, sheet, spring, stone,
 };
+use contactd_tests::sweep::sized;
 use contactd_tests::triangles::{Body, distance};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -52,7 +53,8 @@ fn the_slope_is_the_derivative() {
 fn two_meshes_are_as_far_apart_as_points_of_one_are_from_the_other_at_least() {
     let mut r = Random::new(4);
     let (mut met, mut apart) = (0, 0);
-    for i in 0..100 {
+    let count = sized("CONTACTD_PAIRS", 40);
+    for i in 0..count {
         let [a, b] = [random(&mut r, 0.7), random(&mut r, 0.7)];
         let at = Pose::new(r.direction() * r.within(0.4, 1.6), r.rotation());
         let place = Pose::new(r.vector(1.0), r.rotation());
@@ -73,7 +75,7 @@ fn two_meshes_are_as_far_apart_as_points_of_one_are_from_the_other_at_least() {
         let ball = distance((&p, &place), (&Body::ball(0.1), &place.compose(&at)), 10.0);
         assert!((ball - (from_mesh(&a, at.position) - 0.1).max(0.0)).abs() < 1e-12);
     }
-    assert!(met > 20 && apart > 20, "{met} {apart}");
+    assert!(5 * met > count && 5 * apart > count, "{met} {apart}");
 }
 
 #[test]

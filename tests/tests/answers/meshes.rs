@@ -32,7 +32,7 @@ fn ask(a: &Model, b: &Model, motions: [Motion; 2]) -> Outcome {
 fn a_point_is_inside_where_the_mesh_winds_around_it_and_f_is_no_more_than_its_distance() {
     let mut r = Random::new(5);
     let (mut inside, mut seen) = (0, 0);
-    for i in 0..pairs(90) {
+    for i in 0..pairs(45) {
         let mesh = meshes::random(&mut r, 1.0);
         let model = alone(meshes::solid(&mesh));
         let around = model.solid.aabb();
@@ -81,7 +81,7 @@ fn the_volume_of_a_mesh_is_that_of_its_tetrahedra() {
 
 #[test]
 fn certificates_of_meshes_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(20);
+    let count = pairs(10);
     certify_all("kinds", (count, 0x3e_5105), |r| {
         let mesh = |r: &mut Random| Shape::from(meshes::solid(&meshes::random(r, 0.8)));
         let other = if r.chance(0.3) { mesh(r) } else { shape(r, 0.8) };
@@ -107,7 +107,7 @@ fn fine(r: &mut Random) -> Mesh {
 fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_and_its_certificates_hold() {
     let mut r = Random::new(0xd1);
     let (mut contacts, mut worst) = (0, 0.0_f64);
-    let count = pairs(20);
+    let count = pairs(8);
     for i in 0..count {
         let mesh = if r.chance(0.3) { meshes::random(&mut r, 0.8) } else { fine(&mut r) };
         let [whole, divided] = [alone(meshes::solid(&mesh)), alone(meshes::divided(&mesh))];
@@ -136,7 +136,7 @@ fn a_mesh_whose_formula_is_divided_meets_when_the_same_with_a_written_one_does_a
         let other = if r.chance(0.3) { Shape::from(meshes::divided(&meshes::random(r, 0.8))) } else { shape(r, 0.8) };
         [(own, place(turning(r))), (alone(other), place(past(r, 2.2)))]
     });
-    certify_trees((count + 10, 0x3e_5105), |r, size| {
+    certify_trees((count.max(10), 0x3e_5105), |r, size| {
         if r.chance(0.5) { meshes::divided(&meshes::random(r, size)).into() } else { shape(r, size) }
     });
 }

@@ -7,6 +7,7 @@ use contactd_tests::engine::ask;
 use contactd_tests::random_solids::Random;
 use contactd_tests::reference::{Moving, deepest};
 use contactd_tests::scenes::{Recipe, Scene, pose, tree};
+use contactd_tests::sweep::sized;
 use glam::DVec3;
 
 /// What a thousandth may cost in depth, and what a bound of the search rounds away.
@@ -71,8 +72,8 @@ fn of_many_feet_the_deepest_is_reported() {
 #[test]
 fn the_reference_finds_nothing_deeper_in_random_trees() {
     let mut r = Random::new(62);
-    let mut seen = 0;
-    while seen < 30 {
+    let (mut seen, count) = (0, sized("CONTACTD_LAW_SCENES", 12));
+    while seen < count {
         let (leaves_a, leaves_b) = (2 + r.below(4), 2 + r.below(4));
         let (a, b) = (tree(&mut r, leaves_a), tree(&mut r, leaves_b));
         let (at_a, at_b) = (pose(&mut r, 0.3), pose(&mut r, 0.3));

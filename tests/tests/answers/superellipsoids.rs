@@ -175,7 +175,7 @@ fn superellipsoids_meet_convex_bodies_in_front_of_the_search_as_in_it() {
 
 #[test]
 fn certificates_of_superellipsoids_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(30);
+    let count = pairs(12);
     certify_all("kinds", (count, 0x5e_1195), |r| {
         let other = if r.chance(0.3) { superellipsoid(r, 0.8).into() } else { shape(r, 0.8) };
         [(alone(superellipsoid(r, 0.8)), placed(turning(r))), (alone(other), placed(past(r, 2.2)))]

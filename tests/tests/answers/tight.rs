@@ -347,6 +347,11 @@ fn ask_with(scene: &Scene, models: [&Model; 2], strategies: Strategies) -> Outco
     earliest_contact(&query, &mut Scratch::default())
 }
 
+/// Scenes of a kind that is drawn at random: twenty in the command, sixty in the long form.
+fn scenes_of_a_kind() -> usize {
+    sized("CONTACTD_TIGHT_SCENES", 20).min(60)
+}
+
 fn still() -> Motion {
     Motion::resting(Pose::IDENTITY)
 }
@@ -558,7 +563,7 @@ fn turning_peg(rng: &mut Random, turns: f64) -> Option<(Scene, String)> {
 #[test]
 fn a_round_peg_turns_in_a_hole_with_flat_walls() {
     let rng = &mut Random::new(4_711);
-    for k in 0..60 {
+    for k in 0..scenes_of_a_kind() {
         let Some((scene, what)) = turning_peg(rng, 1.0) else { continue };
         // By the search alone.
         let o = decided_with(&format!("peg {k}"), &scene, 400, Strategies { cavities: false, ..Strategies::default() });
@@ -571,7 +576,7 @@ fn a_round_peg_turns_in_a_hole_with_flat_walls() {
 #[test]
 fn a_round_peg_turns_many_times_in_a_hole_with_flat_walls() {
     let rng = &mut Random::new(4_712);
-    for k in 0..60 {
+    for k in 0..scenes_of_a_kind() {
         let Some((scene, what)) = turning_peg(rng, 5.0 * TAU) else { continue };
         let o = decided(&format!("peg {k}"), &scene, 0);
         assert_eq!(o.status(), Status::Clear, "{k}: {what}");

@@ -29,7 +29,7 @@ fn from_circle(pose: &Pose, major: f64, x: DVec3) -> f64 {
 
 #[test]
 fn a_torus_meets_a_ball_and_a_plane_and_leaves_round_walls_when_closed_forms_say_so() {
-    let count = pairs(30);
+    let count = pairs(15);
     compare("ball", (count, 1, 4.0), |r| {
         let (t, ball) = (torus(r, 1.0), r.within(0.05, 0.6));
         let motions = [turning(r), past(r, 2.0)];
@@ -90,7 +90,7 @@ fn passing(r: &mut Random) -> [(Model, Placed); 2] {
 
 #[test]
 fn certificates_of_tori_against_every_kind_and_of_trees_with_them_hold() {
-    let count = pairs(40);
+    let count = pairs(16);
     certify_all("kinds", (count, KINDS_SEED), passing);
     certify_trees((count, KINDS_SEED), shape_or_torus);
 }

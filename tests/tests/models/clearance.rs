@@ -127,7 +127,7 @@ fn no_sample_is_nearer_than_is_proven_and_what_is_told_is_so_near() {
 fn a_ball_on_an_arm_comes_as_near_as_its_arc_does() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(21);
-    for k in 0..20 {
+    for k in 0..sized("CONTACTD_ROBOTS", 8) {
         let (p, q, arm) = (r.within(0.05, 0.2), r.within(0.05, 0.2), r.within(0.5, 1.5));
         let (from, whole) = (r.within(-1.0, 1.0), r.within(0.3, 3.0));
         let x = r.direction() * r.within(2.2, 3.5);

@@ -26,7 +26,7 @@ fn replay(name: &str, runs: u64) {
 
 #[test]
 fn any_text_is_a_model_or_one_sentence() {
-    replay("csg", 600);
+    replay("csg", 300);
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn any_batch_is_taken_whole_or_changes_nothing() {
 
 #[test]
 fn any_scene_has_an_answer_in_order_that_the_reference_does_not_refute() {
-    replay("scenes", 150);
+    replay("scenes", 75);
 }
 
 #[test]

@@ -228,7 +228,7 @@ fn a_large_mesh_that_something_is_cut_from_is_marched_through_too() {
 #[test]
 fn triangles_of_a_solid_lie_on_it_and_are_closed() {
     let mut r = Random::new(37);
-    for _ in 0..2 {
+    for _ in 0..sweep::sized("CONTACTD_VIEW_SOLIDS", 1_usize) {
         let solid = solid_of(&mut r, 2, shape_or_torus);
         let made = tessellation::of_solid(&solid, &solid.aabb(), 6);
         assert!(made.indices.len() > 100 && made.indices.len() == made.faces.len());

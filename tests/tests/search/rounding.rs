@@ -316,16 +316,19 @@ impl Worst {
     }
 }
 
-/// How many numbers each test compares.
-fn evaluations() -> u64 {
-    sized("CONTACTD_EVALUATIONS", 20_000)
+/// How many numbers a test compares: `few` in the command.
+fn evaluations(few: u64) -> u64 {
+    sized("CONTACTD_EVALUATIONS", few)
 }
+
+/// Of each kind of solid by itself.
+const OF_A_KIND: u64 = 8_000;
 
 #[test]
 fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget() {
     let mut r = Random::new(7);
     let models = models(&mut r);
-    evaluate(&mut r, &models, evaluations(), "all kinds");
+    evaluate(&mut r, &models, evaluations(20_000), "all kinds");
 }
 
 #[test]
@@ -333,7 +336,7 @@ fn nothing_that_is_computed_of_a_torus_differs_by_more_than_the_budget() {
     let mut r = Random::new(8);
     let shapes: Vec<Shape> = (0..24).map(|_| random_solids::torus(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, evaluations(), "tori");
+    evaluate(&mut r, &models, evaluations(OF_A_KIND), "tori");
 }
 
 #[test]
@@ -341,7 +344,7 @@ fn nothing_that_is_computed_of_an_elliptic_face_differs_by_more_than_the_budget(
     let mut r = Random::new(9);
     let shapes: Vec<Shape> = (0..48).map(|_| random_solids::elliptic(&mut r, 1.0)).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, evaluations(), "elliptic faces");
+    evaluate(&mut r, &models, evaluations(OF_A_KIND), "elliptic faces");
 }
 
 #[test]
@@ -349,7 +352,7 @@ fn nothing_that_is_computed_of_a_capsule_differs_by_more_than_the_budget() {
     let mut r = Random::new(10);
     let shapes: Vec<Shape> = (0..24).map(|_| random_solids::capsule(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, evaluations(), "capsules");
+    evaluate(&mut r, &models, evaluations(OF_A_KIND), "capsules");
 }
 
 #[test]
@@ -357,7 +360,7 @@ fn nothing_that_is_computed_of_a_quadric_differs_by_more_than_the_budget() {
     let mut r = Random::new(11);
     let shapes: Vec<Shape> = (0..48).map(|_| quadrics::random(&mut r, 1.0)).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
-    evaluate(&mut r, &models, evaluations(), "quadrics");
+    evaluate(&mut r, &models, evaluations(OF_A_KIND), "quadrics");
 }
 
 #[test]
@@ -366,7 +369,7 @@ fn nothing_that_is_computed_of_a_superellipsoid_differs_by_more_than_the_budget(
     let shapes: Vec<Shape> = (0..48).map(|_| random_solids::superellipsoid(&mut r, 1.0).into()).collect();
     let models: Vec<Model> = shapes.into_iter().map(|shape| Model::new(alone(&mut r, shape))).collect();
     // Logarithms of many digits take their time.
-    evaluate(&mut r, &models, evaluations().div_ceil(8), "superellipsoids");
+    evaluate(&mut r, &models, evaluations(20_000).div_ceil(8), "superellipsoids");
 }
 
 /// Draws cells, literals and times until so many numbers were compared.

@@ -10,11 +10,17 @@ use contactd_proto::{Detect, EffectCounters, Effects, Report, Rule};
 use contactd_tests::engine::question;
 use contactd_tests::lanes::{Class, EFFECTS, Lane, Lanes, NARROW, PLAIN, WIDE, counts, rule};
 use contactd_tests::scenes::{Recipe, Scene};
+use contactd_tests::sweep::sized;
 use glam::DVec3;
 
 /// Lanes of each class, and copies of each lane.
 const LANES: usize = 9;
 const COPIES: usize = 8;
+
+/// Lanes of each class where every share of the pairs asks: `CONTACTD_LANES=9` is the long form.
+fn few() -> usize {
+    sized("CONTACTD_LANES", 3)
+}
 
 fn value(counts: &[(&'static str, u64)], name: &str) -> u64 {
     counts.iter().find(|(n, _)| *n == name).expect("a count").1
@@ -39,7 +45,7 @@ fn an_effect_that_no_pair_asks_for_costs_nothing() {
 #[test]
 fn the_cost_of_an_effect_is_straight_in_the_pairs_that_ask_for_it() {
     for effect in &EFFECTS {
-        let lanes = effect.class.lanes(LANES / 2);
+        let lanes = effect.class.lanes(few());
         let at = |k: usize| counts(effect.lanes(&lanes, (k, COPIES)).step());
         let (none, all) = (at(0), at(COPIES));
         assert!(none != all, "{}: the effect does something", effect.name);
@@ -57,7 +63,7 @@ fn the_cost_of_an_effect_is_straight_in_the_pairs_that_ask_for_it() {
 #[test]
 fn an_effect_that_all_pairs_ask_for_costs_the_effect_alone() {
     for effect in &EFFECTS {
-        let lanes = effect.class.lanes(LANES);
+        let lanes = effect.class.lanes(few());
         let all = counts(effect.lanes(&lanes, (COPIES, COPIES)).step());
         let alone = counts(Lanes::shared(&lanes, (0, COPIES), &[rule(PLAIN, effect.on)]).step());
         assert_eq!(all, alone, "{}", effect.name);

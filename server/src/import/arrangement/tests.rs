@@ -78,10 +78,14 @@ fn judged(soup: &Soup, r: &mut Random, what: &str) -> Came {
     if done.crossing.is_some() { Came::Wound } else { Came::Whole }
 }
 
-/// The long form: `CONTACTD_WOUND=1000 cargo test -p contactd --lib arrangement`.
+/// Meshes of a kind: `few` in the command. The long form: `CONTACTD_WOUND=1000 cargo test -p contactd --lib arrangement`.
+fn rounds(few: u64) -> u64 {
+    std::env::var("CONTACTD_WOUND").ok().and_then(|n| n.parse().ok()).unwrap_or(few)
+}
+
 #[test]
 fn random_meshes_that_cross_themselves_are_what_they_wind_around() {
-    let rounds = std::env::var("CONTACTD_WOUND").ok().and_then(|n| n.parse().ok()).unwrap_or(12);
+    let rounds = rounds(5);
     let mut counts = [[0; 4]; 7];
     for seed in 0..rounds {
         let mut r = Random(1 + seed * 77);
@@ -138,7 +142,7 @@ fn boxes_on_a_grid_have_the_volume_of_the_cubes_that_they_wind_around() {
 
 #[test]
 fn what_comes_out_is_closed_to_the_bit_and_what_does_not_cross_is_left_alone() {
-    for seed in 0..40 {
+    for seed in 0..rounds(14) {
         let mut r = Random(900 + seed);
         let soup = if seed % 2 == 0 { heap(&mut r, seed % 4 == 0) } else { helix(&mut r, 5 + (seed % 7) as u32) };
         let fan = |f: &Vec<u32>| (1..f.len() - 1).map(|i| [f[0], f[i], f[i + 1]]).collect::<Vec<_>>();

@@ -255,7 +255,7 @@ mod tests {
     /// Area by sums over a grid of the plane at half height.
     fn area(import: &Import) -> f64 {
         let b = import.solid.aabb();
-        let n = 150;
+        let n = 100;
         let at = |i: u32, low: f64, high: f64| low + (high - low) * (f64::from(i) + 0.5) / f64::from(n);
         let inside = (0..n * n).filter(|k| {
             let p = DVec3::new(at(k % n, b.min.x, b.max.x), at(k / n, b.min.y, b.max.y), 1.0);

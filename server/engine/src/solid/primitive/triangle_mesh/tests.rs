@@ -146,7 +146,7 @@ fn judge(name: &str, (points, triangles): &Mesh, r: &mut Random, count: usize) {
 fn f_has_the_sign_of_the_winding_number_and_at_most_the_distance() {
     let mut r = Random(9);
     // Points a mesh; long: CONTACTD_POINTS=2000.
-    let points = std::env::var("CONTACTD_POINTS").ok().and_then(|n| n.parse().ok()).unwrap_or(500);
+    let points = std::env::var("CONTACTD_POINTS").ok().and_then(|n| n.parse().ok()).unwrap_or(200);
     for n in [3, 5, 8, 16, 32] {
         judge(&format!("torus {n}"), &torus(n, n.max(4)), &mut r, points);
     }
