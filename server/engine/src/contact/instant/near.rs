@@ -166,9 +166,13 @@ mod tests {
                     left += near.tokens(side).len();
                 }
                 let mut next = x;
-                for k in 0..12 {
-                    // The last ones lie outside of the box that was asked for, some of them of the one that is kept.
-                    let y = x + r.vector(if k < 8 { size } else { 60.0 * size });
+                for k in 0..16 {
+                    // The last ones lie outside of the box that was asked for: in the one that is kept, and mostly beyond that.
+                    let y = match k {
+                        0..8 => x + r.vector(size),
+                        8..12 if near.half.is_finite() => near.center + r.vector(near.half),
+                        _ => x + r.vector(60.0 * size),
+                    };
                     let (own, kept) = (f(y), near.value(y));
                     let is_beyond = (y - near.center).abs().max_element() > near.half;
                     assert!(kept == own, "{kept} for {own}");
