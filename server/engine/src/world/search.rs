@@ -106,7 +106,7 @@ impl PairJob {
 pub struct Memory {
     /// One for each thread.
     thread_scratches: Vec<Mutex<ThreadScratch>>,
-    /// Work of the last step (`WORTH_WAKING`); `None` before the first one.
+    /// Work of the last step (`WORTH_WAKING`), at least half of what stood here before it; `None` before the first one.
     last: Option<u64>,
 }
 
@@ -143,7 +143,8 @@ impl Memory {
             last += std::mem::take(&mut thread_scratch.work);
             thread_scratch.cells = 0;
         }
-        self.last = (!self.thread_scratches.is_empty()).then_some(last);
+        let before = self.last.map_or(0, |before| before / 2);
+        self.last = (!self.thread_scratches.is_empty()).then_some(last.max(before));
     }
 
     /// True when so many pairs are to be shared among the threads. An answer does not depend on it, only when it is there: what a step
