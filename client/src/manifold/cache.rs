@@ -374,7 +374,7 @@ impl ContactCache {
             let direction = if self.bodies[b].object == record.b { direction } else { -direction };
             let (way, depth) = (moved(b) - moved(a), detail.penetration);
             let went = way.length();
-            // What sticks in by an edge or a corner is as much deeper than the ball within it as it is deep: the depth falls evenly.
+            // The ball within an edge or a corner that sticks in is in proportion to how deep that is: it falls evenly on the way out.
             let falls = (pair.depth - depth) / (went - pair.moved);
             let rest = if falls > LEAST_FALL { (depth / falls).max(depth) } else { depth };
             let way = way + direction * (0.5 * self.gap + rest);

@@ -25,10 +25,10 @@ use std::sync::{Arc, Mutex};
 
 /// With fewer pairs to ask about than this one thread is done before others wake up …
 const WORTH_SHARING: usize = 8;
-/// … and where the last step's have taken less work than this, in evaluations of a literal: some tenth of a millisecond.
-const WORTH_WAKING: u64 = 8192;
+/// … and where the last step's have taken less work than this, in evaluations of a literal: a third of a millisecond.
+const WORTH_WAKING: u64 = 16_384;
 /// So many of them is what a cell costs beside its own, what a closed form does, and what a pair does that is asked about.
-const BESIDE: [u64; 3] = [256, 64, 16];
+const BESIDE: [u64; 3] = [256, 64, 128];
 
 /// A pair of the step: indices of its bodies, the one with the smaller id first.
 #[derive(Debug)]
