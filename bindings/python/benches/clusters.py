@@ -1,16 +1,22 @@
 """Tables of queries on Ray, Dask and Spark for real, a node or a worker killed half way, held against one process bit for bit.
 
-    python benches/clusters.py [--rows N] [ray] [dask] [spark]
+    python benches/clusters.py [--rows N] [--namespaces] [ray] [dask] [spark]
 
 Each is tried where it is installed (`pip install "ray[data]" "dask[dataframe,distributed]" pyspark`; Spark needs Java). Prints what
 each took and whether its answers are those of one process; exit status 1 where they are not.
+
+With `--namespaces` Ray's nodes are machines of their own to each other: each runs in a network namespace, joined by a virtual cable
+alone, and the second one is killed with all its processes. Needs root and iproute2.
 """
 
 import argparse
+import contextlib
 import importlib.util
 import os
 import pathlib
+import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import threading
@@ -59,38 +65,111 @@ class MarkingChecker(Marking):
         super().__init__(Checker(scene), folder)
 
 
-def by_ray(source, scene, out, parts, marks):
-    import ray
+# Queries of one call of a Ray actor.
+BATCH = 500
+NAMESPACES = ("contactd-head", "contactd-node")
+ADDRESSES = ("10.77.0.1", "10.77.0.2")
+
+
+def ip(*words):
+    return subprocess.run(["ip", *words], check=True, capture_output=True, text=True).stdout
+
+
+def kill_all_in(namespace):
+    for pid in ip("netns", "pids", namespace).split():
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(int(pid), signal.SIGKILL)
+
+
+@contextlib.contextmanager
+def namespaces():
+    """Two network namespaces, joined by a virtual cable; what runs in them ends with them."""
+    ends = ("contactd0", "contactd1")
+    try:
+        for namespace in NAMESPACES:
+            ip("netns", "add", namespace)
+        ip("link", "add", ends[0], "netns", NAMESPACES[0], "type", "veth", "peer", "name", ends[1], "netns", NAMESPACES[1])
+        for namespace, end, address in zip(NAMESPACES, ends, ADDRESSES, strict=True):
+            ip("-n", namespace, "address", "add", f"{address}/24", "dev", end)
+            for device in ("lo", end):
+                ip("-n", namespace, "link", "set", device, "up")
+        yield
+    finally:
+        for namespace in NAMESPACES:
+            with contextlib.suppress(subprocess.CalledProcessError):
+                kill_all_in(namespace)
+                ip("netns", "delete", namespace)
+
+
+@contextlib.contextmanager
+def ray_nodes():
+    """Two nodes of this machine: yields the cluster's address and what kills the second one."""
     from ray.cluster_utils import Cluster
 
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     other = cluster.add_node(num_cpus=1)
-    ray.init(address=cluster.address, logging_level="ERROR")
-    cluster.wait_for_nodes()
-    ray.data.DataContext.get_current().enable_progress_bars = False
-    killed = half_way(marks, parts // 2, lambda: cluster.remove_node(other, allow_graceful=False))
-    data = ray.data.read_parquet(source, override_num_blocks=parts)
-    answers = data.map_batches(
-        MarkingChecker,
-        fn_constructor_args=(scene, marks),
-        batch_format="pyarrow",
-        batch_size=500,
-        compute=ray.data.ActorPoolStrategy(min_size=1, max_size=2),
-        num_cpus=0.5,
-    )
-    answers.write_parquet(str(out))
-    killed.join(60)
-    dead = not killed.is_alive()
-    ray.shutdown()
-    cluster.shutdown()
-    return f"ray {ray.__version__}, two nodes, one of them killed" if dead else "ray: no node was killed"
+    try:
+        yield cluster.address, lambda: cluster.remove_node(other, allow_graceful=False)
+    finally:
+        cluster.shutdown()
+
+
+@contextlib.contextmanager
+def ray_nodes_in_namespaces():
+    """The same in two network namespaces, the first of which is this process's."""
+    program = pathlib.Path(sys.executable).with_name("ray")
+    head = f"{ADDRESSES[0]}:6379"
+    roles = (("--head", "--port=6379", "--include-dashboard=false"), (f"--address={head}",))
+    nodes = []
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            for namespace, address, role in zip(NAMESPACES, ADDRESSES, roles, strict=True):
+                log = open(pathlib.Path(folder) / namespace, "wb")
+                words = ["ip", "netns", "exec", namespace, str(program), "start", *role]
+                words += [f"--node-ip-address={address}", "--num-cpus=1", "--disable-usage-stats", "--block"]
+                nodes.append(subprocess.Popen(words, stdout=log, stderr=log))
+                # The second one asks the first one's address once alone.
+                time.sleep(15)
+                if nodes[-1].poll() is not None:
+                    sys.exit((pathlib.Path(folder) / namespace).read_text())
+            yield head, lambda: kill_all_in(NAMESPACES[1])
+        finally:
+            for node in nodes:
+                node.kill()
+
+
+def by_ray(source, scene, out, rows, parts, marks, apart):
+    import ray
+
+    with ray_nodes_in_namespaces() if apart else ray_nodes() as (address, kill):
+        ray.init(address=address, logging_level="ERROR")
+        while len([node for node in ray.nodes() if node["Alive"]]) < 2:
+            time.sleep(0.1)
+        addresses = sorted(node["NodeManagerAddress"] for node in ray.nodes())
+        ray.data.DataContext.get_current().enable_progress_bars = False
+        killed = half_way(marks, rows // BATCH // 2, kill)
+        data = ray.data.read_parquet(source, override_num_blocks=parts)
+        answers = data.map_batches(
+            MarkingChecker,
+            fn_constructor_args=(scene, marks),
+            batch_format="pyarrow",
+            batch_size=BATCH,
+            compute=ray.data.ActorPoolStrategy(min_size=1, max_size=2),
+            num_cpus=0.5,
+        )
+        answers.write_parquet(str(out))
+        killed.join(60)
+        dead = not killed.is_alive()
+        ray.shutdown()
+    where = f" in network namespaces ({', '.join(addresses)})" if apart else ""
+    return f"ray {ray.__version__}, two nodes{where}, one of them killed" if dead else "ray: no node was killed"
 
 
 def marked(frame, scene, folder):
     return Marking(lambda f: solve_frame(f, scene, threads=1), folder)(frame)
 
 
-def by_dask(source, scene, out, parts, marks):
+def by_dask(source, scene, out, _rows, parts, marks, _apart):
     import dask.dataframe
     import distributed
 
@@ -106,7 +185,7 @@ def by_dask(source, scene, out, parts, marks):
         return f"dask {dask.__version__}, two workers, one of them killed" if not killed.is_alive() else "dask: no worker was killed"
 
 
-def by_spark(source, scene, out, parts, _marks):
+def by_spark(source, scene, out, _rows, parts, _marks, _apart):
     import pyspark
     from pyspark.sql import SparkSession
     from pyspark.sql.pandas.types import from_arrow_schema
@@ -125,15 +204,24 @@ def main():
     ways = {"ray": by_ray, "dask": by_dask, "spark": by_spark}
     parser = argparse.ArgumentParser()
     parser.add_argument("--rows", type=int, default=20_000)
+    parser.add_argument("--namespaces", action="store_true")
+    # What runs in the first namespace.
+    parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("ways", nargs="*", choices=[[], *ways])
     asked = parser.parse_args()
+    if asked.namespaces and not asked.inside:
+        if os.geteuid() != 0 or shutil.which("ip") is None:
+            sys.exit("--namespaces needs root and the program `ip` (iproute2)")
+        with namespaces():
+            again = ["ip", "netns", "exec", NAMESPACES[0], sys.executable, *sys.argv, "--inside"]
+            return subprocess.run(again).returncode
     wrong = False
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for file, text in (("scene.toml", SCENE), ("plate.csg", PLATE), ("peg.csg", PEG)):
             (folder / file).write_text(text)
         scene = str(folder / "scene.toml")
-        table, parts = queries(asked.rows, 7), 20
+        table, parts = queries(asked.rows, 7), max(20, asked.rows // 5000)
         source = folder / "in"
         source.mkdir()
         size = -(-asked.rows // parts)
@@ -151,7 +239,7 @@ def main():
             begun = time.perf_counter()
             marks = folder / f"{way} marks"
             marks.mkdir()
-            what = ways[way](str(source), scene, out, parts, str(marks))
+            what = ways[way](str(source), scene, out, asked.rows, parts, str(marks), asked.namespaces)
             elapsed = time.perf_counter() - begun
             found = pa.concat_tables([pq.read_table(p) for p in sorted(out.glob("**/*.parquet"))], promote_options="permissive")
             found = found.select(whole.column_names).cast(whole.schema).sort_by("id").combine_chunks()
