@@ -18,8 +18,8 @@
 //! ```
 //!
 //! The rule of a pair needs `report = "patch"`; with a margin it tells points before they touch. Pairs of sensors are not solved and
-//! have none. An overlap has no regions: its one point is the deepest with its depth and direction, where the rule
-//! asks for the penetration and the step for details, else what the record proves.
+//! have none. Of an overlap the points are those of the face that the bodies came through, with the depth there, where the rule asks for
+//! the penetration, too; where they do not come apart the deepest one, where the step asks for details, else what the record proves.
 //!
 //! # Which points
 //! Regions of one normal are reduced together, as one group: a body that leans by a millionth is told by lines and points where it

@@ -290,7 +290,7 @@ rules! {
         initial_overlap: InitialOverlap = Report;
     }
     flags {
-        /// Depth and direction where a step starts in overlap.
+        /// Depth and direction where a step starts in overlap; with patches, too, by which faces the bodies are in each other.
         penetration, "depth of an overlap";
         /// Record only; never stops a search for the scene's first contact.
         sensor, "sensor: stops nothing";

@@ -465,7 +465,7 @@ typedef struct contactd_rule {
     uint32_t report;
     // CONTACTD_INITIAL_OVERLAP_…: what a pair that starts in overlap does.
     uint32_t initial_overlap;
-    // 1: depth and direction where a step starts in overlap.
+    // 1: depth and direction where a step starts in overlap; with patches, too, by which faces the bodies are in each other.
     uint32_t penetration;
     // 1: record only; never stops a search for the scene's first contact.
     uint32_t sensor;

@@ -8,8 +8,8 @@
             print(pair.a, pair.b, p.id, p.position, p.normal, p.separation)
 
 At most four points of each direction of contact. The rule of a pair needs ``report="patch"``; with a margin it tells points before
-they touch. An overlap has one point, with its depth where the rule asks for the penetration and the options for
-details. How points are chosen, and which ids they get, is told in ``client/src/manifold.rs``: this is the same code.
+they touch. Of an overlap they are those of the face that the bodies came through, with the depth there, where the rule
+asks for ``penetration``, too; without it there is one, which proves the overlap. How points are chosen, and which ids they get, is told in ``client/src/manifold.rs``: this is the same code.
 """
 
 from __future__ import annotations

@@ -91,8 +91,6 @@ class Asked(NamedTuple):
     requests: int
     #: Bodies told in them.
     bodies: int
-    #: Second requests of a step, for pairs in overlap.
-    retracted: int
 
 
 class Coupling:
@@ -243,13 +241,12 @@ class Coupling:
         session.set_rules(rules)
         session.options.details = True
         add_contact, template, offsets = _contact_layout(model, rest, self.skin)
-        skin = self.skin / self.unit
         self._coupled = _native.Coupled(
             session,
             model,
             [(*part, at and (tuple(at.position), tuple(at.rotation))) for *part, at in parts],
             self._filter.pairs,
-            (skin, self.slack * skin, self.unit),
+            (self.slack * self.skin / self.unit, self.unit),
             (add_contact, model._address, mj.mjMINMU, mj.mjMINVAL),
             (template, offsets),
         )
@@ -329,11 +326,6 @@ class Coupling:
     def asked(self) -> Asked:
         """What contactd was asked so far."""
         return Asked(*self._coupled.asked())
-
-    @property
-    def retracted(self) -> int:
-        """Second requests so far, for pairs in overlap."""
-        return self.asked.retracted
 
     def refresh(self) -> None:
         """Asks about all bodies at the next step, wherever they stand: after a change to the session's rules or options."""

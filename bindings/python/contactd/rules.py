@@ -28,7 +28,7 @@ class Rule:
     #: What a pair that starts in overlap does.
     #: One of "report" or "ignore_if_separating".
     initial_overlap: str = "report"
-    #: Depth and direction where a step starts in overlap.
+    #: Depth and direction where a step starts in overlap; with patches, too, by which faces the bodies are in each other.
     penetration: bool = False
     #: Record only; never stops a search for the scene's first contact.
     sensor: bool = False

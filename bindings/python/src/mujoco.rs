@@ -268,7 +268,7 @@ pub struct Coupled {
 
 #[pymethods]
 impl Coupled {
-    /// `scale`: skin, slack (lengths of the session) and unit. `pairs`: geoms of a `<pair>`, the smaller id first, and its number. `mujoco`:
+    /// `scale`: slack (a length of the session) and unit. `pairs`: geoms of a `<pair>`, the smaller id first, and its number. `mujoco`:
     /// addresses of `mj_addContact` and of the model, mjMINMU, mjMINVAL. `contact`: the bytes of an `mjContact` and its fields' offsets.
     #[new]
     fn new(
@@ -276,16 +276,16 @@ impl Coupled {
         model: &Bound<'_, PyAny>,
         parts: Vec<PartFields>,
         pairs: HashMap<(usize, usize), usize>,
-        scale: (f64, f64, f64),
+        scale: (f64, f64),
         mujoco: (usize, usize, f64, f64),
         contact: (Vec<u8>, HashMap<String, usize>),
     ) -> PyResult<Self> {
-        let (skin, slack, unit) = scale;
+        let (slack, unit) = scale;
         let (add_contact, address, least_mu, least) = mujoco;
         if add_contact == 0 || address == 0 {
             return Err(PyValueError::new_err("expected the addresses of mj_addContact and of a model"));
         }
-        let mut cache = ContactCache::new(slack, skin);
+        let mut cache = ContactCache::new(slack);
         for (object, _, _, reach, at) in &parts {
             match at {
                 Some(at) => cache.add_fixed(*object, pose(at.0, at.1)),
@@ -339,10 +339,10 @@ impl Coupled {
         self.told.iter().map(|t| t.geoms).collect()
     }
 
-    /// Requests, bodies told in them, second requests for pairs in overlap.
-    fn asked(&self) -> (u64, u64, u64) {
+    /// Requests, bodies told in them.
+    fn asked(&self) -> (u64, u64) {
         let asked = self.cache.asked();
-        (asked.requests, asked.bodies, asked.retracted)
+        (asked.requests, asked.bodies)
     }
 
     /// All bodies are told anew at the next call.
@@ -386,12 +386,9 @@ impl Coupled {
         }
         // Unless all goes well what the engine has is unknown.
         self.steps = u64::MAX;
-        let mut more = true;
-        while more {
-            let (cache, is_sent) = (&mut self.cache, &mut self.is_sent);
-            let records = cache.records().to_vec();
-            more = Session::ask(&session, &records, is_sent, |reply| !cache.answer(reply).is_empty())?;
-        }
+        let (cache, is_sent) = (&mut self.cache, &mut self.is_sent);
+        let records = cache.records().to_vec();
+        Session::ask(&session, &records, is_sent, |reply| cache.answer(reply))?;
         self.steps = Session::steps(&session)?;
         Ok(())
     }

@@ -54,10 +54,13 @@ def test_a_shoulder_on_a_drilled_plate(session):
         assert np.hypot(*p.position[:2]) == pytest.approx(18) and p.position[2] == pytest.approx(0.05)
         assert p.on_a[2] == pytest.approx(5) and p.on_b[2] == pytest.approx(0, abs=1e-9)
     assert sorted(p.id for _, p in found) == [0, 1, 2, 3]
-    # In overlap there is one point, with its depth.
-    [(pair, point)] = scene.put((0, 0, -0.3))
-    assert pair.status == contactd.Status.OVERLAP and np.allclose(point.normal, UP, atol=1e-6)
-    assert -0.3 - 1e-9 <= point.separation < -0.29
+    # In overlap there are the same, with their depth.
+    found = scene.put((0, 0, -0.3))
+    assert sorted(p.id for _, p in found) == [0, 1, 2, 3]
+    for pair, p in found:
+        assert pair.status == contactd.Status.OVERLAP and np.allclose(p.normal, UP)
+        assert p.separation == pytest.approx(-0.3, abs=1e-7)
+        assert p.on_a[2] == pytest.approx(5, abs=1e-7) and p.on_b[2] == pytest.approx(0, abs=1e-7)
 
 
 def test_a_resting_cylinder_keeps_its_points(session):

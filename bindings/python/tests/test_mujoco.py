@@ -36,7 +36,7 @@ def test_a_box_falls_and_rests_as_mujocos_own_does():
         for _ in range(400):
             n = coupling.step(data)
             mujoco.mj_step(stock, theirs)
-        assert n == 4 and data.ncon == 4 and coupling.retracted > 0
+        assert n == 4 and data.ncon == 4
     # MuJoCo's rests a little in the table; this one as far in the skin.
     assert data.qpos[2] == pytest.approx(theirs.qpos[2] + coupling.skin, abs=1e-6)
     assert np.abs(data.qvel).max() < 1e-5 and np.abs(data.qpos[3:] - [1, 0, 0, 0]).max() < 1e-6
@@ -151,9 +151,9 @@ def test_a_body_between_two_walls_is_told_by_both_faces_and_keeps_its_ids():
             assert sorted(map(len, by_wall.values())) == [4, 4]
             assert all(min(ids) >= 0 and len(set(ids)) == len(ids) for ids in by_wall.values())
             seen.append(by_wall)
-        assert seen[0] == seen[1] == seen[2] and coupling.retracted == 3
+        assert seen[0] == seen[1] == seen[2]
         asked, kept = coupling.asked, coupling.contacts
-        assert asked == (9, 9, 3)
+        assert asked == (3, 3)
         mujoco.mj_step1(model, data)
         assert coupling.add_contacts(data) == data.ncon == 8 and coupling.asked == asked, "nothing has moved"
         assert [p.id for *_, p in coupling.contacts] == [p.id for *_, p in kept] and coupling.contacts is not kept

@@ -26,17 +26,14 @@
 //! narrow phase asks the [`Dispatcher`] pair by pair, on whatever threads, and is answered from the table; ids of points are
 //! parry's feature ids, by which the solver finds its impulses of the step before. Shapes of rapier's own meet each other as ever.
 //!
-//! Solids that overlap have no regions in which they touch. So bodies rest [`Settings::gap`] apart (rapier's contact
-//! skin), and a pair that an impact has driven into overlap is asked about once more, moved apart by its depth, so that its
-//! points are those of the face it came through, with the depth that they really have.
+//! Bodies rest [`Settings::gap`] apart (rapier's contact skin). Solids that an impact has driven into each other are told by the
+//! face they came through, with the depth that they really have there.
 //!
 //! # Not served
 //! A solid meets no shape of rapier's own. Rays and shape casts miss solids; points project to their boxes. Continuous
 //! detection and its sub-steps (`ccd_enabled`, `soft_ccd_prediction` beyond [`Settings::prediction`]): what
 //! moves through a solid within a step is not stopped. A solid keeps its pose within the collider's body for good, and a fixed one
-//! its place. Models are in rapier's unit of length. Pairs that only a joint (`contacts_enabled(false)`) or a hook keeps from
-//! meeting are moved apart like others where they overlap, and what else their bodies meet may have its depth alone meanwhile: give
-//! their colliders `collision_groups` that say the same.
+//! its place. Models are in rapier's unit of length.
 #![forbid(unsafe_code)]
 
 mod dispatch;
@@ -47,8 +44,7 @@ pub use glam;
 pub use solid::Solid;
 
 use contactd::import::{Facets, Limits, import_csg};
-use contactd_client::manifold::{Manifolds, Point};
-use contactd_client::proto::contact_record::OVERLAP;
+use contactd_client::manifold::Manifolds;
 use contactd_client::proto::{Pose as WorldPose, PoseRecord, Report, Rule};
 use contactd_client::{Error, MassOptions, MassProperties, Object, Session, Transport};
 use dispatch::Table;
@@ -56,9 +52,7 @@ use glam::{DQuat, DVec3};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::shape::SharedShape;
-use rapier3d_f64::prelude::{
-    Collider, ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase, PhysicsWorld, RigidBodySet, RigidBodyType,
-};
+use rapier3d_f64::prelude::{ColliderBuilder, ColliderSet, NarrowPhase, PhysicsWorld, RigidBodySet};
 use solid::vector;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
@@ -111,11 +105,9 @@ pub struct Coupling<T: Transport> {
     /// By object id.
     objects: Vec<PlacedObject>,
     batch: Vec<u32>,
-    deep: Vec<(u32, u32, Point)>,
     /// The answer to a request did not come in time; it is still to come.
     is_in_flight: bool,
     requests: u64,
-    retracted: u64,
 }
 
 /// An object as it stands.
@@ -123,19 +115,8 @@ pub struct Coupling<T: Transport> {
 struct PlacedObject {
     /// Where rapier has it.
     pose: WorldPose,
-    /// How far it was moved back for the second request.
-    back: DVec3,
-    is_fixed: bool,
     /// The session has it elsewhere.
     is_stale: bool,
-    /// Its collider, if the world has it.
-    collider: Option<ColliderHandle>,
-}
-
-impl PlacedObject {
-    fn world_pose(&self) -> WorldPose {
-        WorldPose::new(self.pose.position + self.back, self.pose.rotation)
-    }
 }
 
 impl<T: Transport> Coupling<T> {
@@ -161,10 +142,8 @@ impl<T: Transport> Coupling<T> {
             manifolds: Manifolds::default(),
             objects: Vec::new(),
             batch: Vec::new(),
-            deep: Vec::new(),
             is_in_flight: false,
             requests: 0,
-            retracted: 0,
         })
     }
 
@@ -245,12 +224,10 @@ impl<T: Transport> Coupling<T> {
     /// to come.
     pub fn prefetch(&mut self, bodies: &RigidBodySet, colliders: &ColliderSet) -> Result<(), Error> {
         self.batch.clear();
-        self.objects.iter_mut().for_each(|o| o.collider = None);
         let mut any = false;
-        for (handle, collider) in colliders.iter() {
+        for (_, collider) in colliders.iter() {
             let Some(solid) = collider.shape().as_shape::<Solid>() else { continue };
             let Some(placed) = self.objects.get_mut(solid.object as usize) else { continue };
-            placed.collider = Some(handle);
             if solid.is_fixed {
                 continue;
             }
@@ -259,7 +236,7 @@ impl<T: Transport> Coupling<T> {
             let pose = world_pose(&body.map_or(*collider.position(), |b| *b.position() * local));
             let is_active = pose != placed.pose || !body.is_some_and(|b| b.is_sleeping());
             if is_active || placed.is_stale {
-                (placed.pose, placed.back) = (pose, DVec3::ZERO);
+                placed.pose = pose;
                 self.batch.push(solid.object);
             }
             any |= is_active;
@@ -267,36 +244,21 @@ impl<T: Transport> Coupling<T> {
         if !any {
             return Ok(());
         }
-        self.ask(false)?;
-        self.deep.clear();
-        for pair in self.manifolds.pairs().filter(|p| p.status == OVERLAP) {
-            if is_solved([pair.a, pair.b].map(|o| self.objects[o as usize].collider), bodies, colliders) {
-                self.deep.extend(pair.points.iter().map(|p| (pair.a, pair.b, *p)));
-            }
-        }
-        if !self.deep.is_empty() {
-            self.retract();
-            self.ask(true)?;
-        }
+        self.ask()?;
         let objects = &self.objects;
         let pose = |id: u32| objects.get(id as usize).map_or(WorldPose::IDENTITY, |o| o.pose);
         self.table.write().unwrap_or_else(PoisonError::into_inner).fill(&self.manifolds, pose);
         Ok(())
     }
 
-    /// The points of the last `prefetch` that was answered, with their ids: those of its first request where the second one failed.
+    /// The points of the last `prefetch` that was answered, with their ids.
     pub fn manifolds(&self) -> &Manifolds {
         &self.manifolds
     }
 
-    /// How many requests there were, second ones included.
+    /// How many requests there were.
     pub fn requests(&self) -> u64 {
         self.requests
-    }
-
-    /// How many second requests there were, for pairs in overlap.
-    pub fn retracted(&self) -> u64 {
-        self.retracted
     }
 
     /// The session, for its options and models.
@@ -309,14 +271,14 @@ impl<T: Transport> Coupling<T> {
         let object = Object::new(name, model.id).group(GROUP).at(pose);
         let object = self.session.add_object(if is_fixed { object.fixed() } else { object })?;
         // Ids count up from 1.
-        let nowhere = PlacedObject { pose, back: DVec3::ZERO, is_fixed, is_stale: !is_fixed, collider: None };
+        let nowhere = PlacedObject { pose, is_stale: !is_fixed };
         self.objects.resize(object as usize + 1, nowhere);
         let solid = Solid { object, is_fixed, bounds: model.bounds, mass: model.mass };
         Ok(ColliderBuilder::new(SharedShape::new(solid)).contact_skin(0.5 * self.settings.gap))
     }
 
-    /// One request for the batch; `again`: only the pairs in `deep` are taken of its answer, where they are out of overlap.
-    fn ask(&mut self, again: bool) -> Result<(), Error> {
+    /// One request for the batch.
+    fn ask(&mut self) -> Result<(), Error> {
         if self.is_in_flight {
             // Of no use any more; whatever else it may be than late, it is over.
             if let Err(Error::Timeout) = self.session.finish(TIMEOUT) {
@@ -327,7 +289,7 @@ impl<T: Transport> Coupling<T> {
         let slots = self.session.begin_step(self.batch.len())?;
         for (slot, object) in slots.iter_mut().zip(&self.batch) {
             let placed = &mut self.objects[*object as usize];
-            *slot = PoseRecord::start(*object, &placed.world_pose());
+            *slot = PoseRecord::start(*object, &placed.pose);
             placed.is_stale = true;
         }
         self.requests += 1;
@@ -338,58 +300,18 @@ impl<T: Transport> Coupling<T> {
                 return Err(e);
             }
         };
-        if !again {
-            // Not before there is an answer: without one, what is kept stays that of the last step.
-            self.manifolds.start();
-        }
+        // Not before there is an answer: without one, what is kept stays that of the last step.
+        self.manifolds.start();
         for object in &self.batch {
-            self.objects[*object as usize].is_stale = again;
+            self.objects[*object as usize].is_stale = false;
         }
         for record in reply.records() {
-            let pair = (record.a, record.b);
-            let wanted = record.status != OVERLAP && self.deep.iter().any(|d| (d.0, d.1) == pair);
-            if !again || wanted {
-                let [a, b] = [record.a, record.b].map(|id| self.objects[id as usize].world_pose());
-                self.manifolds.add(&reply, record, &a, &b);
-            }
+            let [a, b] = [record.a, record.b].map(|id| self.objects[id as usize].pose);
+            self.manifolds.add(&reply, record, &a, &b);
         }
         self.manifolds.finish();
         Ok(())
     }
-
-    /// Moves each pair in overlap apart along its direction, one body alone, to half a gap.
-    fn retract(&mut self) {
-        self.retracted += 1;
-        for (a, b, point) in &self.deep {
-            let way = point.normal * (0.5 * self.settings.gap - point.separation);
-            // The normal points from a to b: b goes along, a against; where both move b does.
-            let (object, way) = if self.objects[*b as usize].is_fixed { (a, -way) } else { (b, way) };
-            let placed = &mut self.objects[*object as usize];
-            // What an earlier pair has asked for already need not be gone again.
-            let gone = placed.back.dot(way) / way.length_squared();
-            placed.back += way * (1.0 - gone).max(0.0);
-            if !self.batch.contains(object) {
-                self.batch.push(*object);
-            }
-        }
-    }
-}
-
-/// True when rapier will push the bodies of two colliders apart where they meet, as far as colliders and bodies tell. As its narrow
-/// phase decides it (`update_pair`).
-fn is_solved(pair: [Option<ColliderHandle>; 2], bodies: &RigidBodySet, colliders: &ColliderSet) -> bool {
-    let [Some(c1), Some(c2)] = pair.map(|handle| colliders.get(handle?)) else { return false };
-    let meets = |c: &Collider| c.is_enabled() && !c.is_sensor();
-    if !meets(c1) || !meets(c2) || (c1.parent().is_some() && c1.parent() == c2.parent()) {
-        return false;
-    }
-    let [t1, t2] = [c1, c2].map(|c| {
-        let body = c.parent().and_then(|handle| bodies.get(handle));
-        body.map_or(RigidBodyType::Fixed, |b| b.body_type())
-    });
-    (c1.active_collision_types().test(t1, t2) || c2.active_collision_types().test(t1, t2))
-        && c1.collision_groups().test(c2.collision_groups())
-        && c1.solver_groups().test(c2.solver_groups())
 }
 
 fn world_pose(pose: &Pose) -> WorldPose {

@@ -4,6 +4,7 @@
 //! −h_A(n) − h_B(−n), whatever n; points of both surfaces that are no farther apart prove that they are as near. Of an overlap F is
 //! convex, so a point below which none lies near is the lowest of all.
 
+use contactd::contact::pair::overlap;
 use contactd::contact::region::{regions, threshold};
 use contactd::contact::{
     Extent, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
@@ -133,6 +134,55 @@ fn convex_bodies_touch_where_their_reaches_say() {
     assert!(100 * exact as u64 >= 95 * extents[0], "{exact} of {extents:?}");
     // Boxes would need hundreds.
     assert!(cells[0] <= 40 * extents[0], "{cells:?} cells for {extents:?}");
+}
+
+#[test]
+fn bodies_in_overlap_are_told_where_they_come_apart() {
+    let first = sized("CONTACTD_CONVEX_SEED", 0x6170_6294_u64);
+    let count = sized("CONTACTD_CONVEX", 150);
+    let (mut extents, mut cells, mut exact, mut cut) = ([0; 3], 0, 0, 0);
+    for i in 0..count {
+        let mut r = Random::new(first + i);
+        let bodies = [body(&mut r), body(&mut r)];
+        let turns = [attitude(&mut r), attitude(&mut r)];
+        let along = if r.chance(0.5) { turns[1] * DVec3::AXES[r.below(3)] } else { r.direction() };
+        let start = along * 5.0 + r.vector(0.3);
+        let [a, b] = [0, 1].map(|k| Model::new(bodies[k].recipe.build()));
+        let poses = |position| [Pose::new(position, turns[0]), Pose::new(DVec3::ZERO, turns[1])];
+        let o = earliest_contact(&question([&a, &b], poses(start), along * -6.0), &mut Scratch::default());
+        let Some(met) = o.contact().map(|contact| contact.time) else { continue };
+        let tau = threshold(default_resolution(&a, &b), 10f64.powf(r.within(-6.0, -2.5)));
+        let beyond = 10f64.powf(r.within(-6.0, -0.7));
+        let poses = poses(start + along * (-6.0 * met - beyond));
+        let query = question([&a, &b], poses, DVec3::ZERO);
+        let scratch = &mut Scratch::default();
+        let o = earliest_contact(&query, scratch);
+        let Some(penetration) = o.penetration() else { continue };
+        let found = overlap::regions(&query, penetration, tau, scratch);
+        let place = format!("{i}: {} and {}, tau {tau:e}, {penetration:?}", bodies[0].name, bodies[1].name);
+        cells += found.cells;
+        if !found.complete {
+            println!("CUT {place} {found:?}");
+            cut += 1;
+            continue;
+        }
+        let nearest = found.regions.iter().min_by(|p, q| p.separation().total_cmp(&q.separation()));
+        let nearest = nearest.unwrap_or_else(|| panic!("{place}: no region"));
+        let n = nearest.normal;
+        // How far apart they are along n: as far as the told separation says, less than nothing.
+        let apart = -reach(&bodies[0], &poses[0], n) - reach(&bodies[1], &poses[1], -n);
+        let (is_point, off) = (nearest.extent == Extent::Point, nearest.separation() - apart);
+        let is_right = off.abs() <= 1e-9 + 0.5 * tau || !is_point && off > 0.0;
+        assert!(is_right && apart < 0.0, "{place}: {:e} told, {apart:e} along {n}: {found:?}", nearest.separation());
+        // No shorter way parts them than their depth, which is that of a ball.
+        assert!(-nearest.separation() >= penetration.depth * (1.0 - 1e-3) - tau, "{place}: {found:?}");
+        exact += usize::from(is_point && off.abs() <= 1e-9);
+        extents[nearest.extent as usize] += 1;
+    }
+    println!("points, lines, patches: {extents:?}, {cells} cells; {exact} points to 1e-9, {cut} cut");
+    assert!(extents.iter().all(|n| *n >= count / 100), "{extents:?}");
+    assert!(1000 * cut <= count, "{cut} pairs did not come apart");
+    assert!(100 * exact as u64 >= 95 * extents[0], "{exact} of {extents:?}");
 }
 
 #[test]

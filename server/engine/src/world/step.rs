@@ -190,7 +190,8 @@ impl World {
         if roster.plans.measures() {
             touch::measure(bodies, &state.jobs, options, (&mut state.distances, &mut state.outcome), heed);
         }
-        touch::find_regions(bodies, &mut state.jobs, options, left, &mut state.outcome, heed);
+        let budget = (left, &mut state.scratch);
+        touch::find_regions(bodies, &mut state.jobs, options, budget, &mut state.outcome, heed);
         learn(bodies, state, options);
     }
 }

@@ -14,13 +14,13 @@ use super::record;
 use super::search::{self, PairJob};
 use crate::contact::distance::{self, DistanceQuery};
 use crate::contact::margin;
+use crate::contact::pair::overlap;
 use crate::contact::within::Within;
 use crate::contact::{Outcome, PairQuery, Scratch, Status, region};
 use contactd_proto::{Detect, EffectCounters, Report};
 
 /// True when regions are told of a pair. A step that asks for its first contact has no use for clear pairs.
 fn is_asked(job: &PairJob, options: &StepOptions, outcome: &Outcome) -> bool {
-    // Where bodies are in each other their surfaces cut: no place in which they touch.
     job.near && job.plan.reports_regions() && !outcome.past && (outcome.status() == Status::Contact || !options.first)
 }
 
@@ -152,7 +152,7 @@ pub(super) fn find_regions(
     bodies: &[Body],
     jobs: &mut [PairJob],
     options: &StepOptions,
-    mut left: u64,
+    (mut left, scratch): (u64, &mut Scratch),
     out: &mut StepOutcome,
     heed: Option<&Heed>,
 ) {
@@ -172,16 +172,26 @@ pub(super) fn find_regions(
             }
             let query = query(bodies, job, options, left);
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
-            let found = region::complete(&query, &mut p.outcome, threshold);
-            let touches =
-                p.outcome.status() == Status::Contact || (p.outcome.status() == Status::Clear && p.outcome.touching);
-            out.effect_counters.patches += u64::from(touches);
+            // The surfaces of bodies in each other cut. They are told where the bodies come apart, as far as their depth is asked for.
+            let found = match p.outcome.penetration() {
+                Some(penetration) => overlap::regions(&query, penetration, threshold, scratch),
+                None => region::complete(&query, &mut p.outcome, threshold),
+            };
+            let looked = match p.outcome.status() {
+                Status::Contact => true,
+                Status::Clear => p.outcome.touching,
+                Status::Overlap => p.outcome.penetration().is_some(),
+                Status::Undecided => false,
+            };
+            out.effect_counters.patches += u64::from(looked);
             out.counters.instant_cells += found.cells;
             left = left.saturating_sub(found.cells);
             p.regions_complete &= found.complete;
             p.regions.1 = found.regions.len() as u32;
             out.regions.extend_from_slice(&found.regions);
-            if let Some(pair_cache) = job.pair_cache.as_mut().filter(|_| p.regions_complete) {
+            // What a session keeps it can prove: where bodies would come apart is worked out anew.
+            let is_kept = p.regions_complete && p.outcome.penetration().is_none();
+            if let Some(pair_cache) = job.pair_cache.as_mut().filter(|_| is_kept) {
                 pair_cache.report(Reported { outcome: p.outcome, regions: found.regions });
             }
         }

@@ -126,7 +126,7 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
     if found.regions.is_empty() {
         let rest = Work::new(limit.saturating_sub(found.cells));
         let (nearest, proven) = depth::nearest(&task, &at, threshold, depth::BETTER, &rest);
-        let nearest = nearest.map(|lowest| point::nearest(&bodies, &lowest));
+        let nearest = nearest.map(|lowest| single::roughly_nearest(&bodies, &lowest));
         let near = nearest.filter(|m| m.gap <= threshold * (1.0 + SAME_POINT) + bodies.eps);
         found.regions.extend(near.map(|m| point_region(&bodies, &m)));
         found.complete &= proven;

@@ -6,7 +6,7 @@
 //! followed from where F is lowest, or found by Newton's method on the distance itself. That they are nearest is proven: between the
 //! planes through them across the normal neither body reaches.
 
-use super::local::Bodies;
+use super::local::{Bodies, Lit};
 use super::point::{self, Meeting};
 use super::{Region, SAME_FACES, SAME_POINT, point_region, surface};
 use crate::contact::distance::part::Parts;
@@ -25,8 +25,10 @@ const POINTED: f64 = 2.0 * surface::LEAN;
 const LEAN: f64 = 2.0;
 /// Thresholds to which it is enough to know that feet are nearest where boxes know them to less.
 const ROUGH: f64 = 1e-3;
-/// Cosines from 1 within which two ways are one: of feet that nearly touch.
+/// Cosines from 1 within which two ways are one: of feet that nearly touch …
 const SAME_WAY: f64 = 0.1;
+/// … and of a half-space and its own normal, as far as rounding may turn it.
+const SAME_NORMAL: f64 = 1e-14;
 
 /// The region of two convex bodies that touch in one point, none where they are apart; `None` for other bodies, and where it may be more
 /// than a point.
@@ -95,13 +97,35 @@ fn meeting(bodies: &Bodies, both: [&Primitive; 2], lowest: &Deepest, slack: f64)
     followed.and_then(near).or_else(|| polished(feet))
 }
 
+/// Where two bodies are nearest to each other as F tells it, where nothing proves more, as of an edge beside an apex. Along an axis F has
+/// no slope, and its normal may be any: of convex bodies the one is told, of F's, its faces' and the distance's own, along which they
+/// reach least far into each other, and how far they are apart along that.
+pub fn roughly_nearest(bodies: &Bodies, lowest: &Deepest) -> Meeting {
+    let of_f = point::nearest(bodies, lowest);
+    let Some(both) = convex(bodies) else { return of_f };
+    let (x, _, depth, lits) = lowest;
+    let of_face = |lit: &Lit| {
+        let slope = bodies.slant_out(*lit, *x).1.normalize_or_zero();
+        let normal = if lit.0 == Side::A { slope } else { -slope };
+        (normal != DVec3::ZERO).then(|| Meeting {
+            feet: [*x + normal * *depth, *x - normal * *depth],
+            normal,
+            gap: 0.0,
+        })
+    };
+    let others = lits.iter().filter_map(of_face).chain(polished(bodies, [*x; 2], lowest.1));
+    let along = |m: Meeting| Meeting { gap: apart(bodies, both, m.normal), ..m };
+    let least = along(of_f.clone()).gap;
+    let best = others.map(along).max_by(|m, n| m.gap.total_cmp(&n.gap));
+    best.filter(|m| m.gap > least).unwrap_or(of_f)
+}
+
 /// The meeting, if no points of the bodies are nearer to each other than its feet, but for a slack.
-fn nearest(bodies: &Bodies, [a, b]: [&Primitive; 2], mut m: Meeting, slack: f64) -> Option<Meeting> {
-    let own = |side: Side, n: DVec3| if side == Side::A { n } else { bodies.at.b_from_a * -n };
+fn nearest(bodies: &Bodies, both: [&Primitive; 2], mut m: Meeting, slack: f64) -> Option<Meeting> {
     let n = sharpened(bodies, &m);
     m = Meeting { gap: (m.feet[1] - m.feet[0]).dot(n), normal: n, ..m };
     // A half-space reaches on without end, but along its own normal.
-    for (side, whole) in [(Side::A, a), (Side::B, b)] {
+    for (side, whole) in [Side::A, Side::B].into_iter().zip(both) {
         if let Some(h) = half_space(whole) {
             let h = if side == Side::A { h.0 } else { -bodies.at.a_vector(h.0) };
             if h.dot(m.normal) < 1.0 - SAME_FACES {
@@ -110,16 +134,27 @@ fn nearest(bodies: &Bodies, [a, b]: [&Primitive; 2], mut m: Meeting, slack: f64)
             m = Meeting { gap: (m.feet[1] - m.feet[0]).dot(h), normal: h, ..m };
         }
     }
-    let reach = |side: Side, whole: &Primitive| match half_space(whole) {
-        Some((_, offset)) => offset,
+    let aside = (m.feet[1] - m.feet[0] - m.normal * m.gap).length();
+    (aside <= slack && m.gap - apart(bodies, both, m.normal) <= slack).then_some(m)
+}
+
+/// How far the bodies are apart along a unit vector, at least, as far as each reaches: a half-space without end, but along its own normal.
+fn apart(bodies: &Bodies, [a, b]: [&Primitive; 2], normal: DVec3) -> f64 {
+    let reach = |whole: &Primitive, n: DVec3| match half_space(whole) {
+        Some((own, offset)) => {
+            if n.dot(own) > 1.0 - SAME_NORMAL {
+                offset
+            } else {
+                f64::INFINITY
+            }
+        }
         None => {
-            let (axes, n) = (DMat3::from_quat(whole.frame.rotation), own(side, m.normal));
+            let axes = DMat3::from_quat(whole.frame.rotation);
             n.dot(whole.frame.position) + whole.shape.convex().reach(&axes, n)
         }
     };
-    let of_b = reach(Side::B, b) - m.normal.dot(bodies.at.a_point(DVec3::ZERO));
-    let aside = (m.feet[1] - m.feet[0] - m.normal * m.gap).length();
-    (aside <= slack && m.gap + of_b + reach(Side::A, a) <= slack).then_some(m)
+    let of_b = reach(b, bodies.at.b_from_a * -normal) - normal.dot(bodies.at.a_point(DVec3::ZERO));
+    -of_b - reach(a, normal)
 }
 
 /// The normal of a meeting as the faces tell it that pass through its feet: the way between these has as few digits as it is short.
