@@ -7,7 +7,7 @@
 use contactd::contact::pair::overlap;
 use contactd::contact::region::{regions, threshold};
 use contactd::contact::{
-    Extent, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+    Extent, PairQuery, PlacedModel, QueryOptions, Scratch, Strategies, default_resolution, earliest_contact,
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -79,6 +79,29 @@ fn reach(body: &Body, pose: &Pose, n: DVec3) -> f64 {
     n.dot(pose.position) + (body.reach)(pose.rotation.inverse() * n)
 }
 
+/// Two bodies, the first of which has come to where it first touches the second.
+struct Meeting {
+    bodies: [Body; 2],
+    models: [Model; 2],
+    turns: [DQuat; 2],
+    /// Away from the second one, which stands at the origin.
+    along: DVec3,
+    place: DVec3,
+}
+
+/// Bodies of any kinds on a straight way; `None` where they miss each other.
+fn meeting(r: &mut Random) -> Option<Meeting> {
+    let bodies = [body(r), body(r)];
+    let turns = [attitude(r), attitude(r)];
+    let along = if r.chance(0.5) { turns[1] * DVec3::AXES[r.below(3)] } else { r.direction() };
+    let start = along * 5.0 + r.vector(0.3);
+    let models = [0, 1].map(|k| Model::new(bodies[k].recipe.build()));
+    let poses = [Pose::new(start, turns[0]), Pose::new(DVec3::ZERO, turns[1])];
+    let o = earliest_contact(&question(models.each_ref(), poses, along * -6.0), &mut Scratch::default());
+    let place = start - along * (6.0 * o.contact()?.time);
+    Some(Meeting { bodies, models, turns, along, place })
+}
+
 #[test]
 fn convex_bodies_touch_where_their_reaches_say() {
     let first = sized("CONTACTD_CONVEX_SEED", 0x636f_6e76_u64);
@@ -86,23 +109,13 @@ fn convex_bodies_touch_where_their_reaches_say() {
     let (mut extents, mut cells, mut exact, mut cut) = ([0; 3], [0; 3], 0, 0);
     for i in 0..count {
         let mut r = Random::new(first + i);
-        let bodies = [body(&mut r), body(&mut r)];
-        let turns = [attitude(&mut r), attitude(&mut r)];
-        let along = if r.chance(0.5) { turns[1] * DVec3::AXES[r.below(3)] } else { r.direction() };
-        let start = along * 5.0 + r.vector(0.3);
-        let [a, b] = [0, 1].map(|k| Model::new(bodies[k].recipe.build()));
-        let poses = |position| [Pose::new(position, turns[0]), Pose::new(DVec3::ZERO, turns[1])];
-        let o = earliest_contact(&question([&a, &b], poses(start), along * -6.0), &mut Scratch::default());
-        if o.status() != Status::Contact {
-            continue;
-        }
-        let met = o.contact().expect("a contact").time;
+        let Some(Meeting { bodies, models: [a, b], turns, along, place }) = meeting(&mut r) else { continue };
         let tau = threshold(default_resolution(&a, &b), 10f64.powf(r.within(-6.0, -2.5)));
         let gap = if r.chance(0.2) { 0.0 } else { tau * r.within(0.0, 0.9) };
-        let poses = poses(start + along * (gap - 6.0 * met));
+        let poses = [Pose::new(place + along * gap, turns[0]), Pose::new(DVec3::ZERO, turns[1])];
         let found = regions(&question([&a, &b], poses, DVec3::ZERO), 0.0, tau);
-        let place = format!("{i}: {} and {}, tau {tau:e}", bodies[0].name, bodies[1].name);
-        assert!(!found.regions.is_empty(), "{place}: {found:?}");
+        let what = format!("{i}: {} and {}, tau {tau:e}", bodies[0].name, bodies[1].name);
+        assert!(!found.regions.is_empty(), "{what}: {found:?}");
         if !found.complete {
             cut += 1;
             continue;
@@ -115,7 +128,7 @@ fn convex_bodies_touch_where_their_reaches_say() {
             for (model, pose, side) in [(&a, &poses[0], -0.5), (&b, &poses[1], 0.5)] {
                 let foot = pose.inverse().point(p.point + n * (side * p.separation));
                 let off = model.solid.value(foot).abs();
-                assert!(off <= 1e-8 + 1e-3 * tau, "{place}: {off:e} off at {p:?} of {nearest:?}");
+                assert!(off <= 1e-8 + 1e-3 * tau, "{what}: {off:e} off at {p:?} of {nearest:?}");
             }
         }
         let apart = -reach(&bodies[0], &poses[0], n) - reach(&bodies[1], &poses[1], -n);
@@ -123,7 +136,7 @@ fn convex_bodies_touch_where_their_reaches_say() {
         // A line or an area has the normal of a face, which may reach beyond it. Curves that nearly run along each other are followed by
         // boxes, to a part of the threshold.
         let is_right = off.abs() <= 1e-9 + 0.5 * tau || !is_point && off > 0.0;
-        assert!(is_right, "{place}: {:e} told, {apart:e} along {n}: {found:?}", nearest.separation());
+        assert!(is_right, "{what}: {:e} told, {apart:e} along {n}: {found:?}", nearest.separation());
         exact += usize::from(is_point && off.abs() <= 1e-9);
         extents[nearest.extent as usize] += 1;
         cells[nearest.extent as usize] += found.cells;
@@ -143,39 +156,32 @@ fn bodies_in_overlap_are_told_where_they_come_apart() {
     let (mut extents, mut cells, mut exact, mut cut) = ([0; 3], 0, 0, 0);
     for i in 0..count {
         let mut r = Random::new(first + i);
-        let bodies = [body(&mut r), body(&mut r)];
-        let turns = [attitude(&mut r), attitude(&mut r)];
-        let along = if r.chance(0.5) { turns[1] * DVec3::AXES[r.below(3)] } else { r.direction() };
-        let start = along * 5.0 + r.vector(0.3);
-        let [a, b] = [0, 1].map(|k| Model::new(bodies[k].recipe.build()));
-        let poses = |position| [Pose::new(position, turns[0]), Pose::new(DVec3::ZERO, turns[1])];
-        let o = earliest_contact(&question([&a, &b], poses(start), along * -6.0), &mut Scratch::default());
-        let Some(met) = o.contact().map(|contact| contact.time) else { continue };
+        let Some(Meeting { bodies, models: [a, b], turns, along, place }) = meeting(&mut r) else { continue };
         let tau = threshold(default_resolution(&a, &b), 10f64.powf(r.within(-6.0, -2.5)));
         let beyond = 10f64.powf(r.within(-6.0, -0.7));
-        let poses = poses(start + along * (-6.0 * met - beyond));
+        let poses = [Pose::new(place - along * beyond, turns[0]), Pose::new(DVec3::ZERO, turns[1])];
         let query = question([&a, &b], poses, DVec3::ZERO);
         let scratch = &mut Scratch::default();
         let o = earliest_contact(&query, scratch);
         let Some(penetration) = o.penetration() else { continue };
         let found = overlap::regions(&query, penetration, tau, scratch);
-        let place = format!("{i}: {} and {}, tau {tau:e}, {penetration:?}", bodies[0].name, bodies[1].name);
+        let what = format!("{i}: {} and {}, tau {tau:e}, {penetration:?}", bodies[0].name, bodies[1].name);
         cells += found.cells;
         if !found.complete {
-            println!("CUT {place} {found:?}");
+            println!("CUT {what} {found:?}");
             cut += 1;
             continue;
         }
         let nearest = found.regions.iter().min_by(|p, q| p.separation().total_cmp(&q.separation()));
-        let nearest = nearest.unwrap_or_else(|| panic!("{place}: no region"));
+        let nearest = nearest.unwrap_or_else(|| panic!("{what}: no region"));
         let n = nearest.normal;
         // How far apart they are along n: as far as the told separation says, less than nothing.
         let apart = -reach(&bodies[0], &poses[0], n) - reach(&bodies[1], &poses[1], -n);
         let (is_point, off) = (nearest.extent == Extent::Point, nearest.separation() - apart);
         let is_right = off.abs() <= 1e-9 + 0.5 * tau || !is_point && off > 0.0;
-        assert!(is_right && apart < 0.0, "{place}: {:e} told, {apart:e} along {n}: {found:?}", nearest.separation());
+        assert!(is_right && apart < 0.0, "{what}: {:e} told, {apart:e} along {n}: {found:?}", nearest.separation());
         // No shorter way parts them than their depth, which is that of a ball.
-        assert!(-nearest.separation() >= penetration.depth * (1.0 - 1e-3) - tau, "{place}: {found:?}");
+        assert!(-nearest.separation() >= penetration.depth * (1.0 - 1e-3) - tau, "{what}: {found:?}");
         exact += usize::from(is_point && off.abs() <= 1e-9);
         extents[nearest.extent as usize] += 1;
     }
