@@ -142,7 +142,11 @@ fn tangent(bodies: &Bodies, p: Lit, q: Lit) -> Option<Curve> {
 
 /// The candidates among the faces of a box.
 pub fn candidates(bodies: &Bodies, place: &Place) -> Vec<Candidate> {
-    let [a, b] = [Side::A, Side::B].map(|s| place.lits(s));
+    candidates_among(bodies, [Side::A, Side::B].map(|s| place.lits(s)))
+}
+
+/// The candidates among some faces of A and of B.
+pub fn candidates_among(bodies: &Bodies, [a, b]: [&[Lit]; 2]) -> Vec<Candidate> {
     let mut out = Vec::new();
     edges(bodies, a, &mut out);
     edges(bodies, b, &mut out);
@@ -187,6 +191,11 @@ fn beside(bodies: &Bodies, curve: &Curve, lit: Lit, s: f64) -> DVec3 {
 /// has left.
 fn lies_in(bodies: &Bodies, curve: &Curve, (from, to): (f64, f64), lit: Lit) -> bool {
     let pad = (3.0 * (bodies.lie * bodies.size).sqrt() / curve.speed()).max(to - from);
+    let pad = match curve {
+        // Once around: further on the same points would come again.
+        Curve::Circle { .. } => pad.min(0.5 * (TAU - (to - from)).max(0.0)),
+        Curve::Line { .. } => pad,
+    };
     let slack = 4.0 * bodies.lie + bodies.eps;
     let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
     (0..7).all(|k| {
@@ -403,19 +412,30 @@ pub fn runs(bodies: &Bodies, c: &Candidate, places: &[&Place], in_patch: &dyn Fn
         .collect();
     others.sort_unstable();
     others.dedup();
-    if leaves(bodies, c, &others) { Vec::new() } else { runs_among(bodies, c, places, &others, in_patch) }
+    let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
+    range.map_or(Vec::new(), |range| runs_within(bodies, c, range, &others, in_patch))
 }
 
-/// The same; `others`: the faces of the places that do not make the candidate.
-fn runs_among(
+/// The same between two parameters; `others`: the faces that do not make the candidate.
+pub fn runs_within(
     bodies: &Bodies,
     c: &Candidate,
-    places: &[&Place],
+    range: (f64, f64),
     others: &[Lit],
     in_patch: &dyn Fn(DVec3) -> bool,
 ) -> Vec<Run> {
-    let range = places.iter().map(|p| c.curve.range(p)).reduce(|r, s| (r.0.min(s.0), r.1.max(s.1)));
-    let Some(stops) = range.and_then(|range| stops(bodies, c, others, range)) else { return Vec::new() };
+    if leaves(bodies, c, others) { Vec::new() } else { runs_among(bodies, c, range, others, in_patch) }
+}
+
+/// The same, whether it leaves all others or not.
+fn runs_among(
+    bodies: &Bodies,
+    c: &Candidate,
+    range: (f64, f64),
+    others: &[Lit],
+    in_patch: &dyn Fn(DVec3) -> bool,
+) -> Vec<Run> {
+    let Some(stops) = stops(bodies, c, others, range) else { return Vec::new() };
     let round = matches!(c.curve, Curve::Circle { .. });
     let whole = |s: f64| {
         let x = c.curve.point(s);
@@ -688,7 +708,7 @@ mod tests {
                 let lits = [Side::A, Side::B].map(|s| place.lits(s)).concat();
                 for c in candidates(bodies, place) {
                     let others: Vec<Lit> = lits.iter().filter(|l| !c.faces.contains(l)).copied().collect();
-                    let runs = runs_among(bodies, &c, &[place], &others, &|_| false);
+                    let runs = runs_among(bodies, &c, c.curve.range(place), &others, &|_| false);
                     let leaves = leaves(bodies, &c, &others);
                     assert!(!leaves || runs.is_empty(), "{c:?} is said to leave, and runs {runs:?}");
                     left += usize::from(leaves);

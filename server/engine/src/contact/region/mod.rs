@@ -8,8 +8,8 @@
 //! * lines: an edge lies on a face or an edge, or round faces touch along a ruling or a circle (`line`);
 //! * points: what touches nowhere else (`point`).
 //!
-//! Two polytopes are told by their corners (`polytopes`), two convex bodies that touch in one point by that (`single`), both without
-//! these boxes.
+//! Two polytopes are told by their corners (`polytopes`), two convex bodies that lie on each other with flat faces by the outlines of
+//! these (`flat`), those that touch in one point by that (`single`): all without these boxes.
 //!
 //! All points are roots of the faces' own equations and are confirmed by both whole trees: nothing is sampled. Faces that
 //! make up one surface (abutting operands of a union) count as one. Regions and their points are ordered by face ids and
@@ -18,6 +18,7 @@
 //! Not promised: a line along which two cones touch side by side, or one along a curve that is neither straight nor
 //! circular, comes as points; isolated points closer to each other than 1/24 of the smaller body's radius may come as one.
 
+mod flat;
 mod line;
 mod local;
 mod patch;
@@ -222,7 +223,7 @@ fn find(bodies: &Bodies) -> Regions {
         out.regions.sort_by_key(rank);
         return out;
     }
-    if let Some(regions) = single::regions(bodies) {
+    if let Some(regions) = flat::regions(bodies).or_else(|| single::regions(bodies)) {
         (out.regions, out.complete) = (regions, true);
         return out;
     }

@@ -11,6 +11,7 @@ use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::separation::Place;
 use crate::solid::{local, surface::Plane};
 use glam::{DMat3, DVec3};
+use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
 /// Newton's method starts in boxes of at most this radius, in sizes of the smaller body, where curved faces are involved …
@@ -96,7 +97,7 @@ fn meet(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], places: &[&Place]) ->
 
 /// Newton's method for a point of a pair's surface on two cuts, and in which sense the three faces turn there: of two
 /// points that a straight and a round one have in common each has its own.
-fn newton(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], mut x: DVec3) -> Option<(DVec3, u64)> {
+pub fn newton(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], mut x: DVec3) -> Option<(DVec3, u64)> {
     let mut turn = 0;
     for _ in 0..40 {
         let (m, n) = pair.middle(bodies, x);
@@ -139,16 +140,16 @@ fn newton(bodies: &Bodies, pair: &FacePair, cuts: [&Cut; 2], mut x: DVec3) -> Op
     cuts.iter().all(|c| on(c)).then_some((x, turn))
 }
 
-/// Eight directions about the axis of a round boundary, as half as many planes.
-fn marks(bodies: &Bodies, p: Lit, q: Lit) -> Vec<Cut> {
-    let Some((origin, axis, u)) = axis_of_curve(bodies, p, q) else { return Vec::new() };
+/// Eight directions about the axis of a round boundary, as half as many planes n·x = d.
+pub fn marks(bodies: &Bodies, p: Lit, q: Lit) -> SmallVec<[(DVec3, f64); 4]> {
+    let Some((origin, axis, u)) = axis_of_curve(bodies, p, q) else { return SmallVec::new() };
     let v = axis.cross(u);
     let r = std::f64::consts::FRAC_1_SQRT_2;
-    [u, (u + v) * r, v, (v - u) * r].into_iter().map(|n| Cut::Plane(n, n.dot(origin))).collect()
+    [u, (u + v) * r, v, (v - u) * r].into_iter().map(|n| (n, n.dot(origin))).collect()
 }
 
 /// Names of the planes through marks, behind those of all faces.
-const MARK: u64 = u64::MAX - 4;
+pub const MARK: u64 = u64::MAX - 4;
 
 /// The pairs of cuts that come together in some box, each once with the boxes, the smaller name first: the sense in which
 /// they turn must not depend on a box's list.
@@ -170,8 +171,8 @@ fn crossings<'p>(bodies: &Bodies, pair: &FacePair, places: &[&'p Place]) -> Vec<
         for (i, p) in cuts.iter().enumerate() {
             cuts[i + 1..].iter().for_each(|q| add(*p, *q, place));
             if let Cut::Face(lit) = p.1 {
-                for (k, mark) in marks(bodies, lit, pair.alpha).into_iter().enumerate() {
-                    add(*p, (MARK + k as u64, mark), place);
+                for (k, (n, d)) in marks(bodies, lit, pair.alpha).into_iter().enumerate() {
+                    add(*p, (MARK + k as u64, Cut::Plane(n, d)), place);
                 }
             }
         }
@@ -179,25 +180,51 @@ fn crossings<'p>(bodies: &Bodies, pair: &FacePair, places: &[&'p Place]) -> Vec<
     found.into_values().collect()
 }
 
-/// The points that bound the part of a pair's patch that lies in some boxes.
-pub fn corners(bodies: &Bodies, pair: &FacePair, places: &[&Place]) -> Vec<Corner> {
-    let mut found: Vec<Corner> = Vec::new();
-    let mut add = |x: DVec3, key: [u64; 3], on_boundary: bool| {
-        let stands = standing(bodies, pair, x);
-        if stands == Standing::Corner || (on_boundary && stands == Standing::Boundary) {
-            let merge = 1e-9 * bodies.size;
-            match found.iter_mut().find(|c| (c.x - x).length() <= merge) {
+/// Points that bound a patch, each once.
+pub struct Corners<'b, 't, 'a> {
+    bodies: &'b Bodies<'t, 'a>,
+    pair: &'b FacePair,
+    found: Vec<Corner>,
+}
+
+impl<'b, 't, 'a> Corners<'b, 't, 'a> {
+    pub fn of(bodies: &'b Bodies<'t, 'a>, pair: &'b FacePair) -> Self {
+        Self { bodies, pair, found: Vec::new() }
+    }
+
+    /// A point of the surface in which two cuts meet, if the patch ends there: in a corner, or at a mark of its boundary.
+    pub fn add(&mut self, x: DVec3, key: [u64; 3]) {
+        let stands = standing(self.bodies, self.pair, x);
+        if stands == Standing::Corner || (key[1] >= MARK && stands == Standing::Boundary) {
+            let merge = 1e-9 * self.bodies.size;
+            match self.found.iter_mut().find(|c| (c.x - x).length() <= merge) {
                 Some(c) => c.key = c.key.min(key),
-                None => found.push(Corner { x, gap: pair.gap(bodies, x), key }),
+                None => self.found.push(Corner { x, gap: self.pair.gap(self.bodies, x), key }),
             }
         }
-    };
+    }
+
+    /// True where a point is known that is nearer to `x` than a distance.
+    pub fn has_within(&self, x: DVec3, distance: f64) -> bool {
+        self.found.iter().any(|c| (c.x - x).length() < distance)
+    }
+
+    pub fn ordered(mut self) -> Vec<Corner> {
+        order(self.bodies, self.pair, &mut self.found);
+        self.found
+    }
+}
+
+/// The points that bound the part of a pair's patch that lies in some boxes.
+pub fn corners(bodies: &Bodies, pair: &FacePair, places: &[&Place]) -> Vec<Corner> {
+    let mut corners = Corners::of(bodies, pair);
     for (cuts, of) in crossings(bodies, pair, places) {
         let [(first, p), (second, q)] = &cuts;
         for (x, turn) in meet(bodies, pair, [p, q], &of) {
-            add(x, [*first, *second, turn], *second >= MARK);
+            corners.add(x, [*first, *second, turn]);
         }
     }
+    let found = &mut corners.found;
     if found.is_empty()
         && let Some((center, radius)) = bodies.face(pair.alpha).ball()
     {
@@ -211,8 +238,7 @@ pub fn corners(bodies: &Bodies, pair: &FacePair, places: &[&Place]) -> Vec<Corne
             }
         }
     }
-    order(bodies, pair, &mut found);
-    found
+    corners.ordered()
 }
 
 /// Points seen from the middle under a smaller angle than this are not told apart by it.

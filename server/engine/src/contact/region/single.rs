@@ -1,20 +1,21 @@
 //! The one point in which two convex bodies touch, where one of them has no other near: without boxes.
 //!
-//! Two convex bodies are nearest to each other along one direction, and touch in what the faces farthest along it have in common. Where
-//! one of them stands out there (`Convex::is_pointed`), as an ellipsoid does, a rim or a corner, that is a point; and where none of their
-//! faces lie on each other and no curve of one runs along the other (`super::may_extend`), as of two cylinders that cross. Both feet are
-//! followed from where F is lowest, or found by Newton's method on the distance itself. That they are nearest is proven: between the
-//! planes through them across the normal neither body reaches.
+//! Two convex bodies are nearest to each other along one direction, and touch in what both have foremost along it
+//! (`Convex::foremost`). That is a point where one of them stands out, as an ellipsoid does, a rim or a corner, and where an edge or a
+//! ruling crosses another one; and where none of their faces lie on each other and no curve of one runs along the other
+//! (`super::may_extend`). Both feet are followed from where F is lowest, or found by Newton's method on the distance itself. That they
+//! are nearest is proven: between the planes through them across the normal neither body reaches.
 
 use super::local::{Bodies, Lit};
 use super::point::{self, Meeting};
-use super::{Region, SAME_FACES, SAME_POINT, point_region, surface};
+use super::{Region, SAME_FACES, SAME_POINT, line, line_region, on_run, point_region, surface};
 use crate::contact::distance::part::Parts;
 use crate::contact::distance::polish::{self, Polish};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth::{self, Deepest};
-use crate::solid::Face;
-use crate::solid::primitive::Primitive;
+use crate::solid::local::LiteralId;
+use crate::solid::primitive::{Foremost, Primitive};
+use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
@@ -23,6 +24,13 @@ use smallvec::SmallVec;
 const POINTED: f64 = 2.0 * surface::LEAN;
 /// … and lines of what leans by some roots of the threshold over the size (`line`).
 const LEAN: f64 = 2.0;
+/// Sine of the angle from which on two rulings or edges cross: they are near each other along no more than twice the widths of what is
+/// foremost of both, over it.
+const CROSSING: f64 = 0.25;
+/// Thresholds from where F is lowest to the faces that decide there.
+const ACTIVE: f64 = 2.0;
+/// Faces of a body that are looked through.
+pub const MOST_FACES: usize = 32;
 /// Thresholds to which it is enough to know that feet are nearest where boxes know them to less.
 const ROUGH: f64 = 1e-3;
 /// Cosines from 1 within which two ways are one: of feet that nearly touch …
@@ -30,8 +38,18 @@ const SAME_WAY: f64 = 0.1;
 /// … and of a half-space and its own normal, as far as rounding may turn it.
 const SAME_NORMAL: f64 = 1e-14;
 
-/// The region of two convex bodies that touch in one point, none where they are apart; `None` for other bodies, and where it may be more
-/// than a point.
+/// What two convex bodies have in common where they touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Common {
+    /// What is near one point.
+    Point,
+    /// What is near one straight line, or less.
+    Line,
+    Any,
+}
+
+/// The region of two convex bodies that touch in one point or along one straight line, none where they are apart; `None` for other
+/// bodies, and where it may be more than that.
 pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     let both = convex(bodies)?;
     let (lowest, proven) = depth::nearest(bodies.task, bodies.at, bodies.tau, depth::BETTER, bodies.work);
@@ -41,30 +59,75 @@ pub fn regions(bodies: &Bodies) -> Option<Vec<Region>> {
     let Some(lowest) = lowest else { return Some(Vec::new()) };
     // An apex has no normal, and is told beside what touches next to it.
     let (depth, lean) = (POINTED * bodies.tau, LEAN * (bodies.lie / bodies.size).sqrt());
-    let stands_out = |whole: &Primitive, n: DVec3, foot: DVec3| {
+    let foremost = |whole: &Primitive, n: DVec3, foot: DVec3| {
         let is_behind = |apex: DVec3| n.dot(foot - apex) > depth || whole.value(apex) > bodies.eps;
         let mut apexes = whole.faces.listed().iter().filter_map(Face::apex);
-        let is_pointed = whole.shape.convex().is_pointed(whole.frame.rotation.inverse() * n, depth, lean);
-        apexes.all(|apex| is_behind(apex.point)).then_some(is_pointed)
+        let foremost = whole.shape.convex().foremost(whole.frame.rotation.inverse() * n, bodies.tau, depth, lean);
+        apexes.all(|apex| is_behind(apex.point)).then_some(foremost)
     };
-    // Whether one of them stands out; `None` at an apex.
-    let one_stands_out = |m: &Meeting| {
-        let of_a = stands_out(both[0], m.normal, m.feet[0])?;
-        let of_b = stands_out(both[1], bodies.at.b_from_a * -m.normal, bodies.at.b_point(m.feet[1]))?;
-        Some(of_a || of_b)
+    // What both have foremost in common; `None` at an apex.
+    let common = |m: &Meeting| {
+        let of_a = foremost(both[0], m.normal, m.feet[0])?;
+        let of_b = foremost(both[1], bodies.at.b_from_a * -m.normal, bodies.at.b_point(m.feet[1]))?;
+        Some(match (of_a, of_b) {
+            (Foremost::Point, _) | (_, Foremost::Point) => Common::Point,
+            (Foremost::Line { along, width }, Foremost::Line { along: other, width: wide }) => {
+                let (v, w) = (both[0].frame.rotation * along, bodies.at.a_vector(both[1].frame.rotation * other));
+                let sine = v.cross(w).length();
+                let is_short = 2.0 * (width + wide + bodies.tau) <= super::ROUND * 0.5 * bodies.size * sine;
+                if is_short || sine > CROSSING { Common::Point } else { Common::Line }
+            }
+            (Foremost::Line { .. }, Foremost::Area) | (Foremost::Area, Foremost::Line { .. }) => Common::Line,
+            (Foremost::Area, Foremost::Area) => Common::Any,
+        })
     };
     // Where F is lowest the bodies face each other nearly as where they are nearest.
-    let stands_out = one_stands_out(&Meeting { feet: [lowest.0; 2], normal: lowest.1, gap: 0.0 })?;
-    if !stands_out && super::may_extend(bodies) {
+    let first = common(&Meeting { feet: [lowest.0; 2], normal: lowest.1, gap: 0.0 })?;
+    if let (Common::Line, Some(run)) = (first, only_run(bodies, both, &lowest)) {
+        return Some(vec![line_region(bodies, &run)]);
+    }
+    let is_one = first == Common::Point;
+    if !is_one && super::may_extend(bodies) {
         return None;
     }
     let m = meeting(bodies, both, &lowest, bodies.eps)?;
-    let still_does = one_stands_out(&m)?;
-    if stands_out && !still_does {
+    let then = common(&m)?;
+    if is_one && then != Common::Point {
         return None;
     }
     let is_near = m.gap <= bodies.tau * (1.0 + SAME_POINT) + bodies.eps;
     Some(if is_near { vec![point_region(bodies, &m)] } else { Vec::new() })
+}
+
+/// The straight line along which two convex bodies touch, if there is one and no other.
+fn only_run(bodies: &Bodies, both: [&Primitive; 2], lowest: &Deepest) -> Option<line::Run> {
+    if both.iter().any(|whole| whole.faces.len() > MOST_FACES) {
+        return None;
+    }
+    let all = [(Side::A, both[0]), (Side::B, both[1])].map(|(side, whole)| literals(side, whole));
+    let near = |lit: &Lit| bodies.value(*lit, lowest.0).abs() <= ACTIVE * bodies.tau + bodies.eps;
+    let active = [&all[0], &all[1]].map(|lits| lits.iter().copied().filter(near).collect::<SmallVec<[Lit; 4]>>());
+    bodies.work.look((active[0].len() + active[1].len()).pow(2));
+    let mut runs: SmallVec<[line::Run; 2]> = SmallVec::new();
+    for c in line::candidates_among(bodies, [&active[0], &active[1]]) {
+        let line::Curve::Line { .. } = c.curve else { continue };
+        let others: Vec<Lit> = all.iter().flatten().copied().filter(|lit| !c.faces.contains(lit)).collect();
+        let s = c.curve.nearest(lowest.0).0;
+        let far = bodies.size + 2.0 * bodies.tau;
+        runs.extend(line::runs_within(bodies, &c, (s - far, s + far), &others, &|_| false));
+    }
+    // What was not looked at any more may be an end of a line.
+    if bodies.work.is_spent() {
+        return None;
+    }
+    let first = runs.pop()?;
+    runs.iter().all(|r| on_run(bodies, &first, r.middle) && on_run(bodies, r, first.middle)).then_some(first)
+}
+
+/// The faces of a convex body.
+pub fn literals(side: Side, whole: &Primitive) -> SmallVec<[Lit; 8]> {
+    let literal = |face| (side, LiteralId::new(whole.first_face + face as u32, Sense::Positive));
+    (0..whole.faces.len()).map(literal).collect()
 }
 
 /// The point that boxes told of two bodies as their only region, where they are proven to be nearest if they are convex.
@@ -76,7 +139,7 @@ pub fn nearest_point(bodies: &Bodies) -> Option<Region> {
 }
 
 /// Both bodies, if they are convex and one of them is round: of polytopes corners tell more (`polytopes`).
-fn convex<'a>(bodies: &Bodies<'_, 'a>) -> Option<[&'a Primitive; 2]> {
+pub fn convex<'a>(bodies: &Bodies<'_, 'a>) -> Option<[&'a Primitive; 2]> {
     let both = [bodies.task.a.whole()?, bodies.task.b.whole()?];
     let is_flat = |whole: &&Primitive| whole.faces.listed().iter().all(Face::is_flat);
     (both.iter().all(|whole| whole.is_convex()) && !both.iter().all(is_flat)).then_some(both)
@@ -120,7 +183,7 @@ pub fn roughly_nearest(bodies: &Bodies, lowest: &Deepest) -> Meeting {
     best.filter(|m| m.gap > least).unwrap_or(of_f)
 }
 
-/// The meeting, if no points of the bodies are nearer to each other than its feet, but for a slack.
+/// The meeting, if its feet are on the bodies and no points of these are nearer to each other, but for a slack.
 fn nearest(bodies: &Bodies, both: [&Primitive; 2], mut m: Meeting, slack: f64) -> Option<Meeting> {
     let n = sharpened(bodies, &m);
     m = Meeting { gap: (m.feet[1] - m.feet[0]).dot(n), normal: n, ..m };
@@ -135,11 +198,13 @@ fn nearest(bodies: &Bodies, both: [&Primitive; 2], mut m: Meeting, slack: f64) -
         }
     }
     let aside = (m.feet[1] - m.feet[0] - m.normal * m.gap).length();
-    (aside <= slack && m.gap - apart(bodies, both, m.normal) <= slack).then_some(m)
+    // A face that decides where F is lowest may end before the foot on it.
+    let is_on = [Side::A, Side::B].iter().zip(m.feet).all(|(side, foot)| bodies.f(*side, foot).abs() <= slack);
+    (is_on && aside <= slack && m.gap - apart(bodies, both, m.normal) <= slack).then_some(m)
 }
 
 /// How far the bodies are apart along a unit vector, at least, as far as each reaches: a half-space without end, but along its own normal.
-fn apart(bodies: &Bodies, [a, b]: [&Primitive; 2], normal: DVec3) -> f64 {
+pub fn apart(bodies: &Bodies, [a, b]: [&Primitive; 2], normal: DVec3) -> f64 {
     let reach = |whole: &Primitive, n: DVec3| match half_space(whole) {
         Some((own, offset)) => {
             if n.dot(own) > 1.0 - SAME_NORMAL {

@@ -30,7 +30,7 @@ mod triangle_mesh;
 
 pub use capsule::Capsule;
 pub use cone::Cone;
-pub use convex::{Convex, Discs, Farthest, Features, Hold, Shown, Slope};
+pub use convex::{Convex, Discs, Farthest, Features, Foremost, Hold, Shown, Slope};
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use ellipsoid::Ellipsoid;

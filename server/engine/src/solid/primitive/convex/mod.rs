@@ -65,6 +65,22 @@ pub struct Slope {
     pub face: u32,
 }
 
+/// What of a convex body is nearest to a plane in front of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Foremost {
+    /// What is near one point.
+    Point,
+    /// What is no farther from a line than a width.
+    Line {
+        /// Unit vector along it, in the body's own frame.
+        along: DVec3,
+        /// A length.
+        width: f64,
+    },
+    /// More, or what is not known.
+    Area,
+}
+
 /// Discs about one axis, or balls, whose hull a shape is: centres and radii, corners with radius 0.
 pub type Discs = SmallVec<[(DVec3, f64); 8]>;
 
@@ -303,11 +319,11 @@ impl Convex<'_> {
         }
     }
 
-    /// True where all of it that is within `depth` of its farthest plane along the unit direction n, both in its own frame, is near
-    /// one point: no face and no edge leans against that plane by less than an angle whose sine is `lean`.
-    pub fn is_pointed(&self, n: DVec3, depth: f64, lean: f64) -> bool {
+    /// What of it is within `depth` of its farthest plane along the unit direction n, both in its own frame; faces and edges that
+    /// lean against that plane by an angle whose sine is `lean`, or less, count as within. `near`: the depth for which a width is told.
+    pub fn foremost(&self, n: DVec3, near: f64, depth: f64, lean: f64) -> Foremost {
         match self {
-            Convex::Ball(_) | Convex::Ellipsoid(_) => true,
+            Convex::Ball(_) | Convex::Ellipsoid(_) => Foremost::Point,
             Convex::Round { bottom, top, half } => {
                 let across = n.truncate().length();
                 let ends = [(-half, *bottom), (*half, *top)];
@@ -316,18 +332,47 @@ impl Convex<'_> {
                 let rim = if reach(ends[1]) > reach(ends[0]) { *top } else { *bottom };
                 let side = (2.0 * half).hypot(top - bottom);
                 // A rim falls off by the square of the way along it.
-                falls > depth.max(lean * side) && (rim == 0.0 || across > lean && rim * across > RIM * depth)
+                let is_rim = |radius: f64| across > lean && radius * across > RIM * depth;
+                if falls > depth.max(lean * side) {
+                    return if rim == 0.0 || is_rim(rim) { Foremost::Point } else { Foremost::Area };
+                }
+                let widest = bottom.max(*top);
+                if !is_rim(widest) {
+                    return Foremost::Area;
+                }
+                let ruling = (n.truncate() / across * (top - bottom)).extend(2.0 * half);
+                Foremost::Line { along: ruling / side, width: (2.0 * widest * near / across).sqrt() }
             }
-            Convex::Capsule { half, .. } => n.z.abs() > lean && 2.0 * half * n.z.abs() > depth,
-            Convex::Cuboid(half) => n.abs().min_element() > lean && (*half * n).abs().min_element() * 2.0 > depth,
+            Convex::Capsule { half, radius } => {
+                if n.z.abs() > lean && 2.0 * half * n.z.abs() > depth {
+                    return Foremost::Point;
+                }
+                let across = n.truncate().length();
+                Foremost::Line { along: DVec3::Z, width: (2.0 * radius * near / across).sqrt() }
+            }
+            Convex::Cuboid(half) => {
+                let falls = |k: usize| n[k].abs() > lean && 2.0 * half[k] * n[k].abs() > depth;
+                match [0, 1, 2].map(falls) {
+                    [true, true, true] => Foremost::Point,
+                    [false, true, true] => Foremost::Line { along: DVec3::X, width: near / n.y.abs().min(n.z.abs()) },
+                    [true, false, true] => Foremost::Line { along: DVec3::Y, width: near / n.x.abs().min(n.z.abs()) },
+                    [true, true, false] => Foremost::Line { along: DVec3::Z, width: near / n.x.abs().min(n.y.abs()) },
+                    _ => Foremost::Area,
+                }
+            }
             Convex::Corners(corners) => {
                 let Some(far) = corners.iter().copied().max_by(|v, w| n.dot(*v).total_cmp(&n.dot(*w))) else {
-                    return false;
+                    return Foremost::Area;
                 };
-                let falls = |v: &DVec3| n.dot(far - *v) > depth.max(lean * far.distance(*v));
-                corners.iter().all(|v| *v == far || falls(v))
+                let stays = |v: &&DVec3| n.dot(far - **v) <= depth.max(lean * far.distance(**v)) && **v != far;
+                let mut beside = corners.iter().filter(stays);
+                match (beside.next(), beside.next()) {
+                    (None, _) => Foremost::Point,
+                    (Some(v), None) => Foremost::Line { along: (*v - far).normalize(), width: near / lean },
+                    _ => Foremost::Area,
+                }
             }
-            Convex::Elliptic(_) | Convex::Superellipsoid(_) | Convex::HalfSpace | Convex::Other => false,
+            Convex::Elliptic(_) | Convex::Superellipsoid(_) | Convex::HalfSpace | Convex::Other => Foremost::Area,
         }
     }
 
@@ -373,5 +418,71 @@ impl Convex<'_> {
             | Convex::HalfSpace
             | Convex::Other => return None,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    #[test]
+    fn what_is_foremost_holds_all_that_is_as_near() {
+        let mut r = Random(0x0066_6f72_656d_6f73);
+        let mut lines = 0;
+        for i in 0..600 {
+            let mut length = || r.within(0.15, 0.9);
+            let shape = match i % 4 {
+                0 => Convex::Round { bottom: length(), top: length(), half: length() },
+                1 => Convex::Round { bottom: length(), top: 0.0, half: length() },
+                2 => Convex::Capsule { half: length(), radius: length() },
+                _ => Convex::Cuboid(DVec3::new(length(), length(), length())),
+            };
+            let near = 10f64.powf(r.within(-7.0, -2.0));
+            let (depth, lean) = (8.0 * near, 2.0 * near.sqrt());
+            // Any direction, along an axis, across one, or nearly so.
+            let along = DVec3::AXES[i / 4 % 3];
+            let any = r.vector(1.0);
+            let n = match i / 12 % 4 {
+                0 => any,
+                1 => along,
+                2 => any - along * any.dot(along),
+                _ => any - along * any.dot(along) * (1.0 - 10f64.powf(r.within(-8.0, -1.0))),
+            };
+            let n = n.normalize_or(DVec3::Z);
+            let told = shape.foremost(n, near, depth, lean);
+            let (along, width) = match told {
+                Foremost::Line { along, width } => (along, width),
+                // A rim that nearly lies in the plane is near it along a fifth of its radius.
+                Foremost::Point => (DVec3::ZERO, 0.25f64.max(8.0 * near.sqrt())),
+                Foremost::Area => continue,
+            };
+            lines += usize::from(told != Foremost::Point);
+            let discs = shape.discs().expect("a hull of discs");
+            let is_flat = matches!(shape, Convex::Round { .. });
+            let towards = |d: DVec3| if is_flat { d.truncate().normalize_or_zero().extend(0.0) } else { d };
+            let ends = discs.iter().map(|(center, radius)| *center + towards(n) * *radius);
+            let far = ends.max_by(|v, w| n.dot(*v).total_cmp(&n.dot(*w))).expect("a disc");
+            // Points between those of its discs that are farthest along n and along directions beside it.
+            for k in 0..400 {
+                let spread = 10f64.powf(r.within(-5.0, 0.0));
+                let beside = |r: &mut Random| (n + r.vector(spread)).normalize_or(n);
+                let (mut x, mut all) = (DVec3::ZERO, 0.0);
+                let together = beside(&mut r);
+                for (center, radius) in &discs {
+                    // On the surface, all of them on one side of what is farthest; or anywhere.
+                    let (d, part) = if k % 2 == 0 { (together, 1.0) } else { (beside(&mut r), r.unit().powf(spread)) };
+                    let weight = r.unit().powi(4);
+                    x += (*center + towards(d) * *radius * part) * weight;
+                    all += weight;
+                }
+                x /= all;
+                if n.dot(far - x) <= near {
+                    let off = if told == Foremost::Point { x.distance(far) } else { (x - far).cross(along).length() };
+                    assert!(off <= width * (1.0 + 1e-9) + near, "{i}: {off:e}, {told:?} {n}");
+                }
+            }
+        }
+        assert!(lines > 100, "{lines}");
     }
 }
