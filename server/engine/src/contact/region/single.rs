@@ -29,6 +29,8 @@ const LEAN: f64 = 2.0;
 const CROSSING: f64 = 0.25;
 /// Thresholds from where F is lowest to the faces that decide there.
 const ACTIVE: f64 = 2.0;
+/// Steps from a point down to a body.
+const PROJECTIONS: usize = 16;
 /// Faces of a body that are looked through.
 pub const MOST_FACES: usize = 32;
 /// Thresholds to which it is enough to know that feet are nearest where boxes know them to less.
@@ -157,7 +159,24 @@ fn meeting(bodies: &Bodies, both: [&Primitive; 2], lowest: &Deepest, slack: f64)
     }
     let followed = point::followed(bodies, lowest);
     let feet = followed.as_ref().map_or([lowest.0; 2], |m| m.feet);
-    followed.and_then(near).or_else(|| polished(feet))
+    // Beside the end of a face Newton's method needs a start on the bodies.
+    let on_bodies = || [onto(bodies, Side::A, both[0], lowest.0), onto(bodies, Side::B, both[1], lowest.0)];
+    followed.and_then(near).or_else(|| polished(feet)).or_else(|| polished(on_bodies()))
+}
+
+/// A point of a convex body near to `x`, but for rounding: down to one face after the other, the one that is farthest below.
+fn onto(bodies: &Bodies, side: Side, whole: &Primitive, x: DVec3) -> DVec3 {
+    let mut y = if side == Side::A { x } else { bodies.at.b_point(x) };
+    for _ in 0..PROJECTIONS {
+        bodies.work.look(whole.faces.len());
+        let (face, value) = whole.highest(y);
+        if value <= bodies.eps {
+            break;
+        }
+        let at = whole.faces[face].at(y);
+        y -= at.normal * (value / (at.slope * at.slope));
+    }
+    if side == Side::A { y } else { bodies.at.a_point(y) }
 }
 
 /// Where two bodies are nearest to each other as F tells it, where nothing proves more, as of an edge beside an apex. Along an axis F has
@@ -183,7 +202,7 @@ pub fn roughly_nearest(bodies: &Bodies, lowest: &Deepest) -> Meeting {
     best.filter(|m| m.gap > least).unwrap_or(of_f)
 }
 
-/// The meeting, if its feet are on the bodies and no points of these are nearer to each other, but for a slack.
+/// The meeting, if no points of the bodies are nearer to each other than its feet, but for a slack; these are on the bodies.
 fn nearest(bodies: &Bodies, both: [&Primitive; 2], mut m: Meeting, slack: f64) -> Option<Meeting> {
     let n = sharpened(bodies, &m);
     m = Meeting { gap: (m.feet[1] - m.feet[0]).dot(n), normal: n, ..m };
@@ -198,9 +217,7 @@ fn nearest(bodies: &Bodies, both: [&Primitive; 2], mut m: Meeting, slack: f64) -
         }
     }
     let aside = (m.feet[1] - m.feet[0] - m.normal * m.gap).length();
-    // A face that decides where F is lowest may end before the foot on it.
-    let is_on = [Side::A, Side::B].iter().zip(m.feet).all(|(side, foot)| bodies.f(*side, foot).abs() <= slack);
-    (is_on && aside <= slack && m.gap - apart(bodies, both, m.normal) <= slack).then_some(m)
+    (aside <= slack && m.gap - apart(bodies, both, m.normal) <= slack).then_some(m)
 }
 
 /// How far the bodies are apart along a unit vector, at least, as far as each reaches: a half-space without end, but along its own normal.

@@ -281,3 +281,25 @@ fn a_ball_beside_an_edge_is_nearest_to_the_edge() {
         });
     }
 }
+
+#[test]
+fn a_ball_near_edges_and_corners_is_as_far_as_its_centre_says() {
+    let mut r = Random(0x6564_6765);
+    for i in 0..2000 {
+        let (radius, mut half) = (r.within(0.2, 0.9), || r.within(0.2, 0.9));
+        let half = dvec3(half(), half(), half());
+        let models = [simple(Cuboid { half }), simple(Sphere { radius })];
+        let turn = quat_of_rotation_vector(if i % 2 == 0 { DVec3::ZERO } else { r.vector(3.0) });
+        // Next to one face's plane, on this side or beyond the ends of it.
+        let tau = 10f64.powf(r.within(-6.0, -2.5));
+        let gap = tau * r.within(0.0, 0.8);
+        let [beyond, other] = [0, 1].map(|_| if r.unit() < 0.6 { tau * r.within(-0.2, 1.0) } else { -0.1 });
+        let center = half + dvec3(radius + gap, beyond, other);
+        let separation = (center - half).max(DVec3::ZERO).length() - radius;
+        let query = query(&models, [turn, DQuat::IDENTITY], turn * -center, DVec3::ZERO);
+        let found = regions(&query, 0.0, tau).regions;
+        let [point] = &found[..] else { panic!("{i}: {separation:e} {found:#?}") };
+        let off = (point.separation() - separation).abs();
+        assert!(off < 1e-12 && point.extent == Extent::Point, "{i}: {off:e}, {separation:e} {point:#?}");
+    }
+}
