@@ -9,14 +9,16 @@
 //! * points: what touches nowhere else (`point`).
 //!
 //! Two polytopes are told by their corners (`polytopes`), two convex bodies that lie on each other with flat faces by the outlines of
-//! these (`flat`), those that touch in one point by that (`single`): all without these boxes.
+//! these (`flat`), those that touch in one point or along one straight line by that (`single`): all without
+//! these boxes.
 //!
 //! All points are roots of the faces' own equations and are confirmed by both whole trees: nothing is sampled. Faces that
 //! make up one surface (abutting operands of a union) count as one. Regions and their points are ordered by face ids and
 //! by directions fixed in the bodies, never by position, so that a body at rest has the same list from step to step.
 //!
 //! Not promised: a line along which two cones touch side by side, or one along a curve that is neither straight nor
-//! circular, comes as points; isolated points closer to each other than 1/24 of the smaller body's radius may come as one.
+//! circular, comes as points; isolated points closer to each other than 1/24 of the smaller body's radius may come as one; and
+//! rulings or edges of convex bodies that cross by more than 15 degrees as one point, however large the threshold.
 
 mod flat;
 mod line;

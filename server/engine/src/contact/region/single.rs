@@ -1,10 +1,11 @@
-//! The one point in which two convex bodies touch, where one of them has no other near: without boxes.
+//! The one point, or the one straight line, in which two convex bodies touch: without boxes.
 //!
 //! Two convex bodies are nearest to each other along one direction, and touch in what both have foremost along it
 //! (`Convex::foremost`). That is a point where one of them stands out, as an ellipsoid does, a rim or a corner, and where an edge or a
 //! ruling crosses another one; and where none of their faces lie on each other and no curve of one runs along the other
-//! (`super::may_extend`). Both feet are followed from where F is lowest, or found by Newton's method on the distance itself. That they
-//! are nearest is proven: between the planes through them across the normal neither body reaches.
+//! (`super::may_extend`). It is a line where one of them has a ruling or an edge foremost and the faces that decide there have one
+//! candidate with a run (`line`). Both feet of a point are followed from where F is lowest, or found by Newton's method on the distance
+//! itself. That they are nearest is proven: between the planes through them across the normal neither body reaches.
 
 use super::local::{Bodies, Lit};
 use super::point::{self, Meeting};

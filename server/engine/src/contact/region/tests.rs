@@ -50,8 +50,8 @@ struct Seen {
     left: usize,
 }
 
-/// Two bodies that were brought together along a direction until a gap is left, in any attitude, along each other or nearly so; `largest`: the
-/// power of ten that the threshold is below.
+/// Two bodies that were brought together along a direction until a gap is left, in any attitude, along each other or nearly so;
+/// `largest`: the power of ten that the threshold is below.
 fn near(r: &mut Random, kinds: [usize; 2], largest: f64, judge: impl FnMut(&Bodies)) {
     let models = kinds.map(|kind| simple(shape(r, kind)));
     let aligned = |r: &mut Random| {
