@@ -5,7 +5,7 @@
 //! convex, so a point below which none lies near is the lowest of all.
 
 use contactd::contact::pair::overlap;
-use contactd::contact::region::{regions, threshold};
+use contactd::contact::region::{Region, regions, threshold};
 use contactd::contact::{
     Extent, PairQuery, PlacedModel, QueryOptions, Scratch, Strategies, default_resolution, earliest_contact,
 };
@@ -172,17 +172,28 @@ fn bodies_in_overlap_are_told_where_they_come_apart() {
             cut += 1;
             continue;
         }
-        let nearest = found.regions.iter().min_by(|p, q| p.separation().total_cmp(&q.separation()));
-        let nearest = nearest.unwrap_or_else(|| panic!("{what}: no region"));
-        let n = nearest.normal;
-        // How far apart they are along n: as far as the told separation says, less than nothing.
-        let apart = -reach(&bodies[0], &poses[0], n) - reach(&bodies[1], &poses[1], -n);
-        let (is_point, off) = (nearest.extent == Extent::Point, nearest.separation() - apart);
-        let is_right = off.abs() <= 1e-9 + 0.5 * tau || !is_point && off > 0.0;
-        assert!(is_right && apart < 0.0, "{what}: {:e} told, {apart:e} along {n}: {found:?}", nearest.separation());
+        // How far off a region is from how far apart the bodies are along its normal, less than nothing.
+        let off = |region: &Region| {
+            let n = region.normal;
+            let apart = -reach(&bodies[0], &poses[0], n) - reach(&bodies[1], &poses[1], -n);
+            assert!(apart < 0.0, "{what}: apart along {n}: {found:?}");
+            region.separation() - apart
+        };
+        let lowest = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
+        assert!(lowest.is_finite(), "{what}: no region");
+        // An apex within the threshold is told, too, where its cone reaches farther beside it: the deepest is one of those that are as
+        // deep to a threshold.
+        let deepest = found.regions.iter().filter(|region| region.separation() <= lowest + tau);
+        let nearest = deepest.min_by(|p, q| off(p).abs().total_cmp(&off(q).abs())).expect("the lowest is one");
+        let (is_point, off_of_it) = (nearest.extent == Extent::Point, off(nearest));
+        let is_right = off_of_it.abs() <= 1e-9 + 0.5 * tau || !is_point && off_of_it > 0.0;
+        assert!(is_right, "{what}: {off_of_it:e} off along {}: {found:?}", nearest.normal);
+        // None is told deeper than the bodies reach into each other.
+        let least = found.regions.iter().map(off).fold(f64::INFINITY, f64::min);
+        assert!(least >= -1e-9 - 0.5 * tau, "{what}: {least:e} deeper than they reach: {found:?}");
         // No shorter way parts them than their depth, which is that of a ball.
-        assert!(-nearest.separation() >= penetration.depth * (1.0 - 1e-3) - tau, "{what}: {found:?}");
-        exact += usize::from(is_point && off.abs() <= 1e-9);
+        assert!(-lowest >= penetration.depth * (1.0 - 1e-3) - tau, "{what}: {found:?}");
+        exact += usize::from(is_point && off_of_it.abs() <= 1e-9);
         extents[nearest.extent as usize] += 1;
     }
     println!("points, lines, patches: {extents:?}, {cells} cells; {exact} points to 1e-9, {cut} cut");

@@ -49,6 +49,13 @@ impl Capsule {
     }
 }
 
+/// The length of an offset from a segment's end, and its direction; of none a direction across the segment.
+#[inline]
+fn away(d: DVec3, axis: DVec3) -> (f64, DVec3) {
+    let rho = d.length();
+    (rho, if rho > 0.0 { d / rho } else { any_perpendicular(axis) })
+}
+
 impl Surface for Capsule {
     #[inline]
     fn reach(&self) -> f64 {
@@ -76,8 +83,8 @@ impl Surface for Capsule {
         let (rho, normal) = match self.end(o.dot(self.axis)) {
             Some(end) => {
                 let d = o - end;
-                let rho = d.length();
-                (rho, if rho > 0.0 { d / rho } else { any_perpendicular(self.axis) })
+                // Beyond an end the gradient never leads back along the segment. Beside the end's own rounding d may.
+                if d.dot(end) < 0.0 { radial(d, self.axis) } else { away(d, self.axis) }
             }
             None => radial(o, self.axis),
         };

@@ -109,6 +109,40 @@ fn spans_hold_the_values_and_rays_end_where_psi_changes_its_sign() {
 }
 
 #[test]
+fn a_tangent_lies_below_psi_however_near_to_an_axis_or_an_end_it_is_taken() {
+    let mut r = Random(41);
+    for _ in 0..2_000 {
+        for face in &faces(&mut r) {
+            let about = match face.symmetry() {
+                Symmetry::Axis(Axis { origin, direction }) => origin + direction * r.within(-1.0, 1.0),
+                Symmetry::Center(center) => center,
+                Symmetry::Normal(_) | Symmetry::None => r.vector(1.0),
+            };
+            let ends = face.ends();
+            let apex = face.apex().map(|apex| apex.point);
+            let circle =
+                if let Face::Torus(t) = face { Some(t.origin + any_perpendicular(t.axis) * t.major) } else { None };
+            for p in [Some(about), ends[0], ends[1], apex, circle].into_iter().flatten() {
+                let x = p + r.vector(1.0) * 10f64.powf(r.within(-18.0, -12.0));
+                let at = face.at(x);
+                let under = face.under(x, x);
+                for _ in 0..10 {
+                    let d = r.vector(1.0) * 10f64.powf(r.within(-3.0, 0.0));
+                    let dip = under.map_or(0.0, |u| {
+                        let (p, along) = (u.rho + u.out.dot(d), u.axis.cross(u.out).normalize_or_zero());
+                        let t = u.beside.map_or(along.dot(d), |b| b.dot(d));
+                        u.k * (p.hypot(t) - p)
+                    });
+                    let (value, normal) = under.map_or((at.value, at.normal), |u| (u.value, u.normal));
+                    let over = value + normal.dot(d) - dip - face.value(x + d);
+                    assert!(over < 1e-14, "{face:?} at {x}: {over:e} above it at {}", x + d);
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_moved_face_has_its_values_moved_and_its_own_symmetry_changes_none() {
     let mut r = Random(7);
     for _ in 0..200 {
