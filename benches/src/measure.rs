@@ -45,7 +45,13 @@ impl Setting {
     /// The search alone: nothing is answered in front of it.
     pub fn search_alone() -> Self {
         Self {
-            strategies: Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() },
+            strategies: Strategies {
+                convex: false,
+                cavities: false,
+                facets: false,
+                balls: false,
+                ..Strategies::default()
+            },
             ..Self::default()
         }
     }

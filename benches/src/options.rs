@@ -25,6 +25,8 @@ pub enum Strategy {
     Cavities,
     /// Meshes answered in front of the search.
     Facets,
+    /// Balls against other solids answered in front of the search.
+    Balls,
     /// A coarser resolution where a search takes too long.
     Coarser,
 }
@@ -58,6 +60,7 @@ impl Options {
                 Strategy::Convex => strategies.convex = false,
                 Strategy::Cavities => strategies.cavities = false,
                 Strategy::Facets => strategies.facets = false,
+                Strategy::Balls => strategies.balls = false,
                 Strategy::Coarser => strategies.coarser = false,
             }
         }

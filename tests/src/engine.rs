@@ -111,6 +111,7 @@ pub const SEARCH_ALONE: Strategies = Strategies {
     convex: false,
     cavities: false,
     facets: false,
+    balls: false,
     coarser: true,
 };
 

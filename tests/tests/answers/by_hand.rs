@@ -43,7 +43,7 @@ fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
         ma,
         b,
         mb,
-        Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() },
+        Strategies { convex: false, cavities: false, facets: false, balls: false, ..Strategies::default() },
     );
     let fronted = ask_with(name, a, ma, b, mb, Strategies::default());
     assert_eq!(o.status(), fronted.status(), "{name}");
@@ -278,7 +278,7 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
         };
         earliest_contact(&query, scratch)
     };
-    let search = Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() };
+    let search = Strategies { convex: false, cavities: false, facets: false, balls: false, ..Strategies::default() };
     let mut timed = Scratch::timed();
     let own = ask(&plate, down, search, &mut Scratch::default());
     assert!(own.status() == Status::Contact && own.counters.cells > 0, "{own:?}");
@@ -322,7 +322,13 @@ fn a_limit_of_cells_cuts_the_same_bits() {
             b: PlacedModel { model: &plate, placed: Placed { place, motion: rest() } },
             resolution: default_resolution(&fork, &plate),
             cell_limit: LIMIT,
-            strategies: Strategies { convex: false, cavities: false, facets: false, ..Strategies::default() },
+            strategies: Strategies {
+                convex: false,
+                cavities: false,
+                facets: false,
+                balls: false,
+                ..Strategies::default()
+            },
             query_options: QueryOptions::CONTACT,
         };
         let o = earliest_contact(&query, &mut Scratch::default());

@@ -60,7 +60,7 @@ fn compare(name: &str, count: u64, mut draw: impl FnMut(&mut Random) -> (Motion,
         sum.reported += 1;
         sum.looks += fronted.counters.closed_forms;
         sum.newton += fronted.counters.newton;
-        let alone = ask(x, y, Strategies { convex: false, cavities: false, ..Strategies::default() });
+        let alone = ask(x, y, Strategies { convex: false, cavities: false, balls: false, ..Strategies::default() });
         if alone.status() == Status::Undecided {
             continue;
         }
@@ -266,7 +266,7 @@ fn combs_of_pegs_are_reported() {
             let alone = ask(
                 (&plate, rest()),
                 (&comb, motion),
-                Strategies { convex: false, cavities: false, ..Strategies::default() },
+                Strategies { convex: false, cavities: false, balls: false, ..Strategies::default() },
             );
             assert_eq!(o.status(), alone.status(), "{i}: {o:?} {alone:?}");
             assert!((o.time() - alone.time()).abs() < 1e-8, "{i}: {o:?} {alone:?}");

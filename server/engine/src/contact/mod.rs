@@ -3,6 +3,7 @@
 //! Floor 5: imports `octree`, `bound`, `motion`, `solid`, `math`, `proto`. Its folders stand on floors of their own
 //! (docs/architecture.md): each holds one idea and imports only from those below it, by their own paths.
 
+mod ball;
 mod cavity;
 pub mod certificate;
 mod convex;

@@ -197,21 +197,25 @@ fn prune_operator(
 /// f of an expression at a point given the faces' values there: and = max, or = min, negated = −psi. Of what stands beside them
 /// if there are parts.
 pub fn value(tokens: &[Token], psi: &mut impl FnMut(u32) -> f64) -> f64 {
-    match first(tokens).0 {
-        Expression::Literal(id) => {
-            let v = psi(id.face());
-            if id.sense() == Sense::Positive { v } else { -v }
-        }
-        Expression::And(body) => value_of(body, f64::NEG_INFINITY, f64::max, psi),
-        Expression::Or(body) => value_of(body, f64::INFINITY, f64::min, psi),
-        Expression::Part(_) => f64::NAN,
-    }
+    value_of_literals(tokens, &mut |id| {
+        let v = psi(id.face());
+        if id.sense() == Sense::Positive { v } else { -v }
+    })
 }
 
-fn value_of(mut body: &[Token], mut v: f64, join: fn(f64, f64) -> f64, psi: &mut impl FnMut(u32) -> f64) -> f64 {
+/// What an expression makes of a number for each literal, as it does of their signed values: the largest in a conjunction, the least
+/// in a disjunction. Not for expressions with parts.
+pub fn value_of_literals(tokens: &[Token], of: &mut impl FnMut(LiteralId) -> f64) -> f64 {
+    let (mut body, start, join): (_, _, fn(f64, f64) -> f64) = match first(tokens).0 {
+        Expression::Literal(id) => return of(id),
+        Expression::And(body) => (body, f64::NEG_INFINITY, f64::max),
+        Expression::Or(body) => (body, f64::INFINITY, f64::min),
+        Expression::Part(_) => return f64::NAN,
+    };
+    let mut v = start;
     while !body.is_empty() {
         let n = first(body).1;
-        v = join(v, value(&body[..n], psi));
+        v = join(v, value_of_literals(&body[..n], of));
         body = &body[n..];
     }
     v

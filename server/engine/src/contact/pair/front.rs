@@ -1,5 +1,6 @@
 //! In front of the queue: the kernels, one after another, each with a proof of its own for the pairs that it knows.
 
+use crate::contact::ball;
 use crate::contact::cavity;
 use crate::contact::convex;
 use crate::contact::facets::{self, Front};
@@ -31,6 +32,11 @@ pub(super) fn kernels(contacts: &mut Contacts, along: Option<DVec3>, scratch: &m
         if !matches!(front, Front::Open) {
             return front;
         }
+    }
+    if strategies.balls
+        && let Some(ending) = ball::answer(contacts)
+    {
+        return Front::Ended(ending);
     }
     // What stage 1 leaves nothing of needs no queue.
     if strategies.region {

@@ -75,6 +75,8 @@ pub struct Strategies {
     pub cavities: bool,
     /// Meshes against convex primitives and each other are answered in front of the search, with the same proviso.
     pub facets: bool,
+    /// Balls against other solids are answered in front of the search, with the same proviso.
+    pub balls: bool,
     /// A search that takes too long is begun anew at a coarser resolution, which the answer tells; otherwise it goes on to its limit.
     pub coarser: bool,
 }
@@ -91,6 +93,7 @@ impl Default for Strategies {
             convex: true,
             cavities: true,
             facets: true,
+            balls: true,
             coarser: true,
         }
     }
