@@ -11,6 +11,7 @@ use contactd::solid::Shape;
 use contactd::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
+use contactd_tests::engine::SEARCH_ALONE;
 use contactd_tests::models::{pierced, simple};
 use glam::DVec3;
 use std::sync::Arc;
@@ -37,14 +38,7 @@ fn tilt(v: DVec3) -> glam::DQuat {
 
 /// The answer of the search alone; a whole-primitive answer in front of it must say the same.
 fn ask(name: &str, a: &Model, ma: Motion, b: &Model, mb: Motion) -> Outcome {
-    let o = ask_with(
-        name,
-        a,
-        ma,
-        b,
-        mb,
-        Strategies { convex: false, cavities: false, facets: false, balls: false, ..Strategies::default() },
-    );
+    let o = ask_with(name, a, ma, b, mb, SEARCH_ALONE);
     let fronted = ask_with(name, a, ma, b, mb, Strategies::default());
     assert_eq!(o.status(), fronted.status(), "{name}");
     if o.status() != Status::Overlap {
@@ -278,7 +272,7 @@ fn a_clock_tells_the_stages_that_worked_and_changes_no_bit() {
         };
         earliest_contact(&query, scratch)
     };
-    let search = Strategies { convex: false, cavities: false, facets: false, balls: false, ..Strategies::default() };
+    let search = SEARCH_ALONE;
     let mut timed = Scratch::timed();
     let own = ask(&plate, down, search, &mut Scratch::default());
     assert!(own.status() == Status::Contact && own.counters.cells > 0, "{own:?}");
@@ -322,13 +316,7 @@ fn a_limit_of_cells_cuts_the_same_bits() {
             b: PlacedModel { model: &plate, placed: Placed { place, motion: rest() } },
             resolution: default_resolution(&fork, &plate),
             cell_limit: LIMIT,
-            strategies: Strategies {
-                convex: false,
-                cavities: false,
-                facets: false,
-                balls: false,
-                ..Strategies::default()
-            },
+            strategies: SEARCH_ALONE,
             query_options: QueryOptions::CONTACT,
         };
         let o = earliest_contact(&query, &mut Scratch::default());
