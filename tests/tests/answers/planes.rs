@@ -7,6 +7,7 @@
 
 use super::kinds::{Scene, Told, alone, at_rest, compare, compare_told, pairs, past, placed, speed, turning};
 use contactd::contact::region::{regions, threshold};
+use contactd::contact::within::Within;
 use contactd::contact::{ContactKind, Extent, Outcome, QueryOptions, Scratch, Status, earliest_contact, margin};
 use contactd::octree::Model;
 use contactd::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, HalfSpace, Polyhedron, Shape, Sphere};
@@ -104,6 +105,43 @@ fn bodies_meet_planes_when_their_supports_say_so_without_a_cell() {
             // Corners of a random hull lie off its planes by up to a billionth: such a one is searched now and then.
             let most = if name == "polyhedron" { 5 * count as u64 } else { 0 };
             assert!(worst < 5e-14 && cells <= most, "{name}, {word}: {worst:e}, {cells} cells");
+        }
+    }
+}
+
+#[test]
+fn whether_a_body_is_within_a_distance_of_a_plane_is_told_by_its_lowest_points_alone() {
+    // Between the lowest point of a torus' hull and the plane lies no point of the torus' own, where the torus lies flat.
+    for (seed, (name, draw)) in (0..).zip(KINDS).filter(|(_, (name, _))| *name != "torus") {
+        let mut r = Random::new(300 + seed);
+        for i in 0..pairs(40) {
+            let shape = draw(&mut r);
+            let s = falling(&mut r, vec![(shape, Pose::IDENTITY)], true);
+            let distance = 10f64.powf(r.within(-6.0, -3.0));
+            // In each other, too, and lying flat where the frames' axes agree.
+            let share = r.within(-2.0, 2.0);
+            let [mut a, b] = s.motions;
+            if r.chance(0.3) {
+                a.start.rotation = b.start.rotation;
+            }
+            let s = Scene { motions: [a, b], ..s };
+            a.start.position += b.start.rotation * DVec3::Z * (distance * share - s.at(0.0));
+            let (body, plane) = (Model::new(s.a.build()), Model::new(s.b.build()));
+            for swapped in [false, true] {
+                let mut both = [(&body, placed(a)), (&plane, placed(b))];
+                if swapped {
+                    both.reverse();
+                }
+                let query = question(both[0], both[1], QueryOptions::CONTACT);
+                let (within, cells) = margin::touching(&query, distance, &mut Scratch::default());
+                let says = format!("{name} {i}, {share} of {distance:e}: {within:?} for {cells} cells");
+                match within {
+                    Within::Witness(_) => assert!(share < 1.0 + 1e-6, "{says}"),
+                    _ => assert!(within == Within::Apart && share > 1.0 - 1e-6, "{says}"),
+                }
+                // The two points that are looked at count as a part of one.
+                assert!(cells <= u64::from(share < 1.0 + 1e-6), "{says}");
+            }
         }
     }
 }

@@ -453,7 +453,8 @@ fn a_hit_is_told_only_once_the_start_is_free() {
 fn a_margins_time_is_never_late_and_hardly_early() {
     let mut r = Random::new(516);
     let (mut entered, mut never, mut short) = (0, 0, 0);
-    let count = sized("CONTACTD_MARGINS", 48);
+    let count = sized("CONTACTD_MARGINS", 24);
+    let all_times = std::env::var_os("CONTACTD_MARGINS").is_some();
     for i in 0..count {
         let primitives = i / 4 % 2 == 0;
         let mut scene = if primitives { scenes::primitives(&mut r) } else { scenes::trees(&mut r) };
@@ -471,8 +472,10 @@ fn a_margins_time_is_never_late_and_hardly_early() {
         let query = question_of(&scene, [&a, &b], QueryOptions::CONTACT);
         let (until, known, _) = apart_until(&query, margin, &mut Scratch::default());
         // Of two convex primitives the distance tells when, and beside an edge f is far below half of it: nothing is looked for
-        // close to the end.
-        for k in (0..=8).filter(|k| !primitives || [0, 2, 4, 6].contains(k)) {
+        // close to the end. The judge of trees is slow: all times in the long form alone.
+        let looked_at =
+            |k: &i32| if primitives { [0, 2, 4, 6].contains(k) } else { all_times || [3, 6, 8].contains(k) };
+        for k in (0..=8).filter(looked_at) {
             let t = until * f64::from(k) / 8.0;
             let at_t = lowest(t);
             let least = 0.5 * margin * if k < 8 { 1.0 - 1e-9 } else { 1.0 - MARGIN_SLACK };

@@ -121,8 +121,11 @@ impl<'a> ConvexPair<'a> {
     }
 
     /// A point of A's frame that is as near to both of two convex primitives at the start as any, or common to both, but for rounding;
-    /// `None` for other solids and where none is found.
+    /// `None` for other solids and where none is found. The second one may be a half-space.
     pub fn between(task: Task<'a>) -> Option<DVec3> {
+        if let Some(x) = plane::between(&task) {
+            return Some(x);
+        }
         let (a, b) = (task.a.whole()?, task.b.whole()?);
         let advance = Advance::new(task, (a, body_of(a)?), (b, body_of(b)?));
         let m = advance.moment(0.0);

@@ -289,6 +289,22 @@ impl<'a> Floor<'a> {
     }
 }
 
+/// A point of A's frame halfway between a half-space, the task's second body, and the middle of those points of the first one that
+/// are nearest to it at the start, or that middle where it lies in the half-space; `None` for other bodies. f being 1-Lipschitz,
+/// it is no more than half the height in either body.
+pub fn between(task: &Task) -> Option<DVec3> {
+    let (body, plane) = (task.a.whole()?, task.b.whole()?);
+    if !is_half_space(plane) {
+        return None;
+    }
+    let at = task.relative.at(0.0);
+    let up = at.a_vector(plane.frame.rotation * DVec3::Z).normalize();
+    let Farthest { middle, .. } = farthest(body, body.frame.rotation.inverse() * -up)?;
+    let lowest = body.frame.point(middle);
+    let height = up.dot(lowest - at.a_point(plane.frame.position));
+    Some(lowest - up * (0.5 * height.max(0.0)))
+}
+
 /// True for a body and a half-space, in a task, that are proven not to meet over the whole step, however near they
 /// start.
 pub fn stays_free(task: &Task) -> bool {
