@@ -5,6 +5,7 @@
 //! The two share the trees' values and Newton's equations, and nothing of how time before a contact is excluded.
 
 use contactd::contact::Status;
+use contactd::solid::Op;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::{SEARCH_ALONE, are_tied, ask, ask_scene_with, differences};
 use contactd_tests::random_solids::Random;
@@ -35,6 +36,21 @@ fn ball(r: &mut Random) -> Scene {
     };
     let scene = Scene::new("ball", solid, of_solid, ball, of_ball);
     if r.chance(0.5) { scene.swapped() } else { scene }
+}
+
+#[test]
+fn a_ball_that_is_all_that_is_left_of_a_tree_is_told_without_a_cell() {
+    let nothing = || Recipe::Op(Op::Union, vec![]);
+    // Its face is the seventh: those of the box, which holds nothing of what it is cut with, come before.
+    let cut = Recipe::Op(Op::Intersection, vec![Recipe::cuboid(1.0, 1.0, 1.0), nothing()]);
+    let left = cut.union(Recipe::sphere(0.3));
+    let plate = Recipe::cuboid(2.0, 2.0, 0.1).minus(Recipe::cylinder(0.05, 0.2).at(1.5, 1.5, 0.0));
+    let scene = Scene::falling(plate, left, DVec3::Z, DVec3::NEG_Z);
+    for scene in [scene.swapped(), scene] {
+        let told = ask(&scene);
+        assert_eq!((told.status(), told.counters.cells), (Status::Contact, 0), "{told:?}");
+        assert!((told.time() - 0.6).abs() < 1e-12, "{told:?}");
+    }
 }
 
 #[test]

@@ -41,19 +41,23 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
     if task.delta <= 0.0 || task.ignored_depth > 0.0 {
         return None;
     }
-    let ending = Advance::of(&task)?.run(contacts);
+    let advance = Advance::of(&task)?;
+    let before = (contacts.found.clone(), contacts.hints.clone());
+    let ending = advance.run(contacts);
     if ending.is_none() {
-        // What touches beside it first was not proven.
-        contacts.found = None;
-        contacts.hints.clear();
+        // What touches beside it first was not proven. What others have confirmed stays.
+        (contacts.found, contacts.hints) = before;
     }
     ending
 }
 
-/// The centre and the radius of a solid that is a ball, in its own frame.
-fn ball(solid: &Solid) -> Option<(DVec3, f64)> {
-    let [face] = solid.whole()?.faces.listed() else { return None };
-    face.ball()
+/// The centre and the radius of a solid that is a ball, in its own frame, and its face.
+fn ball(solid: &Solid) -> Option<(DVec3, f64, LiteralId)> {
+    // Its number is not 0 where the tree once had more than is left of it.
+    let whole = solid.whole()?;
+    let [face] = whole.faces.listed() else { return None };
+    let (center, radius) = face.ball()?;
+    Some((center, radius, LiteralId::new(whole.first_face, Sense::Positive)))
 }
 
 /// A ball that moves against a solid.
@@ -64,6 +68,7 @@ struct Advance<'t, 'a> {
     /// In the ball's own frame.
     center: DVec3,
     radius: f64,
+    face: LiteralId,
     /// The other body.
     other: &'t Model,
     /// V: the centre moves no faster against the other body, length per step.
@@ -77,8 +82,8 @@ struct Advance<'t, 'a> {
 impl<'t, 'a> Advance<'t, 'a> {
     /// `None` for other pairs, and where rounding is not far below the depth that is asked for.
     fn of(task: &'t Task<'a>) -> Option<Self> {
-        let of = |side, solid, other| ball(solid).map(|(center, radius)| (side, center, radius, other));
-        let (side, center, radius, other): (_, _, _, &Model) =
+        let of = |side, solid, other| ball(solid).map(|ball| (side, ball, other));
+        let (side, (center, radius, face), other): (_, _, &Model) =
             of(Side::A, task.a, task.model_b).or_else(|| of(Side::B, task.b, task.model_a))?;
         if other.solid.faces.len() > MOST_FACES || other.solid.has_parts {
             return None;
@@ -96,7 +101,7 @@ impl<'t, 'a> Advance<'t, 'a> {
         );
         let least = excluded(task.delta, 2.0 * task.rounding);
         let is_sound = least < -4.0 * task.rounding && speed.is_finite() && turning.is_finite();
-        is_sound.then_some(Self { task, side, center, radius, other, speed, turning, least })
+        is_sound.then_some(Self { task, side, center, radius, face, other, speed, turning, least })
     }
 
     /// Runs to the end.
@@ -143,10 +148,11 @@ impl<'t, 'a> Advance<'t, 'a> {
             let is_positive = id.sense() == Sense::Positive;
             let sign = if is_positive { 1.0 } else { -1.0 };
             let above = sign * here.value - self.radius - self.least;
-            if above <= 0.0 || above.is_nan() {
+            let falls = -sign * here.normal.dot(velocity);
+            if above <= 0.0 || above.is_nan() || falls.is_nan() {
                 return 0.0;
             }
-            let falls = (-sign * here.normal.dot(velocity)).max(0.0);
+            let falls = falls.max(0.0);
             let bends = !(is_positive && face.is_convex());
             // The first is too long a time, maybe: the rate over it bounds that over all shorter ones.
             let rate = |h: f64| {
@@ -194,9 +200,9 @@ impl<'t, 'a> Advance<'t, 'a> {
         }
         let when = when.min(1.0);
         let (x, id, normal, _) = closing(&relative.at(when));
-        let (own, others) = (LiteralId::new(0, Sense::Positive), if self.side == Side::A { Side::B } else { Side::A });
+        let others = if self.side == Side::A { Side::B } else { Side::A };
         let mut active = Actives::new();
-        active.push(Constraint::Literal(self.side, own));
+        active.push(Constraint::Literal(self.side, self.face));
         active.push(Constraint::Literal(others, id));
         let mut lambda = Weights::new();
         lambda.push(0.5);

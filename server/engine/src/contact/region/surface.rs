@@ -127,6 +127,15 @@ impl Around<'_> {
 
     /// What the point is to the patch: by the sectors between the lines in which the parts cut the tangent plane.
     fn standing(&self) -> Standing {
+        let mut cutting = self.parts.iter().filter(|p| p.across != DVec3::ZERO);
+        if let (Some(part), None, None) = (cutting.next(), cutting.next(), self.limit) {
+            // One line alone: two halves, as beside the rim of a face.
+            return match [part.across, -part.across].map(|d| self.holds(d)) {
+                [true, true] => Standing::Inside,
+                [false, false] => Standing::Outside,
+                _ => Standing::Boundary,
+            };
+        }
         let n = self.normal;
         let e1 = any_perpendicular(n);
         let e2 = n.cross(e1);
