@@ -10,9 +10,11 @@ use contactd::motion::Placed;
 use contactd::octree::Model;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::{
-    ReportedPoint as _, SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences, point_mut,
+    ReportedPoint as _, SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences, point_mut, question_of,
 };
+use contactd_tests::random_solids::Random;
 use contactd_tests::scenes::{Recipe, Scene};
+use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
 
@@ -648,4 +650,60 @@ fn a_curved_wall_is_there_from_twice_the_resolution_on() {
     }
     let there = Scene { resolution: Some(1e-6), ..through_a_plate(shell(2.1e-6)) };
     meets("wall_2.1", &there, ask(&through_a_plate(Recipe::sphere(1.0))).time());
+}
+
+/// Bodies that touch along a whole rim, line or face start just so deep that the search can tell neither that a point is as deep as
+/// it searches nor that none is: bisection leads to each such depth. Halving cells would decide next to nothing there.
+#[test]
+fn a_start_that_is_just_as_deep_as_what_is_searched_costs_no_more_than_others() {
+    let slab = || Recipe::cuboid(4.0, 4.0, 0.5).at(0.0, 0.0, -0.5);
+    let holed = |hole: Recipe| slab().minus(hole);
+    let hole = |r: f64| Recipe::cylinder(r, 2.0);
+    let countersink = Recipe::cone(0.0, 2.0, 1.0);
+    let seated = 0.5 * SQRT_2 - 1.0;
+    // How many cells each may cost: twice what it cost when that was recorded, with CONTACTD_JUST=60.
+    let pairs = [
+        ("a ball on the rim of a hole", 1_200, holed(hole(0.6)), Recipe::sphere(1.0), 0.8),
+        ("a tip in a hole", 10, holed(hole(0.6)), tip_down(0.9, 0.9), 0.3),
+        ("a ball in a countersink", 18_000, holed(countersink), Recipe::sphere(0.5), seated),
+        ("a ball in a socket", 500, holed(Recipe::sphere(0.7)), Recipe::sphere(0.7), 0.0),
+        ("a ring on a slab", 12_000, slab(), Recipe::torus(1.0, 0.3), 0.3),
+        // Its lowest circle is the rim.
+        ("a ring on the rim of a hole", 13_000, holed(hole(1.0)), Recipe::torus(1.0, 0.3), 0.3),
+        ("a tube on a slab", 400, slab(), Recipe::cylinder(1.0, 1.0).minus(Recipe::cylinder(0.8, 2.0)), 1.0),
+        ("a box on a slab with a hole", 10, holed(hole(0.2)), cube(), 1.0),
+    ];
+    let mut r = Random::new(179);
+    for (name, ceiling, a, b, height) in pairs {
+        let models = [Model::new(a.build()), Model::new(b.build())];
+        let mut most = 0;
+        for seed in 0..sized("CONTACTD_JUST", 2) {
+            let beside = r.vector(1e-7).with_z(0.0);
+            let tilt = if seed % 2 == 0 { DQuat::IDENTITY } else { DQuat::from_scaled_axis(r.vector(1e-8)) };
+            let velocity = DVec3::Z * -(10f64.powf(r.within(-6.0, -2.0)));
+            let mut ask_at = |more: f64| {
+                let motion = going(beside + DVec3::Z * (height + more), tilt, velocity, DVec3::ZERO);
+                let scene = scene(a.clone(), still(), b.clone(), motion);
+                let query = question_of(&scene, [&models[0], &models[1]], QueryOptions::DEPTH);
+                let o = earliest_contact(&query, &mut Scratch::default());
+                assert_ne!(o.status(), Status::Undecided, "{name}, {seed}: {more:e}: {o:?}");
+                most = most.max(o.counters.cells);
+                o
+            };
+            let asked = ask_at(1.0).resolution;
+            let is_raised = |o: &Outcome| o.resolution > asked;
+            let is_above: [&dyn Fn(&Outcome) -> bool; 3] =
+                [&|o| !o.touching, &|o| o.status() != Status::Overlap && !is_raised(o), &|o| {
+                    o.status() != Status::Overlap
+                }];
+            for is_above in is_above {
+                let (mut below, mut above) = (-1e-6, 1e-6);
+                for _ in 0..40 {
+                    let middle = 0.5 * (below + above);
+                    *(if is_above(&ask_at(middle)) { &mut above } else { &mut below }) = middle;
+                }
+            }
+        }
+        assert!(most <= ceiling, "{name}: {most} cells");
+    }
 }

@@ -32,18 +32,29 @@ const ROUNDS: usize = 16;
 const NEAR: [f64; 4] = [1e-2, 1e-4, 1e-7, 1e-10];
 /// Faces of a solid beyond which its f is not asked for at a point.
 const MOST_FACES: usize = 256;
+/// Radii of the ball up to which it may reach into the other body at the start.
+const SHALLOW: f64 = 1e-3;
 /// How much of a span is taken for proven: its quotient is rounded.
 const SURE: f64 = 1.0 - 1e-14;
 
 /// The answer for a pair of which one is a ball; `None` leaves it to the search, as it was.
 pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
+    at_depth(contacts, false)
+}
+
+/// The same for a pair that is known to touch at the start, at the depth that is searched for by now.
+pub(super) fn answer_of_touching(contacts: &mut Contacts) -> Option<Ending> {
+    at_depth(contacts, true)
+}
+
+fn at_depth(contacts: &mut Contacts, touches: bool) -> Option<Ending> {
     let task = contacts.task;
     if task.delta <= 0.0 || task.ignored_depth > 0.0 {
         return None;
     }
     let advance = Advance::of(&task)?;
     let before = (contacts.found.clone(), contacts.hints.clone());
-    let ending = advance.run(contacts);
+    let ending = advance.run(contacts, touches);
     if ending.is_none() {
         // What touches beside it first was not proven. What others have confirmed stays.
         (contacts.found, contacts.hints) = before;
@@ -104,14 +115,22 @@ impl<'t, 'a> Advance<'t, 'a> {
         is_sound.then_some(Self { task, side, center, radius, face, other, speed, turning, least })
     }
 
-    /// Runs to the end.
-    fn run(&self, contacts: &mut Contacts) -> Option<Ending> {
+    /// Runs to the end; a start at which the bodies touch is left to the search, unless that is known of them or deep.
+    fn run(&self, contacts: &mut Contacts, touches: bool) -> Option<Ending> {
         let (mut t, mut tries) = (0.0, 0);
         for _ in 0..ROUNDS {
             let at = self.task.relative.at(t);
             let gap = self.gap(&at);
             contacts.counters.closed_forms += 1;
-            if t == 0.0 && gap <= APART * self.task.delta || gap <= self.least || gap.is_nan() {
+            if t == 0.0 && gap <= APART * self.task.delta {
+                if let Some(x) = self.deep(&at, gap) {
+                    return Some(Ending::Deep(x));
+                }
+                if !touches {
+                    break;
+                }
+            }
+            if gap <= self.least || gap.is_nan() {
                 break;
             }
             let close = NEAR.iter().filter(|near| gap <= *near * self.task.scale).count();
@@ -177,29 +196,42 @@ impl<'t, 'a> Advance<'t, 'a> {
         self.other.value(self.center(at).1) - self.radius
     }
 
+    /// A point that is deep in both bodies at the start, where the ball reaches little into the other one: in the middle between its
+    /// surface and that of the face that decides at its centre.
+    fn deep(&self, at: &Instant, gap: f64) -> Option<DVec3> {
+        if -gap > SHALLOW * self.radius {
+            return None;
+        }
+        let (x, _, normal) = self.facing(at);
+        let middle = x - normal * (self.radius + 0.5 * gap);
+        self.task.is_deep_at_start(middle, at).then_some(middle)
+    }
+
+    /// The centre along A's axes, the face that decides there, and its direction from the solid to the centre.
+    fn facing(&self, at: &Instant) -> (DVec3, LiteralId, DVec3) {
+        let (x, y) = self.center(at);
+        let (_, id) = self.other.deciding(y);
+        let normal = self.other.solid.faces[id.face() as usize].unit_normal(y);
+        let normal = if id.sense() == Sense::Positive { normal } else { -normal };
+        (x, id, if self.side == Side::A { at.a_vector(normal) } else { normal })
+    }
+
     /// Solves for the contact with the face that decides at the centre, from when the gap is used up along its normal; true when it was
     /// confirmed.
     fn attempt(&self, contacts: &mut Contacts, at: &Instant, gap: f64) -> bool {
         let relative = &self.task.relative;
-        let closing = |at: &Instant| {
-            let (x, y) = self.center(at);
-            let (_, id) = self.other.deciding(y);
-            let normal = self.other.solid.faces[id.face() as usize].unit_normal(y);
-            let normal = if id.sense() == Sense::Positive { normal } else { -normal };
-            // From the solid to the centre, along A's axes, and how fast the centre comes down against it.
-            let (normal, against) = match self.side {
-                Side::A => (at.a_vector(normal), -1.0),
-                Side::B => (normal, 1.0),
-            };
-            (x, id, normal, against * normal.dot(at.velocity(x)))
+        // How fast the centre comes down against it.
+        let against = if self.side == Side::A { -1.0 } else { 1.0 };
+        let falls = {
+            let (x, _, normal) = self.facing(at);
+            against * normal.dot(at.velocity(x))
         };
-        let falls = closing(at).3;
         let when = at.t + gap.max(0.0) / falls;
         if !(falls > 0.0 && when <= 1.0 + 0.25 * (when - at.t)) {
             return false;
         }
         let when = when.min(1.0);
-        let (x, id, normal, _) = closing(&relative.at(when));
+        let (x, id, normal) = self.facing(&relative.at(when));
         let others = if self.side == Side::A { Side::B } else { Side::A };
         let mut active = Actives::new();
         active.push(Constraint::Literal(self.side, self.face));

@@ -3,6 +3,7 @@
 use super::front;
 use super::report::{DEPTHS, NEAR_DEPTH, contact_of, fill_overlap};
 use super::unbounded;
+use crate::contact::ball;
 use crate::contact::cavity;
 use crate::contact::convex::{self, Quick};
 use crate::contact::facets::Front;
@@ -11,7 +12,7 @@ use crate::contact::instant::separation;
 use crate::contact::instant::work::Work;
 use crate::contact::query::outcome::{Counters, Outcome, Penetration, Status, Verdict};
 use crate::contact::query::question::PairQuery;
-use crate::contact::query::task::{RAISES, Task, clear_of_walls, most_raised, raised};
+use crate::contact::query::task::{NEARLY_DEEP, RAISES, SUNK, Task, clear_of_walls, raised};
 use crate::contact::queue::clock::Stage;
 use crate::contact::queue::scratch::Scratch;
 use crate::contact::queue::search::Search;
@@ -92,6 +93,10 @@ fn quick(query: &PairQuery, outcome: &mut Outcome) -> Quick {
         None => whole(query, outcome),
     }
 }
+
+/// Roundings about twice the resolution within which a start is just that deep. A search could neither exclude nor confirm it until
+/// its cells are as small as rounding lets a bound tell them apart: along a rim these are thousands.
+const JUST: f64 = 16.0;
 
 /// Effort (`Counters::effort`) after which a coarser resolution is tried.
 const PATIENCE: u64 = 100_000;
@@ -342,6 +347,7 @@ impl<'a> PairSearch<'a> {
             State::Reported(Outcome { verdict: Verdict::Clear { .. }, .. }, _) => f64::INFINITY,
             State::Reported(reported, _) => reported.time_lower(),
             State::Ended(Some(Ending::Contact(found)), ..) => found.goal,
+            State::Ended(Some(Ending::Deep(_)), ..) => 0.0,
             State::Ended(..) => f64::INFINITY,
             State::Searching(search) => search.earliest(),
         }
@@ -429,32 +435,53 @@ impl<'a> PairSearch<'a> {
         if doubled {
             self.task.delta = self.level * self.resolution;
         }
+        let at = self.task.relative.at(0.0);
         // A point that is as deep as that already tells what a search for it would.
-        let is_open = doubled && !self.task.is_deep(x, &self.task.relative.at(0.0), 0.0);
-        if is_open || self.raises_depth(x) {
+        let is_deep = self.task.is_deep(x, &at, 0.0);
+        let is_just = is_deep || self.task.is_deep(x, &at, -JUST * self.task.rounding);
+        let raises = is_just && self.raises_depth(x, is_deep);
+        if raises || !is_deep {
+            if is_just && !raises {
+                // What is as deep is all that is left to look for.
+                self.task.start_tolerance = 0.0;
+            }
             self.restart(cells);
             return None;
         }
         (!self.goes_past(x, cells)).then(|| self.overlaps(x, None))
     }
 
-    /// A body that was stopped at its contact starts at depth 0 ± rounding: the search is for twice the depth. False when it
-    /// was, or when an overlap is searched past.
+    /// A body that was stopped at its contact starts at depth 0 ± rounding: the search is for twice the depth, and what is just
+    /// that deep ends it. False when it was, or when an overlap is searched past.
     fn doubles_depth(&mut self) -> bool {
         if self.level != 1.0 || self.task.ignored_depth != 0.0 {
             return false;
         }
         self.level = 2.0;
-        self.task.start_tolerance = 0.0;
+        self.task.start_tolerance = JUST / NEARLY_DEEP * self.task.rounding;
         true
     }
 
     /// A step that raised the resolution may have left the bodies a little deeper than 2 delta: raises it, too, where x is no
-    /// deeper than that.
-    fn raises_depth(&mut self, x: DVec3) -> bool {
-        let most = 2.0 * most_raised(self.resolution, self.task.rounding);
-        let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x);
-        self.task.ignored_depth == 0.0 && depth <= most && self.raise()
+    /// deeper than that, and where x is just 2 delta deep. At once by as much as leaves x clearly less deep. False where no raise is
+    /// as much; the last ones are for what is not quite as deep as now.
+    fn raises_depth(&mut self, x: DVec3, is_deep: bool) -> bool {
+        if self.task.ignored_depth > 0.0 {
+            return false;
+        }
+        let rounding = self.task.rounding;
+        let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x) + JUST * rounding;
+        let mut resolution = self.resolution;
+        let is_enough = |more: &f64| {
+            resolution = raised(resolution, *more, rounding);
+            2.0 * resolution >= depth
+        };
+        let left = RAISES.get(self.raised..if is_deep { SUNK } else { RAISES.len() });
+        let Some(skipped) = left.and_then(|left| left.iter().position(is_enough)) else { return false };
+        for _ in 0..=skipped {
+            self.raise();
+        }
+        true
     }
 
     /// Leaves open what comes after `t`, unless the search begins `anew`; says whether it does.
@@ -588,7 +615,10 @@ impl<'a> PairSearch<'a> {
         self.task.limit = self.task.limit.saturating_sub(cells);
         let mut contacts = Contacts::new(self.task);
         let again = self.coarser > 0 && self.task.strategies.cavities;
-        let ending = if again { cavity::answer(&mut contacts) } else { None };
+        let mut ending = if again { cavity::answer(&mut contacts) } else { None };
+        if ending.is_none() && self.task.strategies.balls {
+            ending = ball::answer_of_touching(&mut contacts);
+        }
         let scratch = self.take_scratch();
         if ending.is_some() {
             self.state = State::Ended(ending, contacts.counters, scratch);

@@ -165,7 +165,7 @@ impl<'a> Task<'a> {
     /// takes for deep is searched again at twice the depth.
     /// At a negative depth −g that is a point hardly farther than g: what keeps a distance is told to be nearer, never the contrary.
     pub(in crate::contact) fn is_deep_at_start(&self, x: DVec3, at: &Instant) -> bool {
-        let level = (8.0 * self.start_tolerance).min(0.5 * self.delta.abs()) - self.delta;
+        let level = (NEARLY_DEEP * self.start_tolerance).min(0.5 * self.delta.abs()) - self.delta;
         self.model_a.value_within(x, level) <= level && self.model_b.value_within(at.b_point(x), level) <= level
     }
 }
@@ -177,7 +177,10 @@ pub(in crate::contact) fn witness_level(delta: f64, rounding: f64) -> f64 {
 }
 
 /// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
-pub(in crate::contact) const RAISES: [f64; 3] = [16.0, 64.0, 256.0];
+pub(in crate::contact) const RAISES: [f64; 6] = [16.0, 64.0, 256.0, 64.0, 64.0, 64.0];
+
+/// The first of these are for a start that is deeper, too; the others for one that is just as deep as the last of them.
+pub(in crate::contact) const SUNK: usize = 3;
 
 /// The resolution after a raise.
 pub(in crate::contact) fn raised(resolution: f64, more: f64, rounding: f64) -> f64 {
@@ -190,7 +193,7 @@ pub(in crate::contact) fn clear_of_walls(mut resolution: f64, rounding: f64, mod
     let at_depth = |wall: f64, depth: f64| {
         (2.0 * depth..=2.0 * (witness_level(depth, rounding) + NEARLY_DEEP * rounding)).contains(&wall)
     };
-    for _ in 0..RAISES.len() {
+    for _ in 0..SUNK {
         let mut walls = models.iter().flat_map(|m| m.solid.alike.walls()).map(|above| -above);
         if !walls.any(|wall| at_depth(wall, resolution) || at_depth(wall, 2.0 * resolution)) {
             break;
@@ -200,10 +203,11 @@ pub(in crate::contact) fn clear_of_walls(mut resolution: f64, rounding: f64, mod
     resolution
 }
 
-/// Roundings beyond a witness' depth up to which a wall counts as just that thick.
-const NEARLY_DEEP: f64 = 8.0;
+/// Roundings beyond a witness' depth up to which a wall counts as just that thick; roundings about a depth within which a start
+/// counts as just that deep.
+pub(in crate::contact) const NEARLY_DEEP: f64 = 8.0;
 
 /// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
 pub(in crate::contact) fn most_raised(resolution: f64, rounding: f64) -> f64 {
-    RAISES.iter().fold(resolution, |r, more| raised(r, *more, rounding))
+    RAISES[..SUNK].iter().fold(resolution, |r, more| raised(r, *more, rounding))
 }

@@ -29,12 +29,14 @@ use crate::contact::exclusion::clause::{self, Advance, Hint};
 use crate::contact::exclusion::enumeration;
 use crate::contact::exclusion::literal::{Side, View};
 use crate::contact::exclusion::tighten::{Left, TIGHTENINGS, WORTH};
+use crate::contact::instant::separation;
 use crate::contact::query::outcome::Counters;
 use crate::contact::witness::balance::{self, MOST_BALANCED};
 use crate::contact::witness::climb;
 use crate::contact::witness::contacts::{Contacts, Visited};
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
+use crate::contact::witness::newton::Constraint;
 use crate::motion::{Bounds, Instant};
 use crate::solid::Solid;
 use crate::solid::local::{self, LiteralId, Truth};
@@ -79,6 +81,9 @@ const LAST: u64 = 16_000;
 
 /// A bracket this wide, a fraction of the step, is told where no coarser resolution has a narrower one.
 const WIDE: f64 = 1e-3;
+
+/// Depths searched for within which a start is hardly deeper.
+const SHALLOW: f64 = 4.0;
 
 /// Sets of faces that are asked where they are deepest in each other at the start.
 const MOST_ASKED: usize = 8;
@@ -128,6 +133,8 @@ pub struct Search<'a> {
     stuck: Option<(f64, DVec3)>,
     /// Faces that were asked where they are deepest in each other at the start.
     balanced: SmallVec<[BalancedLits; 2]>,
+    /// The faces of a contact that comes at once were asked so, too.
+    asked_soon: bool,
 }
 
 impl<'a> Search<'a> {
@@ -143,6 +150,7 @@ impl<'a> Search<'a> {
             patience: u64::MAX,
             stuck: None,
             balanced: SmallVec::new(),
+            asked_soon: false,
         }
     }
 
@@ -282,7 +290,7 @@ impl<'a> Search<'a> {
         if cell.t == 0.0 {
             for x in [cell.center, cell.center + bounded.found.y, cell.center + bounded.now] {
                 if self.contacts.task.is_deep_at_start(x, &at) {
-                    return Some(Ending::Deep(x));
+                    return Some(Ending::Deep(self.deeper(x, &bounded.found, &at)));
                 }
             }
         }
@@ -300,7 +308,6 @@ impl<'a> Search<'a> {
             }
         }
         if cell.t == 0.0
-            && self.contacts.found.is_none()
             && let Some(x) = self.deep_balance(&cell, &bounded.found, &at)
         {
             return Some(Ending::Deep(x));
@@ -313,17 +320,42 @@ impl<'a> Search<'a> {
     }
 
     /// A point deep in both bodies at the start, where the faces that hold a cell are deepest in each other. What a small overlap
-    /// leaves in common is thin: cells that find it by halving must become as small.
+    /// leaves in common is thin: cells that find it by halving must become as small. A contact that comes so soon that rounding
+    /// forbids to prove the start free leads to one by its own faces.
     fn deep_balance(&mut self, cell: &Cell, found: &Advance, at: &Instant) -> Option<DVec3> {
-        let mut lits: BalancedLits = found.support.iter().map(|l| (l.0, l.1)).collect();
-        lits.sort_unstable();
-        if self.balanced.len() >= MOST_ASKED || self.balanced.contains(&lits) {
-            return None;
-        }
         let task = &self.contacts.task;
-        let balance = balance::of_literals(task, at, &lits, cell.center + found.y);
-        self.balanced.push(lits);
+        let (lits, x): (BalancedLits, DVec3) = match &self.contacts.found {
+            None => {
+                let mut lits: BalancedLits = found.support.iter().map(|l| (l.0, l.1)).collect();
+                lits.sort_unstable();
+                if self.balanced.len() >= MOST_ASKED || self.balanced.contains(&lits) {
+                    return None;
+                }
+                self.balanced.push(lits.clone());
+                (lits, cell.center + found.y)
+            }
+            Some(soon) if soon.goal <= f64::MIN_POSITIVE && task.query_options.time() && !self.asked_soon => {
+                self.asked_soon = true;
+                (soon.deep.active.iter().filter_map(Constraint::literal).collect(), soon.deep.x)
+            }
+            Some(_) => return None,
+        };
+        let balance = balance::of_literals(task, at, &lits, x);
         balance.map(|((x, ..), _)| x).filter(|x| task.is_deep_at_start(*x, at))
+    }
+
+    /// A point that is deep at the start, or where the faces that hold its cell are deepest in each other, if that is deeper. Asked of
+    /// bodies that are hardly deeper than is searched: how deep they are tells which depth is worth a search.
+    fn deeper(&self, x: DVec3, found: &Advance, at: &Instant) -> DVec3 {
+        let task = &self.contacts.task;
+        let value = |x: DVec3| separation::value(task, at, x);
+        let here = value(x);
+        if -here > SHALLOW * task.delta {
+            return x;
+        }
+        let lits: BalancedLits = found.support.iter().map(|l| (l.0, l.1)).collect();
+        let balance = balance::of_literals(task, at, &lits, x).map(|((x, ..), _)| x);
+        balance.filter(|other| value(*other) < here).unwrap_or(x)
     }
 
     /// How far a cell's bounds are to look ahead.

@@ -23,6 +23,10 @@ use std::sync::Arc;
 /// Points kept at which curved faces are touched.
 const MAX_HINTS: usize = 8;
 
+/// Roundings before a crossing that are left unproven. Those of a bound are nearly as many: with fewer left than it takes, each cell
+/// along a rim or a line that is touched at once would have to become as small as rounding lets its bounds be.
+const RESERVE: f64 = 8.0;
+
 /// Where Newton starts: faces with their multipliers, a point of A's frame, a time.
 #[derive(Clone, Debug)]
 pub struct Guess {
@@ -277,7 +281,7 @@ impl<'a> Contacts<'a> {
     fn hint(&mut self, s: &Solution) {
         let at = self.task.relative.at(s.t);
         for c in &s.active {
-            let Constraint::Literal(side, id) = *c else { continue };
+            let Some((side, id)) = c.literal() else { continue };
             let (solid, point) = if side == Side::A { (self.task.a, s.x) } else { (self.task.b, at.b_point(s.x)) };
             if id.sense() == Sense::Negative || solid.faces[id.face() as usize].is_flat() {
                 continue;
@@ -317,7 +321,7 @@ impl<'a> Contacts<'a> {
         // The depth delta itself is reached a little before the witness, which a slow pair takes its time for.
         let crossing = deep.t - (witness_level(self.task.delta, self.task.rounding) - self.task.delta) / speed;
         // Rounding forbids to prove what is nearer to the crossing.
-        let reserve = 4.0 * self.task.rounding / speed;
+        let reserve = RESERVE * self.task.rounding / speed;
         let goal = match &touch {
             Some(s) if s.t > 0.0 => 0.5 * (s.t + deep.t),
             // Touching at the start: nothing but the start needs a proof.

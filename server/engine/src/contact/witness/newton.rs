@@ -63,6 +63,16 @@ pub enum Constraint {
     Apex(Side, LiteralId, u8),
 }
 
+impl Constraint {
+    /// The face, where it is one.
+    pub fn literal(&self) -> Option<(Side, LiteralId)> {
+        match *self {
+            Self::Literal(side, id) => Some((side, id)),
+            Self::Apex(..) => None,
+        }
+    }
+}
+
 /// A point of contact in space-time with its multipliers.
 #[derive(Clone, Debug)]
 pub struct Solution {
