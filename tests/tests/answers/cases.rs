@@ -10,11 +10,15 @@ fn moving((solid, placed): &(Solid, Placed)) -> Moving<'_> {
     Moving { solid, place: placed.place, motion: placed.motion }
 }
 
-/// Every fifth in the command; all where `CONTACTD_LAW_SCENES` asks the reference for more.
+/// Cases that take the reference three quarters of what it takes for all: seconds each.
+const DEAR: [&str; 3] = ["hard_mjThin15um", "hard_fcl388_box", "hard_coal604"];
+
+/// Every third in the command, but for the dear ones; all where `CONTACTD_LAW_SCENES` asks the reference for more.
 #[test]
 fn the_reference_reproduces_every_known_answer() {
-    let apart = if std::env::var_os("CONTACTD_LAW_SCENES").is_some() { 1 } else { 5 };
-    for case in cases().into_iter().step_by(apart) {
+    let all = std::env::var_os("CONTACTD_LAW_SCENES").is_some();
+    let is_asked = |name: &str| all || !DEAR.contains(&name);
+    for case in cases().into_iter().filter(|c| is_asked(&c.name)).step_by(if all { 1 } else { 3 }) {
         let radius = |b: contactd::math::Aabb| b.half().length();
         let delta = 1e-9 * radius(case.a.0.aabb()).max(radius(case.b.0.aabb()));
         let truth = earliest_contact(moving(&case.a), moving(&case.b), delta, Effort::QUICK);
