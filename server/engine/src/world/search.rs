@@ -345,8 +345,9 @@ fn run_queue(
         let search = &mut searches[i];
         if time > horizon {
             let verdict = Verdict::Clear { until: time.min(1.0), rest: None };
-            let (depth, past, counters) = (search.depth(), search.is_past(), search.counters());
-            open[i].found.outcome = Outcome { verdict, depth, past, counters, ..open[i].found.outcome };
+            let (resolution, depth) = (search.resolution(), search.depth());
+            let (past, counters) = (search.is_past(), search.counters());
+            open[i].found.outcome = Outcome { verdict, resolution, depth, past, counters, ..open[i].found.outcome };
             open[i].is_left = true;
             continue;
         }

@@ -335,6 +335,14 @@ impl<'a> PairSearch<'a> {
         }
     }
 
+    /// The resolution that the search has come to by now.
+    pub fn resolution(&self) -> f64 {
+        match &self.state {
+            State::Reported(reported, _) => reported.resolution,
+            _ => self.resolution,
+        }
+    }
+
     /// True when an overlap at the start is searched past.
     pub fn is_past(&self) -> bool {
         self.task.ignored_depth > 0.0
@@ -377,7 +385,7 @@ impl<'a> PairSearch<'a> {
             State::Searching(search) => {
                 let ending = search.run(until)?;
                 // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
-                let last = matches!(ending, Ending::Rounding(_)) && self.raised == RAISES.len();
+                let last = matches!(ending, Ending::Rounding(_)) && self.raised >= SUNK;
                 let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
                 (ending, search.take_counters())
             }
@@ -413,7 +421,7 @@ impl<'a> PairSearch<'a> {
             }
             Ending::Rounding(t) => {
                 // A depth that the motion comes to and stays at is told apart from a slightly larger one.
-                let anew = self.raise() || self.coarsen(t, None);
+                let anew = self.raised < SUNK && self.raise() || self.coarsen(t, None);
                 self.leave_open_unless(anew, t)
             }
         };
@@ -436,9 +444,9 @@ impl<'a> PairSearch<'a> {
             self.task.delta = self.level * self.resolution;
         }
         let at = self.task.relative.at(0.0);
-        // A point that is as deep as that already tells what a search for it would.
-        let is_deep = self.task.is_deep(x, &at, 0.0);
-        let is_just = is_deep || self.task.is_deep(x, &at, -JUST * self.task.rounding);
+        // What is as deep as is searched, of no tolerance at the start, tells what a search for it would.
+        let is_deep = self.task.is_deep(x, &at, 0.0) || !doubled && self.task.start_tolerance == 0.0;
+        let is_just = is_deep || self.task.is_deep(x, &at, -self.just());
         let raises = is_just && self.raises_depth(x, is_deep);
         if raises || !is_deep {
             if is_just && !raises {
@@ -462,22 +470,31 @@ impl<'a> PairSearch<'a> {
         true
     }
 
+    /// By how much a start may be off 2 delta to count as just that deep: what is asked of a start there, too.
+    fn just(&self) -> f64 {
+        (JUST * self.task.rounding).min(0.5 * self.task.delta)
+    }
+
     /// A step that raised the resolution may have left the bodies a little deeper than 2 delta: raises it, too, where x is no
     /// deeper than that, and where x is just 2 delta deep. At once by as much as leaves x clearly less deep. False where no raise is
-    /// as much; the last ones are for what is not quite as deep as now.
+    /// as much.
     fn raises_depth(&mut self, x: DVec3, is_deep: bool) -> bool {
         if self.task.ignored_depth > 0.0 {
             return false;
         }
         let rounding = self.task.rounding;
-        let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x) + JUST * rounding;
-        let mut resolution = self.resolution;
+        let depth = -separation::value(&self.task, &self.task.relative.at(0.0), x);
+        let left = RAISES.get(self.raised..).unwrap_or_default();
+        let sunk = left.iter().take(SUNK.saturating_sub(self.raised));
+        if is_deep && depth > 2.0 * sunk.fold(self.resolution, |r, more| raised(r, *more, rounding)) {
+            return false;
+        }
+        let (enough, mut resolution) = (depth + self.just(), self.resolution);
         let is_enough = |more: &f64| {
             resolution = raised(resolution, *more, rounding);
-            2.0 * resolution >= depth
+            2.0 * resolution >= enough
         };
-        let left = RAISES.get(self.raised..if is_deep { SUNK } else { RAISES.len() });
-        let Some(skipped) = left.and_then(|left| left.iter().position(is_enough)) else { return false };
+        let Some(skipped) = left.iter().position(is_enough) else { return false };
         for _ in 0..=skipped {
             self.raise();
         }

@@ -179,7 +179,8 @@ pub(in crate::contact) fn witness_level(delta: f64, rounding: f64) -> f64 {
 /// By how many roundings of a bound the resolution is raised, one after the other, where a motion comes to just its depth.
 pub(in crate::contact) const RAISES: [f64; 6] = [16.0, 64.0, 256.0, 64.0, 64.0, 64.0];
 
-/// The first of these are for a start that is deeper, too; the others for one that is just as deep as the last of them.
+/// How many of these a motion may ask for, and what a start may be deeper by; the others are for a start that is just as deep as they
+/// leave it.
 pub(in crate::contact) const SUNK: usize = 3;
 
 /// The resolution after a raise.
@@ -207,7 +208,7 @@ pub(in crate::contact) fn clear_of_walls(mut resolution: f64, rounding: f64, mod
 /// counts as just that deep.
 pub(in crate::contact) const NEARLY_DEEP: f64 = 8.0;
 
-/// The largest that a resolution is raised to: a body that sank so deep in one step may start the next one there.
+/// The largest that a motion raises a resolution to: a body that sank so deep in one step may start the next one there.
 pub(in crate::contact) fn most_raised(resolution: f64, rounding: f64) -> f64 {
     RAISES[..SUNK].iter().fold(resolution, |r, more| raised(r, *more, rounding))
 }
