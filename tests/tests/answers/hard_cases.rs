@@ -707,3 +707,25 @@ fn a_start_that_is_just_as_deep_as_what_is_searched_costs_no_more_than_others() 
         assert!(most <= ceiling, "{name}: {most} cells");
     }
 }
+
+/// A ball that starts deeper in a face than is searched, hardly or a little, is told as the search tells it, and without one.
+#[test]
+fn a_ball_that_starts_in_a_face_is_told_in_front_of_the_search() {
+    let slab = Recipe::cuboid(4.0, 4.0, 0.5).minus(Recipe::cylinder(0.6, 2.0));
+    let fronts = Strategies { cavities: false, ..Strategies::default() };
+    let mut told = [0; 2];
+    for depths in [2.2, 2.9, 3.7, 6.0, 1e3] {
+        let falls = |resolution: f64| {
+            let start = dvec3(2.0, 0.3, 1.0 - depths * resolution);
+            scene(slab.clone(), still(), Recipe::sphere(0.5), going(start, DQuat::IDENTITY, 1e-3 * DOWN, DVec3::ZERO))
+        };
+        let s = falls(ask(&falls(0.0)).resolution);
+        let (o, searched) = (ask_scene_with(&s, fronts), ask_scene_with(&s, SEARCH_ALONE));
+        assert_eq!(o.counters.cells, 0, "{depths}: {o:?}");
+        assert!(searched.counters.cells > 0, "{depths}: {searched:?}");
+        assert_eq!((o.status(), o.touching), (searched.status(), searched.touching), "{depths}: {o:?}\n{searched:?}");
+        assert!((o.time() - searched.time()).abs() < 1e-9, "{depths}: {o:?}\n{searched:?}");
+        told[usize::from(o.status() == Status::Overlap)] += 1;
+    }
+    assert!(told.iter().all(|n| *n > 0), "{told:?}");
+}
