@@ -160,7 +160,7 @@ fn cones_in_touch_with_their_pockets_at_the_start_are_told_of_what_is_there() {
 /// multipliers hardly miss their balance, and where another face of the same body is ahead, neither is so.
 #[test]
 fn touches_of_cones_in_their_pockets_are_balanced() {
-    // Of these the touch is found with the faces beside the end of the way back, and with no others.
+    // Of these no touch was found with the faces that hold the end of the way back.
     let continued = [250, 763];
     let (mut met, mut bad) = (0, Vec::new());
     all(loose, 24, &continued, |seed, scene, models, o| {

@@ -155,19 +155,6 @@ impl<'t, 'a> Features<'t, 'a> {
         by_faces.or_else(|| self.held_by_an_apex(&each))
     }
 
-    /// All sets of active faces that nearly hold each other, the smallest first.
-    pub fn nearly_held(&self, within: f64) -> Vec<Vec<(Constraint, f64)>> {
-        let each = self.smooth();
-        let mut out = Vec::new();
-        for set in (2..=4usize).flat_map(|count| sets(&each, count)) {
-            let Some((lambda, rest)) = balance(&set.iter().map(|l| l.2).collect::<Vec<_>>()) else { continue };
-            if rest <= within {
-                out.push(set.iter().map(|l| Constraint::Literal(l.0, l.1)).zip(lambda).collect());
-            }
-        }
-        out
-    }
-
     /// True when active faces of both bodies oppose each other, up to what is left of their gradients' weighted sum, or
     /// an apex holds.
     pub fn is_balanced(&self, within: f64) -> bool {

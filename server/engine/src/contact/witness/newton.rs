@@ -338,9 +338,8 @@ impl Problem<'_> {
         Some(Solution { x, t, active: Actives::from_slice(active), lambda, stationarity: sum.abs().max_element() })
     }
 
-    /// A step without damping, or a part of it, after which the squared residual is less than `PROGRESS` of what it was, and which comes
-    /// to no later time: along a rim normals balance where it touches first and where it touches last. Damped steps lead back to the
-    /// surfaces where it left them, as a long step along a rim does.
+    /// A step without damping, or a part of it, after which the squared residual is less than `PROGRESS` of what it was, be it at an
+    /// earlier time or at a later one. Damped steps lead back to the surfaces where it left them, as a long step along a rim does.
     fn undamped(
         &self,
         active: &[Constraint],
@@ -363,7 +362,7 @@ impl Problem<'_> {
                 lambda.iter_mut().zip(&step[4..n]).for_each(|(l, s)| *l += s);
                 let (mut nf, mut nj) = ([0.0; MAX_UNKNOWNS], [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS]);
                 let next = self.fill(active, (x, at), &lambda, level, (&mut nf, &mut nj));
-                if next < PROGRESS * best && at <= t {
+                if next < PROGRESS * best {
                     return Some(((x, at), lambda, nf, nj, next));
                 }
                 step = damped_step(&nj, &nf, n, LEAST_DAMPING)?;

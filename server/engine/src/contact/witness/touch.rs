@@ -37,12 +37,6 @@ const MENDS: usize = 8;
 /// lies so near the witness alone is told (`Outcome::not_continued`).
 const TOUCHES: f64 = 1e-11;
 
-/// How far from a witness the faces may pass that its touch is looked for with, in depths.
-const CROWD: f64 = 1.5;
-
-/// What the gradients of such faces may leave of each other.
-const NEARLY_HELD: f64 = 1e-3;
-
 /// A continuation that leads farther from its witness than this, in scales of the pair, is another contact's.
 const NOT_FAR: f64 = 1e-2;
 
@@ -184,19 +178,10 @@ impl<'t, 'a> Touch<'t, 'a> {
             let touches = |s: &Solution| near(s) && balances(s) && self.is_held(s) && self.is_touch(s, deep);
             self.mended(&self.climbed(t, held), 0.0).filter(touches)
         };
-        let end = match climber.back((deep.t, deep.x, level), solve) {
-            Some(Ok(solved)) => return Some(solved),
-            Some(Err(end)) => Some(end),
-            None => None,
+        let (t, held) = match climber.back((deep.t, deep.x, level), solve)? {
+            Ok(solved) => return Some(solved),
+            Err(end) => end,
         };
-        let (from, x) = end.as_ref().map_or((deep.t, deep.x), |(t, held)| (*t, held.0));
-        let near = |s: &Solution| (s.x - x).length() <= NOT_FAR * self.task.scale && s.stationarity < BALANCED;
-        let touches = |s: &Solution| near(s) && self.is_held(s) && self.is_touch(s, deep);
-        let beside = if from > 0.0 { self.of_faces_beside(from, x).find(touches) } else { None };
-        if beside.is_some() {
-            return beside;
-        }
-        let (t, held) = end?;
         // A climb may end on one of the surfaces.
         let at = self.task.relative.at(t);
         let values = [self.task.model_a.value(held.0), self.task.model_b.value(at.b_point(held.0))];
@@ -204,18 +189,6 @@ impl<'t, 'a> Touch<'t, 'a> {
         let most = TOUCHES * self.task.scale + self.task.rounding;
         let is_deep_at_start = t == 0.0 && held.1 > ON_SURFACE * self.task.rounding;
         ((is_deep_at_start || off <= most) && self.is_balanced(held.0, &at, off)).then(|| self.climbed(t, &held))
-    }
-
-    /// Touches that the faces beside a point may have, which pass it no farther than a witness is deep, by what holds both
-    /// bodies there. A climb follows the faces that hold it at a depth: another face of the same body may be ahead of these
-    /// where the surfaces meet.
-    fn of_faces_beside(&self, t: f64, x: DVec3) -> impl Iterator<Item = Solution> {
-        let at = self.task.relative.at(t);
-        let features = Features::at(self.task, x, &at, Some(CROWD * self.task.delta));
-        features.nearly_held(NEARLY_HELD).into_iter().take(MENDS).filter_map(move |held| {
-            let (active, lambda) = held.into_iter().unzip();
-            self.mended(&Solution { x, t, active, lambda, stationarity: CLIMBED }, 0.0)
-        })
     }
 
     /// True when faces of both bodies oppose each other at the end of a climb that lies `off` their surfaces. Where none
