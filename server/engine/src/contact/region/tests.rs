@@ -51,8 +51,8 @@ struct Seen {
 }
 
 /// Two bodies that were brought together along a direction until a gap is left, in any attitude, along each other or nearly so;
-/// `largest`: the power of ten that the threshold is below.
-fn near(r: &mut Random, kinds: [usize; 2], largest: f64, judge: impl FnMut(&Bodies)) {
+/// `largest`: the power of ten that the threshold is below. The judge is told the gap: their distance is no larger.
+fn near(r: &mut Random, kinds: [usize; 2], largest: f64, mut judge: impl FnMut(&Bodies, f64)) {
     let models = kinds.map(|kind| simple(shape(r, kind)));
     let aligned = |r: &mut Random| {
         let quarter = |r: &mut Random| (r.unit() * 4.0).floor() * FRAC_PI_2;
@@ -77,7 +77,8 @@ fn near(r: &mut Random, kinds: [usize; 2], largest: f64, judge: impl FnMut(&Bodi
     let Verdict::Contact(contact) = &outcome.verdict else { return };
     let tau = 10f64.powf(r.within(-6.0, largest));
     let gap = if r.unit() < 0.2 { 0.0 } else { tau * r.within(0.0, 1.2) };
-    seen(&query(&models, turns, start + along * (gap - 6.0 * contact.time), DVec3::ZERO), tau, judge);
+    let query = query(&models, turns, start + along * (gap - 6.0 * contact.time), DVec3::ZERO);
+    seen(&query, tau, |bodies| judge(bodies, gap));
 }
 
 /// A question about the first model at a place, moving, and the second at the origin, at rest; both turned.
@@ -105,11 +106,11 @@ fn seen(query: &PairQuery, tau: f64, mut judge: impl FnMut(&Bodies)) {
 fn one_point_is_told_where_boxes_find_one_point() {
     let mut r = Random(0x706f_696e_7473);
     let mut seen = Seen::default();
-    let count = std::env::var("CONTACTD_POINTS").map_or(600, |n| n.parse().expect("a number"));
+    let count = std::env::var("CONTACTD_POINTS").map_or(1200, |n| n.parse().expect("a number"));
     for i in 0..count {
         // A half-space stands alone.
         let kinds = [(r.unit() * 8.0) as usize, (r.unit() * 9.0) as usize];
-        near(&mut r, kinds, -3.0, |bodies| {
+        near(&mut r, kinds, -3.0, |bodies, _| {
             let place = format!("{i}: {kinds:?}, tau {:e}", bodies.tau);
             let Some(found) = single::regions(bodies) else {
                 seen.left += 1;
@@ -195,7 +196,7 @@ fn the_patch_of_round_flat_faces_is_the_one_that_boxes_find() {
     let count = std::env::var("CONTACTD_POINTS").map_or(1500, |n| n.parse().expect("a number"));
     for i in 0..count {
         let kinds = [[2, 3, 4][(r.unit() * 3.0) as usize], [2, 3, 4, 6, 7, 8, 9][(r.unit() * 7.0) as usize]];
-        near(&mut r, kinds, -1.0, |bodies| {
+        near(&mut r, kinds, -1.0, |bodies, gap| {
             let place = format!("{i}: {kinds:?}, tau {:e}", bodies.tau);
             let found = flat::regions(bodies);
             let boxes = in_boxes(bodies);
@@ -227,6 +228,8 @@ fn the_patch_of_round_flat_faces_is_the_one_that_boxes_find() {
                 }
             }
             assert!(more == 0 && known.next().is_none(), "{place}: {told:#?} {expected:#?}");
+            let above = told.separation() - gap;
+            assert!(above <= 3e-3 * bodies.tau + 1e-8, "{place}: {above:e} farther than they can be, {told:#?}");
             // Boxes tell such a rim as a line as well.
             for other in boxes.regions.iter().filter(|r| r.extent != Extent::Patch) {
                 let of_patch = other.faces_a.contains(&told.faces_a[0]) || other.faces_b.contains(&told.faces_b[0]);
@@ -240,6 +243,27 @@ fn the_patch_of_round_flat_faces_is_the_one_that_boxes_find() {
     }
     println!("{patches} {beside} {left}");
     assert!(patches > count / 30 && 10 * (beside + left) <= patches, "{patches} {beside} {left}");
+}
+
+#[test]
+fn an_oblique_side_bounds_its_face_where_it_ends() {
+    // A small peg over the narrow end of a frustum: nearer than the end's edge, farther out than the side's plane at its height.
+    let [bottom, top] =
+        [(0.9, -0.3), (0.5, 0.3)].map(|(w, z)| [dvec3(w, w, z), dvec3(-w, w, z), dvec3(-w, -w, z), dvec3(w, -w, z)]);
+    let frustum = Polyhedron::hull([bottom, top].concat()).expect("a frustum");
+    let models = [simple(Cylinder { radius: 0.08, half_height: 0.5 }), simple(frustum)];
+    let start = dvec3(0.415, 0.1, 0.3 + 0.06 + 0.5);
+    seen(&query(&models, [DQuat::IDENTITY; 2], start, DVec3::ZERO), 0.07, |bodies| {
+        let found = flat::regions(bodies).expect("a patch");
+        let [patch] = &found[..] else { panic!("{found:#?}") };
+        for across in [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y] {
+            let rim = (start + 0.08 * across).with_z(0.33);
+            let off = |p: &RegionPoint| bodies.at.b_point(p.point).distance(rim);
+            let off = patch.points.iter().map(off).fold(f64::INFINITY, f64::min);
+            assert!(off < 1e-9, "{rim}: {off:e}, {patch:#?}");
+        }
+        assert_eq!(patch.extent, Extent::Patch);
+    });
 }
 
 #[test]
