@@ -331,11 +331,10 @@ fn what_fits_closely_is_met_without_a_search_of_its_rims() {
 fn touches_are_balanced_and_of_the_faces_ahead() {
     for (family, index) in [(6, 4242), (7, 19373), (2, 14256), (7, 17903), (9, 19685), (7, 11221)] {
         let scene = scene(1, family, index);
-        let verdict = examine(&scene, 0, Effort::Quick);
-        assert_eq!(verdict.status, Some(Status::Contact));
-        assert!(verdict.is_right(), "{} {index}: {:?}", NAMES[family], verdict.faults);
         let answer = ask(&scene, 0).expect("a scene");
         let o = &answer.pair.outcome;
+        assert_eq!(o.status(), Status::Contact, "{} {index}", NAMES[family]);
+        assert_eq!(judge(&scene, o, Effort::Quick, || answer.witness()), [], "{} {index}", NAMES[family]);
         if o.time() == 0.0 {
             continue;
         }
