@@ -17,6 +17,7 @@ use super::surface::NUMBERS;
 use super::{Face, Faces, Sense};
 use crate::math::Aabb;
 use glam::DVec3;
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 /// Units in the last place by which two faces may differ over a solid, beside what rounding hides, and still be the same one.
@@ -173,6 +174,11 @@ impl Alike {
         self.first.get(face as usize).copied().unwrap_or(face)
     }
 
+    /// A literal by the face that stands for all that are the same.
+    fn named(&self, id: LiteralId) -> LiteralId {
+        LiteralId::new(self.one(id.face()), id.sense())
+    }
+
     /// Lower bound of psi_p − psi_q over the solid, p positive and q subtracted, both curved alike, where it may be above
     /// −2·`delta`, or where they are near each other anyway.
     pub fn wall(&self, faces: &Faces, p: u32, q: u32, delta: f64) -> Option<f64> {
@@ -200,8 +206,29 @@ impl Alike {
             out.extend_from_slice(tokens);
             return if tokens.is_empty() { Truth::True } else { Truth::Open };
         }
+        SEATS.with_borrow_mut(|seats| {
+            if !self.any_twice(tokens, seats) {
+                out.extend_from_slice(tokens);
+                return Truth::Open;
+            }
+            self.simplified_with(seats, tokens, out).0
+        })
+    }
+
+    /// True where two literals of an expression have faces that are the same; makes room for all faces that it has.
+    fn any_twice(&self, tokens: &[Token], seats: &mut Seats) -> bool {
+        let mut twice = false;
+        seats.next();
+        for id in local::literals(tokens) {
+            twice |= seats.mark(self.one(id.face()));
+        }
+        twice
+    }
+
+    /// `simplified` of an expression in which faces stand twice, and the tokens that were looked at.
+    fn simplified_with(&self, seats: &mut Seats, tokens: &[Token], out: &mut Vec<Token>) -> (Truth, usize) {
         let left = (WORK * tokens.len() + LEAST_WORK).min(MOST_WORK);
-        let mut s = Simplifier { alike: self, state: HashMap::new(), trail: Vec::new(), left, look: true };
+        let mut s = Simplifier { alike: self, state: &mut seats.assumed, trail: Vec::new(), left, look: true };
         let mut tree = Tree::of(tokens);
         for _ in 0..4 {
             let before = tree.size();
@@ -210,14 +237,16 @@ impl Alike {
                 break;
             }
         }
-        match tree {
+        let looked = left - s.left;
+        let truth = match tree {
             Tree::Known(true) => Truth::True,
             Tree::Known(false) => Truth::False,
             tree => {
                 tree.write(out);
                 Truth::Open
             }
-        }
+        };
+        (truth, looked)
     }
 }
 
@@ -313,9 +342,73 @@ struct Assumed {
     negative: Option<bool>,
 }
 
+/// What a thread keeps of each face while it simplifies: no formula of a voxel is worth an allocation.
+#[derive(Default)]
+struct Seats {
+    /// By face; nothing is assumed of any between two formulas.
+    assumed: Vec<Assumed>,
+    /// By face, the last formula that has it.
+    seen: Vec<u32>,
+    formula: u32,
+}
+
+thread_local! {
+    static SEATS: RefCell<Seats> = RefCell::default();
+}
+
+impl Seats {
+    /// Another formula begins.
+    fn next(&mut self) {
+        if self.formula == u32::MAX {
+            (self.formula, self.seen) = (0, Vec::new());
+        }
+        self.formula += 1;
+    }
+
+    /// Notes that the formula has a face; true where that is known.
+    fn mark(&mut self, face: u32) -> bool {
+        let i = face as usize;
+        if i >= self.seen.len() {
+            self.seen.resize(i + 1, 0);
+            self.assumed.resize(i + 1, Assumed::default());
+        }
+        std::mem::replace(&mut self.seen[i], self.formula) == self.formula
+    }
+}
+
+/// Where among the operands of a conjunction each literal stands.
+struct Occurrences {
+    /// Literals, each face by the first that is the same, and operands, in order.
+    all: Vec<(LiteralId, usize)>,
+}
+
+impl Occurrences {
+    fn of(alike: &Alike, operands: &[Tree]) -> Self {
+        fn add(alike: &Alike, e: &Tree, i: usize, all: &mut Vec<(LiteralId, usize)>) {
+            match e {
+                Tree::Known(_) | Tree::Part(_) => {}
+                Tree::One(id) => all.push((alike.named(*id), i)),
+                Tree::Many(_, inner) => inner.iter().for_each(|e| add(alike, e, i, all)),
+            }
+        }
+        let mut all = Vec::new();
+        operands.iter().enumerate().for_each(|(i, e)| add(alike, e, i, &mut all));
+        all.sort_unstable();
+        all.dedup();
+        Self { all }
+    }
+
+    /// The operands that have a literal, of a face that stands for all that are the same.
+    fn with(&self, id: LiteralId) -> impl Iterator<Item = usize> + '_ {
+        let from = self.all.partition_point(|o| o.0 < id);
+        self.all[from..].iter().take_while(move |o| o.0 == id).map(|o| o.1)
+    }
+}
+
 struct Simplifier<'a> {
     alike: &'a Alike,
-    state: HashMap<u32, Assumed>,
+    /// By face; all that a formula has are there.
+    state: &'a mut [Assumed],
     /// What was assumed before, to be restored.
     trail: Vec<(u32, Assumed)>,
     left: usize,
@@ -325,14 +418,14 @@ struct Simplifier<'a> {
 
 impl Simplifier<'_> {
     fn known(&self, id: LiteralId) -> Option<bool> {
-        let s = self.state.get(&self.alike.one(id.face()))?;
+        let s = &self.state[self.alike.one(id.face()) as usize];
         if id.sense() == Sense::Positive { s.positive } else { s.negative }
     }
 
     /// Assumes a literal to hold or not, until the trail is taken back.
     fn assume(&mut self, id: LiteralId, holds: bool) {
         let face = self.alike.one(id.face());
-        let before = self.state.get(&face).copied().unwrap_or_default();
+        let before = self.state[face as usize];
         let mut s = before;
         let (own, other) = if id.sense() == Sense::Positive {
             (&mut s.positive, &mut s.negative)
@@ -344,13 +437,13 @@ impl Simplifier<'_> {
             *other = Some(false);
         }
         self.trail.push((face, before));
-        self.state.insert(face, s);
+        self.state[face as usize] = s;
     }
 
     fn back(&mut self, to: usize) {
         while self.trail.len() > to {
             let (face, before) = self.trail.pop().expect("longer than that");
-            self.state.insert(face, before);
+            self.state[face as usize] = before;
         }
     }
 
@@ -438,23 +531,22 @@ impl Simplifier<'_> {
 
     /// Drops the alternatives of a conjunction's disjunctions that contradict what stands beside them; true when any did.
     fn try_alternatives(&mut self, rest: &mut [Tree]) -> bool {
-        if rest.len() < 2 {
+        let size: usize = rest.iter().map(Tree::size).sum();
+        if rest.len() < 2 || self.left < size {
             return false;
         }
+        self.left -= size;
+        let has = Occurrences::of(self.alike, rest);
         let mut any = false;
         self.look = false;
         for i in 0..rest.len() {
-            let Tree::Many(false, alternatives) = &rest[i] else { continue };
-            let mut kept = Vec::new();
-            for e in alternatives.clone() {
-                let clashes = self.left > 0 && {
-                    let beside = rest.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, e)| e.clone());
-                    let all: Vec<Tree> = std::iter::once(e.clone()).chain(beside).collect();
-                    self.left = self.left.saturating_sub(all.iter().map(Tree::size).sum());
-                    self.operator(true, all) == Tree::Known(false)
-                };
-                if clashes { any = true } else { kept.push(e) }
+            let Tree::Many(false, alternatives) = &mut rest[i] else { continue };
+            let alternatives = std::mem::take(alternatives);
+            let (mut kept, mut clash) = (Vec::with_capacity(alternatives.len()), false);
+            for e in alternatives {
+                if self.left > 0 && self.contradicts(&e, rest, i, &has) { clash = true } else { kept.push(e) }
             }
+            any |= clash;
             rest[i] = match kept.len() {
                 0 => Tree::Known(false),
                 1 => kept.pop().expect("one"),
@@ -463,6 +555,67 @@ impl Simplifier<'_> {
         }
         self.look = true;
         any
+    }
+
+    /// True where an expression contradicts one of `rest`, all but one of them, by what each literal in turn leaves of those
+    /// that have it the other way round.
+    fn contradicts(&mut self, e: &Tree, rest: &[Tree], except: usize, has: &Occurrences) -> bool {
+        let mark = self.trail.len();
+        let mut news = vec![e.clone()];
+        // What is open of the expression itself, and what is left of those beside it that its literals are in.
+        let (mut own, mut left): (Vec<Tree>, Vec<(usize, Tree)>) = (Vec::new(), Vec::new());
+        let mut drawn = mark;
+        let clash = 'all: loop {
+            let before = self.trail.len();
+            while let Some(e) = news.pop() {
+                match e {
+                    Tree::Known(true) => {}
+                    Tree::Known(false) => break 'all true,
+                    Tree::One(id) => match self.known(id) {
+                        Some(true) => {}
+                        Some(false) => break 'all true,
+                        None => self.assume(id, true),
+                    },
+                    Tree::Many(true, inner) => news.extend(inner),
+                    e => own.push(e),
+                }
+            }
+            if self.trail.len() > before {
+                news = std::mem::take(&mut own).into_iter().map(|e| self.simplify(e)).collect();
+                own.extend(news.extract_if(.., |e| matches!(e, Tree::Many(false, _) | Tree::Part(_))));
+                if !news.is_empty() {
+                    continue;
+                }
+            }
+            let Some(&(face, before)) = self.trail.get(drawn) else { break false };
+            if self.left == 0 {
+                break false;
+            }
+            drawn += 1;
+            let now = self.state[face as usize];
+            for (sense, before, now) in
+                [(Sense::Positive, before.positive, now.positive), (Sense::Negative, before.negative, now.negative)]
+            {
+                if now != Some(false) || before == now {
+                    continue;
+                }
+                for j in has.with(LiteralId::new(face, sense)).filter(|j| *j != except) {
+                    let known = left.iter().position(|(k, _)| *k == j);
+                    let beside = known.map_or(&rest[j], |at| &left[at].1).clone();
+                    self.left = self.left.saturating_sub(beside.size());
+                    let mut beside = self.simplify(beside);
+                    if !matches!(beside, Tree::Many(false, _) | Tree::Part(_)) {
+                        news.push(std::mem::replace(&mut beside, Tree::Known(true)));
+                    }
+                    match known {
+                        Some(at) => left[at].1 = beside,
+                        None => left.push((j, beside)),
+                    }
+                }
+            }
+        };
+        self.back(mark);
+        clash
     }
 
     /// Leaves out operands that say nothing beside others: the same again, and of those that hold some operands in common one
@@ -504,7 +657,7 @@ impl Simplifier<'_> {
     fn named(&self, e: &Tree) -> Tree {
         match e {
             Tree::Known(_) | Tree::Part(_) => e.clone(),
-            Tree::One(id) => Tree::One(LiteralId::new(self.alike.one(id.face()), id.sense())),
+            Tree::One(id) => Tree::One(self.alike.named(*id)),
             Tree::Many(and, all) => {
                 let mut all: Vec<Tree> = all.iter().map(|e| self.named(e)).collect();
                 all.sort_unstable();
@@ -514,3 +667,6 @@ impl Simplifier<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

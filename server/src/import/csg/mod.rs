@@ -89,7 +89,10 @@ pub const FORMAT: Format = Format { name: "csg", endings: &["csg"], read: Read::
 
 /// The files that the text imports and the fonts that it is set in, each once.
 fn named(bytes: &[u8], limits: &Limits) -> Vec<Named> {
-    let tree = std::str::from_utf8(bytes).ok().and_then(|text| syntax::parse(text, limits).ok());
+    // All names are told by these two words: a text without them, which may be long, is not read twice.
+    let may_name = |text: &&str| ["file", "text"].iter().any(|word| text.contains(word));
+    let text = std::str::from_utf8(bytes).ok().filter(may_name);
+    let tree = text.and_then(|text| syntax::parse(text, limits).ok());
     let Some(tree) = tree else { return Vec::new() };
     let mut all: Vec<Named> = Vec::new();
     for call in &tree.calls {
