@@ -2,6 +2,7 @@
 
 use contactd::contact::PlacedModel;
 use contactd::contact::distance::{DEFAULT_LIMIT, Distance, DistanceQuery, at_instant, over_step};
+use contactd::import::{Facets, Limits, import_csg};
 use contactd::math::random::Random;
 use contactd::motion::Placed;
 use contactd::octree::Model;
@@ -137,4 +138,42 @@ fn the_least_distance_of_an_arm_that_turns_is_that_of_its_arc() {
         };
         assert!((d.time - when).abs() < 1e-4, "arm {i}: at {} and not {when}", d.time);
     }
+}
+
+#[test]
+fn a_body_of_which_tangents_leave_nothing_is_told_without_a_distance() {
+    // What three bodies would have in common, and have not; some of its boxes are left until tangents of the torus have cut them.
+    let corners = [
+        [-0.4108565553180219, 0.5484856647027183, -0.605273495002701],
+        [-0.6856009666145957, -0.22620963969177432, 0.8083186030892711],
+        [0.10147838809928682, 0.49703993943793634, 0.7828774965398873],
+        [-0.9100879481183057, 0.2921121787249461, -0.20219700410856722],
+        [0.5119312952149153, -0.5587359894017971, -0.18837416457793776],
+    ];
+    let faces = [[0, 2, 3], [0, 4, 2], [0, 3, 4], [1, 3, 2], [1, 2, 4], [1, 4, 3]];
+    let disc = "cylinder(h = 1, r1 = 0.41351124261854755, r2 = 0.41351124261854755);";
+    let slot = format!("hull() {{ {disc} multmatrix([[1,0,0,0.4],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) {disc} }}");
+    let circle = "circle(r = 0.17021011110165443);";
+    let ring = format!(
+        "rotate_extrude(angle = 360) multmatrix([[1,0,0,0.9566577766569939],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) {circle}"
+    );
+    let turned = "[[0.4973635570263346,0.38343296252729553,-0.7782086194521706,-0.264],\
+        [-0.07667493218242058,-0.8740881103749272,-0.4796779441208546,0.227],\
+        [-0.8641472368276907,0.29824342163529793,-0.40533987533221594,-0.678],[0,0,0,1]]";
+    let s = 0.07846079903790039;
+    let text = format!(
+        "multmatrix([[{s},0,0,0],[0,{s},0,0],[0,0,{s},0],[0,0,0,1]]) intersection() {{ \
+         polyhedron(points = {corners:?}, faces = {faces:?}); \
+         multmatrix([[1,0,0,-0.106],[0,1,0,0.316],[0,0,-1,0.115],[0,0,0,1]]) {slot} multmatrix({turned}) {ring} }}"
+    );
+    let nothing = import_csg("nothing.csg", &text, Facets::Auto, &Limits::default()).expect("a text").solid;
+    let (nothing, ball) = (Model::new(nothing), simple(Sphere { radius: 0.4 * s }));
+    let turned = DQuat::from_xyzw(0.3742207833586022, 0.3372355598882748, -0.8228468348560202, -0.2629716121879803);
+    let [from, to] = [DVec3::ZERO, DVec3::new(-0.012594168414471753, 0.020037593123204092, 0.008688152258787404)];
+    let a = Motion { start: Pose::new(from, turned), velocity: to - from, spin: DVec3::ZERO };
+    let [from, to] = [DVec3::new(-0.11, -0.0061, 0.036), DVec3::new(-0.031, -0.012, 0.069)];
+    let b = Motion { start: Pose::at(from), velocity: to - from, spin: DVec3::ZERO };
+    let query = DistanceQuery { a: placed(&nothing, a), b: placed(&ball, b), tolerance: 1e-4, limit: DEFAULT_LIMIT };
+    let d = over_step(&query);
+    assert!(d.upper == f64::INFINITY, "{d:?}");
 }

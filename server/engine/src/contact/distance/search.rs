@@ -334,6 +334,10 @@ impl<'a> Search<'a> {
             self.done = self.done.min(bound);
             return Look::Done;
         }
+        // Tangents that other pairs have asked for may have left nothing of it.
+        if (0..2).any(|k| self.parts[k][parts[k]].hull.is_empty()) {
+            return Look::Done;
+        }
         bound = bound.max(self.by_round(parts, span, &strays));
         let (mut near, mut lost) = ((DVec3::ZERO, DVec3::ZERO), 0.0);
         for _ in 0..ROUNDS {
