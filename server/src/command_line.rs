@@ -23,7 +23,7 @@ use crate::cache::{self, Cache, Prepared};
 use crate::check::Check;
 use crate::contact::Status;
 use crate::demo::Program;
-use crate::import::{Access, Facets, Limits, ModelBytes, Openscad, Scene};
+use crate::import::{Access, Facets, Limits, ModelBytes, Note, Openscad, Scene};
 use crate::inspect;
 use crate::ipc::{CacheFolder, Level, ServerConfig};
 use crate::octree::Model;
@@ -412,12 +412,25 @@ fn pairs_of<'a>(scene: &Scene, files: &'a [String], check: &'a Check, outcome: &
     outcome.pairs.iter().map(pair).collect()
 }
 
-/// The models of a scene, with a word on standard error where the cache is in trouble.
+/// Lines about what a model has lost.
+const MOST_LOSSES: usize = 3;
+
+/// The models of a scene, with a word on standard error where the cache is in trouble, and of what is left out.
 fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
     let prepared = prepare_parts(scene, facets, cache)?;
     for (source, _) in scene.models.iter().zip(&prepared).filter(|(_, p)| p.model.solid.is_empty()) {
         let at = if scene.file.is_empty() { String::new() } else { format!("{}:{}: ", scene.file, source.at) };
         warn(&format!("{at}the model \"{}\" is empty: nothing can touch it", source.name));
+    }
+    // Of texts alone `check` tells every note.
+    for (source, p) in scene.models.iter().zip(&prepared).filter(|_| !scene.file.is_empty()) {
+        let lost: Vec<Note> = p.notes.iter().filter(|n| n.is_loss()).cloned().collect();
+        let lines = inspect::grouped(&lost);
+        lines.iter().take(MOST_LOSSES).for_each(|n| warn(&format!("{}:{n}", source.text_name())));
+        if lines.len() > MOST_LOSSES {
+            let more = lines.len() - MOST_LOSSES;
+            warn(&format!("{}: {more} more like these: `contactd inspect` tells all", source.text_name()));
+        }
     }
     Ok(prepared)
 }

@@ -101,6 +101,21 @@ fn what_has_no_effect_is_a_line_on_standard_error() {
 }
 
 #[test]
+fn what_a_model_of_a_scene_has_lost_is_a_line_on_standard_error() {
+    let flat = "polyhedron(points = [[0,0,0],[1,0,0],[0,1,0],[1,1,0]], faces = [[0,1,2],[1,3,2],[2,1,0],[2,3,1]]);\n";
+    // What the file itself takes out is no loss.
+    let model = format!("{flat}%sphere(r = 9);\n{BALL}{}", "sphere(r = 0);\ncube(0);\ncylinder(h = 0, r = 1);\n");
+    let folder = folder(&[("ball.csg", &model), ("s.toml", &scene(4.0))]);
+    let out = run(folder.path(), &["check", "s.toml"]);
+    assert_eq!(out.status.code(), Some(0));
+    let lines: Vec<&str> = text(&out.stderr).lines().collect();
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    assert!(lines[0].starts_with("contactd: ball.csg:1:1: polyhedron without volume: left out"), "{lines:?}");
+    assert!(lines[1].starts_with("contactd: ball.csg:4:1: sphere of no size: left out"), "{lines:?}");
+    assert_eq!(lines[3], "contactd: ball.csg: 1 more like these: `contactd inspect` tells all");
+}
+
+#[test]
 fn what_a_step_refuses_is_told_with_its_place() {
     let fast = format!("dt = 1.0\n{}max_speed = 1.0\n", scene(4.0));
     let coarse = format!("resolution = 1.0\n{}", scene(4.0));

@@ -89,6 +89,13 @@ pub struct Note {
     pub amount: Option<f64>,
 }
 
+impl Note {
+    /// True where something that a file names is not in its solid, but for what the file itself takes out by a modifier.
+    pub fn is_loss(&self) -> bool {
+        self.text.contains("left out") && ![" after %:", " after *:"].iter().any(|taken| self.text.contains(taken))
+    }
+}
+
 impl std::fmt::Display for Note {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}", self.at, self.text)?;

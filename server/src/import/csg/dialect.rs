@@ -567,3 +567,27 @@ fn a_spike_of_slivers_is_part_of_the_solid() {
         !inside(1e-6, 1e-6, 2.0) && !inside(-1e-8, 2e-8, 2.0) && !inside(2e-8, 2e-8, 4.1) && !inside(0.1, 0.1, 1.1)
     );
 }
+
+#[test]
+fn a_foil_is_part_of_the_solid_whatever_it_is_made_by() {
+    // 2 x 2 and a millionth thick: as thin as what six digits of its size may be off, but told exactly.
+    let points = "[[-1,-1,0],[1,-1,0],[1,1,0],[-1,1,0],[-1,-1,1e-6],[1,-1,1e-6],[1,1,1e-6],[-1,1,1e-6]]";
+    let faces = "[[0,1,2,3],[7,6,5,4],[0,4,5,1],[1,5,6,2],[2,6,7,3],[3,7,4,0]]";
+    let foil = format!("polyhedron(points = {points}, faces = {faces});");
+    let upright = "multmatrix([[1,0,0,-1],[0,0,-1,1],[0,1,0,0],[0,0,0,1]])";
+    let sliver = "linear_extrude(height = 2) polygon(points = [[0,0],[2,0],[2,1e-6],[0,1e-6]]);";
+    for text in [
+        foil.clone(),
+        format!("hull() {{ {foil} }}"),
+        "minkowski() { cube([1,1,1e-6], center = true); multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,5e-7],[0,0,0,1]]) \
+         cube([1,1,1e-9], center = true); }"
+            .to_owned(),
+        format!("{upright} {sliver}"),
+    ] {
+        let whole = format!("union() {{ {text} translate([3,0,0]) cube(1); }}");
+        let import = read(&whole).unwrap_or_else(|e| panic!("{text}: {e}"));
+        assert!(!import.notes.iter().any(|n| n.is_loss()), "{text}: {:?}", import.notes);
+        let inside = |z: f64| import.solid.value(glam::DVec3::new(0.2, 0.3, z)) < 0.0;
+        assert!(inside(5e-7) && !inside(2e-6) && !inside(-1e-6), "{text}");
+    }
+}

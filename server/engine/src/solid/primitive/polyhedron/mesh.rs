@@ -65,19 +65,67 @@ struct Facet {
     sliver: bool,
 }
 
+/// What counts as rounding of a mesh's points, in parts of its size.
+#[derive(Clone, Copy)]
+struct Tolerances {
+    coplanar: f64,
+    convexity: f64,
+    rounding: f64,
+}
+
+/// Points as texts have them, of six digits.
+const WRITTEN: Tolerances = Tolerances { coplanar: COPLANAR, convexity: CONVEXITY, rounding: ROUNDING };
+/// Points that are meant to the last digits: what is as thin as the others' rounding has a volume if it has one by these.
+const EXACT: Tolerances = Tolerances { coplanar: 1e-12, convexity: 1e-12, rounding: 1e-12 };
+
+/// Thickness of a foil, in parts of its size, and sine of the angle of two planes that meet in a corner of it, at least.
+const THINNEST: f64 = 1e-9;
+const BLUNT: f64 = 1e-3;
+
 impl Polyhedron {
     /// The convex polyhedron of a mesh: `faces` hold indices of `points`, clockwise as seen from outside.
     pub fn from_faces(points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Self, Fit), MeshError> {
+        let found = Self::within(points, faces, &WRITTEN);
+        // A foil is none the less where its points are told exactly, as z = 0 and z = 1e-6 are.
+        if found == Err(MeshError::Flat) {
+            Self::within(points, faces, &EXACT).ok().filter(|(p, _)| p.is_blunt()).map_or(found, Ok)
+        } else {
+            found
+        }
+    }
+
+    /// True where planes that meet in a corner lean enough for what rounds them not to move the corner: a sliver with two sides that
+    /// run along each other is none of this kind.
+    fn is_blunt(&self) -> bool {
+        let size = 2.0 * Aabb::of_points(self.vertices.iter().copied()).half().length();
+        let meet = |v: &DVec3| {
+            let on = |(n, d): &&(DVec3, f64)| (n.dot(*v) - d).abs() <= EXACT.coplanar * size;
+            self.planes.iter().filter(on).map(|plane| plane.0).collect::<Vec<DVec3>>()
+        };
+        let leans = |n: &DVec3, m: &DVec3| n.cross(*m).length() >= BLUNT;
+        let thickness = |(n, d): &(DVec3, f64)| self.vertices.iter().map(|v| d - n.dot(*v)).fold(0.0, f64::max);
+        self.planes.iter().all(|plane| thickness(plane) >= THINNEST * size)
+            && self.vertices.iter().all(|v| {
+                let normals = meet(v);
+                (1..normals.len()).all(|i| normals[..i].iter().all(|m| leans(&normals[i], m)))
+            })
+    }
+
+    fn within(
+        points: &[DVec3],
+        faces: &[Vec<u32>],
+        &Tolerances { coplanar, convexity, rounding }: &Tolerances,
+    ) -> Result<(Self, Fit), MeshError> {
         // Size: the diagonal of the bounding box.
         let size = 2.0 * Aabb::of_points(faces.iter().flatten().map(|i| points[*i as usize])).half().length();
         if !(size > 0.0 && size.is_finite()) {
             return Err(MeshError::Flat);
         }
-        let mut facets = facets(points, faces, size);
+        let mut facets = facets(points, faces, coplanar * size);
         let neighbours = neighbours(&facets)?;
-        let mut fit = Fit { flipped: orient(&mut facets, points, size)?, ..Fit::default() };
+        let mut fit = Fit { flipped: orient(&mut facets, points, rounding * size * size * size)?, ..Fit::default() };
 
-        let groups = coplanar_groups(&facets, &neighbours, points, size);
+        let groups = coplanar_groups(&facets, &neighbours, points, coplanar * size);
         fit.merged = facets.iter().filter(|f| !f.sliver).count().saturating_sub(groups.len());
         let mut planes = Vec::with_capacity(groups.len());
         let mut touching: HashMap<u32, usize> = HashMap::new();
@@ -103,13 +151,13 @@ impl Polyhedron {
         for ((n, d), group) in planes.iter().zip(&groups) {
             for &c in &all {
                 let by = n.dot(points[c as usize]) - d;
-                if by > CONVEXITY * size {
+                if by > convexity * size {
                     return Err(MeshError::Dented { point: c, face: facets[group[0]].index, by });
                 }
                 fit.moved = fit.moved.max(by);
             }
         }
-        if fit.moved <= ROUNDING * size {
+        if fit.moved <= rounding * size {
             fit.moved = 0.0;
             let vertices: Vec<DVec3> =
                 used.into_iter().filter(|c| touching[c] >= 3).map(|c| points[c as usize]).collect();
@@ -124,8 +172,8 @@ impl Polyhedron {
     }
 }
 
-/// Faces with three different corners or more; points with equal coordinates become the first of them.
-fn facets(points: &[DVec3], faces: &[Vec<u32>], size: f64) -> Vec<Facet> {
+/// Faces with three different corners or more; points with equal coordinates become the first of them. Slivers are no wider than a length.
+fn facets(points: &[DVec3], faces: &[Vec<u32>], least: f64) -> Vec<Facet> {
     let mut first: HashMap<[u64; 3], u32> = HashMap::new();
     let mut canonical = |i: u32| {
         // Adding 0 turns -0 into 0.
@@ -145,7 +193,7 @@ fn facets(points: &[DVec3], faces: &[Vec<u32>], size: f64) -> Vec<Facet> {
         let p = |i: usize| points[corners[i % corners.len()] as usize];
         let twice: DVec3 = (0..corners.len()).map(|i| (p(i + 1) - p(0)).cross(p(i) - p(0))).sum();
         let longest = (0..corners.len()).map(|i| (p(i + 1) - p(i)).length()).fold(0.0, f64::max);
-        let sliver = twice.length() <= COPLANAR * size * longest;
+        let sliver = twice.length() <= least * longest;
         facets.push(Facet { corners, index, area: twice * 0.5, sliver });
     }
     facets
@@ -180,8 +228,8 @@ fn neighbours(facets: &[Facet]) -> Result<Vec<Vec<usize>>, MeshError> {
     Ok(across)
 }
 
-/// Turns the normals outwards; true when they pointed inwards. The sign is that of the enclosed volume.
-fn orient(facets: &mut [Facet], points: &[DVec3], size: f64) -> Result<bool, MeshError> {
+/// Turns the normals outwards; true when they pointed inwards. The sign is that of the enclosed volume, of which there is more than `least`.
+fn orient(facets: &mut [Facet], points: &[DVec3], least: f64) -> Result<bool, MeshError> {
     let Some(origin) = facets.first().map(|f| points[f.corners[0] as usize]) else { return Err(MeshError::Flat) };
     let volume: f64 = facets
         .iter()
@@ -190,7 +238,7 @@ fn orient(facets: &mut [Facet], points: &[DVec3], size: f64) -> Result<bool, Mes
             f.area.dot(middle) / (3.0 * f.corners.len() as f64)
         })
         .sum();
-    if volume.abs() <= ROUNDING * size * size * size {
+    if volume.abs() <= least {
         return Err(MeshError::Flat);
     }
     if volume < 0.0 {
@@ -200,8 +248,9 @@ fn orient(facets: &mut [Facet], points: &[DVec3], size: f64) -> Result<bool, Mes
 }
 
 /// Groups of faces on one plane, each led by its first face in file order. The largest faces gather first, and a face
-/// is measured against the plane of the one that gathers, so a finely faceted curve does not creep together.
-fn coplanar_groups(facets: &[Facet], neighbours: &[Vec<usize>], points: &[DVec3], size: f64) -> Vec<Vec<usize>> {
+/// is measured against the plane of the one that gathers, so a finely faceted curve does not creep together. Corners lie on a plane
+/// where they are within `off` of it.
+fn coplanar_groups(facets: &[Facet], neighbours: &[Vec<usize>], points: &[DVec3], off: f64) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..facets.len()).filter(|k| !facets[*k].sliver).collect();
     order.sort_by(|a, b| facets[*b].area.length_squared().total_cmp(&facets[*a].area.length_squared()).then(a.cmp(b)));
     let mut taken = vec![false; facets.len()];
@@ -214,8 +263,7 @@ fn coplanar_groups(facets: &[Facet], neighbours: &[Vec<usize>], points: &[DVec3]
         let n = facets[seed].area.normalize();
         let d = n.dot(points[facets[seed].corners[0] as usize]);
         let fits = |f: &Facet| {
-            (f.sliver || f.area.dot(n) > 0.0)
-                && f.corners.iter().all(|c| (n.dot(points[*c as usize]) - d).abs() <= COPLANAR * size)
+            (f.sliver || f.area.dot(n) > 0.0) && f.corners.iter().all(|c| (n.dot(points[*c as usize]) - d).abs() <= off)
         };
         let mut group = vec![seed];
         let mut next = 0;
@@ -284,6 +332,32 @@ mod tests {
                 assert!(on >= 3 && p.planes.iter().all(|(n, d)| n.dot(*v) <= d + 1e-12));
             }
         }
+    }
+
+    #[test]
+    fn a_foil_has_a_volume_where_its_points_say_so() {
+        for thickness in [1e-3, 1e-5, 1e-6, 1e-8] {
+            let points: Vec<DVec3> = cube_points().iter().map(|p| *p * DVec3::new(1.0, 1.0, thickness)).collect();
+            for faces in [cube_faces(), split(cube_faces())] {
+                let (p, fit) = Polyhedron::from_faces(&points, &faces).expect("a foil");
+                assert_eq!((p.vertices.len(), p.planes.len(), fit.moved), (8, 6, 0.0), "{thickness}");
+            }
+        }
+        // A wedge whose sides run along each other is none.
+        let wedge = |p: &DVec3| DVec3::new(p.x, p.y, 1e-6 * p.z * (2.0 + p.x));
+        let points: Vec<DVec3> = cube_points().iter().map(wedge).collect();
+        assert!(Polyhedron::from_faces(&points, &cube_faces()).is_ok(), "a foil that is thicker at one end");
+        let points = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1e-7, 0.0)];
+        let points: Vec<DVec3> = points.iter().map(|p| *p + DVec3::Z).chain(points).collect();
+        let faces = vec![vec![0, 2, 1], vec![3, 4, 5], vec![0, 1, 4, 3], vec![1, 2, 5, 4], vec![2, 0, 3, 5]];
+        assert_eq!(Polyhedron::from_faces(&points, &faces), Err(MeshError::Flat));
+        // In six digits a foil is one no more.
+        let tilt = |p: &DVec3| {
+            let tilted = DVec3::new(p.x, 0.6 * p.y, 0.8 * p.y + 1e-9 * p.z);
+            tilted + DVec3::new(0.0, 3e-7 * p.x * p.y, 3e-7 * p.x * p.y)
+        };
+        let points: Vec<DVec3> = cube_points().iter().map(tilt).collect();
+        assert_eq!(Polyhedron::from_faces(&points, &cube_faces()), Err(MeshError::Flat));
     }
 
     #[test]
