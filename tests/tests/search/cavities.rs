@@ -36,16 +36,22 @@ fn ask(a: (&Model, Motion), b: (&Model, Motion), strategies: Strategies) -> Outc
 
 /// What became of some scenes.
 #[derive(Debug, Default)]
-struct Sum {
+pub(super) struct Sum {
     scenes: usize,
-    reported: usize,
-    met: usize,
+    pub(super) reported: usize,
+    pub(super) met: usize,
     looks: u64,
     newton: u64,
 }
 
 /// Asks both ways; in which scenes the shortcut answered.
-fn compare(name: &str, count: u64, mut draw: impl FnMut(&mut Random) -> (Motion, Motion), a: &Model, b: &Model) -> Sum {
+pub(super) fn compare(
+    name: &str,
+    count: u64,
+    mut draw: impl FnMut(&mut Random) -> (Motion, Motion),
+    a: &Model,
+    b: &Model,
+) -> Sum {
     let mut sum = Sum::default();
     let mut r = Random(0x0048_6f6c_6500 + name.len() as u64);
     for i in 0..count {
@@ -94,11 +100,11 @@ fn compare(name: &str, count: u64, mut draw: impl FnMut(&mut Random) -> (Motion,
     sum
 }
 
-fn rest() -> Motion {
+pub(super) fn rest() -> Motion {
     Motion::resting(Pose::IDENTITY)
 }
 
-fn moving(at: DVec3, tilt: DVec3, by: DVec3, spin: DVec3) -> Motion {
+pub(super) fn moving(at: DVec3, tilt: DVec3, by: DVec3, spin: DVec3) -> Motion {
     Motion::turning(Pose::new(at, quat_of_rotation_vector(tilt)), at + by, spin)
 }
 

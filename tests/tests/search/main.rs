@@ -12,4 +12,5 @@ mod round_faces;
 mod rounding;
 mod stages;
 mod tighten;
+mod unions;
 mod walk;

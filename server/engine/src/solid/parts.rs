@@ -58,13 +58,16 @@ pub struct Parts {
 impl Parts {
     /// The parts of a solid; `None` where it is no union of such, or of more than are looked through.
     pub fn of(solid: &Solid) -> Option<Self> {
-        Self::within(solid, &|_| true)
+        let mut parts = Self::default();
+        parts.take(&Seen { solid, has_say: &|_| true, fills: false }, solid.root, None)?;
+        Some(parts)
     }
 
-    /// The parts of what the nodes for which `has_say` holds leave of a solid; others have neither material nor holes.
+    /// The parts of what the nodes for which `has_say` holds leave of a solid; others have neither material nor holes. Subtracted
+    /// operands that are no unions of convex primitives are filled: the parts hold the solid there, and may hold more.
     pub fn within(solid: &Solid, has_say: &impl Fn(NodeId) -> bool) -> Option<Self> {
         let mut parts = Self::default();
-        parts.take(&Seen { solid, has_say }, solid.root, None)?;
+        parts.take(&Seen { solid, has_say, fills: true }, solid.root, None)?;
         Some(parts)
     }
 
@@ -151,7 +154,11 @@ impl Parts {
             Node::Op(Op::Difference, children) => {
                 let (first, rest) = children.split_first()?;
                 let mut holes = Vec::new();
-                rest.iter().try_for_each(|c| convex(seen, *c, &mut holes))?;
+                for c in rest {
+                    if convex(seen, *c, &mut holes).is_none() && !seen.fills {
+                        return None;
+                    }
+                }
                 let group = if holes.is_empty() { outer } else { Some(self.add(solid, holes, outer)) };
                 self.take(seen, *first, group)?;
             }
@@ -173,6 +180,8 @@ impl Parts {
 struct Seen<'s, S> {
     solid: &'s Solid,
     has_say: &'s S,
+    /// Holes of other kinds are filled.
+    fills: bool,
 }
 
 /// The convex primitives of which a subtracted node is the union; holes in it would be material.

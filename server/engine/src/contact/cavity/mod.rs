@@ -1,7 +1,8 @@
-//! In front of the search: convex primitives against solids with cavities, answered by a proven advance.
+//! In front of the search: unions of convex parts, and convex bodies in cavities, answered by proven advances.
 //!
-//! Idea: a body P meets K − H only where it meets K, and there only where it leaves H. While P cut by the faces of K lies
-//! inside H, nothing is met, whatever else P does above and below. How far the cut body reaches in a direction across the
+//! Idea: a body P meets K − H only where it meets K, and there only where it leaves H. So two unions are free while each pair of their
+//! parts is, cavities filled (`convex::ConvexParts`); and while P cut by the faces of K lies inside H, nothing is met, whatever else P
+//! does above and below. How far the cut body reaches in a direction across the
 //! cavity is told by its support and one multiplier (`body`); a sector of directions over a span of time is excluded by its
 //! four corners (`proof`). So: (1) from the start, the lines along which the clearance falls say when and in which
 //! direction it is used up first; (2) the faces that hold the body there are solved for a contact, as the search does
@@ -18,6 +19,7 @@ mod pierced;
 mod proof;
 
 use crate::bound::Region;
+use crate::contact::convex::ConvexParts;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
@@ -42,21 +44,19 @@ const MOST_TRIED: usize = 3;
 /// Contacts that are solved for before a pair is left to the contacts.
 const MOST_CONTACTS: usize = 6;
 
-/// The answer for two unions of convex primitives, of which one or both have cavities; `None` leaves them to the contacts. What
-/// is no such union, or one of too many, may be one in the collision region, beyond which nothing is met.
+/// The answer for two unions of convex primitives, less others; `None` leaves them to the contacts. What is no such union, or one of
+/// too many, may be one in the collision region, beyond which nothing is met.
 pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
     let task = contacts.task;
     if let (Some(of_a), Some(of_b)) = (&task.model_a.parts, &task.model_b.parts)
         && of_a.all().len() * of_b.all().len() <= MOST_PAIRS
+        && (of_a.are_pierced() || of_b.are_pierced())
     {
-        if !of_a.are_pierced() && !of_b.are_pierced() {
-            return None;
-        }
         let pairs = of_a.all().iter().flat_map(|a| of_b.all().iter().map(|b| (*a, *b))).collect();
         return Unions::new(&task, [of_a, of_b], pairs, false).answer(contacts);
     }
-    // At a negative depth a point lies beyond the boxes of its primitives.
-    if task.delta <= 0.0 || !task.strategies.region {
+    // At a negative depth a point lies beyond the boxes of its primitives. Two convex primitives have had their turn.
+    if task.delta <= 0.0 || !task.strategies.region || task.a.whole().is_some() && task.b.whole().is_some() {
         return None;
     }
     let region = contacts.region(0.0, 1.0)?;
@@ -65,9 +65,6 @@ pub(super) fn answer(contacts: &mut Contacts) -> Option<Ending> {
     }
     let of_a = Parts::within(task.a, &|n| region.a.node_alive(n))?;
     let of_b = Parts::within(task.b, &|n| region.b.node_alive(n))?;
-    if !of_a.are_pierced() && !of_b.are_pierced() {
-        return None;
-    }
     let pairs = near(&task, &region, &of_a, &of_b, 0.0)?;
     Unions::new(&task, [&of_a, &of_b], pairs, true).answer(contacts)
 }
@@ -90,13 +87,13 @@ pub(super) fn keeps_apart(task: &Task, way: f64) -> bool {
     let of_b = Parts::within(task.b, &|n| region.b.node_alive(n));
     let (Some(of_a), Some(of_b)) = (of_a, of_b) else { return false };
     let Some(pairs) = near(task, &region, &of_a, &of_b, way) else { return false };
-    if !pairs.is_empty() && !of_a.are_pierced() && !of_b.are_pierced() {
-        return false;
-    }
-    let task = Task { delta: 0.0, rounding: task.rounding + 0.5 * way, ..*task };
-    let unions = Unions::new(&task, [&of_a, &of_b], pairs, true);
-    (0..unions.pairs.len())
-        .all(|index| unions.cavities(index).iter().any(|pair| pair.prove(1.0, None).0 == ProofEnd::Proven))
+    let least = way + 8.0 * task.rounding;
+    let of_cavities = Task { delta: 0.0, rounding: task.rounding + 0.5 * way, ..*task };
+    let unions = Unions::new(&of_cavities, [&of_a, &of_b], pairs, true);
+    (0..unions.pairs.len()).all(|index| {
+        unions.convex(index).is_some_and(|parts| parts.stay_apart(least))
+            || unions.cavities(index).iter().any(|pair| pair.prove(1.0, None).0 == ProofEnd::Proven)
+    })
 }
 
 /// Parts of both bodies by pairs.
@@ -181,6 +178,15 @@ impl<'s, 'a> Unions<'s, 'a> {
         }
     }
 
+    /// Both parts, their cavities filled: what keeps apart so does all the more without what is in them.
+    fn convex(&self, index: usize) -> Option<ConvexParts<'_>> {
+        let (a, b) = self.pairs[index];
+        if !self.task.strategies.convex {
+            return None;
+        }
+        ConvexParts::new(*self.task, &self.task.a.primitives[a.main as usize], &self.task.b.primitives[b.main as usize])
+    }
+
     fn cavities(&self, index: usize) -> Cavities<'_> {
         let mut found = Cavities::new();
         self.add_cavities(index, &mut found);
@@ -192,6 +198,17 @@ impl<'s, 'a> Unions<'s, 'a> {
             let (placed_a, placed_b) = self.task.relative.placed();
             Relative::new(placed_b, placed_a)
         })
+    }
+
+    /// The pairs, within a region those first that seem to meet first: what is met later need not be solved for.
+    fn order(&self) -> SmallVec<[usize; 16]> {
+        let mut order: SmallVec<[usize; 16]> = (0..self.pairs.len()).collect();
+        if self.in_region && order.len() > 1 {
+            let when = |index| self.convex(index).map_or(f64::INFINITY, |parts| parts.about_when());
+            let when: SmallVec<[f64; 16]> = order.iter().map(|index| when(*index)).collect();
+            order.sort_by(|i, j| when[*i].total_cmp(&when[*j]));
+        }
+        order
     }
 
     /// Looks for the first contact of each pair, and solves for it; what is left to be proven. `None` where a pair may touch at the
@@ -206,7 +223,13 @@ impl<'s, 'a> Unions<'s, 'a> {
         let mut guess: Option<(usize, Guess)> = None;
         // Later ones than what is known are not looked for to their end.
         let mut until: f64 = 1.0;
-        'pairs: for index in 0..self.pairs.len() {
+        'pairs: for index in self.order() {
+            let (a, b) = self.pairs[index];
+            let is_filled = a.is_pierced() || b.is_pierced();
+            if self.in_region && self.convex(index).is_some_and(|parts| parts.meet(contacts, is_filled)) {
+                until = until.min(contacts.goal());
+                continue;
+            }
             let first = cavities.len();
             self.add_cavities(index, cavities);
             for cavity in first..cavities.len() {

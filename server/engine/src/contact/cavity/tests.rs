@@ -11,7 +11,7 @@ use crate::motion::{Placed, Relative};
 use crate::octree::Model;
 use crate::octree::testing::{pierced, simple};
 use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
-use crate::solid::{Label, Shape, SolidBuilder};
+use crate::solid::{Label, Op, Shape, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use glam::{DVec3, dvec3};
@@ -67,6 +67,56 @@ fn what_is_shown_to_keep_apart_is_farther_apart() {
         assert!(kept || way > 0.4 * gap, "{i}: {way} of {gap}");
     }
     assert!(shown > 60, "{shown}");
+}
+
+#[test]
+fn unions_that_are_shown_to_keep_apart_are_farther_apart() {
+    // Steps of a stair, and a block with a ball in front of it: the ball over the middle of the step that is as far away as any.
+    let stair = |depths: [f64; 3]| {
+        let mut b = SolidBuilder::new();
+        let block = |(i, depth): (usize, f64)| (Cuboid { half: dvec3(0.5 * depth, 0.5, 0.5) }, i as f64 - 1.0, depth);
+        let steps = depths.into_iter().enumerate().map(block);
+        let steps = steps.map(|(shape, y, depth)| (shape, Pose::at(dvec3(0.5 * depth, y, 0.0))));
+        let steps: Vec<_> = steps.map(|(shape, pose)| b.primitive(shape, pose, Label::default())).collect();
+        let all = b.operation(Op::Union, &steps);
+        Model::new(b.finish(all))
+    };
+    let mut b = SolidBuilder::new();
+    let parts = [
+        b.primitive(Cuboid { half: dvec3(0.1, 0.1, 0.1) }, Pose::at(DVec3::X * 0.3), Label::default()),
+        b.primitive(Sphere { radius: 0.2 }, Pose::IDENTITY, Label::default()),
+    ];
+    let whole = b.operation(Op::Union, &parts);
+    let knob = Model::new(b.finish(whole));
+    let mut n = Random(23);
+    let mut shown = 0;
+    for i in 0..300 {
+        let depths = [n.within(0.5, 1.5), n.within(0.5, 1.5), n.within(0.5, 1.5)];
+        let step = n.within(0.0, 3.0) as usize;
+        // All others stand back by more than the ball's radius, so that they are farther.
+        let depths = std::array::from_fn(|k| if k == step { depths[k] } else { depths[k].min(depths[step] - 0.1) });
+        let stair = stair(depths);
+        let gap = n.within(0.001, 0.04);
+        let at = dvec3(depths[step] + 0.2 + gap, step as f64 - 1.0 + n.within(-0.2, 0.2), n.within(-0.2, 0.2));
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let still = Motion::resting(Pose::at(at));
+        let sides = [(&stair, rest()), (&knob, still)].map(|(model, m)| PlacedModel { model, placed: placed(m) });
+        let [a, b] = if i % 2 == 0 { sides } else { [sides[1], sides[0]] };
+        let query = PairQuery {
+            a,
+            b,
+            resolution: default_resolution(&stair, &knob),
+            cell_limit: 1000,
+            strategies: Strategies::default(),
+            query_options: QueryOptions::DEPTH,
+        };
+        let (task, _) = Task::of(&query);
+        let way = n.within(0.0, 0.04);
+        let kept = super::keeps_apart(&task, way);
+        assert_eq!(kept, way < gap, "{i}: {way} of {gap}");
+        shown += u32::from(kept);
+    }
+    assert!(shown > 100, "{shown}");
 }
 
 #[test]

@@ -192,6 +192,46 @@ impl<'a> ConvexPair<'a> {
     }
 }
 
+/// A convex part of each of two solids, which are unions of such.
+pub struct ConvexParts<'a>(Advance<'a>);
+
+impl<'a> ConvexParts<'a> {
+    /// The parts by their primitives; `None` where one has no bounds, or is not convex.
+    pub fn new(task: Task<'a>, a: &'a Primitive, b: &'a Primitive) -> Option<Self> {
+        Some(Self(Advance::new(task, (a, body_of(a)?), (b, body_of(b)?))))
+    }
+
+    /// About when they meet, by the gap between them along the line of their middles: parts that meet first are asked first.
+    pub fn about_when(&self) -> f64 {
+        let (m, end) = (self.0.moment(0.0), self.0.moment(1.0));
+        let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.0.a.0.ball.center);
+        let Some(n) = way.try_normalize() else { return 0.0 };
+        let [here, there] = [&m, &end].map(|m| self.0.gap(m, n).phi);
+        if here <= 0.0 {
+            0.0
+        } else if there < here {
+            here / (here - there)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Looks for the contact of both parts, which counts where both whole trees confirm it; true when nothing is deep in both before the
+    /// goal that the contacts have then. What more it is told than that is one of them.
+    ///
+    /// Parts that are `filled` have cavities left out here: what they seem to meet first may be one.
+    pub fn meet(&self, contacts: &mut Contacts, filled: bool) -> bool {
+        self.0.never_near() || self.0.frees_to_goal(contacts, filled)
+    }
+
+    /// True when they stay farther apart than `least` (a length) over the whole step.
+    pub fn stay_apart(self, least: f64) -> bool {
+        let m = self.0.moment(0.0);
+        let start = self.0.widest(&m, m.b.support(DVec3::ZERO) - self.0.a.0.ball.center);
+        start.is_some_and(|start| ConvexPair { bodies: Bodies::Two(self.0), start }.keeps(least).0 >= 1.0)
+    }
+}
+
 /// An instant with B as A sees it.
 struct Moment<'a> {
     at: Instant,
@@ -285,16 +325,11 @@ impl<'a> Advance<'a> {
             let first = along
                 .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
             contacts.counters.closed_forms += 1;
-            let seen = |b: &ConvexBody| {
-                let found = nearest(&self.a.1, b, first, GOOD)?;
-                let n = (m.at.world_from_a * found.normal).normalize();
-                Some((found, self.gap(&m, n))).filter(|(_, gap)| gap.phi > self.pace.least)
-            };
-            let (found, here) = match seen(&m.b) {
+            let (found, here) = match self.seen(&m, &m.b, first) {
                 Some(seen) => seen,
                 None if round == 0 || near => {
                     near = true;
-                    seen(&self.set_off(&m))?
+                    self.seen(&m, &self.set_off(&m), first)?
                 }
                 None => return None,
             };
@@ -325,7 +360,7 @@ impl<'a> Advance<'a> {
                     return contacts.found.take().map(Ending::Contact);
                 }
             }
-            let until = self.until(t, &here, &last, goal);
+            let until = self.until(&self.pace, &here, &last, goal);
             if until >= 1.0 {
                 return if contact.is_none() { Some(Ending::Clear) } else { None };
             }
@@ -337,13 +372,83 @@ impl<'a> Advance<'a> {
         None
     }
 
-    /// Until when the direction of `here`, the gap at `t`, keeps the bodies apart, as far as `goal`; `last` is its gap at the
-    /// end of the step. A nearer end tightens the bound.
-    fn until(&self, t: f64, here: &Gap, last: &Gap, goal: f64) -> f64 {
+    /// `run` for two parts of larger bodies: a contact of others ends it as well as their own.
+    fn frees_to_goal(&self, contacts: &mut Contacts, filled: bool) -> bool {
+        let (end_of_step, mut t, mut near) = (self.moment(1.0), 0.0, false);
+        let size = self.task.scale.min(self.a.0.ball.radius + self.b.0.ball.radius);
+        let (mut along, mut own): (Option<DVec3>, Option<DVec3>) = (None, None);
+        for round in 0..ROUNDS {
+            let m = self.moment(t);
+            if round == 0 && self.frees_all(&m, &end_of_step) {
+                return true;
+            }
+            let first = along
+                .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
+            contacts.counters.closed_forms += 1;
+            let seen = match self.seen(&m, &m.b, first) {
+                None if round == 0 || near => {
+                    near = true;
+                    self.seen(&m, &self.set_off(&m), first)
+                }
+                seen => seen,
+            };
+            let Some((found, here)) = seen else { return false };
+            near |= round == 0 && found.distance <= APART * self.task.delta;
+            along = Some(here.n);
+            let last = self.gap(&end_of_step, here.n);
+            let goal = contacts.goal().min(1.0);
+            // What does not even touch before the goal is no rival of the contact that is known.
+            let touch = Pace { least: 0.0, ..self.pace };
+            if t >= goal || self.until(&touch, &here, &last, goal) >= goal {
+                return true;
+            }
+            let closing = found.normal.dot(m.at.velocity(found.a));
+            let guess = t + found.distance.max(0.0) / closing;
+            if own.is_none() && !near && closing > 0.0 && found.distance <= NEAR * size && guess <= LATEST * goal {
+                let mend = found.distance <= MEND.0 * size || round >= MEND.1;
+                own = self.contact(contacts, &m, &found, guess.min(1.0), mend).map(|c| c.n);
+                if own.is_none() && filled && guess <= contacts.goal() {
+                    return false;
+                }
+            }
+            let goal = contacts.goal().min(1.0);
+            if let Some(n) = own {
+                let met = self.gap(&self.moment(goal), n);
+                let fixed = self.gap(&m, n);
+                let is_free = |from: &Gap| from.phi > self.pace.least && met.phi > self.pace.least;
+                if is_free(&fixed) && self.pace.proven(&fixed, &met) >= goal
+                    || is_free(&here) && self.pace.prove(here, met, |t, n| self.gap(&self.moment(t), n)) >= goal
+                {
+                    return true;
+                }
+            }
+            let until = self.until(&self.pace, &here, &last, goal);
+            if until >= goal {
+                return true;
+            }
+            if until <= t {
+                return false;
+            }
+            t = until;
+        }
+        false
+    }
+
+    /// The nearest points of A and of B as it is told, with the gap between both along them; `None` where B is not proven apart.
+    fn seen(&self, m: &Moment<'a>, b: &ConvexBody<'a>, first: DVec3) -> Option<(Nearest, Gap)> {
+        let found = nearest(&self.a.1, b, first, GOOD)?;
+        let n = (m.at.world_from_a * found.normal).normalize();
+        Some((found, self.gap(m, n))).filter(|(_, gap)| gap.phi > self.pace.least)
+    }
+
+    /// Until when the direction of a gap keeps the bodies apart, as far as `goal`; `last` is its gap at the end of the step. A
+    /// nearer end tightens the bound.
+    fn until(&self, pace: &Pace, here: &Gap, last: &Gap, goal: f64) -> f64 {
+        let t = here.t;
         let (mut end, mut until) = (goal, t);
         for _ in 0..6 {
             let there = if end == 1.0 { *last } else { self.gap(&self.moment(end), here.n) };
-            let proven = self.pace.proven(here, &there);
+            let proven = pace.proven(here, &there);
             until = until.max(proven);
             if proven >= end || proven - t > 0.25 * (end - t) {
                 break;
@@ -391,10 +496,11 @@ impl<'a> Advance<'a> {
                 break;
             }
             tried.clone_from(&constraints);
+            let before = contacts.found.clone();
             if contacts.confirm(constraints, x, guess, lambda, mend) {
                 if contacts.found.as_ref().is_some_and(|f| f.deep.stationarity > BALANCED) {
                     // Balanced but for a slight tilt: which end of the line comes first is not told.
-                    contacts.found = None;
+                    contacts.found = before;
                     continue;
                 }
                 if contacts.found.as_ref().is_some_and(|f| self.lags(f)) {

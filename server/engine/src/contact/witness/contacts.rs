@@ -100,6 +100,14 @@ impl<'a> Contacts<'a> {
         self.found.as_ref().map_or(f64::INFINITY, |f| f.latest_rival().max(f.goal))
     }
 
+    /// When the witness of another contact must have come to count: that of a rival, which may touch first, comes a little later.
+    fn latest(&self) -> f64 {
+        match &self.found {
+            Some(found) if found.deep.stationarity < SETTLED => found.latest_rival(),
+            _ => self.goal(),
+        }
+    }
+
     /// The end: with the contact that is known, or without.
     pub fn end(&mut self) -> Ending {
         self.found.take().map_or(Ending::Clear, Ending::Contact)
@@ -143,7 +151,8 @@ impl<'a> Contacts<'a> {
             lambda.clone(),
             witness_level(self.task.delta, self.task.rounding),
         ) {
-            Ok(s) if !(0.0..=1.0).contains(&s.t) || s.t >= self.goal() => false,
+            Ok(s) if !(0.0..=1.0).contains(&s.t) || s.t >= self.latest() => false,
+            Ok(s) if self.is_found(&s) => true,
             Ok(s) => {
                 let at = self.task.relative.at(s.t);
                 let holds = |(c, l): (&Constraint, &f64)| matches!(c, Constraint::Apex(..)) || *l >= -1e-9;
@@ -161,7 +170,7 @@ impl<'a> Contacts<'a> {
                 lambda.clone(),
                 witness_level(self.task.delta, self.task.rounding),
             ) {
-                Some(s) if (0.0..=1.0).contains(&s.t) && s.t < self.goal() && s.stationarity < SETTLED => {
+                Some(s) if (0.0..=1.0).contains(&s.t) && s.t < self.latest() && s.stationarity < SETTLED => {
                     let at = self.task.relative.at(s.t);
                     if self.task.is_deep(s.x, &at, self.task.rounding) {
                         Problem::of(&self.task).holds_at_apexes(&s, &at) && self.accept(Known::All, s)
