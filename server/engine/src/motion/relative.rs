@@ -139,6 +139,12 @@ impl Relative {
         self.a.motion.start.position + self.a.motion.velocity * at.t + at.world_from_a * (x - self.center_a)
     }
 
+    /// A point of the world in A's model frame at the instant `at`.
+    pub fn model_point(&self, at: &Instant, x: DVec3) -> DVec3 {
+        let center = self.a.motion.start.position + self.a.motion.velocity * at.t;
+        self.center_a + at.world_from_a.transpose() * (x - center)
+    }
+
     /// Bounds that hold at all times of [t, t + h] for points fixed in A within `x_max` of A's centre of rotation,
     /// rounding included.
     pub fn bounds(&self, t: f64, h: f64, x_max: f64) -> Bounds {

@@ -32,6 +32,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
+use crate::contact::distance::{self, DistanceQuery};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth;
 use crate::contact::instant::separation::{Cover, Place};
@@ -43,6 +44,7 @@ use glam::DVec3;
 use line::Candidate;
 use local::{Bodies, Lit};
 use patch::Corner;
+use point::Meeting;
 use std::collections::BTreeMap;
 use surface::{FacePair, Standing, same_surface};
 
@@ -127,13 +129,26 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
     let mut found = find(&bodies);
     found.cells = work.cells();
     if found.regions.is_empty() {
-        let rest = Work::new(limit.saturating_sub(found.cells));
-        let (nearest, proven) = depth::nearest(&task, &at, threshold, depth::BETTER, &rest);
-        let nearest = nearest.map(|lowest| single::roughly_nearest(&bodies, &lowest));
-        let near = nearest.filter(|m| m.gap <= threshold * (1.0 + SAME_POINT) + bodies.eps);
-        found.regions.extend(near.map(|m| point_region(&bodies, &m)));
+        let is_near = |m: &Meeting| m.gap <= threshold * (1.0 + SAME_POINT) + bodies.eps;
+        // Far from both surfaces F is less than the distance at every edge.
+        let mut left = limit.saturating_sub(found.cells);
+        let mut far = None;
+        if threshold > bodies.tau {
+            let cells;
+            (far, cells) = nearest_at(query, time, swapped, &bodies, left / 2);
+            (found.cells, left) = (found.cells + cells, left.saturating_sub(cells));
+        }
+        let (nearest, proven) = match far {
+            Some(meeting) => (Some(meeting), true),
+            None => {
+                let rest = Work::new(left);
+                let (nearest, proven) = depth::nearest(&task, &at, threshold, depth::BETTER, &rest);
+                found.cells += rest.cells();
+                (nearest.map(|lowest| single::roughly_nearest(&bodies, &lowest)), proven)
+            }
+        };
+        found.regions.extend(nearest.filter(is_near).map(|m| point_region(&bodies, &m)));
         found.complete &= proven;
-        found.cells += rest.cells();
     }
     for r in &mut found.regions {
         r.normal = (at.world_from_a * r.normal).normalize();
@@ -146,6 +161,17 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
         }
     }
     found
+}
+
+/// Where two bodies that are farther apart than `local::REACH` are nearest, by their least distance, and the pairs of parts that were
+/// looked at; `None` where the work ran out before.
+fn nearest_at(query: &PairQuery, time: f64, swapped: bool, bodies: &Bodies, limit: u64) -> (Option<Meeting>, u64) {
+    let (a, b) = if swapped { (query.b, query.a) } else { (query.a, query.b) };
+    let found = distance::at_instant(&DistanceQuery { a, b, tolerance: SAME_POINT * bodies.size, limit }, time);
+    let feet = [found.a.point, found.b.point].map(|x| bodies.task.relative.model_point(bodies.at, x));
+    let normal = (feet[1] - feet[0]).try_normalize();
+    let meeting = normal.map(|normal| Meeting { feet, normal, gap: found.upper });
+    (meeting.filter(|_| found.is_settled), found.cells)
 }
 
 /// The regions of an answered question: at the contact, or at the start where the pair touches and does not meet; such a
@@ -611,7 +637,7 @@ fn line_region(bodies: &Bodies, run: &line::Run) -> Region {
     }
 }
 
-fn point_region(bodies: &Bodies, m: &point::Meeting) -> Region {
+fn point_region(bodies: &Bodies, m: &Meeting) -> Region {
     let [on_a, on_b] = m.feet;
     let kind = ContactKind::of_active(bodies.rank(Side::A, on_a), bodies.rank(Side::B, on_b));
     // Where a vertex meets a vertex the average of the adjacent normals stands for the normal, as in the paper.

@@ -1,6 +1,7 @@
 //! What is told without boxes of convex bodies, against what boxes tell.
 
 use super::*;
+use crate::contact::convex::ConvexPair;
 use crate::contact::query::question::{PlacedModel, Strategies, default_resolution};
 use crate::contact::{QueryOptions, Scratch, earliest_contact};
 use crate::math::random::Random;
@@ -326,4 +327,45 @@ fn a_ball_near_edges_and_corners_is_as_far_as_its_centre_says() {
         let off = (point.separation() - separation).abs();
         assert!(off < 1e-12 && point.extent == Extent::Point, "{i}: {off:e}, {separation:e} {point:#?}");
     }
+}
+
+#[test]
+fn what_is_far_apart_within_a_wide_threshold_is_told_by_its_least_distance() {
+    let mut r = Random(61);
+    let (mut told, mut most) = (0, 0);
+    for i in 0..200 {
+        let kind = |r: &mut Random| [0, 1, 2, 3, 4, 5, 6, 7, 9][(r.unit() * 9.0) as usize];
+        let kinds = [kind(&mut r), kind(&mut r)];
+        let models = kinds.map(|kind| simple(shape(&mut r, kind)));
+        let turns =
+            [0, 1].map(|_| if r.unit() < 0.5 { DQuat::IDENTITY } else { quat_of_rotation_vector(r.vector(3.0)) });
+        let start = r.vector(1.0).normalize() * r.within(2.0, 6.0);
+        let query = query(&models, turns, start, DVec3::ZERO);
+        // By their supports alone, where the distance is found by parts.
+        let (task, _) = Task::of(&query);
+        let distance = ConvexPair::new(task).map_or(0.0, |pair| pair.distance());
+        let size = 2.0 * models[0].radius.min(models[1].radius);
+        if distance < 0.2 * size {
+            continue;
+        }
+        let found = regions(&query, 0.0, distance * r.within(1.01, 3.0));
+        let [region] = &found.regions[..] else { panic!("{i} {kinds:?}: {found:?}") };
+        let [p] = &region.points[..] else { panic!("{i} {kinds:?}: {region:?}") };
+        let slack = 2.0 * SAME_POINT * size;
+        assert!((p.separation - distance).abs() <= slack, "{i} {kinds:?}: {distance} {region:?}");
+        // The feet lie on both bodies.
+        if region.kind != ContactKind::VertexVertex {
+            for (k, sign) in [-0.5, 0.5].into_iter().enumerate() {
+                let pose = [&query.a, &query.b][k].placed.motion.start;
+                let foot = pose.inverse().point(p.point + region.normal * (sign * p.separation));
+                assert!(models[k].value(foot).abs() <= slack, "{i} {kinds:?}: {} {region:?}", models[k].value(foot));
+            }
+        }
+        assert!(region.faces_a[0] != NO_FACE && region.faces_b[0] != NO_FACE, "{i} {kinds:?}: {region:?}");
+        told += 1;
+        most = most.max(found.cells);
+        assert!(regions(&query, 0.0, 0.9 * distance).regions.is_empty(), "{i} {kinds:?}");
+    }
+    println!("{told} told, {most} cells at most");
+    assert!(told > 150, "{told}");
 }
