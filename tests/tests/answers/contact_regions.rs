@@ -651,6 +651,58 @@ fn the_line_along_a_capsule_ends_with_its_side() {
     assert!(lines.iter().all(|n| *n > 10) && short > 30, "{lines:?}, {short} end with the capsule");
 }
 
+/// A box that is rounded all round, of parts that lie in each other, and a hull of a few points that comes down on it anywhere: where a
+/// part's face ends inside of the others no face passes, and what is told there ends with the face. Each point is as far from both
+/// bodies as is told, at most: the box has a closed form.
+#[test]
+fn points_on_a_body_of_parts_in_each_other_are_on_its_surface() {
+    let mut r = Random::new(0x0072_6f75_6e64);
+    let (mut told, mut lines) = (0, 0);
+    for i in 0..sized("CONTACTD_REGIONS", 90) {
+        let (half, radius) = (dvec3(r.within(0.2, 0.6), r.within(0.2, 0.6), r.within(0.2, 0.6)), r.within(0.05, 0.3));
+        let mut rounded = Recipe::cuboid(half.x + radius, half.y, half.z);
+        rounded = rounded.union(Recipe::cuboid(half.x, half.y + radius, half.z));
+        rounded = rounded.union(Recipe::cuboid(half.x, half.y, half.z + radius));
+        for (axis, turn) in
+            [(0, DQuat::from_rotation_y(FRAC_PI_2)), (1, DQuat::from_rotation_x(FRAC_PI_2)), (2, DQuat::IDENTITY)]
+        {
+            for k in 0..4 {
+                let sign = |bit: usize| if k & bit == 0 { -1.0 } else { 1.0 };
+                let mut at = dvec3(half.x * sign(1), half.y * sign(if axis == 0 { 1 } else { 2 }), half.z * sign(2));
+                at[axis] = 0.0;
+                rounded = rounded.union(Recipe::capsule(half[axis], radius).moved(&Pose::new(at, turn)));
+            }
+        }
+        let corners: Vec<DVec3> = (0..4 + r.below(4)).map(|_| r.direction() * r.within(0.4, 1.0)).collect();
+        let Some(hull) = Polyhedron::hull(corners) else { continue };
+        let planes = hull.planes.clone();
+        let from = r.direction() * 4.0;
+        let pose_a = Pose::new(DVec3::ZERO, r.rotation());
+        let s = Rest::new(Recipe::of(hull), pose_a, rounded, Pose::new(from, r.rotation()));
+        let velocity = r.vector(0.3) - from;
+        let margin = r.within(0.02, 0.2);
+        let (o, found) = s.answer(velocity, margin);
+        if o.status() != Status::Contact {
+            continue;
+        }
+        let at_contact = Pose { position: from + velocity * o.time(), ..s.pose_b };
+        for region in &found.regions {
+            lines += usize::from(region.extent == Extent::Line);
+            for p in &region.points {
+                let y = at_contact.inverse().point(p.point).abs() - half;
+                let to_box = y.max(DVec3::ZERO).length() - radius;
+                let x = pose_a.inverse().point(p.point);
+                let to_hull = planes.iter().map(|(n, d)| n.dot(x) - d).fold(f64::NEG_INFINITY, f64::max);
+                let most = 0.5 * p.separation.abs() + 1e-7;
+                assert!(to_box <= most && to_hull <= most, "{i}: {to_box} {to_hull} of {p:?} in {region:#?}");
+                told += 1;
+            }
+        }
+    }
+    println!("{told} points, {lines} lines");
+    assert!(told > 120 && lines > 10, "{told} points, {lines} lines");
+}
+
 /// A hull whose bottom is nearly flat in many facets, on a face within a margin: whatever the work allows, where they touch is told.
 #[test]
 fn hulls_of_many_nearly_coplanar_facets_have_a_region() {

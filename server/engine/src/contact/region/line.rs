@@ -17,6 +17,10 @@ use glam::DVec3;
 use smallvec::SmallVec;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
+/// Parts of a run within which its end counts as next to where it ceases to touch, and halvings by which that is found.
+const NEXT_TO: f64 = 1e-6;
+const HALVINGS: usize = 40;
+
 /// A straight or circular curve, its parameter a length or an angle.
 #[derive(Clone, Copy, Debug)]
 pub enum Curve {
@@ -483,13 +487,32 @@ fn runs_among(
                 let foot = held.map(|l| bodies.foot(*l, x));
                 foot.map_or((x, gap), |y| ((x + y) * 0.5, (y - x).length()))
             };
-            let feet = touches(bodies, &c.faces, others, x);
+            let feet = touches(bodies, &c.faces, others, x).or_else(|| brim(&c.curve, (run.middle, s), &whole));
             let (x, gap) = feet.map_or_else(beyond, |f| ((f[0] + f[1]) * 0.5, (f[1] - f[0]).length()));
             Corner { x, gap, key: [key[0], key[1], i as u64] }
         };
         run.ends = ends(run, round).into_iter().enumerate().map(corner).collect();
     }
     out
+}
+
+/// The feet where a straight run that has none at its end ceases to touch, on the way to that end from a point of it: at the brim of a
+/// part of which what lies beyond is no part of the body, so that no other face passes there. `None` where that is next to the end.
+fn brim(curve: &Curve, (from, end): (DVec3, f64), touches: &dyn Fn(f64) -> Option<[DVec3; 2]>) -> Option<[DVec3; 2]> {
+    let Curve::Line { .. } = curve else { return None };
+    let (mut within, mut beyond) = (curve.nearest(from).0, end);
+    if touches(end + (within - end) * NEXT_TO).is_some() {
+        return None;
+    }
+    let mut feet = touches(within)?;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (within + beyond);
+        match touches(middle) {
+            Some(found) => (within, feet) = (middle, found),
+            None => beyond = middle,
+        }
+    }
+    Some(feet)
 }
 
 /// Where between two stops a candidate's curve leaves the threshold, in order: it may lean against the face along which it runs.
