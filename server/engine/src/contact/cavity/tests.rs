@@ -30,6 +30,17 @@ fn moving(at: DVec3, tilt: DVec3, by: DVec3, spin: DVec3) -> Motion {
     Motion::turning(Pose::new(at, quat_of_rotation_vector(tilt)), at + by, spin)
 }
 
+fn asked<'m>(a: PlacedModel<'m>, b: PlacedModel<'m>) -> PairQuery<'m> {
+    PairQuery {
+        a,
+        b,
+        resolution: default_resolution(a.model, b.model),
+        cell_limit: 1000,
+        strategies: Strategies::default(),
+        query_options: QueryOptions::DEPTH,
+    }
+}
+
 fn plate() -> Model {
     pierced(
         Cuboid { half: dvec3(0.5, 0.5, 0.1) },
@@ -50,14 +61,7 @@ fn what_is_shown_to_keep_apart_is_farther_apart() {
         let still = Motion::resting(Pose::new(at, quat_of_rotation_vector(DVec3::Z * n.within(0.0, 3.0))));
         let sides = [(&plate, rest()), (&peg, still)].map(|(model, m)| PlacedModel { model, placed: placed(m) });
         let [a, b] = if i % 2 == 0 { sides } else { [sides[1], sides[0]] };
-        let query = PairQuery {
-            a,
-            b,
-            resolution: default_resolution(&plate, &peg),
-            cell_limit: 1000,
-            strategies: Strategies::default(),
-            query_options: QueryOptions::DEPTH,
-        };
+        let query = asked(a, b);
         let (task, _) = Task::of(&query);
         let (gap, way) = (0.25 - 0.2 - off, n.within(0.0, 0.06));
         let kept = super::keeps_apart(&task, way);
@@ -102,14 +106,7 @@ fn unions_that_are_shown_to_keep_apart_are_farther_apart() {
         let still = Motion::resting(Pose::at(at));
         let sides = [(&stair, rest()), (&knob, still)].map(|(model, m)| PlacedModel { model, placed: placed(m) });
         let [a, b] = if i % 2 == 0 { sides } else { [sides[1], sides[0]] };
-        let query = PairQuery {
-            a,
-            b,
-            resolution: default_resolution(&stair, &knob),
-            cell_limit: 1000,
-            strategies: Strategies::default(),
-            query_options: QueryOptions::DEPTH,
-        };
+        let query = asked(a, b);
         let (task, _) = Task::of(&query);
         let way = n.within(0.0, 0.04);
         let kept = super::keeps_apart(&task, way);

@@ -71,7 +71,8 @@ pub struct Strategies {
     /// Whole convex primitives are answered in front of the search. Its answers may differ from the search's in their
     /// last digits: both solve the same equations, from another guess.
     pub convex: bool,
-    /// Convex primitives against solids with holes are answered in front of the search, with the same proviso.
+    /// Convex primitives against solids with holes, and unions of convex parts, are answered in front of the search, with the same
+    /// proviso; the latter where `convex` is on too.
     pub cavities: bool,
     /// Meshes against convex primitives and each other are answered in front of the search, with the same proviso.
     pub facets: bool,
