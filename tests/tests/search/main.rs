@@ -11,6 +11,7 @@ mod octree;
 mod round_faces;
 mod rounding;
 mod stages;
+mod stepped;
 mod tighten;
 mod unions;
 mod walk;

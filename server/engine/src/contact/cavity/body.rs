@@ -16,6 +16,7 @@
 use crate::math::any_perpendicular;
 use crate::motion::Instant;
 use crate::solid::Primitive;
+use crate::solid::local::LiteralId;
 use crate::solid::primitive::{Convex, Discs};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -58,12 +59,12 @@ impl CavityBody {
     }
 }
 
-/// A half-space n·x <= d, with the face that bounds it.
+/// A half-space n·x <= d, with the literal that bounds the solid there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
     pub normal: DVec3,
     pub offset: f64,
-    pub face: u32,
+    pub literal: LiteralId,
 }
 
 /// A linear bound: points beyond the wall have u·x >= base, those of the cut body u·x <= max over P of (u − μ)·x + κ.
@@ -132,6 +133,11 @@ impl Moment {
             }
         }
         m
+    }
+
+    /// Indices of the planes that it crosses.
+    pub fn crossed(&self) -> impl Iterator<Item = usize> {
+        self.crossed.iter().map(|k| usize::from(*k))
     }
 
     /// The part of v that a disc reaches along.

@@ -2,15 +2,15 @@
 //!
 //! Idea: a body P meets K − H only where it meets K, and there only where it leaves H. So two unions are free while each pair of their
 //! parts is, cavities filled (`convex::ConvexParts`); and while P cut by the faces of K lies inside H, nothing is met, whatever else P
-//! does above and below. How far the cut body reaches in a direction across the
-//! cavity is told by its support and one multiplier (`body`); a sector of directions over a span of time is excluded by its
-//! four corners (`proof`). So: (1) from the start, the lines along which the clearance falls say when and in which
+//! does above and below. How far the cut body reaches in a direction across the cavity is told by its support and one multiplier
+//! (`body`); a sector of directions over a span of time is excluded by its four corners (`proof`). A body that is in two cavities, one
+//! through the floor of the other, is cut by that floor, too, and each piece lies inside of its own (`CavityPair::stacked`). So: (1) from the start, the lines along which the clearance falls say when and in which
 //! direction it is used up first; (2) the faces that hold the body there are solved for a contact, as the search does
 //! it, and both trees confirm it or it is none; (3) the time up to it is proven; what the proof meets instead is
 //! solved in turn. No contact by the end: clear.
 //!
-//! Both solids may be unions; cavities are cylinders or have flat faces; of several cavities of one body the nearest one is asked.
-//! P's own cavities are left out, which only makes more of it. What starts nearer than a few resolutions is proven to come no deeper or
+//! Both solids may be unions; cavities are cylinders, cones or have flat faces; of several cavities of one body the nearest one is
+//! asked. P's own cavities are left out, which only makes more of it. What starts nearer than a few resolutions is proven to come no deeper or
 //! left to the search, as is what overlaps or does not settle; nothing is guessed.
 //! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) on a bound by duality; derivation in `proof`.
 
@@ -19,7 +19,7 @@ mod pierced;
 mod proof;
 
 use crate::bound::Region;
-use crate::contact::convex::ConvexParts;
+use crate::contact::convex::{ConvexParts, Sight};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
@@ -29,7 +29,7 @@ use crate::motion::{Relative, Sweep};
 use crate::solid::Solid;
 use crate::solid::parts::{Parts, PiercedPart};
 use glam::DVec3;
-use pierced::{CavityPair, First, Guess, Wall};
+use pierced::{CavityPair, First, Guess};
 use proof::ProofEnd;
 use smallvec::SmallVec;
 use std::cell::OnceCell;
@@ -37,10 +37,12 @@ use std::cell::OnceCell;
 /// Pairs of parts beyond which the search does better.
 const MOST_PAIRS: usize = 256;
 /// As many of them within a collision region, those apart by their boxes left out; and most primitives of a region that is looked at.
-const MOST_NEAR: usize = 48;
+const MOST_NEAR: usize = 128;
 const MOST_LEFT: usize = 96;
 /// Cavities of one part that are tried for one body within a region.
 const MOST_TRIED: usize = 3;
+/// What seems to be met within this time, in steps, may be met at once: parts that share a rim both meet what either does.
+const AT_ONCE: f64 = 1e-3;
 /// Contacts that are solved for before a pair is left to the contacts.
 const MOST_CONTACTS: usize = 6;
 
@@ -142,15 +144,31 @@ struct Claim {
     toward: Option<DVec3>,
 }
 
+/// All of it, for each pair of parts.
+type Claims = SmallVec<[Claim; 1]>;
+
+/// About when something seems to be met.
+struct Event {
+    t: f64,
+    what: Met,
+}
+
+/// What seems to be met: a cavity's wall, by a claim's index and a guess, or one part by another, by the pair's index and the direction
+/// of the world that they are apart in at the start.
+enum Met {
+    Wall(usize, Guess),
+    Parts(usize, DVec3),
+}
+
 impl<'s, 'a> Unions<'s, 'a> {
     fn new(task: &'s Task<'a>, [of_a, of_b]: [&'s Parts; 2], pairs: Pairs, in_region: bool) -> Self {
         Self { task, of_a, of_b, pairs, seen_from_a: OnceCell::new(), in_region }
     }
 
     fn answer(&self, contacts: &mut Contacts) -> Option<Ending> {
-        let mut solved = 0;
         let mut cavities = Cavities::new();
-        let claims = self.look(contacts, &mut cavities, &mut solved)?;
+        let claims = self.look(contacts, &mut cavities)?;
+        let mut solved = 0;
         for claim in &claims {
             self.prove(contacts, &cavities[claim.cavity], claim, &mut solved)?;
         }
@@ -200,70 +218,136 @@ impl<'s, 'a> Unions<'s, 'a> {
         })
     }
 
-    /// The pairs, within a region those first that seem to meet first: what is met later need not be solved for.
-    fn order(&self) -> SmallVec<[usize; 16]> {
-        let mut order: SmallVec<[usize; 16]> = (0..self.pairs.len()).collect();
-        if self.in_region && order.len() > 1 {
-            let when = |index| self.convex(index).map_or(f64::INFINITY, |parts| parts.about_when());
-            let when: SmallVec<[f64; 16]> = order.iter().map(|index| when(*index)).collect();
-            order.sort_by(|i, j| when[*i].total_cmp(&when[*j]));
-        }
-        order
-    }
-
     /// Looks for the first contact of each pair, and solves for it; what is left to be proven. `None` where a pair may touch at the
     /// start, or is not of the kind.
-    fn look<'u>(
-        &'u self,
-        contacts: &mut Contacts,
-        cavities: &mut Cavities<'u>,
-        solved: &mut usize,
-    ) -> Option<SmallVec<[Claim; 1]>> {
-        let mut claims: SmallVec<[Claim; 1]> = SmallVec::new();
-        let mut guess: Option<(usize, Guess)> = None;
-        // Later ones than what is known are not looked for to their end.
+    ///
+    /// Those that seem to meet first are solved for first: what is met later need not be.
+    fn look<'u>(&'u self, contacts: &mut Contacts, cavities: &mut Cavities<'u>) -> Option<Claims> {
+        let mut claims = Claims::new();
+        let mut events: SmallVec<[Event; 2]> = SmallVec::new();
+        // Later ones than what seems to come first are not looked for to their end.
         let mut until: f64 = 1.0;
-        'pairs: for index in self.order() {
-            let (a, b) = self.pairs[index];
-            let is_filled = a.is_pierced() || b.is_pierced();
-            if self.in_region && self.convex(index).is_some_and(|parts| parts.meet(contacts, is_filled)) {
-                until = until.min(contacts.goal());
-                continue;
-            }
-            let first = cavities.len();
-            self.add_cavities(index, cavities);
-            for cavity in first..cavities.len() {
-                let (pair, mut toward) = (&cavities[cavity], None);
-                match pair.first(until, &mut contacts.counters.closed_forms) {
-                    // What starts as near as it may be is told where it comes no deeper.
-                    First::Near if proves(contacts, pair, 1.0, None) == ProofEnd::Proven => continue 'pairs,
-                    First::Near => continue,
-                    First::Never => {}
-                    First::Guess(g) => {
-                        if let Wall::Round(u) = g.wall {
-                            toward = Some(u);
-                        }
+        for index in 0..self.pairs.len() {
+            let sight = if self.in_region { self.convex(index).map(|parts| parts.sight()) } else { None };
+            match sight {
+                Some(Sight::Free) => {}
+                Some(Sight::Apart { t, n }) => events.push(Event { t, what: Met::Parts(index, n) }),
+                Some(Sight::Common) | None => {
+                    if let Some((claim, guess)) = self.claim(contacts, index, until, cavities, &mut claims)? {
                         if !self.in_region {
-                            until = until.min(g.t);
-                            if guess.as_ref().is_none_or(|(_, other)| g.t < other.t) {
-                                guess = Some((claims.len(), g));
-                            }
-                        } else if pair.solve(contacts, &g) {
-                            until = until.min(contacts.goal());
+                            until = until.min(guess.t + AT_ONCE);
+                        }
+                        events.push(Event { t: guess.t, what: Met::Wall(claim, guess) });
+                    }
+                }
+            }
+        }
+        events.sort_by(|e, f| e.t.total_cmp(&f.t));
+        for Event { t, what } in events {
+            match what {
+                // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
+                Met::Wall(claim, guess) => {
+                    if t < contacts.goal() + AT_ONCE {
+                        cavities[claims[claim].cavity].solve(contacts, &guess);
+                    }
+                }
+                Met::Parts(index, n) => {
+                    let (a, b) = self.pairs[index];
+                    let is_filled = a.is_pierced() || b.is_pierced();
+                    if !self.convex(index)?.meet(contacts, n, is_filled) {
+                        let until = contacts.goal().min(1.0);
+                        if let Some((claim, guess)) = self.claim(contacts, index, until, cavities, &mut claims)? {
+                            cavities[claims[claim].cavity].solve(contacts, &guess);
                         }
                     }
                 }
-                claims.push(Claim { cavity, index, toward });
-                continue 'pairs;
             }
-            return None;
-        }
-        if let Some((i, g)) = &guess {
-            *solved += 1;
-            // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
-            cavities[claims[*i].cavity].solve(contacts, g);
         }
         Some(claims)
+    }
+
+    /// Adds what is to be proven of a pair of parts, and tells which of it seems to be met before `until`, and where; the outer `None`
+    /// where no cavity shows it. Nothing is left to be proven of what starts as near as it may be and comes no deeper.
+    fn claim<'u>(
+        &'u self,
+        contacts: &mut Contacts,
+        index: usize,
+        until: f64,
+        cavities: &mut Cavities<'u>,
+        claims: &mut Claims,
+    ) -> Option<Option<(usize, Guess)>> {
+        let first = cavities.len();
+        self.add_cavities(index, cavities);
+        // Each shows that nothing is met before its guess: the one with the latest says most.
+        let mut latest: Option<(usize, Guess)> = None;
+        for cavity in first..cavities.len() {
+            match seen(contacts, &cavities[cavity], until) {
+                None => {}
+                Some(Seen::Kept) => return Some(None),
+                Some(Seen::Never) => {
+                    claims.push(Claim { cavity, index, toward: None });
+                    return Some(None);
+                }
+                Some(Seen::Guess(guess)) if latest.as_ref().is_none_or(|(_, other)| guess.t > other.t) => {
+                    latest = Some((cavity, guess));
+                }
+                Some(Seen::Guess(_)) => {}
+            }
+        }
+        let (cavity, guess) = latest?;
+        // What seems to be met may lie in another cavity.
+        if let Some(found) = self.claim_stacked(contacts, (index, cavity), &guess, until, cavities, claims) {
+            return Some(found);
+        }
+        claims.push(Claim { cavity, index, toward: guess.wall.direction() });
+        Some(Some((claims.len() - 1, guess)))
+    }
+
+    /// The same for a body that seems to meet the wall of a cavity, by two pieces where another one goes through the floor of that, or
+    /// that one through the floor of another one; `None` where it does not.
+    fn claim_stacked<'u>(
+        &'u self,
+        contacts: &mut Contacts,
+        (index, cavity): (usize, usize),
+        guess: &Guess,
+        until: f64,
+        cavities: &mut Cavities<'u>,
+        claims: &mut Claims,
+    ) -> Option<Option<(usize, Guess)>> {
+        let pair = &cavities[cavity];
+        let (a, b) = self.pairs[index];
+        let (solid, parts, part) = match pair.side {
+            Side::A => (self.task.a, self.of_a, a),
+            Side::B => (self.task.b, self.of_b, b),
+        };
+        let main = &solid.primitives[part.main as usize];
+        let holes = pair.openings(guess).into_iter().flat_map(|x| parts.holes_at(solid, part, x, MOST_TRIED));
+        let mut others = holes.filter(|hole| !std::ptr::eq(*hole, pair.cavity));
+        let pieces = others.find_map(|hole| {
+            let other = CavityPair::new(self.task, pair.primitive, (main, hole), pair.side, pair.relative)?;
+            pair.stacked(&other).or_else(|| other.stacked(pair))
+        })?;
+        let mut first: Option<(usize, Guess)> = None;
+        let mut found: SmallVec<[Claim; 2]> = SmallVec::new();
+        let mut kept = Cavities::new();
+        for piece in pieces {
+            let toward = match seen(contacts, &piece, until)? {
+                Seen::Kept => continue,
+                Seen::Never => None,
+                Seen::Guess(guess) => {
+                    let toward = guess.wall.direction();
+                    if first.as_ref().is_none_or(|(_, other)| guess.t < other.t) {
+                        first = Some((claims.len() + found.len(), guess));
+                    }
+                    toward
+                }
+            };
+            found.push(Claim { cavity: cavities.len() + kept.len(), index, toward });
+            kept.push(piece);
+        }
+        claims.extend(found);
+        cavities.extend(kept);
+        Some(first)
     }
 
     /// Proves that a pair does not meet before the first contact, which is found first where the proof meets it; `None` if it cannot.
@@ -288,6 +372,25 @@ impl<'s, 'a> Unions<'s, 'a> {
             return shown.then_some(());
         }
     }
+}
+
+/// What a first look at a body in a cavity shows.
+enum Seen {
+    /// It starts as near as it may be, and comes no deeper.
+    Kept,
+    /// It meets nothing within the time that was asked for.
+    Never,
+    Guess(Guess),
+}
+
+/// A first look, as far as `until`; `None` where the body may touch at the start and more.
+fn seen(contacts: &mut Contacts, pair: &CavityPair, until: f64) -> Option<Seen> {
+    Some(match pair.first(until, &mut contacts.counters.closed_forms) {
+        First::Near if proves(contacts, pair, 1.0, None) == ProofEnd::Proven => Seen::Kept,
+        First::Near => return None,
+        First::Never => Seen::Never,
+        First::Guess(guess) => Seen::Guess(guess),
+    })
 }
 
 /// `CavityPair::prove`, counted.

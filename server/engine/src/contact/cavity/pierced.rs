@@ -1,6 +1,6 @@
 //! A convex body against a body with a cavity that it is in: its clearances, and the contact that they point to.
 
-use super::body::{Best, CavityBody, Moment, Plane};
+use super::body::{Best, Bound, CavityBody, Moment, Plane};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
@@ -10,7 +10,7 @@ use crate::math::any_perpendicular;
 use crate::motion::Relative;
 use crate::solid::local::LiteralId;
 use crate::solid::surface::Axis;
-use crate::solid::{Primitive, Sense};
+use crate::solid::{Face, Primitive, Sense};
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -31,6 +31,10 @@ const ACTIVE: f64 = 1e-9;
 /// A clearance, in the same measure, from which the equations are sure to find the contact, and steps that it may take.
 const SETTLED: f64 = 1e-4;
 const SETTLING: u32 = 4;
+/// How far within a plane an opening is looked at, relative to the wall's radius.
+const WITHIN: f64 = 1e-3;
+/// tan α of a cone's half angle up to which it is taken for a wall: a flatter one is hardly entered.
+const STEEPEST: f64 = 4.0;
 
 /// One direction of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,19 +45,55 @@ pub(super) enum Wall {
     Flat(usize),
 }
 
-/// A round wall: a point of its axis, the axis, its radius and face.
+impl Wall {
+    /// The direction of a round one.
+    pub(super) fn direction(self) -> Option<DVec3> {
+        if let Self::Round(u) = self { Some(u) } else { None }
+    }
+}
+
+/// A round wall, of a cylinder or a cone: the middle of its widest section, the axis, the radius there, and its face.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Round {
     pub(super) origin: DVec3,
     pub(super) axis: DVec3,
     pub(super) radius: f64,
-    pub(super) face: u32,
+    /// A cone's planes that touch it lean: the one in direction u across the axis is (u + lean)·(x − origin) = radius.
+    pub(super) lean: DVec3,
+    pub(super) literal: LiteralId,
+}
+
+impl Round {
+    /// The round wall that a face of a cavity is, if it is one.
+    fn of(cavity: &Primitive, face: &Face, literal: LiteralId) -> Option<Self> {
+        let Axis { origin, direction: axis } = face.axis().filter(|_| face.developable().is_some())?;
+        if let Some(radius) = face.radius() {
+            return Some(Self { origin, axis, radius, lean: DVec3::ZERO, literal });
+        }
+        let apex = face.apex().filter(|apex| apex.rows.is_none() && apex.sin <= STEEPEST * apex.cos)?;
+        let discs = cavity.shape.convex().discs()?;
+        let (center, radius) = discs.into_iter().max_by(|d, e| d.1.total_cmp(&e.1))?;
+        let lean = apex.axis * (-apex.sin / apex.cos);
+        Some(Self { origin: cavity.frame.point(center), axis: apex.axis, radius, lean, literal })
+    }
+
+    /// The direction across the axis that a bound's plane is of.
+    pub(super) fn across(&self, bound: &Bound) -> DVec3 {
+        bound.u - self.lean
+    }
+
+    /// The largest radius at which a point may be `delta` beyond the wall's widest section.
+    pub(super) fn widest(&self, delta: f64) -> f64 {
+        self.radius + self.lean.length() * delta
+    }
 }
 
 /// A convex body against a body with a cavity that it is in; everything in the frame of the cavity.
+#[derive(Clone)]
 pub(super) struct CavityPair<'a> {
     pub(super) body: CavityBody,
     pub(super) primitive: &'a Primitive,
+    pub(super) cavity: &'a Primitive,
     /// The side of the body with the cavity.
     pub(super) side: Side,
     pub(super) planes: SmallVec<[Plane; 6]>,
@@ -91,17 +131,17 @@ impl<'a> CavityPair<'a> {
     pub(super) fn new(
         task: &Task,
         primitive: &'a Primitive,
-        (main, cavity): (&Primitive, &Primitive),
+        (main, cavity): (&Primitive, &'a Primitive),
         side: Side,
         relative: &'a Relative,
     ) -> Option<Self> {
         let body = CavityBody::of(primitive)?;
-        let planes = |p: &Primitive| -> SmallVec<[Plane; 6]> {
+        let planes = |p: &Primitive, sense: Sense| -> SmallVec<[Plane; 6]> {
             let faces = p.faces.listed().iter().enumerate();
             faces
                 .filter_map(|(i, face)| {
                     let (normal, offset) = face.flat()?;
-                    Some(Plane { normal, offset, face: p.first_face + i as u32 })
+                    Some(Plane { normal, offset, literal: LiteralId::new(p.first_face + i as u32, sense) })
                 })
                 .collect()
         };
@@ -110,15 +150,15 @@ impl<'a> CavityPair<'a> {
             if face.is_flat() {
                 continue;
             }
-            // Of round walls those alone that are as wide everywhere along an axis.
-            let (Some(radius), Some(Axis { origin, direction: axis }), Some(_)) =
-                (face.radius(), face.axis(), face.developable())
-            else {
+            // Of round walls those alone that are straight along an axis, and one.
+            if round.is_some() {
                 return None;
-            };
-            round = Some(Round { origin, axis, radius, face: cavity.first_face + i as u32 });
-            let e = any_perpendicular(axis);
-            let f = axis.cross(e);
+            }
+            let literal = LiteralId::new(cavity.first_face + i as u32, Sense::Negative);
+            let wall = Round::of(cavity, face, literal)?;
+            round = Some(wall);
+            let e = any_perpendicular(wall.axis);
+            let f = wall.axis.cross(e);
             let (g, h) = ((e + f) * FRAC_1_SQRT_2, (f - e) * FRAC_1_SQRT_2);
             directions = [e, g, f, h, -e, -g, -f, -h];
         }
@@ -126,13 +166,14 @@ impl<'a> CavityPair<'a> {
         // A wall that the pierced body does not reach is none. One without bounds has no middle, and reaches all.
         let reach = |p: &Plane| p.normal.dot(middle) + p.normal.abs().dot(half);
         let is_wall = |p: &Plane| reach(p).is_nan() || reach(p) > p.offset;
-        let flats = planes(cavity).into_iter().filter(is_wall).collect();
+        let flats = planes(cavity, Sense::Negative).into_iter().filter(is_wall).collect();
         let far = (primitive.ball.center - relative.center_a()).length() + primitive.ball.radius;
         Some(Self {
             body,
             primitive,
+            cavity,
             side,
-            planes: planes(main),
+            planes: planes(main, Sense::Positive),
             round,
             directions,
             flats,
@@ -144,17 +185,53 @@ impl<'a> CavityPair<'a> {
         })
     }
 
+    /// Points of the round wall's axis: beside a guess, and where it passes planes: those of the pierced body that the convex one crosses
+    /// then, a little within, and the cavity's own.
+    pub(super) fn openings(&self, guess: &Guess) -> SmallVec<[DVec3; 4]> {
+        let Some(Round { origin, axis, radius, .. }) = self.round else { return SmallVec::new() };
+        let m = self.moment(guess.t);
+        let beside = origin + axis * (guess.best.x - origin).dot(axis);
+        let planes = m.crossed().map(|k| &self.planes[k]).chain(&self.flats);
+        let passed = planes.filter_map(|plane| {
+            let along = plane.normal.dot(axis);
+            let s = (plane.offset - WITHIN * radius - plane.normal.dot(origin)) / along;
+            s.is_finite().then(|| origin + axis * s)
+        });
+        std::iter::once(beside).chain(passed).collect()
+    }
+
+    /// The two pieces of what a body may do that is in a cavity with a floor, `self`, which another one, `through`, goes through: cut by
+    /// the floor it is in the one on this side, and in the other one on the far side. `None` where there are other flat walls than that.
+    ///
+    /// A point common to both bodies lies on either side, however deep it is: by its depth the planes of the cut lie farther out, for what
+    /// the proof takes off at planes of the pierced body.
+    pub(super) fn stacked(&self, through: &Self) -> Option<[Self; 2]> {
+        let (own, other) = (self.round.as_ref()?, through.round.as_ref()?);
+        let &[floor] = &self.flats[..] else { return None };
+        let (mut near, mut far) = (self.clone(), through.clone());
+        near.flats.clear();
+        near.planes.push(Plane { offset: floor.offset + self.delta, literal: other.literal, ..floor });
+        // Beside a cylinder's floor there is a ring of it; a cone mostly ends where the other one goes on.
+        let literal = if own.lean == DVec3::ZERO { floor.literal } else { own.literal };
+        far.planes.push(Plane { normal: -floor.normal, offset: self.delta - floor.offset, literal });
+        Some([near, far])
+    }
+
     pub(super) fn moment(&self, t: f64) -> Moment {
         Moment::new(&self.body, self.relative.at(t), &self.planes)
     }
 
+    /// The largest radius at which the round wall may be met.
     pub(super) fn radius(&self) -> f64 {
-        self.round.map_or(0.0, |r| r.radius)
+        self.round.map_or(0.0, |r| r.widest(self.delta))
     }
 
     pub(super) fn best(&self, m: &Moment, wall: Wall) -> Best {
         match (wall, &self.round) {
-            (Wall::Round(u), Some(round)) => m.best(u, round.radius + round.origin.dot(u), &self.planes),
+            (Wall::Round(u), Some(round)) => {
+                let u = u + round.lean;
+                m.best(u, round.radius + round.origin.dot(u), &self.planes)
+            }
             (Wall::Flat(j), _) => m.best(self.flats[j].normal, self.flats[j].offset, &self.planes),
             (Wall::Round(_), None) => unreachable!("a round wall is asked for where there is one"),
         }
@@ -180,9 +257,8 @@ impl<'a> CavityPair<'a> {
 
     /// The lowest direction within an eighth of a turn of the one that `here` is of.
     pub(super) fn lowest_beside(&self, m: &Moment, here: Best, rounds: usize) -> (DVec3, Best) {
-        let u = here.bound.u;
-        let falls = self.slope(&here) < 0.0;
-        let Some(round) = &self.round else { return (u, here) };
+        let Some(round) = &self.round else { return (here.bound.u, here) };
+        let (u, falls) = (round.across(&here.bound), self.slope(&here) < 0.0);
         let turned = (u + round.axis.cross(u) * if falls { 1.0 } else { -1.0 }) * FRAC_1_SQRT_2;
         let there = self.best(m, Wall::Round(turned));
         let ends = if falls { [here, there] } else { [there, here] };
@@ -285,7 +361,7 @@ impl<'a> CavityPair<'a> {
             // Half way between the wall and the farthest point of what lands, if that is flat.
             let w = at.a_vector(-plane.normal);
             for part in [0.5, 0.0] {
-                x = best.x - best.bound.u * (part * best.beyond());
+                x = best.x - best.bound.u * (part * best.beyond() / best.bound.u.length_squared());
                 faces_at(other, self.primitive, at.a_point(x), w, 1e2 * tol, &mut active);
                 if !active.is_empty() {
                     break;
@@ -294,13 +370,13 @@ impl<'a> CavityPair<'a> {
             if active.is_empty() {
                 return false;
             }
-            active.push((Constraint::Literal(self.side, LiteralId::new(plane.face, Sense::Positive)), 1.0));
+            active.push((Constraint::Literal(self.side, plane.literal), 1.0));
         } else {
-            let face = match guess.wall {
-                Wall::Round(_) => self.round.map(|r| r.face),
-                Wall::Flat(j) => Some(self.flats[j].face),
+            let wall = match guess.wall {
+                Wall::Round(_) => self.round.map(|r| r.literal),
+                Wall::Flat(j) => Some(self.flats[j].literal),
             };
-            let Some(face) = face else { return false };
+            let Some(wall) = wall else { return false };
             let w = best.bound.w();
             let length = w.length();
             faces_at(other, self.primitive, at.a_point(x), at.a_vector(w / length), tol, &mut active);
@@ -308,9 +384,9 @@ impl<'a> CavityPair<'a> {
                 return false;
             }
             active.iter_mut().for_each(|(_, weight)| *weight *= length);
-            active.push((Constraint::Literal(self.side, LiteralId::new(face, Sense::Negative)), 1.0));
+            active.push((Constraint::Literal(self.side, wall), 1.0));
             if let Some((plane, lambda)) = plane {
-                active.push((Constraint::Literal(self.side, LiteralId::new(plane.face, Sense::Positive)), lambda));
+                active.push((Constraint::Literal(self.side, plane.literal), lambda));
             }
         }
         if active.len() > newton::MAX_ACTIVE {

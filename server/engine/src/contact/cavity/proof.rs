@@ -22,6 +22,10 @@
 //! φ >= (1−σ) φ₁ + σ φ₂ − σ(1−σ) K,    K = (R − κ' r) D² / (1 + √(1 − D²/4)),  or half that D² where R < κ' r.
 //! ```
 //!
+//! The planes that touch a cone lean: (u + l)·(x − o) <= R, l = −tan α a, a the axis to its wide end, o and R of its widest section. With
+//! u + l for u all of this holds, l being the same along a chord: a point beyond the wall by delta at a height z has |x⊥| >= R(z) +
+//! delta/cos α, R(z) its section there, 1/cos α = |u + l|. d_u is multiplied by R(z), for which R stands: it is no larger.
+//!
 //! In time, for every material point of P, (w·x)'' is at most 2|Δw|/h·V + |w·x''|, so between two moments φ is above the
 //! line through its values there, less ½ Q s(1−s) h²; positive throughout where ½ Q h² <= (√φ₀ + √φ₁)².
 //! A flat wall is one direction, and a plane that keeps P out is a bound with u = 0: for those D = 0.
@@ -179,7 +183,16 @@ impl CavityPair<'_> {
                 half_q = half_q.min(self.wobble(moments, i, w[0]));
             }
             if !holds(corners, half_q) {
-                return Worth::None;
+                // A wide sector's reserves are less than what its corners have alone.
+                let own = each.spread(|e, c| {
+                    let b = &bounds[e.min(bounds.len() - 1)][c];
+                    phi[e][c] - reserves[e][c] + (self.delta * CLAIMED - 2.0 * self.rounding) * b.weight()
+                });
+                let alone = [own[0][0].min(own[0][1]), own[1][0].min(own[1][1])];
+                if chord == 0.0 || !holds(alone, half_q) {
+                    return Worth::None;
+                }
+                worth = Worth::Corners;
             }
             if chord > 0.0 && worth == Worth::All {
                 let between =
@@ -334,12 +347,13 @@ impl CavityPair<'_> {
     /// The direction between two at which φ is lowest at a moment; regula falsi on its slope.
     pub(super) fn lowest(&self, m: &Moment, mut ends: [Best; 2], rounds: usize) -> (DVec3, Best) {
         let mut slopes = ends.map(|best| self.slope(&best));
+        let across = |best: &Best| self.round.map_or(best.bound.u, |round| round.across(&best.bound));
         for _ in 0..rounds {
             if !(slopes[0] < 0.0 && slopes[1] > 0.0) {
                 break;
             }
             let part = (slopes[0] / (slopes[0] - slopes[1])).clamp(MARGIN, 1.0 - MARGIN);
-            let middle = ends[0].bound.u.lerp(ends[1].bound.u, part).normalize();
+            let middle = across(&ends[0]).lerp(across(&ends[1]), part).normalize();
             let best = self.best(m, Wall::Round(middle));
             let slope = self.slope(&best);
             // The other end's slope counts half (Illinois).
@@ -352,7 +366,7 @@ impl CavityPair<'_> {
             }
         }
         let best = if ends[0].phi <= ends[1].phi { ends[0] } else { ends[1] };
-        (best.bound.u, best)
+        (across(&best), best)
     }
 }
 

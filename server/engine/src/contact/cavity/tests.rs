@@ -10,8 +10,9 @@ use crate::math::random::Random;
 use crate::motion::{Placed, Relative};
 use crate::octree::Model;
 use crate::octree::testing::{pierced, simple};
+use crate::solid::local::LiteralId;
 use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
-use crate::solid::{Label, Op, Shape, SolidBuilder};
+use crate::solid::{Label, Op, Sense, Shape, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use glam::{DVec3, dvec3};
@@ -204,6 +205,68 @@ fn no_point_of_a_body_is_in_the_wall_within_a_proven_span() {
 }
 
 #[test]
+fn no_point_of_a_body_is_in_the_wall_of_a_stepped_hole_within_a_proven_span() {
+    let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+    let mut r = Random(31);
+    let (mut proven, mut met) = ([0, 0], 0);
+    for i in 0..600 {
+        // A bore with a countersink, or with a counterbore, whose floor the bore goes through.
+        let deep = r.within(0.02, 0.15);
+        let wide = 0.21 + r.within(0.0, 3.0) * deep;
+        let (height, middle) = (0.5 * (deep + 0.01), Pose::at(DVec3::Z * (0.1 - 0.5 * (deep - 0.01))));
+        let is_cone = i % 2 == 0;
+        let mouth: Shape = if is_cone {
+            Cone { bottom: r.within(0.15, 0.205), top: wide, half_height: height }.into()
+        } else {
+            Cylinder { radius: wide, half_height: height }.into()
+        };
+        let bore = (Cylinder { radius: 0.2, half_height: 0.5 }.into(), Pose::at(DVec3::X * r.within(-0.02, 0.02)));
+        let plate = pierced(Cuboid { half: dvec3(0.5, 0.5, 0.1) }, vec![bore, (mouth, middle)]);
+        let radius = r.within(0.05, 0.2);
+        let (top, half_height) = (radius * r.within(0.3, 1.2), r.within(0.05, 0.5));
+        let peg: Shape = if i % 3 == 0 {
+            Cylinder { radius, half_height }.into()
+        } else {
+            Cone { bottom: radius, top, half_height }.into()
+        };
+        let peg = simple(peg);
+        let at = across(&mut r, 0.6 * (0.2 - radius)) + DVec3::Z * r.within(-0.4, 0.6);
+        let motion = moving(at, r.vector(0.5), r.vector(0.1), r.vector(0.5));
+        let query = asked(
+            PlacedModel { model: &plate, placed: placed(rest()) },
+            PlacedModel { model: &peg, placed: placed(motion) },
+        );
+        let (task, _) = Task::of(&query);
+        let relative = Relative::new(placed(motion), placed(rest()));
+        let [main, bore, mouth] = [0, 1, 2].map(|k| &plate.solid.primitives[k]);
+        let primitive = &peg.solid.primitives[0];
+        let of = |hole| CavityPair::new(&task, primitive, (main, hole), Side::A, &relative).expect("a peg in a hole");
+        let pieces = of(mouth).stacked(&of(bore)).expect("a mouth with a floor");
+        assert!(of(bore).stacked(&of(mouth)).is_none(), "a bore has no floor");
+        if !pieces.iter().all(|piece| piece.prove(1.0, None).0 == ProofEnd::Proven) {
+            met += 1;
+            continue;
+        }
+        proven[usize::from(is_cone)] += 1;
+        for k in 0..=10 {
+            let at = relative.at(f64::from(k) / 10.0);
+            for (center, radius) in &pieces[0].body.discs {
+                for j in 0..24 {
+                    let rim = DVec3::X.rotate_z(std::f64::consts::TAU * f64::from(j) / 24.0) * *radius;
+                    let other = pieces[0].body.discs[0];
+                    let start = other.0 + rim * (other.1 / radius);
+                    for part in [0.0, 0.3, 0.6] {
+                        let x = at.b_point((*center + rim).lerp(start, part));
+                        assert!(plate.value(x) >= -task.delta, "{i}: {x} at {} is {} deep", at.t, -plate.value(x));
+                    }
+                }
+            }
+        }
+    }
+    assert!(proven.iter().all(|n| *n > 60) && met > 100, "{proven:?} {met}");
+}
+
+#[test]
 fn a_best_bound_is_the_reach_of_the_cut_body() {
     // Against the farthest of many points of a tilted cylinder, frustum or box below a plane.
     let mut r = Random(5);
@@ -218,7 +281,8 @@ fn a_best_bound_is_the_reach_of_the_cut_body() {
         let placed = |motion| Placed { place: Pose::IDENTITY, motion };
         let relative = Relative::new(placed(motion), placed(rest()));
         let primitive = &model.solid.primitives[0];
-        let planes = [Plane { normal: DVec3::Z, offset: r.within(-0.2, 0.2), face: 0 }];
+        let literal = LiteralId::new(0, Sense::Positive);
+        let planes = [Plane { normal: DVec3::Z, offset: r.within(-0.2, 0.2), literal }];
         let m = Moment::new(&super::body::CavityBody::of(primitive).expect("bounded"), relative.at(0.0), &planes);
         let u = across(&mut r, 1.0);
         let best = m.best(u, 0.0, &planes);

@@ -192,6 +192,21 @@ impl<'a> ConvexPair<'a> {
     }
 }
 
+/// How two convex parts are seen at the start of a step.
+pub enum Sight {
+    /// The line between their middles keeps them apart over the whole step.
+    Free,
+    /// Apart in the direction n of the world, but for a few resolutions, along which they meet at about t; infinite where they part.
+    Apart {
+        /// A fraction of the step.
+        t: f64,
+        /// A unit vector, from the first one.
+        n: DVec3,
+    },
+    /// They have points in common.
+    Common,
+}
+
 /// A convex part of each of two solids, which are unions of such.
 pub struct ConvexParts<'a>(Advance<'a>);
 
@@ -201,27 +216,29 @@ impl<'a> ConvexParts<'a> {
         Some(Self(Advance::new(task, (a, body_of(a)?), (b, body_of(b)?))))
     }
 
-    /// About when they meet, by the gap between them along the line of their middles: parts that meet first are asked first.
-    pub fn about_when(&self) -> f64 {
+    /// How both are seen at the start.
+    pub fn sight(&self) -> Sight {
         let (m, end) = (self.0.moment(0.0), self.0.moment(1.0));
-        let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.0.a.0.ball.center);
-        let Some(n) = way.try_normalize() else { return 0.0 };
-        let [here, there] = [&m, &end].map(|m| self.0.gap(m, n).phi);
-        if here <= 0.0 {
-            0.0
-        } else if there < here {
-            here / (here - there)
-        } else {
-            f64::INFINITY
+        if self.0.never_near() || self.0.frees_all(&m, &end) {
+            return Sight::Free;
         }
+        let way = m.b.support(DVec3::ZERO) - self.0.a.0.ball.center;
+        if let Some((_, here)) = self.0.seen(&m, &m.b, way) {
+            let there = self.0.gap(&end, here.n).phi;
+            let t = if there < here.phi { here.phi / (here.phi - there) } else { f64::INFINITY };
+            return Sight::Apart { t, n: here.n };
+        }
+        let beside = self.0.seen(&m, &self.0.set_off(&m), way);
+        beside.map_or(Sight::Common, |(_, here)| Sight::Apart { t: 0.0, n: here.n })
     }
 
     /// Looks for the contact of both parts, which counts where both whole trees confirm it; true when nothing is deep in both before the
     /// goal that the contacts have then. What more it is told than that is one of them.
     ///
-    /// Parts that are `filled` have cavities left out here: what they seem to meet first may be one.
-    pub fn meet(&self, contacts: &mut Contacts, filled: bool) -> bool {
-        self.0.never_near() || self.0.frees_to_goal(contacts, filled)
+    /// At the start they are apart in the direction `along` of the world. Parts that are `filled` have cavities left out here: what they
+    /// seem to meet first may be one.
+    pub fn meet(&self, contacts: &mut Contacts, along: DVec3, filled: bool) -> bool {
+        self.0.frees_to_goal(contacts, along, filled)
     }
 
     /// True when they stay farther apart than `least` (a length) over the whole step.
@@ -373,17 +390,13 @@ impl<'a> Advance<'a> {
     }
 
     /// `run` for two parts of larger bodies: a contact of others ends it as well as their own.
-    fn frees_to_goal(&self, contacts: &mut Contacts, filled: bool) -> bool {
+    fn frees_to_goal(&self, contacts: &mut Contacts, mut along: DVec3, filled: bool) -> bool {
         let (end_of_step, mut t, mut near) = (self.moment(1.0), 0.0, false);
         let size = self.task.scale.min(self.a.0.ball.radius + self.b.0.ball.radius);
-        let (mut along, mut own): (Option<DVec3>, Option<DVec3>) = (None, None);
+        let mut own: Option<DVec3> = None;
         for round in 0..ROUNDS {
             let m = self.moment(t);
-            if round == 0 && self.frees_all(&m, &end_of_step) {
-                return true;
-            }
-            let first = along
-                .map_or(m.b.support(DVec3::ZERO) - self.a.0.ball.center, |n: DVec3| m.at.world_from_a.transpose() * n);
+            let first = m.at.world_from_a.transpose() * along;
             contacts.counters.closed_forms += 1;
             let seen = match self.seen(&m, &m.b, first) {
                 None if round == 0 || near => {
@@ -394,7 +407,7 @@ impl<'a> Advance<'a> {
             };
             let Some((found, here)) = seen else { return false };
             near |= round == 0 && found.distance <= APART * self.task.delta;
-            along = Some(here.n);
+            along = here.n;
             let last = self.gap(&end_of_step, here.n);
             let goal = contacts.goal().min(1.0);
             // What does not even touch before the goal is no rival of the contact that is known.
