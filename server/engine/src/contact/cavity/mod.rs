@@ -4,10 +4,10 @@
 //! parts is, cavities filled (`convex::ConvexParts`); and while P cut by the faces of K lies inside H, nothing is met, whatever else P
 //! does above and below. How far the cut body reaches in a direction across the cavity is told by its support and one multiplier
 //! (`body`); a sector of directions over a span of time is excluded by its four corners (`proof`). A body that is in two cavities, one
-//! through the floor of the other, is cut by that floor, too, and each piece lies inside of its own (`CavityPair::stacked`). So: (1) from the start, the lines along which the clearance falls say when and in which
-//! direction it is used up first; (2) the faces that hold the body there are solved for a contact, as the search does
-//! it, and both trees confirm it or it is none; (3) the time up to it is proven; what the proof meets instead is
-//! solved in turn. No contact by the end: clear.
+//! through the floor of the other, is cut by that floor, too, and each piece lies inside of its own (`CavityPair::stacked`). So: (1)
+//! from the start, the lines along which the clearance falls say when and in which direction it is used up first; (2) the faces that
+//! hold the body there are solved for a contact, as the search does it, and both trees confirm it or it is none; (3) the time up to it
+//! is proven; what the proof meets instead is solved in turn. No contact by the end: clear.
 //!
 //! Both solids may be unions; cavities are cylinders, cones or have flat faces; of several cavities of one body the nearest one is
 //! asked. P's own cavities are left out, which only makes more of it. What starts nearer than a few resolutions is proven to come no deeper or
