@@ -21,7 +21,7 @@ fn across(n: &mut Random, size: f64) -> DVec3 {
     dvec3(angle.cos(), angle.sin(), 0.0) * size
 }
 
-fn ask(a: (&Model, Motion), b: (&Model, Motion), strategies: Strategies) -> Outcome {
+pub(super) fn ask(a: (&Model, Motion), b: (&Model, Motion), strategies: Strategies) -> Outcome {
     let placed = |motion| Placed { place: Pose::IDENTITY, motion };
     let query = PairQuery {
         a: PlacedModel { model: a.0, placed: placed(a.1) },

@@ -1,7 +1,9 @@
 //! What is told of bodies in holes of several steps in front of the search, and the search without it: the same answers on random
 //! bores with countersinks and counterbores, flush or not, some of them askew, and on what is put into them.
 
-use super::cavities::{compare, moving};
+use super::cavities::{ask, compare, moving, rest};
+use contactd::contact::{Status, Strategies};
+use contactd::import::{Facets, Limits, read_model};
 use contactd::math::random::Random;
 use contactd::octree::Model;
 use contactd::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, Sphere};
@@ -148,4 +150,28 @@ fn bodies_in_stepped_holes_are_reported_as_the_search_tells_them() {
     }
     println!("reported: {reported} of {}, {met} with a contact", 4 * scenes);
     assert!(reported * 2 >= scenes && met * 2 >= scenes, "{reported}, {met} of {}", 4 * scenes);
+}
+
+#[test]
+fn a_cover_over_its_dowels_is_solved_for_where_it_meets_first() {
+    let part = |name: &str| {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/models").join(name);
+        Model::new(read_model(&path, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}")).solid)
+    };
+    let (base, cover) = (part("base.csg"), part("cover.csg"));
+    let mut newton = 0;
+    for k in 0..12 {
+        // Half a millimetre above the base it comes down and tilts: its flat rim would reach it after most of the step, its bores
+        // meet the dowels soon.
+        let tilt = DVec3::X.rotate_z(f64::from(k)) * 0.01 + DVec3::Z * 0.004;
+        let down = moving(DVec3::Z * 0.55, DVec3::ZERO, DVec3::Z * -0.05, tilt);
+        let fronted = ask((&base, rest()), (&cover, down), Strategies::default());
+        let alone = ask((&base, rest()), (&cover, down), Strategies { region: false, ..Strategies::default() });
+        assert_eq!((fronted.status(), alone.status()), (Status::Contact, Status::Contact), "{k}");
+        assert!((fronted.time() - alone.time()).abs() < 1e-9, "{k}: {fronted:?} {alone:?}");
+        assert_eq!(fronted.counters.cells, 0, "{k}: {fronted:?}");
+        newton += fronted.counters.newton;
+    }
+    println!("{newton} solutions");
+    assert!(newton <= 36, "{newton}");
 }

@@ -1,7 +1,8 @@
 //! A convex body as the hull of discs of one axis, and how far it reaches when cut by one plane.
 //!
 //! A cylinder or frustum is the hull of its two rims, a ball one disc without an axis (all directions count), a capsule two of them,
-//! a box or a polyhedron the hull of its corners: discs of radius 0. Along w the disc about c with radius r reaches c·w + r|w⊥|, w⊥ the part of w across the axis.
+//! a box or a polyhedron the hull of its corners: discs of radius 0. Along w the disc about c with radius r reaches c·w + r|w⊥|, w⊥ the
+//! part of w across the axis.
 //!
 //! Of a body P cut by half-spaces n_k·x <= d_k no point reaches farther along u than
 //!

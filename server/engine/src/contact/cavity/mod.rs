@@ -10,8 +10,8 @@
 //! is proven; what the proof meets instead is solved in turn. No contact by the end: clear.
 //!
 //! Both solids may be unions; cavities are cylinders, cones or have flat faces; of several cavities of one body the nearest one is
-//! asked. P's own cavities are left out, which only makes more of it. What starts nearer than a few resolutions is proven to come no deeper or
-//! left to the search, as is what overlaps or does not settle; nothing is guessed.
+//! asked. P's own cavities are left out, which only makes more of it. What starts nearer than a few resolutions is proven to come no
+//! deeper or left to the search, as is what overlaps or does not settle; nothing is guessed.
 //! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) on a bound by duality; derivation in `proof`.
 
 mod body;
