@@ -6,15 +6,20 @@
 //! a hinge how far the link's farthest point is from its axis at most, whatever the joints between them do. So d − Σ L_k h_k is a
 //! bound for the whole box. Joints that move both links alike do not count.
 //!
+//! However near the bounds are to each other, a bound of 0 from below excludes no clash: where it is not proven that there is none
+//! anywhere, boxes are halved on.
+//!
 //! Floor 10: imports `import`, `contact`, `terminal`.
 
-use crate::contact::PlacedModel;
 use crate::contact::distance::{DEFAULT_LIMIT, DistanceQuery, at_instant};
+use crate::contact::{
+    PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
+};
 use crate::import::Scene;
 use crate::import::robot::{DofKind, Robot, Values};
 use crate::motion::Placed;
 use crate::octree::Model;
-use contactd_proto::{Motion, Pose};
+use contactd_proto::{Motion, Pose, Report};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -23,6 +28,8 @@ use std::sync::Arc;
 
 /// Boxes that are looked at side by side: what comes of them does not depend on how many threads do it.
 const SIDE_BY_SIDE: usize = 16;
+/// Cells that a search for a common point may refine.
+const MEETING: u64 = 20_000;
 /// Part of the tolerance that a distance at the middle of a box may be off.
 const DISTANCE_PART: f64 = 0.25;
 
@@ -41,12 +48,31 @@ pub struct Question {
     pub boxes: u64,
 }
 
+impl Question {
+    /// True where bounds answer the question.
+    fn is_enough(&self, lower: f64, upper: f64) -> bool {
+        upper == 0.0
+            || match self.least {
+                Some(least) => lower >= least || upper < least,
+                None => lower > 0.0 && upper - lower <= self.tolerance,
+            }
+    }
+
+    /// True where nothing in a box counts, given the least that is known elsewhere.
+    fn is_done(&self, lower: f64, upper: f64) -> bool {
+        match self.least {
+            Some(least) => lower >= least,
+            None => lower > 0.0 && lower >= upper - self.tolerance,
+        }
+    }
+}
+
 /// The least clearance.
 #[derive(Clone, Debug)]
 pub struct Least {
     /// Proven: nowhere in the ranges two links that are tested are nearer. Infinite without a pair.
     pub lower: f64,
-    /// At `values` two are so near; 0 where they clash.
+    /// At `values` two are so near; 0 where they clash, or touch for all that numbers tell.
     pub upper: f64,
     /// Values of the joints that have ranges.
     pub values: Values,
@@ -60,7 +86,7 @@ pub struct Least {
     pub boxes: u64,
     /// Distances that were worked out.
     pub distances: u64,
-    /// The bounds are as near as was asked, or decide what was.
+    /// The bounds are as near as was asked and exclude a clash, or decide what was asked.
     pub is_settled: bool,
 }
 
@@ -169,7 +195,7 @@ pub fn least(robot: &Robot, scene: &Scene, models: &[Arc<Model>], question: &Que
         while open.len() < SIDE_BY_SIDE {
             let Some(cell) = queue.pop() else { break };
             match cell.is_known {
-                _ if cell.lower >= out.upper - question.tolerance => floor = floor.min(cell.lower),
+                _ if question.is_done(cell.lower, out.upper) => floor = floor.min(cell.lower),
                 false => open.push(cell),
                 true => {
                     let halves = cell.halves();
@@ -183,7 +209,7 @@ pub fn least(robot: &Robot, scene: &Scene, models: &[Arc<Model>], question: &Que
         if open.is_empty() {
             // What was left is no nearer, or has no width any more.
             out.lower = floor.max(0.0);
-            out.is_settled = out.upper - out.lower <= question.tolerance;
+            out.is_settled = question.is_enough(out.lower, out.upper);
             return Ok(out);
         }
         let looks: Vec<Look> = open.par_iter().map(|cell| search.look(cell)).collect();
@@ -200,8 +226,7 @@ pub fn least(robot: &Robot, scene: &Scene, models: &[Arc<Model>], question: &Que
         }
         search.best = out.upper;
         out.lower = floor.min(queue.peek().map_or(f64::INFINITY, |cell: &Cell| cell.lower)).max(0.0);
-        let is_enough = question.least.is_some_and(|least| out.lower >= least || out.upper < least);
-        if out.upper == 0.0 || is_enough || out.upper - out.lower <= question.tolerance {
+        if question.is_enough(out.lower, out.upper) {
             return Ok(out);
         }
         if out.boxes >= question.boxes {
@@ -209,6 +234,20 @@ pub fn least(robot: &Robot, scene: &Scene, models: &[Arc<Model>], question: &Que
             return Ok(out);
         }
     }
+}
+
+/// True where two bodies at rest share a point, or touch to within the resolution.
+fn do_meet(a: PlacedModel, b: PlacedModel) -> bool {
+    let query = PairQuery {
+        a,
+        b,
+        resolution: default_resolution(a.model, b.model),
+        cell_limit: MEETING,
+        strategies: Strategies::default(),
+        query_options: QueryOptions { report: Report::Hit, ..QueryOptions::CONTACT },
+    };
+    let found = earliest_contact(&query, &mut Scratch::default());
+    found.touching || found.status() == Status::Overlap
 }
 
 /// The box of all ranges.
@@ -361,7 +400,7 @@ impl<'a> Search<'a> {
         let split = (0..weights.len()).max_by(|i, j| weights[*i].total_cmp(&weights[*j])).unwrap_or(0);
         let bound = self.balls_apart(cell, &at) - reach;
         let mut cell = Cell { is_known: true, split, ..cell.clone() };
-        if bound >= self.best - self.question.tolerance {
+        if self.question.is_done(bound, self.best) {
             cell.lower = cell.lower.max(bound);
             return Look { cell, near: None };
         }
@@ -370,10 +409,21 @@ impl<'a> Search<'a> {
             placed: Placed { place: Pose::IDENTITY, motion: Motion::resting(at.poses[self.owners[o]]) },
         };
         let [a, b] = self.pairs[cell.pair as usize].objects.map(placed);
-        let tolerance = DISTANCE_PART * self.question.tolerance;
-        let d = at_instant(&DistanceQuery { a, b, tolerance, limit: DEFAULT_LIMIT }, 0.0);
+        let ask = |tolerance: f64| at_instant(&DistanceQuery { a, b, tolerance, limit: DEFAULT_LIMIT }, 0.0);
+        let mut d = ask(DISTANCE_PART * self.question.tolerance);
+        // Where it is not decided the box must be smaller, or the distance finer than that.
+        let level = self.question.least.unwrap_or(0.0);
+        if d.upper > 0.0 && d.upper >= level && d.lower - reach <= level {
+            let finer = DISTANCE_PART * reach.max(d.upper - level);
+            if finer < d.upper - d.lower {
+                d = ask(finer);
+            }
+        }
         cell.lower = cell.lower.max(d.lower - reach);
-        Look { cell, near: Some((d.upper, [d.a.point, d.b.point])) }
+        // Where bodies hardly lie in each other the distance ends beside what they share: that there is such a point a search tells.
+        let is_near = d.lower <= 0.0 && d.upper <= self.question.tolerance;
+        let upper = if d.upper <= d.rounding || is_near && do_meet(a, b) { 0.0 } else { d.upper };
+        Look { cell, near: Some((upper, [d.a.point, d.b.point])) }
     }
 
     /// How far a pair's objects may have moved against each other from the middle of a box; `part` hears what each variable does to it.

@@ -362,7 +362,13 @@ fn least_text(least: &Least, question: &Question) -> String {
         _ => format!("least clearance {upper}; proven: {lower} or more\n"),
     };
     if !least.is_settled {
-        out.push_str("not to the tolerance: the boxes that it may look at are spent (--boxes)\n");
+        let what = if least.lower > 0.0 { "not to the tolerance" } else { "whether they touch is not proven" };
+        let why = if least.boxes >= question.boxes {
+            "the boxes that it may look at are spent (--boxes)"
+        } else {
+            "rounding allows no more"
+        };
+        let _ = writeln!(out, "{what}: {why}");
     }
     if least.upper > 0.0 {
         let _ = writeln!(out, "  {} - {}", names[0], names[1]);

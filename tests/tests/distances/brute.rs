@@ -136,3 +136,36 @@ fn no_points_refute_the_distances_of_trees() {
     assert!(failures.is_empty(), "{} refuted, such as {:#?}", failures.len(), &failures[..failures.len().min(5)]);
     assert!(2 * apart[0] > count && 3 * apart[1] > count, "{apart:?} of {count} are apart");
 }
+
+#[test]
+fn bodies_that_share_points_are_told_to() {
+    let count = sized("CONTACTD_DISTANCE_TREES", 200usize);
+    let (mut shared, mut missed) = (0, Vec::new());
+    for i in 0..count {
+        let mut r = Random::new(91_000 + i as u64);
+        let (of_a, of_b) = (1 + r.below(3), 1 + r.below(2));
+        let trees = [scenes::tree(&mut r, of_a), scenes::tree(&mut r, of_b)];
+        let place = r.direction() * r.within(0.0, 1.2);
+        let motions = [Pose::IDENTITY, Pose::new(place, r.rotation())].map(Motion::resting);
+        let [a, b] = [0, 1].map(|k| Body::new(&trees[k], motions[k], &mut r));
+        // A ball of a hundredth about a point of both is in both.
+        let is_deep = |x: &DVec3| a.is_inside(*x, 0.0, -0.01) && b.is_inside(*x, 0.0, -0.01);
+        let of_b = b.points.iter().map(|x| motions[1].start.point(*x));
+        if !a.points.iter().copied().chain(of_b).any(|x| is_deep(&x)) {
+            continue;
+        }
+        shared += 1;
+        let models = trees.map(|t| Model::new(t.build()));
+        let [a, b] = [0, 1].map(|k| {
+            let placed = Placed { place: Pose::IDENTITY, motion: motions[k] };
+            PlacedModel { model: &models[k], placed }
+        });
+        let d = at_instant(&DistanceQuery { a, b, tolerance: 1e-6, limit: 40_000 }, 0.0);
+        if d.upper > 0.0 {
+            missed.push(format!("pair {i}: {d:?}"));
+        }
+    }
+    println!("{shared} of {count} share points");
+    assert!(missed.is_empty(), "{} missed, such as {:#?}", missed.len(), &missed[..missed.len().min(3)]);
+    assert!(5 * shared > count, "{shared} of {count}");
+}

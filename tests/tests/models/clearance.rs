@@ -2,7 +2,7 @@
 //!
 //! `CONTACTD_ROBOTS=2000 cargo test --release -p contactd-tests --test models clearance::` sets the number of random arms (20 by default).
 
-use super::robots::{Arm, Joint, frame, models, read};
+use super::robots::{Arm, Joint, frame, models, read, shift};
 use contactd::clearance::{Least, Question, least};
 use contactd::import::robot::{Ask, Values};
 use contactd_tests::random_solids::Random;
@@ -161,4 +161,83 @@ fn a_ball_on_an_arm_comes_as_near_as_its_arc_does() {
         let right = found.lower <= expected + 1e-12 && expected <= found.upper + 1e-12;
         assert!(right && found.upper - found.lower <= 1e-6, "{k}: {expected} in {found:?}");
     }
+}
+
+/// A box, a ball or a cylinder as URDF writes it, and how deep a point of its frame lies in it, but for edges.
+fn solid(r: &mut Random) -> (String, Box<dyn Fn(DVec3) -> f64>) {
+    let (x, y, z) = (r.within(0.05, 0.4), r.within(0.05, 0.4), r.within(0.05, 0.4));
+    match r.below(3) {
+        0 => {
+            let half = DVec3::new(x, y, z);
+            let text = format!("<box size=\"{:?} {:?} {:?}\"/>", 2.0 * x, 2.0 * y, 2.0 * z);
+            (text, Box::new(move |p| (half - p.abs()).min_element()))
+        }
+        1 => (format!("<sphere radius=\"{x:?}\"/>"), Box::new(move |p| x - p.length())),
+        _ => {
+            let text = format!("<cylinder radius=\"{x:?}\" length=\"{:?}\"/>", 2.0 * z);
+            (text, Box::new(move |p| (x - p.x.hypot(p.y)).min(z - p.z.abs())))
+        }
+    }
+}
+
+/// Two links that a slide moves through each other or past: a clash is told wherever a sampled point lies deep in both, and none is
+/// excluded that there is.
+#[test]
+fn what_clashes_at_a_value_of_the_range_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut r = Random::new(33);
+    let (mut clashes, mut clear) = (0, 0);
+    for k in 0..sized("CONTACTD_ROBOTS", 60usize) {
+        let [(base, in_base), (tool, in_tool)] = [solid(&mut r), solid(&mut r)];
+        let (xyz, rpy) = (r.vector(0.5), r.vector(3.0));
+        let text = format!(
+            "<robot><link name=\"base\"><collision><geometry>{base}</geometry></collision></link><link name=\"hub\"/>\
+             <link name=\"tool\"><collision><origin xyz=\"{:?} {:?} {:?}\" rpy=\"{:?} {:?} {:?}\"/><geometry>{tool}</geometry>\
+             </collision></link><joint name=\"lift\" type=\"prismatic\"><parent link=\"base\"/><child link=\"hub\"/>\
+             <axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"1\"/></joint><joint name=\"s\" type=\"prismatic\">\
+             <parent link=\"hub\"/><child link=\"tool\"/><axis xyz=\"1 0 0\"/><limit lower=\"-1\" upper=\"1\"/></joint></robot>",
+            xyz.x, xyz.y, xyz.z, rpy.x, rpy.y, rpy.z
+        );
+        let (robot, scene) = read(folder.path(), "slide.urdf", &text, &Ask::default());
+        let from = r.within(-1.0, 0.5);
+        // Many are one value alone.
+        let to = from + if r.chance(0.5) { 0.0 } else { r.within(0.0, 0.4) };
+        let question = Question {
+            ranges: vec![("s".into(), [from, to])],
+            values: Values::new(),
+            tolerance: 1e-3,
+            least: if r.chance(0.3) { Some(5e-4) } else { None },
+            boxes: 100_000,
+        };
+        let found = least(&robot, &scene, &models(&scene), &question).expect("an answer");
+        // The deepest of many points.
+        let mut deepest = f64::NEG_INFINITY;
+        for value in 0..=8 {
+            let stand = shift(DVec3::X * (from + (to - from) * f64::from(value) / 8.0)) * frame(xyz, rpy);
+            let back = stand.inverse();
+            let own = |p: DVec3| in_base(p).min(in_tool(back.transform_point3(p)));
+            let (mut best, mut size) = (DVec3::ZERO, 0.5);
+            let mut depth = own(best);
+            for _ in 0..500 {
+                let p = best + r.direction() * (size * r.within(0.0, 1.0));
+                if own(p) > depth {
+                    (best, depth) = (p, own(p));
+                } else {
+                    size *= 0.99;
+                }
+            }
+            deepest = deepest.max(depth);
+        }
+        if deepest > 1e-6 {
+            clashes += 1;
+            // Nearer than was asked says enough.
+            let is_told = found.upper == 0.0 || question.least.is_some_and(|least| found.upper < least);
+            assert!(is_told, "{k}: {deepest} deep: {found:?}\n{text}");
+        }
+        assert!(found.is_settled, "{k}: {deepest} deep from {from} to {to}, {question:?}: {found:?}\n{text}");
+        assert!(found.upper == 0.0 || question.least.is_some() || found.lower > 0.0, "{k}: {found:?}");
+        clear += u32::from(found.lower > 0.0);
+    }
+    println!("{clashes} clash, {clear} clear");
+    assert!(clashes > 10 && clear > 10, "{clashes} {clear}");
 }

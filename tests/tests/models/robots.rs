@@ -79,7 +79,7 @@ pub(super) fn turn(axis: DVec3, angle: f64) -> DMat4 {
     )
 }
 
-fn shift(v: DVec3) -> DMat4 {
+pub(super) fn shift(v: DVec3) -> DMat4 {
     DMat4::from_translation(v)
 }
 

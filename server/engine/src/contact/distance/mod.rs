@@ -55,7 +55,7 @@ impl NearPoint {
 pub struct Distance {
     /// Proven: no two points of the bodies are nearer to each other. A length; infinite where a body has no points.
     pub lower: f64,
-    /// Proven: two points of them are no farther apart, `a` and `b` but for rounding. 0 where the bodies share a point; infinite
+    /// Proven: two points of them are no farther apart, `a` and `b` but for rounding. 0 where a point is known that they share; infinite
     /// where no points were found.
     pub upper: f64,
     /// When these are so near, fraction of the step.
@@ -66,6 +66,8 @@ pub struct Distance {
     pub b: NearPoint,
     /// True when the bounds are as near to each other as was asked, or as rounding lets them be.
     pub is_settled: bool,
+    /// What rounding may take from a bound, a length: bodies that are no farther apart touch, for all that numbers tell.
+    pub rounding: f64,
     /// Pairs of parts that were looked at.
     pub cells: u64,
 }
@@ -93,6 +95,7 @@ fn between(query: &DistanceQuery, from: f64, to: f64) -> Distance {
             a: NearPoint::NONE,
             b: NearPoint::NONE,
             is_settled: true,
+            rounding: 0.0,
             cells: 0,
         };
     }

@@ -23,6 +23,9 @@ const SMALL: f64 = 1e-3;
 const EXACT: f64 = 1e-15;
 /// Every so many looks the nearest points are looked for, once a few were.
 const EVERY: u64 = 8;
+/// Steps of one length on the way to a common point, and the next length.
+const STEPS: usize = 32;
+const SHORTER: f64 = 0.25;
 /// Looks at first that each look for the nearest points.
 const FIRST: u64 = 24;
 
@@ -115,7 +118,11 @@ impl<'a> Search<'a> {
             self.first_points(from, to);
             self.push(0, 0, 0, 0.0);
             self.search();
-            let lower = self.queue.lowest().min(self.done).min(self.upper);
+            let lower = self.queue.lowest().min(self.done);
+            if lower <= 0.0 {
+                self.share();
+            }
+            let lower = lower.min(self.upper);
             return self.answer(lower, from);
         }
         self.answer(0.0, from)
@@ -164,10 +171,11 @@ impl<'a> Search<'a> {
     fn answer(self, lower: f64, from: f64) -> Distance {
         let lower = lower.max(0.0);
         let is_settled = self.upper - lower <= self.tolerance || lower == self.upper;
+        let rounding = self.slack;
         let Some((pair, time)) = self.best.filter(|_| self.parts.len() == 2) else {
             let upper = if lower == f64::INFINITY { lower } else { self.upper };
             let (a, b, cells) = (NearPoint::NONE, NearPoint::NONE, self.cells);
-            return Distance { lower, upper, time: from, a, b, is_settled: lower == upper, cells };
+            return Distance { lower, upper, time: from, a, b, is_settled: lower == upper, rounding, cells };
         };
         let at = self.relative[0].at(time);
         let polish = self.polish([0, 0], &at);
@@ -176,7 +184,7 @@ impl<'a> Search<'a> {
             faces: polish.faces(side, own),
         };
         let (a, b) = (near(0, pair.x, pair.x), near(1, at.a_point(pair.y), pair.y));
-        Distance { lower, upper: self.upper, time, a, b, is_settled, cells: self.cells }
+        Distance { lower, upper: self.upper, time, a, b, is_settled, rounding, cells: self.cells }
     }
 
     fn polish<'s>(&'s self, parts: [u32; 2], at: &'s Instant) -> Polish<'s, 'a> {
@@ -233,6 +241,42 @@ impl<'a> Search<'a> {
             (self.best, self.upper) = (Some((pair, at.t)), pair.distance);
         }
         Some(pair)
+    }
+
+    /// Looks for a point of both bodies beside points of them that are as near as was asked: of bodies that lie in each other the search
+    /// may come to where their surfaces meet.
+    ///
+    /// It steps against the gradient of the higher f, by ever shorter steps: where both are convex the way to any point of both becomes
+    /// shorter by a step that is shorter than that point is deep (N. Z. Shor, Minimization Methods for Non-Differentiable Functions,
+    /// Springer 1985, section 2.1).
+    fn share(&mut self) {
+        let Some((pair, t)) = self.best.filter(|_| self.upper > 0.0 && self.upper <= self.tolerance) else { return };
+        let at = self.relative[0].at(t);
+        let higher = |x: DVec3| {
+            let y = at.b_point(x);
+            let [(f, f_id), (g, g_id)] = [self.models[0].deciding(x), self.models[1].deciding(y)];
+            let gradient = |k: usize, id: LiteralId, x: DVec3| {
+                literal_at(&self.models[k].solid.faces[id.face() as usize], id.sense(), x).1
+            };
+            if f >= g { (f, gradient(0, f_id, x)) } else { (g, at.a_vector(gradient(1, g_id, y))) }
+        };
+        let (mut best, mut step) = ((f64::INFINITY, pair.x), self.models[0].size().min(self.models[1].size()));
+        while step > self.slack {
+            step *= SHORTER;
+            let mut x = best.1;
+            for _ in 0..STEPS {
+                let (f, gradient) = higher(x);
+                if f <= -self.rounding {
+                    let pair = Pair { x, y: at.b_point(x), distance: 0.0 };
+                    (self.best, self.upper) = (Some((pair, t)), 0.0);
+                    return;
+                }
+                if f < best.0 {
+                    best = (f, x);
+                }
+                x -= gradient * step;
+            }
+        }
     }
 
     /// Moves the nearest points that are known to the time at which they are nearest: where the distance neither grows nor shrinks, by
