@@ -84,6 +84,8 @@ pub struct Found {
     /// How many are proven separate: by their boxes, by a search, and by what follows from the sides of
     /// surfaces alone.
     pub separate: [u64; 3],
+    /// How many a scene's rules leave out: none of them is asked of.
+    pub left_out: u64,
 }
 
 /// Something that stands.
@@ -106,7 +108,7 @@ impl<'a> Standing<'a> {
     }
 }
 
-/// The objects of a scene at its start, with the scene's models in order.
+/// The objects of a scene at its start, with the scene's models in order; not the pairs that no rule tests.
 pub fn of_scene(scene: &Scene, models: &[Arc<Model>], tolerance: Option<f64>) -> Found {
     let standing: Vec<Standing<'_>> = scene
         .objects
@@ -114,7 +116,7 @@ pub fn of_scene(scene: &Scene, models: &[Arc<Model>], tolerance: Option<f64>) ->
         .map(|o| Standing::new(o.name.clone(), &models[o.model], o.motion.start.compose(&o.place)))
         .collect();
     let mut found = Found::default();
-    siblings("", &standing, tolerance, &mut found);
+    siblings("", &standing, tolerance, |i, j| scene.is_tested(i, j), &mut found);
     found.order();
     found
 }
@@ -181,7 +183,7 @@ pub fn of_volumes(
     for (i, volume) in volumes.volumes.iter().enumerate().filter(|(_, v)| is_asked(v)) {
         let standing: Vec<Standing<'_>> =
             volume.daughters.iter().map(|d| Standing::new(d.name.clone(), &models[d.volume], d.pose)).collect();
-        siblings(&volume.name, &standing, tolerance, &mut found);
+        siblings(&volume.name, &standing, tolerance, |_, _| true, &mut found);
         let Some(outside) = of.iter().position(|o| *o == i) else { continue };
         let outside = Standing::new(String::new(), &outsides[outside], Pose::IDENTITY);
         let verdicts: Vec<Verdict> =
@@ -194,10 +196,19 @@ pub fn of_volumes(
     found
 }
 
-/// All pairs of what stands in the same place: those whose boxes meet are asked of.
-fn siblings(within: &str, standing: &[Standing<'_>], tolerance: Option<f64>, found: &mut Found) {
-    let (near, by_boxes) = near(standing);
+/// All pairs of what stands in the same place that are tested: those whose boxes meet are asked of.
+fn siblings(
+    within: &str,
+    standing: &[Standing<'_>],
+    tolerance: Option<f64>,
+    is_tested: impl Fn(usize, usize) -> bool,
+    found: &mut Found,
+) {
+    let (mut near, by_boxes) = near(standing);
     found.separate[0] += by_boxes;
+    let all = near.len();
+    near.retain(|[i, j]| is_tested(*i, *j));
+    found.left_out += (all - near.len()) as u64;
     let verdicts: Vec<Verdict> = near
         .par_iter()
         .map_init(Scratch::default, |scratch, [i, j]| ask([&standing[*i], &standing[*j]], tolerance, scratch))

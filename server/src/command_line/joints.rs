@@ -79,6 +79,14 @@ impl JointArguments {
     }
 }
 
+impl JointArguments {
+    /// They say how a robot stands, and not how it moves.
+    pub fn no_step(&self) -> Result<(), String> {
+        let expected = "expected --joints in place of --to: overlaps are of what stands, not of a step";
+        if self.to.is_empty() { Ok(()) } else { Err(expected.into()) }
+    }
+}
+
 /// The scene without the pairs that touch at its start, where that was asked for; they are told on standard error.
 pub(super) fn without_touching(
     scene: Scene,

@@ -1,6 +1,6 @@
 //! `contactd overlaps`: what is in each other of a GDML or OpenMC geometry or a scene.
 
-use super::joints::JointArguments;
+use super::joints::{JointArguments, without_touching};
 use super::{AccessArguments, CacheArguments, Done, models_of, prepare_parts, prepare_scene, print, scene_of, warn};
 use crate::import::{Facets, Limits, Scene, gdml, openmc, read_bytes};
 use crate::octree::Model;
@@ -56,8 +56,10 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
             if let Some(file) = files.iter().find(|f| is_gdml(f)) {
                 return Err(format!("expected one GDML file alone, found {} among others", file.display()).into());
             }
+            arguments.joints.no_step()?;
             let scene = scene_of(files, &arguments.access, &arguments.joints)?;
             let models = models_of(&prepare_scene(&scene, Facets::Auto, &arguments.cache)?);
+            let scene = without_touching(scene, &models, &arguments.joints)?;
             (overlaps::of_scene(&scene, &models, arguments.tolerance), scene.unit)
         }
     };
@@ -92,8 +94,13 @@ fn text(found: &Found, unit: &str) -> String {
     let [by_boxes, searched, by_surfaces] = found.separate;
     let surfaces = if by_surfaces > 0 { format!(", {by_surfaces} by their surfaces alone") } else { String::new() };
     let many = |n: usize, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
+    let left_out = if found.left_out > 0 {
+        format!(", {} left out by rules", many(found.left_out as usize, "pair"))
+    } else {
+        String::new()
+    };
     let mut out = format!(
-        "{}, {open} not proven, {} pairs proven separate ({by_boxes} by their boxes{surfaces})\n",
+        "{}, {open} not proven, {} pairs proven separate ({by_boxes} by their boxes{surfaces}){left_out}\n",
         many(overlaps, "overlap"),
         by_boxes + searched + by_surfaces
     );
@@ -139,7 +146,8 @@ fn as_json(found: &Found) -> String {
     let [overlaps, open] = found.counts();
     json!({
         "overlaps": overlaps, "not_proven": open, "separate": found.separate.iter().sum::<u64>(),
-        "separate_by_boxes": found.separate[0], "separate_by_surfaces": found.separate[2], "pairs": found.pairs.iter().map(pair).collect::<Vec<_>>(),
+        "separate_by_boxes": found.separate[0], "separate_by_surfaces": found.separate[2],
+        "left_out": found.left_out, "pairs": found.pairs.iter().map(pair).collect::<Vec<_>>(),
     })
     .to_string()
         + "\n"

@@ -14,7 +14,7 @@ use super::openscad::Access;
 use super::problem::Problem;
 use super::{Facets, Import, ImportError, Limits, Note, Place};
 use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
-use contactd_proto::{Motion, MotionState, Pose, Report, Rule};
+use contactd_proto::{Detect, Motion, MotionState, Pose, Report, Rule};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -165,6 +165,14 @@ pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
 }
 
 impl Scene {
+    /// True where the rules test a pair of objects, by their indices: the first rule that names them decides; without rules all are.
+    pub fn is_tested(&self, a: usize, b: usize) -> bool {
+        let objects = [a, b].map(|i| &self.objects[i]);
+        let (groups, names) = (objects.map(|o| o.group.as_str()), objects.map(|o| o.name.as_str()));
+        let deciding = self.rules.iter().find(|rule| rule.names(groups, names));
+        self.rules.is_empty() || deciding.is_some_and(|rule| rule.detect != Detect::Off)
+    }
+
     /// Reads a scene from its text; `file` is what errors call it, `folder` what its models' files are relative to.
     pub fn parse(file: &str, text: &str, folder: &Path) -> Result<Self, SceneError> {
         let checker = Checker { file, text };
@@ -464,7 +472,7 @@ impl Checker<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contactd_proto::{Detect, InitialOverlap};
+    use contactd_proto::InitialOverlap;
     use std::f64::consts::TAU;
 
     const MODELS: &str = "[[model]]\nname = \"m\"\nfile = \"m.csg\"\n";

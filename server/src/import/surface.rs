@@ -2,9 +2,9 @@
 //! heights.
 //!
 //! As OpenSCAD 2021.01 builds them: a number is a corner of a square of side 1, rows go up in y (of a picture the lowest is the first);
-//! each square has a corner in its middle, as high as its four are in the mean; the solid reaches down to one below the lowest, or to
-//! -1 where that is higher. A short row ends in zeros. A picture's heights are its luminance in hundredths of white, or, inverted, that
-//! of 1 - 255 times it.
+//! each square has a corner in its middle, as high as its four are in the mean; the solid reaches down to one below the lowest that is
+//! told, or to 0 where that is higher. A short row ends in zeros. A picture's heights are its luminance in hundredths of white, or,
+//! inverted, that of 1 - 255 times it.
 
 use super::Place;
 use super::mesh::Polygons;
@@ -19,6 +19,8 @@ struct Heights {
     rows: usize,
     columns: usize,
     all: Vec<f64>,
+    /// The lowest that was told.
+    lowest: f64,
 }
 
 /// The solid between the plane z = `base` and heights above it, given in rows that go up in y, each of `columns` in x,
@@ -71,12 +73,12 @@ pub fn read(bytes: &[u8], (center, invert): (bool, bool), limits: &Limits) -> Re
         true => of_picture(bytes, invert, limits)?,
         false => of_text(bytes, limits)?,
     };
-    let Heights { rows, columns, all } = heights;
+    let Heights { rows, columns, all, lowest } = heights;
     let mut mesh = Polygons::default();
     if rows < 2 || columns < 2 {
         return Ok(mesh);
     }
-    let base = all.iter().fold(0.0, |m: f64, h| m.min(h - 1.0));
+    let base = (lowest - 1.0).min(0.0);
     let half = |n: usize| if center { (n - 1) as f64 * 0.5 } else { 0.0 };
     let at = |row: f64, column: f64, z: f64| DVec3::new(column - half(columns), row - half(rows), z);
     let height = |row: usize, column: usize| all[row * columns + column];
@@ -122,8 +124,9 @@ fn of_text(bytes: &[u8], limits: &Limits) -> Result<Heights> {
         rows.push(row);
         affordable(rows.len(), columns, limits)?;
     }
+    let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     let all = rows.iter().flat_map(|r| (0..columns).map(|c| r.get(c).copied().unwrap_or(0.0))).collect();
-    Ok(Heights { rows: rows.len(), columns, all })
+    Ok(Heights { rows: rows.len(), columns, all, lowest })
 }
 
 fn of_picture(bytes: &[u8], invert: bool, limits: &Limits) -> Result<Heights> {
@@ -147,7 +150,8 @@ fn of_picture(bytes: &[u8], invert: bool, limits: &Limits) -> Result<Heights> {
             all.push(100.0 / 255.0 * if invert { 1.0 - light } else { light });
         }
     }
-    Ok(Heights { rows, columns: width, all })
+    let lowest = all.iter().copied().fold(f64::INFINITY, f64::min);
+    Ok(Heights { rows, columns: width, all, lowest })
 }
 
 #[cfg(test)]
@@ -232,6 +236,17 @@ mod tests {
             };
             check(&png, round % 2 == 1, invert, (rows, columns), &light);
         }
+    }
+
+    /// As OpenSCAD 2021.01 exports it.
+    #[test]
+    fn what_a_short_row_lacks_does_not_lower_the_base() {
+        let base = |text: &str| {
+            let mesh = read(text.as_bytes(), (false, false), &Limits::default()).expect("a surface");
+            mesh.points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
+        };
+        assert_eq!(base("1 2 3 4\n4 5\n7 8 10\n"), 0.0);
+        assert_eq!((base("1 2\n0.5 3\n"), base("1 2\n-3 3\n"), base("5 2\n3 3\n")), (-0.5, -4.0, 0.0));
     }
 
     #[test]

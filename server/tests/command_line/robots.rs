@@ -181,3 +181,47 @@ fn a_step_begins_at_a_keyframe() {
         assert!(status == Some(2) && said.contains(words), "{joints}: {said}");
     }
 }
+
+/// Two balls of 0.1 m whose middles are 0.05 m apart, but for what a joint, a file or a rule says of them.
+#[test]
+fn overlaps_are_asked_of_the_pairs_that_are_tested() {
+    let ball = "<collision><geometry><sphere radius=\"0.1\"/></geometry></collision>";
+    let robot = format!(
+        "<robot name=\"r\"><link name=\"a\">{ball}</link><link name=\"hub\"/><link name=\"b\">{ball}</link>\
+         <joint name=\"f\" type=\"fixed\"><parent link=\"a\"/><child link=\"hub\"/></joint>\
+         <joint name=\"s\" type=\"prismatic\"><parent link=\"hub\"/><child link=\"b\"/><axis xyz=\"1 0 0\"/>\
+         <limit lower=\"0\" upper=\"1\"/></joint></robot>"
+    );
+    let srdf = "<robot name=\"r\"><disable_collisions link1=\"a\" link2=\"b\" reason=\"Never\"/></robot>";
+    let scene = |rule: &str| {
+        let object = |name: &str, x: f64| {
+            format!(
+                "[[object]]\nname = \"{name}\"\nmodel = \"ball\"\ngroup = \"g\"\nstart = {{ position = [{x}, 0.0, 0.0] }}\n"
+            )
+        };
+        format!(
+            "unit = \"m\"\n[[model]]\nname = \"ball\"\nfile = \"ball.csg\"\n{}{}[[rule]]\nbetween = [\"g\", \"g\"]\n{rule}\n",
+            object("a", 0.0),
+            object("b", 0.05)
+        )
+    };
+    let (off, except) = ("detect = \"off\"", "except = [[\"a\", \"b\"]]");
+    let (off, except, on) = (scene(off), scene(except), scene("report = \"contact\""));
+    let ball = "sphere($fn = 0, $fa = 12, $fs = 2, r = 0.1);";
+    let files = [("r.urdf", &*robot), ("r.srdf", srdf), ("ball.csg", ball)];
+    let folder = folder(&[&files[..], &[("off.toml", &*off), ("except.toml", &*except), ("on.toml", &*on)]].concat());
+    for (words, status, said) in [
+        (&["r.urdf", "--joints", "s=0.05"][..], 1, "a and b: at least 0.075 m deep"),
+        (&["r.urdf", "--joints", "s=0.3"], 0, "1 pairs proven separate"),
+        (&["r.urdf", "--joints", "s=0.05", "--srdf", "r.srdf"], 0, "1 pair left out by rules"),
+        (&["r.urdf", "--joints", "s=0.05", "--ignore-touching"], 0, "1 pair left out by rules"),
+        (&["on.toml"], 1, "a and b: at least 0.075 m deep"),
+        (&["off.toml"], 0, "1 pair left out by rules"),
+        (&["except.toml"], 0, "1 pair left out by rules"),
+        (&["r.urdf", "--to", "s=0.05"], 2, "expected --joints in place of --to"),
+    ] {
+        let out = run(folder.path(), &[&["overlaps"], words].concat());
+        let told = format!("{}{}", text(&out.stdout), text(&out.stderr));
+        assert!(out.status.code() == Some(status) && told.contains(said), "{words:?}: {told}");
+    }
+}

@@ -328,8 +328,22 @@ fn lengths_with_units_are_what_they_are_to_openscad() {
         (format!("<defs>{rect}</defs>"), None),
         (format!("<defs><symbol id='s'>{rect}</symbol></defs><use href='#s' x='20'/>"), None),
         (format!("<g><defs><g>{rect}</g></defs></g>"), None),
+        // OpenSCAD leaves what is only defined at the first end of one.
+        (format!("<defs><defs><circle r='9'/></defs>{rect}</defs>"), as_it_is),
+        (format!("<defs>{rect}<defs><circle r='9'/></defs></defs>"), None),
     ] {
         is(&format!("<svg width='100' height='100' viewBox='0 0 100 100'>{text}</svg>"), expected);
+    }
+    // Of several pages the last one counts for all shapes, and where it stands does not.
+    for (inner, expected) in [
+        ("x='5' y='5' width='50' height='50' viewBox='0 0 100 100'", [1.76389, 3.52777, 12.3472, 15.875]),
+        ("", [10.0, -80.0, 70.0, -10.0]),
+        ("width='100mm' height='100mm' viewBox='0 0 100 100'", [10.0, 20.0, 70.0, 90.0]),
+    ] {
+        let shapes = format!(
+            "<rect x='10' y='10' width='20' height='20'/><svg {inner}><rect x='50' y='50' width='20' height='30'/></svg>"
+        );
+        is(&format!("<svg width='100mm' height='100mm' viewBox='0 0 100 100'>{shapes}</svg>"), Some(expected));
     }
     // At random: as if 0 stood there, and counted.
     let mut r = Random::new(41);

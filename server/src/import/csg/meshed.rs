@@ -131,12 +131,22 @@ impl Meshed {
         Ok(paths.into_iter().map(|p| p.into_iter().map(|v| DVec2::new(v.x, v.y)).collect()).collect())
     }
 
-    /// Where the plane z = 0 cuts it, as closed paths; of a face in that plane what lies above it.
+    /// Where the plane z = 0 cuts it, as closed paths, faces in that plane with it, whichever side the solid is on.
     ///
     /// # Errors
     /// A mesh that the operation does not take.
     pub fn section(&self, at: Place) -> Result<Vec<Vec<DVec2>>> {
-        let paths = guarded(at, || self.solid.slice(0.0).to_polygons())?;
+        let paths = guarded(at, || {
+            let mesh = self.solid.get_mesh_gl64(-1);
+            let in_plane = |t: &[u64]| t.iter().all(|v| mesh.get_vert_pos(*v as usize)[2] == 0.0);
+            // A slice has what lies above the plane.
+            let above = self.solid.slice(0.0);
+            if mesh.tri_verts.chunks_exact(3).any(in_plane) {
+                above.union(&self.solid.mirror(Vec3::new(0.0, 0.0, 1.0)).slice(0.0)).to_polygons()
+            } else {
+                above.to_polygons()
+            }
+        })?;
         Ok(paths.into_iter().map(|p| p.into_iter().map(|v| DVec2::new(v.x, v.y)).collect()).collect())
     }
 

@@ -64,7 +64,7 @@ fn of_paths(parts: &mut Parts<'_>, at: Place, like: &Flat, paths: Vec<Vec<DVec2>
     flat(like, Outline::Paths(paths), DVec2::ZERO)
 }
 
-/// What the plane z = 0 cuts of some solids, of a face in it what lies above it, as flat parts like `like`.
+/// What the plane z = 0 cuts of some solids, faces in it with it, whichever side the solid is on, as flat parts like `like`.
 ///
 /// # Errors
 /// Whatever a mesh of a primitive fails for.
@@ -156,7 +156,7 @@ impl Cut {
             let [low, high] = [self.level(middle.z - half), self.level(middle.z + half)];
             let (bottom, top) = if axis.z > 0.0 { (bottom, top) } else { (top, bottom) };
             let radius = bottom + (top - bottom) * (-low / (high - low));
-            Some(if low <= 0.0 && high > 0.0 { circle(radius) } else { None })
+            Some(if low <= 0.0 && high >= 0.0 { circle(radius) } else { None })
         };
         match shape {
             Shape::Sphere(s) => Some(circle((s.radius * s.radius - middle.z * middle.z).max(0.0).sqrt())),
@@ -185,9 +185,6 @@ impl Cut {
     /// The section of the hull of points: that of all ways between two of them.
     fn polygon(&self, corners: &[DVec3]) -> Option<(Outline, DVec2)> {
         let corners: Vec<DVec3> = corners.iter().map(|c| c.with_z(self.level(c.z))).collect();
-        if corners.iter().all(|c| c.z <= 0.0) {
-            return None;
-        }
         let mut points: Vec<DVec2> = corners.iter().filter(|c| c.z == 0.0).map(|c| c.truncate()).collect();
         for a in corners.iter().filter(|c| c.z < 0.0) {
             for b in corners.iter().filter(|c| c.z > 0.0) {
@@ -205,7 +202,7 @@ impl Cut {
         let across = n.truncate();
         if across.length() <= SAME {
             let z = self.level(frame.position.z);
-            let here = if n.z > 0.0 { z > 0.0 } else { z <= 0.0 };
+            let here = if n.z > 0.0 { z >= 0.0 } else { z <= 0.0 };
             let corners = [[-far, -far], [far, -far], [far, far], [-far, far]];
             return here.then(|| (Outline::Paths(vec![corners.map(DVec2::from_array).to_vec()]), middle));
         }

@@ -266,6 +266,42 @@ fn extrusions_are_prisms_and_their_set_operations() {
     assert_eq!(import(&path).solid.aabb().max, DVec3::new(2.0, 2.0, 1.0));
 }
 
+/// As OpenSCAD 2021.01 cuts them (`openscad -o x.stl`): solids have their faces, and so have what is taken away.
+#[test]
+fn a_section_has_the_faces_in_its_plane() {
+    let cube = |x: f64, y: f64, z: f64, size: [f64; 3]| {
+        format!("translate([{x}, {y}, {z}]) cube(size = [{}, {}, {}]);", size[0], size[1], size[2])
+    };
+    let (around, below) = (cube(0.0, 0.0, -5.0, [10.0; 3]), cube(0.0, 0.0, -5.0, [5.0; 3]));
+    let (over, under) = (cube(2.0, 2.0, 0.0, [3.0, 3.0, 9.0]), cube(2.0, 2.0, -9.0, [3.0, 3.0, 9.0]));
+    let mesh = |z: f64| {
+        format!(
+            "translate([0, 0, {z}]) minkowski() {{ cube(size = [4, 4, 2]); cylinder($fn = 6, $fa = 12, $fs = 2, h = 1, r1 = 1, r2 = 1); }}"
+        )
+    };
+    let (middle, corner) = ([3.5, 3.5], [1.0, 1.0]);
+    for (text, inside, outside) in [
+        (format!("difference() {{ {around} {over} }}"), vec![corner], vec![middle]),
+        (format!("difference() {{ {around} {under} }}"), vec![corner], vec![middle]),
+        (format!("intersection() {{ {below} {over} }}"), vec![middle], vec![corner]),
+        (format!("intersection() {{ {around} {under} }}"), vec![middle], vec![corner]),
+        (format!("{below} {}", cube(8.0, 0.0, 0.0, [1.0; 3])), vec![corner, [8.5, 0.5]], vec![[6.0, 0.5]]),
+        (mesh(-3.0), vec![corner], vec![[7.0, 1.0]]),
+        (mesh(0.0), vec![corner], vec![[7.0, 1.0]]),
+        (
+            "translate([0, 0, -2]) cylinder($fn = 0, $fa = 12, $fs = 2, h = 2, r1 = 4, r2 = 3);".into(),
+            vec![corner, [2.9, 0.0]],
+            vec![[3.1, 0.0]],
+        ),
+        (cube(0.0, 0.0, -5.0, [5.0, 5.0, 4.999]), vec![], vec![corner]),
+    ] {
+        let solid = import(&format!("linear_extrude(height = 1) {{ projection(cut = true) {{ {text} }} }}")).solid;
+        let value = |[x, y]: [f64; 2]| solid.value(DVec3::new(x, y, 0.5));
+        assert!(inside.iter().all(|x| value(*x) < 0.0), "{text}");
+        assert!(outside.iter().all(|x| value(*x) > 0.0), "{text}");
+    }
+}
+
 #[test]
 fn infinite_primitives_are_half_spaces() {
     let half = "cylinder(h = inf, r1 = inf, r2 = inf, center = false);";

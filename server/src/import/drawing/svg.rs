@@ -44,11 +44,12 @@ pub fn read(bytes: &[u8], frame: &Frame<'_>) -> Result<Drawing> {
     if root.tag_name().name() != "svg" {
         return Err(xml::wrong(root, "an element svg", Some(root.tag_name().name())));
     }
-    let mut reader = Reader { frame, shapes: Vec::new(), corners: 0, off: 0.0, left: BTreeMap::new(), zeros: None };
+    let page = Page::of(root, frame.dpi);
+    let (shapes, left) = (Vec::new(), BTreeMap::new());
+    let mut reader = Reader { frame, page, shapes, corners: 0, off: 0.0, left, zeros: None, is_defined: false };
     let all = frame.id.is_empty() && frame.layer.is_empty();
     reader.element(root, DAffine2::IDENTITY, (all, false), 0)?;
-    let page = Page::of(root, frame.dpi);
-    let Reader { mut shapes, off, left, zeros, .. } = reader;
+    let Reader { page, mut shapes, off, left, zeros, .. } = reader;
     let scale = page.scale;
     let origin = if frame.center {
         let corners = || shapes.iter().flatten().flatten();
@@ -133,12 +134,16 @@ fn length(text: &str) -> Option<(f64, &'static str)> {
 /// What was read.
 struct Reader<'f> {
     frame: &'f Frame<'f>,
+    /// The page that was read last.
+    page: Page,
     shapes: Vec<Vec<Path>>,
     corners: usize,
     /// How far pieces of curves lie off them at most, in the drawing's units.
     off: f64,
     left: BTreeMap<String, usize>,
     zeros: Zeros,
+    /// Within `defs`, as OpenSCAD counts: up to the first end of one.
+    is_defined: bool,
 }
 
 /// The elements that are shapes.
@@ -175,8 +180,11 @@ impl Reader<'_> {
         let to_page = to_page * own;
         let mut pen = Pen { paths: Vec::new(), off: 0.0, stroke: Stroke::of(node), zeros: None };
         match name {
-            "svg" if depth > 0 => self.leave("svg inside of svg"),
             "svg" | "g" => {
+                // Of several pages the last one is that of all shapes.
+                if name == "svg" {
+                    self.page = Page::of(node, frame.dpi);
+                }
                 for child in node.children().filter(Node::is_element) {
                     self.element(child, to_page, (chosen, layer), depth + 1)?;
                 }
@@ -201,16 +209,17 @@ impl Reader<'_> {
                 let points: Path = numbers.chunks_exact(2).map(|c| DVec2::new(c[0], c[1])).collect();
                 if name == "polyline" { pen.stroke(&points) } else { pen.paths.push(points) }
             }
-            "use" | "text" | "image" => self.leave(name),
+            "use" | "text" | "image" if !self.is_defined => self.leave(name),
             // What changes no shape: gradients, styles, titles, the data of editors; and what is only defined.
             _ => {}
         }
-        if !["svg", "defs"].contains(&name) {
-            for child in node.children().filter(Node::is_element) {
-                self.element(child, outer, (chosen, layer), depth + 1)?;
-            }
+        let was_defined = self.is_defined;
+        self.is_defined |= name == "defs";
+        for child in node.children().filter(Node::is_element) {
+            self.element(child, outer, (chosen, layer), depth + 1)?;
         }
-        if !chosen {
+        self.is_defined &= name != "defs";
+        if !chosen || was_defined {
             return Ok(());
         }
         if let Some((first, count)) = pen.zeros {
