@@ -19,7 +19,7 @@ mod pierced;
 mod proof;
 
 use crate::bound::Region;
-use crate::contact::convex::{ConvexParts, Sight};
+use crate::contact::convex::{ConvexParts, Sight, View};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
@@ -94,7 +94,7 @@ pub(super) fn keeps_apart(task: &Task, way: f64) -> bool {
     let unions = Unions::new(&of_cavities, [&of_a, &of_b], pairs, true);
     (0..unions.pairs.len()).all(|index| {
         unions.convex(index).is_some_and(|parts| parts.stay_apart(least))
-            || unions.cavities(index).iter().any(|pair| pair.prove(1.0, None).0 == ProofEnd::Proven)
+            || unions.cavities(index).any(|pair| pair.prove(1.0, None).0 == ProofEnd::Proven)
     })
 }
 
@@ -153,11 +153,11 @@ struct Event {
     what: Met,
 }
 
-/// What seems to be met: a cavity's wall, by a claim's index and a guess, or one part by another, by the pair's index and the direction
-/// of the world that they are apart in at the start.
+/// What seems to be met: a cavity's wall, by a claim's index and a guess, or one part by another, by the pair's index and how they are
+/// seen at the start.
 enum Met {
     Wall(usize, Guess),
-    Parts(usize, DVec3),
+    Parts(usize, View),
 }
 
 impl<'s, 'a> Unions<'s, 'a> {
@@ -166,7 +166,8 @@ impl<'s, 'a> Unions<'s, 'a> {
     }
 
     fn answer(&self, contacts: &mut Contacts) -> Option<Ending> {
-        let mut cavities = Cavities::new();
+        // Large as they are, they are not moved again.
+        let mut cavities = Cavities::with_capacity(self.pairs.len());
         let claims = self.look(contacts, &mut cavities)?;
         let mut solved = 0;
         for claim in &claims {
@@ -176,24 +177,22 @@ impl<'s, 'a> Unions<'s, 'a> {
     }
 
     /// The body of one part with a cavity of the other, those first that it is in half way of the step, and the one before that it is
-    /// deepest in; then the other way round, where more are asked for. They are appended.
-    fn add_cavities<'u>(&'u self, index: usize, found: &mut Cavities<'u>) {
+    /// deepest in; then the other way round, where more are asked for. Each is made when it is asked for.
+    fn cavities(&self, index: usize) -> impl Iterator<Item = CavityPair<'_>> {
         let (a, b) = self.pairs[index];
         let Self { task, of_a, of_b, .. } = self;
         let (main_a, main_b) = (&task.a.primitives[a.main as usize], &task.b.primitives[b.main as usize]);
         let (most, of_both) = if self.in_region { (MOST_TRIED, 2 * MOST_TRIED) } else { (1, 1) };
         let center = task.relative.at(0.5).b_point(main_a.ball.center);
         let of_b = of_b.holes_at(task.b, b, center, most).into_iter();
-        let of_b = of_b.filter_map(|hole| CavityPair::new(task, main_a, (main_b, hole), Side::B, &task.relative));
-        let all = found.len() + of_both;
-        found.extend(of_b.take(of_both));
-        if found.len() < all {
+        let of_b = of_b.filter_map(move |hole| CavityPair::new(task, main_a, (main_b, hole), Side::B, &task.relative));
+        let of_a = std::iter::once(()).flat_map(move |()| {
             let seen_from_a = self.seen_from_a();
             let center = seen_from_a.at(0.5).b_point(main_b.ball.center);
             let of_a = of_a.holes_at(task.a, a, center, most).into_iter();
-            let of_a = of_a.filter_map(|hole| CavityPair::new(task, main_b, (main_a, hole), Side::A, seen_from_a));
-            found.extend(of_a.take(all - found.len()));
-        }
+            of_a.filter_map(move |hole| CavityPair::new(task, main_b, (main_a, hole), Side::A, seen_from_a))
+        });
+        of_b.chain(of_a).take(of_both)
     }
 
     /// Both parts, their cavities filled: what keeps apart so does all the more without what is in them.
@@ -203,12 +202,6 @@ impl<'s, 'a> Unions<'s, 'a> {
             return None;
         }
         ConvexParts::new(*self.task, &self.task.a.primitives[a.main as usize], &self.task.b.primitives[b.main as usize])
-    }
-
-    fn cavities(&self, index: usize) -> Cavities<'_> {
-        let mut found = Cavities::new();
-        self.add_cavities(index, &mut found);
-        found
     }
 
     fn seen_from_a(&self) -> &Relative {
@@ -231,7 +224,7 @@ impl<'s, 'a> Unions<'s, 'a> {
             let sight = if self.in_region { self.convex(index).map(|parts| parts.sight()) } else { None };
             match sight {
                 Some(Sight::Free) => {}
-                Some(Sight::Apart { t, n }) => events.push(Event { t, what: Met::Parts(index, n) }),
+                Some(Sight::Apart(view)) => events.push(Event { t: view.t, what: Met::Parts(index, view) }),
                 Some(Sight::Common) | None => {
                     if let Some((claim, guess)) = self.claim(contacts, index, until, cavities, &mut claims)? {
                         if !self.in_region {
@@ -251,10 +244,10 @@ impl<'s, 'a> Unions<'s, 'a> {
                         cavities[claims[claim].cavity].solve(contacts, &guess);
                     }
                 }
-                Met::Parts(index, n) => {
+                Met::Parts(index, view) => {
                     let (a, b) = self.pairs[index];
                     let is_filled = a.is_pierced() || b.is_pierced();
-                    if !self.convex(index)?.meet(contacts, n, is_filled) {
+                    if !self.convex(index)?.meet(contacts, &view, is_filled) {
                         let until = contacts.goal().min(1.0);
                         if let Some((claim, guess)) = self.claim(contacts, index, until, cavities, &mut claims)? {
                             cavities[claims[claim].cavity].solve(contacts, &guess);
@@ -276,30 +269,30 @@ impl<'s, 'a> Unions<'s, 'a> {
         cavities: &mut Cavities<'u>,
         claims: &mut Claims,
     ) -> Option<Option<(usize, Guess)>> {
-        let first = cavities.len();
-        self.add_cavities(index, cavities);
         // Each shows that nothing is met before its guess: the one with the latest says most.
-        let mut latest: Option<(usize, Guess)> = None;
-        for cavity in first..cavities.len() {
-            match seen(contacts, &cavities[cavity], until) {
+        let mut latest: Option<(CavityPair<'u>, Guess)> = None;
+        for pair in self.cavities(index) {
+            match seen(contacts, &pair, until) {
                 None => {}
                 Some(Seen::Kept) => return Some(None),
                 Some(Seen::Never) => {
-                    claims.push(Claim { cavity, index, toward: None });
+                    claims.push(Claim { cavity: cavities.len(), index, toward: None });
+                    cavities.push(pair);
                     return Some(None);
                 }
                 Some(Seen::Guess(guess)) if latest.as_ref().is_none_or(|(_, other)| guess.t > other.t) => {
-                    latest = Some((cavity, guess));
+                    latest = Some((pair, guess));
                 }
                 Some(Seen::Guess(_)) => {}
             }
         }
-        let (cavity, guess) = latest?;
+        let (pair, guess) = latest?;
         // What seems to be met may lie in another cavity.
-        if let Some(found) = self.claim_stacked(contacts, (index, cavity), &guess, until, cavities, claims) {
+        if let Some(found) = self.claim_stacked(contacts, (index, &pair), &guess, until, cavities, claims) {
             return Some(found);
         }
-        claims.push(Claim { cavity, index, toward: guess.wall.direction() });
+        claims.push(Claim { cavity: cavities.len(), index, toward: guess.wall.direction() });
+        cavities.push(pair);
         Some(Some((claims.len() - 1, guess)))
     }
 
@@ -308,13 +301,12 @@ impl<'s, 'a> Unions<'s, 'a> {
     fn claim_stacked<'u>(
         &'u self,
         contacts: &mut Contacts,
-        (index, cavity): (usize, usize),
+        (index, pair): (usize, &CavityPair<'u>),
         guess: &Guess,
         until: f64,
         cavities: &mut Cavities<'u>,
         claims: &mut Claims,
     ) -> Option<Option<(usize, Guess)>> {
-        let pair = &cavities[cavity];
         let (a, b) = self.pairs[index];
         let (solid, parts, part) = match pair.side {
             Side::A => (self.task.a, self.of_a, a),
@@ -367,8 +359,8 @@ impl<'s, 'a> Unions<'s, 'a> {
             }
             // What one cavity does not show another one may, or the same parts the other way round.
             let end = contacts.goal().min(1.0);
-            let others = if self.in_region { self.cavities(claim.index) } else { Cavities::new() };
-            let shown = others.iter().any(|other| proves(contacts, other, end, None) == ProofEnd::Proven);
+            let mut others = self.cavities(claim.index).take(if self.in_region { usize::MAX } else { 0 });
+            let shown = others.any(|other| proves(contacts, &other, end, None) == ProofEnd::Proven);
             return shown.then_some(());
         }
     }

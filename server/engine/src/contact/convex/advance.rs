@@ -196,15 +196,21 @@ impl<'a> ConvexPair<'a> {
 pub enum Sight {
     /// The line between their middles keeps them apart over the whole step.
     Free,
-    /// Apart in the direction n of the world, but for a few resolutions, along which they meet at about t; infinite where they part.
-    Apart {
-        /// A fraction of the step.
-        t: f64,
-        /// A unit vector, from the first one.
-        n: DVec3,
-    },
+    /// Apart, but for a few resolutions.
+    Apart(View),
     /// They have points in common.
     Common,
+}
+
+/// Two convex parts that are apart at the start of a step, or were one of them a few resolutions off.
+#[derive(Clone, Copy)]
+pub struct View {
+    /// About when they meet along the direction in which they are apart, a fraction of the step; infinite where they part.
+    pub t: f64,
+    found: Nearest,
+    here: Gap,
+    /// They may touch.
+    near: bool,
 }
 
 /// A convex part of each of two solids, which are unions of such.
@@ -223,22 +229,28 @@ impl<'a> ConvexParts<'a> {
             return Sight::Free;
         }
         let way = m.b.support(DVec3::ZERO) - self.0.a.0.ball.center;
-        if let Some((_, here)) = self.0.seen(&m, &m.b, way) {
-            let there = self.0.gap(&end, here.n).phi;
-            let t = if there < here.phi { here.phi / (here.phi - there) } else { f64::INFINITY };
-            return Sight::Apart { t, n: here.n };
-        }
-        let beside = self.0.seen(&m, &self.0.set_off(&m), way);
-        beside.map_or(Sight::Common, |(_, here)| Sight::Apart { t: 0.0, n: here.n })
+        let seen = self.0.seen(&m, &m.b, way);
+        let off = seen.is_none();
+        let Some((found, here)) = seen.or_else(|| self.0.seen(&m, &self.0.set_off(&m), way)) else {
+            return Sight::Common;
+        };
+        let near = off || found.distance <= APART * self.0.task.delta;
+        let there = self.0.gap(&end, here.n).phi;
+        let t = match () {
+            () if off => 0.0,
+            () if there < here.phi => here.phi / (here.phi - there),
+            () => f64::INFINITY,
+        };
+        Sight::Apart(View { t, found, here, near })
     }
 
     /// Looks for the contact of both parts, which counts where both whole trees confirm it; true when nothing is deep in both before the
     /// goal that the contacts have then. What more it is told than that is one of them.
     ///
-    /// At the start they are apart in the direction `along` of the world. Parts that are `filled` have cavities left out here: what they
-    /// seem to meet first may be one.
-    pub fn meet(&self, contacts: &mut Contacts, along: DVec3, filled: bool) -> bool {
-        self.0.frees_to_goal(contacts, along, filled)
+    /// `view` is how they are seen at the start. Parts that are `filled` have cavities left out here: what they seem to meet first may be
+    /// one.
+    pub fn meet(&self, contacts: &mut Contacts, view: &View, filled: bool) -> bool {
+        self.0.frees_to_goal(contacts, view, filled)
     }
 
     /// True when they stay farther apart than `least` (a length) over the whole step.
@@ -390,23 +402,21 @@ impl<'a> Advance<'a> {
     }
 
     /// `run` for two parts of larger bodies: a contact of others ends it as well as their own.
-    fn frees_to_goal(&self, contacts: &mut Contacts, mut along: DVec3, filled: bool) -> bool {
-        let (end_of_step, mut t, mut near) = (self.moment(1.0), 0.0, false);
+    fn frees_to_goal(&self, contacts: &mut Contacts, view: &View, filled: bool) -> bool {
+        let (end_of_step, mut t) = (self.moment(1.0), 0.0);
         let size = self.task.scale.min(self.a.0.ball.radius + self.b.0.ball.radius);
-        let mut own: Option<DVec3> = None;
+        let (mut along, mut own) = (view.here.n, None::<DVec3>);
         for round in 0..ROUNDS {
             let m = self.moment(t);
-            let first = m.at.world_from_a.transpose() * along;
             contacts.counters.closed_forms += 1;
-            let seen = match self.seen(&m, &m.b, first) {
-                None if round == 0 || near => {
-                    near = true;
-                    self.seen(&m, &self.set_off(&m), first)
-                }
-                seen => seen,
+            let first = m.at.world_from_a.transpose() * along;
+            let seen = if round == 0 {
+                Some((view.found, view.here))
+            } else {
+                let beside = || view.near.then(|| self.seen(&m, &self.set_off(&m), first)).flatten();
+                self.seen(&m, &m.b, first).or_else(beside)
             };
             let Some((found, here)) = seen else { return false };
-            near |= round == 0 && found.distance <= APART * self.task.delta;
             along = here.n;
             let last = self.gap(&end_of_step, here.n);
             let goal = contacts.goal().min(1.0);
@@ -417,7 +427,7 @@ impl<'a> Advance<'a> {
             }
             let closing = found.normal.dot(m.at.velocity(found.a));
             let guess = t + found.distance.max(0.0) / closing;
-            if own.is_none() && !near && closing > 0.0 && found.distance <= NEAR * size && guess <= LATEST * goal {
+            if own.is_none() && !view.near && closing > 0.0 && found.distance <= NEAR * size && guess <= LATEST * goal {
                 let mend = found.distance <= MEND.0 * size || round >= MEND.1;
                 own = self.contact(contacts, &m, &found, guess.min(1.0), mend).map(|c| c.n);
                 if own.is_none() && filled && guess <= contacts.goal() {
