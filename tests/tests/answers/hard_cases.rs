@@ -573,11 +573,14 @@ fn a_cone_moved_sideways_in_its_hole_meets_the_wall() {
     // Lifted by 0.1 out of a hole that widens by one half of its height, it has 0.05 to either side.
     let cone = || tip_down(0.5, 1.0);
     let plate = Recipe::cuboid(1.0, 1.0, 0.5).at(0.0, 0.0, 0.5).minus(cone());
-    for direction in [dvec3(1.0, 0.0, 0.0), dvec3(0.6, 0.8, 0.0)] {
-        let motion = going(dvec3(0.0, 0.0, 0.1), DQuat::IDENTITY, 0.2 * direction, DVec3::ZERO);
-        let o = ask(&scene(plate.clone(), still(), cone(), motion));
-        assert_eq!(o.status(), Status::Contact, "{direction}: {o:?}");
-        assert!((o.time() - 0.25).abs() < 1e-8, "{direction}: {} and not 0.25", o.time());
+    // Nothing in front of the search answers for an intersection.
+    for body in [cone(), cone().intersection(Recipe::cuboid(4.0, 4.0, 4.0))] {
+        for direction in [dvec3(1.0, 0.0, 0.0), dvec3(0.6, 0.8, 0.0)] {
+            let motion = going(dvec3(0.0, 0.0, 0.1), DQuat::IDENTITY, 0.2 * direction, DVec3::ZERO);
+            let o = ask(&scene(plate.clone(), still(), body.clone(), motion));
+            assert_eq!(o.status(), Status::Contact, "{direction}: {o:?}");
+            assert!((o.time() - 0.25).abs() < 1e-8, "{direction}: {} and not 0.25", o.time());
+        }
     }
 }
 

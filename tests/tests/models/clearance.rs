@@ -241,3 +241,29 @@ fn what_clashes_at_a_value_of_the_range_is_told() {
     println!("{clashes} clash, {clear} clear");
     assert!(clashes > 10 && clear > 10, "{clashes} {clear}");
 }
+
+/// A ball whose way ends in a block, and is hardly clear of it half way: the bounds there are as near to each other as was asked.
+#[test]
+fn a_range_whose_middle_is_hardly_clear_may_end_in_a_clash() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "<robot><link name=\"base\"><collision><geometry><box size=\"0.4 0.4 0.4\"/></geometry></collision></link>\
+                <link name=\"hub\"/><link name=\"tool\"><collision><geometry><sphere radius=\"0.05\"/></geometry></collision></link>\
+                <joint name=\"lift\" type=\"fixed\"><parent link=\"base\"/><child link=\"hub\"/></joint>\
+                <joint name=\"s\" type=\"prismatic\"><parent link=\"hub\"/><child link=\"tool\"/><axis xyz=\"0 0 1\"/>\
+                <limit lower=\"-1\" upper=\"1\"/></joint></robot>";
+    let (robot, scene) = read(folder.path(), "block.urdf", text, &Ask::default());
+    for (range, least_asked, is_clash) in [
+        ([0.1506, 0.3506], None, true),
+        ([0.1506, 0.3506], Some(5e-4), true),
+        ([0.2506, 0.3506], None, false),
+        ([0.2506, 0.3506], Some(5e-4), false),
+        ([0.25 + 1e-7, 0.3506], None, false),
+    ] {
+        let ranges = vec![("s".into(), range)];
+        let question = Question { ranges, values: Values::new(), tolerance: 1e-3, least: least_asked, boxes: 10_000 };
+        let found = least(&robot, &scene, &models(&scene), &question).expect("an answer");
+        let told = format!("{range:?}, {least_asked:?}: {found:?}");
+        assert!(found.is_settled && (found.upper == 0.0) == is_clash, "{told}");
+        assert!(is_clash || found.lower > 0.0 && least_asked.is_none_or(|least| found.lower >= least), "{told}");
+    }
+}

@@ -3,14 +3,18 @@
 use super::body::{Moment, Plane};
 use super::pierced::{CavityPair, Wall};
 use super::proof::ProofEnd;
+use super::{Sight, Unions};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
+use crate::contact::witness::contacts::Contacts;
+use crate::contact::witness::found::Ending;
 use crate::contact::{PairQuery, PlacedModel, QueryOptions, Strategies, default_resolution};
 use crate::math::random::Random;
 use crate::motion::{Placed, Relative};
 use crate::octree::Model;
 use crate::octree::testing::{pierced, simple};
 use crate::solid::local::LiteralId;
+use crate::solid::parts::Parts;
 use crate::solid::primitive::{Cone, Cuboid, Cylinder, Sphere};
 use crate::solid::{Label, Op, Sense, Shape, SolidBuilder};
 use contactd_proto::motion::quat_of_rotation_vector;
@@ -115,6 +119,48 @@ fn unions_that_are_shown_to_keep_apart_are_farther_apart() {
         shown += u32::from(kept);
     }
     assert!(shown > 100, "{shown}");
+}
+
+#[test]
+fn parts_that_touch_first_are_found_beside_others_that_are_deep_first() {
+    // A ball, and beside it an edge of 90° that reaches lower by less than a resolution; the ball is asked first.
+    let delta = 1e-7;
+    let floor = simple(Cuboid { half: dvec3(2.0, 2.0, 0.5) });
+    for lower in [0.2, 0.6] {
+        let mut b = SolidBuilder::new();
+        let edge = DVec3::Z * (0.08f64.sqrt() - lower * delta) + DVec3::X * 0.7;
+        let turned = quat_of_rotation_vector(DVec3::X * std::f64::consts::FRAC_PI_4);
+        let ball = Pose::at(dvec3(-0.7, 0.0, 0.25));
+        let parts = [
+            b.primitive(Sphere { radius: 0.25 }, ball, Label::default()),
+            b.primitive(Cuboid { half: dvec3(0.2, 0.2, 0.2) }, Pose::new(edge, turned), Label::default()),
+        ];
+        let whole = b.operation(Op::Union, &parts);
+        let pair = Model::new(b.finish(whole));
+        let placed = |motion| Placed { place: Pose::IDENTITY, motion };
+        let below = Motion::resting(Pose::at(DVec3::Z * -0.5));
+        let falls = moving(DVec3::Z * 0.5, DVec3::ZERO, -DVec3::Z, DVec3::ZERO);
+        let query = PairQuery {
+            resolution: delta,
+            ..asked(
+                PlacedModel { model: &floor, placed: placed(below) },
+                PlacedModel { model: &pair, placed: placed(falls) },
+            )
+        };
+        let (task, _) = Task::of(&query);
+        let [of_a, of_b] = [task.a, task.b].map(|solid| Parts::of(solid).expect("a union"));
+        let pairs = of_a.all().iter().flat_map(|a| of_b.all().iter().map(|b| (*a, *b))).collect();
+        let unions = Unions::new(&task, [&of_a, &of_b], pairs, true);
+        let mut contacts = Contacts::new(task);
+        for index in 0..2 {
+            let parts = unions.convex(index).expect("two convex parts");
+            let Sight::Apart(view) = parts.sight() else { panic!("apart by half of the step") };
+            assert!(parts.meet(&mut contacts, &view, false), "{index}");
+        }
+        let Ending::Contact(found) = contacts.end() else { panic!("a contact") };
+        let t = found.touch.expect("a touch").t;
+        assert!((t - (0.5 - lower * delta)).abs() < 1e-12, "{lower}: {t}");
+    }
 }
 
 #[test]
