@@ -331,7 +331,7 @@ fn what_fits_closely_is_met_without_a_search_of_its_rims() {
 fn touches_are_balanced_and_of_the_faces_ahead() {
     let all = [(6, 4242), (7, 19373), (2, 14256), (7, 17903), (9, 19685), (7, 11221)];
     // Of some as intersections, too, which nothing in front of the search answers for.
-    let cut = [(6, 4242), (2, 14256), (9, 19685), (7, 11221)].map(|one| (one, true));
+    let cut = [(6, 4242), (2, 14256), (9, 19685)].map(|one| (one, true));
     for ((family, index), is_cut) in all.map(|one| (one, false)).into_iter().chain(cut) {
         let mut scene = scene(1, family, index);
         if is_cut {
