@@ -147,16 +147,18 @@ struct Claim {
 /// All of it, for each pair of parts.
 type Claims = SmallVec<[Claim; 1]>;
 
+/// Where walls of cavities seem to be met, by their indices: the later ones where the first one is not.
+type Guesses = SmallVec<[(usize, Guess); 1]>;
+
 /// About when something seems to be met.
 struct Event {
     t: f64,
     what: Met,
 }
 
-/// What seems to be met: a cavity's wall, by a claim's index and a guess, or one part by another, by the pair's index and how they are
-/// seen at the start.
+/// What seems to be met: a cavity's wall, or one part by another, by the pair's index and how they are seen at the start.
 enum Met {
-    Wall(usize, Guess),
+    Walls(Guesses),
     Parts(usize, View),
 }
 
@@ -226,32 +228,28 @@ impl<'s, 'a> Unions<'s, 'a> {
                 Some(Sight::Free) => {}
                 Some(Sight::Apart(view)) => events.push(Event { t: view.t, what: Met::Parts(index, view) }),
                 Some(Sight::Common) | None => {
-                    if let Some((claim, guess)) = self.claim(contacts, index, until, cavities, &mut claims)? {
+                    let guesses = self.claim(contacts, index, until, cavities, &mut claims)?;
+                    if let Some((_, Guess { t, .. })) = guesses.first() {
                         if !self.in_region {
-                            until = until.min(guess.t + AT_ONCE);
+                            until = until.min(t + AT_ONCE);
                         }
-                        events.push(Event { t: guess.t, what: Met::Wall(claim, guess) });
+                        events.push(Event { t: *t, what: Met::Walls(guesses) });
                     }
                 }
             }
         }
         events.sort_by(|e, f| e.t.total_cmp(&f.t));
-        for Event { t, what } in events {
+        for Event { what, .. } in events {
             match what {
                 // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
-                Met::Wall(claim, guess) => {
-                    if t < contacts.goal() + AT_ONCE {
-                        cavities[claims[claim].cavity].solve(contacts, &guess);
-                    }
-                }
+                Met::Walls(guesses) => solve(contacts, cavities, &guesses),
                 Met::Parts(index, view) => {
                     let (a, b) = self.pairs[index];
                     let is_filled = a.is_pierced() || b.is_pierced();
                     if !self.convex(index)?.meet(contacts, &view, is_filled) {
                         let until = contacts.goal().min(1.0);
-                        if let Some((claim, guess)) = self.claim(contacts, index, until, cavities, &mut claims)? {
-                            cavities[claims[claim].cavity].solve(contacts, &guess);
-                        }
+                        let guesses = self.claim(contacts, index, until, cavities, &mut claims)?;
+                        solve(contacts, cavities, &guesses);
                     }
                 }
             }
@@ -259,8 +257,8 @@ impl<'s, 'a> Unions<'s, 'a> {
         Some(claims)
     }
 
-    /// Adds what is to be proven of a pair of parts, and tells which of it seems to be met before `until`, and where; the outer `None`
-    /// where no cavity shows it. Nothing is left to be proven of what starts as near as it may be and comes no deeper.
+    /// Adds what is to be proven of a pair of parts, and tells what of it seems to be met before `until`; `None` where no cavity shows
+    /// it. Nothing is left to be proven of what starts as near as it may be and comes no deeper.
     fn claim<'u>(
         &'u self,
         contacts: &mut Contacts,
@@ -268,17 +266,17 @@ impl<'s, 'a> Unions<'s, 'a> {
         until: f64,
         cavities: &mut Cavities<'u>,
         claims: &mut Claims,
-    ) -> Option<Option<(usize, Guess)>> {
+    ) -> Option<Guesses> {
         // Each shows that nothing is met before its guess: the one with the latest says most.
         let mut latest: Option<(CavityPair<'u>, Guess)> = None;
         for pair in self.cavities(index) {
             match seen(contacts, &pair, until) {
                 None => {}
-                Some(Seen::Kept) => return Some(None),
+                Some(Seen::Kept) => return Some(Guesses::new()),
                 Some(Seen::Never) => {
                     claims.push(Claim { cavity: cavities.len(), index, toward: None });
                     cavities.push(pair);
-                    return Some(None);
+                    return Some(Guesses::new());
                 }
                 Some(Seen::Guess(guess)) if latest.as_ref().is_none_or(|(_, other)| guess.t > other.t) => {
                     latest = Some((pair, guess));
@@ -287,13 +285,15 @@ impl<'s, 'a> Unions<'s, 'a> {
             }
         }
         let (pair, guess) = latest?;
-        // What seems to be met may lie in another cavity.
-        if let Some(found) = self.claim_stacked(contacts, (index, &pair), &guess, until, cavities, claims) {
-            return Some(found);
+        // What seems to be met may lie in another cavity, or not, as where a head lands on the floor of its counterbore.
+        let mut guesses = Guesses::new();
+        match self.claim_stacked(contacts, (index, &pair), &guess, until, cavities, claims) {
+            Some(found) => guesses.extend(found),
+            None => claims.push(Claim { cavity: cavities.len(), index, toward: guess.wall.direction() }),
         }
-        claims.push(Claim { cavity: cavities.len(), index, toward: guess.wall.direction() });
+        guesses.push((cavities.len(), guess));
         cavities.push(pair);
-        Some(Some((claims.len() - 1, guess)))
+        Some(guesses)
     }
 
     /// The same for a body that seems to meet the wall of a cavity, by two pieces where another one goes through the floor of that, or
@@ -329,7 +329,7 @@ impl<'s, 'a> Unions<'s, 'a> {
                 Seen::Guess(guess) => {
                     let toward = guess.wall.direction();
                     if first.as_ref().is_none_or(|(_, other)| guess.t < other.t) {
-                        first = Some((claims.len() + found.len(), guess));
+                        first = Some((cavities.len() + kept.len(), guess));
                     }
                     toward
                 }
@@ -362,6 +362,15 @@ impl<'s, 'a> Unions<'s, 'a> {
             let mut others = self.cavities(claim.index).take(if self.in_region { usize::MAX } else { 0 });
             let shown = others.any(|other| proves(contacts, &other, end, None) == ProofEnd::Proven);
             return shown.then_some(());
+        }
+    }
+}
+
+/// Solves for the contact that the first of some guesses points to that both trees confirm.
+fn solve(contacts: &mut Contacts, cavities: &Cavities, guesses: &Guesses) {
+    for (cavity, guess) in guesses {
+        if guess.t >= contacts.goal() + AT_ONCE || cavities[*cavity].solve(contacts, guess) {
+            break;
         }
     }
 }
