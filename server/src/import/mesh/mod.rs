@@ -284,8 +284,9 @@ fn solid(polygons: Polygons, limits: &Limits) -> std::result::Result<(Shape, Vec
     Ok((mesh.into(), done.notes("a mesh")))
 }
 
-/// Text of a file.
+/// Text of a file, without the mark of UTF-8 that some programs begin it with.
 fn text(bytes: &[u8]) -> Result<&str> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     std::str::from_utf8(bytes).map_err(|e| {
         let before = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
         let found = format!("the byte 0x{:02x}", bytes[e.valid_up_to()]);

@@ -1,16 +1,18 @@
 //! Wavefront OBJ: points, faces by their points' numbers from 1, or from the last one backwards. All groups are one mesh.
 //!
-//! Normals, texture coordinates, groups, materials and smoothing change no shape and are not read.
+//! Normals, texture coordinates, groups, materials, smoothing, lines and single points change no shape and are not read. A line that
+//! ends in a backslash goes on in the next one.
 
 use super::{Bodies, Line, MeshFormat, Polygons, Result};
 use crate::import::Limits;
+use std::borrow::Cow;
 
 /// The row of `mesh::FORMATS`.
 pub const FORMAT: MeshFormat =
     MeshFormat { name: "obj", endings: &["obj"], read: |bytes, limits| Ok(Bodies::of(read(bytes, limits)?, "OBJ")) };
 
 /// What changes no shape.
-const HARMLESS: [&str; 9] = ["vn", "vt", "vp", "o", "g", "s", "usemtl", "mtllib", "l"];
+const HARMLESS: [&str; 10] = ["vn", "vt", "vp", "o", "g", "s", "usemtl", "mtllib", "l", "p"];
 
 /// Reads a mesh.
 ///
@@ -18,7 +20,7 @@ const HARMLESS: [&str; 9] = ["vn", "vt", "vp", "o", "g", "s", "usemtl", "mtllib"
 /// What is wrong, with its place.
 pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
     let (mut mesh, mut triangles) = (Polygons::default(), 0);
-    for line in Line::all(super::text(bytes)?) {
+    for line in Line::all(&joined(super::text(bytes)?)) {
         let mut words = line.words();
         let word = words.next();
         match word.unwrap_or_default() {
@@ -38,6 +40,26 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
         }
     }
     Ok(mesh)
+}
+
+/// The text with lines that go on in one, each followed by as many empty ones: the lines behind keep their numbers.
+fn joined(text: &str) -> Cow<'_, str> {
+    if !text.contains('\\') {
+        return Cow::Borrowed(text);
+    }
+    let (mut all, mut taken) = (String::with_capacity(text.len()), 0);
+    for line in text.lines() {
+        if let Some(start) = line.strip_suffix('\\') {
+            all.push_str(start);
+            all.push(' ');
+            taken += 1;
+        } else {
+            all.push_str(line);
+            (0..=taken).for_each(|_| all.push('\n'));
+            taken = 0;
+        }
+    }
+    Cow::Owned(all)
 }
 
 /// The place in the list of `count` points that a corner such as 3/1/2 or -1 names.

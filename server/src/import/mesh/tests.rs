@@ -74,6 +74,7 @@ fn every_format_tells_the_same_solid() {
         ("l.STL", binary_stl()),
         ("l.off", off().into_bytes()),
         ("l.obj", obj().into_bytes()),
+        ("l.obj", format!("\u{feff}{}p 1 2\n", obj().replacen("f ", "f \\\n ", 2)).into_bytes()),
     ];
     for (name, bytes) in files {
         let import = read(name, &bytes).unwrap_or_else(|e| panic!("{e}"));
@@ -154,6 +155,7 @@ fn what_is_wrong_with_a_file_is_told_with_its_place() {
             "a.obj:3:6: expected a finite number, found the end of the line",
         ),
         ("a.obj", text(obj.replacen("f 6//3", "f 13//3", 1)), "expected a point's number up to 12, found \"13//3\""),
+        ("a.obj", text("v 0 0 0\nv 1 \\\n0 0\nw\n".into()), "a.obj:4:1: expected v, f, or what changes no shape"),
         ("a.obj", text("f 1 2\n".into()), "expected a point's number up to 0, found \"1\""),
         ("a.obj", Vec::new(), "a.obj:1:1: expected a closed mesh, found a mesh without volume"),
     ] {

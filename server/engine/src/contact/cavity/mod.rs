@@ -19,7 +19,7 @@ mod pierced;
 mod proof;
 
 use crate::bound::Region;
-use crate::contact::convex::{ConvexParts, Sight, View};
+use crate::contact::convex::{AtStart, ConvexParts, Sight};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
 use crate::contact::witness::contacts::Contacts;
@@ -159,7 +159,7 @@ struct Event {
 /// What seems to be met: a cavity's wall, or one part by another, by the pair's index and how they are seen at the start.
 enum Met {
     Walls(Guesses),
-    Parts(usize, View),
+    Parts(usize, AtStart),
 }
 
 impl<'s, 'a> Unions<'s, 'a> {
@@ -226,7 +226,7 @@ impl<'s, 'a> Unions<'s, 'a> {
             let sight = if self.in_region { self.convex(index).map(|parts| parts.sight()) } else { None };
             match sight {
                 Some(Sight::Free) => {}
-                Some(Sight::Apart(view)) => events.push(Event { t: view.t, what: Met::Parts(index, view) }),
+                Some(Sight::Apart(at_start)) => events.push(Event { t: at_start.t, what: Met::Parts(index, at_start) }),
                 Some(Sight::Common) | None => {
                     let guesses = self.claim(contacts, index, until, cavities, &mut claims)?;
                     if let Some((_, Guess { t, .. })) = guesses.first() {
@@ -243,10 +243,10 @@ impl<'s, 'a> Unions<'s, 'a> {
             match what {
                 // Where there is none, as when a body that spins swings back, the proof says so, or where it is.
                 Met::Walls(guesses) => solve(contacts, cavities, &guesses),
-                Met::Parts(index, view) => {
+                Met::Parts(index, at_start) => {
                     let (a, b) = self.pairs[index];
                     let is_filled = a.is_pierced() || b.is_pierced();
-                    if !self.convex(index)?.meet(contacts, &view, is_filled) {
+                    if !self.convex(index)?.meet(contacts, &at_start, is_filled) {
                         let until = contacts.goal().min(1.0);
                         let guesses = self.claim(contacts, index, until, cavities, &mut claims)?;
                         solve(contacts, cavities, &guesses);

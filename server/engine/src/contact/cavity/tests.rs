@@ -154,8 +154,8 @@ fn parts_that_touch_first_are_found_beside_others_that_are_deep_first() {
         let mut contacts = Contacts::new(task);
         for index in 0..2 {
             let parts = unions.convex(index).expect("two convex parts");
-            let Sight::Apart(view) = parts.sight() else { panic!("apart by half of the step") };
-            assert!(parts.meet(&mut contacts, &view, false), "{index}");
+            let Sight::Apart(at_start) = parts.sight() else { panic!("apart by half of the step") };
+            assert!(parts.meet(&mut contacts, &at_start, false), "{index}");
         }
         let Ending::Contact(found) = contacts.end() else { panic!("a contact") };
         let t = found.touch.expect("a touch").t;

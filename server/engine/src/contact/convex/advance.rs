@@ -197,14 +197,14 @@ pub enum Sight {
     /// The line between their middles keeps them apart over the whole step.
     Free,
     /// Apart, but for a few resolutions.
-    Apart(View),
+    Apart(AtStart),
     /// They have points in common.
     Common,
 }
 
 /// Two convex parts that are apart at the start of a step, or were one of them a few resolutions off.
 #[derive(Clone, Copy)]
-pub struct View {
+pub struct AtStart {
     /// About when they meet along the direction in which they are apart, a fraction of the step; infinite where they part.
     pub t: f64,
     found: Nearest,
@@ -241,16 +241,16 @@ impl<'a> ConvexParts<'a> {
             () if there < here.phi => here.phi / (here.phi - there),
             () => f64::INFINITY,
         };
-        Sight::Apart(View { t, found, here, near })
+        Sight::Apart(AtStart { t, found, here, near })
     }
 
     /// Looks for the contact of both parts, which counts where both whole trees confirm it; true when nothing is deep in both before the
     /// goal that the contacts have then. What more it is told than that is one of them.
     ///
-    /// `view` is how they are seen at the start. Parts that are `filled` have cavities left out here: what they seem to meet first may be
+    /// `at_start` is how they are seen at the start. Parts that are `filled` have cavities left out here: what they seem to meet first may be
     /// one.
-    pub fn meet(&self, contacts: &mut Contacts, view: &View, filled: bool) -> bool {
-        self.0.frees_to_goal(contacts, view, filled)
+    pub fn meet(&self, contacts: &mut Contacts, at_start: &AtStart, filled: bool) -> bool {
+        self.0.frees_to_goal(contacts, at_start, filled)
     }
 
     /// True when they stay farther apart than `least` (a length) over the whole step.
@@ -402,18 +402,18 @@ impl<'a> Advance<'a> {
     }
 
     /// `run` for two parts of larger bodies: a contact of others ends it as well as their own.
-    fn frees_to_goal(&self, contacts: &mut Contacts, view: &View, filled: bool) -> bool {
+    fn frees_to_goal(&self, contacts: &mut Contacts, at_start: &AtStart, filled: bool) -> bool {
         let (end_of_step, mut t) = (self.moment(1.0), 0.0);
         let size = self.task.scale.min(self.a.0.ball.radius + self.b.0.ball.radius);
-        let (mut along, mut own) = (view.here.n, None::<DVec3>);
+        let (mut along, mut own) = (at_start.here.n, None::<DVec3>);
         for round in 0..ROUNDS {
             let m = self.moment(t);
             contacts.counters.closed_forms += 1;
             let first = m.at.world_from_a.transpose() * along;
             let seen = if round == 0 {
-                Some((view.found, view.here))
+                Some((at_start.found, at_start.here))
             } else {
-                let beside = || view.near.then(|| self.seen(&m, &self.set_off(&m), first)).flatten();
+                let beside = || at_start.near.then(|| self.seen(&m, &self.set_off(&m), first)).flatten();
                 self.seen(&m, &m.b, first).or_else(beside)
             };
             let Some((found, here)) = seen else { return false };
@@ -427,7 +427,12 @@ impl<'a> Advance<'a> {
             }
             let closing = found.normal.dot(m.at.velocity(found.a));
             let guess = t + found.distance.max(0.0) / closing;
-            if own.is_none() && !view.near && closing > 0.0 && found.distance <= NEAR * size && guess <= LATEST * goal {
+            if own.is_none()
+                && !at_start.near
+                && closing > 0.0
+                && found.distance <= NEAR * size
+                && guess <= LATEST * goal
+            {
                 let mend = found.distance <= MEND.0 * size || round >= MEND.1;
                 own = self.contact(contacts, &m, &found, guess.min(1.0), mend).map(|c| c.n);
                 if own.is_none() && filled && guess <= contacts.goal() {

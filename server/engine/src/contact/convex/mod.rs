@@ -42,7 +42,7 @@ mod whole;
 use crate::contact::query::outcome::Outcome;
 use crate::contact::query::question::PairQuery;
 use crate::solid::primitive::Convex;
-pub(super) use advance::{ConvexPair, ConvexParts, Sight, View, answer};
+pub(super) use advance::{AtStart, ConvexPair, ConvexParts, Sight, answer};
 pub(super) use balls::quick as balls;
 pub(super) use gjk::{Nearest, SupportMapping, nearest};
 use glam::DVec3;
