@@ -36,7 +36,7 @@
 // the object is static and cannot be moved.
 #define CONTACTD_ERROR_STATIC_OBJECT 5
 
-// a position or rotation is not a finite number.
+// a position or rotation is not a finite number, or is farther away than numbers can square.
 #define CONTACTD_ERROR_NOT_FINITE 6
 
 // the quaternion is not of unit length (its squared norm is off by more than 0.001).

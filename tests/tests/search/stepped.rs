@@ -28,7 +28,8 @@ fn along(b: &mut SolidBuilder, r: &mut Random, x: DVec3, [from, to]: [f64; 2], s
     b.primitive(shape(0.5 * (to - from).abs()), Pose::new(at, rotation), Label::default())
 }
 
-/// The steps of one hole about x, of a plate between −h and h: a bore, through or blind, and what it has at either end.
+/// The steps of one hole about x, of a plate between −h and h: a bore, through or blind, what it has at either end, and now and then
+/// a groove around it, round or of two cones, or a pocket with flat walls.
 fn hole(b: &mut SolidBuilder, r: &mut Random, x: DVec3, h: f64) -> Vec<NodeId> {
     let radius = r.within(0.1, 0.25);
     let depth = if often(r, 0.3) { r.within(-0.5, 0.5) * h } else { -h - 0.1 };
@@ -46,6 +47,20 @@ fn hole(b: &mut SolidBuilder, r: &mut Random, x: DVec3, h: f64) -> Vec<NodeId> {
             steps.push(along(b, r, x, span, cone));
         } else if often(r, 0.5) {
             steps.push(along(b, r, x, span, |half| Cylinder { radius: wide, half_height: half }.into()));
+        }
+    }
+    if often(r, 0.3) {
+        let (from, half, wide) = (r.within(-0.7, 0.3) * h, r.within(0.02, 0.2) * h, radius + r.within(0.01, 0.1));
+        match r.within(0.0, 3.0) as usize {
+            0 => steps.push(along(b, r, x, [from, from + 2.0 * half], |half| {
+                Cylinder { radius: wide, half_height: half }.into()
+            })),
+            1 => {
+                let side = |half| Cone { bottom: wide, top: radius, half_height: half }.into();
+                steps.extend([from + half, from - half].map(|end| along(b, r, x, [from, end], side)));
+            }
+            _ => steps
+                .push(along(b, r, x, [from, h + 0.01], |half| Cuboid { half: dvec3(wide, 0.9 * radius, half) }.into())),
         }
     }
     steps

@@ -8,7 +8,7 @@
 //!
 //! Invariant: the same holes in the same order as if each part had a list of its own, inner differences first.
 
-use crate::math::{Ball, BallTree};
+use crate::math::{Aabb, Ball, BallTree};
 use crate::solid::{Node, NodeId, Op, Primitive, Solid};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -132,6 +132,33 @@ impl Parts {
             }
         }
         found
+    }
+
+    /// The holes of a part whose boxes meet a box, inner differences first; `None` where there are more than `most`.
+    pub fn holes_within<'s>(
+        &self,
+        solid: &'s Solid,
+        part: PiercedPart,
+        within: &Aabb,
+        most: usize,
+    ) -> Option<Holes<'s>> {
+        let (mut found, mut are_few) = (Holes::new(), true);
+        let (center, reach) = (within.center(), within.half().length());
+        for group in self.groups_of(part) {
+            let mut look = |i: u32| {
+                let hole = &solid.primitives[group.holes[i as usize] as usize];
+                if are_few && hole.aabb.meets(within) {
+                    are_few = found.len() < most;
+                    found.push(hole);
+                }
+                reach
+            };
+            match &group.tree {
+                Some(tree) if reach.is_finite() => tree.visit(center, &mut look),
+                _ => (0..group.holes.len() as u32).for_each(|i| _ = look(i)),
+            }
+        }
+        are_few.then_some(found)
     }
 
     /// Groups of holes of a part, the inner ones first.

@@ -38,7 +38,8 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Polygons> {
 
 /// Binary files, too, may begin with that word.
 fn is_text(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().starts_with(b"solid") && std::str::from_utf8(bytes).is_ok()
+    let begins = bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    begins && std::str::from_utf8(bytes).is_ok()
 }
 
 fn binary(bytes: &[u8], count: usize, limits: &Limits) -> Result<Polygons> {

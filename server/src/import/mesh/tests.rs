@@ -71,6 +71,7 @@ fn read(name: &str, bytes: &[u8]) -> Result<crate::import::Import, String> {
 fn every_format_tells_the_same_solid() {
     let files = [
         ("l.stl", ascii_stl().into_bytes()),
+        ("l.stl", ascii_stl().to_uppercase().into_bytes()),
         ("l.STL", binary_stl()),
         ("l.off", off().into_bytes()),
         ("l.obj", obj().into_bytes()),

@@ -136,11 +136,6 @@ impl Moment {
         m
     }
 
-    /// Indices of the planes that it crosses.
-    pub fn crossed(&self) -> impl Iterator<Item = usize> {
-        self.crossed.iter().map(|k| usize::from(*k))
-    }
-
     /// The part of v that a disc reaches along.
     pub fn across(&self, v: DVec3) -> DVec3 {
         self.axis.map_or(v, |a| v - a * a.dot(v))

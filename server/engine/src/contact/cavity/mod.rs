@@ -3,8 +3,8 @@
 //! Idea: a body P meets K − H only where it meets K, and there only where it leaves H. So two unions are free while each pair of their
 //! parts is, cavities filled (`convex::ConvexParts`); and while P cut by the faces of K lies inside H, nothing is met, whatever else P
 //! does above and below. How far the cut body reaches in a direction across the cavity is told by its support and one multiplier
-//! (`body`); a sector of directions over a span of time is excluded by its four corners (`proof`). A body that is in two cavities, one
-//! through the floor of the other, is cut by that floor, too, and each piece lies inside of its own (`CavityPair::stacked`). So: (1)
+//! (`body`); a sector of directions over a span of time is excluded by its four corners (`proof`). A body that several cavities hold
+//! together is cut by the planes in which they end, too, and each piece lies inside of its own (`layers`). So: (1)
 //! from the start, the lines along which the clearance falls say when and in which direction it is used up first; (2) the faces that
 //! hold the body there are solved for a contact, as the search does it, and both trees confirm it or it is none; (3) the time up to it
 //! is proven; what the proof meets instead is solved in turn. No contact by the end: clear.
@@ -15,6 +15,7 @@
 //! Source: conservative advancement (B. Mirtich, PhD thesis, Berkeley 1996) on a bound by duality; derivation in `proof`.
 
 mod body;
+mod layers;
 mod pierced;
 mod proof;
 
@@ -26,8 +27,8 @@ use crate::contact::witness::contacts::Contacts;
 use crate::contact::witness::found::Ending;
 use crate::math::Aabb;
 use crate::motion::{Relative, Sweep};
-use crate::solid::Solid;
 use crate::solid::parts::{Parts, PiercedPart};
+use crate::solid::{Primitive, Solid};
 use glam::DVec3;
 use pierced::{CavityPair, First, Guess};
 use proof::ProofEnd;
@@ -43,6 +44,9 @@ const MOST_LEFT: usize = 96;
 const MOST_TRIED: usize = 3;
 /// What seems to be met within this time, in steps, may be met at once: parts that share a rim both meet what either does.
 const AT_ONCE: f64 = 1e-3;
+/// Directions across which layers are looked for, and how nearly equal, by their cosine, two are taken for one.
+const MOST_AXES: usize = 4;
+const ALONG: f64 = 1.0 - 1e-9;
 /// Contacts that are solved for before a pair is left to the contacts.
 const MOST_CONTACTS: usize = 6;
 
@@ -268,78 +272,111 @@ impl<'s, 'a> Unions<'s, 'a> {
         claims: &mut Claims,
     ) -> Option<Guesses> {
         // Each shows that nothing is met before its guess: the one with the latest says most.
-        let mut latest: Option<(CavityPair<'u>, Guess)> = None;
+        let mut latest: Option<(CavityPair<'u>, Option<Guess>)> = None;
         for pair in self.cavities(index) {
-            match seen(contacts, &pair, until) {
-                None => {}
+            let guess = match seen(contacts, &pair, until) {
+                None => None,
                 Some(Seen::Kept) => return Some(Guesses::new()),
                 Some(Seen::Never) => {
                     claims.push(Claim { cavity: cavities.len(), index, toward: None });
                     cavities.push(pair);
                     return Some(Guesses::new());
                 }
-                Some(Seen::Guess(guess)) if latest.as_ref().is_none_or(|(_, other)| guess.t > other.t) => {
-                    latest = Some((pair, guess));
-                }
-                Some(Seen::Guess(_)) => {}
+                Some(Seen::Guess(guess)) => Some(guess),
+            };
+            let when = |guess: &Option<Guess>| guess.as_ref().map_or(f64::NEG_INFINITY, |guess| guess.t);
+            if latest.as_ref().is_none_or(|(_, other)| when(&guess) > when(other)) {
+                latest = Some((pair, guess));
             }
         }
         let (pair, guess) = latest?;
         // What seems to be met may lie in another cavity, or not, as where a head lands on the floor of its counterbore.
+        let layered = self.claim_layers(contacts, (index, &pair, guess.as_ref()), until, cavities, claims);
         let mut guesses = Guesses::new();
-        match self.claim_stacked(contacts, (index, &pair), &guess, until, cavities, claims) {
-            Some(found) => guesses.extend(found),
-            None => claims.push(Claim { cavity: cavities.len(), index, toward: guess.wall.direction() }),
+        match (layered, &guess) {
+            (Some(found), _) => guesses.extend(found),
+            (None, None) => return None,
+            (None, Some(guess)) => {
+                claims.push(Claim { cavity: cavities.len(), index, toward: guess.wall.direction() });
+            }
         }
-        guesses.push((cavities.len(), guess));
-        cavities.push(pair);
+        if let Some(guess) = guess {
+            guesses.push((cavities.len(), guess));
+            cavities.push(pair);
+        }
         Some(guesses)
     }
 
-    /// The same for a body that seems to meet the wall of a cavity, by two pieces where another one goes through the floor of that, or
-    /// that one through the floor of another one; `None` where it does not.
-    fn claim_stacked<'u>(
+    /// The same for a body that seems to meet the wall of a cavity, by pieces where others hold the body together with that one; `None`
+    /// where they do not.
+    fn claim_layers<'u>(
         &'u self,
         contacts: &mut Contacts,
-        (index, pair): (usize, &CavityPair<'u>),
-        guess: &Guess,
+        (index, pair, guess): (usize, &CavityPair<'u>, Option<&Guess>),
         until: f64,
         cavities: &mut Cavities<'u>,
         claims: &mut Claims,
     ) -> Option<Option<(usize, Guess)>> {
         let (a, b) = self.pairs[index];
-        let (solid, parts, part) = match pair.side {
-            Side::A => (self.task.a, self.of_a, a),
-            Side::B => (self.task.b, self.of_b, b),
+        let (placed_a, placed_b) = self.task.relative.placed();
+        let (solid, parts, part, mover, observer) = match pair.side {
+            Side::A => (self.task.a, self.of_a, a, placed_b, placed_a),
+            Side::B => (self.task.b, self.of_b, b, placed_a, placed_b),
         };
         let main = &solid.primitives[part.main as usize];
-        let holes = pair.openings(guess).into_iter().flat_map(|x| parts.holes_at(solid, part, x, MOST_TRIED));
-        let mut others = holes.filter(|hole| !std::ptr::eq(*hole, pair.cavity));
-        let pieces = others.find_map(|hole| {
-            let other = CavityPair::new(self.task, pair.primitive, (main, hole), pair.side, pair.relative)?;
-            pair.stacked(&other).or_else(|| other.stacked(pair))
-        })?;
-        let mut first: Option<(usize, Guess)> = None;
-        let mut found: SmallVec<[Claim; 2]> = SmallVec::new();
-        let mut kept = Cavities::new();
-        for piece in pieces {
-            let toward = match seen(contacts, &piece, until)? {
-                Seen::Kept => continue,
-                Seen::Never => None,
-                Seen::Guess(guess) => {
-                    let toward = guess.wall.direction();
-                    if first.as_ref().is_none_or(|(_, other)| guess.t < other.t) {
-                        first = Some((cavities.len() + kept.len(), guess));
-                    }
-                    toward
-                }
-            };
-            found.push(Claim { cavity: cavities.len() + kept.len(), index, toward });
-            kept.push(piece);
+        let swept = Sweep::new(mover, observer).of_box(&pair.primitive.aabb, 0.0, 1.0);
+        let common = swept.intersection(&main.aabb);
+        if common.is_empty() {
+            return None;
         }
-        claims.extend(found);
-        cavities.extend(kept);
-        Some(first)
+        let mut holes = parts.holes_within(solid, part, &common, layers::MOST_CAVITIES)?;
+        if !holes.iter().any(|hole| std::ptr::eq(*hole, pair.cavity)) {
+            holes.push(pair.cavity);
+        }
+        if holes.len() < 2 {
+            return None;
+        }
+        let of =
+            |hole: &&'u Primitive| CavityPair::new(self.task, pair.primitive, (main, hole), pair.side, pair.relative);
+        let all: SmallVec<[CavityPair<'u>; 4]> = holes.iter().filter_map(of).collect();
+        let center = pair.relative.at(0.0).b_point(pair.primitive.ball.center).clamp(common.min, common.max);
+        let times = [0.0, guess.map_or(until, |guess| guess.t)];
+        let mut axes: SmallVec<[DVec3; 4]> = SmallVec::new();
+        for pair in std::iter::once(pair).chain(&all) {
+            let own = pair.round.map(|round| round.axis).into_iter().chain(pair.flats.iter().map(|flat| flat.normal));
+            for axis in own {
+                if axes.len() < MOST_AXES && axes.iter().all(|other| other.dot(axis).abs() < ALONG) {
+                    axes.push(axis);
+                }
+            }
+        }
+        axes.into_iter().find_map(|axis| {
+            let pieces = layers::layers(&all, axis, &common, center, times)?;
+            if pieces.len() == 1 && std::ptr::eq(pieces[0].cavity, pair.cavity) {
+                return None;
+            }
+            let mut first: Option<(usize, Guess)> = None;
+            let mut found: SmallVec<[Claim; 4]> = SmallVec::new();
+            let mut kept = Cavities::new();
+            for piece in pieces {
+                let toward = match seen(contacts, &piece, until)? {
+                    Seen::Kept => continue,
+                    Seen::Never => None,
+                    Seen::Guess(guess) => {
+                        let toward = guess.wall.direction();
+                        if first.as_ref().is_none_or(|(_, other)| guess.t < other.t) {
+                            first = Some((cavities.len() + kept.len(), guess));
+                        }
+                        toward
+                    }
+                };
+                found.push(Claim { cavity: cavities.len() + kept.len(), index, toward });
+                kept.push(piece);
+            }
+            claims.extend(found);
+            cavities.extend(kept);
+            Some(first)
+        })
     }
 
     /// Proves that a pair does not meet before the first contact, which is found first where the proof meets it; `None` if it cannot.

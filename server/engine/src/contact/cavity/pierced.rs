@@ -31,8 +31,6 @@ const ACTIVE: f64 = 1e-9;
 /// A clearance, in the same measure, from which the equations are sure to find the contact, and steps that it may take.
 const SETTLED: f64 = 1e-4;
 const SETTLING: u32 = 4;
-/// How far within a plane an opening is looked at, relative to the wall's radius.
-const WITHIN: f64 = 1e-3;
 /// tan α of a cone's half angle up to which it is taken for a wall: a flatter one is hardly entered.
 const STEEPEST: f64 = 4.0;
 
@@ -105,6 +103,8 @@ pub(super) struct CavityPair<'a> {
     pub(super) relative: &'a Relative,
     /// Its farthest point from its centre of rotation.
     pub(super) reach: f64,
+    /// The pierced body's farthest point from the origin of its frame, or what is farther.
+    pub(super) extent: f64,
     pub(super) delta: f64,
     pub(super) rounding: f64,
     pub(super) scale: f64,
@@ -179,42 +179,11 @@ impl<'a> CavityPair<'a> {
             flats,
             relative,
             reach: far,
+            extent: middle.length() + half.length(),
             delta: task.delta,
             rounding: task.rounding,
             scale: task.scale,
         })
-    }
-
-    /// Points of the round wall's axis: beside a guess, and where it passes planes: those of the pierced body that the convex one crosses
-    /// then, a little within, and the cavity's own.
-    pub(super) fn openings(&self, guess: &Guess) -> SmallVec<[DVec3; 4]> {
-        let Some(Round { origin, axis, radius, .. }) = self.round else { return SmallVec::new() };
-        let m = self.moment(guess.t);
-        let beside = origin + axis * (guess.best.x - origin).dot(axis);
-        let planes = m.crossed().map(|k| &self.planes[k]).chain(&self.flats);
-        let passed = planes.filter_map(|plane| {
-            let along = plane.normal.dot(axis);
-            let s = (plane.offset - WITHIN * radius - plane.normal.dot(origin)) / along;
-            s.is_finite().then(|| origin + axis * s)
-        });
-        std::iter::once(beside).chain(passed).collect()
-    }
-
-    /// The two pieces of what a body may do that is in a cavity with a floor, `self`, which another one, `through`, goes through: cut by
-    /// the floor it is in the one on this side, and in the other one on the far side. `None` where there are other flat walls than that.
-    ///
-    /// A point common to both bodies lies on either side, however deep it is: by its depth the planes of the cut lie farther out, for what
-    /// the proof takes off at planes of the pierced body.
-    pub(super) fn stacked(&self, through: &Self) -> Option<[Self; 2]> {
-        let (own, other) = (self.round.as_ref()?, through.round.as_ref()?);
-        let &[floor] = &self.flats[..] else { return None };
-        let (mut near, mut far) = (self.clone(), through.clone());
-        near.flats.clear();
-        near.planes.push(Plane { offset: floor.offset + self.delta, literal: other.literal, ..floor });
-        // Beside a cylinder's floor there is a ring of it; a cone mostly ends where the other one goes on.
-        let literal = if own.lean == DVec3::ZERO { floor.literal } else { own.literal };
-        far.planes.push(Plane { normal: -floor.normal, offset: self.delta - floor.offset, literal });
-        Some([near, far])
     }
 
     pub(super) fn moment(&self, t: f64) -> Moment {
@@ -235,6 +204,12 @@ impl<'a> CavityPair<'a> {
             (Wall::Flat(j), _) => m.best(self.flats[j].normal, self.flats[j].offset, &self.planes),
             (Wall::Round(_), None) => unreachable!("a round wall is asked for where there is one"),
         }
+    }
+
+    /// Its flat walls, and a few directions of its round one.
+    pub(super) fn walls(&self) -> impl Iterator<Item = Wall> {
+        let around = if self.round.is_some() { &self.directions[..] } else { &[] };
+        (0..self.flats.len()).map(Wall::Flat).chain(around.iter().copied().map(Wall::Round))
     }
 
     /// How fast φ grows with the angle of a round wall's direction about its axis.
@@ -276,11 +251,9 @@ impl<'a> CavityPair<'a> {
         for round in 0..ROUNDS {
             let m = self.moment(t);
             *looks += 1;
-            let around = if self.round.is_some() { &self.directions[..] } else { &[] };
-            let walls = (0..self.flats.len()).map(Wall::Flat).chain(around.iter().copied().map(Wall::Round));
             let mut soonest: Option<(f64, Wall, Best)> = None;
             let mut least: Option<(Wall, Best)> = None;
-            for wall in walls {
+            for wall in self.walls() {
                 let best = self.best(&m, wall);
                 let when = self.when(&m, &best);
                 if soonest.as_ref().is_none_or(|s| when < s.0) {
