@@ -139,10 +139,10 @@ fn a_successor_knows_frames_parts_and_allowed_pairs() {
         "sphere($fn = 0, r = 0.3);",
     ];
     fn scene<T: Transport>(session: &mut Session<T>, texts: [&str; 3]) -> Vec<u32> {
-        let places = [DVec3::ZERO, DVec3::Z * 1.5, DVec3::new(0.9, 0.0, 1.5)];
-        let add = |(text, place): (&str, DVec3)| {
+        let places = [("plate", DVec3::ZERO), ("bar", DVec3::Z * 1.5), ("ball", DVec3::new(0.9, 0.0, 1.5))];
+        let add = |(text, (name, place)): (&str, (&str, DVec3))| {
             let model = session.load_model("thing.csg", text).unwrap().id;
-            session.add_object(Object::new("", model).at(Pose::at(place))).unwrap()
+            session.add_object(Object::new(name, model).at(Pose::at(place))).unwrap()
         };
         texts.into_iter().zip(places).map(add).collect()
     }

@@ -21,46 +21,73 @@ pub struct Frame {
     pub pose: Pose,
 }
 
+/// An object of the session.
+#[derive(Clone, Debug)]
+struct Member {
+    name: String,
+    group: String,
+    /// Its model in its frame.
+    place: Pose,
+    /// Its model in the frame that it has where it is not attached.
+    own: Pose,
+}
+
 /// A part that goes with another object.
 #[derive(Clone, Debug)]
 struct Attached {
-    /// The object whose records it gets.
+    /// The object that it was attached to, which may be attached itself.
     carrier: u32,
-    /// Objects that it may touch meanwhile.
+    /// The object at the end of that chain, whose frame it has and whose records it gets.
+    root: u32,
+    /// Its model as the root's model sees it.
+    held: Pose,
+    /// Objects that it may touch meanwhile, the carrier among them.
     touching: Vec<u32>,
 }
 
 /// The most records of one object in a batch: a start and a motion.
 const RECORDS: usize = 2;
 
-/// The objects of a session by name and group, the rules, and what is not to be tested whatever they say.
+/// Exceptions go by names, as in scene files.
+const AMBIGUOUS: Error = Error::Misuse(
+    "what is attached or allowed is told by names, and another object has the same: give each object a name of its own",
+);
+
+/// The objects of a session, the rules, and what is not to be tested whatever they say.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Company {
-    /// Name and group of each object.
-    names: BTreeMap<u32, [String; 2]>,
+    members: BTreeMap<u32, Member>,
     rules: Vec<Rule>,
     allowed: BTreeSet<[u32; 2]>,
     attached: BTreeMap<u32, Attached>,
 }
 
 impl Company {
-    /// An object was added; whether the rules have to be told anew: those that stand for none name groups.
-    pub fn added(&mut self, id: u32, name: &str, group: &str) -> bool {
-        let is_new = !self.names.values().any(|[_, known]| known == group);
-        self.names.insert(id, [name.to_owned(), group.to_owned()]);
-        is_new && self.rules.is_empty() && !self.exceptions().is_empty()
+    /// True for the name of an object that is attached or allowed to meet another one: no other may have it.
+    fn is_taken(&self, name: &str) -> bool {
+        let touching = self.attached.iter().flat_map(|(part, attached)| attached.touching.iter().chain([part]));
+        let mut excepted = self.allowed.iter().flatten().chain(touching);
+        excepted.any(|id| self.members.get(id).is_some_and(|member| member.name == name))
     }
 
-    /// An object was removed. What it carried stays where it is.
-    pub fn removed(&mut self, id: u32) {
-        self.names.remove(&id);
-        self.allowed.retain(|pair| !pair.contains(&id));
-        self.attached.retain(|part, attached| *part != id && attached.carrier != id);
+    /// True where there are no rules but what stands for them, which names each group.
+    fn stands_for_rules(&self) -> bool {
+        self.rules.is_empty() && !self.exceptions().is_empty()
     }
 
     /// How many slots a batch needs for parts beside those of the caller, at most.
     pub fn slots(&self) -> usize {
         RECORDS * self.attached.len()
+    }
+
+    /// True for a part, which has no records of its own.
+    pub fn is_attached(&self, id: u32) -> bool {
+        self.attached.contains_key(&id)
+    }
+
+    /// The object whose records an object gets: its own, unless it is attached.
+    pub fn root_of(&self, id: u32) -> u32 {
+        self.attached.get(&id).map_or(id, |attached| attached.root)
     }
 
     /// Writes the records of the parts behind the first `n` slots, those of the caller; how many slots are set then.
@@ -69,13 +96,28 @@ impl Company {
         let mut end = n;
         for (part, attached) in &self.attached {
             for i in 0..n {
-                if slots[i].object == attached.carrier && end < slots.len() {
+                if slots[i].object == attached.root && end < slots.len() {
                     slots[end] = PoseRecord { object: *part, ..slots[i] };
                     end += 1;
                 }
             }
         }
         end
+    }
+
+    /// An object and those that carry it, up to its root.
+    fn carriers(&self, id: u32) -> impl Iterator<Item = u32> {
+        std::iter::successors(Some(id), |id| self.attached.get(id).map(|attached| attached.carrier))
+    }
+
+    /// What hangs on an object, over whatever is between.
+    fn parts_of(&self, id: u32) -> Vec<u32> {
+        self.attached.keys().copied().filter(|part| self.carriers(*part).skip(1).any(|own| own == id)).collect()
+    }
+
+    /// Where an object's model lies in its frame.
+    fn place_of(&self, id: u32) -> Pose {
+        self.members.get(&id).map_or(Pose::IDENTITY, |member| member.place)
     }
 
     /// Pairs of objects that are not tested.
@@ -85,16 +127,33 @@ impl Company {
         self.allowed.iter().copied().chain(self.attached.iter().flat_map(touching)).collect()
     }
 
+    /// True where the names of an exception are those of another pair, which would not be tested either.
+    fn is_ambiguous(&self) -> bool {
+        let exceptions = self.exceptions();
+        if exceptions.is_empty() {
+            return false;
+        }
+        let mut called: BTreeMap<&str, Vec<u32>> = BTreeMap::new();
+        for (id, member) in &self.members {
+            called.entry(&member.name).or_default().push(*id);
+        }
+        let alike = |id: &u32| self.members.get(id).map_or(&[][..], |member| &called[member.name.as_str()]);
+        exceptions.iter().any(|[a, b]| {
+            let others = alike(a).iter().flat_map(|x| alike(b).iter().map(|y| pair(*x, *y)));
+            others.into_iter().any(|[x, y]| x != y && !exceptions.contains(&[x, y]))
+        })
+    }
+
     /// The rules as the server is told them. A scene without rules has one for each two groups, once a pair is excepted.
     fn effective(&self) -> Vec<Rule> {
         let names = |pair: [u32; 2]| {
-            let [a, b] = pair.map(|id| self.names.get(&id).map(|[name, _]| name.clone()));
+            let [a, b] = pair.map(|id| self.members.get(&id).map(|member| member.name.clone()));
             Some([a?, b?])
         };
         let except: Vec<[String; 2]> = self.exceptions().into_iter().filter_map(names).collect();
         let mut rules = self.rules.clone();
         if rules.is_empty() && !except.is_empty() {
-            let groups: BTreeSet<&String> = self.names.values().map(|[_, group]| group).collect();
+            let groups: BTreeSet<&String> = self.members.values().map(|member| &member.group).collect();
             let groups: Vec<&String> = groups.into_iter().collect();
             for (i, group) in groups.iter().enumerate() {
                 rules.extend(groups[i..].iter().map(|other| Rule::new([(*group).clone(), (*other).clone()])));
@@ -115,76 +174,78 @@ fn pair(a: u32, b: u32) -> [u32; 2] {
 impl<T: Transport> Session<T> {
     /// Gives objects other frames, in which their models lie at other places: all of them, or none. A motion is one of an object's
     /// frame, whose origin goes straight while it turns; what is to turn about an axis needs a frame on that axis. The objects rest
-    /// at the new poses. What is attached to them goes with the new frames.
+    /// at the new poses. What is attached to them goes along, and has the new frames.
     ///
     /// # Errors
-    /// `Refused` at the index of a frame: unknown or static object, a pose that is none; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
+    /// `Refused` at the index of a frame: unknown or static object, a pose that is none; `Misuse` for an object that is attached, whose
+    /// frame is its carrier's; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn reframe(&mut self, frames: &[Frame]) -> Result<(), Error> {
-        let wire = |f: &Frame| WireFrame { object: f.object, place: f.place.into(), pose: f.pose.into() };
-        let frames: Vec<WireFrame> = frames.iter().map(wire).collect();
-        self.done(Command::Reframe(frames.clone()))?;
-        if self.transport.may_lose_server() {
-            frames.iter().for_each(|frame| self.journal.reframed(frame));
+        if frames.iter().any(|frame| self.company.is_attached(frame.object)) {
+            return Err(Error::Misuse("a part that is attached has its carrier's frame: detach it first"));
         }
-        let carried: Vec<(u32, u32)> = self.company.attached.iter().map(|(part, a)| (*part, a.carrier)).collect();
-        for (part, carrier) in carried.into_iter().filter(|(_, carrier)| frames.iter().any(|f| f.object == *carrier)) {
-            self.carry(part, carrier)?;
+        let mut all = frames.to_vec();
+        for (part, attached) in &self.company.attached {
+            if let Some(frame) = frames.iter().rfind(|frame| frame.object == attached.root) {
+                all.push(Frame { object: *part, place: frame.place.compose(&attached.held), pose: frame.pose });
+            }
+        }
+        self.give_frames(&all)?;
+        for frame in frames {
+            if let Some(member) = self.company.members.get_mut(&frame.object) {
+                member.own = frame.place;
+            }
         }
         Ok(())
     }
 
     /// From now on `part` moves with `carrier`, as it stands to it (at `options.advance` of the last step), and is not tested against it,
-    /// nor against the objects in `touching`: those that a gripper holds it with. It gets the carrier's records, and none of its own.
-    /// What is attached to the part goes along. A carrier that is attached itself hands it on to its own.
+    /// nor against the objects in `touching`: those that a gripper holds it with. It has the carrier's frame and gets its records, and none
+    /// of its own. What is attached to the part goes along. A carrier that is attached itself hands it on to its own.
     ///
     /// # Errors
-    /// `Misuse`: of a part to itself or to what it carries; `Refused`: an object is unknown, or the part is static; `ServerLost`,
-    /// `ReplyLost`, `Timeout`, `System`.
+    /// `Misuse`: of a part to itself or to what it carries; an object in `touching` that was not added here; names that are others' as
+    /// well; `Refused`: an object is unknown, or the part is static; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn attach(&mut self, part: u32, carrier: u32, touching: &[u32]) -> Result<(), Error> {
-        let root = self.company.attached.get(&carrier).map_or(carrier, |attached| attached.carrier);
-        if root == part || carrier == part {
+        if self.company.carriers(carrier).any(|own| own == part) {
             return Err(Error::Misuse("a part cannot be attached to itself, nor to what it carries"));
         }
-        let before = self.company.clone();
-        self.carry(part, root)?;
-        let along: Vec<u32> =
-            self.company.attached.iter().filter(|(_, a)| a.carrier == part).map(|(id, _)| *id).collect();
-        for id in along {
-            self.carry(id, root)?;
-            if let Some(attached) = self.company.attached.get_mut(&id) {
-                attached.carrier = root;
-            }
+        if touching.iter().any(|id| !self.company.members.contains_key(id)) {
+            return Err(Error::Misuse("expected objects of this session that the part may touch"));
         }
-        let mut touching = touching.to_vec();
-        touching.push(carrier);
-        self.company.attached.insert(part, Attached { carrier: root, touching });
-        self.tell_rules().inspect_err(|_| self.company = before)
+        let (root, held) = (self.company.root_of(carrier), Pose::IDENTITY);
+        let touching = touching.iter().copied().chain([carrier]).collect();
+        let before = self.company.attached.clone();
+        self.company.attached.insert(part, Attached { carrier, root, held, touching });
+        let done = if self.company.is_ambiguous() { Err(AMBIGUOUS) } else { Ok(()) };
+        let done = done.and_then(|()| self.hand_over(part, root)).and_then(|()| self.tell_rules());
+        done.inspect_err(|_| self.company.attached = before)
     }
 
-    /// The part stays where it is from now on, and is tested as the rules say. Nothing where it is not attached.
+    /// The part stays where it is from now on, in the frame that it had of its own, and is tested as the rules say; what is attached to it
+    /// goes with it. Nothing where it is not attached.
     ///
     /// # Errors
     /// As `set_rules`.
     pub fn detach(&mut self, part: u32) -> Result<(), Error> {
-        let before = self.company.clone();
-        match self.company.attached.remove(&part) {
-            None => Ok(()),
-            Some(_) => self.tell_rules().inspect_err(|_| self.company = before),
+        if !self.company.is_attached(part) {
+            return Ok(());
         }
+        self.release(part)?;
+        self.tell_rules()
     }
 
     /// The object whose records a part gets; `None` where it is not attached.
     pub fn carrier(&self, part: u32) -> Option<u32> {
-        self.company.attached.get(&part).map(|attached| attached.carrier)
+        self.company.attached.get(&part).map(|attached| attached.root)
     }
 
     /// Pairs of objects that may meet and are not tested, whatever the rules say (an allowed-collision matrix); `false`: no longer.
     /// They are exceptions of all rules, by the objects' names.
     ///
     /// # Errors
-    /// `Misuse` for an object that was not added here; otherwise as `set_rules`.
+    /// `Misuse` for an object that was not added here, or whose name is another's as well; otherwise as `set_rules`.
     pub fn allow(&mut self, pairs: &[[u32; 2]], allowed: bool) -> Result<(), Error> {
-        if pairs.iter().flatten().any(|id| !self.company.names.contains_key(id)) {
+        if pairs.iter().flatten().any(|id| !self.company.members.contains_key(id)) {
             return Err(Error::Misuse("expected pairs of objects of this session"));
         }
         let before = self.company.clone();
@@ -194,7 +255,8 @@ impl<T: Transport> Session<T> {
                 false => self.company.allowed.remove(&pair(*a, *b)),
             };
         }
-        self.tell_rules().inspect_err(|_| self.company = before)
+        let done = if self.company.is_ambiguous() { Err(AMBIGUOUS) } else { self.tell_rules() };
+        done.inspect_err(|_| self.company = before)
     }
 
     /// The rules that were set, without what is allowed beside them.
@@ -222,44 +284,106 @@ impl<T: Transport> Session<T> {
     /// Adds an object; returns its id.
     ///
     /// # Errors
-    /// `Refused`: unknown model, bad pose or speed, too many objects, resolution; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
+    /// `Refused`: unknown model, bad pose or speed, too many objects, resolution; `Misuse`: a name of an object that is attached or allowed
+    /// to meet another one; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn add_object(&mut self, object: Object) -> Result<u32, Error> {
         let id = self.last_object + 1;
         let spec = object.spec(id);
+        if self.company.is_taken(&spec.name) {
+            return Err(AMBIGUOUS);
+        }
         self.done(Command::AddObject(spec.clone()))?;
         self.last_object = id;
-        let needs_rules = self.company.added(id, &spec.name, &spec.group);
+        let is_new = !self.company.members.values().any(|member| member.group == spec.group);
+        // The server has taken it.
+        let place = spec.place.checked().unwrap_or(Pose::IDENTITY);
+        let member = Member { name: spec.name.clone(), group: spec.group.clone(), place, own: place };
+        self.company.members.insert(id, member);
         if self.transport.may_lose_server() {
             self.journal.object(spec);
         }
-        if needs_rules {
+        if is_new && self.company.stands_for_rules() {
             self.tell_rules()?;
         }
         Ok(id)
     }
 
-    /// Removes an object; its id is not used again. What it carried stays where it is.
+    /// Removes an object; its id is not used again. What it carried stays where it is, as if it was detached before.
     ///
     /// # Errors
     /// `Refused`: unknown object; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn remove_object(&mut self, object: u32) -> Result<(), Error> {
+        let carried: Vec<u32> =
+            self.company.attached.iter().filter(|(_, a)| a.carrier == object).map(|(part, _)| *part).collect();
+        for part in carried {
+            self.release(part)?;
+        }
         self.done(Command::RemoveObject(object))?;
         self.journal.removed(object);
-        self.company.removed(object);
+        let company = &mut self.company;
+        let before = company.exceptions();
+        company.members.remove(&object);
+        company.allowed.retain(|pair| !pair.contains(&object));
+        company.attached.remove(&object);
+        company.attached.values_mut().for_each(|attached| attached.touching.retain(|id| *id != object));
+        // Another object of its name is none of them.
+        if company.exceptions() != before { self.tell_rules() } else { Ok(()) }
+    }
+
+    /// Ends that a part is attached: it has its own frame again, where it stands, and what hangs on it has that one.
+    fn release(&mut self, part: u32) -> Result<(), Error> {
+        let Some(own) = self.company.members.get(&part).map(|member| member.own) else { return Ok(()) };
+        let root = self.company.root_of(part);
+        let frame = self.carry(part, root)?;
+        let pose = frame.pose.compose(&frame.place).compose(&own.inverse());
+        self.give_frames(&[Frame { object: part, place: own, pose }])?;
+        self.company.attached.remove(&part);
+        for id in self.company.parts_of(part) {
+            self.hand_over(id, part)?;
+        }
         Ok(())
     }
 
-    /// Gives a part the frame of its carrier.
-    fn carry(&mut self, object: u32, carrier: u32) -> Result<(), Error> {
-        let advance = self.options.advance;
-        match self.command(Command::Carry { object, carrier, advance })? {
-            Answer::Reframed(frame) => {
-                if self.transport.may_lose_server() {
-                    self.journal.reframed(&frame);
-                }
-                Ok(())
+    /// Gives a part that is attached, and what hangs on it, the frame of the object at the end of its chain.
+    fn hand_over(&mut self, part: u32, root: u32) -> Result<(), Error> {
+        let mut all = self.company.parts_of(part);
+        all.insert(0, part);
+        for id in all {
+            let frame = self.carry(id, root)?;
+            let held = self.company.place_of(root).inverse().compose(&frame.place);
+            if let Some(attached) = self.company.attached.get_mut(&id) {
+                (attached.root, attached.held) = (root, held);
             }
-            other => Err(unexpected(&other)),
+        }
+        Ok(())
+    }
+
+    /// Gives objects frames, whatever is attached.
+    fn give_frames(&mut self, frames: &[Frame]) -> Result<(), Error> {
+        let wire = |f: &Frame| WireFrame { object: f.object, place: f.place.into(), pose: f.pose.into() };
+        let wires: Vec<WireFrame> = frames.iter().map(wire).collect();
+        self.done(Command::Reframe(wires.clone()))?;
+        wires.iter().zip(frames).for_each(|(wire, frame)| self.reframed(wire, frame.place));
+        Ok(())
+    }
+
+    /// Gives a part the frame of another object, where it stands: that frame, and where the part's model lies in it.
+    fn carry(&mut self, object: u32, carrier: u32) -> Result<Frame, Error> {
+        let advance = self.options.advance;
+        let answer = self.command(Command::Carry { object, carrier, advance })?;
+        let Answer::Reframed(wire) = &answer else { return Err(unexpected(&answer)) };
+        let (place, pose) = wire.checked().map_err(|_| unexpected(&answer))?;
+        self.reframed(wire, place);
+        Ok(Frame { object, place, pose })
+    }
+
+    /// Notes that an object has another frame.
+    fn reframed(&mut self, wire: &WireFrame, place: Pose) {
+        if self.transport.may_lose_server() {
+            self.journal.reframed(wire);
+        }
+        if let Some(member) = self.company.members.get_mut(&wire.object) {
+            member.place = place;
         }
     }
 }

@@ -58,7 +58,7 @@ impl<T: Transport> Session<T> {
     /// Sends the batch without waiting; `finish` does it too.
     ///
     /// # Errors
-    /// `Misuse` when no step was begun, `ServerLost`, `System`.
+    /// `Misuse` when no step was begun, or a record names a part that is attached; `ServerLost`, `System`.
     pub fn send(&mut self) -> Result<(), Error> {
         match self.stage {
             Stage::Loaned => {}
@@ -67,7 +67,14 @@ impl<T: Transport> Session<T> {
         }
         let records = match self.company.slots() {
             0 => self.own_slots,
-            _ => self.company.fill(self.transport.loaned_mut(), self.own_slots),
+            _ => {
+                let slots = self.transport.loaned_mut();
+                if slots.iter().take(self.own_slots).any(|record| self.company.is_attached(record.object)) {
+                    let what = "a record names a part that is attached, which moves with its carrier: detach it first";
+                    return Err(Error::Misuse(what));
+                }
+                self.company.fill(slots, self.own_slots)
+            }
         };
         let o = &self.options;
         let asked = [(o.first, ASK_FIRST), (o.details, ASK_DETAILS), (o.clear, ASK_CLEAR), (o.polling, ASK_POLLING)];
@@ -124,9 +131,7 @@ impl<T: Transport> Session<T> {
         let (status, error, index) = (header.status, header.error, header.index);
         if status == STEP_REFUSED || error != 0 {
             let code = ErrorCode::of_number(error).unwrap_or(ErrorCode::Internal);
-            let index = (index != NO_INDEX).then_some(index);
-            let record = index.and_then(|i| self.transport.loaned().get(i as usize));
-            let detail = record.map_or_else(String::new, |r| format!("object id {}", r.object));
+            let (index, detail) = self.refused_at((index != NO_INDEX).then_some(index));
             return Err(self.failed(Error::Refused { code, index, detail }));
         }
         (self.stage, self.unanswered) = (Stage::Idle, None);
@@ -138,6 +143,20 @@ impl<T: Transport> Session<T> {
             Some((header, slots)) => Ok(Reply::of(*header, slots)),
             None => Err(absent()),
         }
+    }
+
+    /// The caller's record that a refused one is, or that it was made of, and what it is about.
+    fn refused_at(&self, index: Option<u32>) -> (Option<u32>, String) {
+        let slots = self.transport.loaned();
+        let Some(record) = index.and_then(|i| slots.get(i as usize)) else { return (index, String::new()) };
+        let object = record.object;
+        if index.is_none_or(|i| (i as usize) < self.own_slots) {
+            return (index, format!("object id {object}"));
+        }
+        // What a part does is what its carrier does.
+        let root = self.company.root_of(object);
+        let own = slots.iter().take(self.own_slots).rposition(|r| r.object == root);
+        (own.map(|i| i as u32), format!("object id {object}, which object id {root} carries"))
     }
 
     /// After `reconnect`: the batch that was in flight when the server was lost, loaned again with the same poses. It can be had

@@ -2,6 +2,7 @@
 //! One program for all of them links once; `--test models NAME::` runs those of one file.
 #![allow(missing_docs)]
 
+mod attached;
 mod batch;
 mod builder;
 mod cache;
