@@ -12,9 +12,9 @@ pub const ON_AXIS: f64 = 8.0 * f64::EPSILON;
 /// leaves 2e-6.
 pub const SIMILARITY: f64 = 1e-5;
 
-/// A polyhedron this close to convex, relative to the diagonal of its box, is taken as the hull of its planes: real
-/// sources leave faces non-planar by that much.
-pub const CONVEXITY: f64 = 1e-4;
+/// A polyhedron this close to convex, relative to the diagonal of its box, is taken as the hull of its planes: six printed digits
+/// leave faces non-planar by so much. What is dented by more is a mesh: planes of a dent cut far corners off by many times its depth.
+pub const CONVEXITY: f64 = 4e-6;
 
 /// Neighbouring faces of a polyhedron whose corners lie this close to one plane, relative to the diagonal of its box, are
 /// one face: six printed digits bend a triangulated face by this much.

@@ -556,6 +556,45 @@ fn outlines_of_very_many_corners_hold_what_their_sectors_say() {
     }
 }
 
+/// A convex outline with a dent in one side keeps its corners, however flat the dent.
+#[test]
+fn outlines_with_flat_dents_keep_their_corners() {
+    let mut r = Random(23);
+    for round in 0..60 {
+        let (n, size) = (3 + (r.within(0.0, 5.0) as usize), r.within(0.5, 200.0));
+        let mut outline: Vec<DVec2> = (0..n)
+            .map(|i| DVec2::from_angle((i as f64 + r.within(-0.2, 0.2)) * std::f64::consts::TAU / n as f64) * size)
+            .collect();
+        let (from, to) = (outline[0], outline[1]);
+        let depth = size * 10f64.powf(r.within(-4.8, -3.0));
+        outline.insert(1, from.lerp(to, r.within(0.2, 0.8)) + (to - from).perp().normalize() * depth);
+        let listed = outline.iter().map(|p| [p.x, p.y]).collect::<Vec<_>>();
+        let points: Vec<[f64; 3]> = [0.0, 1.0].iter().flat_map(|z| listed.iter().map(|p| [p[0], p[1], *z])).collect();
+        let m = outline.len();
+        let mut faces: Vec<Vec<usize>> = vec![(0..m).collect(), (m..2 * m).rev().collect()];
+        faces.extend((0..m).map(|i| vec![i, i + m, (i + 1) % m + m, (i + 1) % m]));
+        let texts = [
+            linear("height = 1", &format!("polygon(points = {listed:?});")),
+            format!("polyhedron(points = {points:?}, faces = {faces:?});"),
+        ];
+        for text in texts {
+            let import =
+                import_csg("dent.csg", &text, Facets::Auto, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+            assert!(import.notes.iter().all(|note| !note.text.contains("convex")), "{text}: {:?}", import.notes);
+            for i in 0..m {
+                let (a, b) = (outline[i], outline[(i + 1) % m]);
+                for t in [0.001, 0.01, 0.1, 0.5, 0.9, 0.99, 0.999] {
+                    for aside in [-1e-7, 1e-7] {
+                        let p = a.lerp(b, t) + (b - a).perp().normalize() * (aside * size);
+                        let told = import.solid.value(p.extend(0.5)) < 0.0;
+                        assert_eq!(told, even_odd(&[&listed], p), "{round}: {p} of {text}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn outlines_as_deep_as_they_have_corners_are_meshes_and_too_many_corners_are_refused() {
     let arm = |i: usize, width: f64| {

@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn a_rough_cube_becomes_the_hull_of_its_planes() {
         let mut points = cube_points();
-        points[7] += DVec3::new(3e-7, -2e-7, 4e-5);
+        points[7] += DVec3::new(3e-7, -2e-7, 1e-5);
         points[0] += DVec3::new(-3e-7, -2e-7, -1e-7);
         for faces in [cube_faces(), split(cube_faces())] {
             let (p, fit) = Polyhedron::from_faces(&points, &faces).expect("nearly a cube");
