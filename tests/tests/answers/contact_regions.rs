@@ -2,6 +2,7 @@
 //! that bound them, against what elementary geometry says.
 
 use super::tight::prism;
+use contactd::contact::distance::{DEFAULT_LIMIT, DistanceQuery, at_instant};
 use contactd::contact::margin::touching;
 use contactd::contact::region::{Region, Regions, complete, regions, threshold};
 use contactd::contact::within::Within;
@@ -16,7 +17,7 @@ use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::ReportedPoint as _;
 use contactd_tests::random_solids::Random;
-use contactd_tests::scenes::Recipe;
+use contactd_tests::scenes::{Recipe, primitive, tree};
 use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2, TAU};
@@ -736,4 +737,75 @@ fn hulls_of_many_nearly_coplanar_facets_have_a_region() {
         cut += usize::from(!found.complete);
     }
     assert!(cut > 0, "no search was cut");
+}
+
+/// A disc whose rim is rounded, as a union of cylinders and tori: none of the edges where these end is one of the whole.
+#[test]
+fn a_ball_beside_a_rounded_disc_is_as_far_as_its_centre_says() {
+    let (radius, half, round, ball) = (0.63, 0.385, 0.17, 0.42);
+    let rim = || Recipe::torus(radius, round);
+    let disc = || {
+        let flat = Recipe::cylinder(radius, half + round).union(Recipe::cylinder(radius + round, half));
+        flat.union(rim().at(0.0, 0.0, half)).union(rim().at(0.0, 0.0, -half))
+    };
+    let mut r = Random::new(37);
+    for k in 0..sized("CONTACTD_ROUNDED", 150) {
+        let gap = 10f64.powf(r.within(-4.0, -2.0));
+        // About the seam between flat and round as well as anywhere.
+        let angle = if r.chance(0.5) { r.within(0.0, FRAC_PI_2) } else { r.within(0.0, 0.05) };
+        let (s, c) = angle.sin_cos();
+        let far = round + ball + gap;
+        let at = DQuat::from_rotation_z(r.within(0.0, TAU)) * dvec3(radius + far * s, 0.0, half + far * c);
+        let turn = Pose::new(r.vector(1.0), r.rotation());
+        let beside = Rest::new(disc(), turn, Recipe::sphere(ball), turn.compose(&Pose::at(at)));
+        let found = beside.regions(0.02);
+        let nearest = found.regions.iter().min_by(|p, q| p.separation().total_cmp(&q.separation())).expect("a region");
+        assert!((nearest.separation() - gap).abs() < 1e-9, "{k}: gap {gap} at {angle}: {found:#?}");
+        let center = dvec3(radius, 0.0, half);
+        let normal = turn.rotation
+            * DQuat::from_rotation_z(at.y.atan2(at.x))
+            * (dvec3(radius + far * s, 0.0, half + far * c) - center).normalize();
+        assert!(nearest.normal.dot(normal) > 1.0 - 1e-10, "{k}: {normal} {nearest:?}");
+    }
+}
+
+/// What is told of the nearest region is the least distance, which is found and proven by other means.
+#[test]
+fn the_nearest_region_within_a_margin_is_as_far_as_the_least_distance() {
+    let mut r = Random::new(91);
+    let (mut asked, mut off) = (0, 0);
+    for k in 0..sized("CONTACTD_NEAREST", 60) {
+        let body = |r: &mut Random| match r.below(4) {
+            0 => tree(r, 2 + k % 3),
+            1 => Recipe::torus(r.within(0.5, 1.0), r.within(0.1, 0.4)),
+            _ => primitive(r, 1.0),
+        };
+        let (a, b) = (body(&mut r), body(&mut r));
+        let way = r.direction();
+        let mut beside = Rest::new(a, Pose::new(DVec3::ZERO, r.rotation()), b, Pose::new(way * 5.0, r.rotation()));
+        let met = earliest_contact(&beside.moving(way * -5.0), &mut Scratch::default());
+        if met.status() != Status::Contact {
+            continue;
+        }
+        beside.pose_b.position = way * (5.0 - 5.0 * met.time() + 10f64.powf(r.within(-3.5, -1.5)));
+        let query = beside.query();
+        let PairQuery { a, b, .. } = query;
+        let least = at_instant(&DistanceQuery { a, b, tolerance: 1e-10, limit: DEFAULT_LIMIT }, 0.0);
+        let found = regions(&query, 0.0, threshold(query.resolution, 1.3 * least.upper));
+        let nearest = found.regions.iter().map(Region::separation).fold(f64::INFINITY, f64::min);
+        asked += 1;
+        let by = (nearest - least.upper).max(least.lower - nearest);
+        // A few of long forms end beside another local minimum.
+        if by.is_nan() || by >= 1e-8 {
+            off += 1;
+            println!(
+                "{k}: told {nearest}, proven {} to {}: {:?}",
+                least.lower,
+                least.upper,
+                found.regions.first().map(|r| (r.extent, r.kind, r.faces_a, r.faces_b))
+            );
+        }
+    }
+    println!("{off} of {asked}");
+    assert!(asked > 20 && off * 500 <= asked, "{off} of {asked}");
 }

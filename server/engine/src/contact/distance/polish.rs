@@ -25,6 +25,8 @@ const STEPS: usize = 40;
 const CHOICES: usize = 3;
 /// Literals this near to 0, relative to the size, count as met at first.
 const MET: f64 = 1e-7;
+/// Faces of a body that are looked through for others at a point.
+const MOST_FACES: usize = 256;
 /// Literals this near to 0, relative to the size, are told as the features of a point.
 const FEATURE: f64 = 1e-9;
 
@@ -103,6 +105,24 @@ impl Polish<'_, '_> {
             }
         }
         best
+    }
+
+    /// Points beside one of a body, in its frame, at a length along its faces there towards `way`: where a part ends on another one, that
+    /// goes on beneath. None where the part that decides there has all faces.
+    pub fn beside(&self, side: usize, x: DVec3, way: DVec3, length: f64) -> SmallVec<[DVec3; 4]> {
+        let faces = &self.sides[side].parts.solid.faces;
+        let Some(clause) = self.clause(side, x).filter(|_| faces.len() <= MOST_FACES) else { return SmallVec::new() };
+        let reach = FEATURE * self.scale + 1e3 * self.rounding;
+        let met = |id: &&LiteralId| self.at(side, **id, x).0.abs() <= reach;
+        let is_other = |f: usize| !clause.iter().any(|id| id.face() as usize == f) && faces[f].value(x).abs() <= reach;
+        if clause.iter().filter(met).count() < 2 || !(0..faces.len()).any(is_other) {
+            return SmallVec::new();
+        }
+        let along = |id: &LiteralId| {
+            let normal = self.at(side, *id, x).1.normalize_or_zero();
+            (way - normal * normal.dot(way)).try_normalize()
+        };
+        clause.iter().filter(met).filter_map(along).map(|s| x + s * length).collect()
     }
 
     /// The apexes of a body's cones that hold around a point, those that are its own.

@@ -101,6 +101,8 @@ const PAIRS_PER_LOOK: usize = 4;
 
 /// Diameters of the smaller body within which two points are one …
 const SAME_POINT: f64 = 1e-6;
+/// … those by which points are nearer to each other than others, for all that rounding tells …
+const NEARER: f64 = 1e-9;
 /// … and those of the same faces.
 const SAME_FACES: f64 = 1e-4;
 
@@ -144,7 +146,7 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
                 let rest = Work::new(left);
                 let (nearest, proven) = depth::nearest(&task, &at, threshold, depth::BETTER, &rest);
                 found.cells += rest.cells();
-                (nearest.map(|lowest| single::roughly_nearest(&bodies, &lowest)), proven)
+                (nearest.map(|lowest| single::roughly_nearest(&bodies, &lowest, threshold)), proven)
             }
         };
         found.regions.extend(nearest.filter(is_near).map(|m| point_region(&bodies, &m)));
@@ -256,6 +258,10 @@ fn find(bodies: &Bodies) -> Regions {
         return out;
     }
     let mut found = in_boxes(bodies);
+    if let Some(nearest) = beside_the_nearest(bodies, &found.regions) {
+        found.regions.push(nearest);
+        found.regions.sort_by_key(rank);
+    }
     // Boxes follow curves that nearly run along each other to a part of the threshold.
     if let [only] = &mut found.regions[..]
         && only.extent == Extent::Point
@@ -264,6 +270,20 @@ fn find(bodies: &Bodies) -> Regions {
         *only = nearest;
     }
     found
+}
+
+/// The point where bodies are nearest to each other, by the distance from what is told as nearest, where that is none: an edge that leans
+/// against a round face is told by its ends. A patch is told by corners and by directions that stay.
+fn beside_the_nearest(bodies: &Bodies, regions: &[Region]) -> Option<Region> {
+    let region = regions.iter().min_by(|r, s| r.separation().total_cmp(&s.separation()))?;
+    if region.extent == Extent::Patch {
+        return None;
+    }
+    let p = region.points.iter().min_by(|p, q| p.separation.total_cmp(&q.separation))?;
+    let aside = region.normal * (0.5 * p.separation);
+    let m = Meeting { feet: [p.point - aside, p.point + aside], normal: region.normal, gap: p.separation };
+    let nearer = single::nearer(bodies, &m, p.separation - NEARER * bodies.size)?;
+    Some(point_region(bodies, &nearer))
 }
 
 /// All regions of any bodies.
@@ -318,6 +338,7 @@ fn in_boxes(bodies: &Bodies) -> Regions {
     }
     let mut points: Vec<(DVec3, [u32; 3], [u32; 3])> = Vec::new();
     for m in point::meetings(bodies, &places, &told) {
+        let m = single::nearer(bodies, &m, m.gap - NEARER * bodies.size).unwrap_or(m);
         let x = m.middle();
         let region = point_region(bodies, &m);
         let faces = (region.faces_a, region.faces_b);

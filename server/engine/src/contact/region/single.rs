@@ -30,6 +30,8 @@ const LEAN: f64 = 2.0;
 const CROSSING: f64 = 0.25;
 /// Thresholds from where F is lowest to the faces that decide there.
 const ACTIVE: f64 = 2.0;
+/// Diameters of the smaller body from which on bodies are apart for Newton's method on the distance.
+const APART: f64 = 1e-6;
 /// Steps from a point down to a body.
 const PROJECTIONS: usize = 16;
 /// Faces of a body that are looked through.
@@ -183,9 +185,9 @@ fn onto(bodies: &Bodies, side: Side, whole: &Primitive, x: DVec3) -> DVec3 {
 /// Where two bodies are nearest to each other as F tells it, where nothing proves more, as of an edge beside an apex. Along an axis F has
 /// no slope, and its normal may be any: of convex bodies the one is told, of F's, its faces' and the distance's own, along which they
 /// reach least far into each other, and how far they are apart along that.
-pub fn roughly_nearest(bodies: &Bodies, lowest: &Deepest) -> Meeting {
+pub fn roughly_nearest(bodies: &Bodies, lowest: &Deepest, threshold: f64) -> Meeting {
     let of_f = point::nearest(bodies, lowest);
-    let Some(both) = convex(bodies) else { return of_f };
+    let Some(both) = convex(bodies) else { return nearer(bodies, &of_f, threshold).unwrap_or(of_f) };
     let (x, _, depth, lits) = lowest;
     let of_face = |lit: &Lit| {
         let slope = bodies.slant_out(*lit, *x).1.normalize_or_zero();
@@ -264,15 +266,47 @@ fn half_space(whole: &Primitive) -> Option<(DVec3, f64)> {
     }
 }
 
+/// Points of both bodies near the feet of a meeting that are nearest to each other, and no farther apart than `most`; `None` where the
+/// bodies are hardly apart, or none are found. Where parts of a body end on it, F may balance beside the nearest points: its edges
+/// are none of the whole.
+pub fn nearer(bodies: &Bodies, m: &Meeting, most: f64) -> Option<Meeting> {
+    // Below that equations of faces tell more digits.
+    let is_apart = |m: &Meeting| m.gap > APART * bodies.size;
+    if !is_apart(m) {
+        return None;
+    }
+    let parts = parts_of(bodies);
+    let polish = polish_of(bodies, &parts);
+    let [x, y] = m.feet;
+    let (y, way) = (bodies.at.b_point(y), -(bodies.at.b_from_a * m.normal));
+    let of_a = polish.beside(0, x, m.normal, m.gap).into_iter().map(|x| [x, y]);
+    let of_b = polish.beside(1, y, way, m.gap).into_iter().map(|y| [x, y]);
+    let starts = std::iter::once([x, y]).chain(of_a).chain(of_b);
+    let found = starts.filter_map(|feet| run(bodies, &polish, feet, m.normal));
+    found.min_by(|m, n| m.gap.total_cmp(&n.gap)).filter(|found| is_apart(found) && found.gap <= most)
+}
+
 /// The feet by Newton's method on the distance.
 fn polished(bodies: &Bodies, [x, y]: [DVec3; 2], normal: DVec3) -> Option<Meeting> {
+    let parts = parts_of(bodies);
+    run(bodies, &polish_of(bodies, &parts), [x, bodies.at.b_point(y)], normal)
+}
+
+fn parts_of<'a>(bodies: &Bodies<'_, 'a>) -> [Parts<'a>; 2] {
+    [bodies.task.a, bodies.task.b].map(|solid| Parts::none(solid, bodies.task.rounding))
+}
+
+fn polish_of<'s, 'a>(bodies: &Bodies<'s, 'a>, parts: &'s [Parts<'a>; 2]) -> Polish<'s, 'a> {
     let (task, at) = (bodies.task, bodies.at);
-    let parts = [task.a, task.b].map(|solid| Parts::none(solid, task.rounding));
     let side = |k: usize, model| polish::Side { parts: &parts[k], model, tokens: &parts[k].solid.normal_form };
     let sides = [side(0, task.model_a), side(1, task.model_b)];
-    let polish = Polish { sides, at, scale: task.scale, rounding: task.rounding };
-    let pair = polish.run(x, at.b_point(y))?;
+    Polish { sides, at, scale: task.scale, rounding: task.rounding }
+}
+
+/// Newton's method from points in the frames of their bodies.
+fn run(bodies: &Bodies, polish: &Polish, [x, y]: [DVec3; 2], normal: DVec3) -> Option<Meeting> {
+    let pair = polish.run(x, y)?;
     bodies.work.bound();
-    let feet = [pair.x, at.a_point(pair.y)];
+    let feet = [pair.x, bodies.at.a_point(pair.y)];
     Some(point::met(bodies, feet, normal))
 }
