@@ -9,9 +9,10 @@
 //! some face of the piece's cavity by δ; no floor of it that was left out can be that face, since the piece does not reach
 //! beyond it by more than a part of δ (`SLACK`). The planes of the cut lie δ farther out for what the proof takes off at planes.
 
-use super::body::Plane;
+use super::body::{Moment, Plane};
 use super::pierced::CavityPair;
 use crate::math::Aabb;
+use crate::solid::Sense;
 use crate::solid::local::LiteralId;
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -136,10 +137,8 @@ impl Layers<'_, '_> {
         };
         let floor = floor.map(|flat| flat.literal);
         let listed = if are_alike { wall.or(floor) } else { floor.or(wall) };
-        // A cavity has faces.
-        listed
-            .or(other.flats.first().map(|flat| flat.literal))
-            .unwrap_or(LiteralId::new(0, crate::solid::Sense::Negative))
+        // A cavity that the solid does not reach has no walls, and is met nowhere.
+        listed.or(other.flats.first().map(|flat| flat.literal)).unwrap_or(LiteralId::new(0, Sense::Negative))
     }
 }
 
@@ -172,16 +171,13 @@ impl CavityPair<'_> {
     }
 
     /// The least clearance in a few directions.
-    pub(super) fn clearance(&self, m: &super::body::Moment) -> f64 {
+    fn clearance(&self, m: &Moment) -> f64 {
         self.walls().fold(f64::INFINITY, |least, wall| least.min(self.best(m, wall).phi))
     }
 
     /// The piece of the body between two planes across an axis, each with the face that its cavity's wall has an edge with there. The
     /// floors beyond are no walls of it.
-    fn cut(&self, axis: DVec3, [lower, upper]: [Option<(f64, LiteralId)>; 2]) -> Self
-    where
-        Self: Clone,
-    {
+    fn cut(&self, axis: DVec3, [lower, upper]: [Option<(f64, LiteralId)>; 2]) -> Self {
         let mut piece = self.clone();
         for (normal, at) in [(-axis, lower.map(|(c, edge)| (-c, edge))), (axis, upper)] {
             let Some((offset, literal)) = at else { continue };
