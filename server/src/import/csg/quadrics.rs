@@ -20,6 +20,9 @@ type Result<T> = std::result::Result<T, (Place, Problem)>;
 /// By how much of its size the planes around a hyperboloid of one sheet stand off it: they hold it and are none of its faces.
 const ROOM: f64 = 0.125;
 
+/// What is no farther from a cylinder than this, relative to its radius, is one to rounding.
+const STRAIGHT: f64 = 1e-12;
+
 /// An inequality within a box, in the call's coordinates.
 struct Asked {
     form: Form,
@@ -30,6 +33,8 @@ struct Asked {
     cut: Vec<u8>,
     /// Of two pieces the one that holds this point.
     holds: Option<DVec3>,
+    /// Of one sheet: 1 − (waist/r)², by how much it is no cylinder.
+    sheet: Option<f64>,
 }
 
 /// `paraboloid`: a dome with its tip up, as a cone of the same height and radius; `hyperboloid`, of one sheet with a waist or such a
@@ -63,7 +68,8 @@ fn of_revolution(call: &Call, is_paraboloid: bool) -> Result<Option<Asked>> {
             constant: -a + b * shift + c * shift * shift,
         }
     };
-    let dome = |form| Asked { form, around, cage: around, cut: vec![4], holds: Some(DVec3::Z * (low + 0.5 * h)) };
+    let dome =
+        |form| Asked { form, around, cage: around, cut: vec![4], holds: Some(DVec3::Z * (low + 0.5 * h)), sheet: None };
     if is_paraboloid {
         return Ok(Some(dome(form([1.0, 1.0 / h, 0.0]))));
     }
@@ -78,7 +84,7 @@ fn of_revolution(call: &Call, is_paraboloid: bool) -> Result<Option<Asked>> {
             let form = form([w + rest, 4.0 * rest / h, -4.0 * rest / (h * h)]);
             let room = DVec3::new(ROOM * r, ROOM * r, 0.0);
             let cage = Aabb { min: around.min - room, max: around.max + room };
-            Ok(Some(Asked { form, around, cage, cut: Vec::new(), holds: None }))
+            Ok(Some(Asked { form, around, cage, cut: vec![4, 5], holds: None, sheet: Some(rest) }))
         }
         (None, Some(_)) => {
             let Some(cone) = arguments.finite_size("cone")? else { return Ok(None) };
@@ -106,7 +112,7 @@ fn general(call: &Call) -> Result<Asked> {
         ));
     }
     let around = Aabb { min, max };
-    Ok(Asked { form: Form::of_matrix(&m), around, cage: around, cut: (0..6).collect(), holds: None })
+    Ok(Asked { form: Form::of_matrix(&m), around, cage: around, cut: (0..6).collect(), holds: None, sheet: None })
 }
 
 fn symmetric(value: &Value) -> Result<[[f64; 4]; 4]> {
@@ -158,6 +164,12 @@ fn made(shapes: &mut Shapes<'_>, call: &Call, outer: &DAffine3, asked: Asked) ->
         NoQuadric::Planes => refused("a quadric that is none of planes", "planes, nothing or all of space"),
         NoQuadric::Far => refused("a quadric with its centre within a thousand sizes of its box", "one farther off"),
     })?;
+    // Two cones that meet in a point are no neck, and a cylinder has no waist: neither is loaded in place of what was asked for.
+    let is_sheet = |sides: &[Face]| sides.len() == 1 && !sides[0].is_convex();
+    if asked.sheet.is_some_and(|rest| !is_sheet(&quadrics.sides) && (rest > STRAIGHT || quadrics.sides.len() > 1)) {
+        let expected = "a hyperboloid with a waist that is no less than about a millionth of r and of h";
+        return Err(refused(expected, "one that is thinner than its digits tell"));
+    }
     let holds = asked.holds.map(|x| map.transform_point3(x));
     let sides: Vec<Face> = quadrics.sides.into_iter().filter(|s| holds.is_none_or(|x| s.value(x) < 0.0)).collect();
     // What is taken away reaches beyond the block, so that no skin is left where both end.

@@ -585,3 +585,41 @@ fn a_sheet_of_a_quadric_is_never_left_out_in_silence() {
     let left = "1:1: a piece of a quadric that is thin or not in its box: left out";
     assert_eq!(sheets("1.0000000000001"), (1, vec![left.to_string()]));
 }
+
+/// A waist that is too thin to be told from two cones' common tip is refused, however thin; a wider one is what was asked for.
+#[test]
+fn a_hyperboloid_has_its_waist_or_is_refused() {
+    for size in [1e-6, 1.0, 1e6] {
+        for power in 3..=15 {
+            let waist = size * 10f64.powi(-power);
+            let text = format!("hyperboloid(h = {size:e}, r = {size:e}, waist = {waist:e}, center = true);");
+            if power > 6 {
+                let told = refused(&text);
+                assert!(told.contains("expected a hyperboloid with a waist that is no less than"), "{text}: {told}");
+                continue;
+            }
+            let solid = import(&text).solid;
+            let at = |rho: f64, z: f64| solid.value(DVec3::new(rho, 0.0, z));
+            assert!(at(0.99 * waist, 0.0) < 0.0 && at(1.01 * waist, 0.0) > 0.0, "{text}");
+            assert!(at(0.99 * size, 0.4999 * size) < 0.0 && at(0.5 * size, 0.51 * size) > 0.0, "{text}");
+        }
+    }
+    // A cylinder to rounding ends where it was told to.
+    let solid = import("hyperboloid(h = 1, r = 1, waist = 0.99999999999999, center = true);").solid;
+    assert!(solid.value(DVec3::Z * 0.49) < 0.0 && solid.value(DVec3::Z * 0.51) > 0.0);
+    assert!(solid.value(DVec3::Z * 1e3) > 0.0);
+}
+
+/// A quadric that lies beyond its box, however far, is refused, and so it is at every scale of its matrix.
+#[test]
+fn a_quadric_beyond_its_box_is_refused() {
+    for scale in [1e-100, 1e-3, 1.0, 1e100] {
+        for power in 1..=15 {
+            let constant = scale * 10f64.powi(power);
+            let m = format!("[[{scale:e},0,0,0],[0,-{scale:e},0,0],[0,0,{scale:e},0],[0,0,0,{constant:e}]]");
+            let told = refused(&format!("quadric(m = {m}, min = [-1, -1, -1], max = [1, 1, 1]);"));
+            let is_told = told.contains("an inside within its box") || told.contains("none of planes");
+            assert!(is_told, "{constant:e} of {scale:e}: {told}");
+        }
+    }
+}

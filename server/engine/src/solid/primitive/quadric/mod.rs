@@ -39,6 +39,8 @@ const LOOKS: u32 = 13;
 const WAYS: u32 = 32;
 /// By how much the step of the search around the deepest of them shrinks at most.
 const FINEST: f64 = 1e-6;
+/// Directions that are tried in all: what has been found until then is deep enough, or nothing.
+const MOST: u32 = 1 << 17;
 
 impl Quadric {
     /// The inside of an elliptic face, a bowl or a saddle before some planes, each with its number: −x, +x, −y, +y, bottom, top. `around`
@@ -62,10 +64,12 @@ impl Quadric {
         }
         // f has ridges, along which few directions lead down: ever others are tried.
         let (mut by, mut turn) = (1.0, 0u32);
-        while by > FINEST {
+        while by > FINEST && turn < MOST {
             let center = best;
-            let lower = (0..WAYS).filter(|k| look(center + way(turn + k) * step * by, &mut best)).count();
-            turn = turn.wrapping_add(WAYS);
+            // Within the box: towards a piece that lies beyond it f falls as long as one likes to follow.
+            let next = |k: u32| (center + way(turn + k) * step * by).clamp(around.min, around.max);
+            let lower = (0..WAYS).filter(|k| look(next(*k), &mut best)).count();
+            turn += WAYS;
             if lower == 0 {
                 by *= 0.5;
             }
