@@ -183,7 +183,7 @@ pub enum RayOutcome {
         /// True when it begins in an object and does not leave it.
         is_inside: bool,
     },
-    /// The limit of work was met.
+    /// The limit of work was met, or the ray comes from so far away that rounding hides whether it meets an object.
     Undecided {
         /// Proven: up to this parameter it crosses no surface.
         until: f64,
@@ -244,7 +244,7 @@ pub struct PointRecord {
 pub const RAY_HIT: u8 = 0;
 /// `outcome` of a [`RayRecord`]: proven that it crosses none.
 pub const RAY_MISS: u8 = 1;
-/// `outcome` of a [`RayRecord`]: the limit of work was met.
+/// `outcome` of a [`RayRecord`]: the limit of work was met, or it comes from too far away to tell.
 pub const RAY_UNDECIDED: u8 = 2;
 
 /// The answer about a ray, as it lies in memory in C and Python.

@@ -254,7 +254,7 @@
 // `outcome` of a contactd_ray_record: proven that it crosses none.
 #define CONTACTD_RAY_MISS 1
 
-// `outcome` of a contactd_ray_record: the limit of work was met.
+// `outcome` of a contactd_ray_record: the limit of work was met, or it comes from too far away to tell.
 #define CONTACTD_RAY_UNDECIDED 2
 
 // `effects`: pairs searched over the whole step.

@@ -2,6 +2,7 @@
 
 mod by_hand;
 mod closed;
+mod far;
 mod judge;
 mod points;
 mod rays;

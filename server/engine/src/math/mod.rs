@@ -14,6 +14,7 @@ pub mod mix;
 pub mod moments;
 pub mod oriented;
 pub mod random;
+pub mod scaled;
 pub mod tolerance;
 
 pub use aabb::Aabb;

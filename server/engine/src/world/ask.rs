@@ -11,7 +11,7 @@ use crate::contact::distance::{self, Distance, DistanceQuery};
 use crate::contact::probe::{
     self, PointAnswer, PointOptions, PosedModel, Ray, RayAnswer, RayOptions, RayOutcome, Side,
 };
-use crate::math::{Aabb, halt};
+use crate::math::{Aabb, halt, scaled};
 use crate::motion::Placed;
 use contactd_proto::{ErrorCode, Motion};
 use glam::DVec3;
@@ -99,7 +99,7 @@ impl Standing<'_> {
         not_negative("surface", options.surface)?;
         not_negative("tolerance", options.tolerance)?;
         if let Some(i) = points.iter().position(|x| !x.is_finite()) {
-            return Err(Refusal::new(ErrorCode::NotFinite, format!("the point {}", points[i])).at(i));
+            return Err(Refusal::new(ErrorCode::NotFinite, format!("the point {}", vector(points[i]))).at(i));
         }
         let asked = self.asked(bodies)?;
         let told = points.par_iter().map(|x| {
@@ -121,13 +121,18 @@ impl Standing<'_> {
         let mut unit = Vec::with_capacity(rays.len());
         for (i, ray) in rays.iter().enumerate() {
             if !(ray.origin.is_finite() && ray.direction.is_finite()) {
-                return refuse(ErrorCode::NotFinite, i, format!("the ray from {} along {}", ray.origin, ray.direction));
+                let detail = format!("the ray from {} along {}", vector(ray.origin), vector(ray.direction));
+                return refuse(ErrorCode::NotFinite, i, detail);
             }
             if ray.length.is_nan() || ray.length < 0.0 {
-                return refuse(ErrorCode::BadNumber, i, format!("a ray's length must be >= 0, not {}", ray.length));
+                return refuse(
+                    ErrorCode::BadNumber,
+                    i,
+                    format!("a ray's length must be >= 0, not {}", number(ray.length)),
+                );
             }
-            let Some(direction) = ray.direction.try_normalize() else {
-                return refuse(ErrorCode::BadNumber, i, format!("a ray cannot go along {}", ray.direction));
+            let Some(direction) = scaled::direction(ray.direction) else {
+                return refuse(ErrorCode::BadNumber, i, format!("a ray cannot go along {}", vector(ray.direction)));
             };
             unit.push(Ray { direction, ..*ray });
         }
@@ -155,11 +160,22 @@ impl Standing<'_> {
     }
 }
 
+/// A number in few characters, however large or small.
+fn number(x: f64) -> String {
+    let is_plain = x == 0.0 || !x.is_finite() || (1e-5..1e16).contains(&x.abs());
+    if is_plain { x.to_string() } else { format!("{x:e}") }
+}
+
+/// A vector likewise.
+fn vector(v: DVec3) -> String {
+    format!("[{}]", v.to_array().map(number).join(", "))
+}
+
 fn not_negative(what: &str, length: f64) -> Result<(), Refusal> {
     if length >= 0.0 {
         return Ok(());
     }
-    Err(Refusal::new(ErrorCode::BadNumber, format!("the {what} must be a length >= 0, not {length}")))
+    Err(Refusal::new(ErrorCode::BadNumber, format!("the {what} must be a length >= 0, not {}", number(length))))
 }
 
 impl Asked<'_> {
@@ -181,7 +197,7 @@ impl Asked<'_> {
         let away = |aabb: &Aabb| {
             let beyond = (aabb.min - x).max(x - aabb.max);
             let within = beyond.max_element();
-            Some(if within > 0.0 { beyond.max(DVec3::ZERO).length() } else { within })
+            Some(if within > 0.0 { scaled::length(beyond.max(DVec3::ZERO)) } else { within })
         };
         let (infinity, faces) = (f64::INFINITY, [u32::MAX; 3]);
         let nothing = PointAnswer {

@@ -104,7 +104,7 @@ pub enum RayOutcome {
         /// True when it begins in the solid and does not leave it.
         is_inside: bool,
     },
-    /// The limit of work was met.
+    /// The limit of work was met, or the ray comes from so far away that rounding hides whether it meets the solid.
     Undecided {
         /// Proven: up to this parameter it crosses no surface. A length along the ray.
         until: f64,

@@ -4,6 +4,9 @@
 //! show f > −δ all along it. A place is a *witness* where f <= −2 E. Both are proofs, and what is less than 4 E long is one of
 //! them since f is 1-Lipschitz: the search ends. Where a literal changes its sign is guessed by a face's own roots; the guess only
 //! says where a ray is cut.
+//!
+//! From so far away that 16 E is more than the solid's octree and boxes are true to, no such depth says anything. There only f > 2 E
+//! is free, by the whole tree; a stretch of 4 E that is neither stays open, and a ray with such a one is no miss.
 
 use super::along::Line;
 use super::foot::Ground;
@@ -12,7 +15,7 @@ use super::{
     PosedModel, Ray, RayAnswer, RayHit, RayOptions, RayOutcome, Sought, children, faces_at, has_octree, literal_at,
     open_voxel, rounding, three, worthwhile,
 };
-use crate::math::Aabb;
+use crate::math::{Aabb, scaled};
 use crate::octree::{Model, Node};
 use crate::solid::local::{self, Token, Truth};
 use glam::DVec3;
@@ -48,6 +51,9 @@ struct Caster<'a> {
     level: f64,
     limit: u64,
     cells: u64,
+    /// Where E is coarse beside the solid: where the first stretch begins that is neither free nor has a witness; infinite where there
+    /// is none. `None` where E is not.
+    open: Option<f64>,
 }
 
 /// Where a line is in a box, and `None` where it passes by.
@@ -65,7 +71,7 @@ pub fn of_ray(solid: &PosedModel, ray: &Ray, options: &RayOptions) -> RayAnswer 
     let turn = solid.pose.rotation.conjugate();
     let seen = |x: DVec3| turn * (x - solid.pose.position);
     let whole = Line { origin: seen(ray.origin), direction: turn * ray.direction };
-    let far = ray.origin.length() + solid.pose.position.length();
+    let far = scaled::length(ray.origin) + scaled::length(solid.pose.position);
     // From where the ray may be near the solid on it is told by coordinates of the solid's size.
     let (mut from, mut to): (f64, f64) = (0.0, ray.length);
     if aabb.is_finite() {
@@ -78,24 +84,35 @@ pub fn of_ray(solid: &PosedModel, ray: &Ray, options: &RayOptions) -> RayAnswer 
             return miss;
         }
     }
+    let undecided = |until: f64| RayAnswer { outcome: RayOutcome::Undecided { until }, cells: 0 };
     if !to.is_finite() {
-        return RayAnswer { outcome: RayOutcome::Undecided { until: 0.0 }, cells: 0 };
+        return undecided(0.0);
     }
     let line = Line { origin: seen(ray.at(from)), direction: whole.direction };
     let length = to - from;
     let rounding = rounding(model, line.origin.length() + length) + 8.0 * f64::EPSILON * (far + to);
     let most = if model.radius.is_finite() { 0.25 * model.margin() } else { f64::INFINITY };
+    let is_coarse = rounding.is_nan() || 16.0 * rounding > most;
+    if is_coarse && (rounding.is_nan() || 2.0 * rounding >= model.radius) {
+        // Nothing of it is deep enough to be a witness.
+        return undecided(from);
+    }
     let depth = options.depth.min(most).max(16.0 * rounding);
-    let (sought, level) = (Sought::Solid, depth - 8.0 * rounding);
-    let mut caster = Caster { model, line, sought, rounding, level, limit: options.limit, cells: 0 };
+    let level = if is_coarse { -2.0 * rounding } else { depth - 8.0 * rounding };
+    let open = is_coarse.then_some(f64::INFINITY);
+    let mut caster =
+        Caster { model, line, sought: Sought::Solid, rounding, level, limit: options.limit, cells: 0, open };
     if from == 0.0 && caster.begins_inside() {
         caster.sought = Sought::Complement;
     }
     let is_inside = caster.sought == Sought::Complement;
-    let outcome = match caster.run(length) {
+    let ended = caster.run(length);
+    let open = caster.open.unwrap_or(f64::INFINITY);
+    let outcome = match ended {
+        None if open < f64::INFINITY => RayOutcome::Undecided { until: from + open },
         None => RayOutcome::Miss { is_inside },
-        Some(End::Limit(until)) => RayOutcome::Undecided { until: from + until },
-        Some(End::Witness(lower, upper)) => RayOutcome::Hit(caster.hit(solid, ray, from, (lower, upper))),
+        Some(End::Limit(until)) => RayOutcome::Undecided { until: from + until.min(open) },
+        Some(End::Witness(lower, upper)) => RayOutcome::Hit(caster.hit(solid, ray, from, (lower.min(open), upper))),
     };
     RayAnswer { outcome, cells: caster.cells }
 }
@@ -115,6 +132,9 @@ impl Caster<'_> {
         if f.abs() >= near {
             return f < 0.0;
         }
+        if self.open.is_some() {
+            return false;
+        }
         // On a face, which may be a seam within.
         let (model, x) = (self.model, self.line.origin);
         let scale = if model.radius.is_finite() { model.radius } else { x.length() + model.face_reach + 1.0 };
@@ -124,7 +144,7 @@ impl Caster<'_> {
     }
 
     fn run(&mut self, length: f64) -> Option<End> {
-        if has_octree(self.model) {
+        if has_octree(self.model) && self.open.is_none() {
             let aabb = self.model.octree.root().aabb();
             let inside = clipped(&self.line, &aabb).map(|(a, b)| (a.max(0.0), b.min(length)));
             let Some((a, b)) = inside.filter(|(a, b)| a <= b) else { return self.beyond(0.0, length) };
@@ -205,8 +225,15 @@ impl Caster<'_> {
         if self.is_witness(a) {
             return Some(End::Witness(a, a));
         }
-        if b - a <= 4.0 * level && self.is_witness(b) {
+        let short = if self.open.is_some() { 4.0 * rounding } else { 4.0 * level };
+        if b - a <= short && self.is_witness(b) {
             return Some(End::Witness(a, b));
+        }
+        if let Some(open) = &mut self.open
+            && b - a <= short
+        {
+            *open = open.min(a);
+            return None;
         }
         let middle = 0.5 * (a + b);
         if !(a < middle && middle < b) {

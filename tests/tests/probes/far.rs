@@ -1,0 +1,162 @@
+//! Points and rays from far away, and directions of every length: what rounding hides is never told as proven.
+
+use contactd::contact::probe::{DEFAULT_LIMIT, PointOptions, PosedModel, RayOptions, points};
+use contactd::ipc::{Embedded, ServerConfig};
+use contactd::solid::primitive::HalfSpace;
+use contactd_client::{Object, Session};
+use contactd_proto::Pose;
+use contactd_proto::query::{ObjectRay, RayOutcome, Side};
+use contactd_tests::models::simple;
+use glam::DVec3;
+
+const RAYS: RayOptions = RayOptions { depth: 0.0, limit: DEFAULT_LIMIT };
+
+/// The signed distance of a point outside of a body, from far away: no squares.
+type Distance = fn(DVec3) -> f64;
+
+/// A session with one body at the origin.
+fn of(text: &str) -> Session<Embedded> {
+    let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
+    let model = session.load_model("m.csg", text).unwrap().id;
+    session.add_object(Object::new("body", model)).unwrap();
+    session
+}
+
+fn norm(v: DVec3) -> f64 {
+    let most = v.abs().max_element();
+    if most == 0.0 { 0.0 } else { most * (v / most).length() }
+}
+
+const BODIES: [(&str, Distance); 5] = [
+    ("sphere(r = 1);", |x| norm(x) - 1.0),
+    ("cube(size = 2, center = true);", |x| norm((x.abs() - 1.0).max(DVec3::ZERO))),
+    // A foil: less than what rounding hides from afar.
+    ("cube(size = [2, 2, 1e-3], center = true);", |x| norm((x.abs() - DVec3::new(1.0, 1.0, 5e-4)).max(DVec3::ZERO))),
+    ("difference() { sphere(r = 1); translate([0, 0, 5]) sphere(r = 1); }", |x| norm(x) - 1.0),
+    ("rotate([0, 90, 0]) cylinder(h = 4, r = 1, center = true);", |x| {
+        norm(DVec3::new((x.x.abs() - 2.0).max(0.0), (norm(DVec3::new(0.0, x.y, x.z)) - 1.0).max(0.0), 0.0))
+    }),
+];
+
+#[test]
+fn points_however_far_are_bracketed() {
+    let options = PointOptions { surface: 1e-9, tolerance: 1e-6, limit: DEFAULT_LIMIT };
+    for (text, truth) in BODIES {
+        let mut session = of(text);
+        for power in 1..=300 {
+            for way in [DVec3::X, DVec3::new(0.6, -0.8, 0.0), DVec3::new(-0.5, 0.1, 0.7), DVec3::Z] {
+                let x = way * 10f64.powi(power) + DVec3::new(0.0, 0.1, 0.2);
+                let told = session.points(&[x.to_array()], &options, None).unwrap()[0];
+                let (d, off) = (truth(x), 1e-15 * norm(x));
+                let name = format!("{text} {x:?}: {d:e} {told:?}");
+                assert!(told.lower <= d + off && d - off <= told.upper && told.side == Side::Outside, "{name}");
+                // 8 E, of 300 units in the last place each.
+                assert!(told.is_settled && told.upper - told.lower <= 1e-6 + 8e-13 * norm(x), "{name}");
+                let near = DVec3::from_array(told.nearest);
+                assert!(norm(near) < 2.5 && norm(near - x) <= told.upper + off, "{name}");
+            }
+        }
+        // The side alone.
+        let options = PointOptions { tolerance: f64::INFINITY, ..options };
+        for x in [1e3, 1e13, 1e160, 1e300, f64::MAX] {
+            let told = session.points(&[[x, x, -x]], &options, None).unwrap()[0];
+            assert!(
+                told.side == Side::Outside && told.is_settled && told.lower <= 1.7321 * x,
+                "{text} {x:e}: {told:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_distance_that_is_no_double_has_no_upper_bound() {
+    let mut session = of("cube(1);");
+    let told = session.points(&[[f64::MAX; 3]], &PointOptions::default(), None).unwrap()[0];
+    assert!(
+        told.lower > 1e308 && told.lower.is_finite() && told.upper == f64::INFINITY && !told.is_settled,
+        "{told:?}"
+    );
+}
+
+/// Of a solid without bounds nothing is told from where squares are no doubles.
+#[test]
+fn points_far_from_a_half_space_are_bracketed_or_nothing_is_told() {
+    let model = simple(HalfSpace);
+    let options = PointOptions { surface: 1e-9, tolerance: 1e-6, limit: DEFAULT_LIMIT };
+    for power in 1..=300 {
+        let z = 10f64.powi(power);
+        let told = points(&PosedModel { model: &model, pose: Pose::IDENTITY }, &[DVec3::new(3.0, 1.0, z)], &options)[0];
+        assert!(told.lower <= z && z <= told.upper && told.is_settled == (power < 150), "{z:e}: {told:?}");
+    }
+}
+
+#[test]
+fn rays_however_far_are_no_false_misses() {
+    for (k, text) in ["sphere(r = 1);", "cube(size = 2, center = true);"].into_iter().enumerate() {
+        let mut session = of(text);
+        let mut hits = 0;
+        for power in 1..=300 {
+            for start in [1.0, 2.0, 5.0] {
+                let x = start * 10f64.powi(power);
+                let mut cast = |y: f64| {
+                    let ray = ObjectRay { origin: [x, y, 0.0], direction: [-1.0, 0.0, 0.0], length: f64::INFINITY };
+                    session.rays(&[ray], &RAYS, None).unwrap()[0].outcome
+                };
+                // Through the middle: x − 1 off.
+                match cast(0.0) {
+                    RayOutcome::Hit(hit) => {
+                        hits += 1;
+                        let slack = 1e-12 * x;
+                        assert!(hit.lower <= x - 1.0 + slack && x - 1.0 <= hit.upper + slack, "{text} {x:e}: {hit:?}");
+                        assert!(hit.upper <= x + 2.0 && hit.lower <= hit.t && hit.t <= hit.upper, "{text} {x:e}");
+                    }
+                    RayOutcome::Undecided { until } => {
+                        assert!(until <= x && x > 1e13, "{text} {x:e}: {until:e}");
+                    }
+                    RayOutcome::Miss { .. } => panic!("{text} {x:e}: a miss through the middle"),
+                }
+                // Far beside it.
+                assert_eq!(cast(0.2 * x + 2.0), RayOutcome::Miss { is_inside: false }, "{text} {x:e}");
+                // Beside the ball, within its box.
+                if k == 0 && x <= 1e9 {
+                    let ray = ObjectRay { origin: [x, 0.8, 0.8], direction: [-1.0, 0.0, 0.0], length: f64::INFINITY };
+                    let told = session.rays(&[ray], &RAYS, None).unwrap()[0].outcome;
+                    assert_eq!(told, RayOutcome::Miss { is_inside: false }, "{x:e}");
+                }
+            }
+        }
+        println!("{text} {hits} hits");
+        assert!(hits >= 39, "{text}: {hits}");
+    }
+}
+
+#[test]
+fn directions_have_any_length_but_none() {
+    let mut session = of("sphere(r = 1);");
+    let ways = [([9.0, 0.0, 0.0], DVec3::new(-1.0, 0.0, 0.0)), ([9.0, 3.0, 0.0], DVec3::new(-0.75, -0.25, 0.0))];
+    for (origin, way) in ways {
+        let from = DVec3::from_array(origin).length() - 1.0;
+        for power in -323..=308 {
+            let direction = way * format!("1e{power}").parse::<f64>().unwrap();
+            // Of the smallest numbers no digits are left to point anywhere.
+            if power < -300 && way.y != 0.0 {
+                continue;
+            }
+            let ray = ObjectRay { origin, direction: direction.to_array(), length: f64::INFINITY };
+            let told = session.rays(&[ray], &RAYS, None).unwrap()[0].outcome;
+            let RayOutcome::Hit(hit) = told else { panic!("{direction:?}: {told:?}") };
+            assert!((hit.t - from).abs() < 1e-12 && hit.lower <= from && from <= hit.upper, "{direction:?}: {hit:?}");
+        }
+    }
+    for (direction, length, end) in [
+        (DVec3::ZERO, 1.0, "a ray cannot go along [0, 0, 0]"),
+        (DVec3::X, -1e300, "a ray's length must be >= 0, not -1e300"),
+    ] {
+        let ray = ObjectRay { origin: [9.0, 0.0, 0.0], direction: direction.to_array(), length };
+        let told = session.rays(&[ray], &RAYS, None).unwrap_err().to_string();
+        assert!(told.ends_with(end), "{told}");
+    }
+    let ray = ObjectRay { origin: [1e300, f64::NAN, 0.0], direction: [1.0, 0.0, 0.0], length: 1.0 };
+    let told = session.rays(&[ray], &RAYS, None).unwrap_err().to_string();
+    assert!(told.ends_with("the ray from [1e300, NaN, 0] along [1, 0, 0]"), "{told}");
+}
