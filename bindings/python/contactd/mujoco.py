@@ -33,6 +33,7 @@ import ctypes
 import os
 import pathlib
 import warnings
+import weakref
 from typing import Any, Mapping, NamedTuple
 
 import mujoco as mj
@@ -53,6 +54,8 @@ __all__ = ["Asked", "Coupling", "CouplingWarning", "attach"]
 
 #: Option flags with which MuJoCo has no contacts.
 _OFF = int(mj.mjtDisableBit.mjDSBL_CONTACT) | int(mj.mjtDisableBit.mjDSBL_CONSTRAINT)
+#: Addresses of the models of open couplings because of which geoms do not collide.
+_taken: set[int] = set()
 #: A solid as it is given: OpenSCAD CSG text, a solid that was built, or the path of a file (CSG, STL, OFF …).
 Given = str | os.PathLike | Solid
 
@@ -93,6 +96,32 @@ class Asked(NamedTuple):
     bodies: int
 
 
+class _Silenced:
+    """What of a model no longer collides as long as a coupling of it is open."""
+
+    def __init__(self, model: mj.MjModel):
+        self.model = model
+        #: Geoms with their contype and conaffinity, flexes likewise, pairs with their margin.
+        self.geoms: list[tuple[int, int, int]] = []
+        self.flexes: list[tuple[int, int, int]] = []
+        self.pairs: list[tuple[int, float]] = []
+        #: What the bits of all geoms of each body were together, where they are other ones meanwhile.
+        self.body_bits: tuple[np.ndarray, np.ndarray] | None = None
+
+    def restore(self) -> None:
+        """Lets all of it collide again as it did."""
+        for geom, contype, conaffinity in self.geoms:
+            self.model.geom_contype[geom], self.model.geom_conaffinity[geom] = contype, conaffinity
+        for flex, contype, conaffinity in self.flexes:
+            self.model.flex_contype[flex], self.model.flex_conaffinity[flex] = contype, conaffinity
+        for pair, margin in self.pairs:
+            self.model.pair_margin[pair] = margin
+        if self.body_bits is not None:
+            self.model.body_contype[:], self.model.body_conaffinity[:] = self.body_bits
+        if self.geoms or self.flexes or self.pairs:
+            _taken.discard(self.model._address)
+
+
 class Coupling:
     """contactd's contacts for the bodies of an ``MjModel``.
 
@@ -111,6 +140,7 @@ class Coupling:
     what they have MuJoCo's own contacts with; a ``<pair>`` of two that have solids has no reach. What
     makes contacts (friction, ``solref``, ``condim`` …) is that of the geoms, of a body with a solid that of its first colliding
     geom, combined as MuJoCo does. The filters are read once: what is changed in the model later is not seen.
+    A model has one open coupling at a time; a copy of it that is made before has its own.
 
     Raises ``ValueError`` before anything is changed where contacts would not be those that the model asks for; warns
     (``CouplingWarning``) where they are taken in another way. Each sentence names the body or geom and says what to do.
@@ -137,6 +167,11 @@ class Coupling:
             raise ValueError(f"expected a part of the skin as slack, at least 0 and below 1, found {slack}")
         if meshes not in MESHES:
             raise ValueError(f"expected one of {', '.join(map(repr, MESHES))} for meshes, found {meshes!r}")
+        if model._address in _taken:
+            raise ValueError(
+                "the model has an open coupling already, because of which its geoms do not collide: close that one first "
+                "(by close(), or by using it in a with statement), or attach to a copy of the model that was made before it"
+            )
         self.model = model
         self.skin = skin
         self.slack = slack
@@ -155,12 +190,10 @@ class Coupling:
         self._contact_geoms: list[tuple[str, str]] | None = None
         self._own = session is None
         self.session = embedded() if session is None else session
-        #: What no longer collides: geoms with their contype and conaffinity, flexes likewise, pairs with their margin.
-        self._silenced: list[tuple[int, int, int]] = []
-        self._silenced_flexes: list[tuple[int, int, int]] = []
-        #: What the bits of all geoms of each body were together, where they are other ones meanwhile.
-        self._body_bits: tuple[np.ndarray, np.ndarray] | None = None
-        self._unpaired: list[tuple[int, float]] = []
+        self._silenced = _Silenced(model)
+        # Of one that is forgotten, too, the model would stay silent for good.
+        self._restores = weakref.finalize(self, self._silenced.restore)
+        self._restores.atexit = False
         try:
             self._add(given)
         except BaseException:
@@ -175,15 +208,7 @@ class Coupling:
 
     def close(self) -> None:
         """Lets the geoms collide again as they did; closes the session, if the coupling opened it."""
-        for geom, contype, conaffinity in self._silenced:
-            self.model.geom_contype[geom], self.model.geom_conaffinity[geom] = contype, conaffinity
-        for flex, contype, conaffinity in self._silenced_flexes:
-            self.model.flex_contype[flex], self.model.flex_conaffinity[flex] = contype, conaffinity
-        for pair, margin in self._unpaired:
-            self.model.pair_margin[pair] = margin
-        if self._body_bits is not None:
-            self.model.body_contype[:], self.model.body_conaffinity[:] = self._body_bits
-        self._silenced, self._silenced_flexes, self._unpaired, self._body_bits = [], [], [], None
+        self._restores()
         if self._own:
             self.session.close()
 
@@ -251,26 +276,29 @@ class Coupling:
             (template, offsets),
         )
         # Last, so that what is refused before has changed nothing.
+        silenced = self._silenced
         own, own_of_flexes = self._filter.own_bits, self._filter.own_flex_bits
         if not given:
             # What is left to MuJoCo is all that there is: by the model's own bits.
             own, own_of_flexes = {}, {}
         for geom in sorted({g for part, _ in given for g in part.geoms} | set(own)):
-            self._silenced.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
+            silenced.geoms.append((geom, int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])))
             model.geom_contype[geom], model.geom_conaffinity[geom] = own.get(geom, (0, 0))
         for flex, bits in own_of_flexes.items():
-            self._silenced_flexes.append((flex, int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])))
+            silenced.flexes.append((flex, int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])))
             model.flex_contype[flex], model.flex_conaffinity[flex] = bits
         if own_of_flexes and hasattr(model, "body_contype"):
             # Before it looks at geoms MuJoCo asks whether any of a body's has a bit of the flex.
-            self._body_bits = model.body_contype.copy(), model.body_conaffinity.copy()
+            silenced.body_bits = model.body_contype.copy(), model.body_conaffinity.copy()
             np.bitwise_or.at(model.body_contype, model.geom_bodyid, model.geom_contype)
             np.bitwise_or.at(model.body_conaffinity, model.geom_bodyid, model.geom_conaffinity)
         for (g1, g2), pair in self._filter.pairs.items():
-            self._unpaired.append((pair, float(model.pair_margin[pair])))
+            silenced.pairs.append((pair, float(model.pair_margin[pair])))
             # With this margin MuJoCo's test of bounding balls leaves the pair out; planes have none, and no distance is so small.
             bounds = float(model.geom_rbound[g1]), float(model.geom_rbound[g2])
             model.pair_margin[pair] = -sum(bounds) if all(bounds) else -mj.mjMAXVAL
+        if silenced.geoms or silenced.flexes or silenced.pairs:
+            _taken.add(model._address)
 
     def step(self, data: mj.MjData) -> int:
         """One step of MuJoCo with contactd's contacts; returns how many there were."""

@@ -388,7 +388,7 @@ def test_a_closed_coupling_gives_the_geoms_back():
     model = bodies(("a", "", FREE + box(contype=3, conaffinity=5)), ("b", 'pos="0 0 1"', FREE + box()))
     with Coupling(model, {"a": CUBE, "b": CUBE}):
         assert not model.geom_contype.any() and not model.geom_conaffinity.any()
-        with pytest.raises(ValueError, match="another coupling's bodies are so until it is closed"):
+        with pytest.raises(ValueError, match="an open coupling already"):
             Coupling(model, {"a": CUBE, "b": CUBE})
     assert model.geom_contype.tolist() == [3, 1] and model.geom_conaffinity.tolist() == [5, 1]
     with pytest.raises(contactd.Refused):

@@ -3,6 +3,8 @@
 Long form: CONTACTD_MUJOCO_MODELS=1000 python -m pytest tests/test_mujoco_attach.py
 """
 
+import copy
+import gc
 import os
 import warnings
 
@@ -720,3 +722,39 @@ def test_edges_and_corners_are_as_deep_as_mujoco_says():
                 own, stocks = (min((c.dist for c in d.contact), default=1.0) for d in (data, theirs))
                 assert own == pytest.approx(stocks, abs=1e-8) or min(own, stocks) > 0, (euler, z)
                 assert data.ncon == points or own > -1e-3, (euler, z, data.ncon)
+
+
+def test_a_model_has_one_open_coupling_at_a_time():
+    text = FLOOR + '<body name="b" pos="0 0 .06"><freejoint/><geom type="cylinder" size=".05 .05"/></body>'
+    model = scene(text)
+    other = copy.copy(model)
+    bits = model.geom_contype.copy(), model.geom_conaffinity.copy()
+    refused = pytest.raises(ValueError, match=r"an open coupling already.*close that one first.*or attach to a copy of the model")
+
+    def rests(model, coupling):
+        data = mujoco.MjData(model)
+        for _ in range(200):
+            coupling.step(data)
+        assert 0.049 < data.qpos[2] < 0.051, data.qpos[2]
+
+    first = attach(model, keep_exact=False)
+    with refused:
+        attach(model, keep_exact=False)
+    # A copy that was made before has a coupling of its own, and the first one is as it was.
+    with attach(other, keep_exact=False) as second:
+        rests(other, second)
+    rests(model, first)
+    first.close()
+    first.close()
+    assert np.array_equal(model.geom_contype, bits[0]) and np.array_equal(model.geom_conaffinity, bits[1])
+    second = attach(model, keep_exact=False)
+    first.close()
+    with refused:
+        attach(model, keep_exact=False)
+    rests(model, second)
+    # One that is forgotten is closed.
+    del second
+    gc.collect()
+    assert np.array_equal(model.geom_contype, bits[0]) and np.array_equal(model.geom_conaffinity, bits[1])
+    with attach(model, keep_exact=False) as third:
+        rests(model, third)
