@@ -4,7 +4,7 @@
 //! (time, a, b); with `first` only those whose bracket meets the earliest contact's.
 
 use crate::contact::{self, Clock, PairQuery, PlacedModel, Scratch, Strategies, certificate};
-use crate::import::{Place, Scene};
+use crate::import::{Place, Scene, SceneObject};
 use crate::motion::Placed;
 use crate::octree::Model;
 use crate::world::{MeasuredModel, ObjectSpec, PairOutcome, Refusal, StepOptions, StepOutcome, World};
@@ -18,12 +18,12 @@ pub enum CheckError {
     #[error("{0}")]
     Resolution(Refusal),
     /// An object, a rule or the resolution.
-    #[error("{file}:{at}: {refusal}")]
+    #[error("{file}{}: {refusal}", Line(*at))]
     World {
-        /// The scene's file.
+        /// The scene's file, or a model's that is taken as it stands.
         file: String,
-        /// Where it says so.
-        at: Place,
+        /// Where it says so; `None` of what no file says.
+        at: Option<Place>,
         /// The world's reason.
         refusal: Refusal,
     },
@@ -39,6 +39,15 @@ pub enum CheckError {
         /// The world's reason.
         code: ErrorCode,
     },
+}
+
+/// A place behind its file's name.
+struct Line(Option<Place>);
+
+impl std::fmt::Display for Line {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.map_or(Ok(()), |at| write!(f, ":{at}"))
+    }
 }
 
 /// A scene as a world with the records of its step.
@@ -63,7 +72,15 @@ impl Check {
     /// What the world refuses.
     pub fn new(scene: &Scene, models: &[Arc<Model>], resolution: Option<f64>) -> Result<Self, CheckError> {
         let file = scene.file.clone();
-        let refused = |at| move |refusal| CheckError::World { file: scene.file.clone(), at, refusal };
+        let refused = |at| move |refusal| CheckError::World { file: scene.file.clone(), at: Some(at), refusal };
+        // Of models that are taken as they stand no file has an object.
+        let of_object = |o: &SceneObject| {
+            let (file, at) = match scene.file.as_str() {
+                "" => (scene.models[o.model].text_name(), None),
+                file => (file.to_owned(), Some(o.at)),
+            };
+            move |refusal| CheckError::World { file, at, refusal }
+        };
         let mut parts: Vec<Arc<MeasuredModel>> = Vec::with_capacity(models.len());
         for model in models {
             let same = parts.iter().find(|p| Arc::ptr_eq(&p.model, model)).cloned();
@@ -90,7 +107,7 @@ impl Check {
                 place: o.place,
                 pose: o.motion.start,
             };
-            world.add_object(spec).map_err(refused(o.at))?;
+            world.add_object(spec).map_err(of_object(o))?;
             if let Some(record) = o.record {
                 records.push(PoseRecord { object: id, ..record });
                 moving.push((o.name.clone(), o.at));

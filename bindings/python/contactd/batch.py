@@ -306,6 +306,10 @@ def _objects(scene: Scene, queries: pa.RecordBatch, rows: np.ndarray, refusals: 
     """The ids of the objects of each row, where all are known."""
     if "objects" not in queries.schema.names:
         return dict.fromkeys(map(int, rows), scene._movable)
+    kind = queries.schema.field("objects").type
+    is_list = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+    if not (pa.types.is_null(kind) or is_list):
+        raise ValueError(f'column "objects": expected lists of names, found {kind}')
     ids = {}
     for row, names in zip(map(int, rows), queries.column("objects").take(pa.array(rows)).to_pylist()):
         names = scene.movable if names is None else names

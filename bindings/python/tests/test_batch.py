@@ -239,6 +239,12 @@ def test_tables_that_are_none_are_refused_in_one_sentence(play):
         contactd.batch.solve(table.append_column("status", pa.array([1] * 5)), paths)
     with pytest.raises(ValueError, match='column "end": expected lists of numbers, found string'):
         contactd.batch.solve({"end": ["here"]}, one)
+    with pytest.raises(ValueError, match='column "objects": expected lists of names, found string'):
+        contactd.batch.solve({"objects": ["bolt"], "end": [[0.0] * 7]}, one)
+    # A number may be finite and yet too large.
+    name = contactd.batch.Scene(one).movable[0]
+    far = contactd.batch.solve({"objects": [[name]], "end": [[1e308, 0, 0, 0, 0, 0, 1]]}, one)
+    assert "is farther away than numbers can square" in far.column("refusal")[0].as_py()
     with pytest.raises(contactd.Refused, match=r"nowhere\.toml: expected a readable file"):
         contactd.batch.solve(table, "nowhere.toml")
     none = contactd.batch.solve(table.slice(0, 0), paths)

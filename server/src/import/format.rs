@@ -42,7 +42,31 @@ pub enum Named {
     Font(Pattern),
 }
 
-/// Every format that is read. A file whose name ends in none of these ways is taken for one of the first.
+/// Files that are no models, by how their names end: an empty one would else be taken for an empty model, and of another one its
+/// first byte would be told.
+const OTHERS: [(&[&str], &str); 6] = [
+    (
+        &[
+            "step", "stp", "iges", "igs", "brep", "brp", "sat", "x_t", "x_b", "jt", "fcstd", "sldprt", "ipt", "f3d",
+            "3dm",
+        ],
+        "a CAD file (export a mesh, such as STL or 3MF, or OpenSCAD's CSG)",
+    ),
+    (
+        &["fbx", "blend", "usd", "usda", "usdc", "usdz", "wrl", "x3d", "ctm"],
+        "a mesh of a format that is not read (export STL, OBJ or glTF)",
+    ),
+    (
+        &["svg", "dxf", "png", "jpg", "jpeg", "pdf", "ttf", "otf"],
+        "a drawing, a picture or a font (import, surface and text of a CSG text read SVG, DXF, PNG and fonts)",
+    ),
+    (&["mcap"], "a recording (contactd replay repeats it)"),
+    (&["toml", "urdf", "sdf", "srdf", "xacro", "xml", "gdml"], "a scene, a robot or a geometry, which is no model"),
+    (&["zip", "gz", "xz", "7z", "tar"], "an archive (unpack it)"),
+];
+
+/// Every format that is read. A file whose name ends in none of these ways, nor in one of another format, is taken for one of the
+/// first.
 pub static FORMATS: LazyLock<Vec<Format>> = LazyLock::new(|| {
     let of_meshes = |f: mesh::MeshFormat| Format {
         name: f.name,
@@ -75,17 +99,21 @@ impl<'a> Source<'a> {
     /// Its format.
     ///
     /// # Errors
-    /// `Format` when one is stated that is not read.
+    /// `Format` when one is stated that is not read, or none is and the name ends as files of another one do.
     pub fn format(&self) -> Result<&'static Format, ImportError> {
+        let refused = |found: String| ImportError::Format {
+            file: self.name.to_owned(),
+            expected: FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", "),
+            found,
+        };
         if !self.format.is_empty() {
             let stated = self.format.to_ascii_lowercase();
-            return FORMATS.iter().find(|f| f.name == stated).ok_or_else(|| ImportError::Format {
-                file: self.name.to_owned(),
-                expected: FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", "),
-                found: self.format.to_owned(),
-            });
+            return FORMATS.iter().find(|f| f.name == stated).ok_or_else(|| refused(format!("{:?}", self.format)));
         }
         let ending = Path::new(self.name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        if let Some((_, what)) = OTHERS.iter().find(|(endings, _)| endings.contains(&ending.as_str())) {
+            return Err(refused((*what).to_owned()));
+        }
         Ok(FORMATS.iter().find(|f| f.endings.contains(&ending.as_str())).unwrap_or(&FORMATS[0]))
     }
 
@@ -249,6 +277,20 @@ mod tests {
         let sentence = of("part.csg", "step").unwrap_err().to_string();
         assert!(sentence.starts_with("part.csg: expected one of the formats csg, stl, off, "), "{sentence}");
         assert!(sentence.ends_with(", found \"step\""), "{sentence}");
+        assert_eq!(of("part.step", "csg").unwrap(), "csg");
+        // Empty or not: what is no model by its name is none.
+        for (name, found) in [
+            ("run.mcap", "a recording (contactd replay repeats it)"),
+            ("part.STEP", "a CAD file (export a mesh, such as STL or 3MF, or OpenSCAD's CSG)"),
+            ("s.toml", "a scene, a robot or a geometry, which is no model"),
+        ] {
+            let sentence = of(name, "").unwrap_err().to_string();
+            assert!(
+                sentence.starts_with(&format!("{name}: expected one of the formats csg, stl, off, ")),
+                "{sentence}"
+            );
+            assert!(sentence.ends_with(&format!(", found {found}")), "{sentence}");
+        }
     }
 
     #[test]
@@ -261,7 +303,8 @@ mod tests {
             assert!(names.iter().all(|n| !n.is_empty() && n.to_ascii_lowercase() == *n));
         };
         all(FORMATS.iter().map(|f| f.name).collect());
-        all(FORMATS.iter().flat_map(|f| f.endings.iter().copied()).collect());
+        let others = OTHERS.iter().flat_map(|(endings, _)| endings.iter());
+        all(FORMATS.iter().flat_map(|f| f.endings.iter()).chain(others).copied().collect());
     }
 
     #[test]

@@ -204,13 +204,13 @@ pub enum ImportError {
         found: String,
     },
     /// A format that is not read.
-    #[error("{file}: expected one of the formats {expected}, found {found:?}")]
+    #[error("{file}: expected one of the formats {expected}, found {found}")]
     Format {
         /// The file.
         file: String,
         /// The names of those that are.
         expected: String,
-        /// What was stated.
+        /// What was stated, in quotes; or what a file is whose name ends like this one's.
         found: String,
     },
     /// Something in the file.

@@ -117,6 +117,26 @@ fn a_geometry_is_no_scene_and_the_sentence_says_what_takes_it() {
     assert_eq!(run(folder.path(), &["overlaps", "g.gdml"]).status.code(), Some(0));
 }
 
+/// Empty or not: what is no model by its name is none, and a sentence begins with a file's name or none.
+#[test]
+fn what_is_no_model_is_refused_by_name() {
+    let folder = folder(&[("run.mcap", ""), ("part.step", ""), ("a.csg", "cube(1);")]);
+    std::fs::write(folder.path().join("full.mcap"), b"\x89MCAP0\r\n").unwrap();
+    for (arguments, words) in [
+        (vec!["check", "full.mcap", "a.csg"], "full.mcap: expected one of the formats csg, stl, "),
+        (vec!["check", "run.mcap", "a.csg"], "found a recording (contactd replay repeats it)"),
+        (vec!["inspect", "run.mcap"], "found a recording (contactd replay repeats it)"),
+        (vec!["overlaps", "a.csg", "part.step"], "part.step: expected one of the formats csg, stl, "),
+        (vec!["inspect", "part.step"], "found a CAD file (export a mesh, such as STL or 3MF, or OpenSCAD's CSG)"),
+        (vec!["check", "a.csg", "a.csg", "--resolution", "1e300"], "a.csg: the resolution is not a positive length"),
+    ] {
+        let out = run(folder.path(), &arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        let said = text(&out.stderr);
+        assert!(said.contains(words) && said.lines().count() == 1 && !said.contains(":1:1"), "{arguments:?}: {said}");
+    }
+}
+
 #[test]
 fn cells_of_openmc_that_overlap_and_gaps_are_told() {
     let fuel = include_str!("../../models/fuel.xml");
