@@ -68,6 +68,27 @@ fn points_however_far_are_bracketed() {
     }
 }
 
+/// Among bodies the nearest one is told, also where the squares of its distance are no doubles.
+#[test]
+fn the_nearest_of_bodies_far_away_is_told() {
+    let mut session = of("sphere(r = 1);");
+    let model = session.load_model("n.csg", "sphere(r = 1);").unwrap().id;
+    let far = Pose::at(DVec3::X * 1e100);
+    let other = session.add_object(Object::new("other", model).at(far)).unwrap();
+    let options = PointOptions { surface: 1e-9, tolerance: 1e-6, limit: DEFAULT_LIMIT };
+    for power in 100..=114 {
+        let x = 2.0 * 10f64.powi(power);
+        let told = session.points(&[[x, 0.0, 0.0]], &options, None).unwrap()[0];
+        let is_told = told.object == Some(other) || x - 1e100 > x * (1.0 - 1e-12);
+        assert!(is_told && told.lower <= x - 1e100 && x - 1e100 <= told.upper, "{x:e}: {told:?}");
+    }
+    for power in 150..=300 {
+        let x = 10f64.powi(power);
+        let told = session.points(&[[x, 0.0, 0.0]], &options, None).unwrap()[0];
+        assert!(told.lower <= x && x <= told.upper && told.is_settled, "{x:e}: {told:?}");
+    }
+}
+
 #[test]
 fn a_distance_that_is_no_double_has_no_upper_bound() {
     let mut session = of("cube(1);");

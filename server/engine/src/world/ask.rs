@@ -13,6 +13,7 @@ use crate::contact::probe::{
 };
 use crate::math::{Aabb, halt, scaled};
 use crate::motion::Placed;
+use contactd_proto::pose::FARTHEST;
 use contactd_proto::{ErrorCode, Motion};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -197,7 +198,7 @@ impl Asked<'_> {
         let away = |aabb: &Aabb| {
             let beyond = (aabb.min - x).max(x - aabb.max);
             let within = beyond.max_element();
-            Some(if within > 0.0 { scaled::length(beyond.max(DVec3::ZERO)) } else { within })
+            Some(if within > 0.0 { beyond.max(DVec3::ZERO).length() } else { within })
         };
         let (infinity, faces) = (f64::INFINITY, [u32::MAX; 3]);
         let nothing = PointAnswer {
@@ -211,7 +212,9 @@ impl Asked<'_> {
         };
         let mut best = BodyPoint { body: None, answer: nothing };
         let (mut lower, mut cells, mut is_settled) = (infinity, 0, true);
-        for (near, i) in self.by_box(away) {
+        // Where squares are no doubles all are asked.
+        let is_far = x.abs().max_element() > FARTHEST;
+        for (near, i) in self.by_box(|aabb| if is_far { Some(f64::NEG_INFINITY) } else { away(aabb) }) {
             if near > best.answer.upper {
                 lower = lower.min(near);
                 break;

@@ -10,12 +10,11 @@ use super::{PointAnswer, PointOptions, PosedModel, Side, Sought, faces_at, round
 use crate::contact::query::outcome::NO_FACE;
 use crate::math::{Ball, scaled};
 use crate::octree::Model;
+use contactd_proto::pose::FARTHEST;
 use glam::DVec3;
 
 /// ρ is no less than this times R.
 const NEAREST: f64 = 8.0;
-/// Beyond this, a length, squares are too large: of a solid without bounds nothing is told.
-const FARTHEST: f64 = 1e150;
 
 /// See [`super::points`].
 pub fn of_point(solid: &PosedModel, point: DVec3, options: &PointOptions) -> PointAnswer {
@@ -42,6 +41,7 @@ pub fn of_point(solid: &PosedModel, point: DVec3, options: &PointOptions) -> Poi
         }
         return found;
     }
+    // Beyond it squares are too large: of a solid without bounds nothing is told.
     if far.is_nan() || far >= FARTHEST {
         return answer(solid, (f64::NEG_INFINITY, f64::INFINITY), None, (options, [rounding; 2]), 0);
     }
