@@ -181,9 +181,10 @@ impl<T: Transport> Session<T> {
                 Err(Error::NoServer(_) | Error::ServerLost | Error::Timeout) if start.elapsed() < timeout => {
                     std::thread::sleep(Duration::from_millis(5));
                 }
-                other => return other,
+                other => break other?,
             }
         }
+        self.settle()
     }
 
     /// Ends the session; a step in flight is waited for, a second at most.

@@ -34,7 +34,7 @@ codes! {
     3 UnknownObject "there is no object of this id in the session",
     4 DuplicateObject "the object is named twice",
     5 StaticObject "the object is static and cannot be moved",
-    6 NotFinite "a position or rotation is not a finite number, or is farther away than numbers can square",
+    6 NotFinite "a position or rotation is not a finite number, or is farther than 1e150 away",
     7 BadQuaternion "the quaternion is not of unit length (its squared norm is off by more than 0.001)",
     8 BadCount "the batch is malformed: its record count or its flags are not of the protocol",
     9 TooMany "the batch has more records than the server's limit",

@@ -354,7 +354,8 @@ impl LoadedScene {
         match sent.and_then(|()| session.finish(timeout)) {
             Ok(reply) => Ok(reply),
             Err(error) => {
-                if matches!(error, Error::Refused { .. }) {
+                // What is refused here was not sent.
+                if matches!(error, Error::Refused { .. } | Error::Misuse(_)) {
                     self.refused();
                 }
                 Err(error.into())

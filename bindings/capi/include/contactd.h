@@ -36,7 +36,7 @@
 // the object is static and cannot be moved.
 #define CONTACTD_ERROR_STATIC_OBJECT 5
 
-// a position or rotation is not a finite number, or is farther away than numbers can square.
+// a position or rotation is not a finite number, or is farther than 1e150 away.
 #define CONTACTD_ERROR_NOT_FINITE 6
 
 // the quaternion is not of unit length (its squared norm is off by more than 0.001).
@@ -1193,7 +1193,7 @@ struct contactd_rule contactd_rule_new(const char *a, const char *b);
 // Adds an object; `*id` is its id, which stays the same over restarts of the server and is never used again.
 int32_t contactd_add_object(struct contactd_session *session, const struct contactd_object *object, uint32_t *id);
 
-// Removes an object; its id is not used again.
+// Removes an object; its id is not used again. What it carried is detached before.
 int32_t contactd_remove_object(struct contactd_session *session, uint32_t id);
 
 // Replaces the session's rules. The first rule that names a pair decides; a pair that no rule names is off once there are
@@ -1201,15 +1201,18 @@ int32_t contactd_remove_object(struct contactd_session *session, uint32_t id);
 int32_t contactd_set_rules(struct contactd_session *session, const struct contactd_rule *rules, size_t count);
 
 // From now on `part` moves with `carrier` as it stands to it (at `options.advance` of the last step), and is not tested against it nor
-// against the `count` objects in `touching`. It gets the carrier's records, and none of its own.
+// against the `count` objects in `touching`. It has the carrier's frame and gets its records; a record of its own is refused. Refused, too:
+// a part to itself or to what it carries, and names that other objects share with those that are not tested.
 int32_t contactd_attach(struct contactd_session *session,
                         uint32_t part,
                         uint32_t carrier,
                         const uint32_t *touching,
                         size_t count);
 
-// The part stays where it is, and is tested as the rules say. Nothing where it is not attached.
-int32_t contactd_detach(struct contactd_session *session, uint32_t part);
+// The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules say. Nothing
+// where it is not attached.
+int32_t contactd_detach(struct contactd_session *session,
+                        uint32_t part);
 
 // A pair of objects that may meet and is not tested, whatever the rules say; `allowed` 0: it is no longer.
 int32_t contactd_allow(struct contactd_session *session, uint32_t a, uint32_t b, uint32_t allowed);

@@ -59,7 +59,7 @@ pub unsafe extern "C" fn contactd_add_object(session: *mut Session, object: *con
     unsafe { on(session, call) }
 }
 
-/// Removes an object; its id is not used again.
+/// Removes an object; its id is not used again. What it carried is detached before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_remove_object(session: *mut Session, id: u32) -> i32 {
     // SAFETY: the caller's handle (3).
@@ -84,7 +84,8 @@ pub unsafe extern "C" fn contactd_set_rules(session: *mut Session, rules: *const
 }
 
 /// From now on `part` moves with `carrier` as it stands to it (at `options.advance` of the last step), and is not tested against it nor
-/// against the `count` objects in `touching`. It gets the carrier's records, and none of its own.
+/// against the `count` objects in `touching`. It has the carrier's frame and gets its records; a record of its own is refused. Refused, too:
+/// a part to itself or to what it carries, and names that other objects share with those that are not tested.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_attach(
     session: *mut Session,
@@ -102,7 +103,8 @@ pub unsafe extern "C" fn contactd_attach(
     unsafe { on(session, call) }
 }
 
-/// The part stays where it is, and is tested as the rules say. Nothing where it is not attached.
+/// The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules say. Nothing
+/// where it is not attached.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_detach(session: *mut Session, part: u32) -> i32 {
     // SAFETY: the caller's handle (3).

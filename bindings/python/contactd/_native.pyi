@@ -155,17 +155,20 @@ class Session:
         """Writes the last step as a scene in a new folder, for ``contactd check``; returns the scene's path. ``Refused``: the folder
         exists or cannot be written."""
     def remove_object(self, object: int) -> None:
-        """Removes an object; its id is not used again."""
+        """Removes an object; its id is not used again. What it carried is detached before."""
     def attach(self, part: int, carrier: int, touching: Sequence[int] = ...) -> None:
         """From now on ``part`` moves with ``carrier``, as it stands to it (at ``options.advance`` of the last step), and is not tested
-        against it nor against the objects in ``touching``. It gets the carrier's records, and none of its own. ``Misuse`` for a part to
-        itself or to what it carries."""
+        against it nor against the objects in ``touching``. It has the carrier's frame and gets its records; a record of its own is
+        ``Misuse``. ``Misuse``, too: a part to itself or to what it carries, and names that other objects share with those that are not
+        tested."""
     def detach(self, part: int) -> None:
-        """The part stays where it is, and is tested as the rules say."""
+        """The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules
+        say."""
     def carrier(self, part: int) -> int | None:
-        """The object that a part moves with; None where it is not attached."""
+        """The object at the end of a part's chain, whose records it gets; None where it is not attached."""
     def allow(self, pairs: Sequence[Sequence[int]], allowed: bool = True) -> None:
-        """Pairs of objects that may meet and are not tested, whatever the rules say; ``allowed=False``: no longer."""
+        """Pairs of objects that may meet and are not tested, whatever the rules say; ``allowed=False``: no longer. ``Misuse``: names that
+        other objects share with them."""
     def _reframe(self, object: int, place: _Pose, at: _Pose) -> None: ...
     def set_resolution(self, resolution: float | None) -> None:
         """Sets the resolution of every pair, a length; None: each pair its default."""

@@ -307,7 +307,9 @@ def _objects(scene: Scene, queries: pa.RecordBatch, rows: np.ndarray, refusals: 
     if "objects" not in queries.schema.names:
         return dict.fromkeys(map(int, rows), scene._movable)
     kind = queries.schema.field("objects").type
-    is_list = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+    # Views of lists are there in newer versions.
+    tests = ("is_list", "is_large_list", "is_fixed_size_list", "is_list_view", "is_large_list_view")
+    is_list = any(getattr(pa.types, test)(kind) for test in tests if hasattr(pa.types, test))
     if not (pa.types.is_null(kind) or is_list):
         raise ValueError(f'column "objects": expected lists of names, found {kind}')
     ids = {}

@@ -371,7 +371,7 @@ impl Session {
         Self::call(slf, move |s| s.add_object(object))
     }
 
-    /// Removes an object; its id is not used again.
+    /// Removes an object; its id is not used again. What it carried is detached before.
     fn remove_object(slf: &Bound<'_, Self>, object: u32) -> PyResult<()> {
         Self::call(slf, move |s| s.remove_object(object))
     }
@@ -383,12 +383,12 @@ impl Session {
         attached.map_err(|e| errors::of(slf.py(), &e))
     }
 
-    /// The part stays where it is, and is tested as the rules say.
+    /// The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules say.
     fn detach(slf: &Bound<'_, Self>, part: u32) -> PyResult<()> {
         Self::call(slf, move |s| s.detach(part))
     }
 
-    /// The object that a part moves with; None where it is not attached.
+    /// The object at the end of a part's chain, whose records it gets; None where it is not attached.
     fn carrier(slf: &Bound<'_, Self>, part: u32) -> PyResult<Option<u32>> {
         Self::enter(slf)?.with(slf.py(), |s| s.carrier(part))
     }

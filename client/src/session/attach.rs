@@ -54,20 +54,43 @@ const AMBIGUOUS: Error = Error::Misuse(
 );
 
 /// The objects of a session, the rules, and what is not to be tested whatever they say.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Company {
     members: BTreeMap<u32, Member>,
     rules: Vec<Rule>,
     allowed: BTreeSet<[u32; 2]>,
     attached: BTreeMap<u32, Attached>,
+    /// Names of objects in an exception; `None` where these have changed since.
+    taken: Option<BTreeSet<String>>,
+    /// The server may have rules with other exceptions.
+    owes_rules: bool,
+    /// Objects may have other frames than they should.
+    owes_frames: bool,
 }
 
 impl Company {
     /// True for the name of an object that is attached or allowed to meet another one: no other may have it.
-    fn is_taken(&self, name: &str) -> bool {
-        let touching = self.attached.iter().flat_map(|(part, attached)| attached.touching.iter().chain([part]));
-        let mut excepted = self.allowed.iter().flatten().chain(touching);
-        excepted.any(|id| self.members.get(id).is_some_and(|member| member.name == name))
+    fn is_taken(&mut self, name: &str) -> bool {
+        if self.allowed.is_empty() && self.attached.is_empty() {
+            return false;
+        }
+        let taken = self.taken.get_or_insert_with(|| {
+            let touching = self.attached.iter().flat_map(|(part, attached)| attached.touching.iter().chain([part]));
+            let members = self.allowed.iter().flatten().chain(touching).filter_map(|id| self.members.get(id));
+            members.map(|member| member.name.clone()).collect()
+        });
+        taken.contains(name)
+    }
+
+    /// True where an object is in an exception.
+    fn is_excepted(&self, id: u32) -> bool {
+        let attached = |(part, attached): (&u32, &Attached)| *part == id || attached.touching.contains(&id);
+        self.allowed.iter().any(|pair| pair.contains(&id)) || self.attached.iter().any(attached)
+    }
+
+    /// Exceptions are others from now on.
+    fn change(&mut self) {
+        (self.taken, self.owes_rules) = (None, true);
     }
 
     /// True where there are no rules but what stands for them, which names each group.
@@ -180,16 +203,26 @@ impl<T: Transport> Session<T> {
     /// `Refused` at the index of a frame: unknown or static object, a pose that is none; `Misuse` for an object that is attached, whose
     /// frame is its carrier's; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn reframe(&mut self, frames: &[Frame]) -> Result<(), Error> {
+        self.settle()?;
         if frames.iter().any(|frame| self.company.is_attached(frame.object)) {
             return Err(Error::Misuse("a part that is attached has its carrier's frame: detach it first"));
         }
         let mut all = frames.to_vec();
+        let mut of_frame: Vec<usize> = (0..frames.len()).collect();
         for (part, attached) in &self.company.attached {
-            if let Some(frame) = frames.iter().rfind(|frame| frame.object == attached.root) {
+            if let Some(i) = frames.iter().rposition(|frame| frame.object == attached.root) {
+                let frame = &frames[i];
                 all.push(Frame { object: *part, place: frame.place.compose(&attached.held), pose: frame.pose });
+                of_frame.push(i);
             }
         }
-        self.give_frames(&all)?;
+        self.give_frames(&all).map_err(|error| match error {
+            // What a part cannot have its carrier cannot be given.
+            Error::Refused { code, index: Some(i), detail } if i as usize >= frames.len() => {
+                Error::Refused { code, index: of_frame.get(i as usize).map(|i| *i as u32), detail }
+            }
+            other => other,
+        })?;
         for frame in frames {
             if let Some(member) = self.company.members.get_mut(&frame.object) {
                 member.own = frame.place;
@@ -212,13 +245,24 @@ impl<T: Transport> Session<T> {
         if touching.iter().any(|id| !self.company.members.contains_key(id)) {
             return Err(Error::Misuse("expected objects of this session that the part may touch"));
         }
+        self.settle()?;
         let (root, held) = (self.company.root_of(carrier), Pose::IDENTITY);
         let touching = touching.iter().copied().chain([carrier]).collect();
         let before = self.company.attached.clone();
         self.company.attached.insert(part, Attached { carrier, root, held, touching });
-        let done = if self.company.is_ambiguous() { Err(AMBIGUOUS) } else { Ok(()) };
-        let done = done.and_then(|()| self.hand_over(part, root)).and_then(|()| self.tell_rules());
-        done.inspect_err(|_| self.company.attached = before)
+        self.company.change();
+        let done = match self.company.is_ambiguous() {
+            true => Err(AMBIGUOUS),
+            false => {
+                self.company.owes_frames = true;
+                self.hand_over(part, root).and_then(|()| self.tell_rules())
+            }
+        };
+        self.company.owes_frames &= done.is_err();
+        done.inspect_err(|_| {
+            self.company.attached = before;
+            self.company.change();
+        })
     }
 
     /// The part stays where it is from now on, in the frame that it had of its own, and is tested as the rules say; what is attached to it
@@ -227,6 +271,7 @@ impl<T: Transport> Session<T> {
     /// # Errors
     /// As `set_rules`.
     pub fn detach(&mut self, part: u32) -> Result<(), Error> {
+        self.settle()?;
         if !self.company.is_attached(part) {
             return Ok(());
         }
@@ -234,9 +279,9 @@ impl<T: Transport> Session<T> {
         self.tell_rules()
     }
 
-    /// The object whose records a part gets; `None` where it is not attached.
+    /// The object at the end of a part's chain, whose records it gets; `None` where it is not attached.
     pub fn carrier(&self, part: u32) -> Option<u32> {
-        self.company.attached.get(&part).map(|attached| attached.root)
+        self.company.carriers(part).skip(1).last()
     }
 
     /// Pairs of objects that may meet and are not tested, whatever the rules say (an allowed-collision matrix); `false`: no longer.
@@ -248,15 +293,20 @@ impl<T: Transport> Session<T> {
         if pairs.iter().flatten().any(|id| !self.company.members.contains_key(id)) {
             return Err(Error::Misuse("expected pairs of objects of this session"));
         }
-        let before = self.company.clone();
+        self.settle()?;
+        let before = self.company.allowed.clone();
         for [a, b] in pairs {
             match allowed {
                 true => self.company.allowed.insert(pair(*a, *b)),
                 false => self.company.allowed.remove(&pair(*a, *b)),
             };
         }
+        self.company.change();
         let done = if self.company.is_ambiguous() { Err(AMBIGUOUS) } else { self.tell_rules() };
-        done.inspect_err(|_| self.company = before)
+        done.inspect_err(|_| {
+            self.company.allowed = before;
+            self.company.change();
+        })
     }
 
     /// The rules that were set, without what is allowed beside them.
@@ -278,7 +328,29 @@ impl<T: Transport> Session<T> {
         let rules = self.company.effective();
         self.done(Command::SetRules(rules.iter().map(WireRule::from).collect()))?;
         self.journal.rules(&rules);
+        self.company.owes_rules = false;
         Ok(())
+    }
+
+    /// Does what an earlier call could not end, as where its server was lost: frames and rules are what the company says.
+    pub(super) fn settle(&mut self) -> Result<(), Error> {
+        if self.company.owes_frames {
+            // Roots first: parts have the frames that these have then.
+            let is_astray = |(id, member): (&u32, &Member)| {
+                (!self.company.is_attached(*id) && member.place != member.own).then_some(*id)
+            };
+            let astray: Vec<u32> = self.company.members.iter().filter_map(is_astray).collect();
+            for id in astray {
+                self.own_frame(id, id)?;
+            }
+            let parts: Vec<u32> = self.company.attached.keys().copied().collect();
+            for part in parts {
+                let root = self.company.carriers(part).last().unwrap_or(part);
+                self.hand_over_one(part, root)?;
+            }
+            self.company.owes_frames = false;
+        }
+        if self.company.owes_rules { self.tell_rules() } else { Ok(()) }
     }
 
     /// Adds an object; returns its id.
@@ -303,8 +375,10 @@ impl<T: Transport> Session<T> {
             self.journal.object(spec);
         }
         if is_new && self.company.stands_for_rules() {
-            self.tell_rules()?;
+            self.company.owes_rules = true;
         }
+        // The object is there, whatever becomes of the rules: they are told before the next step at the latest.
+        self.settle()?;
         Ok(id)
     }
 
@@ -313,6 +387,8 @@ impl<T: Transport> Session<T> {
     /// # Errors
     /// `Refused`: unknown object; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn remove_object(&mut self, object: u32) -> Result<(), Error> {
+        self.settle()?;
+        let is_excepted = self.company.is_excepted(object);
         let carried: Vec<u32> =
             self.company.attached.iter().filter(|(_, a)| a.carrier == object).map(|(part, _)| *part).collect();
         for part in carried {
@@ -321,39 +397,50 @@ impl<T: Transport> Session<T> {
         self.done(Command::RemoveObject(object))?;
         self.journal.removed(object);
         let company = &mut self.company;
-        let before = company.exceptions();
         company.members.remove(&object);
-        company.allowed.retain(|pair| !pair.contains(&object));
-        company.attached.remove(&object);
-        company.attached.values_mut().for_each(|attached| attached.touching.retain(|id| *id != object));
+        if is_excepted {
+            company.allowed.retain(|pair| !pair.contains(&object));
+            company.attached.remove(&object);
+            company.attached.values_mut().for_each(|attached| attached.touching.retain(|id| *id != object));
+            company.change();
+        }
         // Another object of its name is none of them.
-        if company.exceptions() != before { self.tell_rules() } else { Ok(()) }
+        self.settle()
     }
 
     /// Ends that a part is attached: it has its own frame again, where it stands, and what hangs on it has that one.
     fn release(&mut self, part: u32) -> Result<(), Error> {
-        let Some(own) = self.company.members.get(&part).map(|member| member.own) else { return Ok(()) };
         let root = self.company.root_of(part);
-        let frame = self.carry(part, root)?;
-        let pose = frame.pose.compose(&frame.place).compose(&own.inverse());
-        self.give_frames(&[Frame { object: part, place: own, pose }])?;
         self.company.attached.remove(&part);
+        self.company.change();
+        self.company.owes_frames = true;
+        self.own_frame(part, root)?;
         for id in self.company.parts_of(part) {
             self.hand_over(id, part)?;
         }
+        self.company.owes_frames = false;
         Ok(())
+    }
+
+    /// Gives an object the frame that it has where it is not attached, where it stands by now in the frame of another one.
+    fn own_frame(&mut self, object: u32, root: u32) -> Result<(), Error> {
+        let Some(own) = self.company.members.get(&object).map(|member| member.own) else { return Ok(()) };
+        let frame = self.carry(object, root)?;
+        let pose = frame.pose.compose(&frame.place).compose(&own.inverse());
+        self.give_frames(&[Frame { object, place: own, pose }])
     }
 
     /// Gives a part that is attached, and what hangs on it, the frame of the object at the end of its chain.
     fn hand_over(&mut self, part: u32, root: u32) -> Result<(), Error> {
-        let mut all = self.company.parts_of(part);
-        all.insert(0, part);
-        for id in all {
-            let frame = self.carry(id, root)?;
-            let held = self.company.place_of(root).inverse().compose(&frame.place);
-            if let Some(attached) = self.company.attached.get_mut(&id) {
-                (attached.root, attached.held) = (root, held);
-            }
+        self.hand_over_one(part, root)?;
+        self.company.parts_of(part).into_iter().try_for_each(|id| self.hand_over_one(id, root))
+    }
+
+    fn hand_over_one(&mut self, part: u32, root: u32) -> Result<(), Error> {
+        let frame = self.carry(part, root)?;
+        let held = self.company.place_of(root).inverse().compose(&frame.place);
+        if let Some(attached) = self.company.attached.get_mut(&part) {
+            (attached.root, attached.held) = (root, held);
         }
         Ok(())
     }

@@ -20,6 +20,7 @@ impl<T: Transport> Session<T> {
 
     /// Slots for `n` records of the caller, with room behind them for what is attached.
     fn loan(&mut self, n: usize) -> Result<&mut [PoseRecord], Error> {
+        self.settle()?;
         let all = n + self.company.slots();
         self.check_count(all)?;
         self.stage = Stage::Idle;
@@ -69,6 +70,9 @@ impl<T: Transport> Session<T> {
             0 => self.own_slots,
             _ => {
                 let slots = self.transport.loaned_mut();
+                if slots.len() < self.own_slots + self.company.slots() {
+                    return Err(Error::Misuse("a part was attached after the batch was begun: begin it again"));
+                }
                 if slots.iter().take(self.own_slots).any(|record| self.company.is_attached(record.object)) {
                     let what = "a record names a part that is attached, which moves with its carrier: detach it first";
                     return Err(Error::Misuse(what));
@@ -153,9 +157,12 @@ impl<T: Transport> Session<T> {
         if index.is_none_or(|i| (i as usize) < self.own_slots) {
             return (index, format!("object id {object}"));
         }
-        // What a part does is what its carrier does.
+        // What a part does is what its carrier does: its records are the carrier's, in their order.
         let root = self.company.root_of(object);
-        let own = slots.iter().take(self.own_slots).rposition(|r| r.object == root);
+        let of = |id: u32| move |(i, r): (usize, &PoseRecord)| (r.object == id).then_some(i);
+        let before = index.map_or(0, |i| i as usize);
+        let nth = slots[..before].iter().enumerate().skip(self.own_slots).filter_map(of(object)).count();
+        let own = slots.iter().enumerate().take(self.own_slots).filter_map(of(root)).nth(nth);
         (own.map(|i| i as u32), format!("object id {object}, which object id {root} carries"))
     }
 

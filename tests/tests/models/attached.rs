@@ -4,16 +4,20 @@
 
 use super::load::{one_joint, served};
 use super::robots::{Arm, turn};
-use contactd::ipc::ServerConfig;
+use contactd::ipc::{Embedded, ServerConfig};
 use contactd::load::{LoadOptions, LoadScene};
 use contactd_client::solid::cuboid;
-use contactd_client::{Error, Frame, Object, Session, Transport};
+use contactd_client::transport::{Opened, Transport};
+use contactd_client::{Error, Frame, Object, Session};
+use contactd_proto::control::{Answer, Command};
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::query::{PointOptions, Side};
-use contactd_proto::{Pose, PoseRecord};
+use contactd_proto::{ContactRecord, Pose, PoseRecord, StepReply, StepRequest};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
 use glam::{DMat4, DVec3};
+use std::cell::Cell;
+use std::rc::Rc;
 use std::time::Duration;
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -37,6 +41,52 @@ struct Thing {
     carrier: Option<usize>,
 }
 
+/// An engine to which commands get lost now and then, before anything is done.
+struct Flaky {
+    inner: Embedded,
+    /// Commands until the one that is lost.
+    left: Rc<Cell<Option<u32>>>,
+}
+
+impl Transport for Flaky {
+    fn may_lose_server(&self) -> bool {
+        self.inner.may_lose_server()
+    }
+    fn open(&mut self) -> Result<Opened, Error> {
+        self.inner.open()
+    }
+    fn command(&mut self, command: Command, timeout: Duration) -> Result<Answer, Error> {
+        match self.left.get() {
+            Some(0) => {
+                self.left.set(None);
+                Err(Error::System("lost".into()))
+            }
+            left => {
+                self.left.set(left.map(|n| n - 1));
+                self.inner.command(command, timeout)
+            }
+        }
+    }
+    fn loan(&mut self, records: usize) -> Result<&mut [PoseRecord], Error> {
+        self.inner.loan(records)
+    }
+    fn loaned(&self) -> &[PoseRecord] {
+        self.inner.loaned()
+    }
+    fn loaned_mut(&mut self) -> &mut [PoseRecord] {
+        self.inner.loaned_mut()
+    }
+    fn send(&mut self, request: StepRequest) -> Result<(), Error> {
+        self.inner.send(request)
+    }
+    fn receive(&mut self, timeout: Duration) -> Result<(), Error> {
+        self.inner.receive(timeout)
+    }
+    fn reply(&self) -> Option<(&StepReply, &[ContactRecord])> {
+        self.inner.reply()
+    }
+}
+
 struct Play<T: Transport> {
     session: Session<T>,
     things: Vec<Thing>,
@@ -46,7 +96,9 @@ struct Play<T: Transport> {
 impl<T: Transport> Play<T> {
     fn add(&mut self, r: &mut Random) {
         let sizes = DVec3::new(r.within(0.5, 2.0), r.within(0.5, 2.0), r.within(0.5, 2.0));
-        let model = self.session.load_model("box", &cuboid(sizes.x, sizes.y, sizes.z)).expect("a box").id;
+        let Ok(model) = self.session.load_model("box", &cuboid(sizes.x, sizes.y, sizes.z)).map(|m| m.id) else {
+            return;
+        };
         // Names are given again once their objects are gone.
         let name = (0..).map(|k| format!("box {k}")).nth(self.made % 9).expect("a name");
         self.made += 1;
@@ -61,7 +113,15 @@ impl<T: Transport> Play<T> {
                 carrier: None,
             }),
             Err(Error::Misuse(said)) => assert!(said.contains("by names"), "{said}"),
-            Err(e) => panic!("{e}"),
+            Err(e) => self.lost(&e),
+        }
+    }
+
+    /// A command was lost on the way: what is attached is what the session says then.
+    fn lost(&mut self, e: &Error) {
+        assert!(matches!(e, Error::System(what) if what == "lost"), "{e}");
+        for thing in &mut self.things {
+            thing.carrier = thing.carrier.filter(|_| self.session.carrier(thing.id).is_some());
         }
     }
 
@@ -94,15 +154,18 @@ impl<T: Transport> Play<T> {
                 Err(Error::Misuse(said)) => {
                     assert!(self.chain(j).contains(&i) || said.contains("by names"), "{said}");
                 }
-                Err(e) => panic!("{e}"),
+                Err(e) => self.lost(&e),
             },
-            2 => {
-                self.session.detach(id).unwrap_or_else(|e| panic!("{e}"));
-                self.things[i].carrier = None;
-            }
+            2 => match self.session.detach(id) {
+                Ok(()) => self.things[i].carrier = None,
+                Err(e) => self.lost(&e),
+            },
             3 => {
                 let (to, by) = (r.vector(2.0), r.vector(1.0));
-                self.session.begin_step(1).expect("a slot")[0] = PoseRecord::turn(id, to, by);
+                match self.session.begin_step(1) {
+                    Ok(slots) => slots[0] = PoseRecord::turn(id, to, by),
+                    Err(e) => return self.lost(&e),
+                }
                 let done = self.session.finish(PATIENCE).map(|_| ());
                 if root != i {
                     assert!(matches!(done, Err(Error::Misuse(_))), "{done:?}");
@@ -117,6 +180,9 @@ impl<T: Transport> Play<T> {
             4 => {
                 let (place, at) = (pose(r), pose(r));
                 let done = self.session.reframe(&[Frame { object: id, place, pose: at }]);
+                if let Err(e @ Error::System(_)) = &done {
+                    return self.lost(e);
+                }
                 if root != i {
                     assert!(matches!(done, Err(Error::Misuse(_))), "{done:?}");
                     return;
@@ -128,7 +194,11 @@ impl<T: Transport> Play<T> {
                 self.things[i].own = matrix(&place);
             }
             _ if self.things.len() > 2 && r.chance(0.4) => {
-                self.session.remove_object(id).unwrap_or_else(|e| panic!("{e}"));
+                if let Err(e) = self.session.remove_object(id)
+                    && self.session.points(&[[0.0; 3]], &PointOptions::default(), Some(&[id])).is_ok()
+                {
+                    return self.lost(&e);
+                }
                 self.things.remove(i);
                 for thing in &mut self.things {
                     thing.carrier = thing.carrier.filter(|c| *c != i).map(|c| if c > i { c - 1 } else { c });
@@ -165,6 +235,26 @@ fn play<T: Transport>(session: Session<T>, seed: u64, mut between: impl FnMut(&m
 fn what_hangs_on_what_stands_where_matrices_have_it() {
     for seed in 0..sized("CONTACTD_ATTACHED", 40u64) {
         play(contactd::embedded(&ServerConfig::default()).expect("an engine"), seed, |_, _| {});
+    }
+}
+
+#[test]
+fn what_hangs_on_what_stands_where_matrices_have_it_though_commands_are_lost() {
+    for seed in 500..500 + sized("CONTACTD_ATTACHED", 60u64) {
+        let left = Rc::new(Cell::new(None));
+        let inner = Embedded::new(&ServerConfig::default());
+        let session = Session::new(Flaky { inner, left: Rc::clone(&left) }).expect("a session");
+        let mut r = Random::new(seed);
+        let mut play = Play { session, things: Vec::new(), made: 0 };
+        while play.things.len() < 4 {
+            play.add(&mut r);
+        }
+        for k in 0..40 {
+            left.set(r.chance(0.6).then(|| r.below(6) as u32));
+            play.act(&mut r);
+            left.set(None);
+            play.check(k);
+        }
     }
 }
 
@@ -266,4 +356,39 @@ fn another_object_of_the_name_of_one_that_is_gone_is_tested() {
         let refused = session.attach(part, wall, &[77]);
         assert!(matches!(refused, Err(Error::Misuse(said)) if said.contains("may touch")), "{refused:?}");
     }
+}
+
+#[test]
+fn what_a_carrier_that_is_gone_held_is_tested_against_all() {
+    let mut session = contactd::embedded(&ServerConfig::default()).expect("an engine");
+    let model = session.load_model("box", &cuboid(1.0, 1.0, 1.0)).expect("a box").id;
+    let add = |session: &mut Session<_>, name: &str, x: f64| {
+        session.add_object(Object::new(name, model).at(Pose::at(DVec3::X * x))).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let [palm, finger, part] = [("palm", 9.0), ("finger", 0.0), ("part", 5.0)].map(|(n, x)| add(&mut session, n, x));
+    session.attach(part, palm, &[finger]).expect("attached");
+    session.begin_step(1).expect("a slot")[0] = PoseRecord::end(part, &Pose::IDENTITY);
+    let said = session.finish(PATIENCE).map(|_| ()).expect_err("a part has no record of its own").to_string();
+    assert!(said.contains("attached"), "{said}");
+    session.remove_object(palm).expect("removed");
+    for name in ["finger", "palm"] {
+        if name == "palm" {
+            session.remove_object(finger).expect("removed");
+            add(&mut session, "palm", 0.0);
+        }
+        let records = [PoseRecord::start(part, &Pose::at(DVec3::X * 5.0)), PoseRecord::end(part, &Pose::IDENTITY)];
+        session.begin_step(2).expect("slots").copy_from_slice(&records);
+        let reply = session.finish(PATIENCE).expect("a step");
+        assert!((reply.records()[0].time - 0.8).abs() < 1e-9, "{name}: {:?}", reply.records());
+    }
+    // A batch that was begun before has no room for a part.
+    let wall = add(&mut session, "wall", 20.0);
+    session.begin_step(1).expect("a slot")[0] = PoseRecord::end(wall, &Pose::IDENTITY);
+    session.attach(part, wall, &[]).expect("attached");
+    let said = session.finish(PATIENCE).map(|_| ()).expect_err("no room").to_string();
+    assert!(said.contains("begin it again"), "{said}");
+    // What is refused of a part is told of its carrier's record.
+    let far = PoseRecord::start(wall, &Pose::at(DVec3::X * f64::NAN));
+    session.begin_step(1).expect("a slot")[0] = far;
+    assert!(matches!(session.finish(PATIENCE), Err(Error::Refused { index: Some(0), .. })));
 }

@@ -167,8 +167,8 @@ fn made(shapes: &mut Shapes<'_>, call: &Call, outer: &DAffine3, asked: Asked) ->
     // Two cones that meet in a point are no neck, and a cylinder has no waist: neither is loaded in place of what was asked for.
     let is_sheet = |sides: &[Face]| sides.len() == 1 && !sides[0].is_convex();
     if asked.sheet.is_some_and(|rest| !is_sheet(&quadrics.sides) && (rest > STRAIGHT || quadrics.sides.len() > 1)) {
-        let expected = "a hyperboloid with a waist that is no less than about a millionth of r and of h";
-        return Err(refused(expected, "one that is thinner than its digits tell"));
+        let expected = "a hyperboloid with a waist that is no less than about a millionth of r and of h, or is r";
+        return Err(refused(expected, "one that its digits do not tell from two cones or a cylinder"));
     }
     let holds = asked.holds.map(|x| map.transform_point3(x));
     let sides: Vec<Face> = quadrics.sides.into_iter().filter(|s| holds.is_none_or(|x| s.value(x) < 0.0)).collect();

@@ -111,7 +111,8 @@ impl Polish<'_, '_> {
     /// goes on beneath. None where the part that decides there has all faces.
     pub fn beside(&self, side: usize, x: DVec3, way: DVec3, length: f64) -> SmallVec<[DVec3; 4]> {
         let faces = &self.sides[side].parts.solid.faces;
-        let Some(clause) = self.clause(side, x).filter(|_| faces.len() <= MOST_FACES) else { return SmallVec::new() };
+        let clause = if faces.len() <= MOST_FACES { self.clause(side, x) } else { None };
+        let Some(clause) = clause else { return SmallVec::new() };
         let reach = FEATURE * self.scale + 1e3 * self.rounding;
         let met = |id: &&LiteralId| self.at(side, **id, x).0.abs() <= reach;
         let is_other = |f: usize| !clause.iter().any(|id| id.face() as usize == f) && faces[f].value(x).abs() <= reach;

@@ -272,18 +272,19 @@ fn find(bodies: &Bodies) -> Regions {
     found
 }
 
-/// The point where bodies are nearest to each other, by the distance from what is told as nearest, where that is none: an edge that leans
-/// against a round face is told by its ends. A patch is told by corners and by directions that stay.
+/// The point where bodies are nearest to each other near a line that is told as the nearest, where it is none of that: of an edge that
+/// leans against a round face the ends alone are told. A patch is told by corners and by directions that stay.
 fn beside_the_nearest(bodies: &Bodies, regions: &[Region]) -> Option<Region> {
     let region = regions.iter().min_by(|r, s| r.separation().total_cmp(&s.separation()))?;
-    if region.extent == Extent::Patch {
+    if region.extent != Extent::Line {
         return None;
     }
     let p = region.points.iter().min_by(|p, q| p.separation.total_cmp(&q.separation))?;
     let aside = region.normal * (0.5 * p.separation);
     let m = Meeting { feet: [p.point - aside, p.point + aside], normal: region.normal, gap: p.separation };
-    let nearer = single::nearer(bodies, &m, p.separation - NEARER * bodies.size)?;
-    Some(point_region(bodies, &nearer))
+    let nearer = single::nearer(bodies, &m, p.separation - SAME_POINT * bodies.size)?;
+    let is_other = |r: &Region| r.points.iter().all(|p| p.point.distance(nearer.middle()) > SAME_FACES * bodies.size);
+    regions.iter().all(is_other).then(|| point_region(bodies, &nearer))
 }
 
 /// All regions of any bodies.

@@ -32,6 +32,8 @@ const CROSSING: f64 = 0.25;
 const ACTIVE: f64 = 2.0;
 /// Diameters of the smaller body from which on bodies are apart for Newton's method on the distance.
 const APART: f64 = 1e-6;
+/// Times that Newton's method on the distance asks both trees, or so.
+const ROUNDS: usize = 8;
 /// Steps from a point down to a body.
 const PROJECTIONS: usize = 16;
 /// Faces of a body that are looked through.
@@ -272,7 +274,7 @@ fn half_space(whole: &Primitive) -> Option<(DVec3, f64)> {
 pub fn nearer(bodies: &Bodies, m: &Meeting, most: f64) -> Option<Meeting> {
     // Below that equations of faces tell more digits.
     let is_apart = |m: &Meeting| m.gap > APART * bodies.size;
-    if !is_apart(m) {
+    if !is_apart(m) || bodies.work.is_spent() {
         return None;
     }
     let parts = parts_of(bodies);
@@ -282,7 +284,10 @@ pub fn nearer(bodies: &Bodies, m: &Meeting, most: f64) -> Option<Meeting> {
     let of_a = polish.beside(0, x, m.normal, m.gap).into_iter().map(|x| [x, y]);
     let of_b = polish.beside(1, y, way, m.gap).into_iter().map(|y| [x, y]);
     let starts = std::iter::once([x, y]).chain(of_a).chain(of_b);
-    let found = starts.filter_map(|feet| run(bodies, &polish, feet, m.normal));
+    // Of a face that is as far off as the gap, and bends as the smaller body does, the nearest point is within √(2 gap size).
+    let reach = 2.0 * (m.gap * bodies.size).sqrt();
+    let is_beside = |found: &Meeting| (0..2).all(|side| found.feet[side].distance(m.feet[side]) <= reach);
+    let found = starts.filter_map(|feet| run(bodies, &polish, feet, m.normal)).filter(is_beside);
     found.min_by(|m, n| m.gap.total_cmp(&n.gap)).filter(|found| is_apart(found) && found.gap <= most)
 }
 
@@ -305,8 +310,11 @@ fn polish_of<'s, 'a>(bodies: &Bodies<'s, 'a>, parts: &'s [Parts<'a>; 2]) -> Poli
 
 /// Newton's method from points in the frames of their bodies.
 fn run(bodies: &Bodies, polish: &Polish, [x, y]: [DVec3; 2], normal: DVec3) -> Option<Meeting> {
-    let pair = polish.run(x, y)?;
-    bodies.work.bound();
+    let pair = polish.run(x, y);
+    // Each of a few rounds asks both trees.
+    let looks = polish.sides.iter().map(|side| ROUNDS * side.tokens.len()).sum();
+    bodies.work.look(looks);
+    let pair = pair?;
     let feet = [pair.x, bodies.at.a_point(pair.y)];
     Some(point::met(bodies, feet, normal))
 }
