@@ -9,7 +9,7 @@
 //! some face of the piece's cavity by δ; no floor of it that was left out can be that face, since the piece does not reach
 //! beyond it by more than a part of δ (`SLACK`). The planes of the cut lie δ farther out for what the proof takes off at planes.
 
-use super::body::{Moment, Plane};
+use super::body::Plane;
 use super::pierced::CavityPair;
 use crate::math::Aabb;
 use crate::solid::Sense;
@@ -35,8 +35,8 @@ struct Layers<'p, 'a> {
     axis: DVec3,
     /// Where each cavity ends along the axis; infinite where it does not.
     spans: SmallVec<[[f64; 2]; 8]>,
-    /// When the pieces are looked at to choose between cavities.
-    times: [f64; 2],
+    /// A point of the body, by which cavities are chosen.
+    middle: DVec3,
 }
 
 /// A layer, its ends along the axis, and the index of the cavity that a piece is in.
@@ -47,19 +47,20 @@ struct Layer {
 }
 
 /// The pieces of a body in cavities by layers across `axis`, `pairs` the body with each of them. `reached` is a box around all that
-/// the body reaches of the solid, `center` a point in it at the start. `None` where the point is in no layer that a cavity goes through.
+/// the body reaches of the solid, `center` a point in it at the start, `middle` one of the body when a wall seems to be met. `None` where
+/// the first is in no layer that a cavity goes through.
 pub(super) fn layers<'a>(
     pairs: &[CavityPair<'a>],
     axis: DVec3,
     reached: &Aabb,
     center: DVec3,
-    times: [f64; 2],
+    middle: DVec3,
 ) -> Option<Pieces<'a>> {
     let delta = pairs.first()?.delta;
     let spans = pairs.iter().map(|pair| pair.span(axis)).collect();
-    let this = Layers { pairs, axis, spans, times };
-    let (middle, half) = (reached.center().dot(axis), reached.half().dot(axis.abs()));
-    let [from, to] = [middle - half, middle + half];
+    let this = Layers { pairs, axis, spans, middle };
+    let (along, half) = (reached.center().dot(axis), reached.half().dot(axis.abs()));
+    let [from, to] = [along - half, along + half];
     let mut cuts: SmallVec<[f64; 16]> = this.spans.iter().flatten().copied().filter(|c| *c > from && *c < to).collect();
     cuts.sort_unstable_by(f64::total_cmp);
     cuts.dedup_by(|next, kept| *next - *kept <= SLACK * delta);
@@ -114,12 +115,10 @@ impl Layers<'_, '_> {
         Some(Layer { ends, cavity: best.0 })
     }
 
-    /// The least clearance that a piece between two ends has in a cavity, at both moments.
+    /// How far the walls of a cavity are from the body's middle, moved along the axis to half way between two ends.
     fn room(&self, cavity: usize, ends: [f64; 2]) -> f64 {
-        let pair = &self.pairs[cavity];
-        let any = self.edge(cavity, cavity, ends[0]);
-        let piece = pair.cut(self.axis, ends.map(|end| Some((end, any))));
-        self.times.iter().fold(f64::INFINITY, |least, t| least.min(piece.clearance(&piece.moment(*t))))
+        let half_way = 0.5 * (ends[0] + ends[1]);
+        self.pairs[cavity].room(self.axis, self.middle + self.axis * (half_way - self.middle.dot(self.axis)))
     }
 
     /// What a piece in `own` meets where its wall ends in a cut and the cavity `other` goes on: the wall of that, or beside a narrower
@@ -170,9 +169,16 @@ impl CavityPair<'_> {
         (along.abs() > 1.0 - ALIKE).then(|| round.radius - round.lean.dot(round.axis) * s)
     }
 
-    /// The least clearance in a few directions.
-    fn clearance(&self, m: &Moment) -> f64 {
-        self.walls().fold(f64::INFINITY, |least, wall| least.min(self.best(m, wall).phi))
+    /// How far its cavity's walls are from a point, its floors across an axis left out.
+    fn room(&self, axis: DVec3, x: DVec3) -> f64 {
+        let round = self.round.iter().map(|round| {
+            let from = x - round.origin;
+            let along = from.dot(round.axis);
+            round.radius - round.lean.dot(round.axis) * along - (from - round.axis * along).length()
+        });
+        let walls = self.flats.iter().filter(|flat| flat.normal.dot(axis).abs() < 1.0 - ALIKE);
+        let flat = walls.map(|flat| flat.offset - flat.normal.dot(x));
+        round.chain(flat).fold(f64::INFINITY, f64::min)
     }
 
     /// The piece of the body between two planes across an axis, each with the face that its cavity's wall has an edge with there. The

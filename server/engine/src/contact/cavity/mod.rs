@@ -339,8 +339,8 @@ impl<'s, 'a> Unions<'s, 'a> {
         let of =
             |hole: &&'u Primitive| CavityPair::new(self.task, pair.primitive, (main, hole), pair.side, pair.relative);
         let all: SmallVec<[CavityPair<'u>; 4]> = holes.iter().filter_map(of).collect();
-        let center = pair.relative.at(0.0).b_point(pair.primitive.ball.center).clamp(common.min, common.max);
-        let times = [0.0, guess.map_or(until, |guess| guess.t)];
+        let middle = |t| pair.relative.at(t).b_point(pair.primitive.ball.center).clamp(common.min, common.max);
+        let [center, then] = [0.0, guess.map_or(0.0, |guess| guess.t)].map(middle);
         let mut axes: SmallVec<[DVec3; 4]> = SmallVec::new();
         for pair in std::iter::once(pair).chain(&all) {
             let own = pair.round.map(|round| round.axis).into_iter().chain(pair.flats.iter().map(|flat| flat.normal));
@@ -351,7 +351,7 @@ impl<'s, 'a> Unions<'s, 'a> {
             }
         }
         axes.into_iter().find_map(|axis| {
-            let pieces = layers::layers(&all, axis, &common, center, times)?;
+            let pieces = layers::layers(&all, axis, &common, center, then)?;
             if pieces.len() == 1 && std::ptr::eq(pieces[0].cavity, pair.cavity) {
                 return None;
             }

@@ -315,7 +315,7 @@ fn no_point_of_a_body_is_in_the_wall_of_a_hole_of_layers_within_a_proven_span() 
         let swept = Sweep::new(placed(motion), placed(rest())).of_box(&primitive.aabb, 0.0, 1.0);
         let reached = swept.intersection(&main[0].aabb);
         let center = at.clamp(reached.min, reached.max);
-        let Some(pieces) = layers(&all, DVec3::Z, &reached, center, [0.0, 0.5]) else { continue };
+        let Some(pieces) = layers(&all, DVec3::Z, &reached, center, center) else { continue };
         if pieces.len() < 2 || !pieces.iter().all(|piece| piece.prove(1.0, None).0 == ProofEnd::Proven) {
             met += 1;
             continue;
