@@ -4,6 +4,7 @@
 use super::convex;
 use super::element::Element;
 use super::flat::{Flat, Outline, Plane};
+use super::hull::Disc;
 use super::meshed::Meshed;
 use super::outlines::{self, flat_of, flats};
 use super::parts::{Around, Part, PartId, Parts};
@@ -12,6 +13,7 @@ use super::polygon::Region;
 use super::revolve::{Lathe, Turn};
 use super::shadow;
 use super::shapes::Shapes;
+use super::swept::{Rim, Swept};
 use super::syntax::Call;
 use super::{Place, Problem};
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
@@ -290,7 +292,14 @@ pub fn revolve(
         }
         None => Vec::new(),
     };
+    // Into how many pieces OpenSCAD cuts the turn, where it has to be cut.
+    let pieces = shapes.pieces(&arguments, far)?;
     let parts = &mut shapes.parts;
+    let swept = if sides.is_empty() && parts.swept.is_some() {
+        Some(Swept { outer: *outer, turn: [turn.start, turn.angle], rims: rims(parts, at, &built, side)? })
+    } else {
+        None
+    };
     for leaf in leaves {
         let Some(flat) = flat_of(parts, leaf) else { continue };
         let (name, at) = (flat.name.clone(), flat.at);
@@ -317,13 +326,40 @@ pub fn revolve(
         if region.open {
             return Err((at, outlines::crossing()));
         }
+        let first = parts.list.len();
         parts.list[leaf] = lathe.region(parts, &region)?;
+        parts.pieces.extend((first..parts.list.len()).map(|p| (p, pieces)));
     }
     let whole = parts.push(Part::Op(Op::Union, at, built));
-    Ok(match turn.wedge(parts, at, outer)? {
+    let whole = match turn.wedge(parts, at, outer)? {
         Some(wedge) => parts.push(Part::Op(Op::Intersection, at, vec![whole, wedge])),
         None => whole,
-    })
+    };
+    if let (Some(swept), Some(all)) = (swept, &mut parts.swept) {
+        all.insert(whole, swept);
+    }
+    Ok(whole)
+}
+
+/// What turns about the axis: whole discs and outlines, or what is left of them.
+fn rims(parts: &mut Parts<'_>, at: Place, built: &[PartId], side: f64) -> Result<Vec<Rim>> {
+    let turned = |p: DVec2| DVec2::new(p.x * side, p.y);
+    let whole: Option<Vec<PartId>> = built
+        .iter()
+        .map(|p| parts.leaves(*p).filter(|(_, cut)| !cut).map(|(leaves, _)| leaves))
+        .collect::<Option<Vec<_>>>()
+        .map(|all| all.into_iter().flatten().collect());
+    if let Some(leaves) = whole {
+        let rim = |flat: &Flat| match flat.disc() {
+            Some(disc) => Rim::Disc(Disc { center: turned(disc.center), ..disc }),
+            None => Rim::Corners(flat.paths().into_iter().flatten().map(turned).collect()),
+        };
+        return Ok(leaves.iter().filter_map(|l| flat_of(parts, *l)).map(rim).collect());
+    }
+    let before = parts.notes.len();
+    let left = outlines::paths(parts, at, built, "rotate_extrude")?;
+    parts.notes.truncate(before);
+    Ok(vec![Rim::Corners(left.into_iter().flatten().map(turned).collect())])
 }
 
 /// On which side of the axis an outline lies: 1 or −1. One on both has no solid in OpenSCAD, either.

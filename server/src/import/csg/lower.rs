@@ -26,6 +26,7 @@ use crate::math::Aabb;
 use crate::math::tolerance::{ROUNDING, SIMILARITY};
 use crate::solid::Op;
 use glam::{DAffine3, DMat3, DVec3};
+use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
 
@@ -386,7 +387,8 @@ impl<'a> Lowering<'a> {
 
     /// The box of what is inside of a call, in the call's own coordinates; of 2D shapes flat. `None` for nothing.
     fn bounds(&self, call: &'a Call, context: Context) -> Result<Option<(Aabb, f64)>> {
-        let parts = Parts::new(self.shapes.limits);
+        let mut parts = Parts::new(self.shapes.limits);
+        parts.swept = Some(HashMap::new());
         let shapes = Shapes { facets: self.shapes.facets, limits: self.shapes.limits, parts };
         let mut inside = Lowering { file: self.file, attached: self.attached, shapes };
         let plane = context.plane.map(|_| Plane { inner: DAffine3::IDENTITY, overshoot: 0 });

@@ -43,6 +43,7 @@ mod shapes;
 mod slices;
 mod straight;
 mod superellipsoid;
+mod swept;
 mod syntax;
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@ use super::element::Element;
 use super::flat::Flat;
 use super::place::PlacedShape;
 use super::polygon::Formula;
+use super::swept::Swept;
 use super::{Limits, Place, Problem};
 use crate::import::Note;
 use crate::solid::{Label, Measured, NodeId, Op, Shape, Solid, SolidBuilder};
@@ -78,6 +79,8 @@ pub struct Parts<'a> {
     pub prisms: HashMap<PartId, Prism>,
     /// Of an extrusion of very many sides: its moments.
     pub measured: HashMap<PartId, Measured>,
+    /// Where sizes are asked for: of a turned outline what turns, for its mesh has other ends.
+    pub swept: Option<HashMap<PartId, Swept>>,
     faces: usize,
 }
 
@@ -93,7 +96,8 @@ impl<'a> Parts<'a> {
         let (loose, operands) = (HashSet::new(), HashMap::new());
         let (prisms, measured) = (HashMap::new(), HashMap::new());
         let (notes, list) = (Vec::new(), Vec::new());
-        Self { limits, notes, list, pieces, bent, points, loose, operands, hulls, prisms, measured, faces: 0 }
+        let swept = None;
+        Self { limits, notes, list, pieces, bent, points, loose, operands, hulls, prisms, measured, swept, faces: 0 }
     }
 
     /// Adds a part.

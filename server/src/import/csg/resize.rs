@@ -4,10 +4,11 @@ use super::arguments::{Arguments, finite};
 use super::convex;
 use super::meshed::Meshed;
 use super::outlines::{flat_of, paths};
-use super::parts::{PartId, Parts};
+use super::parts::{Part, PartId, Parts};
 use super::syntax::{Call, ValueKind};
 use super::{Place, Problem};
 use crate::math::Aabb;
+use crate::solid::Op;
 use glam::DVec3;
 
 type Result<T> = std::result::Result<T, (Place, Problem)>;
@@ -71,6 +72,20 @@ pub fn scale(call: &Call, flat: bool, bounds: impl FnOnce() -> Result<Option<Bou
     Ok(scale)
 }
 
+/// The box of a solid that nothing has cut, by what it is made of.
+fn whole(parts: &Parts<'_>, root: PartId) -> Option<Aabb> {
+    if let Some(swept) = parts.swept.as_ref().and_then(|all| all.get(&root)) {
+        return Some(swept.bounds());
+    }
+    if let Some(all) = convex::extremes(parts, root) {
+        return Some(all.iter().fold(Aabb::EMPTY, |b, e| b.union(&e.bounds())));
+    }
+    match &parts.list[root] {
+        Part::Op(Op::Union, _, of) => of.iter().try_fold(Aabb::EMPTY, |b, p| Some(b.union(&whole(parts, *p)?))),
+        _ => None,
+    }
+}
+
 /// The box of a part: of the elements of what nothing has cut, else of its mesh or its outline.
 ///
 /// # Errors
@@ -95,8 +110,8 @@ pub fn bounds(parts: &mut Parts<'_>, at: Place, root: PartId, flat: bool) -> Res
             (whole.iter().fold(Aabb::EMPTY, round), 0.0)
         }
     } else {
-        match convex::extremes(parts, root) {
-            Some(all) => (all.iter().fold(Aabb::EMPTY, |b, e| b.union(&e.bounds())), 0.0),
+        match whole(parts, root) {
+            Some(around) => (around, 0.0),
             None => {
                 let mesh = Meshed::of(parts, at, root)?;
                 (mesh.bounds(), mesh.off)

@@ -186,6 +186,86 @@ fn resized_shapes_have_the_sizes_that_are_asked_for() {
 }
 
 #[test]
+fn parts_of_a_turn_are_resized_by_their_own_size_and_not_by_that_of_pieces() {
+    let mut r = Random(61);
+    for round in 0..40 {
+        let [low, high, h] = [r.within(1.0, 5.0), r.within(5.5, 9.0), r.within(1.0, 4.0)];
+        let (start, angle) = ((r.unit() * 400.0).floor() - 200.0, 5.0 + (r.unit() * 340.0).floor());
+        let angle = if round % 8 == 7 { 360.0 } else { angle };
+        // A ring of a rectangle, with a bevel, of a disc, or cut.
+        let (mid, thick) = (0.5 * (low + high), 0.5 * (high - low));
+        let outline = match round % 4 {
+            0 => format!("polygon([[{low}, 0], [{high}, 0], [{high}, {h}], [{low}, {h}]]);"),
+            1 => format!("polygon([[{low}, 0], [{high}, {h}], [{low}, {h}]]);"),
+            2 => moved(DVec3::new(mid, 0.0, 0.0), &format!("circle({thick}, $fn = 100);")),
+            _ => format!(
+                "difference() {{ polygon([[{low}, 0], [{high}, 0], [{high}, {h}], [{low}, {h}]]); {} }}",
+                moved(DVec3::new(mid, 0.5 * h, 0.0), "square(50);")
+            ),
+        };
+        let within = |rho: f64, z: f64| match round % 4 {
+            0 => (rho - low).min(high - rho).min(z).min(h - z),
+            1 => (rho - low).min(h - z).min(z * (high - low) - (rho - low) * h),
+            2 => thick - (rho - mid).hypot(z),
+            _ => (rho - low).min(high - rho).min(z).min(h - z).min((mid - rho).max(0.5 * h - z)),
+        };
+        let text = format!(
+            "resize([10, 20, 30]) {{ multmatrix([[{}, {}, 0, 1], [{}, {}, 0, -2], [0, 0, 1, 0], [0, 0, 0, 1]]) {{ \
+             rotate_extrude(angle = {angle}, $fn = 360) {{ {outline} }} }} }}",
+            start.to_radians().cos(),
+            -start.to_radians().sin(),
+            start.to_radians().sin(),
+            start.to_radians().cos(),
+        );
+        let import = read(&text);
+        // The box: both ends and whole quarters of the turn, at the inner and the outer radius.
+        let mut b = crate::math::Aabb::EMPTY;
+        let quarters = (-16..=32).map(|k| f64::from(k) * 90.0).filter(|q| *q >= start && *q <= start + angle);
+        for phi in [start, start + angle].into_iter().chain(quarters) {
+            let (sin, cos) = phi.to_radians().sin_cos();
+            for rho in [low, high] {
+                b = b.union(&crate::math::Aabb::of_points([DVec3::new(rho * cos, rho * sin, 0.0)]));
+            }
+        }
+        let (bottom, top) = if round % 4 == 2 { (-thick, thick) } else { (0.0, h) };
+        // A disc that turns and is scaled is a polygon of 100 sides.
+        let off = if round % 4 == 2 { 1e-6 + thick * (1.0 - (0.01 * std::f64::consts::PI).cos()) } else { 1e-6 };
+        let scale = DVec3::new(10.0, 20.0, 30.0) / DVec3::new(b.max.x - b.min.x, b.max.y - b.min.y, top - bottom);
+        for _ in 0..4000 {
+            let (rho, phi) = (r.within(0.9 * low, 1.1 * high), (start + r.within(-0.1, 1.1) * angle).to_radians());
+            let z = r.within(bottom - 0.3, top + 0.3);
+            let turned = (phi.to_degrees() - start).rem_euclid(360.0);
+            let sides = if angle == 360.0 { f64::INFINITY } else { turned.min(angle - turned).to_radians() * rho };
+            let inside = within(rho, z).min(sides);
+            let x = DVec3::new(rho * phi.cos() + 1.0, rho * phi.sin() - 2.0, z) * scale;
+            let f = import.solid.value(x);
+            assert!(inside.abs() < off || (inside > 0.0) == (f < 0.0), "{x}: {inside} {f} of {text}");
+        }
+    }
+    // A quarter of a ring of radii 5 and 8, 4 high.
+    let inner = "rotate_extrude(angle = 90, $fn = 360) { polygon([[5, 0], [8, 0], [8, 4], [5, 4]]); }";
+    let quarter = read(&format!("resize([10, 10, 10]) {{ {inner} }}"));
+    let area = std::f64::consts::FRAC_PI_4 * (64.0 - 25.0) * (10.0 / 8.0) * (10.0 / 8.0);
+    assert!((area * 10.0 - 478.602).abs() < 1e-3);
+    for (x, y, inside) in [(9.999, 1e-3, true), (1e-3, 9.999, true), (1e-3, 10.001, false), (10.001, 1e-3, false)] {
+        assert_eq!(quarter.solid.value(DVec3::new(x, y, 9.999)) < 0.0, inside, "{x} {y}");
+    }
+    // Beside another solid, and where something is taken from it: by its own pieces, of which 360 end on the axes.
+    for text in [
+        format!("resize([10, 10, 10]) {{ {inner} cube(1); }}"),
+        format!("resize([10, 10, 10]) {{ difference() {{ {inner} cube([1, 1, 20], center = true); }} }}"),
+        format!(
+            "resize([10, 10, 10]) {{ difference() {{ {inner} {} }} }}",
+            moved(DVec3::new(4.0, 4.0, 1.0), "cube(1);")
+        ),
+    ] {
+        let solid = read(&text).solid;
+        let at = |y: f64| solid.value(DVec3::new(1e-3, y, 9.999)) < 0.0;
+        assert!(at(9.999) && !at(10.001), "{text}");
+    }
+}
+
+#[test]
 fn offsets_by_a_delta_at_which_sides_meet_are_the_moved_half_planes() {
     // Two squares and a bridge between them; a fork whose gap closes.
     let bridge = "polygon([[0, 0], [4, 0], [4, 1.5], [6, 1.5], [6, 0], [10, 0], [10, 4], [6, 4], [6, 2.5], [4, 2.5], [4, 4], [0, 4]]);";
