@@ -191,6 +191,28 @@ fn what_was_planted_is_found_and_nothing_else() {
     assert!(all > 3, "{all}");
 }
 
+/// A plane that rounding has put below the one before makes no cut that nothing can be proven beside.
+#[test]
+fn a_step_back_by_rounding_hides_no_proof() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("g.gdml");
+    for (kind, more) in [("polycone", ""), ("polyhedra", "numsides=\"5\"")] {
+        for z in ["-32.8", "-32.80000000000001", "-32.79999999999999"] {
+            let text = format!(
+                "<gdml><define/><materials/><solids><{kind} name=\"s\" startphi=\"93\" deltaphi=\"100\" aunit=\"deg\" {more}>\
+                 <zplane rmin=\"58.76\" rmax=\"85.9\" z=\"-63.9\"/><zplane rmin=\"22.2\" rmax=\"42.2\" z=\"-32.8\"/>\
+                 <zplane rmin=\"50\" rmax=\"59.97\" z=\"{z}\"/><zplane rmin=\"40.1\" rmax=\"56.6\" z=\"98.2\"/></{kind}>\
+                 <box name=\"w\" x=\"5000\" y=\"5000\" z=\"5000\"/></solids><structure>\
+                 <volume name=\"A\"><solidref ref=\"s\"/></volume><volume name=\"W\"><solidref ref=\"w\"/><physvol name=\"pA\">\
+                 <volumeref ref=\"A\"/><rotation name=\"r\" x=\"30\" y=\"20\" z=\"10\" unit=\"deg\"/></physvol></volume></structure></gdml>"
+            );
+            std::fs::write(&path, text).expect("written");
+            let found = overlaps_of(&path, 1e-6);
+            assert!(found.pairs.is_empty() && found.separate[1] == 1, "{kind}, {z}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn what_is_wrong_is_one_sentence_with_its_place() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -6,6 +6,8 @@
 
 mod expression;
 mod solids;
+#[cfg(test)]
+mod tests;
 mod text;
 
 use super::problem::Problem;

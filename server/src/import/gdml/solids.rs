@@ -14,6 +14,8 @@ use std::f64::consts::TAU;
 
 /// Solids within solids.
 const DEEPEST: usize = 200;
+/// Two planes that are no farther apart, in sizes, are one: what files calculate of the same height differs so.
+const SAME_PLANE: f64 = 1e-12;
 /// Bytes of one solid's text.
 const LONGEST: usize = 16 << 20;
 
@@ -330,6 +332,15 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
     if read.kind().starts_with("generic") {
         let points = read.all("rzpoint");
         let outline = points.iter().map(|p| Ok(DVec2::new(p.rest("r")?, p.len("z")?))).collect::<Result<Vec<_>>>()?;
+        let (radii, heights): (Vec<f64>, Vec<f64>) = outline.iter().map(|p| (p.x, p.y)).unzip();
+        let mut outline: Vec<DVec2> =
+            radii.iter().zip(level(heights, &radii)).map(|(r, z)| DVec2::new(*r, z)).collect();
+        // Its last corner stands beside the first.
+        if let [first, .., last] = &mut outline[..]
+            && level(vec![first.y, last.y], &radii)[1] == first.y
+        {
+            last.y = first.y;
+        }
         if outline.len() < 3 {
             return Err(xml::wrong(read.node, "three rzpoints at least", Some(&outline.len().to_string())));
         }
@@ -342,9 +353,11 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
     if planes.len() < 2 {
         return Err(xml::wrong(read.node, "two planes at least", Some(&planes.len().to_string())));
     }
-    let side =
-        |key: &str| planes.iter().map(|p| Ok(DVec2::new(p.len_or(key, 0.0)?, p.len("z")?))).collect::<Result<Vec<_>>>();
-    let (outer, inner) = (side("rmax")?, side("rmin")?);
+    let radii = |key: &str| planes.iter().map(|p| p.len_or(key, 0.0)).collect::<Result<Vec<_>>>();
+    let (outer, inner) = (radii("rmax")?, radii("rmin")?);
+    let heights = level(planes.iter().map(|p| p.len("z")).collect::<Result<_>>()?, &outer);
+    let [outer, inner]: [Vec<DVec2>; 2] =
+        [outer, inner].map(|radii| radii.into_iter().zip(&heights).map(|(r, z)| DVec2::new(r, *z)).collect());
     if read.kind() == "polycone" {
         let outline: Vec<DVec2> = outer.iter().chain(inner.iter().rev()).copied().collect();
         return Ok(turned(&outline, from, turn));
@@ -356,6 +369,18 @@ fn revolved(read: &Read<'_, '_, '_>) -> Result<String> {
         // What is taken away goes on beyond the ends of the other.
         false => minus(&whole, &rings(&beyond(&inner), sides, (from, turn))),
     })
+}
+
+/// Planes' heights, those that differ by rounding from the one before as that: a step back by rounding would be a cut into the solid,
+/// thinner than any tolerance, and what lies beside it could not be told.
+fn level(mut heights: Vec<f64>, radii: &[f64]) -> Vec<f64> {
+    let size = heights.iter().chain(radii).fold(0.0, |m: f64, x| m.max(x.abs()));
+    for k in 1..heights.len() {
+        if (heights[k] - heights[k - 1]).abs() <= SAME_PLANE * size {
+            heights[k] = heights[k - 1];
+        }
+    }
+    heights
 }
 
 /// How many sides a polyhedra has over its turn.
@@ -554,6 +579,9 @@ fn extruded(read: &Read<'_, '_, '_>) -> Result<String> {
         ));
     }
     sections.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let reach: Vec<f64> = outline.iter().map(|p| p.length()).collect();
+    let heights = level(sections.iter().map(|s| s.1).collect(), &reach);
+    sections.iter_mut().zip(heights).for_each(|(s, z)| s.1 = z);
     if outline.len() < 3 || sections.len() < 2 {
         return Err(xml::wrong(read.node, "three corners and two sections at least", None));
     }
