@@ -190,16 +190,17 @@ impl Set {
         let ids: Vec<u32> = characters.iter().map(|c| font.glyph(*c)).collect();
         let mut unknown: String = characters.iter().zip(&ids).filter(|(_, id)| **id == 0).map(|(c, _)| *c).collect();
         unknown.truncate(unknown.char_indices().nth(20).map_or(unknown.len(), |(i, _)| i));
-        let (ascent, descent) = font.extent();
-        let [ascent, descent] = [ascent, descent].map(|y| y * STEP);
         let (mut pen, mut off, mut wide) = (DVec2::ZERO, 0.0_f64, 0.0_f64);
         let (mut above, mut below) = (0.0_f64, 0.0_f64);
         let mut placed = Vec::with_capacity(ids.len());
         for (i, &id) in ids.iter().enumerate() {
             let glyph = font.outline(id, setting.pieces);
             let advance = font.advance(id) * STEP;
-            // In a column glyphs hang below their origin, about its middle.
-            let hung = if level { DVec2::ZERO } else { DVec2::new(-0.5 * advance, -ascent) };
+            // In a column glyphs hang below their origin, about its middle, each by its own height.
+            let high = if glyph.low.is_finite() { glyph.high.y - glyph.low.y } else { 0.0 };
+            let (down, top) = font.column(id, high);
+            let up = if glyph.low.is_finite() { glyph.high.y } else { 0.0 };
+            let hung = if level { DVec2::ZERO } else { DVec2::new(-0.5 * advance, -(up + top) * STEP) };
             if glyph.low.is_finite() {
                 (above, below) = (above.max(glyph.high.y * STEP), below.max(-glyph.low.y * STEP));
                 wide = wide.max((glyph.high.x - glyph.low.x) * STEP);
@@ -211,7 +212,7 @@ impl Set {
                     let kerning = ids.get(i + 1).map_or(0.0, |next| font.kerning(id, *next) * STEP);
                     DVec2::new(advance + kerning, 0.0)
                 } else {
-                    DVec2::new(0.0, descent - ascent)
+                    DVec2::new(0.0, -down * STEP)
                 };
         }
         let origin = setting.origin(pen, wide, (above, below));
@@ -313,6 +314,53 @@ mod tests {
         assert!(size("ttb")[1] > 3.0 * size("ltr")[1] && size("ttb")[0] < 0.5 * size("ltr")[0]);
         assert_eq!(size("ttb"), size("btt"));
         assert_eq!(size("rtl"), size("ltr"));
+    }
+
+    #[test]
+    fn glyphs_of_a_column_hang_where_openscad_hangs_them() {
+        // Bounds of what OpenSCAD 2021.01 makes of these in the same fonts, $fn = 100.
+        for (font, text, way, [across, along], [size, spacing], all) in [
+            ("Hack", "A.", "ttb", ["default", "default"], [10.0, 1.0], [-3.832, -21.4685, 4.02798, -1.59715]),
+            ("Hack", "A.", "ttb", ["default", "default"], [5.0, 1.3], [-1.916, -12.7688, 2.01399, -0.798569]),
+            ("Hack", "A.", "btt", ["default", "default"], [10.0, 1.0], [-3.832, -25.2856, 4.02798, -5.61296]),
+            ("Hack", "A.", "btt", ["default", "default"], [5.0, 1.3], [-1.916, -14.6773, 2.01399, -2.80647]),
+            ("Hack", ".", "ttb", ["default", "default"], [10.0, 1.0], [-1.0244, -7.90517, 1.17288, -5.61296]),
+            ("Hack", "Agjy8@%-", "ttb", ["default", "default"], [10.0, 1.0], [-3.8998, -102.186, 4.05508, -1.59715]),
+            ("Hack", "Agjy8@%-", "ttb", ["default", "default"], [5.0, 1.3], [-1.94989, -65.3345, 2.02754, -0.798569]),
+            ("Hack", "Agjy8@%-", "btt", ["default", "default"], [10.0, 1.0], [-3.8998, -106.666, 4.05508, -6.13011]),
+            ("Hack", "Agjy8@%-", "btt", ["default", "default"], [5.0, 1.3], [-1.94989, -67.5745, 2.02754, -3.06505]),
+            ("Hack", "_", "ttb", ["default", "default"], [10.0, 1.0], [-3.4454, -7.22827, 3.63469, -6.41447]),
+            ("Hack", " W", "ttb", ["default", "default"], [5.0, 1.3], [-2.04144, -14.6773, 2.13943, -9.61478]),
+            ("Hack", " W", "btt", ["default", "default"], [5.0, 1.3], [-2.04144, -5.86113, 2.13943, -0.798569]),
+            ("Hack", "i l", "ttb", ["default", "default"], [10.0, 1.0], [-2.8622, -39.0888, 3.32268, -1.35541]),
+            ("Hack", "Ag.", "ttb", ["left", "bottom"], [10.0, 1.3], [-3.832, -43.17, 4.02798, -1.59715]),
+            ("Hack", "Ag.", "ttb", ["center", "center"], [10.0, 1.3], [-7.67262, -16.7214, 0.187363, 24.8514]),
+            ("Hack", "Ag.", "btt", ["right", "top"], [10.0, 1.3], [-11.5133, 5.91013, -3.65326, 47.2842]),
+            ("", "A.", "ttb", ["default", "default"], [10.0, 1.0], [-4.20816, -20.2947, 4.41623, -1.59248]),
+            ("", "A.", "ttb", ["default", "default"], [5.0, 1.3], [-2.10408, -12.1025, 2.20811, -0.796234]),
+            ("", "A.", "btt", ["default", "default"], [10.0, 1.0], [-4.20816, -24.2513, 4.41623, -5.73265]),
+            ("", "A.", "btt", ["default", "default"], [5.0, 1.3], [-2.10408, -14.0808, 2.20811, -2.86632]),
+            ("", ".", "ttb", ["default", "default"], [10.0, 1.0], [-0.723862, -7.26035, 0.803833, -5.73265]),
+            ("", "Agjy8@%-", "ttb", ["default", "default"], [10.0, 1.0], [-5.37489, -98.1013, 5.67999, -1.59248]),
+            ("", "Agjy8@%-", "ttb", ["default", "default"], [5.0, 1.3], [-2.68744, -62.7367, 2.84, -0.796234]),
+            ("", "Agjy8@%-", "btt", ["default", "default"], [10.0, 1.0], [-5.37489, -102.458, 5.67999, -5.98575]),
+            ("", "Agjy8@%-", "btt", ["default", "default"], [5.0, 1.3], [-2.68744, -64.9148, 2.84, -2.99287]),
+            ("", "_", "ttb", ["default", "default"], [10.0, 1.0], [-3.39244, -6.95026, 3.55154, -6.17255]),
+            ("", " W", "ttb", ["default", "default"], [5.0, 1.3], [-2.87294, -14.0808, 3.02249, -9.26859]),
+            ("", " W", "btt", ["default", "default"], [5.0, 1.3], [-2.87294, -5.60844, 3.02249, -0.796234]),
+            ("", "i l", "ttb", ["default", "default"], [10.0, 1.0], [-0.635025, -37.9125, 1.40939, -1.37941]),
+            ("", "Ag.", "ttb", ["left", "bottom"], [10.0, 1.3], [-4.20816, -41.1497, 4.41623, -1.59248]),
+            ("", "Ag.", "ttb", ["center", "center"], [10.0, 1.3], [-8.42378, -15.7327, 0.200592, 23.8245]),
+            ("", "Ag.", "btt", ["right", "top"], [10.0, 1.3], [-12.6394, 5.72778, -4.01501, 45.1014]),
+        ] {
+            let arguments = format!(
+                "{text:?}, size = {size}, spacing = {spacing}, font = {font:?}, direction = {way:?}, halign = {across:?}, \
+                 valign = {along:?}, $fn = 100"
+            );
+            let import = read(&arguments);
+            let off = bounds(&import).iter().zip(all).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-3 * size, "{arguments}: {:?} instead of {all:?}", bounds(&import));
+        }
     }
 
     #[test]

@@ -92,6 +92,22 @@ impl<'a> Font<'a> {
         }
     }
 
+    /// Of a glyph so high (in em) in a column: how far below it the next one stands, and how far below its place its own top is. Where the
+    /// font has no metrics of columns they are FreeType's: the glyph is in the middle of what ascender and descender span, in whole
+    /// units, a half unit off the middle where that is uneven.
+    pub fn column(&self, glyph: u32, high: f64) -> (f64, f64) {
+        if let Ok(table) = self.font.vmtx()
+            && let (Some(advance), Some(top)) =
+                (table.advance(GlyphId::new(glyph)), table.side_bearing(GlyphId::new(glyph)))
+        {
+            return (f64::from(advance) / self.units, f64::from(top) / self.units);
+        }
+        let (ascent, descent) = self.extent();
+        let advance = ((ascent - descent) * self.units).round();
+        let top = (0.5 * (advance - (high * self.units).round())).trunc();
+        (advance / self.units, top / self.units)
+    }
+
     /// The lookups of pairs of `GPOS` for Latin text; `None` where it has none.
     fn pairs(&self) -> Option<Vec<u16>> {
         let gpos = self.font.gpos().ok()?;
