@@ -418,10 +418,7 @@ const MOST_LOSSES: usize = 3;
 /// The models of a scene, with a word on standard error where the cache is in trouble, and of what is left out.
 fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Result<Vec<Prepared>, Box<dyn Error>> {
     let prepared = prepare_parts(scene, facets, cache)?;
-    for (source, _) in scene.models.iter().zip(&prepared).filter(|(_, p)| p.model.solid.is_empty()) {
-        let at = if scene.file.is_empty() { String::new() } else { format!("{}:{}: ", scene.file, source.at) };
-        warn(&format!("{at}the model \"{}\" is empty: nothing can touch it", source.name));
-    }
+    tell_empty(scene, &prepared);
     // Of texts alone `check` tells every note.
     for (source, p) in scene.models.iter().zip(&prepared).filter(|_| !scene.file.is_empty()) {
         let lost: Vec<Note> = p.notes.iter().filter(|n| n.is_loss()).cloned().collect();
@@ -433,6 +430,14 @@ fn prepare_scene(scene: &Scene, facets: Facets, cache: &CacheArguments) -> Resul
         }
     }
     Ok(prepared)
+}
+
+/// A word on standard error about models without a point.
+fn tell_empty(scene: &Scene, prepared: &[Prepared]) {
+    for (source, _) in scene.models.iter().zip(prepared).filter(|(_, p)| p.model.solid.is_empty()) {
+        let at = if scene.file.is_empty() { String::new() } else { format!("{}:{}: ", scene.file, source.at) };
+        warn(&format!("{at}the model \"{}\" is empty: nothing can touch it", source.name));
+    }
 }
 
 /// The same of models that may well be empty.

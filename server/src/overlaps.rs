@@ -14,6 +14,8 @@ mod cells;
 
 pub use cells::{Suspect, decide, of_cells, scene_of_cells, scene_of_uses};
 
+use crate::contact::margin;
+use crate::contact::within::Within;
 use crate::contact::{
     Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
 };
@@ -86,6 +88,23 @@ pub struct Found {
     pub separate: [u64; 3],
     /// How many a scene's rules leave out: none of them is asked of.
     pub left_out: u64,
+    /// What has facets in place of its surface.
+    pub faceted: Vec<Faceted>,
+}
+
+/// A solid of which facets are asked in place of its surface; what is proven of its volume is proven of both.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Faceted {
+    /// The volume that has it.
+    pub volume: String,
+    /// Its kind.
+    pub kind: String,
+    /// Its name.
+    pub solid: String,
+    /// How many there are.
+    pub facets: u64,
+    /// How far they are off at most, a length.
+    pub deviation: f64,
 }
 
 /// Something that stands.
@@ -94,6 +113,8 @@ struct Standing<'a> {
     model: &'a Model,
     pose: Pose,
     around: Aabb,
+    /// How far its surface may be off that of what is meant, a length: it has facets.
+    off: f64,
 }
 
 impl<'a> Standing<'a> {
@@ -104,7 +125,12 @@ impl<'a> Standing<'a> {
         } else {
             own
         };
-        Self { name, model, pose, around }
+        Self { name, model, pose, around, off: 0.0 }
+    }
+
+    /// The same where its surface may be off.
+    fn within(self, off: f64) -> Self {
+        Self { around: self.around.grown(off), off, ..self }
     }
 }
 
@@ -181,11 +207,14 @@ pub fn of_volumes(
     // What is in an assembly is asked of where that is placed; in one that is nowhere, here.
     let is_asked = |v: &crate::import::gdml::Volume| !v.text.is_empty() || !v.is_placed;
     for (i, volume) in volumes.volumes.iter().enumerate().filter(|(_, v)| is_asked(v)) {
-        let standing: Vec<Standing<'_>> =
-            volume.daughters.iter().map(|d| Standing::new(d.name.clone(), &models[d.volume], d.pose)).collect();
+        let standing: Vec<Standing<'_>> = volume
+            .daughters
+            .iter()
+            .map(|d| Standing::new(d.name.clone(), &models[d.volume], d.pose).within(volumes.volumes[d.volume].off))
+            .collect();
         siblings(&volume.name, &standing, tolerance, |_, _| true, &mut found);
         let Some(outside) = of.iter().position(|o| *o == i) else { continue };
-        let outside = Standing::new(String::new(), &outsides[outside], Pose::IDENTITY);
+        let outside = Standing::new(String::new(), &outsides[outside], Pose::IDENTITY).within(volume.off);
         let verdicts: Vec<Verdict> =
             standing.par_iter().map_init(Scratch::default, |s, d| ask([d, &outside], tolerance, s)).collect();
         for (d, verdict) in standing.iter().zip(verdicts) {
@@ -256,13 +285,23 @@ fn ask(pair: [&Standing<'_>; 2], tolerance: Option<f64>, scratch: &mut Scratch) 
         query_options: QueryOptions::DEPTH,
     };
     let outcome = earliest_contact(&query, scratch);
-    verdict(pair, &outcome, 2.0 * resolution)
+    let off = pair[0].off.max(pair[1].off);
+    match verdict(pair, &outcome, 2.0 * resolution) {
+        found if off == 0.0 => found,
+        // What is meant lies within {f <= off} of what is searched, f being at most the distance: where these are apart, so is that.
+        Verdict::Separate(bound) => match margin::touching(&query, 2.0 * off, scratch).0 {
+            Within::Apart => Verdict::Separate(0.0),
+            Within::Witness(_) | Within::Open => Verdict::NotProven(Some(bound + off)),
+        },
+        Verdict::NotProven(bound) => Verdict::NotProven(bound.map(|bound| bound + off)),
+        overlap @ Verdict::Overlap(..) => overlap,
+    }
 }
 
 fn verdict(pair: [&Standing<'_>; 2], outcome: &Outcome, tolerance: f64) -> Verdict {
     // f is at most the distance from the surface: a ball of that radius around the point is in both.
     let deep = |x: DVec3| {
-        pair.map(|s| -s.model.solid.value(s.pose.inverse().point(x))).into_iter().fold(f64::INFINITY, f64::min)
+        pair.map(|s| -s.model.solid.value(s.pose.inverse().point(x)) - s.off).into_iter().fold(f64::INFINITY, f64::min)
     };
     let points = outcome.penetration().map(|p| p.point).into_iter().chain(outcome.point().map(|p| p.point));
     let deepest = points.map(|x| (x, deep(x))).max_by(|a, b| a.1.total_cmp(&b.1));

@@ -1,15 +1,24 @@
 //! `contactd overlaps`: what is in each other of a GDML or OpenMC geometry or a scene.
 
 use super::joints::{JointArguments, without_touching};
-use super::{AccessArguments, CacheArguments, Done, models_of, prepare_parts, prepare_scene, print, scene_of, warn};
-use crate::import::{Facets, Limits, Scene, gdml, openmc, read_bytes};
+use super::{
+    AccessArguments, CacheArguments, Done, models_of, prepare_parts, prepare_scene, print, scene_of, tell_empty, warn,
+};
+use crate::cache::Prepared;
+use crate::import::{Facets, Limits, Note, Scene, gdml, openmc, read_bytes};
 use crate::octree::Model;
-use crate::overlaps::{self, Beside, Found, Pair, Verdict};
+use crate::overlaps::{self, Beside, Faceted, Found, Pair, Verdict};
 use crate::terminal::{clean, number, sentence};
 use serde_json::{Value, json};
+use std::collections::HashSet;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Lines about what a geometry has lost.
+const MOST_LOSSES: usize = 10;
+/// Lines about solids in facets.
+const MOST_FACETED: usize = 10;
 
 #[derive(clap::Args)]
 pub(super) struct OverlapsArguments {
@@ -40,13 +49,7 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
     let (found, unit) = match arguments.files.as_slice() {
         [file] if is_gdml(file) => {
             arguments.joints.none(file)?;
-            let volumes = gdml::read_gdml(file)?;
-            volumes.notes.iter().for_each(|n| warn(&format!("{}:{}", file.display(), clean(&n.to_string()))));
-            let prepared = prepare_scene(&overlaps::scene_of(file, &volumes), Facets::Auto, &arguments.cache)?;
-            let models = overlaps::spread(&volumes, &models_of(&prepared));
-            let (outside, of) = overlaps::around(file, &volumes, &models);
-            let outsides = models_of(&prepare_scene(&outside, Facets::Auto, &arguments.cache)?);
-            (overlaps::of_volumes(&volumes, &models, (&outsides, &of), arguments.tolerance), "mm".to_owned())
+            (of_gdml(file, arguments)?, "mm".to_owned())
         }
         [file] if is_openmc(file) => {
             arguments.joints.none(file)?;
@@ -69,6 +72,51 @@ pub(super) fn overlaps(arguments: &OverlapsArguments) -> Result<Done, Box<dyn Er
         [0, _] => Done::Undecided,
         _ => Done::Clashes,
     })
+}
+
+fn of_gdml(file: &Path, arguments: &OverlapsArguments) -> Result<Found, Box<dyn Error>> {
+    let mut volumes = gdml::read_gdml(file)?;
+    let tell = |n: &Note| warn(&format!("{}:{}", file.display(), clean(&n.to_string())));
+    volumes.notes.iter().for_each(tell);
+    let scene = overlaps::scene_of(file, &volumes);
+    let prepared = prepare_parts(&scene, Facets::Auto, &arguments.cache)?;
+    tell_empty(&scene, &prepared);
+    volumes.deviate(prepared.iter().map(|p| p.notes.as_slice()));
+    let faceted = of_solids(file, &scene, &prepared, tell);
+    let models = overlaps::spread(&volumes, &models_of(&prepared));
+    let (outside, of) = overlaps::around(file, &volumes, &models);
+    // What is told of these has been told of the volumes.
+    let outsides = models_of(&prepare_parts(&outside, Facets::Auto, &arguments.cache)?);
+    let found = overlaps::of_volumes(&volumes, &models, (&outsides, &of), arguments.tolerance);
+    Ok(Found { faceted, ..found })
+}
+
+/// Tells what the volumes of a GDML file have lost, of its solids by name; those in facets are handed on.
+fn of_solids(file: &Path, scene: &Scene, prepared: &[Prepared], tell: impl Fn(&Note)) -> Vec<Faceted> {
+    let all = || scene.models.iter().zip(prepared).flat_map(|(source, p)| p.notes.iter().map(|n| (&source.name, n)));
+    let told = || all().filter(|(_, n)| n.is_loss() || n.facets().is_some());
+    // The file is read again where there is something to tell.
+    let origins = told().next().map(|_| gdml::Origins::read(file));
+    let (mut faceted, mut lines) = (Vec::new(), HashSet::new());
+    for (volume, note) in told() {
+        let found = origins.as_ref().and_then(|o| o.told(volume, note));
+        let (note, [kind, solid]) = found.unwrap_or_else(|| (note.clone(), ["solid", volume]));
+        match note.facets() {
+            Some((facets, deviation)) => {
+                let (volume, kind, solid) = (volume.clone(), kind.to_owned(), solid.to_owned());
+                let one = Faceted { volume, kind, solid, facets, deviation };
+                if !faceted.contains(&one) {
+                    faceted.push(one);
+                }
+            }
+            None if lines.insert(note.to_string()) && lines.len() <= MOST_LOSSES => tell(&note),
+            None => {}
+        }
+    }
+    if lines.len() > MOST_LOSSES {
+        warn(&format!("{}: {} more like these", file.display(), lines.len() - MOST_LOSSES));
+    }
+    faceted
 }
 
 /// Is it an OpenMC geometry? Robots' files (MJCF) end in the same way.
@@ -104,6 +152,18 @@ fn text(found: &Found, unit: &str) -> String {
         many(overlaps, "overlap"),
         by_boxes + searched + by_surfaces
     );
+    for one in found.faceted.iter().take(MOST_FACETED) {
+        let [kind, solid, volume] = [&one.kind, &one.solid, &one.volume].map(|name| clean(name));
+        let what = format!(
+            "the {kind} {solid} of {volume} is taken in {} facets, at most {} {unit} off: all here allows for that",
+            one.facets,
+            number(one.deviation, 0.0, 3)
+        );
+        out.push_str(&sentence("  ", &what));
+    }
+    if found.faceted.len() > MOST_FACETED {
+        out.push_str(&sentence("  ", &format!("{} more are taken in facets", found.faceted.len() - MOST_FACETED)));
+    }
     for pair in &found.pairs {
         let (a, mother) = (clean(&pair.a), clean(&pair.within));
         let two = match &pair.b {
@@ -143,11 +203,16 @@ fn as_json(found: &Found) -> String {
         };
         json!({ "kind": kind, "within": p.within, "a": p.a, "b": other, "status": status, "point": point, "depth": depth })
     };
+    let faceted = |f: &Faceted| -> Value {
+        json!({ "volume": f.volume, "kind": f.kind, "solid": f.solid, "facets": f.facets, "deviation": f.deviation })
+    };
     let [overlaps, open] = found.counts();
     json!({
         "overlaps": overlaps, "not_proven": open, "separate": found.separate.iter().sum::<u64>(),
         "separate_by_boxes": found.separate[0], "separate_by_surfaces": found.separate[2],
-        "left_out": found.left_out, "pairs": found.pairs.iter().map(pair).collect::<Vec<_>>(),
+        "left_out": found.left_out,
+        "faceted": found.faceted.iter().map(faceted).collect::<Vec<_>>(),
+        "pairs": found.pairs.iter().map(pair).collect::<Vec<_>>(),
     })
     .to_string()
         + "\n"

@@ -89,7 +89,19 @@ pub struct Note {
     pub amount: Option<f64>,
 }
 
+/// What stands in notes of facets before their number, and before how far off they are.
+const FACETED: &str = ": faceted, ";
+/// See `FACETED`.
+const DEVIATION: &str = " facets, max deviation ";
+
 impl Note {
+    /// Of a shape that is taken in facets: how many, and how far off they are at most, a length.
+    pub fn facets(&self) -> Option<(u64, f64)> {
+        let (_, rest) = self.text.rsplit_once(FACETED)?;
+        let (count, off) = rest.split_once(DEVIATION)?;
+        Some((count.parse().ok()?, off.parse().ok()?))
+    }
+
     /// True where something that a file names is not in its solid, but for what the file itself takes out by a modifier.
     pub fn is_loss(&self) -> bool {
         self.text.contains("left out") && ![" after %:", " after *:"].iter().any(|taken| self.text.contains(taken))

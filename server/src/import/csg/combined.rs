@@ -320,7 +320,7 @@ pub fn revolve(
         }
         let paths: Vec<Vec<DVec2>> =
             flat.paths().iter().map(|p| p.iter().map(|p| DVec2::new(p.x * side, p.y)).collect()).collect();
-        outlines::note_facets(parts, at, &[leaf], "rotate_extrude");
+        outlines::note_stretched_facets(parts, at, &[leaf], "rotate_extrude", place::stretch(outer.matrix3));
         parts.affordable(at, paths.iter().map(Vec::len).sum::<usize>() + 2)?;
         let region = Region::of_paths(&paths);
         if region.open {

@@ -58,10 +58,15 @@ pub fn flat_of<'p>(parts: &'p Parts<'_>, id: PartId) -> Option<&'p Flat> {
 
 /// Tells that round shapes are taken as polygons, by whom; nothing where none is round.
 pub fn note_facets(parts: &mut Parts<'_>, at: Place, leaves: &[PartId], who: &str) {
+    note_stretched_facets(parts, at, leaves, who, 1.0);
+}
+
+/// The same of what is then made longer, `stretch` times at most.
+pub fn note_stretched_facets(parts: &mut Parts<'_>, at: Place, leaves: &[PartId], who: &str, stretch: f64) {
     let round = leaves.iter().filter_map(|l| flat_of(parts, *l)).filter(|f| matches!(f.outline, Outline::Circle(_)));
     let (count, sides, off) = round.fold((0, 0, 0.0_f64), |(n, s, d), f| (n + 1, s + f.pieces, d.max(f.deviation())));
     if count > 0 {
-        parts.faceted(at, &format!("{count} circle(s) of {who}"), sides as usize, off);
+        parts.faceted(at, &format!("{count} circle(s) of {who}"), sides as usize, off * stretch);
     }
 }
 

@@ -6,7 +6,7 @@ use super::place::PlacedShape;
 use super::polygon::Formula;
 use super::swept::Swept;
 use super::{Limits, Place, Problem};
-use crate::import::Note;
+use crate::import::{DEVIATION, FACETED, Note};
 use crate::solid::{Label, Measured, NodeId, Op, Shape, Solid, SolidBuilder};
 use contactd_proto::Pose;
 use glam::DVec3;
@@ -84,6 +84,13 @@ pub struct Parts<'a> {
     faces: usize,
 }
 
+/// A length as two digits tell it, rounded up: what is told is a bound.
+fn told_up(off: f64) -> f64 {
+    let unit = 10f64.powf(off.log10().floor() - 1.0);
+    let up = (off / unit).ceil() * unit;
+    if up.is_finite() { up } else { off }
+}
+
 /// True for a primitive that is meant to reach to infinity.
 pub fn is_unbounded(shape: &Shape) -> bool {
     !shape.geometry().ball().radius.is_finite()
@@ -113,7 +120,7 @@ impl<'a> Parts<'a> {
 
     /// Tells that something has no exact form and is taken in OpenSCAD's pieces: how many, and how far they lie off at most.
     pub fn faceted(&mut self, at: Place, what: &str, facets: usize, off: f64) {
-        self.note(at, format!("{what}: faceted, {facets} facets, max deviation {off:.1e}"), None);
+        self.note(at, format!("{what}{FACETED}{facets}{DEVIATION}{:.1e}", told_up(off)), None);
     }
 
     /// The most pieces that a round primitive below a part is cut into.

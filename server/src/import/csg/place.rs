@@ -289,6 +289,12 @@ pub fn half_space_at(a: &DAffine3, n: DVec3, point: DVec3) -> PlacedShape {
     PlacedShape::new(HalfSpace, Pose::new(a.transform_point3(point), DQuat::from_rotation_arc(DVec3::Z, normal)))
 }
 
+/// How many times longer `m` makes a vector, at most: by sums of rows of m·mᵀ and of mᵀ·m, exact where axes stay square to each other.
+pub fn stretch(m: DMat3) -> f64 {
+    let bound = |s: DMat3| (0..3).map(|k| s.row(k).abs().element_sum()).fold(0.0, f64::max).sqrt();
+    bound(m * m.transpose()).min(bound(m.transpose() * m))
+}
+
 /// Why a curved primitive cannot follow `m`.
 fn refusal(m: DMat3, kind: &str) -> Problem {
     Problem::unsupported(format!("{} on a {kind}", bending(m)))

@@ -5,6 +5,7 @@
 //! Geant4 has it: what is placed is turned the other way; in solids that are made of others it is turned as told.
 
 mod expression;
+mod origins;
 mod solids;
 #[cfg(test)]
 mod tests;
@@ -16,7 +17,10 @@ use super::{Limits, Note, Place, read_bytes, xml};
 use contactd_proto::Pose;
 use expression::Names;
 use glam::{DMat3, DQuat, DVec3};
+use origins::Marks;
+pub use origins::Origins;
 use roxmltree::Node;
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -38,6 +42,8 @@ pub struct Volume {
     pub daughters: Vec<Daughter>,
     /// It is placed somewhere.
     pub is_placed: bool,
+    /// How far its surface may be off where a part of it is taken in facets, a length: what `Volumes::deviate` has been told.
+    pub off: f64,
 }
 
 /// A volume that is placed in another one.
@@ -69,6 +75,8 @@ struct Geometry<'a, 'i> {
     rotations: HashMap<&'a str, DVec3>,
     scales: HashMap<&'a str, DVec3>,
     solids: HashMap<&'a str, Node<'a, 'i>>,
+    /// Where it is asked which solid a part of a text stands for.
+    origins: Option<RefCell<Marks>>,
 }
 
 /// Reads a GDML file.
@@ -82,6 +90,11 @@ pub fn read_gdml(path: &Path) -> std::result::Result<Volumes, SceneError> {
 }
 
 fn read(bytes: &[u8]) -> Result<Volumes> {
+    Ok(read_with(bytes, None)?.0)
+}
+
+/// The volumes, their texts marked where that is asked for.
+fn read_with(bytes: &[u8], marks: Option<Marks>) -> Result<(Volumes, Option<Marks>)> {
     let document = xml::parse(bytes)?;
     let root = document.root_element();
     if root.tag_name().name() != "gdml" {
@@ -94,6 +107,7 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
         rotations: HashMap::new(),
         scales: HashMap::new(),
         solids: HashMap::new(),
+        origins: marks.map(RefCell::new),
     };
     for define in xml::inside(root, "define") {
         geometry.define(define)?;
@@ -143,7 +157,7 @@ fn read(bytes: &[u8]) -> Result<Volumes> {
         let found = index.get(name).copied();
         out.keep(found.ok_or_else(|| xml::wrong(world, "the name of a volume", Some(name)))?);
     }
-    Ok(out)
+    Ok((out, geometry.origins.map(RefCell::into_inner)))
 }
 
 /// The setup that counts: the one called Default, as Geant4 takes it, else the first one.
@@ -170,6 +184,14 @@ fn only(node: Node<'_, '_>, known: &[&str]) -> Result<()> {
 }
 
 impl Volumes {
+    /// Takes in what the imports of its texts have noted of facets, of all volumes that have a solid in order.
+    pub fn deviate<'n>(&mut self, notes: impl Iterator<Item = &'n [Note]>) {
+        let solid = self.volumes.iter_mut().filter(|v| !v.text.is_empty());
+        for (volume, notes) in solid.zip(notes) {
+            volume.off = notes.iter().filter_map(Note::facets).fold(0.0, |most, (_, off)| most.max(off));
+        }
+    }
+
     fn note(&mut self, at: Place, text: String) {
         self.notes.push(Note { at, text, amount: None });
     }
@@ -389,7 +411,7 @@ impl<'a, 'i> Geometry<'a, 'i> {
                 other => return Err(xml::wrong(child, "placements and the solid of a volume", Some(other))),
             }
         }
-        Ok(Volume { name, at: xml::place(node), text, daughters, is_placed: false })
+        Ok(Volume { name, at: xml::place(node), text, daughters, is_placed: false, off: 0.0 })
     }
 
     /// Copies along an axis, side by side.
