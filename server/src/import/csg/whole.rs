@@ -211,7 +211,7 @@ fn parts_of_a_turn_are_resized_by_their_own_size_and_not_by_that_of_pieces() {
         };
         let text = format!(
             "resize([10, 20, 30]) {{ multmatrix([[{}, {}, 0, 1], [{}, {}, 0, -2], [0, 0, 1, 0], [0, 0, 0, 1]]) {{ \
-             rotate_extrude(angle = {angle}, $fn = 360) {{ {outline} }} }} }}",
+             rotate_extrude(angle = {angle}, $fn = 50) {{ {outline} }} }} }}",
             start.to_radians().cos(),
             -start.to_radians().sin(),
             start.to_radians().sin(),
