@@ -43,7 +43,7 @@ impl Body {
     /// A primitive, exact: no facets.
     ///
     /// # Panics
-    /// A frustum, a polyhedron or a half-space: no benchmark has one.
+    /// A frustum, a half-space or what parry does not know: no benchmark has one.
     pub fn of(shape: &Shape, place: &contactd_proto::Pose) -> Self {
         // y to z.
         let upright = Pose::from_rotation(Rot3::from_rotation_x(std::f64::consts::FRAC_PI_2));
@@ -53,6 +53,10 @@ impl Body {
             Shape::Cylinder(c) => (SharedShape::cylinder(c.half_height, c.radius), upright),
             Shape::Capsule(c) => (SharedShape::capsule_z(c.half, c.radius), Pose::IDENTITY),
             Shape::Cone(c) if c.top == 0.0 => (SharedShape::cone(c.half_height, c.bottom), upright),
+            Shape::Polyhedron(p) => {
+                let corners: Vec<Vec3> = p.vertices.iter().map(|v| vector(*v)).collect();
+                (SharedShape::convex_hull(&corners).expect("corners of a polyhedron"), Pose::IDENTITY)
+            }
             other => panic!("no peer for {other:?}"),
         };
         Self { shape, frame: pose(place) * turn }

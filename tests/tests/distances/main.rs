@@ -3,5 +3,6 @@
 mod brute;
 mod by_hand;
 mod closed;
+mod convex;
 mod forms;
 mod moving;

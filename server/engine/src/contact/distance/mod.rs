@@ -8,6 +8,8 @@
 //! f of a tree is at most the distance and less at sharp features; these bounds are of the distance itself.
 
 pub(in crate::contact) mod active_set;
+mod common;
+mod convex;
 pub(in crate::contact) mod part;
 pub(in crate::contact) mod polish;
 pub(in crate::contact) mod polytope;
@@ -18,6 +20,7 @@ use crate::contact::exclusion::rounding;
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::query::question::{PlacedModel, without_own_spin};
 use crate::motion::Relative;
+use crate::octree::Model;
 use glam::DVec3;
 
 /// A question: two bodies, and how exactly it is asked.
@@ -32,6 +35,9 @@ pub struct DistanceQuery<'a> {
     /// Pairs of parts that may be looked at: then the bounds stay as far apart as they are.
     pub limit: u64,
 }
+
+/// Bounds come as near to each other as this many times what rounding may take from one of them: points are moved inwards by some of it.
+const LEAST: f64 = 8.0;
 
 /// Pairs of parts that a distance may cost by default.
 pub const DEFAULT_LIMIT: u64 = 200_000;
@@ -99,11 +105,20 @@ fn between(query: &DistanceQuery, from: f64, to: f64) -> Distance {
             cells: 0,
         };
     }
-    let relative = [Relative::new(a, b), Relative::new(b, a)];
-    let rounding = rounding::of_literals(model_a, model_b, &relative[0]).max(rounding::of_literals(
-        model_b,
-        model_a,
-        &relative[1],
-    ));
-    search::Search::new(query, relative, rounding).run(from, to)
+    let relative = Relative::new(a, b);
+    let rounding = rounding::of_both(model_a, model_b, &relative);
+    if from == to
+        && let Some(answer) = convex::at_instant([model_a, model_b], &relative, rounding, query.tolerance, from)
+    {
+        return answer;
+    }
+    search::Search::new(query, [relative, Relative::new(b, a)], rounding).run(from, to)
+}
+
+/// What rounding may take from a bound, a length: of faces and poses, of hulls and supports.
+fn slack(models: [&Model; 2], relative: &Relative, rounding: f64) -> f64 {
+    let scale = models[0].size().max(models[1].size());
+    let reaches = models.iter().map(|m| m.extents[0]).filter(|e| e.is_finite());
+    let extent = relative.apart() + reaches.fold(scale, |s, e| s + 2.0 * e);
+    4.0 * rounding + 256.0 * f64::EPSILON * extent
 }

@@ -5,7 +5,7 @@
 //! as rounding may hide, and both trees are asked whether they are inside.
 
 use super::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause};
-use super::part::{Parts, literal_at};
+use super::part::literal_at;
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::witness::newton::hessian;
 use crate::math::gjk::least_of;
@@ -17,10 +17,6 @@ use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
-/// Unknowns: two points and the weights.
-const MOST: usize = 6 + 2 * MOST_MET;
-/// Steps at most.
-const STEPS: usize = 40;
 /// Rounds in which the alternatives are chosen anew.
 const CHOICES: usize = 3;
 /// Literals this near to 0, relative to the size, count as met at first.
@@ -28,7 +24,7 @@ const MET: f64 = 1e-7;
 /// Faces of a body that are looked through for others at a point.
 const MOST_FACES: usize = 256;
 /// Literals this near to 0, relative to the size, are told as the features of a point.
-const FEATURE: f64 = 1e-9;
+pub const FEATURE: f64 = 1e-9;
 
 /// A point of each body.
 #[derive(Clone, Copy, Debug)]
@@ -44,8 +40,6 @@ pub struct Pair {
 /// What a body is to the polishing.
 #[derive(Clone, Copy)]
 pub struct Side<'s, 'a> {
-    /// Its parts.
-    pub parts: &'s Parts<'a>,
     /// Its model.
     pub model: &'a Model,
     /// What of its tree is looked at.
@@ -62,16 +56,36 @@ pub struct Polish<'s, 'a> {
     pub scale: f64,
     /// What rounding may do to f, a length.
     pub rounding: f64,
+    /// How near its steps begin, and end.
+    pub steps: Steps,
+}
+
+/// Where Newton's steps begin and end.
+#[derive(Clone, Copy, Debug)]
+pub struct Steps {
+    /// Literals this near to 0 count as met at first, in the pair's size.
+    pub met: f64,
+    /// A step of this length is the last one, in the pair's size.
+    pub last: f64,
+    /// Steps at most.
+    pub most: usize,
+    /// The longest step, in the pair's size.
+    pub longest: f64,
+}
+
+impl Steps {
+    /// From where hulls of parts come nearest to what is hardly more than rounding.
+    pub const ALL: Self = Self { met: MET, last: 1e-14, most: 40, longest: 0.25 };
 }
 
 impl Polish<'_, '_> {
     fn clause(&self, side: usize, x: DVec3) -> Option<Clause> {
-        let Side { parts, tokens, .. } = self.sides[side];
-        clause(tokens, &mut |f| parts.solid.faces[f as usize].value(x))
+        let Side { model, tokens } = self.sides[side];
+        clause(tokens, &mut |f| model.solid.faces[f as usize].value(x))
     }
 
     fn at(&self, side: usize, id: LiteralId, x: DVec3) -> (f64, DVec3) {
-        literal_at(&self.sides[side].parts.solid.faces[id.face() as usize], id.sense(), x)
+        literal_at(&self.sides[side].model.solid.faces[id.face() as usize], id.sense(), x)
     }
 
     /// The points of both bodies, verified, to which x (A's frame) and y (B's) lead; `None` where they lead to none.
@@ -93,13 +107,13 @@ impl Polish<'_, '_> {
             for tip in &tips[held] {
                 let start = if held == 0 { (*tip, y) } else { (x, *tip) };
                 let clauses = [self.clause(0, start.0)?, self.clause(1, start.1)?];
-                let (p, q) = self.solve(&clauses, start, Some(held));
+                let (p, q, _) = self.solve(&clauses, start, Some(held));
                 keep(self.verified(p, q));
             }
         }
         for _ in 0..CHOICES {
             let clauses = [self.clause(0, x)?, self.clause(1, y)?];
-            (x, y) = self.solve(&clauses, (x, y), None);
+            (x, y, _) = self.solve(&clauses, (x, y), None);
             if !(x.is_finite() && y.is_finite()) || keep(self.verified(x, y)) {
                 break;
             }
@@ -110,7 +124,7 @@ impl Polish<'_, '_> {
     /// Points beside one of a body, in its frame, at a length along its faces there towards `way`: where a part ends on another one, that
     /// goes on beneath. None where the part that decides there has all faces.
     pub fn beside(&self, side: usize, x: DVec3, way: DVec3, length: f64) -> SmallVec<[DVec3; 4]> {
-        let faces = &self.sides[side].parts.solid.faces;
+        let faces = &self.sides[side].model.solid.faces;
         let clause = if faces.len() <= MOST_FACES { self.clause(side, x) } else { None };
         let Some(clause) = clause else { return SmallVec::new() };
         let reach = FEATURE * self.scale + 1e3 * self.rounding;
@@ -128,10 +142,10 @@ impl Polish<'_, '_> {
 
     /// The apexes of a body's cones that hold around a point, those that are its own.
     fn tips(&self, side: usize, x: DVec3) -> SmallVec<[DVec3; 2]> {
-        let Side { parts, model, .. } = self.sides[side];
+        let model = self.sides[side].model;
         let clause = self.clause(side, x).unwrap_or_default();
         let positive = clause.iter().filter(|id| id.sense() == Sense::Positive);
-        let apexes = positive.filter_map(|id| parts.solid.faces[id.face() as usize].apex());
+        let apexes = positive.filter_map(|id| model.solid.faces[id.face() as usize].apex());
         apexes.map(|apex| apex.point).filter(|tip| model.value(*tip) <= 2.0 * self.rounding).collect()
     }
 
@@ -149,7 +163,7 @@ impl Polish<'_, '_> {
             return Some(x);
         }
         let clause = self.clause(side, x)?;
-        let faces = clause.iter().map(|id| &self.sides[side].parts.solid.faces[id.face() as usize]);
+        let faces = clause.iter().map(|id| &self.sides[side].model.solid.faces[id.face() as usize]);
         let apexes = faces.filter_map(Face::apex).filter(|a| (a.point - x).length() <= MET * self.scale);
         for apex in apexes {
             let into = apex.axis / apex.sin;
@@ -166,79 +180,91 @@ impl Polish<'_, '_> {
         [2.0, 8.0, 64.0].into_iter().map(|k| x + inwards * (k * self.rounding)).find(|x| is_inside(*x))
     }
 
-    /// Newton's steps of both points, or of the one that is not held.
-    fn solve(&self, clauses: &[Clause; 2], (mut x, mut y): (DVec3, DVec3), held: Option<usize>) -> (DVec3, DVec3) {
+    /// Newton's steps of both points, each in its body's frame, or of the one that is not held, among the literals of each body; and
+    /// whether they have come to an end.
+    pub fn solve(
+        &self,
+        clauses: &[Clause; 2],
+        (mut x, mut y): (DVec3, DVec3),
+        held: Option<usize>,
+    ) -> (DVec3, DVec3, bool) {
         let mut met: [ActiveSet; 2] = Default::default();
-        let (near, tiny) = (MET * self.scale, 4.0 * self.rounding);
+        let (near, tiny) = (self.steps.met * self.scale, 4.0 * self.rounding);
         for (side, p) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
             met[side] = ActiveSet::new(&clauses[side], near, |id| self.at(side, id, p).0);
         }
-        for _ in 0..STEPS {
+        for _ in 0..self.steps.most {
             let way = self.at.a_point(y) - x;
             // Towards the other point, in the side's frame.
             met[0].weigh(way, |id| self.at(0, id, x).1);
             met[1].weigh(-(self.at.b_from_a * way), |id| self.at(1, id, y).1);
             let Some((p, q)) = self.step(&met, (x, y), held) else { break };
             let length = p.length().max(q.length());
-            let most = 0.25 * self.scale;
+            let most = self.steps.longest * self.scale;
             let damp = if length > most { most / length } else { 1.0 };
             (x, y) = (x + p * damp, y + q * damp);
             let mut changed = false;
             for (side, at) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
                 changed |= met[side].enter(&clauses[side], tiny, |id| self.at(side, id, at).0);
             }
-            if !changed && length <= 1e-14 * self.scale {
-                break;
+            if !changed && length <= self.steps.last * self.scale {
+                return (x, y, true);
             }
         }
-        (x, y)
+        (x, y, false)
     }
 
-    /// One step of both points, each in its frame.
+    /// One step of both points, each in its frame: of the distance and what the weighted literals bend, among the ways that leave the
+    /// literals met (the null-space method; J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., 16.2).
     fn step(&self, met: &[ActiveSet; 2], (x, y): (DVec3, DVec3), held: Option<usize>) -> Option<(DVec3, DVec3)> {
-        let n = 6 + met[0].len() + met[1].len();
-        let mut a = [[0.0; MOST]; MOST];
-        let mut f = [0.0; MOST];
-        let way = x - self.at.a_point(y);
-        let stiff = |side: usize| if held == Some(side) { HELD } else { 1.0 + REGULAR };
-        let mut blocks = [0, 1].map(|side| DMat3::IDENTITY * stiff(side));
-        let mut k = 6;
+        let mut bent = [DMat3::IDENTITY * (1.0 + REGULAR); 2];
+        let mut ways: [Ways; 2] = Default::default();
         for side in [0, 1] {
+            let p = if side == 0 { x } else { y };
+            let mut literals: SmallVec<[(DVec3, f64); MOST_MET]> = SmallVec::new();
+            let mut bend = DMat3::ZERO;
             for (id, weight) in met[side].iter() {
-                let p = if side == 0 { x } else { y };
-                let face = &self.sides[side].parts.solid.faces[id.face() as usize];
-                let (value, mut g) = literal_at(face, id.sense(), p);
+                let face = &self.sides[side].model.solid.faces[id.face() as usize];
+                let (value, g) = literal_at(face, id.sense(), p);
                 let sign = if id.sense() == Sense::Positive { 1.0 } else { -1.0 };
-                let mut h = hessian(face, p) * (sign * weight);
-                if side == 1 {
-                    // Along A's axes.
-                    g = self.at.a_vector(g);
-                    let turn = self.at.b_from_a;
-                    h = turn.transpose() * h * turn;
-                }
-                blocks[side] += h;
-                for i in 0..3 {
-                    a[3 * side + i][k] = g[i];
-                    a[k][3 * side + i] = g[i];
-                }
-                a[k][k] = -REGULAR;
-                f[k] = -value - REGULAR * weight;
-                k += 1;
+                bend += hessian(face, p) * (sign * weight);
+                literals.push((g, -value));
+            }
+            if side == 1 {
+                // Along A's axes.
+                let turn = self.at.b_from_a;
+                bend = turn.transpose() * bend * turn;
+                literals.iter_mut().for_each(|l| l.0 = self.at.a_vector(l.0));
+            }
+            bent[side] += bend;
+            if held != Some(side) {
+                ways[side] = Ways::of(&literals);
             }
         }
-        for i in 0..3 {
-            for j in 0..3 {
-                a[i][j] = blocks[0].col(j)[i];
-                a[3 + i][3 + j] = blocks[1].col(j)[i];
-            }
-            a[i][3 + i] = -1.0;
-            a[3 + i][i] = -1.0;
-            (f[i], f[3 + i]) = (-way[i], way[i]);
+        let apart = x - self.at.a_point(y);
+        let [a, b] = &ways;
+        let pull = [-apart - bent[0] * a.first + b.first, apart + a.first - bent[1] * b.first];
+        let (m, n) = (a.along.len(), a.along.len() + b.along.len());
+        let mut matrix = [[0.0; 6]; 6];
+        let mut f = [0.0; 6];
+        for (i, u) in a.along.iter().enumerate() {
+            f[i] = u.dot(pull[0]);
+            let own = bent[0] * *u;
+            a.along.iter().enumerate().for_each(|(j, v)| matrix[i][j] = own.dot(*v));
+            b.along.iter().enumerate().for_each(|(j, v)| {
+                matrix[i][m + j] = -u.dot(*v);
+                matrix[m + j][i] = matrix[i][m + j];
+            });
         }
-        let step = eliminated(&mut a, f, n)?;
-        let own = |side: usize| DVec3::from_slice(&step[3 * side..3 * side + 3]);
-        let [p, q] = [0, 1].map(|side| if held == Some(side) { DVec3::ZERO } else { own(side) });
-        Some((p, self.at.b_from_a * q))
+        for (i, u) in b.along.iter().enumerate() {
+            f[m + i] = u.dot(pull[1]);
+            let own = bent[1] * *u;
+            b.along.iter().enumerate().for_each(|(j, v)| matrix[m + i][m + j] = own.dot(*v));
+        }
+        let step = eliminated(&mut matrix, f, n)?;
+        let moved =
+            |ways: &Ways, from: usize| ways.along.iter().zip(&step[from..]).fold(ways.first, |p, (u, s)| p + *u * *s);
+        Some((moved(a, 0), self.at.b_from_a * moved(b, m)))
     }
 
     /// The faces at a point of one body: those of the literals that are nearly 0 there.
@@ -256,5 +282,39 @@ impl Polish<'_, '_> {
     }
 }
 
-/// Stiffness that holds a point.
-const HELD: f64 = 1e30;
+/// The ways from a point to where some literals are met, to first order: one of them, and what else leaves them met. None of a point
+/// that is held.
+#[derive(Default)]
+struct Ways {
+    first: DVec3,
+    along: SmallVec<[DVec3; 3]>,
+}
+
+impl Ways {
+    /// Of literals by their gradients and by how much each has to rise, the ones before the others: what those before have told is not told
+    /// again (orthogonalisation by Gram and Schmidt; G. Golub, C. Van Loan, Matrix Computations, 4th ed., 5.2.7).
+    fn of(literals: &[(DVec3, f64)]) -> Self {
+        let (mut first, mut told) = (DVec3::ZERO, SmallVec::<[DVec3; 3]>::new());
+        for (g, rise) in literals {
+            let rest = told.iter().fold(*g, |rest, e| rest - *e * e.dot(rest));
+            let square = rest.length_squared();
+            if told.len() < 3 && square > ALIKE * g.length_squared() {
+                first += rest * ((rise - g.dot(first)) / square);
+                told.push(rest / square.sqrt());
+            }
+        }
+        let along = match told[..] {
+            [] => SmallVec::from(DVec3::AXES),
+            [e] => {
+                let (u, v) = e.any_orthonormal_pair();
+                SmallVec::from_slice(&[u, v])
+            }
+            [e, f] => SmallVec::from_slice(&[e.cross(f)]),
+            _ => SmallVec::new(),
+        };
+        Self { first, along }
+    }
+}
+
+/// The square of a sine below which two gradients are taken for one.
+const ALIKE: f64 = 1e-10;

@@ -1,10 +1,11 @@
 //! The branch and bound; see the module's face for the idea and docs/algorithm/clearance.md for the bounds.
 
+use super::convex::{ConvexPair, NearestPair};
 use super::part::{Cut, Part, Parts, literal_at};
-use super::polish::{Pair, Polish, Side};
+use super::polish::{Pair, Polish, Side, Steps};
 use super::polytope::support;
 use super::span::{Span, Stray};
-use super::{Distance, DistanceQuery, NearPoint};
+use super::{Distance, DistanceQuery, LEAST, NearPoint, common, slack};
 use crate::math::gjk::{Cores, of_supports};
 use crate::math::{Aabb, BoundQueue};
 use crate::motion::{Instant, Relative, Sweep};
@@ -23,9 +24,6 @@ const SMALL: f64 = 1e-3;
 const EXACT: f64 = 1e-15;
 /// Every so many looks the nearest points are looked for, once a few were.
 const EVERY: u64 = 8;
-/// Steps of one length on the way to a common point, and the next length.
-const STEPS: usize = 32;
-const SHORTER: f64 = 0.25;
 /// Looks at first that each look for the nearest points.
 const FIRST: u64 = 24;
 
@@ -54,6 +52,8 @@ struct Thick<'p> {
 /// The search for the distance of one pair.
 pub struct Search<'a> {
     models: [&'a Model; 2],
+    /// Both, where each is one convex primitive: then no part is taken apart, but the time.
+    convex: Option<ConvexPair<'a>>,
     parts: Vec<Parts<'a>>,
     /// A's points seen from B, and the reverse.
     relative: [Relative; 2],
@@ -84,15 +84,14 @@ impl<'a> Search<'a> {
     pub fn new(query: &DistanceQuery<'a>, relative: [Relative; 2], rounding: f64) -> Self {
         let models = [query.a.model, query.b.model];
         let scale = models[0].size().max(models[1].size());
-        let extent = relative[0].apart()
-            + models.iter().map(|m| m.extents[0]).filter(|e| e.is_finite()).fold(scale, |s, e| s + 2.0 * e);
-        let slack = 4.0 * rounding + 256.0 * f64::EPSILON * extent;
+        let slack = slack(models, &relative[0], rounding);
         Self {
             models,
+            convex: ConvexPair::of(models),
             parts: Vec::new(),
             relative,
             spans: Vec::new(),
-            tolerance: query.tolerance.max(4.0 * slack),
+            tolerance: query.tolerance.max(LEAST * slack),
             rounding,
             slack,
             scale,
@@ -107,6 +106,8 @@ impl<'a> Search<'a> {
 
     /// The least distance between two times.
     pub fn run(mut self, from: f64, to: f64) -> Distance {
+        // At an instant their own proof has not settled it: parts are taken apart.
+        self.convex = self.convex.filter(|_| from < to);
         if let Some(boxes) = self.boxes(from, to) {
             for k in 0..2 {
                 match Parts::new(&self.models[k].solid, &boxes[k], self.rounding) {
@@ -122,6 +123,8 @@ impl<'a> Search<'a> {
             if lower <= 0.0 {
                 self.share();
             }
+            // The pair of parts with the nearest points is bounded by their distance: above what is known no bound of all holds.
+            debug_assert!(lower <= self.upper, "{lower:e} is no bound of {:e}", self.upper);
             let lower = lower.min(self.upper);
             return self.answer(lower, from);
         }
@@ -188,12 +191,8 @@ impl<'a> Search<'a> {
     }
 
     fn polish<'s>(&'s self, parts: [u32; 2], at: &'s Instant) -> Polish<'s, 'a> {
-        let sides = [0, 1].map(|k| Side {
-            parts: &self.parts[k],
-            model: self.models[k],
-            tokens: &self.parts[k][parts[k]].tokens,
-        });
-        Polish { sides, at, scale: self.scale, rounding: self.rounding }
+        let sides = [0, 1].map(|k| Side { model: self.models[k], tokens: &self.parts[k][parts[k]].tokens });
+        Polish { sides, at, scale: self.scale, rounding: self.rounding, steps: Steps::ALL }
     }
 
     /// Looks for near points where the whole boxes come nearest, at both ends and in the middle.
@@ -227,6 +226,13 @@ impl<'a> Search<'a> {
 
     /// Makes two points nearest and keeps them where they are nearer than those that are known.
     fn improve(&mut self, parts: [u32; 2], at: &Instant, x: DVec3, y: DVec3) -> Option<Pair> {
+        if let Some(convex) = &self.convex {
+            let pair = convex.nearest(self.models, at, self.scale, self.rounding)?.pair;
+            if pair.distance < self.upper {
+                (self.best, self.upper) = (Some((pair, at.t)), pair.distance);
+            }
+            return Some(pair);
+        }
         // A point of both.
         for p in [x, at.a_point(y)] {
             let q = at.b_point(p);
@@ -245,37 +251,11 @@ impl<'a> Search<'a> {
 
     /// Looks for a point of both bodies beside points of them that are as near as was asked: of bodies that lie in each other the search
     /// may come to where their surfaces meet.
-    ///
-    /// It steps against the gradient of the higher f, by ever shorter steps: where both are convex the way to any point of both becomes
-    /// shorter by a step that is shorter than that point is deep (N. Z. Shor, Minimization Methods for Non-Differentiable Functions,
-    /// Springer 1985, section 2.1).
     fn share(&mut self) {
         let Some((pair, t)) = self.best.filter(|_| self.upper > 0.0 && self.upper <= self.tolerance) else { return };
         let at = self.relative[0].at(t);
-        let higher = |x: DVec3| {
-            let y = at.b_point(x);
-            let [(f, f_id), (g, g_id)] = [self.models[0].deciding(x), self.models[1].deciding(y)];
-            let gradient = |k: usize, id: LiteralId, x: DVec3| {
-                literal_at(&self.models[k].solid.faces[id.face() as usize], id.sense(), x).1
-            };
-            if f >= g { (f, gradient(0, f_id, x)) } else { (g, at.a_vector(gradient(1, g_id, y))) }
-        };
-        let (mut best, mut step) = ((f64::INFINITY, pair.x), self.models[0].size().min(self.models[1].size()));
-        while step > self.slack {
-            step *= SHORTER;
-            let mut x = best.1;
-            for _ in 0..STEPS {
-                let (f, gradient) = higher(x);
-                if f <= -self.rounding {
-                    let pair = Pair { x, y: at.b_point(x), distance: 0.0 };
-                    (self.best, self.upper) = (Some((pair, t)), 0.0);
-                    return;
-                }
-                if f < best.0 {
-                    best = (f, x);
-                }
-                x -= gradient * step;
-            }
+        if let Some(pair) = common::from_point(self.models, &at, pair.x, self.rounding, self.slack) {
+            (self.best, self.upper) = (Some((pair, t)), 0.0);
         }
     }
 
@@ -312,19 +292,27 @@ impl<'a> Search<'a> {
             (low, pair, slope, step) = (t, next, s, 2.0 * step);
         }
         let Some(((mut p, mut at_p), (mut q, mut at_q))) = bracket else { return };
-        for i in 0..48 {
+        // Where a corner takes over from a face the rate jumps: false position then hardly moves one end.
+        let mut is_slow = false;
+        for _ in 0..96 {
             let secant = p - at_p * (q - p) / (at_q - at_p);
             let middle = 0.5 * (p + q);
             let inner = (secant - p) * (secant - q) < 0.0;
-            let t = if i % 3 != 2 && inner && at_q * way > 0.0 { secant } else { middle };
-            if (q - p).abs() * at_p.abs().max(at_q.abs()) <= 1e-3 * self.tolerance || t == p || t == q {
+            let t = if !is_slow && inner && at_q * way > 0.0 { secant } else { middle };
+            let width = (q - p).abs();
+            if width * at_p.abs().max(at_q.abs()) <= 1e-3 * self.tolerance || t == p || t == q {
                 return;
             }
             let at = self.relative[0].at(t);
             let Some(next) = self.improve([0, 0], &at, pair.x, pair.y) else { return };
             pair = next;
             let s = rate(self, &pair, t);
-            if s * way < 0.0 { (p, at_p) = (t, s) } else { (q, at_q) = (t, s) }
+            if s * way < 0.0 {
+                (p, at_p) = (t, s)
+            } else {
+                (q, at_q) = (t, s)
+            }
+            is_slow = (q - p).abs() > 0.5 * width;
         }
     }
 
@@ -382,6 +370,9 @@ impl<'a> Search<'a> {
         if (0..2).any(|k| self.parts[k][parts[k]].hull.is_empty()) {
             return Look::Done;
         }
+        if let Some(pair) = self.convex {
+            return self.look_at_convex(&pair, parts, span, bound, &strays);
+        }
         bound = bound.max(self.by_round(parts, span, &strays));
         let (mut near, mut lost) = ((DVec3::ZERO, DVec3::ZERO), 0.0);
         for _ in 0..ROUNDS {
@@ -399,7 +390,7 @@ impl<'a> Search<'a> {
                 lost = 0.5 * (strays[0].middle + strays[1].middle);
             } else {
                 let [a, b] = [0, 1].map(|k| Thick { points: &self.parts[k][parts[k]].hull.corners, radius: 0.0 });
-                let along = self.along(v.normalize(), [a, b], span, &strays[1]);
+                let along = self.along(v.normalize(), [a, b], span, &strays);
                 lost = (v.length() - along - self.slack).max(0.0);
                 bound = bound.max(along);
             }
@@ -414,6 +405,77 @@ impl<'a> Search<'a> {
         let at = self.spans[span as usize].middle;
         let [a, b] = parts;
         Look::Open(Cell { a, b, span, bound, x: near.0, y: at.b_point(near.1), lost })
+    }
+
+    /// Bounds two whole convex primitives over a span: along the direction in which they are nearest in its middle, seen from A, every point
+    /// of B is above the chord of its places at the ends less what it strays from that; and the same with both in turn.
+    fn look_at_convex(
+        &mut self,
+        pair: &ConvexPair,
+        [a, b]: [u32; 2],
+        span: u32,
+        least: f64,
+        strays: &[Stray; 2],
+    ) -> Look {
+        let over = &self.spans[span as usize];
+        let middle = &over.middle;
+        let (points, bound, lost) = match pair.nearest(self.models, middle, self.scale, self.rounding) {
+            Some(NearestPair { pair: found, way, .. }) if way != DVec3::ZERO => {
+                let seen = middle.b_from_a * way;
+                let (mut in_a, mut in_b) = (f64::INFINITY, f64::INFINITY);
+                for end in &over.ends {
+                    let placed = pair.at(end);
+                    in_a = in_a.min(placed.along(way));
+                    in_b = in_b.min(placed.along(end.a_vector(seen)));
+                }
+                // The plane's own direction is fixed in its own frame alone.
+                let [of_a, of_b] = [in_a - strays[1].chord, in_b - strays[0].chord];
+                let bound = match [0, 1].map(|k| pair.is_half_space(k)) {
+                    [true, _] => of_a,
+                    [_, true] => of_b,
+                    [false, false] => of_a.max(of_b),
+                } - self.slack;
+                ((found.x, found.y), bound, (found.distance - bound).max(0.0))
+            }
+            Some(NearestPair { pair: found, .. }) => ((found.x, found.y), 0.0, 0.0),
+            None => ((self.parts[0][a].aabb.center(), self.parts[1][b].aabb.center()), 0.0, 0.0),
+        };
+        let (x, y) = points;
+        let mut bound = bound.max(least);
+        if 0.0 < bound && bound < self.goal() && over.length() > 0.0 {
+            bound = bound.max(self.along_turning(pair, over));
+        }
+        if bound >= self.goal() {
+            self.done = self.done.min(bound);
+            return Look::Done;
+        }
+        Look::Open(Cell { a, b, span, bound, x, y, lost })
+    }
+
+    /// Bounds two whole convex primitives over a span by a direction n that turns from that in which they are nearest at its begin to that at
+    /// its end. Of any two of their points the way along n has a second derivative of at most
+    /// Q = 2|ν|(|v| + ω_A ρ_A + ω_B ρ_B) + ω_A² ρ_A + ω_B² ρ_B, with ν the rate of n and ρ the farthest point of a core from where it turns
+    /// about; so what lies between the bodies along n is above the chord between the ends less Q s(1 − s) h²/2, and |n| <= 1. Edges that
+    /// cross need it: no fixed direction stays across both.
+    fn along_turning(&self, pair: &ConvexPair, over: &Span) -> f64 {
+        let nearest = |at: &Instant| pair.nearest(self.models, at, self.scale, self.rounding);
+        let [from, to] = &over.ends[..] else { return 0.0 };
+        let (Some(p), Some(q)) = (nearest(from), nearest(to)) else { return 0.0 };
+        let rate = (to.world_from_a * q.way - from.world_from_a * p.way).length();
+        let reaches = [0, 1].map(|k| {
+            let (aabb, center) = (&self.parts[k][0].aabb, self.relative[k].center_a());
+            ((aabb.center() - center).abs() + aabb.half()).length()
+        });
+        let h = over.length();
+        let (a, b) = self.relative[0].placed();
+        let spins = [a, b].map(|placed| placed.motion.spin.length());
+        let moved = (a.motion.velocity - b.motion.velocity).length() + spins[0] * reaches[0] + spins[1] * reaches[1];
+        let pull = spins[0] * spins[0] * reaches[0] + spins[1] * spins[1] * reaches[1];
+        let dip = (2.0 * rate * h * moved + pull * h * h) * (1.0 + 1e-12);
+        // The least of p + (q - p) s - dip s (1 - s) / 2.
+        let rise = q.lower - p.lower;
+        let s = if dip > 0.0 { (0.5 - rise / dip).clamp(0.0, 1.0) } else { 0.0 };
+        (p.lower + rise * s - 0.5 * dip * s * (1.0 - s)).min(p.lower).min(q.lower) - self.slack
     }
 
     /// Takes the tangents of convex faces at the points where two hulls are nearest. False where nothing changes.
@@ -442,13 +504,24 @@ impl<'a> Search<'a> {
         between.length() - box_a.half().length() - box_b.half().length() - strays[1].middle - self.slack
     }
 
-    /// A lower bound of the distance along a unit direction of A's frame from A to B, over a span: what lies between the points that are
-    /// farthest along it. Along it every point of B is above the chord of its places at the ends less what it strays from that.
-    fn along(&self, u: DVec3, [a, b]: [Thick; 2], span: u32, stray: &Stray) -> f64 {
+    /// A lower bound of the distance along a unit direction from A to B, over a span: what lies between the points that are farthest along
+    /// it. Fixed in A's frame, every point of B is above the chord of its places at the ends less what it strays from that; fixed in B's
+    /// (both are as `u` of A's frame in the middle of the span), every point of A below. What moves straight on in one of them may stray
+    /// in the other.
+    fn along(&self, u: DVec3, [a, b]: [Thick; 2], span: u32, strays: &[Stray; 2]) -> f64 {
+        let span = &self.spans[span as usize];
+        let ends = || span.ends.iter();
         let reach = u.dot(support(a.points, u));
         let lowest = |at: &Instant| u.dot(at.a_point(support(b.points, at.b_from_a * -u)));
-        let low = self.spans[span as usize].ends.iter().map(lowest).fold(f64::INFINITY, f64::min);
-        low - reach - a.radius - b.radius - stray.chord - self.slack
+        let in_a = ends().map(lowest).fold(f64::INFINITY, f64::min) - reach - strays[1].chord;
+        let in_b = if strays[0].chord < strays[1].chord {
+            let w = span.middle.b_from_a * u;
+            let highest = |at: &Instant| w.dot(at.b_point(support(a.points, at.a_vector(w))));
+            w.dot(support(b.points, -w)) - ends().map(highest).fold(f64::NEG_INFINITY, f64::max) - strays[0].chord
+        } else {
+            f64::NEG_INFINITY
+        };
+        in_a.max(in_b) - a.radius - b.radius - self.slack
     }
 
     /// The best bound that round faces give.
@@ -467,7 +540,7 @@ impl<'a> Search<'a> {
                 if let Cores::Apart { v, .. } = of_supports(|v| support(p.points, v), seen, start, EXACT)
                     && let Some(u) = v.try_normalize()
                 {
-                    best = best.max(self.along(u, [p, q], span, &strays[1]));
+                    best = best.max(self.along(u, [p, q], span, strays));
                 }
             }
         }
@@ -512,18 +585,29 @@ impl<'a> Search<'a> {
 
     /// Takes a pair of parts apart where that gains most: a part that does not hold the nearest point of its hull, or the span.
     fn branch(&mut self, cell: &Cell) {
-        let (points, parts) = ([cell.x, cell.y], [cell.a, cell.b]);
-        let worst = [0, 1].map(|k| self.worst(k, parts[k], points[k]));
-        let k = usize::from(worst[1].0 > worst[0].0);
-        let (violation, cut) = worst[k];
         let span = &self.spans[cell.span as usize];
         let (from, to) = (span.from, span.to);
         let middle = 0.5 * (from + to);
-        if cell.lost >= violation.min(self.largest(k, parts[k])) && from < middle && middle < to {
-            for (from, to) in [(from, middle), (middle, to)] {
+        let halves = (from < middle && middle < to).then_some([(from, middle), (middle, to)]);
+        let (points, parts) = ([cell.x, cell.y], [cell.a, cell.b]);
+        let worst = if self.convex.is_some() {
+            [(0.0, Cut::Halves(0)); 2]
+        } else {
+            [0, 1].map(|k| self.worst(k, parts[k], points[k]))
+        };
+        let k = usize::from(worst[1].0 > worst[0].0);
+        let (violation, cut) = worst[k];
+        if let Some(halves) = halves
+            && (self.convex.is_some() || cell.lost >= violation.min(self.largest(k, parts[k])))
+        {
+            for (from, to) in halves {
                 self.spans.push(Span::new(&self.relative[0], from, to));
                 self.push(cell.a, cell.b, self.spans.len() as u32 - 1, cell.bound);
             }
+            return;
+        }
+        if self.convex.is_some() {
+            self.done = self.done.min(cell.bound);
             return;
         }
         let (k, cut) = if violation > 0.0 { (k, cut) } else { self.larger(parts) };

@@ -31,6 +31,14 @@ pub fn of_literals(a: &Model, b: &Model, relative: &Relative) -> f64 {
     of_motion(a, b, offsets, relative.apart(), &relative.rounding())
 }
 
+/// The larger one of either body carrying the cells; `relative` is that of a against b.
+pub fn of_both(a: &Model, b: &Model, relative: &Relative) -> f64 {
+    let (placed_a, placed_b) = relative.placed();
+    let [of_a, of_b] = [placed_a, placed_b].map(|p| p.place.position.length());
+    let (apart, motion) = (relative.apart(), relative.rounding());
+    of_motion(a, b, [of_a, of_b], apart, &motion).max(of_motion(b, a, [of_b, of_a], apart, &motion))
+}
+
 /// The same from the distances of the centres of rotation from the models' origins, how far these centres come apart, and
 /// what rounding does to the motion.
 pub fn of_motion(a: &Model, b: &Model, [offset_a, offset_b]: [f64; 2], apart: f64, rounding: &Rounding) -> f64 {

@@ -10,7 +10,6 @@
 use super::local::{Bodies, Lit};
 use super::point::{self, Meeting};
 use super::{Region, SAME_FACES, SAME_POINT, line, line_region, on_run, point_region, surface};
-use crate::contact::distance::part::Parts;
 use crate::contact::distance::polish::{self, Polish};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::instant::depth::{self, Deepest};
@@ -277,8 +276,7 @@ pub fn nearer(bodies: &Bodies, m: &Meeting, most: f64) -> Option<Meeting> {
     if !is_apart(m) || bodies.work.is_spent() {
         return None;
     }
-    let parts = parts_of(bodies);
-    let polish = polish_of(bodies, &parts);
+    let polish = polish_of(bodies);
     let [x, y] = m.feet;
     let (y, way) = (bodies.at.b_point(y), -(bodies.at.b_from_a * m.normal));
     let of_a = polish.beside(0, x, m.normal, m.gap).into_iter().map(|x| [x, y]);
@@ -293,19 +291,13 @@ pub fn nearer(bodies: &Bodies, m: &Meeting, most: f64) -> Option<Meeting> {
 
 /// The feet by Newton's method on the distance.
 fn polished(bodies: &Bodies, [x, y]: [DVec3; 2], normal: DVec3) -> Option<Meeting> {
-    let parts = parts_of(bodies);
-    run(bodies, &polish_of(bodies, &parts), [x, bodies.at.b_point(y)], normal)
+    run(bodies, &polish_of(bodies), [x, bodies.at.b_point(y)], normal)
 }
 
-fn parts_of<'a>(bodies: &Bodies<'_, 'a>) -> [Parts<'a>; 2] {
-    [bodies.task.a, bodies.task.b].map(|solid| Parts::none(solid, bodies.task.rounding))
-}
-
-fn polish_of<'s, 'a>(bodies: &Bodies<'s, 'a>, parts: &'s [Parts<'a>; 2]) -> Polish<'s, 'a> {
+fn polish_of<'s, 'a>(bodies: &Bodies<'s, 'a>) -> Polish<'s, 'a> {
     let (task, at) = (bodies.task, bodies.at);
-    let side = |k: usize, model| polish::Side { parts: &parts[k], model, tokens: &parts[k].solid.normal_form };
-    let sides = [side(0, task.model_a), side(1, task.model_b)];
-    Polish { sides, at, scale: task.scale, rounding: task.rounding }
+    let sides = [task.model_a, task.model_b].map(|model| polish::Side { model, tokens: &model.solid.normal_form });
+    Polish { sides, at, scale: task.scale, rounding: task.rounding, steps: polish::Steps::ALL }
 }
 
 /// Newton's method from points in the frames of their bodies.

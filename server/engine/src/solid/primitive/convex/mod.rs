@@ -179,6 +179,24 @@ impl Convex<'_> {
         !matches!(self, Convex::HalfSpace | Convex::Other)
     }
 
+    /// True for all of one side of a plane.
+    pub fn is_half_space(&self) -> bool {
+        matches!(self, Convex::HalfSpace)
+    }
+
+    /// True where the core is the hull of finitely many points.
+    pub fn has_corners_alone(&self) -> bool {
+        match self {
+            Convex::Ball(_) | Convex::Capsule { .. } | Convex::Cuboid(_) | Convex::Corners(_) => true,
+            Convex::Round { .. }
+            | Convex::Ellipsoid(_)
+            | Convex::Elliptic(_)
+            | Convex::Superellipsoid(_)
+            | Convex::HalfSpace
+            | Convex::Other => false,
+        }
+    }
+
     /// The radius of a ball.
     pub fn ball(&self) -> Option<f64> {
         if let Convex::Ball(radius) = self { Some(*radius) } else { None }
