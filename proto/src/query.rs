@@ -48,7 +48,7 @@ pub struct ObjectRay {
     pub origin: [f64; 3],
     /// Where it goes; of any length but 0.
     pub direction: [f64; 3],
-    /// How far it goes: a length >= 0; infinite only where all objects have bounds.
+    /// How far it goes: a length >= 0; of objects without bounds nothing is told beyond some 1e10 times where it begins.
     pub length: f64,
 }
 

@@ -882,7 +882,7 @@ typedef struct contactd_ray {
     double origin[3];
     // Where it goes; of any length but 0.
     double direction[3];
-    // How far it goes: a length >= 0; infinite only where all objects have bounds.
+    // How far it goes: a length >= 0; of objects without bounds nothing is told beyond some 1e10 times where it begins.
     double length;
 } contactd_ray;
 

@@ -151,8 +151,8 @@ class Session(_native.Session):
         """What rays meet first, certified: an array of dtype ``RAY``, one for each.
 
         ``origins``, ``directions``: arrays of (n, 3), world frame; a direction may have any length but 0. ``length``: how far they go,
-        one for all or one each; infinite only where all objects have bounds. ``depth``: a ray that comes no deeper passes. ``limit``: most stretches
-        that are looked at for one and an object. ``objects``: these alone.
+        one for all or one each; infinite asks objects without bounds as far as anything can be told of them. ``depth``: a ray that comes
+        no deeper passes. ``limit``: most stretches that are looked at for one and an object. ``objects``: these alone.
         """
         given = [np.asarray(a, dtype=float) for a in (origins, directions)]
         if any(a.ndim != 2 or a.shape[1] != 3 for a in given) or len(given[0]) != len(given[1]):

@@ -1,13 +1,16 @@
 //! Points and rays from far away, and directions of every length: what rounding hides is never told as proven.
 
-use contactd::contact::probe::{DEFAULT_LIMIT, PointOptions, PosedModel, RayOptions, points};
+use contactd::contact::probe::{
+    DEFAULT_LIMIT, PointOptions, PosedModel, Ray, RayHit, RayOptions, RayOutcome, points, rays,
+};
 use contactd::ipc::{Embedded, ServerConfig};
+use contactd::math::random::Random;
 use contactd::solid::primitive::HalfSpace;
 use contactd_client::{Object, Session};
 use contactd_proto::Pose;
-use contactd_proto::query::{ObjectRay, RayOutcome, Side};
+use contactd_proto::query::{ObjectRay, RayOutcome as Outcome, Side};
 use contactd_tests::models::simple;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 const RAYS: RayOptions = RayOptions { depth: 0.0, limit: DEFAULT_LIMIT };
 
@@ -89,6 +92,69 @@ fn the_nearest_of_bodies_far_away_is_told() {
     }
 }
 
+/// A part at a sharp edge is as shallow as rounding once it is as small: it counts all the same.
+#[test]
+fn points_far_above_rims_are_bracketed() {
+    let mut r = Random(20);
+    let (mut asked, mut settled) = (0, 0);
+    for _ in 0..12 {
+        let (radius, height) = (r.within(0.3, 1.0), r.within(0.2, 0.6));
+        let text = format!("cylinder(r1 = {radius:?}, r2 = 0, h = {height:?});");
+        let mut session = of(&text);
+        for power in 2..=8 {
+            for _ in 0..6 {
+                let way = r.vector(1.0);
+                let x = DVec3::new(way.x, way.y, way.z.abs()).normalize() * 10f64.powi(power);
+                // The rim, the side and the base, in the half-plane of the point.
+                let p = DVec2::new(x.truncate().length(), x.z);
+                let of_edge = |a: DVec2, b: DVec2| {
+                    let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+                    p.distance(a + (b - a) * t)
+                };
+                let (rim, tip) = (DVec2::new(radius, 0.0), DVec2::new(0.0, height));
+                let d = of_edge(rim, tip).min(of_edge(DVec2::ZERO, rim));
+                let options = PointOptions { surface: 0.0, tolerance: 1e-9, limit: 20_000 };
+                let told = session.points(&[x.to_array()], &options, None).unwrap()[0];
+                let off = 4.0 * f64::EPSILON * x.length();
+                assert!(told.lower <= d + off && d - off <= told.upper, "{text} {x:?}: {d:e} {told:?}");
+                (asked, settled) = (asked + 1, settled + u32::from(told.is_settled));
+            }
+        }
+    }
+    println!("{settled} of {asked} settled");
+}
+
+/// What is near is not hidden by what rounding does far along a ray.
+#[test]
+fn long_rays_meet_a_floor_where_it_is() {
+    let model = simple(HalfSpace);
+    let floor = PosedModel { model: &model, pose: Pose::IDENTITY };
+    let ask = |z: f64, direction: DVec3, length: f64| {
+        let ray = Ray { origin: DVec3::new(5.0, 1.0, z), direction, length };
+        rays(&floor, &[ray], &RAYS)[0].outcome
+    };
+    for length in [100.0, 1e6, 1e12, 1e14, 1e19, 1e150, f64::INFINITY] {
+        // From above, from three below upwards, and at a flat angle.
+        let flat = DVec3::new(1.0, 0.0, -0.01).normalize();
+        for (z, direction, t) in [(10.0, -DVec3::Z, 10.0), (-3.0, DVec3::Z, 3.0), (0.01, flat, -0.01 / flat.z)] {
+            let told = ask(z, direction, length);
+            let is_right = |hit: RayHit| {
+                hit.is_leaving == (z < 0.0) && (hit.t - t).abs() < 1e-12 && hit.lower > t - 1e-7 && hit.upper < t + 1e-7
+            };
+            assert!(matches!(told, RayOutcome::Hit(hit) if is_right(hit)), "{length:e} from {z}: {told:?}");
+        }
+        // Away from it, and along it within it: no end of it is met as far as anything can be told.
+        for (z, direction) in [(10.0, DVec3::Z), (-3.0, DVec3::X), (-3.0, -DVec3::Z)] {
+            let is_right = match ask(z, direction, length) {
+                RayOutcome::Miss { is_inside } => is_inside == (z < 0.0),
+                RayOutcome::Undecided { until } => length > 1e10 && until > 1e10,
+                RayOutcome::Hit(_) => false,
+            };
+            assert!(is_right, "{length:e} from {z} along {direction}");
+        }
+    }
+}
+
 #[test]
 fn a_distance_that_is_no_double_has_no_upper_bound() {
     let mut session = of("cube(1);");
@@ -125,24 +191,24 @@ fn rays_however_far_are_no_false_misses() {
                 };
                 // Through the middle: x − 1 off.
                 match cast(0.0) {
-                    RayOutcome::Hit(hit) => {
+                    Outcome::Hit(hit) => {
                         hits += 1;
                         let slack = 1e-12 * x;
                         assert!(hit.lower <= x - 1.0 + slack && x - 1.0 <= hit.upper + slack, "{text} {x:e}: {hit:?}");
                         assert!(hit.upper <= x + 2.0 && hit.lower <= hit.t && hit.t <= hit.upper, "{text} {x:e}");
                     }
-                    RayOutcome::Undecided { until } => {
+                    Outcome::Undecided { until } => {
                         assert!(until <= x && x > 1e13, "{text} {x:e}: {until:e}");
                     }
-                    RayOutcome::Miss { .. } => panic!("{text} {x:e}: a miss through the middle"),
+                    Outcome::Miss { .. } => panic!("{text} {x:e}: a miss through the middle"),
                 }
                 // Far beside it.
-                assert_eq!(cast(0.2 * x + 2.0), RayOutcome::Miss { is_inside: false }, "{text} {x:e}");
+                assert_eq!(cast(0.2 * x + 2.0), Outcome::Miss { is_inside: false }, "{text} {x:e}");
                 // Beside the ball, within its box.
                 if k == 0 && x <= 1e9 {
                     let ray = ObjectRay { origin: [x, 0.8, 0.8], direction: [-1.0, 0.0, 0.0], length: f64::INFINITY };
                     let told = session.rays(&[ray], &RAYS, None).unwrap()[0].outcome;
-                    assert_eq!(told, RayOutcome::Miss { is_inside: false }, "{x:e}");
+                    assert_eq!(told, Outcome::Miss { is_inside: false }, "{x:e}");
                 }
             }
         }
@@ -165,7 +231,7 @@ fn directions_have_any_length_but_none() {
             }
             let ray = ObjectRay { origin, direction: direction.to_array(), length: f64::INFINITY };
             let told = session.rays(&[ray], &RAYS, None).unwrap()[0].outcome;
-            let RayOutcome::Hit(hit) = told else { panic!("{direction:?}: {told:?}") };
+            let Outcome::Hit(hit) = told else { panic!("{direction:?}: {told:?}") };
             assert!((hit.t - from).abs() < 1e-12 && hit.lower <= from && from <= hit.upper, "{direction:?}: {hit:?}");
         }
     }

@@ -30,6 +30,8 @@ const FIRST: u64 = 24;
 
 /// What is nowhere deeper than so many roundings is nothing.
 const SHALLOW: f64 = 4.0;
+/// But for parts of no more than so many roundings.
+const SMALL_PART: f64 = 128.0;
 
 /// Convex faces this near to the foot, relative to the size, are touched there.
 const TANGENT: f64 = 1e-6;
@@ -144,7 +146,9 @@ impl<'a> Search<'a> {
 
     fn search(&mut self) {
         let mut looks = 0u64;
-        while !self.is_enough(self.queue.lowest().min(self.done)) && self.cells < self.enough.limit {
+        // What is done with bounds the distance by no more than that, whatever is found of the others.
+        let may_gain = |search: &Self| search.queue.lowest() < search.done && search.cells < search.enough.limit;
+        while !self.is_enough(self.queue.lowest().min(self.done)) && may_gain(self) {
             let Some((bound, place)) = self.queue.pop() else { return };
             match place {
                 Place::Voxel(node, most) => self.open(node, most, bound),
@@ -224,7 +228,14 @@ impl<'a> Search<'a> {
                 break;
             }
             let hull = &self.parts[part].hull.corners;
-            if hull.is_empty() || self.is_shallow(&self.parts[part]) {
+            if hull.is_empty() {
+                return;
+            }
+            if self.is_shallow(&self.parts[part]) {
+                // A small part is shallow wherever it is, at an edge of a solid too: it counts.
+                if self.parts[part].aabb.half().length() <= SMALL_PART * self.ground.rounding {
+                    self.done = self.done.min(bound);
+                }
                 return;
             }
             match self.nearest(hull) {

@@ -31,6 +31,11 @@ const SEAM_LIMIT: u64 = 1000;
 /// Steps of the way back to the surface, and of the halving there.
 const STEPS: usize = 60;
 
+/// Each stretch of a ray against a solid without bounds is so many times as long as the one before.
+const LONGER: f64 = 64.0;
+/// The longest one, over the distance of the ray's begin and the reach of the faces: there E is a hundredth of these.
+const LONGEST: f64 = 1e10;
+
 /// What a stretch holds.
 #[derive(Clone, Copy, Debug)]
 enum End {
@@ -61,8 +66,33 @@ fn clipped(line: &Line, aabb: &Aabb) -> Option<(f64, f64)> {
     aabb.along(line.origin, line.direction).filter(|(from, to)| from <= to)
 }
 
-/// A ray against a solid.
+/// A ray against a solid. One without bounds is asked in ever longer stretches: what rounding may do grows with the length, and would hide
+/// what is near.
 pub fn of_ray(solid: &PosedModel, ray: &Ray, options: &RayOptions) -> RayAnswer {
+    let model = solid.model;
+    if model.bounds.root().aabb.is_finite() {
+        return of_stretch(solid, ray, options, None);
+    }
+    let near = scaled::length(ray.origin - solid.pose.position) + model.face_reach + 1.0;
+    let (mut length, mut cells, mut known) = (LONGER * near, 0, None);
+    loop {
+        let stretch = Ray { length: length.min(ray.length), ..*ray };
+        let mut answer = of_stretch(solid, &stretch, options, known);
+        answer.cells += cells;
+        let RayOutcome::Miss { is_inside } = answer.outcome else { return answer };
+        if length >= ray.length {
+            return answer;
+        }
+        if length > LONGEST * near {
+            return RayAnswer { outcome: RayOutcome::Undecided { until: stretch.length }, ..answer };
+        }
+        (length, cells) = (length * LONGER, answer.cells);
+        known = Some(if is_inside { Sought::Complement } else { Sought::Solid });
+    }
+}
+
+/// A ray against a solid in one stretch; `known`: what is sought from its begin on.
+fn of_stretch(solid: &PosedModel, ray: &Ray, options: &RayOptions, known: Option<Sought>) -> RayAnswer {
     let miss = RayAnswer { outcome: RayOutcome::Miss { is_inside: false }, cells: 0 };
     let (model, aabb) = (solid.model, solid.model.bounds.root().aabb);
     if model.solid.is_empty() || aabb.is_empty() {
@@ -102,8 +132,10 @@ pub fn of_ray(solid: &PosedModel, ray: &Ray, options: &RayOptions) -> RayAnswer 
     let open = is_coarse.then_some(f64::INFINITY);
     let mut caster =
         Caster { model, line, sought: Sought::Solid, rounding, level, limit: options.limit, cells: 0, open };
-    if from == 0.0 && caster.begins_inside() {
-        caster.sought = Sought::Complement;
+    match known {
+        Some(sought) => caster.sought = sought,
+        None if from == 0.0 && caster.begins_inside() => caster.sought = Sought::Complement,
+        None => {}
     }
     let is_inside = caster.sought == Sought::Complement;
     let ended = caster.run(length);
