@@ -53,9 +53,13 @@ class Server:
         self.start()
 
     def start(self):
-        self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        line = self.process.stdout.readline()
-        assert self.name in line, f"the server did not start: {line!r}"
+        with tempfile.TemporaryFile("w+") as said:
+            self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=said, text=True)
+            line = self.process.stdout.readline()
+            if self.name not in line:
+                self.kill()
+                said.seek(0)
+                raise AssertionError(f"the server did not start: {line!r}, {said.read()!r}")
 
     def kill(self):
         self.process.kill()

@@ -1,8 +1,11 @@
 """Servers that are not there, no longer there, or not answering: an exception, and the session goes on after it."""
 
 import gc
+import signal
 import subprocess
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -44,6 +47,15 @@ def test_a_killed_server_is_noticed_and_its_successor_told(own_server):
         assert session.finish(timeout=10)[0].time == pytest.approx(0.5, abs=1e-9)
 
 
+def start_later(server):
+    time.sleep(0.4)
+    try:
+        server.start()
+    except BaseException:
+        signal.raise_signal(signal.SIGINT)  # nobody else ends the wait of the main thread
+        raise
+
+
 @pytest.mark.parametrize("timeout", [float("inf"), 1e300, 600.0])
 def test_a_wait_for_a_server_is_as_long_as_it_is_and_ends_by_ctrl_c(own_server, timeout):
     with contactd.connect("own") as session:
@@ -55,10 +67,12 @@ def test_a_wait_for_a_server_is_as_long_as_it_is_and_ends_by_ctrl_c(own_server, 
             session.reconnect(timeout)
         with pytest.raises(contactd.ServerLost):
             session.begin_step(1)
-        later = threading.Timer(0.4, own_server.start)
-        later.start()
-        session.reconnect(timeout)
-        later.join()
+        with ThreadPoolExecutor() as pool:
+            later = pool.submit(start_later, own_server)
+            try:
+                session.reconnect(timeout)
+            finally:
+                later.result()
         session.begin_step(1)[0] = contactd.end(ball, (16, 0, 0))
         assert session.finish(timeout=10)[0].time == 0.5
         for wrong in (-1.0, float("nan")):

@@ -97,8 +97,9 @@ impl Control {
     /// `NoServer`, `Address`, `Version`, `System`.
     pub fn with<T>(address: &Address, make: impl FnOnce(Self) -> Result<T, Error>) -> Result<T, Error> {
         let (incarnation, life) = find(address)?;
-        let node = link::node(&link::config(address, incarnation.epoch)?)?;
-        match Self::on(node, life, incarnation.epoch).and_then(make) {
+        let config = link::config(address, incarnation.epoch)?;
+        let opened = link::node(&config).and_then(|node| Self::on(node, life, incarnation.epoch));
+        match opened.and_then(make) {
             // What cannot be opened because its server is just going is no fault of the system.
             Err(Error::System(_)) if !is_locked(address) || address.current() != Some(incarnation) => {
                 Err(Error::NoServer(address.name().into()))

@@ -14,6 +14,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Where POSIX shared memory shows as files.
 const SHARED_MEMORY: &str = "/dev/shm";
+/// How often a folder that comes and goes is made again.
+const TRIES: u32 = 3;
 
 /// Why a server has no place.
 #[derive(Debug, thiserror::Error)]
@@ -71,10 +73,26 @@ impl Root {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let epoch = now.max(address.current().map_or(0, |last| last.epoch + 1));
         let root = Self { address: address.clone(), epoch, lock };
-        root.remove_leftovers();
-        let folder = address.shared_folder();
-        DirBuilder::new().mode(0o700).create(&folder).map_err(|e| system(&folder, e))?;
+        root.make_shared_folder()?;
         Ok(root)
+    }
+
+    /// Makes iceoryx2's folder anew. A client that waits for this server may have read what its killed predecessor published in
+    /// the moment before it was removed, and looks for that one in the folder, which then cannot be removed or is there again. It
+    /// may stay: names in it carry the epoch.
+    fn make_shared_folder(&self) -> Result<(), RootError> {
+        self.remove_leftovers();
+        let folder = self.address.shared_folder();
+        let own = || folder.symlink_metadata().is_ok_and(|m| m.is_dir() && m.uid() == own_uid());
+        let mut tries = 0..TRIES;
+        loop {
+            match DirBuilder::new().mode(0o700).create(&folder) {
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists && own() => return Ok(()),
+                // It went while it was looked at.
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists && tries.next().is_some() => {}
+                made => return made.map_err(|e| system(&folder, e)),
+            }
+        }
     }
 
     /// The number of this incarnation.
@@ -227,6 +245,26 @@ mod tests {
         let root = Root::take(&address).unwrap();
         assert!(root.epoch() > future && !shm.exists() && !address.shared_folder().join("services").exists());
         assert_eq!(address.current(), None, "nobody is reported before it serves");
+    }
+
+    #[test]
+    fn clients_that_look_for_a_killed_predecessor_stop_no_successor() {
+        let dir = base();
+        let address = Address::under(dir.path(), "looked_for").unwrap();
+        let node = address.shared_folder().join("nodes/old/details");
+        let is_over = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_over.load(std::sync::atomic::Ordering::Relaxed) {
+                    let _ = fs::create_dir_all(&node);
+                    std::thread::yield_now();
+                }
+            });
+            // A server of its own each time, as a supervisor starts one; the folder is there or comes back while it is removed.
+            let taken: Vec<_> = (0..200).map(|_| Root::take(&address).map(drop)).collect();
+            is_over.store(true, std::sync::atomic::Ordering::Relaxed);
+            assert_eq!(taken.iter().filter(|t| t.is_err()).count(), 0, "{taken:?}");
+        });
     }
 
     #[test]
