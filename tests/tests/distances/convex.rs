@@ -318,8 +318,10 @@ fn nearest_points_of_convex_primitives_are_proven_by_supports() {
 fn least_distances_of_moving_convex_primitives_hold_at_all_times() {
     let count = sized("CONTACTD_CONVEX_DISTANCES", 6u64).div_ceil(4);
     let (mut failures, mut asked, mut cells, mut inside) = (Vec::new(), 0, 0, 0);
+    // GJK ends in a flat simplex: from elsewhere it does not.
+    let known = |i: usize, j: usize| ((i, j) == (1, 3)).then_some(2260);
     for (i, j) in (0..KINDS).flat_map(|i| (i..=KINDS).map(move |j| (i, j))) {
-        for n in 0..count {
+        for n in (0..count).chain(known(i, j)) {
             let mut r = Random::new(1 << 63 | ((i * 16 + j) as u64) << 32 | n);
             let pair = Pair::new([i, j], &mut r);
             let d = pair.ask(pair.motions, DEFAULT_LIMIT, over_step);

@@ -26,6 +26,8 @@ const STEPS: Steps = Steps { met: 16.0 * GOOD, last: 1e-8, most: 12, longest: 0.
 const TIP: f64 = 1e-9;
 /// Bounds this near to each other, in rounding's lengths, are of the nearest points: those are moved inwards by a few.
 const PROVEN: f64 = 32.0;
+/// The last of the directions from which GJK starts.
+const LAST: usize = 3;
 /// Faces this near to a point, in the pair's size, are those among which it is moved.
 const NEAR: f64 = 0.05;
 
@@ -172,7 +174,7 @@ impl ConvexPair<'_> {
         let mut best: Option<NearestPair> = None;
         // GJK may end early, by rounding: from elsewhere it goes another way.
         let mut start = None;
-        for round in usize::from(is_finite)..4 {
+        for round in usize::from(is_finite)..=LAST {
             let good = if round == 0 { GOOD } else { EXACT };
             let (points, way) = match placed.nearest(good, start)? {
                 Found::Apart { points, way } => (points, way),
@@ -181,6 +183,11 @@ impl ConvexPair<'_> {
                     let f = placed.0[0].value(x).max(placed.0[1].value(y));
                     let shared = (f <= -rounding).then_some(Pair { x, y, distance: 0.0 });
                     let shared = shared.or_else(|| common::from_point(models, at, x, rounding, 4.0 * rounding));
+                    if shared.is_none() && f > PROVEN * rounding && round < LAST {
+                        // GJK ended in a simplex that rounding made flat.
+                        start = Some(start.unwrap_or(DVec3::X).any_orthonormal_vector());
+                        continue;
+                    }
                     // Of bodies that touch and no more: a point of each beside the touch.
                     let beside = || {
                         let [x, y] = [
