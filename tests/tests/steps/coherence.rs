@@ -158,14 +158,14 @@ fn what_is_remembered_changes_no_bit_of_an_answer() {
     assert!(10 * warm <= 11 * cold, "what is remembered costs more than a tenth");
 }
 
-/// A peg of radius .24 comes down on its hole of radius .25, at an even pace, and slides in.
-fn peg_and_hole(jitter: f64) -> (Vec<u64>, Vec<u64>) {
+/// What a peg of radius .24 costs on its way to a place in each of 100 steps, with memory and without; its hole of radius .25 is in the
+/// middle of a plate.
+fn peg_and_hole(start: DVec3, at: impl Fn(i32) -> DVec3) -> [Vec<Counters>; 2] {
     let plate = part(&Recipe::cuboid(0.8, 0.8, 0.2).minus(Recipe::cylinder(0.25, 1.0)));
     let peg = part(&Recipe::cylinder(0.24, 0.5));
-    let mut r = Random::new(5);
     let mut worlds = [World::new(2, 2), World::new(2, 2)];
     for world in &mut worlds {
-        let start = Pose::at(DVec3::new(0.001, 0.002, 2.0));
+        let start = Pose::at(start);
         world
             .add_object(ObjectSpec { is_static: true, ..ObjectSpec::new(1, &plate, Pose::IDENTITY) })
             .expect("a plate");
@@ -173,28 +173,33 @@ fn peg_and_hole(jitter: f64) -> (Vec<u64>, Vec<u64>) {
     }
     let (mut warm, mut cold) = (vec![], vec![]);
     for k in 1..=100 {
-        let at = DVec3::new(0.001, 0.002, 2.0 - 0.02 * f64::from(k)) + r.vector(jitter);
-        let records = [PoseRecord::end(2, &Pose::at(at))];
-        let cells = |world: &mut World| {
+        let records = [PoseRecord::end(2, &Pose::at(at(k)))];
+        let counted = |world: &mut World| {
             let out = world.step(&records, &StepOptions::default()).expect("a step");
             assert!(!out.contact && !out.undecided);
-            // A look of a shortcut in front of the search counts as a cell.
-            out.counters.cells + out.counters.closed_forms
+            out.counters
         };
         worlds[1].forget();
         let [w, c] = &mut worlds;
-        warm.push(cells(w));
-        cold.push(cells(c));
+        warm.push(counted(w));
+        cold.push(counted(c));
     }
-    warm.sort_unstable();
-    cold.sort_unstable();
-    (warm, cold)
+    [warm, cold]
 }
 
 #[test]
 fn an_approaching_peg_costs_next_to_nothing_a_step() {
     for jitter in [0.0, 1e-6, 1e-4] {
-        let (warm, cold) = peg_and_hole(jitter);
+        // At an even pace, down on its hole and into it.
+        let mut r = Random::new(5);
+        let off: Vec<DVec3> = (0..100).map(|_| r.vector(jitter)).collect();
+        let at = |k: i32| DVec3::new(0.001, 0.002, 2.0 - 0.02 * f64::from(k));
+        // A look of a shortcut in front of the search counts as a cell.
+        let [warm, cold] = peg_and_hole(at(0), |k| at(k) + off[k as usize - 1]).map(|all| {
+            let mut cells: Vec<u64> = all.iter().map(|c| c.cells + c.closed_forms).collect();
+            cells.sort_unstable();
+            cells
+        });
         let sum = |cells: &[u64]| cells.iter().sum::<u64>();
         println!(
             "jitter {jitter:e}: cells a step, median {}, all {}; forgetting: median {}, all {}",
@@ -205,6 +210,19 @@ fn an_approaching_peg_costs_next_to_nothing_a_step() {
         );
         assert!(warm[50] <= 8 && 2 * sum(&warm) < sum(&cold));
     }
+}
+
+#[test]
+fn a_peg_that_never_goes_on_as_it_went_is_not_followed_in_vain() {
+    let mut r = Random::new(6);
+    let places: Vec<DVec3> = (0..=100).map(|_| DVec3::new(0.0, 0.0, 0.3) + r.vector(0.004)).collect();
+    let [warm, cold] = peg_and_hole(places[0], |k| places[k as usize]);
+    let evaluations = |all: &[Counters]| all.iter().map(|c| c.evaluations).sum::<u64>();
+    let looks = |all: &[Counters]| all.iter().map(|c| c.closed_forms).sum::<u64>();
+    println!("{} looks and {} evaluations, forgetting {}", looks(&warm), evaluations(&warm), looks(&cold));
+    // The cavity tells of each step by a few looks. What looks ahead costs thousands of evaluations, each time in vain.
+    assert!(looks(&cold) >= 100 && looks(&warm) <= looks(&cold) && evaluations(&cold) == 0);
+    assert!(evaluations(&warm) < 12_000);
 }
 
 /// Two worlds of the same objects and rules, one of which forgets before every step: what each of them tells.

@@ -37,7 +37,7 @@ const FACTOR: u64 = 4;
 const BESIDE_CELLS: [u64; 2] = [8, 256];
 /// The end of a predicted motion is found to this part of a step.
 const PROOF_SLACK: f64 = 0.25;
-/// Failed predicted motions double the steps that pass before the next one is tried, up to two to this power.
+/// Predicted motions that fail, or save no step, double the steps that pass before the next one is tried, up to two to this power.
 const MOST_WAIT: u32 = 6;
 
 /// Which kind of knowledge has answered last.
@@ -107,7 +107,7 @@ pub struct PairCache {
     /// Steps and clearance of the next predicted motion; 0 until there was one.
     steps: f64,
     clearance: f64,
-    /// Failed predicted motions in a row, and steps to let pass before the next one.
+    /// Predicted motions in a row that saved no step, and steps to let pass before the next one.
     failures: u32,
     wait: u32,
     /// Cells and evaluations of the last search; `None` before the first one and after any that was not clear.
@@ -173,11 +173,15 @@ impl PairCache {
         if let Some(prediction) = self.prediction.as_ref().filter(|_| self.on_prediction) {
             match prediction.strays(q) {
                 Some(way) if way < prediction.clearance => {
+                    self.failures = 0;
                     self.via = Via::PredictedMotion;
                     return Some((clear(), Some(0.0)));
                 }
                 Some(_) if !prediction.is_over(q) => {
-                    // They stray: less far ahead, with more clearance.
+                    // They stray: less far ahead, with more clearance. One that has saved no step has failed as one that was not proven.
+                    if self.via == Via::PredictedMotion && prediction.begin + 1.0 >= q.clock {
+                        self.put_off();
+                    }
                     self.steps = (0.5 * self.steps).max(1.0);
                     self.clearance = (4.0 * self.clearance).min(MOST_CLEARANCE * q.size());
                 }
@@ -235,6 +239,12 @@ impl PairCache {
         Some(Finding { outcome, clearance: clearance.unwrap_or(0.0), known: true, apart: clearance.is_some() })
     }
 
+    /// After another failure: the next predicted motion is tried twice as many steps later.
+    fn put_off(&mut self) {
+        self.failures += 1;
+        self.wait = 1 << self.failures.min(MOST_WAIT);
+    }
+
     /// Tries to prove a predicted motion from here; true when it holds over this step at least.
     fn plan_prediction(
         &mut self,
@@ -263,13 +273,11 @@ impl PairCache {
         *counters += kept.counters;
         let until = if kept.until >= 1.0 { f64::INFINITY } else { kept.until * self.steps };
         if until < 1.0 {
-            self.failures += 1;
-            self.wait = 1 << self.failures.min(MOST_WAIT);
+            self.put_off();
             self.steps = (0.5 * self.steps).max(1.0);
             self.clearance *= 0.25;
             return false;
         }
-        self.failures = 0;
         let motions = q.motions();
         let prediction =
             PredictedMotion { motions, begin: q.clock, steps: self.steps, until, clearance: kept.clearance };

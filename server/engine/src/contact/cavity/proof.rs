@@ -68,13 +68,17 @@ pub(super) enum ProofEnd {
     Open,
 }
 
-/// Two directions and two moments, with the best bounds at each: `[time][direction]`.
+/// Two directions and two moments, with the best bounds at each: `[time][direction]`, by their places among all.
 #[derive(Clone, Copy, Debug)]
 struct Rectangle {
     walls: [Wall; 2],
     times: [usize; 2],
-    best: [[Corner; 2]; 2],
+    best: [[usize; 2]; 2],
 }
+
+/// Bounds at the corners of a rectangle: those of each moment, or one row that is taken for both.
+#[derive(Clone, Copy)]
+struct Bounds<'a>([[&'a Bound; 2]; 2], usize);
 
 /// What a proof keeps of a best bound.
 #[derive(Clone, Copy, Debug)]
@@ -120,7 +124,7 @@ impl Distinct {
 impl CavityPair<'_> {
     /// What must be added to φ at each corner so that positive sums exclude a contact: delta times a linear function that is
     /// nowhere above the weight, less rounding. A norm is no less than the part along any one direction, here the corners' mean.
-    fn reserves(&self, bounds: &[[Bound; 2]], w: &[[DVec3; 2]; 2], distinct: Distinct) -> [[f64; 2]; 2] {
+    fn reserves(&self, Bounds(bounds, _): Bounds, w: &[[DVec3; 2]; 2], distinct: Distinct) -> [[f64; 2]; 2] {
         let (mut sums, mut heaviest) = ([DVec3::ZERO; 3], 0.0f64);
         for e in 0..distinct.rows {
             for c in 0..distinct.columns {
@@ -139,17 +143,17 @@ impl CavityPair<'_> {
         })
     }
 
-    /// Whether bounds at the four corners exclude the rectangle: those of each moment, or one row that is taken for both.
-    fn worth(&self, moments: [&Moment; 2], bounds: &[[Bound; 2]]) -> Worth {
+    /// Whether bounds at the four corners exclude the rectangle.
+    fn worth(&self, moments: [&Moment; 2], of_corners: Bounds) -> Worth {
+        let Bounds(bounds, rows) = of_corners;
         let chord = (bounds[0][0].u - bounds[0][1].u).length_squared();
-        let distinct = Distinct { rows: bounds.len(), columns: if chord > 0.0 { 2 } else { 1 } };
+        let distinct = Distinct { rows, columns: if chord > 0.0 { 2 } else { 1 } };
         let w = distinct.spread(|e, c| bounds[e][c].w());
-        let reserves = self.reserves(bounds, &w, distinct);
+        let reserves = self.reserves(of_corners, &w, distinct);
         // What the motion may take.
         let h = moments[1].at.t - moments[0].at.t;
         let turns = self.relative.turns();
-        let turned =
-            if bounds.len() == 1 { 0.0 } else { (w[1][0] - w[0][0]).length().max((w[1][1] - w[0][1]).length()) };
+        let turned = if rows == 1 { 0.0 } else { (w[1][0] - w[0][0]).length().max((w[1][1] - w[0][1]).length()) };
         let mut half_q = 0.0;
         if turned > 0.0 || turns {
             let motion = self.relative.bounds(moments[0].at.t, h, self.reach);
@@ -175,7 +179,7 @@ impl CavityPair<'_> {
             let takes = |ends: [f64; 2], half_q: f64| ends[0].min(ends[1]) > 0.0 && !holds(ends, half_q);
             let each = Distinct { rows: 2, ..distinct };
             let phi = each.spread(|e, c| {
-                let b = &bounds[e.min(bounds.len() - 1)][c];
+                let b = bounds[e][c];
                 b.base - b.kappa - moments[e].discs[i].0.dot(w[e][c]) - radius * lengths[e][c] + reserves[e][c]
             });
             let corners = [phi[0][0].min(phi[0][1]), phi[1][0].min(phi[1][1])];
@@ -185,7 +189,7 @@ impl CavityPair<'_> {
             if !holds(corners, half_q) {
                 // A wide sector's reserves are less than what its corners have alone.
                 let own = each.spread(|e, c| {
-                    let b = &bounds[e.min(bounds.len() - 1)][c];
+                    let b = bounds[e][c];
                     phi[e][c] - reserves[e][c] + (self.delta * CLAIMED - 2.0 * self.rounding) * b.weight()
                 });
                 let alone = [own[0][0].min(own[0][1]), own[1][0].min(own[1][1])];
@@ -238,11 +242,11 @@ impl CavityPair<'_> {
 
     /// The worth of the best of a few ways to take multipliers over a rectangle: those of its end, of its start, or from
     /// the one to the other.
-    fn worth_of(&self, moments: &[Moment], r: &Rectangle) -> Worth {
+    fn worth_of(&self, moments: &[Moment], corners: &[Corner], r: &Rectangle) -> Worth {
         let both = [&moments[r.times[0]], &moments[r.times[1]]];
-        let bounds = r.best.map(|row| row.map(|b| b.bound));
+        let [start, end] = r.best.map(|row| row.map(|place| &corners[place].bound));
         let mut worth = Worth::None;
-        for bounds in [&bounds[1..], &bounds[..1], &bounds] {
+        for bounds in [Bounds([end; 2], 1), Bounds([start; 2], 1), Bounds([start, end], 2)] {
             let this = self.worth(both, bounds);
             if this == Worth::All {
                 return this;
@@ -264,7 +268,7 @@ impl CavityPair<'_> {
     pub(super) fn kept_out(&self, start: &Moment, end: &Moment) -> bool {
         self.planes.iter().any(|plane| {
             let bound = Bound { u: DVec3::ZERO, base: 0.0, mu: plane.normal, kappa: plane.offset };
-            self.worth([start, end], &[[bound; 2]]) == Worth::All
+            self.worth([start, end], Bounds([[&bound; 2]; 2], 1)) == Worth::All
         })
     }
 
@@ -277,16 +281,20 @@ impl CavityPair<'_> {
             return (ProofEnd::Proven, 2);
         }
         let mut stack: SmallVec<[Rectangle; 16]> = SmallVec::new();
-        let row = |wall: Wall, moments: &[Moment]| [self.corner(&moments[0], wall), self.corner(&moments[1], wall)];
+        let mut corners: SmallVec<[Corner; 16]> = SmallVec::new();
+        let placed = |corners: &mut SmallVec<[Corner; 16]>, m: &Moment, wall: Wall| {
+            corners.push(self.corner(m, wall));
+            corners.len() - 1
+        };
         for j in 0..self.flats.len() {
-            let [s, e] = row(Wall::Flat(j), &moments);
+            let [s, e] = [0, 1].map(|k| placed(&mut corners, &moments[k], Wall::Flat(j)));
             stack.push(Rectangle { walls: [Wall::Flat(j); 2], times: [0, 1], best: [[s; 2], [e; 2]] });
         }
         if let Some(round) = &self.round {
             let u = toward.unwrap_or(self.directions[0]);
             let v = round.axis.cross(u);
             let around = [u, v, -u, -v];
-            let rows = around.map(|u| row(Wall::Round(u), &moments));
+            let rows = around.map(|u| [0, 1].map(|k| placed(&mut corners, &moments[k], Wall::Round(u))));
             for k in 0..4 {
                 let l = (k + 1) % 4;
                 let best = [[rows[k][0], rows[l][0]], [rows[k][1], rows[l][1]]];
@@ -296,13 +304,14 @@ impl CavityPair<'_> {
         for _ in 0..MOST_RECTANGLES {
             let Some(r) = stack.pop() else { return (ProofEnd::Proven, moments.len() as u64) };
             for (e, row) in r.best.iter().enumerate() {
-                for (best, wall) in row.iter().zip(r.walls) {
+                for (place, wall) in row.iter().zip(r.walls) {
+                    let best = &corners[*place];
                     if best.phi + best.reserve <= 0.0 {
                         return (ProofEnd::Met(moments[r.times[e]].at.t, wall), moments.len() as u64);
                     }
                 }
             }
-            match self.worth_of(&moments, &r) {
+            match self.worth_of(&moments, &corners, &r) {
                 Worth::All => {}
                 Worth::Corners => {
                     let [Wall::Round(from), Wall::Round(to)] = r.walls else { break };
@@ -310,7 +319,7 @@ impl CavityPair<'_> {
                         break;
                     }
                     // Where the end's φ is lowest, if it is within.
-                    let slopes = [0, 1].map(|k| r.best[1][k].slope);
+                    let slopes = r.best[1].map(|place| corners[place].slope);
                     let mut part = 0.5;
                     if slopes[0] < 0.0 && slopes[1] > 0.0 {
                         let lowest = slopes[0] / (slopes[0] - slopes[1]);
@@ -319,7 +328,7 @@ impl CavityPair<'_> {
                         }
                     }
                     let middle = Wall::Round(from.lerp(to, part).normalize());
-                    let best = r.times.map(|t| self.corner(&moments[t], middle));
+                    let best = r.times.map(|t| placed(&mut corners, &moments[t], middle));
                     let [[a, b], [c, d]] = r.best;
                     stack.push(Rectangle { walls: [middle, r.walls[1]], best: [[best[0], b], [best[1], d]], ..r });
                     stack.push(Rectangle { walls: [r.walls[0], middle], best: [[a, best[0]], [c, best[1]]], ..r });
@@ -335,7 +344,7 @@ impl CavityPair<'_> {
                         moments.push(self.moment(middle));
                         moments.len() - 1
                     });
-                    let best = r.walls.map(|wall| self.corner(&moments[t], wall));
+                    let best = r.walls.map(|wall| placed(&mut corners, &moments[t], wall));
                     stack.push(Rectangle { times: [t, r.times[1]], best: [best, r.best[1]], ..r });
                     stack.push(Rectangle { times: [r.times[0], t], best: [r.best[0], best], ..r });
                 }

@@ -255,7 +255,10 @@ impl<'a> ConvexParts<'a> {
 
     /// True when they stay farther apart than `least` (a length) over the whole step.
     pub fn stay_apart(self, least: f64) -> bool {
-        let m = self.0.moment(0.0);
+        let (m, end) = (self.0.moment(0.0), self.0.moment(1.0));
+        if self.0.stays(&m, &end, least, Pace { least, ..self.0.pace }) {
+            return true;
+        }
         let start = self.0.widest(&m, m.b.support(DVec3::ZERO) - self.0.a.0.ball.center);
         start.is_some_and(|start| ConvexPair { bodies: Bodies::Two(self.0), start }.keeps(least).0 >= 1.0)
     }
@@ -333,10 +336,15 @@ impl<'a> Advance<'a> {
 
     /// True when the way between the centres, without a distance, keeps the bodies apart for the whole step.
     fn frees_all(&self, m: &Moment, end: &Moment) -> bool {
-        let way = m.at.world_from_a * (m.b.support(DVec3::ZERO) - self.a.0.ball.center);
+        self.stays(m, end, APART * self.task.delta, self.pace)
+    }
+
+    /// True when along the way between the centres the gap is above `start` at first and above what `pace` asks for the whole step.
+    fn stays(&self, m: &Moment, end: &Moment, start: f64, pace: Pace) -> bool {
+        let way = m.at.world_from_a * (m.b.center() - self.a.1.center());
         let Some(n) = way.try_normalize() else { return false };
         let here = self.gap(m, n);
-        here.phi > APART * self.task.delta && self.pace.proven(&here, &self.gap(end, n)) >= 1.0
+        here.phi > start && pace.proven(&here, &self.gap(end, n)) >= 1.0
     }
 
     fn run(&self, contacts: &mut Contacts, along: Option<DVec3>) -> Option<Ending> {

@@ -80,15 +80,19 @@ impl Corners {
     /// The outermost along a direction of any length, the first of equals, and its height.
     #[inline]
     pub fn farthest(&self, along: DVec3) -> (f64, DVec3) {
-        let first = (f64::NEG_INFINITY, self.all[0]);
-        let farther = |best: (f64, DVec3), v: DVec3| {
-            let height = along.dot(v);
-            if height > best.0 { (height, v) } else { best }
+        // Of the best its place alone is kept: its corner is read once.
+        let (mut highest, mut best) = (f64::NEG_INFINITY, 0);
+        let mut look = |place: usize| {
+            let height = along.dot(self.all[place]);
+            if height > highest {
+                (highest, best) = (height, place);
+            }
         };
         match self.foremost(along) {
-            Some(some) => some.iter().map(|i| self.all[*i as usize]).fold(first, farther),
-            None => self.all.iter().copied().fold(first, farther),
+            Some(some) => some.iter().for_each(|i| look(*i as usize)),
+            None => (0..self.all.len()).for_each(look),
         }
+        (highest, self.all[best])
     }
 }
 
