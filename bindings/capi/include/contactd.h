@@ -1209,8 +1209,9 @@ int32_t contactd_attach(struct contactd_session *session,
                         const uint32_t *touching,
                         size_t count);
 
-// The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules say. Nothing
-// where it is not attached.
+// The part stays where it is (at `options.advance` of the last step), in the frame that it had of its own, with what is attached to it, and
+// is tested as the rules say. Nothing where it is not attached. `advance` must be left as it is until the next step, here and where a part
+// is attached or its carrier removed: a step that begins elsewhere is misuse.
 int32_t contactd_detach(struct contactd_session *session,
                         uint32_t part);
 

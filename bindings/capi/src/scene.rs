@@ -103,8 +103,9 @@ pub unsafe extern "C" fn contactd_attach(
     unsafe { on(session, call) }
 }
 
-/// The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules say. Nothing
-/// where it is not attached.
+/// The part stays where it is (at `options.advance` of the last step), in the frame that it had of its own, with what is attached to it, and
+/// is tested as the rules say. Nothing where it is not attached. `advance` must be left as it is until the next step, here and where a part
+/// is attached or its carrier removed: a step that begins elsewhere is misuse.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_detach(session: *mut Session, part: u32) -> i32 {
     // SAFETY: the caller's handle (3).

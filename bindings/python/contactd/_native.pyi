@@ -162,8 +162,9 @@ class Session:
         ``Misuse``. ``Misuse``, too: a part to itself or to what it carries, and names that other objects share with those that are not
         tested."""
     def detach(self, part: int) -> None:
-        """The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules
-        say."""
+        """The part stays where it is (at ``options.advance`` of the last step), in the frame that it had of its own, with what is
+        attached to it, and is tested as the rules say. ``advance`` must be left as it is until the next step, here and where a part is
+        attached or its carrier removed: a step that begins elsewhere is ``Misuse``."""
     def carrier(self, part: int) -> int | None:
         """The object at the end of a part's chain, whose records it gets; None where it is not attached."""
     def allow(self, pairs: Sequence[Sequence[int]], allowed: bool = True) -> None:

@@ -104,12 +104,12 @@ impl Session {
         self.with(py, |s| detached(py, s, work))?.map_err(|e| errors::of(py, &e))
     }
 
-    /// A call of the session with the interpreter's lock released.
+    /// A call of the session with the interpreter's lock released, with the options that the next step has.
     fn call<R: Send>(slf: &Bound<'_, Self>, work: impl FnOnce(&mut Inner) -> Result<R, Error> + Send) -> PyResult<R> {
-        Self::enter(slf)?.detached(slf.py(), work)
+        Self::whole(slf, work)?.map_err(|e| errors::of(slf.py(), &e))
     }
 
-    /// The same of work with failures of its own, with the options that the next step has.
+    /// The same of work with failures of its own.
     pub fn whole<R: Send>(slf: &Bound<'_, Self>, work: impl FnOnce(&mut Inner) -> R + Send) -> PyResult<R> {
         let py = slf.py();
         let this = Self::enter(slf)?;
@@ -143,6 +143,8 @@ impl Session {
     ) -> PyResult<Py<Slots>> {
         let py = slf.py();
         let mut this = Self::fresh(slf)?;
+        let options = StepOptions::from(&*this.options.try_borrow(py)?);
+        this.with(py, |s| s.options = options)?;
         let loaned = this.with(py, |s| loan(s).map(|slots| (slots.as_mut_ptr().cast_const(), slots.len())))?;
         let (start, n) = loaned.map_err(|e| errors::of(py, &e))?;
         let spare = this.spare_poses.iter().flatten().find(|slots| {
@@ -379,8 +381,7 @@ impl Session {
     /// From now on ``part`` moves with ``carrier`` as it stands to it, and is not tested against it nor against the objects in ``touching``.
     #[pyo3(signature = (part, carrier, touching = Vec::new()))]
     fn attach(slf: &Bound<'_, Self>, part: u32, carrier: u32, touching: Vec<u32>) -> PyResult<()> {
-        let attached = Self::whole(slf, move |s| s.attach(part, carrier, &touching))?;
-        attached.map_err(|e| errors::of(slf.py(), &e))
+        Self::call(slf, move |s| s.attach(part, carrier, &touching))
     }
 
     /// The part stays where it is, in the frame that it had of its own, with what is attached to it, and is tested as the rules say.

@@ -45,6 +45,12 @@ struct Attached {
     touching: Vec<u32>,
 }
 
+/// A part that is given another frame rests there; where the next step begins is told once.
+const ADVANCED: Error = Error::Misuse(
+    "what was attached, detached or had its carrier removed since the last step stands where `advance` was set to then: set it before, and \
+     leave it until the step",
+);
+
 /// The most records of one object in a batch: a start and a motion.
 const RECORDS: usize = 2;
 
@@ -66,6 +72,8 @@ pub(super) struct Company {
     owes_rules: bool,
     /// Objects may have other frames than they should.
     owes_frames: bool,
+    /// The `advance` at which parts were given frames since the last step.
+    framed_at: Option<f64>,
 }
 
 impl Company {
@@ -231,7 +239,8 @@ impl<T: Transport> Session<T> {
         Ok(())
     }
 
-    /// From now on `part` moves with `carrier`, as it stands to it (at `options.advance` of the last step), and is not tested against it,
+    /// From now on `part` moves with `carrier`, as it stands to it (at `options.advance` of the last step, which must be left as it is until the
+    /// next one), and is not tested against it,
     /// nor against the objects in `touching`: those that a gripper holds it with. It has the carrier's frame and gets its records, and none
     /// of its own. What is attached to the part goes along. A carrier that is attached itself hands it on to its own.
     ///
@@ -246,6 +255,7 @@ impl<T: Transport> Session<T> {
             return Err(Error::Misuse("expected objects of this session that the part may touch"));
         }
         self.settle()?;
+        self.check_advance()?;
         let (root, held) = (self.company.root_of(carrier), Pose::IDENTITY);
         let touching = touching.iter().copied().chain([carrier]).collect();
         let before = self.company.attached.clone();
@@ -258,23 +268,26 @@ impl<T: Transport> Session<T> {
                 self.hand_over(part, root).and_then(|()| self.tell_rules())
             }
         };
-        self.company.owes_frames &= done.is_err();
+        // Refused before any part had another frame, as for an object that is not there: nothing is owed.
+        let is_refused = matches!(done, Err(Error::Refused { .. })) && self.company.framed_at.is_none();
+        self.company.owes_frames &= done.is_err() && !is_refused;
         done.inspect_err(|_| {
             self.company.attached = before;
             self.company.change();
         })
     }
 
-    /// The part stays where it is from now on, in the frame that it had of its own, and is tested as the rules say; what is attached to it
-    /// goes with it. Nothing where it is not attached.
+    /// The part stays where it is from now on (at `options.advance` of the last step, which must be left as it is until the next one), in the
+    /// frame that it had of its own, and is tested as the rules say; what is attached to it goes with it. Nothing where it is not attached.
     ///
     /// # Errors
-    /// As `set_rules`.
+    /// As `set_rules`; `Misuse` where parts were given frames since the last step at another `advance`.
     pub fn detach(&mut self, part: u32) -> Result<(), Error> {
         self.settle()?;
         if !self.company.is_attached(part) {
             return Ok(());
         }
+        self.check_advance()?;
         self.release(part)?;
         self.tell_rules()
     }
@@ -359,6 +372,8 @@ impl<T: Transport> Session<T> {
     /// `Refused`: unknown model, bad pose or speed, too many objects, resolution; `Misuse`: a name of an object that is attached or allowed
     /// to meet another one; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn add_object(&mut self, object: Object) -> Result<u32, Error> {
+        // What is owed first: the object is there in any case once it was added.
+        self.settle()?;
         let id = self.last_object + 1;
         let spec = object.spec(id);
         if self.company.is_taken(&spec.name) {
@@ -382,15 +397,18 @@ impl<T: Transport> Session<T> {
         Ok(id)
     }
 
-    /// Removes an object; its id is not used again. What it carried stays where it is, as if it was detached before.
+    /// Removes an object; its id is not used again. What it carried stays where it is, as if it was detached before (see `detach`).
     ///
     /// # Errors
-    /// `Refused`: unknown object; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
+    /// `Refused`: unknown object; `Misuse` as for `detach`; `ServerLost`, `ReplyLost`, `Timeout`, `System`.
     pub fn remove_object(&mut self, object: u32) -> Result<(), Error> {
         self.settle()?;
         let is_excepted = self.company.is_excepted(object);
         let carried: Vec<u32> =
             self.company.attached.iter().filter(|(_, a)| a.carrier == object).map(|(part, _)| *part).collect();
+        if !carried.is_empty() {
+            self.check_advance()?;
+        }
         for part in carried {
             self.release(part)?;
         }
@@ -456,12 +474,24 @@ impl<T: Transport> Session<T> {
 
     /// Gives a part the frame of another object, where it stands: that frame, and where the part's model lies in it.
     fn carry(&mut self, object: u32, carrier: u32) -> Result<Frame, Error> {
+        self.check_advance()?;
         let advance = self.options.advance;
         let answer = self.command(Command::Carry { object, carrier, advance })?;
         let Answer::Reframed(wire) = &answer else { return Err(unexpected(&answer)) };
         let (place, pose) = wire.checked().map_err(|_| unexpected(&answer))?;
         self.reframed(wire, place);
+        self.company.framed_at = Some(advance);
         Ok(Frame { object, place, pose })
+    }
+
+    /// Whether the parts that have other frames since the last step stand where the next one begins.
+    pub(super) fn check_advance(&self) -> Result<(), Error> {
+        if self.company.framed_at.is_some_and(|at| at != self.options.advance) { Err(ADVANCED) } else { Ok(()) }
+    }
+
+    /// A step has begun where its options say.
+    pub(super) fn advanced(&mut self) {
+        self.company.framed_at = None;
     }
 
     /// Notes that an object has another frame.

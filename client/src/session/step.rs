@@ -66,6 +66,7 @@ impl<T: Transport> Session<T> {
             Stage::Lost => return Err(Error::ServerLost),
             Stage::Idle | Stage::Sent => return Err(Error::Misuse("no step was begun")),
         }
+        self.check_advance()?;
         let records = match self.company.slots() {
             0 => self.own_slots,
             _ => {
@@ -143,6 +144,7 @@ impl<T: Transport> Session<T> {
             self.journal.accepted();
         }
         self.options.advance = 1.0;
+        self.advanced();
         match self.transport.reply() {
             Some((header, slots)) => Ok(Reply::of(*header, slots)),
             None => Err(absent()),

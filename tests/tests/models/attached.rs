@@ -6,7 +6,7 @@ use super::load::{one_joint, served};
 use super::robots::{Arm, turn};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd::load::{LoadOptions, LoadScene};
-use contactd_client::solid::cuboid;
+use contactd_client::solid::{cuboid, sphere};
 use contactd_client::transport::{Opened, Transport};
 use contactd_client::{Error, Frame, Object, Session};
 use contactd_proto::control::{Answer, Command};
@@ -391,4 +391,66 @@ fn what_a_carrier_that_is_gone_held_is_tested_against_all() {
     let far = PoseRecord::start(wall, &Pose::at(DVec3::X * f64::NAN));
     session.begin_step(1).expect("a slot")[0] = far;
     assert!(matches!(session.finish(PATIENCE), Err(Error::Refused { index: Some(0), .. })));
+}
+
+/// A session with a carrier that goes and turns over a step, parts on it and a part on a part.
+fn carried(r: &mut Random) -> (Session<Embedded>, u32, Vec<(u32, DMat4)>, impl Fn(f64) -> DMat4 + use<>) {
+    let mut session = contactd::embedded(&ServerConfig::default()).expect("an engine");
+    let model = session.load_model("box", &cuboid(1.0, 1.0, 1.0)).expect("a box").id;
+    let start = pose(r);
+    let carrier = session.add_object(Object::new("carrier", model).at(start)).expect("a carrier");
+    let (mut on, mut parts) = (carrier, Vec::new());
+    for k in 0..3 {
+        let at = pose(r);
+        let part = session.add_object(Object::new(&format!("part {k}"), model).at(at)).expect("a part");
+        session.attach(part, on, &[]).expect("attached");
+        parts.push((part, matrix(&start).inverse() * matrix(&at)));
+        on = if r.chance(0.5) { part } else { carrier };
+    }
+    let (to, spin) = (r.vector(3.0), r.vector(3.0));
+    let slots = session.begin_step(1).expect("slots");
+    slots[0] = PoseRecord::turn(carrier, to, spin);
+    session.finish(PATIENCE).expect("a step");
+    let stands = move |t: f64| {
+        let rotation = quat_of_rotation_vector(spin * t) * start.rotation;
+        matrix(&Pose::new(start.position.lerp(to, t), rotation))
+    };
+    (session, carrier, parts, stands)
+}
+
+#[test]
+fn what_is_let_go_in_the_middle_of_a_step_is_where_its_carrier_is_then() {
+    for seed in 0..sized("CONTACTD_ATTACHED", 40u64) {
+        let mut r = Random::new(seed);
+        let (mut session, carrier, parts, stands) = carried(&mut r);
+        let t = r.within(0.0, 1.0);
+        session.options.advance = t;
+        match r.below(3) {
+            0 => session.detach(parts[r.below(3)].0).expect("detached"),
+            1 => session.remove_object(carrier).expect("removed"),
+            _ => {
+                session.detach(parts[0].0).expect("detached");
+                session.attach(parts[0].0, carrier, &[]).expect("attached again");
+            }
+        }
+        // At another time they would stand elsewhere than what carried them.
+        session.options.advance = 0.5 * t;
+        session.begin_step(0).expect("slots");
+        let refused = session.finish(PATIENCE).err().map(|e| e.to_string());
+        assert!(refused.is_some_and(|e| e.contains("set it before, and leave it until the step")));
+        session.options.advance = t;
+        session.begin_step(0).expect("slots");
+        session.finish(PATIENCE).expect("a step");
+        for (part, held) in parts {
+            is_at(&mut session, part, DVec3::ONE, stands(t) * held);
+        }
+        // What is refused owes nothing, and changes nothing.
+        let model = session.load_model("ball", &sphere(1.0)).expect("a ball").id;
+        let part = session.add_object(Object::new("another", model)).expect("a part");
+        assert!(session.attach(part, 99, &[]).is_err());
+        // From there on the next step may begin anywhere.
+        session.options.advance = 0.5;
+        session.begin_step(0).expect("slots");
+        session.finish(PATIENCE).expect("a step");
+    }
 }
