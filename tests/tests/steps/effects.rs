@@ -2,9 +2,11 @@
 //! it is on, and asking for less changes no bit of what remains. Over embedded sessions, so that what is compared is what a
 //! client reads. `CONTACTD_MARGINS` sets the number of random pairs with a margin (`CONTACTD_MARGINS=60`).
 
+use contactd::contact::distance::{DistanceQuery, over_step, over_step_heeding};
 use contactd::contact::margin::{MARGIN_SLACK, apart_until};
 use contactd::contact::{QueryOptions, Scratch, Status, Verdict, earliest_contact};
 use contactd::ipc::{Embedded, ServerConfig};
+use contactd::math::halt::Halt;
 use contactd::octree::Model;
 use contactd_client::{Error, Object, Session};
 use contactd_proto::contact_record::{
@@ -20,6 +22,7 @@ use contactd_tests::reference::{Moving, deepest};
 use contactd_tests::scenes::{self, Recipe};
 use contactd_tests::sweep::sized;
 use glam::DVec3;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A plate whose top is at z = 0, with a hole far from everything: what meets it takes a search.
@@ -270,13 +273,9 @@ fn sensors_are_told_and_stop_nothing() {
 
 #[test]
 fn discrete_pairs_are_tested_at_their_end_and_say_when_that_may_not_do() {
-    let run = |detect| {
-        Cell::balls(3, 3.0, &[rule(|r| r.detect = detect)]).step(&[
-            down(0, 0.0, 0.5),
-            down(1, 4.0, -9.0),
-            down(2, 8.0, 2.9),
-        ])
-    };
+    let of_rule =
+        |rule: Rule| Cell::balls(3, 3.0, &[rule]).step(&[down(0, 0.0, 0.5), down(1, 4.0, -9.0), down(2, 8.0, 2.9)]);
+    let run = |detect| of_rule(rule(|r| r.detect = detect));
     let (continuous, discrete) = (run(Detect::Continuous), run(Detect::Discrete));
     assert_eq!(continuous.statuses(), [(1, 3, CONTACT), (1, 2, CONTACT)]);
     assert_eq!((continuous.effects().discrete, continuous.header.counters.may_have_passed), (0, 0));
@@ -285,6 +284,10 @@ fn discrete_pairs_are_tested_at_their_end_and_say_when_that_may_not_do() {
     assert_eq!(discrete.records[0].time, 1.0);
     assert_eq!(discrete.effects(), only(|c| (c.discrete, c.contacts) = (2, 1)));
     assert_eq!(discrete.header.counters.may_have_passed, 1);
+    // What they are at the end is no overlap that they start in.
+    let past =
+        of_rule(rule(|r| (r.detect, r.initial_overlap) = (Detect::Discrete, InitialOverlap::IgnoreIfSeparating)));
+    assert_eq!((past.statuses(), past.effects()), (discrete.statuses(), discrete.effects()));
 }
 
 /// What the motion itself rules out is not worked out, whatever the rules ask for.
@@ -445,6 +448,39 @@ fn a_hit_is_told_only_once_the_start_is_free() {
             assert_eq!(o.status(), Status::Overlap, "{i}, {report:?}: {o:?}");
         }
     }
+}
+
+/// What comes after the end of a step's time takes no more work, and says no more than is proven.
+#[test]
+fn margins_and_distances_end_with_the_time_of_a_step() {
+    let halt = Arc::new(Halt::default());
+    halt.set();
+    let mut r = Random::new(517);
+    let (mut whole, mut cut) = ([0; 2], [0; 2]);
+    for _ in 0..8 {
+        let scene = scenes::trees(&mut r);
+        let (a, b) = (Model::new(scene.a.build()), Model::new(scene.b.build()));
+        let query = question_of(&scene, [&a, &b], QueryOptions::CONTACT);
+        // Nearer than the octrees know, and farther.
+        for part in [1e-3, 2.0] {
+            let margin = part * a.radius.min(b.radius);
+            let cells = |scratch: &mut Scratch| {
+                let (until, _, work) = apart_until(&query, margin, scratch);
+                (until, work.cells + work.instant_cells)
+            };
+            let (until, all) = cells(&mut Scratch::default());
+            let (early, few) = cells(&mut Scratch::heeding(Some(halt.clone())));
+            assert!(early <= until, "{early} and {until}");
+            (whole[0], cut[0]) = (whole[0] + all, cut[0] + few);
+        }
+        let mut asked = DistanceQuery { a: query.a, b: query.b, tolerance: 1e-6, limit: 20_000 };
+        asked.b.placed.motion.start.position += r.direction() * (2.0 * (a.radius + b.radius));
+        let (all, few) = (over_step(&asked), over_step_heeding(&asked, &halt));
+        assert!(few.lower <= all.upper && all.lower <= few.upper, "{few:?} and {all:?}");
+        (whole[1], cut[1]) = (whole[1] + all.cells, cut[1] + few.cells);
+    }
+    println!("cells of margins and distances: {whole:?}, {cut:?} after the end");
+    assert!((0..2).all(|k| whole[k] > 500 && 20 * cut[k] < whole[k]), "{whole:?} {cut:?}");
 }
 
 /// Random pairs that pass each other: before the margin's time the slow reference finds them farther apart than the margin,

@@ -182,7 +182,7 @@ pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (
     }
     let level = 0.5 * distance + 8.0 * task.rounding;
     if level > 0.99 * reach(&task) {
-        let work = Work::new(task.limit);
+        let work = Work::heeding(task.limit, scratch.halt.clone());
         let (until, known) = advance(&task, level, &work);
         return (until, known, Counters { instant_cells: work.cells(), ..Counters::default() });
     }
@@ -267,11 +267,11 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
     let level = 0.5 * distance;
     task.limit = task.limit.min(region::MOST_CELLS);
     if level > 0.99 * reach(&task) {
-        let work = Work::new(task.limit);
+        let work = Work::heeding(task.limit, scratch.halt.clone());
         let within = within(&task, &task.relative.at(0.0), level, &work);
         return (within, work.cells());
     }
-    let work = Work::new(task.limit);
+    let work = Work::heeding(task.limit, scratch.halt.clone());
     // Of two convex primitives a point between the nearest, or a common one, mostly is as near as that.
     let between = || ConvexPair::between(task);
     if let Some(x) = glimpse(&task, &task.relative.at(0.0), level, between, &work) {

@@ -26,12 +26,12 @@ impl PairPlan {
     /// The plan of pairs in a scene without rules.
     pub const DEFAULT: Self = Self(Effects::DEFAULT);
 
-    /// What it asks of a search. Regions are asked for beside it.
+    /// What it asks of a search. Regions are asked for beside it. Where the end of the step alone is looked at nothing is past.
     pub fn query_options(&self) -> QueryOptions {
         QueryOptions {
             report: self.report.min(Report::Contact),
             penetration: self.penetration,
-            past_overlap: self.initial_overlap == InitialOverlap::IgnoreIfSeparating,
+            past_overlap: self.initial_overlap == InitialOverlap::IgnoreIfSeparating && self.detect != Detect::Discrete,
         }
     }
 

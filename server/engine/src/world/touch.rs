@@ -134,7 +134,10 @@ pub(super) fn measure(
         let query = DistanceQuery { a, b, tolerance: p.plan.clearance, limit };
         let pair = (bodies[job.a as usize].id, bodies[job.b as usize].id);
         let found = known.recall(pair, &query).unwrap_or_else(|| {
-            let found = distance::over_step(&query);
+            let found = match heed {
+                Some(heed) => distance::over_step_heeding(&query, &heed.halt),
+                None => distance::over_step(&query),
+            };
             out.effect_counters.clearances += 1;
             out.counters.instant_cells += found.cells;
             found

@@ -19,6 +19,7 @@ mod span;
 use crate::contact::exclusion::rounding;
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::query::question::{PlacedModel, without_own_spin};
+use crate::math::halt::Halt;
 use crate::motion::Relative;
 use crate::octree::Model;
 use glam::DVec3;
@@ -80,16 +81,21 @@ pub struct Distance {
 
 /// The distance of two bodies at a time of their motion, fraction of the step.
 pub fn at_instant(query: &DistanceQuery, time: f64) -> Distance {
-    between(query, time, time)
+    between(query, time, time, None)
 }
 
 /// The least distance of two bodies over their motion.
 pub fn over_step(query: &DistanceQuery) -> Distance {
-    between(query, 0.0, 1.0)
+    between(query, 0.0, 1.0, None)
+}
+
+/// The same, where `halt` ends the search as its limit does.
+pub fn over_step_heeding(query: &DistanceQuery, halt: &Halt) -> Distance {
+    between(query, 0.0, 1.0, Some(halt))
 }
 
 /// The least distance between two times of the motion.
-fn between(query: &DistanceQuery, from: f64, to: f64) -> Distance {
+fn between(query: &DistanceQuery, from: f64, to: f64, halt: Option<&Halt>) -> Distance {
     let (a, b) = (without_own_spin(&query.a), without_own_spin(&query.b));
     let (model_a, model_b) = (query.a.model, query.b.model);
     if model_a.solid.is_empty() || model_b.solid.is_empty() {
@@ -112,7 +118,7 @@ fn between(query: &DistanceQuery, from: f64, to: f64) -> Distance {
     {
         return answer;
     }
-    search::Search::new(query, [relative, Relative::new(b, a)], rounding).run(from, to)
+    search::Search::new(query, [relative, Relative::new(b, a)], rounding, halt).run(from, to)
 }
 
 /// What rounding may take from a bound, a length: of faces and poses, of hulls and supports.

@@ -7,6 +7,7 @@ use super::polytope::support;
 use super::span::{Span, Stray};
 use super::{Distance, DistanceQuery, LEAST, NearPoint, common, slack};
 use crate::math::gjk::{Cores, of_supports};
+use crate::math::halt::Halt;
 use crate::math::{Aabb, BoundQueue};
 use crate::motion::{Instant, Relative, Sweep};
 use crate::octree::Model;
@@ -64,6 +65,7 @@ pub struct Search<'a> {
     slack: f64,
     scale: f64,
     limit: u64,
+    halt: Option<&'a Halt>,
     queue: BoundQueue<Cell>,
     /// The least bound of what is done with.
     done: f64,
@@ -81,7 +83,7 @@ enum Look {
 
 impl<'a> Search<'a> {
     /// A search for the distance of two bodies that have points.
-    pub fn new(query: &DistanceQuery<'a>, relative: [Relative; 2], rounding: f64) -> Self {
+    pub fn new(query: &DistanceQuery<'a>, relative: [Relative; 2], rounding: f64, halt: Option<&'a Halt>) -> Self {
         let models = [query.a.model, query.b.model];
         let scale = models[0].size().max(models[1].size());
         let slack = slack(models, &relative[0], rounding);
@@ -96,6 +98,7 @@ impl<'a> Search<'a> {
             slack,
             scale,
             limit: query.limit,
+            halt,
             queue: BoundQueue::new(),
             done: f64::INFINITY,
             best: None,
@@ -322,7 +325,11 @@ impl<'a> Search<'a> {
     }
 
     fn is_enough(&self) -> bool {
-        self.queue.lowest() >= self.goal() || self.upper == 0.0 || self.cells >= self.limit
+        self.queue.lowest() >= self.goal() || self.upper == 0.0 || self.is_spent()
+    }
+
+    fn is_spent(&self) -> bool {
+        self.cells >= self.limit || self.halt.is_some_and(Halt::is_over)
     }
 
     fn search(&mut self) {
