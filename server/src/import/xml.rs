@@ -142,6 +142,15 @@ pub fn finite(node: Node<'_, '_>, word: &str, what: &str) -> Result<f64> {
     number.ok_or_else(|| wrong(node, format!("a finite number as {what} of {}", node.tag_name().name()), Some(word)))
 }
 
+/// Whether `word` of `node` is the first of two words or the second; `what` tells what it stands for.
+///
+/// # Errors
+/// What is neither, letter by letter.
+pub fn either(node: Node<'_, '_>, word: &str, what: &str, [yes, no]: [&str; 2]) -> Result<bool> {
+    let is_yes = word == yes;
+    if is_yes || word == no { Ok(is_yes) } else { Err(wrong(node, format!("{yes} or {no} as {what}"), Some(word))) }
+}
+
 /// Something else than `expected` stands in a node.
 pub fn wrong(node: Node<'_, '_>, expected: impl Into<String>, found: Option<&str>) -> (Place, Problem) {
     let found = match found {

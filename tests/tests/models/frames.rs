@@ -4,7 +4,7 @@
 //! `CONTACTD_FRAMES=5000 cargo test --release -p contactd-tests --test models frames::` sets the number of random worlds (60 by default).
 
 use super::robots::{Maker, frame, models, read, turn, words};
-use contactd::import::robot::{Ask, Values, read_robot, scene_of};
+use contactd::import::robot::{Ask, DofKind, Robot, Values, read_robot, scene_of};
 use contactd::import::{Facets, Limits};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
@@ -471,5 +471,108 @@ fn frames_that_lead_nowhere_are_one_sentence() {
     ] {
         let told = of(&inner);
         assert!(told.contains(words) && told.lines().count() == 1, "{inner}: {told}");
+    }
+}
+
+/// Flags of SDFormat in capital letters and small ones, as numbers and within spaces, and words that are none.
+#[test]
+fn flags_are_read_in_any_letters_and_others_are_one_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let links = "<link name=\"a\"/><link name=\"b\"/>";
+    std::fs::write(folder.join("in.sdf"), "<sdf version=\"1.9\"><model name=\"k\"><link name=\"c\"/></model></sdf>")
+        .expect("written");
+    let robot = |text: &str| {
+        let path = folder.join("w.sdf");
+        std::fs::write(&path, text).expect("written");
+        read_robot(&path, &Ask::default()).map_err(|e| e.to_string())
+    };
+    let model = |inner: &str| robot(&format!("<sdf version=\"1.9\"><model name=\"m\">\n{inner}</model></sdf>"));
+    let world = |inner: &str| robot(&format!("<sdf version=\"1.9\"><world name=\"w\">\n{inner}</world></sdf>"));
+    let joint = |word: &str| {
+        let axis = format!("<axis><xyz>1 0 0</xyz><use_parent_model_frame>{word}</use_parent_model_frame></axis>");
+        let ends = "<parent>a</parent><child>b</child>";
+        let turned = "<link name=\"a\"/><link name=\"b\"><pose>0 0 0 0 0 1</pose></link>";
+        model(&format!("{turned}\n<joint name=\"j\" type=\"revolute\">{ends}{axis}</joint>"))
+    };
+    let is = |robot: Robot, flag: &str| match flag {
+        // 90 degrees, or 90 radians.
+        "degrees" => robot.links[0].origin.vector(DVec3::X).distance(DVec3::Y) < 1e-12,
+        "static" => robot.links[0].is_static,
+        "self_collide" => !robot.excepted.contains(&[0, 1]),
+        "merge" => robot.links.iter().any(|l| l.name == "m::c"),
+        // The link is turned by 1: the model's x is not its own.
+        _ => {
+            let dof = robot.free().next().expect("a joint").kind;
+            matches!(dof, DofKind::Hinge { axis, .. } if axis.y < -0.5)
+        }
+    };
+    let mut words: Vec<(&str, Option<bool>)> =
+        vec![("", Some(false)), ("\u{b5}", None), ("0.0", None), ("truee", None)];
+    words.extend(["true", "True", "TRUE", "tRuE", "1", " true\t", " 1"].map(|word| (word, Some(true))));
+    words.extend(["false", "False", "FALSE", "0", " fAlse "].map(|word| (word, Some(false))));
+    words.extend(["yes", "on", "abc", "2", "01", "t", "-1", "true true"].map(|word| (word, None)));
+    for (word, value) in words {
+        let both = format!("<self_collide>{word}</self_collide>");
+        for (flag, place, read) in [
+            (
+                "degrees",
+                "2:16",
+                model(&format!("<link name=\"a\"><pose degrees=\"{word}\">0 0 0 0 0 90</pose></link>")),
+            ),
+            ("static", "2:1", model(&format!("<static>{word}</static>{links}"))),
+            (
+                "static",
+                "2:29",
+                world(&format!("<include><uri>in.sdf</uri>\u{20}\u{20}<static>{word}</static></include>")),
+            ),
+            ("self_collide", "2:1", model(&format!("{both}{links}"))),
+            ("self_collide", "2:16", model(&links.replace("/>", &format!(">{both}</link>")))),
+            ("merge", "2:1", model(&format!("<include merge=\"{word}\"><uri>in.sdf</uri></include>{links}"))),
+            ("use_parent_model_frame", "3:89", joint(word)),
+        ] {
+            match (value, read) {
+                (Some(value), Ok(robot)) => assert_eq!(is(robot, flag), value, "{flag} {word:?}"),
+                (None, Err(told)) => {
+                    let wanted = format!("w.sdf:{place}: expected true or false as {flag}, found {word:?}");
+                    assert!(told.ends_with(&wanted), "{told}: {wanted}");
+                }
+                (_, read) => panic!("{flag} {word:?}: {:?}", read.err()),
+            }
+        }
+    }
+    // What is wrong in an included file is told with that one's place.
+    let text = "<sdf version=\"1.9\"><model name=\"k\">\n\n<static>maybe</static><link name=\"c\"/></model></sdf>";
+    std::fs::write(folder.join("in.sdf"), text).expect("written");
+    let told = world("<include><uri>in.sdf</uri></include>").expect_err("no flag");
+    assert!(
+        told.contains("w.sdf:2:1: ") && told.ends_with("in.sdf:3:1: expected true or false as static, found \"maybe\""),
+        "{told}"
+    );
+}
+
+/// Remarks in front of what an element says change nothing.
+#[test]
+fn remarks_within_elements_change_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = |remark: &str| {
+        format!(
+            "<sdf version=\"1.9\"><model name=\"m\"><static>{remark}true</static><link name=\"a\"><pose>{remark}1 2 3 0 0 1</pose>\
+             <collision name=\"c\"><geometry><sphere><radius>{remark}0.3</radius></sphere></geometry></collision></link>\
+             <link name=\"b\"/><joint name=\"j\" type=\"revolute\"><parent>{remark}a</parent><child>{remark}b</child>\
+             <axis><xyz>{remark}1 0 0</xyz></axis></joint></model></sdf>"
+        )
+    };
+    let told = |remark: &str| {
+        let (robot, scene) = read(folder.path(), "w.sdf", &text(remark), &Ask::default());
+        let texts: Vec<_> = scene.models.iter().map(|m| m.text.clone()).collect();
+        let links: Vec<_> =
+            robot.links.iter().map(|l| (l.name.clone(), l.origin, l.is_static, l.dofs.clone())).collect();
+        format!("{links:?} {texts:?} {:?}", robot.notes.iter().map(|n| &n.text).collect::<Vec<_>>())
+    };
+    let plain = told("");
+    assert!(plain.contains("r = 0.3"), "{plain}");
+    for remark in ["<!-- metres -->", "<!-- one --><!-- two -->", "<!---->", "\n  <!-- metres -->"] {
+        assert_eq!(told(remark), plain, "{remark}");
     }
 }

@@ -8,7 +8,7 @@ use contactd::import::robot::{Ask, Values, read_robot, scene_of};
 use contactd::import::{Facets, Limits};
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, DVec4};
 use std::collections::BTreeMap;
 
 struct Joint {
@@ -369,4 +369,125 @@ fn what_is_not_kept_is_told_and_what_is_wrong_is_one_sentence_of_its_file() {
     let ask = Ask { key: Some("k".into()), ..Ask::default() };
     let told = read("", &ask).expect_err("no key").to_string();
     assert!(told.contains("expected a model that has keyframes, found key:k"), "{told}");
+}
+
+/// Ways in which an element may say how it is turned.
+const TURNS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
+
+/// A random turn in one of the ways, as an attribute, with its matrix.
+fn turned(r: &mut Random, way: &str) -> (String, DMat4) {
+    let word = |all: &[f64]| all.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(" ");
+    let columns =
+        |x: DVec3, y: DVec3, z: DVec3| DMat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), DVec4::W);
+    let (numbers, matrix) = match way {
+        "quat" => {
+            let q: Vec<f64> = (0..4).map(|_| r.within(-1.0, 1.0)).collect();
+            // Each axis as Hamilton's product q e q* has it, divided by the square of q's length.
+            let (w, v) = (q[0], DVec3::new(q[1], q[2], q[3]));
+            let of =
+                |e: DVec3| ((w * w - v.dot(v)) * e + 2.0 * v.dot(e) * v + 2.0 * w * v.cross(e)) / (w * w + v.dot(v));
+            (q, columns(of(DVec3::X), of(DVec3::Y), of(DVec3::Z)))
+        }
+        "axisangle" => {
+            let (axis, angle) = (r.direction(), r.within(-3.0, 3.0));
+            ((2.0 * axis).extend(angle).to_array().to_vec(), turn(axis, angle))
+        }
+        "euler" => {
+            let angles = r.vector(3.0);
+            let [x, y, z] = [turn(DVec3::X, angles.x), turn(DVec3::Y, angles.y), turn(DVec3::Z, angles.z)];
+            (angles.to_array().to_vec(), x * y * z)
+        }
+        "xyaxes" => {
+            let (x, z) = (r.direction(), r.direction());
+            let y = z.cross(x) / z.cross(x).length();
+            // What y has along x does not count.
+            let told = [3.0 * x, 2.0 * y + 0.7 * x];
+            (told.iter().flat_map(|v| v.to_array()).collect(), columns(x, y, x.cross(y)))
+        }
+        _ => {
+            let z = r.direction();
+            let axis = DVec3::Z.cross(z);
+            ((2.0 * z).to_array().to_vec(), turn(axis / axis.length(), z.z.acos()))
+        }
+    };
+    (format!("{way}=\"{}\"", word(&numbers)), matrix)
+}
+
+/// Classes within classes that are turned in two ways, all twenty pairs of them: a geom is turned as the innermost class that is turned
+/// at all, or as itself says.
+#[test]
+fn a_geom_is_turned_as_the_innermost_class_that_is_turned() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut r = Random::new(47);
+    for outer in TURNS {
+        for inner in TURNS.into_iter().filter(|way| *way != outer) {
+            let [(first, _), (second, matrix), (third, own)] = [outer, inner, outer].map(|way| turned(&mut r, way));
+            let half = DVec3::new(0.3, 0.6, 0.9);
+            let text = format!(
+                "<mujoco><compiler angle=\"radian\"/><default><geom type=\"box\" size=\"{}\"/>\
+                 <default class=\"p\"><default class=\"c\"><default class=\"d\"><geom mass=\"1\"/></default><geom {second}/></default>\
+                 <geom {first}/></default></default><worldbody><body name=\"c\"><geom class=\"c\"/></body>\
+                 <body name=\"d\" childclass=\"d\"><geom/></body><body name=\"own\"><geom class=\"c\" {third}/></body>\
+                 <body name=\"over\"><geom class=\"p\" {second}/></body></worldbody></mujoco>",
+                words(half)
+            );
+            let (_, scene) = read(folder.path(), "m.xml", &text, &Ask::default());
+            let solids = models(&scene);
+            for (name, matrix) in [("c", matrix), ("d", matrix), ("own", own), ("over", matrix)] {
+                let object = scene.objects.iter().find(|o| o.name == name).expect("an object");
+                let back = matrix.inverse();
+                for _ in 0..200 {
+                    let x = r.vector(1.0);
+                    let q = (back.transform_vector3(x).abs() - half).max_element();
+                    let f = solids[object.model].solid.value(x);
+                    assert!((f < 0.0) == (q < 0.0), "{name}: {f} {q}\n{text}");
+                }
+            }
+        }
+    }
+}
+
+/// Flags of MuJoCo are words as they stand.
+#[test]
+fn flags_that_are_none_are_one_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("m.xml");
+    let read = |compiler: &str, body: &str, joint: &str, rest: &str| {
+        let text = format!(
+            "<mujoco>\n<compiler {compiler}/>\n<worldbody><body {body}><joint name=\"j\" range=\"0 1\" {joint}/></body></worldbody>\n\
+             {rest}</mujoco>"
+        );
+        std::fs::write(&path, text).expect("written");
+        read_robot(&path, &Ask::default()).map_err(|e| e.to_string())
+    };
+    for word in ["True", "1", " true", "yes", "", "true", "false"] {
+        let flag = |name: &str| format!("{name}=\"{word}\"");
+        let active = format!("<equality><joint joint1=\"j\" {}/></equality>", flag("active"));
+        let default = format!("<default><equality {}/></default>", flag("active"));
+        for (told, place) in [
+            (read(&flag("autolimits"), "", "", ""), "2:1: expected true or false as autolimits"),
+            (read(&flag("strippath"), "", "", ""), "2:1: expected true or false as strippath"),
+            (read("", &flag("mocap"), "", ""), "3:12: expected true or false as mocap"),
+            (read("", "", &flag("limited"), ""), "3:19: expected true or false as limited"),
+            (read("", "", "", &active), "4:11: expected true or false as active"),
+            (read("", "", "", &default), "4:10: expected true or false as active"),
+        ] {
+            let wanted = format!("m.xml:{place}, found {word:?}");
+            match told {
+                Ok(_) => assert!(["true", "false"].contains(&word), "{wanted}"),
+                Err(told) => assert!(told.ends_with(&wanted) && !["true", "false"].contains(&word), "{told}"),
+            }
+        }
+    }
+    for (word, is_read) in [("enable", true), ("disable", true), ("Disable", false), ("true", false)] {
+        let told = read("", "", "", &format!("<option><flag filterparent=\"{word}\"/></option>"));
+        let wanted = format!("m.xml:4:9: expected enable or disable as filterparent, found {word:?}");
+        assert_eq!(told.err().is_none_or(|e| !e.ends_with(&wanted)), is_read, "{wanted}");
+    }
+    let is_endless = |joint: &str| {
+        let robot = read("autolimits=\"false\"", "", joint, "").expect("a robot");
+        robot.links[1].dofs[0].range[1] == f64::INFINITY
+    };
+    assert!(is_endless("") && is_endless("limited=\"auto\"") && is_endless("limited=\"false\""));
+    assert!(!is_endless("limited=\"true\""));
 }

@@ -3,9 +3,13 @@
 //!
 //! `CONTACTD_REAL_FILES=2000 cargo test --release -p contactd-tests --test models real_files::` sets the number of each (28 by default).
 
+use super::robots::models;
+use contactd::check::Check;
+use contactd::contact::Status;
 use contactd::import::robot::{Ask, read_robot, scene_of};
 use contactd::import::{Attachment, Facets, Limits, Scene, Source};
 use contactd::solid::Solid;
+use contactd::world::StepOptions;
 use contactd_tests::random_solids::Random;
 use contactd_tests::sweep::sized;
 use glam::{DVec2, DVec3};
@@ -71,19 +75,22 @@ fn hulls_of_many_faces_hold_the_means_of_their_corners_and_end_with_them() {
     }
 }
 
-/// Bodies of a few geoms with random masks, pairs of them and excluded bodies: which objects meet is told by a table.
+/// Bodies of a few geoms with random masks, some of them welded to the world, pairs of geoms and excluded bodies: which objects meet is
+/// told by a table.
 #[test]
 fn geoms_that_a_pair_names_are_tested_whatever_else_is_said_of_them() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(92);
-    let (mut by_pair, mut by_masks) = (0, 0);
+    let (mut by_pair, mut by_masks, mut of_welded, mut within) = (0, 0, 0, 0);
     for _ in 0..rounds() {
         let bodies = 2 + r.below(3);
         // Each geom: its body, its masks.
         let mut geoms: Vec<(usize, [u32; 2])> = Vec::new();
         let mut text = "<mujoco><worldbody>".to_owned();
+        let mut is_welded = Vec::new();
         for b in 0..bodies {
-            text += &format!("<body name=\"b{b}\"><freejoint/>");
+            is_welded.push(r.chance(0.4));
+            text += &format!("<body name=\"b{b}\">{}", if is_welded[b] { "" } else { "<freejoint/>" });
             for _ in 0..1 + r.below(2) {
                 let masks = [r.below(3) as u32, r.below(3) as u32];
                 let g = geoms.len();
@@ -128,23 +135,61 @@ fn geoms_that_a_pair_names_are_tested_whatever_else_is_said_of_them() {
                 let named = pairs.contains(&[a, b]);
                 let alike = masks[0] & others[1] != 0 || masks[1] & others[0] != 0;
                 let free = !excluded.contains(&[*body.min(other), *body.max(other)]);
-                let tested = body != other && (named || alike && free);
-                by_pair += usize::from(body != other && named && !(alike && free));
-                by_masks += usize::from(body != other && alike && free);
+                let both = is_welded[*body] && is_welded[*other];
+                let by_itself = body != other && alike && free && !both;
+                let tested = named || by_itself;
+                by_pair += usize::from(named && !by_itself);
+                by_masks += usize::from(by_itself);
+                of_welded += usize::from(named && both);
+                within += usize::from(named && body == other);
                 // Geoms of one body with the same masks are one object.
                 let (Some(x), Some(y)) = (object(a), object(b)) else {
                     assert!(!tested, "g{a} g{b}: {text}");
                     continue;
                 };
-                let told = x != y && !excepted(&x, &y);
+                let is_static = [&x, &y].map(|name| scene.objects.iter().any(|o| o.name == **name && o.is_static));
+                // Two static objects are never tested.
+                let told = x != y && !excepted(&x, &y) && is_static != [true; 2];
                 assert_eq!(told, tested, "g{a} g{b}: {text}");
             }
         }
     }
-    assert!(by_pair > rounds() / 4 && by_masks > rounds() / 4, "{by_pair} {by_masks}");
+    let counts = [by_pair, by_masks, of_welded, within];
+    assert!(counts[..2].iter().all(|n| *n > rounds() / 4) && counts.iter().all(|n| *n > rounds() / 14), "{counts:?}");
     let wrong = scene(folder.path(), "m.xml", "<mujoco><contact>\n<pair geom1=\"g\" geom2=\"g\"/></contact></mujoco>");
     let wrong = wrong.expect_err("no geom");
     assert!(wrong.ends_with("m.xml:2:1: expected the name of a geom, found \"g\""), "{wrong}");
+}
+
+/// Balls of the world and of bodies that are welded to it, as pairs and not: those of pairs overlap where they do, and the others are
+/// static still.
+#[test]
+fn a_pair_of_what_is_fixed_to_the_world_overlaps_where_it_does() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut r = Random::new(94);
+    let (mut overlaps, mut apart) = (0, 0);
+    for _ in 0..rounds() {
+        let balls: Vec<(DVec3, f64)> = (0..4).map(|_| (r.vector(1.0), r.within(0.2, 1.0))).collect();
+        let geom = |g: usize| {
+            let (at, radius) = balls[g];
+            format!("<geom name=\"g{g}\" size=\"{radius:?}\" pos=\"{:?} {:?} {:?}\"/>", at.x, at.y, at.z)
+        };
+        let bodies = [format!("{}<body>{}</body>", geom(0), geom(1)), format!("<body>{}{}</body>", geom(2), geom(3))];
+        let [a, b] = [[0, 1], [0, 2], [1, 2], [2, 3]][r.below(4)];
+        let pair = format!("<contact><pair geom1=\"g{b}\" geom2=\"g{a}\"/></contact>");
+        let text = format!("<mujoco><worldbody>{}</worldbody>{pair}</mujoco>", bodies.concat());
+        let scene = scene(folder.path(), "m.xml", &text).unwrap_or_else(|e| panic!("{e}: {text}"));
+        assert_eq!(scene.objects.iter().filter(|o| !o.is_static).count(), 1, "{text}");
+        let mut check = Check::new(&scene, &models(&scene), None).expect("a world");
+        let outcome = check.step_with(&StepOptions::default()).expect("a step");
+        let gap = balls[a].0.distance(balls[b].0) - balls[a].1 - balls[b].1;
+        // Pairs that the boxes keep apart are not told of.
+        let told: Vec<Status> = outcome.pairs.iter().map(|p| p.outcome.status()).collect();
+        let is_met = gap < 0.0;
+        *(if is_met { &mut overlaps } else { &mut apart }) += 1;
+        assert!(told.len() <= 1 && (told == [Status::Overlap]) == is_met, "{told:?} {gap}: {text}");
+    }
+    assert!(overlaps > rounds() / 14 && apart > rounds() / 14, "{overlaps} {apart}");
 }
 
 /// Elevations of random grids: at each of its points the solid ends at the height that the file's table has there, rows from the far

@@ -8,7 +8,8 @@ use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::kinematics::{Dof, DofKind, Link, Part, Robot};
 use super::mjcf_couplings::{Slot, begin_at, equalities, filters, paired};
-use super::mjcf_files::{Files, included};
+use super::mjcf_files::{FLAG, Files, flag, included};
+use super::names::Names;
 use super::reader::Reader;
 use super::shape::{Shape, union};
 use super::urdf::{Result, needed, not_negative, numbers_of, vector_of};
@@ -46,6 +47,12 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     }
     // What is held or follows stands where that has it, whatever the keyframe says.
     equalities(&mut robot, &files, is_active)?;
+    let names = Names::of_mjcf();
+    for root in files.roots() {
+        for (node, text) in names.unknown(root) {
+            files.note(&mut robot, node, &text);
+        }
+    }
     Ok(robot)
 }
 
@@ -158,10 +165,10 @@ impl<'a, 'i> Model<'a, 'i> {
             }
             self.euler = word.chars().collect();
         }
-        self.autolimits = compiler.attribute("autolimits").map_or(self.autolimits, |w| w == "true");
+        self.autolimits = flag(compiler, "autolimits")?.unwrap_or(self.autolimits);
         let folder = compiler.attribute("meshdir").or_else(|| compiler.attribute("assetdir"));
         self.meshdir = folder.map_or_else(|| std::mem::take(&mut self.meshdir), PathBuf::from);
-        self.strips = compiler.attribute("strippath").map_or(self.strips, |w| w == "true");
+        self.strips = flag(compiler, "strippath")?.unwrap_or(self.strips);
         Ok(())
     }
 
@@ -186,8 +193,11 @@ impl<'a, 'i> Model<'a, 'i> {
         let (inner, elements): (Vec<_>, Vec<_>) =
             self.files.children(node).into_iter().partition(|n| n.tag_name().name() == "default");
         for element in elements {
-            let all = self.defaults.entry((name.clone(), element.tag_name().name().to_owned())).or_default();
-            overlay(all, element);
+            let kind = element.tag_name().name();
+            if kind == "equality" {
+                flag(element, "active").map_err(|e| self.files.told(element, e))?;
+            }
+            overlay(self.defaults.entry((name.clone(), kind.to_owned())).or_default(), element);
         }
         for inner in inner {
             let told = |e| self.files.told(inner, e);
@@ -204,11 +214,6 @@ impl<'a, 'i> Model<'a, 'i> {
         let mut all = self.defaults.get(&(class.to_owned(), element.to_owned())).cloned().unwrap_or_default();
         if class != "main" && !self.classes.contains(class) {
             return Err(xml::wrong(node, "the name of a default class", Some(class)));
-        }
-        // An element that is turned in a way of its own is not turned as its class, too.
-        const TURNS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
-        if TURNS.iter().any(|turn| node.has_attribute(*turn)) {
-            TURNS.iter().for_each(|turn| _ = all.remove(*turn));
         }
         overlay(&mut all, node);
         Ok(all)
@@ -324,7 +329,7 @@ impl<'a, 'i> Model<'a, 'i> {
         let origin = at.frame.compose(&self.pose(node, &self.own(node))?);
         let class = node.attribute("childclass").map(str::to_owned).or_else(|| at.class.clone());
         let link = self.add(name, Some(at.link), (self.files.place(node), origin));
-        if node.attribute("mocap") == Some("true") {
+        if flag(node, "mocap")? == Some(true) {
             self.robot.links[link].is_free = true;
             self.mocap.insert(link);
         }
@@ -359,9 +364,8 @@ impl<'a, 'i> Model<'a, 'i> {
             None => None,
         };
         let is_limited = match of("limited").unwrap_or("auto") {
-            "true" => true,
-            "false" => false,
-            _ => self.autolimits && range.is_some(),
+            "auto" => self.autolimits && range.is_some(),
+            word => xml::either(node, word, "limited", FLAG)?,
         };
         let range = match range.as_deref() {
             Some([low, high]) if is_limited && (low != high || of("limited") == Some("true")) => {
@@ -562,6 +566,11 @@ impl<'a, 'i> Model<'a, 'i> {
 
 /// An element's attributes over others. Of sizes the first ones may be told, and the others stay.
 fn overlay(all: &mut Attributes, node: Node<'_, '_>) {
+    // What is turned in a way of its own, an element or a class, is not turned as the class around it, too.
+    const TURNS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
+    if TURNS.iter().any(|turn| node.has_attribute(*turn)) {
+        TURNS.iter().for_each(|turn| _ = all.remove(*turn));
+    }
     for attribute in node.attributes() {
         let (name, mut value) = (attribute.name().to_owned(), attribute.value().to_owned());
         if let Some(old) = all.get(&name).filter(|_| name == "size") {

@@ -5,7 +5,7 @@
 use super::super::problem::Problem;
 use super::super::xml;
 use super::kinematics::Robot;
-use super::mjcf_files::Files;
+use super::mjcf_files::{Files, flag};
 use super::urdf::{Result, needed, numbers_of};
 use contactd_proto::Pose;
 use glam::{DQuat, DVec3};
@@ -24,7 +24,7 @@ pub(super) enum Slot {
 
 /// Which pairs are not tested: parent and child unless the parent is the world, pairs of which neither has a degree of freedom (welded to
 /// the world, or moved by hand: `mocap`), and those that the file excludes.
-/// Pairs of geoms that the file names are tested whatever else is said of them, but for those of one body.
+/// Pairs of geoms that the file names are tested whatever else is said of them, those of one body and of welded ones, too.
 pub(super) fn filters(
     robot: &mut Robot,
     files: &Files<'_, '_>,
@@ -37,10 +37,12 @@ pub(super) fn filters(
     let welded: Vec<Option<usize>> = (0..robot.links.len()).map(|i| robot.welded_to(i)).collect();
     let above = |i: usize| welded[i].and_then(|w| robot.links[w].parent).and_then(|p| welded[p]);
     let stands = |i: usize| welded[i].is_none_or(|w| mocap.contains(&w));
-    let filters_parents = !files
-        .within("option")
-        .into_iter()
-        .any(|flag| flag.tag_name().name() == "flag" && flag.attribute("filterparent") == Some("disable"));
+    let mut filters_parents = true;
+    for node in files.within("option").into_iter().filter(|n| n.tag_name().name() == "flag") {
+        let Some(word) = node.attribute("filterparent") else { continue };
+        let is_on = xml::either(node, word, "filterparent", ["enable", "disable"]);
+        filters_parents &= is_on.map_err(|e| files.told(node, e))?;
+    }
     let mut excepted = Vec::new();
     for i in 0..welded.len() {
         for j in i + 1..welded.len() {
@@ -94,8 +96,8 @@ fn excluded(robot: &Robot, node: Node<'_, '_>) -> Result<[usize; 2]> {
 /// Joints that follow others on a line, or that are held: joint1 − ref1 = a + b (joint2 − ref2). All other constraints are told.
 pub(super) fn equalities(robot: &mut Robot, files: &Files<'_, '_>, is_active: bool) -> Result<()> {
     for node in files.within("equality") {
-        let active = node.attribute("active").map_or(is_active, |word| word == "true");
-        if !active {
+        let active = flag(node, "active").map_err(|e| files.told(node, e))?;
+        if !active.unwrap_or(is_active) {
             continue;
         }
         let left = match node.tag_name().name() {

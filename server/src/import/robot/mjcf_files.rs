@@ -57,6 +57,14 @@ fn file_of(folder: &Path, name: &str) -> PathBuf {
     folder.join(name.replace('\\', "/"))
 }
 
+/// What a flag may be: MuJoCo takes these words as they are.
+pub(super) const FLAG: [&str; 2] = ["true", "false"];
+
+/// A flag that an attribute gives; `None` where it is not there.
+pub(super) fn flag(node: Node<'_, '_>, name: &str) -> Result<Option<bool>> {
+    node.attribute(name).map(|word| xml::either(node, word, name, FLAG)).transpose()
+}
+
 /// All files of a model.
 pub(super) struct Files<'a, 'i> {
     main: Node<'a, 'i>,
@@ -69,6 +77,11 @@ impl<'a, 'i> Files<'a, 'i> {
     /// `documents` are those of `texts`, in order.
     pub fn new(main: Node<'a, 'i>, folder: &'a Path, texts: &'a [Included], documents: &'a [Document<'i>]) -> Self {
         Self { main, folder, others: texts.iter().zip(documents.iter().map(Document::root_element)).collect() }
+    }
+
+    /// The root elements of all files, the first one's first.
+    pub fn roots(&self) -> impl Iterator<Item = Node<'a, 'i>> {
+        std::iter::once(self.main).chain(self.others.iter().map(|(_, root)| *root))
     }
 
     /// The elements inside of a node, those of included files where these are included.

@@ -80,6 +80,10 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
     // Which link and part each object is.
     let mut owners: Vec<((usize, usize), &Part)> = Vec::new();
     let mut names = HashMap::new();
+    // Two static objects are never tested against each other: of two that a file names as a pair one is told as at rest instead.
+    let is_fixed = |part: &(usize, usize)| robot.links[part.0].is_static;
+    let resting: HashSet<(usize, usize)> =
+        robot.pairs.iter().filter(|pair| pair.iter().all(is_fixed)).map(|[_, second]| *second).collect();
     for (i, link) in robot.links.iter().enumerate() {
         for (k, part) in link.parts.iter().enumerate() {
             let whole = if part.name.is_empty() { link.name.clone() } else { format!("{}/{}", link.name, part.name) };
@@ -99,7 +103,7 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
                 at: link.at,
                 model,
                 group: "default".into(),
-                is_static: link.is_static,
+                is_static: link.is_static && !resting.contains(&(i, k)),
                 place,
                 motion,
                 record,
@@ -114,8 +118,8 @@ pub fn scene_of(path: &Path, robot: &Robot, ask: &Ask) -> Result<Scene, SceneErr
         for (b, (j, other)) in owners.iter().enumerate().skip(a + 1) {
             let meets = |p: &Part, q: &Part| p.masks[0] & q.masks[1] != 0;
             let are_alike = meets(part, other) || meets(other, part);
-            let is_tested = are_alike && !robot.is_excepted(i.0, j.0) || robot.pairs.contains(&[*i, *j]);
-            if i.0 == j.0 || !is_tested {
+            let is_tested = are_alike && i.0 != j.0 && !robot.is_excepted(i.0, j.0);
+            if !is_tested && !robot.pairs.contains(&[*i, *j]) {
                 rule.except.push([objects[a].name.clone(), objects[b].name.clone()]);
             }
         }

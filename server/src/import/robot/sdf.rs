@@ -8,8 +8,9 @@ use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::frames::{Attached, Frames, Lost};
 use super::kinematics::{Dof, DofKind, Link, Robot};
+use super::names::Names;
 use super::reader::Reader;
-use super::sdf_elements::{geometry_of, is_true, placed, text, version_of};
+use super::sdf_elements::{content, geometry_of, is_set, is_true, placed, text, version_of};
 use super::shape::Collisions;
 use super::urdf::{Result, needed, vector_of};
 use contactd_proto::Pose;
@@ -38,7 +39,21 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
         dof.mimic.iter_mut().for_each(|(leader, ..)| *leader = own(leader));
     }
     robot.follow()?;
+    misspelled(root, reader, &mut robot);
     Ok(robot)
+}
+
+/// Tells what of a file has no name of the format.
+fn misspelled(root: Node<'_, '_>, reader: &Reader<'_>, robot: &mut Robot) {
+    for (node, text) in Names::of_sdf().unknown(root) {
+        reader.note(robot, node, text);
+        // A file that is included again has the same ones.
+        if let Some((last, before)) = robot.notes.split_last()
+            && before.iter().any(|note| note.text == last.text)
+        {
+            robot.notes.pop();
+        }
+    }
 }
 
 /// A file, and how it is to be read.
@@ -108,7 +123,7 @@ impl World {
             let name = needed(link, "name")?;
             let index = self.links.len();
             links.push((link, name, index));
-            self.links.push(Found::new(name, link, file, scope));
+            self.links.push(Found::new(name, link, file, scope)?);
             add(&mut frames, link, name, placed(link)?, Attached::Link(index), file)?;
         }
         let mut inner = Vec::new();
@@ -200,6 +215,7 @@ impl World {
         let root = document.root_element();
         let within = Some(file.reader.place(node));
         let reader = Reader { path: &path, base, within, ..*file.reader };
+        misspelled(root, &reader, &mut self.robot);
         let inner = File { reader: &reader, version: version_of(root).unwrap_or(file.version) };
         let Some(model) = xml::inside(root, "model").next() else {
             // A file may hold a light or an actor in a model's place (sdformat.org/spec, include): `model://sun` of nearly every
@@ -220,11 +236,11 @@ impl World {
             return Err(xml::wrong(node, "a pose beside the placement_frame", None));
         }
         place.frame = frame.or(place.frame);
-        place.is_merged = node.attribute("merge").is_some_and(|word| ["1", "true"].contains(&word));
+        place.is_merged = is_set(node, "merge")?;
         if place.is_merged && scope.model.is_none() {
             return Err(xml::wrong(node, "an include that is merged within a model", Some("one within a world")));
         }
-        let scope = &Scope { is_static: scope.is_static || is_true(node, "static"), ..scope.clone() };
+        let scope = &Scope { is_static: is_true(node, "static")? || scope.is_static, ..scope.clone() };
         place.asker = Some(file.reader.place(node));
         let placed = self.model(model, &inner, &place, (scope, frames)).map_err(|(at, e)| match place.asker {
             // What is wrong with the name or the place of the include itself.
@@ -247,9 +263,9 @@ impl World {
         let name = self.own_name(place, around, at)?;
         let scope = Scope {
             prefix: if place.is_merged { outer.prefix.clone() } else { outer.whole(&name) },
-            is_static: outer.is_static || is_true(node, "static"),
+            is_static: is_true(node, "static")? || outer.is_static,
             model: outer.model.or(Some(self.count)),
-            collides_with_itself: outer.collides_with_itself || is_true(node, "self_collide"),
+            collides_with_itself: is_true(node, "self_collide")? || outer.collides_with_itself,
         };
         let first = self.links.len();
         let frames = self.scope(node, file, &scope)?;
@@ -410,9 +426,9 @@ impl World {
 }
 
 impl Found {
-    fn new(name: &str, node: Node<'_, '_>, file: &File<'_>, scope: &Scope) -> Self {
+    fn new(name: &str, node: Node<'_, '_>, file: &File<'_>, scope: &Scope) -> Result<Self> {
         let mut scope = scope.clone();
-        scope.collides_with_itself |= is_true(node, "self_collide");
+        scope.collides_with_itself |= is_true(node, "self_collide")?;
         let link = Link {
             name: scope.whole(name),
             at: file.reader.place(node),
@@ -423,7 +439,7 @@ impl Found {
             is_free: !scope.is_static,
             is_static: scope.is_static,
         };
-        Self { link, parent: None, pose: Pose::IDENTITY, scope }
+        Ok(Self { link, parent: None, pose: Pose::IDENTITY, scope })
     }
 }
 
@@ -467,10 +483,11 @@ impl Axis<'_, '_> {
         let xyz = axis.and_then(|a| xml::inside(a, "xyz").next());
         let way = match xyz {
             None => DVec3::Z,
-            Some(xyz) => vector_of(xyz, xyz.text().unwrap_or_default(), "axis")?,
+            Some(xyz) => vector_of(xyz, content(xyz).unwrap_or_default(), "axis")?,
         };
         let way = way.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some("0 0 0")))?;
-        let of_model = self.of_model || axis.is_some_and(|a| is_true(a, "use_parent_model_frame"));
+        let is_asked = axis.map_or(Ok(false), |a| is_true(a, "use_parent_model_frame"))?;
+        let of_model = is_asked || self.of_model;
         let of = xyz.and_then(|x| x.attribute("expressed_in")).filter(|of| !of.is_empty());
         let way = match of.or(of_model.then_some(frames.root())) {
             None => own.rotation * way,
@@ -534,8 +551,8 @@ fn model_file(folder: &Path) -> PathBuf {
         let bytes = xml::mended(bytes);
         let document = xml::parse(&bytes).ok()?;
         let files = xml::inside(document.root_element(), "sdf");
-        let newest = files.filter(|n| n.text().is_some()).max_by_key(|n| version_of(*n))?;
-        newest.text().map(|name| folder.join(name.trim()))
+        let newest = files.filter(|n| content(*n).is_some()).max_by_key(|n| version_of(*n))?;
+        content(newest).map(|name| folder.join(name.trim()))
     });
     stated.filter(|path| path.starts_with(folder)).unwrap_or_else(|| folder.join("model.sdf"))
 }

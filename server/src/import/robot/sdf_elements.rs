@@ -15,14 +15,37 @@ pub(super) fn version_of(root: Node<'_, '_>) -> Option<[u32; 2]> {
     Some([major.trim().parse().ok()?, minor.trim().parse().ok()?])
 }
 
+/// The text of an element, behind remarks if it begins with some.
+pub(super) fn content<'a>(node: Node<'a, '_>) -> Option<&'a str> {
+    // White space in front of a remark is none of it.
+    let texts = || node.children().take_while(|n| !n.is_element()).filter(Node::is_text).filter_map(|n| n.text());
+    texts().find(|text| !text.trim().is_empty()).or_else(|| texts().next())
+}
+
 /// The text of an element inside.
 pub(super) fn text<'a>(node: Node<'a, '_>, name: &'static str) -> Option<&'a str> {
-    xml::inside(node, name).next().and_then(|n| n.text())
+    xml::inside(node, name).next().and_then(content)
 }
 
 /// A flag that an element inside says is set.
-pub(super) fn is_true(node: Node<'_, '_>, name: &'static str) -> bool {
-    text(node, name).is_some_and(|word| ["1", "true"].contains(&word.trim()))
+pub(super) fn is_true(node: Node<'_, '_>, name: &'static str) -> Result<bool> {
+    xml::inside(node, name).next().map_or(Ok(false), |n| flag(n, content(n), name))
+}
+
+/// A flag that an attribute says is set.
+pub(super) fn is_set(node: Node<'_, '_>, name: &str) -> Result<bool> {
+    flag(node, node.attribute(name), name)
+}
+
+/// What a text says as a flag, in capital letters or small ones as libsdformat has it; what says nothing is false, the default of all
+/// flags that are read.
+fn flag(node: Node<'_, '_>, text: Option<&str>, what: &str) -> Result<bool> {
+    let word = text.unwrap_or_default().trim();
+    match word.to_ascii_lowercase().as_str() {
+        "true" | "1" => Ok(true),
+        "false" | "0" | "" => Ok(false),
+        _ => Err(xml::wrong(node, format!("true or false as {what}"), Some(word))),
+    }
 }
 
 /// The pose of an element, and the frame that it says it is relative to. Files before 1.7 call it `frame`.
@@ -34,9 +57,9 @@ pub(super) fn placed(node: Node<'_, '_>) -> Result<(Pose, Option<String>)> {
 
 /// A pose: a position, and roll, pitch, yaw or a quaternion.
 fn pose_of(node: Node<'_, '_>) -> Result<Pose> {
-    let words = node.text().unwrap_or_default();
+    let words = content(node).unwrap_or_default();
     let numbers = numbers_of(node, words, "pose")?;
-    let is_degrees = node.attribute("degrees").is_some_and(|d| ["1", "true"].contains(&d));
+    let is_degrees = is_set(node, "degrees")?;
     let position = |n: &[f64]| DVec3::from_slice(n);
     match (numbers.as_slice(), node.attribute("rotation_format").unwrap_or("euler_rpy")) {
         ([], _) => Ok(Pose::IDENTITY),
@@ -105,7 +128,7 @@ pub(super) fn geometry_of(node: Node<'_, '_>, reader: &Reader<'_>) -> Result<Opt
 /// The points of a polyline.
 fn line_of(node: Node<'_, '_>) -> Result<Vec<DVec2>> {
     let point = |point: Node<'_, '_>| {
-        let words = point.text().unwrap_or_default();
+        let words = content(point).unwrap_or_default();
         let two = <[f64; 2]>::try_from(numbers_of(point, words, "point")?).ok().map(DVec2::from_array);
         two.ok_or_else(|| xml::wrong(point, "two numbers as a point", Some(words)))
     };

@@ -6,6 +6,7 @@
 use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::kinematics::{Dof, DofKind, Link, Robot};
+use super::names::Names;
 use super::reader::Reader;
 use super::shape::{Collisions, Shape};
 use contactd_proto::Pose;
@@ -84,6 +85,9 @@ pub(super) fn read(root: Node<'_, '_>, reader: &Reader<'_>) -> Result<Robot> {
     }
     mimics(&robot, root)?;
     robot.except_neighbours();
+    for (node, text) in Names::of_urdf().unknown(root) {
+        reader.note(&mut robot, node, text);
+    }
     Ok(robot)
 }
 
